@@ -47,6 +47,30 @@ class Surfaces:
             )
         )
 
+    def at_edges(self, *, shortest: float = 0.97) -> Surfaces:
+        """The same, with one surface in every pixel: at a silhouette, that of a neighbour.
+
+        Such a pixel has the mean of two surfaces, a place in the air where nothing is; its normal
+        is shorter than `shortest`. The neighbour with the nearest albedo gives place and normal.
+        """
+        is_whole = np.linalg.norm(self.normal, axis=-1) >= shortest
+        position, normal = self.position.copy(), self.normal.copy()
+        best = np.full(is_whole.shape, np.inf)
+        padded = [
+            np.pad(layer, [(1, 1), (1, 1)] + [(0, 0)] * (layer.ndim - 2), mode="edge")
+            for layer in (is_whole, self.albedo, self.position, self.normal)
+        ]
+        height, width = is_whole.shape
+        for dy, dx in ((0, 1), (1, 0), (1, 2), (2, 1), (0, 0), (0, 2), (2, 0), (2, 2)):
+            whole, albedo, place, facing = (
+                layer[dy : dy + height, dx : dx + width] for layer in padded
+            )
+            distance = np.where(whole, np.abs(albedo - self.albedo).sum(axis=-1), np.inf)
+            nearer = ~is_whole & (distance < best)
+            position[nearer], normal[nearer] = place[nearer], facing[nearer]
+            best = np.where(nearer, distance, best)
+        return Surfaces(self.albedo, normal, position)
+
     @property
     def layers(self) -> dict[str, Floats]:
         """By the name that each has in a file."""

@@ -98,12 +98,33 @@ def test_wheel_has_no_more_than_it_needs(built: Path):
 def test_the_demo_does_not_write_over_what_is_there(tmp_path: Path):
     demo = lp.write_demo(tmp_path / "lightpaint-demo")
     assert demo == lp.write_demo(tmp_path / "lightpaint-demo")
-    assert demo.painting.read_bytes() == shipped("targets/gallery/evening.exr")
+    assert demo.painting.read_bytes() == shipped("targets/gallery/evening.png")
     demo.scene.write_text("<scene/>", "utf-8")
     assert "differs from the demo" in run_refused(tmp_path, "demo")
     assert demo.scene.read_text("utf-8") == "<scene/>"
     (tmp_path / "file").write_text("mine", "utf-8")
     assert "cannot write" in run(tmp_path, "demo", "-o", "file").stderr
+
+
+def test_the_demo_has_lamps_that_somebody_could_hang(tmp_path: Path):
+    """No pink sun, no cyan cove: no lamp is green or magenta, and none lacks a channel."""
+    demo = lp.write_demo(tmp_path / "demo")
+    look = lp.paint_with_light(
+        demo.scene,
+        demo.painting,
+        tmp_path / "answer",
+        resolution="1/4",
+        resize=True,
+        spp=16,
+        verify=False,
+        report=False,
+    )
+    assert (look.target.importance == 1).all()
+    assert look.solution.problem.fit.colors == "gentle"
+    for light in look.lighting.lights:
+        red, green, blue = light.emission
+        assert min(red, blue) / 1.1 <= green <= 1.1 * max(red, blue), light.name
+        assert min(red, blue) > 0.05 * max(red, blue), light.name
 
 
 def test_what_can_break_is_bounded_from_above():

@@ -191,7 +191,7 @@ def test_from_the_command_line(
     assert main(["verify", "out"]) == 0
     assert main(["verify", "out/close"]) == 0
     output = capsys.readouterr().out
-    assert output.count("A render confirms it.") == 2
+    assert output.count("Rendered again: equal within noise.") == 2
     assert output.count("agree within noise") >= 3
 
     for arguments, words in (

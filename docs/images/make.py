@@ -68,7 +68,7 @@ MOVES = {
 }
 CEILING_SPOTS = {"kind": "spot", "count": 2, "on": ["ceiling"]}
 
-LOOKS = ("morning.exr", "overcast.png", "last-sun.png", "evening.exr", "opening.png",
+LOOKS = ("morning.exr", "overcast.png", "last-sun.png", "evening.png", "opening.png",
          "after-hours.png")  # fmt: skip
 
 
@@ -257,7 +257,7 @@ def main() -> None:
     if wanted & {"gallery", "six-looks"}:
         gallery = Set.built("gallery", asked.spp, asked.bases)
         if "gallery" in wanted:
-            made["gallery"] = gallery.lit_as("evening.exr")
+            made["gallery"] = gallery.lit_as("evening.png")
         if "six-looks" in wanted:
             made["six-looks"] = six_looks(gallery)
     if "stage" in wanted:

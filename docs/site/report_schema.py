@@ -78,7 +78,7 @@ def _reason(elsewhere: Schema) -> Schema:
     weaker_hold = {"weaker_hold_elsewhere": elsewhere, **_all(_NUMBER, "weaker_hold")}
     return _record(
         **_fields(Reason, "kind", "names", "share", "is_joint"),
-        weaker_hold_share=_NUMBER,
+        **_all(_NUMBER, "delta_e_without", "weaker_hold_share", "weaker_hold_delta_e"),
         **weaker_hold,
     )
 

@@ -1,6 +1,6 @@
 """A room and a painting of it, shipped with the package to try it out.
 
-`gallery` and `evening.exr` are links into `scenes/` and `targets/`; a built package has the files.
+`gallery` and `evening.png` are links into `scenes/` and `targets/`; a built package has the files.
 """
 
 from dataclasses import dataclass
@@ -22,7 +22,7 @@ class Demo:
 
     Attributes:
         scene: Mitsuba XML.
-        painting: EXR in linear light.
+        painting: PNG, as a painter's program writes it.
         answer: Folder to solve into.
 
     Examples:
@@ -54,11 +54,11 @@ def write_demo(folder: str | Path) -> Demo:
         12
     """
     folder = Path(folder)
-    demo = Demo(folder / "gallery" / "scene.xml", folder / "evening.exr", folder / "evening")
+    demo = Demo(folder / "gallery" / "scene.xml", folder / "evening.png", folder / "evening")
     with as_file(files(__name__)) as shipped:
         room = [file for x in PATTERNS for file in (shipped / "gallery").glob(x)]
         contents = {file.relative_to(shipped): file.read_bytes() for file in room}
-        contents[Path("evening.exr")] = (shipped / "evening.exr").read_bytes()
+        contents[Path("evening.png")] = (shipped / "evening.png").read_bytes()
     existing = {file: data for file, data in contents.items() if (folder / file).exists()}
     for file, data in existing.items():
         if not (folder / file).is_file() or (folder / file).read_bytes() != data:

@@ -10,12 +10,13 @@ from statistics import NormalDist
 
 import numpy as np
 
-from lightpaint.arrays import Doubles, Floats
+from lightpaint.arrays import Bools, Doubles, Floats
+from lightpaint.colour.color import luminance
 from lightpaint.colour.color_difference import delta_e
 from lightpaint.colour.display.exposure import choose_exposure
 from lightpaint.display_text import Shown
 from lightpaint.errors import SizeError
-from lightpaint.images.estimate import Estimate
+from lightpaint.images.estimate import Estimate, box_mean
 from lightpaint.images.pixel_blocks import whole_factor
 from lightpaint.keywords import keywords
 
@@ -27,6 +28,16 @@ LIMIT = 5.0
 
 #: Power below which an error would probably not have been detected.
 LOW_POWER = 0.5
+
+#: Share of the render's values around a pixel that must not be exactly 0 for their spread to tell
+#: how noisy the pixel is: where light arrives rarely, most halves miss it, and miss it alike.
+LIT_SHARE = 0.5
+
+#: Hits of light that a render must expect around a pixel for their absence to be an error.
+ENOUGH_HITS = 16
+
+#: Pixels on either side over which noise is pooled.
+POOL_RADIUS = 2
 
 #: Relative round-off of float32 sums; smaller differences are meaningless.
 PRECISION = 1e-5
@@ -55,6 +66,9 @@ class Verification(Shown):
             empty if not computed.
         power: For each lit light, the probability that this render would have disagreed with an
             error of 5 % in it; None if not computed.
+        is_measured: (h, w), False where the render is exactly 0 in most halves of the neighbours,
+            and the noise of the prediction says that it may well be: too few samples found light
+            to tell how noisy they are, so `z` says nothing there. None if not computed.
         limit: Standard errors beyond which a difference counts as real; larger if the render was
             examined several times, so that correct renders pass as often.
         spp: Samples per pixel that were rendered; None if unknown.
@@ -78,6 +92,7 @@ class Verification(Shown):
     delta_e_95: float
     z_lights: Mapping[str, float] = field(default_factory=dict)
     power: Mapping[str, float] | None = None
+    is_measured: Bools | None = None
     limit: float = LIMIT
     spp: int | None = None
 
@@ -157,7 +172,8 @@ def _judge(predicted: Estimate, verified: Estimate) -> Verification:
     difference = predicted.image.astype(np.float64) - verified.image
     squares, magnitude = noise_of(predicted, verified)
 
-    pooled = predicted.variance() + verified.variance() + np.square(PRECISION * magnitude)
+    pooled = sum(estimate.variance(radius=POOL_RADIUS) for estimate in (predicted, verified))
+    pooled += np.square(PRECISION * magnitude)
     z = difference / np.sqrt(pooled + np.finfo(np.float32).tiny)
 
     # A block's difference, divided by the standard error estimated from its own pixels.
@@ -176,7 +192,35 @@ def _judge(predicted: Estimate, verified: Estimate) -> Verification:
         noise_rmse=float(np.sqrt(squares.mean())),
         delta_e_mean=float(delta.mean()),
         delta_e_95=float(np.percentile(delta, 95)),
+        is_measured=_is_measured(predicted, verified),
     )
+
+
+def _is_measured(predicted: Estimate, verified: Estimate) -> Bools:
+    """Return `Verification.is_measured`, (h, w).
+
+    A mean m with the variance v is as noisy as m²/v equal hits are. So the noise of the prediction
+    says how many hits the render has to expect around a pixel, relative to its noise elsewhere:
+    if many, then finding none is an error and no matter of chance.
+    """
+    halves = (verified.image + verified.half_difference, verified.image - verified.half_difference)
+    # A half is a difference of float32, which round-off keeps from being exactly 0.
+    zero = PRECISION * np.abs(verified.image)
+    lit_halves = np.mean([(np.abs(half) > zero).any(axis=-1) for half in halves], axis=0)
+    is_lit = box_mean(lit_halves, POOL_RADIUS) >= LIT_SHARE
+    is_dark = np.asarray(~(predicted.image.any(axis=-1) | verified.image.any(axis=-1)), np.float64)
+    of_prediction, of_render = (
+        luminance(estimate.variance(radius=POOL_RADIUS)) for estimate in (predicted, verified)
+    )
+    is_noisy = is_lit & (of_prediction > 0) & (of_render > 0)
+    noise_ratio = (
+        float(np.median(of_prediction[is_noisy] / of_render[is_noisy])) if is_noisy.any() else 1.0
+    )
+    mean = box_mean(luminance(predicted.image), POOL_RADIUS)
+    hits = (2 * POOL_RADIUS + 1) ** 2 * noise_ratio * np.square(mean)
+    is_expected = hits >= ENOUGH_HITS * of_prediction
+    is_black = box_mean(is_dark, POOL_RADIUS) == 1
+    return np.asarray(is_lit | (is_expected & (mean > 0)) | is_black)
 
 
 def noise_of(predicted: Estimate, verified: Estimate) -> tuple[Doubles, Doubles]:

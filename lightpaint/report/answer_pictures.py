@@ -1,7 +1,8 @@
 """The pictures of comparison and report: the painting, the error, and its place.
 
 All are (h, w, 3) in display values [0, 1]. Pixels that do not count are shown as the
-current look, grey, dim and hatched, so that they cannot be taken for paint.
+current look, grey and dim, so that they cannot be taken for paint; in the map of importance they
+are hatched, too.
 """
 
 import math
@@ -40,6 +41,9 @@ DIVERGING = np.array(
 #: A residual below this part of display white cannot be seen, so no scale is finer.
 FINEST_SCALE = 0.01
 
+#: Share of the largest importance from which on a pixel is shown as it was painted.
+PAINT_SHOWN = 0.1
+
 #: Pixels on either side over which a residual may be averaged, and the part of its scale that
 #: noise may have then.
 RADII, NOISE_SHARE = (0, 1, 2, 3, 4, 6, 8), 0.1
@@ -68,23 +72,26 @@ def coverage(importance: Floats) -> Floats:
     return np.clip(importance / min(1.0, peak), 0, 1) if peak > 0 else 0 * importance
 
 
-def painted_coverage(target: Target, solution: Solution) -> Floats:
-    """Return the coverage of paint that the solve counted, (h, w) in [0, 1]."""
-    return np.where(solution.importance > 0, coverage(target.importance), 0)
+def paint_coverage(importance: Floats) -> Floats:
+    """Return the share of each pixel to show as painted, (h, w) in [0, 1].
+
+    Paint is shown whole, however little it counts; the fringe of soft paint fades.
+    """
+    return np.asarray(np.clip(coverage(importance) / PAINT_SHOWN, 0, 1))
 
 
-def unpainted_look(current: Floats, *, transform: ViewTransform) -> Floats:
-    """Return the current look as a background: grey, dim, with diagonal lines."""
-    return np.repeat(_dim_look(current, transform)[..., None], 3, axis=-1)
+def unpainted_look(current: Floats, *, transform: ViewTransform, hatched: bool = False) -> Floats:
+    """Return the current look as a background: grey and dim, with diagonal lines if `hatched`."""
+    return np.repeat(_dim_look(current, transform, hatched=hatched)[..., None], 3, axis=-1)
 
 
-def _dim_look(current: Floats, transform: ViewTransform) -> Floats:
+def _dim_look(current: Floats, transform: ViewTransform, *, hatched: bool) -> Floats:
     """Return the grey of `unpainted_look`, (h, w)."""
     height, width = current.shape[:2]
     period = max(6, width // 80)
 
     def dim(look: Floats, y: Indices) -> Floats:
-        lines = (np.arange(width) + y) % period < max(1, period // 5)
+        lines = hatched & ((np.arange(width) + y) % period < max(1, period // 5))
         return np.asarray(0.07 + 0.28 * luminance(transform.encode(look)) + 0.08 * lines)
 
     return np.asarray(by_bands(dim, current, np.arange(height)[:, None]))
@@ -97,6 +104,7 @@ def over_unpainted(
     current: Floats,
     *,
     transform: ViewTransform,
+    hatched: bool = False,
     finish: Finish = np.asarray,
 ) -> npt.NDArray[Any]:
     """Return a picture, laid over `unpainted_look` by its share of each pixel, (h, w).
@@ -109,25 +117,33 @@ def over_unpainted(
         share = share[..., None]
         return finish(np.asarray(share * encode(band) + (1 - share) * dim[..., None]))
 
-    return np.asarray(by_bands(lay, picture, share, _dim_look(current, transform)))
+    rest = _dim_look(current, transform, hatched=hatched)
+    return np.asarray(by_bands(lay, picture, share, rest))
 
 
 def target_picture(
     target: Target,
-    solution: Solution,
     current: Floats,
     *,
     transform: ViewTransform,
     finish: Finish = np.asarray,
 ) -> npt.NDArray[Any]:
-    """Return the painting, laid over the dimmed current look by its importance.
+    """Return the painting, as it was painted.
 
-    current: (h, w, 3) linear, the current scene. Fully painted pixels are exactly the display
-    encoding of the target. finish: see `over_unpainted`.
+    What is not painted asks for the current look, if the painting was made over that, and is shown
+    so; else it is `unpainted_look`. current: (h, w, 3) linear, the current scene. Painted pixels
+    are exactly the display encoding of the target.
     """
-    share = painted_coverage(target, solution)
-    options: Any = {"transform": transform, "finish": finish}
-    return over_unpainted(transform.encode, target.image, share, current, **options)
+    share = paint_coverage(target.importance)
+    if not target.over_look:
+        options: Any = {"transform": transform, "finish": finish}
+        return over_unpainted(transform.encode, target.image, share, current, **options)
+
+    def lay(paint: Floats, share: Floats, look: Floats) -> npt.NDArray[Any]:
+        share = share[..., None]
+        return finish(share * transform.encode(paint) + (1 - share) * transform.encode(look))
+
+    return np.asarray(by_bands(lay, target.image, share, current))
 
 
 def importance_picture(
@@ -147,7 +163,7 @@ def importance_picture(
         grey = luminance(transform.encode(look))[..., None]
         return np.asarray((0.35 + 0.65 * grey) * np.array([1.0, 0.93, 0.70]))
 
-    options: Any = {"transform": transform, "finish": finish}
+    options: Any = {"transform": transform, "hatched": True, "finish": finish}
     return over_unpainted(yellow, current, coverage(importance / peak), current, **options)
 
 

@@ -65,7 +65,7 @@ def comparison_image(
     predicted, verified: (h, w, 3) linear, the latter possibly at a multiple of the size; smaller
     pictures are shown with larger pixels. Three pictures where `verified` is None. The residual is
     false-coloured luminance of prediction minus target, of raw data; pixels that do not count are
-    grey, dim and hatched. verified_spp: samples per pixel of `verified`, which its caption says,
+    grey and dim. verified_spp: samples per pixel of `verified`, which its caption says,
     since few show no small patches of light. appearance: the result of `compare_appearance`, if
     known. looks: shown instead of raw renders. missed: the result of `residual_of`. Raises
     SizeError if target and basis differ in size.
@@ -75,7 +75,7 @@ def comparison_image(
     transform = looks.encoder(report_transform(target, basis, predicted))
     view_note = f" ({spoken_view(transform)})" if spoken_view(transform) else ""
     tiles = [
-        _target_tile(target, solution, looks.current, transform=transform),
+        _target_tile(target, looks.current, transform=transform),
         Tile(
             f"predicted{view_note}",
             _short_verdict(appearance or compare_appearance(solution)),
@@ -101,15 +101,14 @@ def comparison_image(
     return compose(tiles)
 
 
-def _target_tile(
-    target: Target, solution: Solution, current: Floats, *, transform: ViewTransform
-) -> Tile:
+def _target_tile(target: Target, current: Floats, *, transform: ViewTransform) -> Tile:
     """Return the picture of the target. current: the background of pixels that do not count."""
     is_part = target.painted_share < WHOLE_SHARE
+    rest = "the current look" if target.over_look else "grey"
     return Tile(
         f"target: {target.name}",
-        f"{target.spoken_share} painted{', the rest hatched' if is_part else ''}",
-        target_picture(target, solution, current, transform=transform, finish=to_8_bit),
+        f"{target.spoken_share} painted{f', the rest {rest}' if is_part else ''}",
+        target_picture(target, current, transform=transform, finish=to_8_bit),
     )
 
 

@@ -3,7 +3,7 @@
 from collections.abc import Sequence
 
 from lightpaint.lighting.analysis.appearance.appearance import Appearance
-from lightpaint.lighting.analysis.appearance.limiting_reasons import Reason
+from lightpaint.lighting.analysis.appearance.limiting_reasons import Loosening, Reason
 from lightpaint.lighting.analysis.diagnosis import Diagnosis, error_shares
 from lightpaint.lighting.answer.active_bound import Bound
 from lightpaint.report.phrases import (
@@ -122,9 +122,11 @@ JOINT_RELEASE_CLAUSES = {
 def spoken_cause(reason: Reason, *, weaker: str = "a hold of", any_color: str = ANY_COLOR) -> str:
     """Name a cause that limits the answer, and the gain of releasing it; "" for views.
 
-    weaker: the words before the strength of a weaker hold. any_color: as in `bound_sentences`.
+    The gain is the mean ΔE without it or, if it is not known, the share of the error that the fit
+    minimises. weaker: the words before the strength of a weaker hold. any_color: as in
+    `bound_sentences`.
     """
-    gain_text = f"would remove {spoken_percent(reason.share)} of the difference"
+    gain_text = spoken_gain(reason)
     if reason.is_joint:
         gain_text += ", if the other constraints were lifted too"
     if reason.kind in RELEASE_CLAUSES:
@@ -138,12 +140,22 @@ def spoken_cause(reason: Reason, *, weaker: str = "a hold of", any_color: str = 
         return ""
     if (loosening := reason.loosening) is None:
         return f"Releasing unpainted parts {gain_text}."
-    share, unpainted_change = spoken_percent(loosening.share), loosening.unpainted_change
-    cost = "" if unpainted_change is None else f", and change {spoken_changed(unpainted_change)}"
+    rest, present = loosening.unpainted_change, loosening.present_hold
+    instead_of = "" if present is None else f" instead of {present:g}"
+    cost = "" if rest is None else f", and change {spoken_changed(rest)}"
     return (
-        f"A weaker hold on unpainted parts ({weaker} {loosening.hold:g}) would remove {share} of "
-        f"the difference{cost}."
+        f"A weaker hold on unpainted parts ({weaker} {loosening.hold:g}{instead_of}) "
+        f"{spoken_gain(loosening)}{cost}."
     )
+
+
+def spoken_gain(release: Reason | Loosening) -> str:
+    """Return the gain of removing a reason: `would bring the mean ΔE from 5.9 to 4.5`."""
+    if release.delta_e is not None:
+        now, then = (f"{x:.1f}" for x in release.delta_e)
+        if float(then) < float(now):
+            return f"would bring the mean ΔE from {now} to {then}"
+    return f"would remove {spoken_percent(release.share)} of the difference from the painting"
 
 
 def painting_noise_clause(diagnosis: Diagnosis) -> str:
@@ -160,14 +172,15 @@ def spoken_bound(bound: Bound, share: float) -> str:
     if bound.kind == "zero":
         return (
             f"{lights} {spoken_hold(bound)} and still too much: the painting is darker there than "
-            f"the other lights leave it ({spoken_percent(share)} of the difference)."
+            f"the other lights leave it ({spoken_percent(share)} of the difference from "
+            "the painting)."
         )
     it = "it" if is_one else "them"
     if bound.tint:
         return (
             f"{spoken_lights(bound.lights, start=True)} would have to be {bound.tint} than its "
             f"whites ({bound.held_by}): any colour would remove {spoken_percent(share)} of the "
-            "miss."
+            "difference from the painting."
         )
     effect = {
         "kept": f"fixed; adjusting {it} too",
@@ -178,7 +191,8 @@ def spoken_bound(bound: Bound, share: float) -> str:
         "limits": f"at a limit ({bound.held_by}); removing it",
         "colour": f"limited in colour ({bound.held_by}); any other colour",
     }[bound.kind]
-    return f"{lights} {effect} would remove {spoken_percent(share)} of the difference."
+    gain_text = f"would remove {spoken_percent(share)} of the difference from the painting"
+    return f"{lights} {effect} {gain_text}."
 
 
 def spoken_hold(bound: Bound) -> str:

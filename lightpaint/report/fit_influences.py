@@ -12,9 +12,9 @@ def fit_clauses(solution: Solution) -> tuple[str, ...]:
     if certificate.display:
         clauses.append(f"fitted as the eye sees it ({certificate.display})")
     if fit.unpainted:
-        clauses.append(f"each unpainted pixel counts {fit.unpainted:g}")
+        clauses.append(f"each unpainted pixel counts {fit.unpainted:g} times a painted one")
     elif fit.hold:
-        clauses.append(f"unpainted parts are held ({fit.hold:g})")
+        clauses.append(f"unpainted parts are held ({fit.hold:g} times the weight of the paint)")
     if fit.colors == "gentle":
         clauses.append("lights are pulled to their own colour (gentle)")
     elif fit.colors == "white":

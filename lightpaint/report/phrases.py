@@ -116,7 +116,7 @@ def spoken_where(place: Place) -> str:
 
 def spoken_place(place: Place) -> str:
     """Return a sentence on where light is missing, and which light."""
-    place_text = f"{spoken_region(place)} ({spoken_percent(place.share)})"
+    place_text = f"{spoken_region(place)} ({spoken_percent(place.share)} of it)"
     change = spoken_difference(place.painted, place.reached)
     return (
         f"Most of what is out of reach is {place_text}: the paint is {change} than any mix of the "

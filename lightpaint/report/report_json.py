@@ -154,8 +154,10 @@ def _reason(reason: Reason) -> dict[str, Any]:
     """Return a reason that keeps the lights from the paint, with its share of the error."""
     numbers: dict[str, Any] = {"kind": reason.kind, "names": reason.names or None}
     numbers |= {"share": reason.share, "is_joint": reason.is_joint or None}
+    numbers |= {"delta_e_without": reason.delta_e and reason.delta_e[1]}
     if (loosening := reason.loosening) is not None:
         numbers |= {"weaker_hold": loosening.hold, "weaker_hold_share": loosening.share}
+        numbers |= {"weaker_hold_delta_e": loosening.delta_e and loosening.delta_e[1]}
         numbers |= {"weaker_hold_elsewhere": _unpainted(loosening.unpainted_change)}
     return numbers
 

@@ -58,7 +58,7 @@ def verdict(
     *,
     appearance: Appearance | None = None,
 ) -> str:
-    """Return sentences on how close the answer is, and whether a render confirms it.
+    """Return sentences on how close the answer is, and whether a render equals it.
 
     Args:
         solution: The answer.
@@ -81,11 +81,11 @@ def verdict(
     if verification is None:
         sentences.append("Not checked by a render.")
     elif verification.agrees:
-        sentences.append("A render confirms it.")
+        sentences.append("Rendered again: equal within noise.")
         if verification.unseen:
             sentences.append(f"{spoken_blindness(verification)}.")
     else:
-        sentences.append(f"A render does NOT confirm it: {agreement(verification)}.")
+        sentences.append(f"Rendered again: NOT equal; {agreement(verification)}.")
     return " ".join(sentences)
 
 
@@ -201,9 +201,9 @@ def spoken_noise(appearance: Appearance) -> str:
     """Return a clause on noise, if it is a third of the error; else ""."""
     share = spoken_percent(appearance.error_shares.get(appearance.main_noise, 0.0))
     if appearance.main_noise == "noise":
-        return f"{share} of the difference is render noise"
+        return f"{share} of the difference from the painting is render noise"
     if appearance.main_noise == "painting_noise":
-        return f"{share} of the difference is finer detail than light can show"
+        return f"{share} of the difference from the painting is finer detail than light can show"
     return ""
 
 
@@ -273,7 +273,9 @@ def agreement(verification: Verification | None) -> str:
     if verification is None:
         return "the prediction is not verified by a render"
     state = "agree within noise" if verification.agrees else "DISAGREE by more than their noise"
-    return (
-        f"prediction and verification {state} "
-        f"({verification.difference:.1f} standard errors apart, limit {verification.limit:.3g})"
-    )
+    return f"prediction and verification {state} ({spoken_distance(verification)})"
+
+
+def spoken_distance(verification: Verification) -> str:
+    """Return `1.8 standard errors apart, limit 5`."""
+    return f"{verification.difference:.1f} standard errors apart, limit {verification.limit:.3g}"

@@ -221,9 +221,10 @@ def _importance(reading: _Reading, mask: str | Path | None) -> tuple[Floats | No
     is_opaque = picture.alpha is None or bool((picture.alpha == 1).all())
     if template is None and picture.alpha is None and picture.transform is not None:
         # Without a template, the meaning of display values is unknown.
-        view = f"{picture.transform.name} at {picture.transform.stops:+g} stops"
-        missing_text = "no template is known (template=... names it)"
-        return None, [f"{missing_text}: all of it counts, as seen through {view}"]
+        view, stops = picture.transform.name, picture.transform.stops
+        view += f" at {stops:+g} stops" if stops else ""
+        missing_text = "no template says what was painted (template=... names one)"
+        return None, [f"all of it counts, as {view} shows it: {missing_text}"]
     if template is None or not is_opaque:
         return picture.alpha, []
     importance = painted_where(path, picture, template)

@@ -6,6 +6,7 @@
 writes beside itself
 
     evening.exr                     dusk, the works glow; alpha says how firmly each part is meant
+    evening.png                     the same as a painter's program saves it, for `lightpaint demo`
     morning.exr, morning.mask.exr   the first sun, the lamps off; what was painted is in the mask
     opening.png                     opening night: everything that can shine does
     after-hours.png                 a lamp left on in the annex
@@ -83,7 +84,7 @@ class Sheet:
     @classmethod
     def over(cls, template: Path) -> Sheet:
         """A fresh one."""
-        canvas, room = Canvas.read_template(template), Room(Surfaces.read(template))
+        canvas, room = Canvas.read_template(template), Room(Surfaces.read(template).at_edges())
         # To a painter bronze has a colour; in the scene it has an index of refraction.
         bronze = room.within((0.8, 1.025, 2.5), (1.75, 1.8, 3.5)).amount[..., None]
         albedo = room.surfaces.albedo * (1 + bronze * (np.array(BRONZE, np.float32) - 1))
@@ -254,6 +255,7 @@ def main() -> None:
         name = mood.__name__.replace("_", "-")
         if mood is evening:
             sheet.canvas.write_with_alpha(HERE / f"{name}.exr")
+            sheet.canvas.write_png(HERE / f"{name}.png")
         elif mood is morning:
             sheet.canvas.write(HERE / f"{name}.exr")
             sheet.canvas.write_mask(HERE / f"{name}.mask.exr")

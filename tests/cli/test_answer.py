@@ -15,12 +15,13 @@ from rich.cells import cell_len
 from lightpaint.basis.file.basis_file import write_basis
 from lightpaint.basis.lights import BasisLight
 from lightpaint.cli import main
-from lightpaint.cli.commands.answer_text import _limit_sentences, change
+from lightpaint.cli.commands.answer_text import _limit_sentences, _sentences, change
 from lightpaint.cli.options.job_options import BY_OPTION
 from lightpaint.cli.output import terminal
 from lightpaint.cli.output.vocabulary import spoken
 from lightpaint.images.formats.exr import write_rgb
 from lightpaint.images.formats.png import png_bytes
+from lightpaint.lighting.analysis.appearance.color_choices import ColorChoice
 from lightpaint.lighting.analysis.appearance.limiting_reasons import Loosening, Reason
 from lightpaint.lighting.answer.light_setting import LightSetting
 from lightpaint.lighting.constraints.constraints import Constraints
@@ -139,13 +140,14 @@ def test_of_many_lights_the_ten_that_matter_and_what_the_others_do(tmp_path: Pat
         (
             ("--space", "display", "--hold", "0.5", "--colors", "gentle"),
             # Most of the painting is brighter than middle grey, a quarter brighter than white.
-            "Fitted as the eye sees it (srgb at -1.2 stops); unpainted parts are held (0.5); "
+            "Fitted as the eye sees it (srgb at -1.2 stops); unpainted parts are held (0.5 times "
+            "the weight of the paint); "
             "lights are pulled to their own colour (gentle); --literal turns this off.",
         ),
         (("--colors", "white"), "Lights are white; --literal turns this off."),
         (
             ("--unpainted", "0.1"),
-            "Each unpainted pixel counts 0.1; --literal turns this off.",
+            "Each unpainted pixel counts 0.1 times a painted one; --literal turns this off.",
         ),
     ],
 )
@@ -183,6 +185,32 @@ def test_one_line_says_what_the_painting_leaves_open(tmp_path: Path, make_basis:
     assert "left unchanged" not in completed.stderr.replace(line, "")
 
 
+def test_other_colours_are_offered_once():
+    """By the line that says which lamp turns; both would have the same ΔE."""
+    white, green = (1.0, 1.0, 1.0), (0.5, 1.2, 0.5)
+    choices = tuple(
+        ColorChoice(colors, colors == "gentle", delta_e, "lamp", white, green, np.ones((1, 3)))
+        for colors, delta_e in (("free", 4.6), ("gentle", 5.9))
+    )
+    reason = Reason("colors", (), 0.12, delta_e=(5.9, 4.6))
+    appearance = SimpleNamespace(reasons=(reason,), is_close=False)
+    constraints = SimpleNamespace(constraints=Constraints())
+    look = SimpleNamespace(
+        solution=SimpleNamespace(problem=constraints),
+        analysis=SimpleNamespace(appearance=appearance, color_choices=choices),
+    )
+    told = _sentences(look, "short")  # type: ignore[arg-type]
+    assert told == [
+        "Other colours come closer: --colors free: ΔE 4.6 instead of 5.9, but lamp turns green."
+    ]
+    alone = replace(choices[0], delta_e=5.8), choices[1]
+    look.analysis.color_choices = alone
+    told = _sentences(look, "short")  # type: ignore[arg-type]
+    assert [spoken(sentence) for sentence in told] == [
+        "Lights keep their colours; --colors free would bring the mean ΔE from 5.9 to 4.6."
+    ]
+
+
 def _setting(r: float, g: float, b: float) -> LightSetting:
     return LightSetting("x", "area", "radiance", "W/(m² sr)", (r, g, b), (r, g, b))
 
@@ -213,10 +241,24 @@ def test_what_became_of_a_light(current: Any, new: Any, sentence: str):
         (
             Reason("off", ("cove",), 0.57),
             "room.toml",
-            "57 % of the difference.",
+            "57 % of the difference from the painting.",
         ),  # of a lights file
         (Reason("hold", loosening=Loosening(0.8, 0.35, None)), "", "(--hold 0.8) would remove"),
-        (Reason("colors", (), 0.5), "", "; --colors free would remove 50 % of the difference."),
+        (
+            Reason("hold", loosening=Loosening(0.8, 0.35, None, (9.14, 6.0), 4.0)),
+            "",
+            "(--hold 0.8 instead of 4) would bring the mean ΔE from 9.1 to 6.0.",
+        ),
+        (
+            Reason("colors", (), 0.5),
+            "",
+            "; --colors free would remove 50 % of the difference from the painting.",
+        ),
+        (
+            Reason("colors", (), 0.12, delta_e=(5.9, 4.5)),
+            "",
+            "; --colors free would bring the mean ΔE from 5.9 to 4.5.",
+        ),
     ],
 )
 def test_what_holds_the_lights_is_said_with_its_option(

@@ -63,7 +63,7 @@ def solved_job(tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, str]:
 def test_solve_leaves_everything_it_promises(solved_job: tuple[Path, str]) -> None:
     folder, output = solved_job
     assert {p.name for p in folder.iterdir()} == RESULTS
-    assert "A render confirms it." in output
+    assert "Rendered again: equal within noise." in output
     for name in ("ceiling", "left_spot", "right_spot", "lamp", "window"):
         assert name in output
     data = json.loads((folder / "lighting.json").read_text(encoding="utf-8"))
@@ -531,7 +531,7 @@ def test_groups_and_kept_lights_from_solve_to_relight(tmp_path: Path) -> None:
 
     succeed(tmp_path, "template", room, "-o", "t.exr", "--spp", 16)
     output = succeed(tmp_path, "solve", room, "t.exr", *choice, "--spp", 64, "-o", "out")
-    assert "A render confirms it." in output
+    assert "Rendered again: equal within noise." in output
     assert re.search(r"^rest .* fixed ", output, re.MULTILINE)
     assert "agree within noise" in succeed(tmp_path, "verify", "out")
     succeed(tmp_path, "relight", room, "out/lighting.json", "-o", "again", "--spp", 4)
@@ -605,7 +605,7 @@ def test_solved_small_and_verified_large(tmp_path: Path) -> None:
     few_samples = ("--resolution", "1/4", "--spp", 16, "--seed", 8)
     arguments = ("solve", CORNELL, WARM, *few_samples, "--verify-spp", 16)
     output = succeed(tmp_path, *arguments)
-    assert "A render confirms it." in output
+    assert "Rendered again: equal within noise." in output
     sizes = {}
     for name in ("predicted", "verified"):
         [part] = read_parts(tmp_path / "warm" / f"{name}.exr")
@@ -669,7 +669,7 @@ def test_a_basis_for_a_time(tmp_path: Path) -> None:
     # The verification has as many samples as the basis: a quarter in each pixel, or the fewer in
     # each of a smaller film.
     solved = ("solve", room, "warm.exr", *arguments[2:], "--quality", "final")
-    assert "A render confirms it." in succeed(tmp_path, *solved)
+    assert "Rendered again: equal within noise." in succeed(tmp_path, *solved)
     [part] = read_parts(tmp_path / "warm" / "predicted.exr")
     spp = spp_of(succeed(tmp_path, "basis", room, *arguments[4:], "--spp", 2))
     view = json.loads(part.attributes["lightpaint.view"])
@@ -716,7 +716,7 @@ def test_a_film_that_no_blocks_fit_into_is_solved_small_and_verified_whole(
         "film of 171x128 reduced to 42x32 blocks of 4x4 pixels: 3 columns of pixels at the right "
         "are left over and ignored" in completed.stderr
     )
-    assert "A render confirms it." in completed.stdout
+    assert "Rendered again: equal within noise." in completed.stdout
     assert read_estimate(tmp_path / "look" / "predicted.exr")[0].size == (32, 42)
     assert read_estimate(tmp_path / "look" / "verified.exr")[0].size == (128, 171)
     # Fewer samples, of what is kept or exactly; both say what they used.

@@ -55,7 +55,7 @@ def test_a_lights_file_holds_lights_and_the_render_confirms_it(room: Path, tmp_p
     output = succeed(
         tmp_path, "solve", "room.xml", "t.exr", "--spp", 64, "-o", "out", "--table", "full"
     )
-    assert "A render confirms it." in output
+    assert "Rendered again: equal within noise." in output
     assert "lock 50%*" in output
     assert "by number of lights" in output
     lights = _lights(tmp_path / "out")

@@ -121,12 +121,12 @@ def test_a_button_says_what_it_lets_go_and_what_that_brings():
     assert ": annex_window is switched off." in sketch_headline(appearance)
     fields = Advice("off", ("annex_window",), gain=0.57, hold=None)
     assert advice(appearance) == fields
-    weaker = Loosening(0.8, 0.35, UnpaintedChange(2.0, 12.0, "annex"))
+    weaker = Loosening(0.8, 0.35, UnpaintedChange(2.0, 12.0, "annex"), (10.0, 7.4), 4.0)
     hold_reason = replace(appearance, reasons=(replace(HOLD, loosening=weaker),))
-    assert advice(hold_reason) == Advice("hold", (), gain=0.35, hold=0.8)
+    assert advice(hold_reason) == Advice("hold", (), gain=0.35, hold=0.8, delta_e=(10.0, 7.4))
     assert spoken_cause(hold_reason.reasons[0]) == (
-        "A weaker hold on unpainted parts (a hold of 0.8) would remove 35 % of the difference, and "
-        "change the annex by ΔE 12."
+        "A weaker hold on unpainted parts (a hold of 0.8 instead of 4) would bring the mean ΔE "
+        "from 10.0 to 7.4, and change the annex by ΔE 12."
     )
     # Of what takes several, none closes a share by itself.
     joint = replace(appearance, reasons=(replace(OFF, is_joint=True), replace(HOLD, is_joint=True)))
@@ -137,12 +137,13 @@ def test_a_button_says_what_it_lets_go_and_what_that_brings():
 
 def test_a_preview_says_what_it_brings_and_what_it_costs():
     annex = UnpaintedChange(2.0, 12.0, "annex")
-    fields = {"delta_e": (17.2, 6.9), "is_at_cost": False}
-    sentence = "Removes 57 % of the difference (ΔE 17 becomes 6.9), and changes the annex by ΔE 12."
-    assert preview_text(0.57, annex, **fields) == (sentence, False)
-    costly = preview_text(0.57, annex, **{**fields, "is_at_cost": True})
+    sentence = (
+        "Comes closer to the paint (mean ΔE 6.9 instead of 17), and changes the annex by ΔE 12."
+    )
+    assert preview_text((17.2, 6.9), annex, is_at_cost=False) == (sentence, False)
+    costly = preview_text((17.2, 6.9), annex, is_at_cost=True)
     assert costly == (f"{sentence} That is more than it gains.", True)
-    none = preview_text(0.004, None, **fields)[0]
+    none = preview_text((6.94, 6.92), None, is_at_cost=False)[0]
     assert none == "The answer comes no closer."
 
 

@@ -155,7 +155,7 @@ def test_captions_do_not_meet(monkeypatch: pytest.MonkeyPatch, size: tuple[int, 
     flat = np.full((*size, 3), 128, np.uint8)
     long = "over the old harbour, version 12, final"
     tiles = [
-        Tile(f"target: evening {long}", f"31 % painted, the rest hatched {long}", flat),
+        Tile(f"target: evening {long}", f"31 % painted, the rest the current look {long}", flat),
         Tile("predicted (agx, exposure +1.5 stops)", "misses 46 % of the target (RMS)", flat),
         Tile("residual", "luminance, predicted - target", flat, limit),
     ]
@@ -218,41 +218,55 @@ def test_another_size_is_refused(make_basis: Any):
 
 def test_what_is_not_painted_is_grey_and_not_the_paintings(make_basis: Any):
     look = _look(make_basis)
-    target, solution = look["target"], look["solution"]
     current = combine(look["basis"], Lighting.current(look["basis"])).image
-    picture = target_picture(target, solution, current, transform=ViewTransform())
+    picture = target_picture(look["target"], current, transform=ViewTransform())
     right = picture[:, 16:]
     assert np.ptp(right, axis=-1).max() == 0
     np.testing.assert_array_equal(right, unpainted_look(current, transform=ViewTransform())[:, 16:])
-    # The lines across it: neighbours of an even look differ.
-    even = unpainted_look(np.full((*SIZE, 3), 0.2), transform=ViewTransform())
-    assert len(np.unique(even)) == 2
 
 
-def test_half_importance_is_half_shown(make_basis: Any):
+def test_the_rest_of_a_painting_over_the_current_look_is_that_look(make_basis: Any):
     look = _look(make_basis)
-    importance = np.full(SIZE, 0.5, np.float32)
+    target = replace(look["target"], over_look=True)
+    current = combine(look["basis"], Lighting.current(look["basis"])).image
+    picture = target_picture(target, current, transform=ViewTransform())
+    np.testing.assert_array_equal(picture[:, :16], encode_display(target.image)[:, :16])
+    np.testing.assert_array_equal(picture[:, 16:], encode_display(current)[:, 16:])
+
+
+@pytest.mark.parametrize("weight", [0.3, 0.64, 1.0])
+def test_a_painting_is_shown_as_it_was_painted_however_little_it_counts(
+    make_basis: Any, weight: float
+):
+    """Nobody who painted a whole picture with half the weight sees it dimmed or hatched."""
+    image = _look(make_basis)["target"].image
+    importance = np.full(SIZE, weight, np.float32)
     importance[0] = 1
-    target = Target("half", look["target"].image, importance, everything=False)
-    current = np.zeros((*SIZE, 3))
-    picture = target_picture(
-        target, solve(look["basis"], target), current, transform=ViewTransform()
-    )
-    mean = (encode_display(target.image) + unpainted_look(current, transform=ViewTransform())) / 2
-    np.testing.assert_allclose(picture[1:], mean[1:], rtol=1e-6)  # the image is float32
+    target = Target("soft", image, importance, everything=False)
+    picture = target_picture(target, np.zeros((*SIZE, 3)), transform=ViewTransform())
+    np.testing.assert_array_equal(picture, encode_display(image))
 
 
-def test_emitters_nobody_painted_are_not_shown_as_target(make_basis: Any):
+def test_emitters_are_shown_as_they_were_painted(make_basis: Any):
+    """Although they do not count: the map of importance says so."""
     emitter_mask = np.zeros(SIZE, bool)
     emitter_mask[4:8, 4:8] = True
     basis = make_basis(3, SIZE, seen=emitter_mask)
     image = np.full((*SIZE, 3), 0.5, np.float32)
     target = Target("all", image, np.ones(SIZE, np.float32), everything=True)
-    picture = target_picture(
-        target, solve(basis, target), np.zeros(image.shape), transform=ViewTransform()
-    )
-    is_shown = np.isclose(picture, encode_display(image)).all(axis=-1)
-    np.testing.assert_array_equal(is_shown, ~emitter_mask)
+    assert not solve(basis, target).importance[emitter_mask].any()
+    picture = target_picture(target, np.zeros(image.shape), transform=ViewTransform())
+    np.testing.assert_array_equal(picture, encode_display(image))
+
+
+def test_lines_cross_only_the_map_of_importance(make_basis: Any):
+    """Neighbours of an even look differ where lines cross it, and nowhere else."""
+    even, corner = np.full((*SIZE, 3), 0.2), np.zeros(SIZE, np.float32)
+    corner[:4, :4] = 1
+    target = Target("corner", np.zeros((*SIZE, 3), np.float32), corner, everything=False)
+    painting = target_picture(target, even, transform=ViewTransform())
+    importance = importance_picture(corner, even, transform=ViewTransform())
+    assert [len(np.unique(picture[4:])) for picture in (painting, importance)] == [1, 2]
 
 
 @pytest.mark.parametrize(
@@ -365,7 +379,7 @@ def test_how_much_is_painted_is_one_number(
         lambda *arguments: (captions.append(arguments[1].detail), draw(*arguments))[1],
     )
     comparison_image(**look_fields, predicted=predicted.image, verified=None)
-    assert captions[0] == f"{100 * share:.3g} % painted, the rest hatched"
+    assert captions[0] == f"{100 * share:.3g} % painted, the rest the current look"
     numbers = json.loads(report_numbers(**look_fields, predicted=predicted, verification=None))
     assert numbers["painting"]["share"] == pytest.approx(share, abs=1e-12)
     assert full.spoken_share == target.spoken_share == f"{100 * share:.3g} %"

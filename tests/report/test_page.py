@@ -182,7 +182,7 @@ def test_agreement_is_said_calmly(make_basis: Any):
     result = _result(make_basis)
     assert result["verification"].agrees
     text = report_page(**result)
-    assert "A render confirms it." in Page(text).text("header")
+    assert "Rendered again: equal within noise." in Page(text).text("header")
     assert 'role="alert"' not in text
 
 

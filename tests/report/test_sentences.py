@@ -71,8 +71,9 @@ def test_difference_of_colours(painted: Any, final: Any, words: str):
 def test_places(region: tuple[int, int], place_words: str):
     place = Place(region, 0.38, (0, 0, 1, 1), (1, 1, 4), (1, 1, 1))
     assert place_words in spoken_place(place)
-    assert "(38 %): the paint is brighter and bluer than any mix of the lights." in spoken_place(
-        place
+    assert (
+        "(38 % of it): the paint is brighter and bluer than any mix of the lights."
+        in spoken_place(place)
     )
 
 
@@ -199,7 +200,7 @@ def test_what_is_out_of_reach_is_so_beside_what_is_held(make_basis: Any):
 def test_what_holds_a_light_is_said(bound: Bound, words: str):
     sentence = spoken_bound(bound, 0.38)
     assert words in sentence
-    assert sentence.endswith("would remove 38 % of the difference.")
+    assert sentence.endswith("would remove 38 % of the difference from the painting.")
 
 
 def test_the_switched_off_light_that_would_help_most_is_named(make_basis: Any):

@@ -170,8 +170,8 @@ PARTS = ("unreachable", "forbidden", "noise", "painting_noise")
 SAID = {
     "unreachable": "is out of reach: lamp would light too much else.",
     "forbidden": "is out of reach: lamp would light too much else.",
-    "noise": "of the difference is render noise.",
-    "painting_noise": "of the difference is finer detail than light can show.",
+    "noise": "of the difference from the painting is render noise.",
+    "painting_noise": "of the difference from the painting is finer detail than light can show.",
 }
 
 
@@ -239,9 +239,9 @@ def test_the_verdict_tells_of_the_verification(make_basis: Any, bias: float):
     checked = compare(replace(predicted, half_difference=noise[2]), rendered)
     sentence = verdict(solution, predicted, checked)
     if bias == 1:
-        assert sentence.endswith("A render confirms it.")
+        assert sentence.endswith("Rendered again: equal within noise.")
     else:
-        assert "A render does NOT confirm it" in sentence
+        assert "Rendered again: NOT equal" in sentence
         assert "standard errors apart, limit 5" in sentence
 
 
@@ -285,8 +285,10 @@ def test_what_a_render_would_have_missed_is_said(make_basis: BasisFactory):
     ):
         sentence = verdict(solution, predicted, replace(checked, power=power))
         warning = f"An error of 5 % in {names} would probably not show in this render."
-        assert sentence.endswith(f"confirms it. {warning}")
-    assert verdict(solution, predicted, replace(checked, power={"sun": 0.5})).endswith("it.")
+        assert sentence.endswith(f"equal within noise. {warning}")
+    assert verdict(solution, predicted, replace(checked, power={"sun": 0.5})).endswith(
+        "equal within noise."
+    )
 
 
 def test_an_answer_that_is_worse_than_the_present_says_so_first():

@@ -143,7 +143,7 @@ def test_the_only_template_beside_a_painting_is_found_under_any_name(tmp_path: P
     write(tmp_path / "tuesday", template)
     target = read_target(tmp_path / "p8.png")
     assert target.everything
-    assert "no template is known (template=... names it)" in target.notes[0]
+    assert "no template says what was painted (template=... names one)" in target.notes[0]
 
 
 def test_of_another_size(tmp_path: Path) -> None:
@@ -153,7 +153,7 @@ def test_of_another_size(tmp_path: Path) -> None:
     target = read_target(tmp_path / "p.png")
     assert target.everything
     assert "another size" in target.notes[0]
-    assert "no template is known" in target.notes[1]
+    assert "no template says what was painted" in target.notes[1]
     with pytest.raises(SizeError, match=r"31x17 but .*template\.png is 80x60"):
         read_target(tmp_path / "p.png", template=tmp_path / "template")
     alpha = np.full((17, 31, 4), 128, np.uint8)
@@ -229,7 +229,7 @@ def test_a_template_of_another_size_says_nothing_of_the_view(tmp_path: Path) -> 
         assert target.transform == transform
         np.testing.assert_allclose(target.image, transform.decode(np.float32(128 / 255)), rtol=1e-4)
         assert "another size" in target.notes[0]
-    assert "no template is known" in target.notes[1]
+    assert "no template says what was painted" in target.notes[1]
     # An EXR holds light: only --space display asks for a view.
     save(tmp_path / "half.exr", np.full((8, 8, 3), 0.5), ViewTransform())
     assert read_target(tmp_path / "half.exr").transform is None

@@ -84,11 +84,15 @@ def _sentences(look: Look, table: Table) -> list[str]:
     """
     choice = closer_choice(look.analysis.color_choices)
     closer = [f"Other colours come closer: --colors {choice}."] if choice else []
+    limits = _limit_sentences(look)
     if table == "short":
-        is_told = not look.analysis.appearance.is_close
-        return [*(_limit_sentences(look)[:1] if is_told else []), *closer]
+        limits = [] if look.analysis.appearance.is_close else limits[:1]
+        # One line offers other colours, the one that says which light turns.
+        if closer and any("--colors free" in sentence for sentence in map(spoken, limits)):
+            limits = []
+        return [*limits, *closer]
     sentences = [
-        *error_sentences(look.diagnosis, look.analysis.appearance, holds=_limit_sentences(look)),
+        *error_sentences(look.diagnosis, look.analysis.appearance, holds=limits),
         *closer,
     ]
     if look.uncertainty is not None:

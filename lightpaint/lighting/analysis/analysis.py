@@ -91,6 +91,7 @@ def analyse(solution: Solution) -> tuple[Analysis, ...]:
     for view, view_appearance, diagnosis, colors in zip(
         solution.views, appearances, diagnoses, choices, strict=True
     ):
+        colors = _with_measured_gain(colors, view_appearance)
         certified = view.with_certificate_fields(
             bounds=diagnosis.bounds, **_certificate_fields(view_appearance)
         )
@@ -119,6 +120,17 @@ def _appearance_and_diagnosis(view: Solution) -> tuple[Appearance, Diagnosis]:
     """Return the visible difference of a view from its painting, and the diagnosis."""
     diagnosis = diagnose(view)
     return compare_appearance(view, diagnosis=diagnosis), diagnosis
+
+
+def _with_measured_gain(choices: Choices, view_appearance: Appearance) -> Choices:
+    """Return the choices with the ΔE of `free` that its reason has, measured with all pixels."""
+    measured = [x.delta_e[1] for x in view_appearance.reasons if x.kind == "colors" and x.delta_e]
+    if not measured:
+        return choices
+    return tuple(
+        replace(choice, delta_e=measured[0]) if choice.colors == "free" else choice
+        for choice in choices
+    )
 
 
 def _certificate_fields(appearance: Appearance) -> dict[str, float]:

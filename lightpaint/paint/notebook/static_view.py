@@ -14,7 +14,7 @@ from lightpaint.colour.display.view_transform import ViewTransform
 from lightpaint.colour.srgb import to_8_bit
 from lightpaint.images.pixel_blocks import block_mean
 from lightpaint.lighting.answer.lighting import Lighting
-from lightpaint.report.answer_pictures import coverage, over_unpainted
+from lightpaint.report.answer_pictures import target_picture
 from lightpaint.report.page.figures import data_uri
 from lightpaint.report.page.mixer import mixer_assets, mixer_html
 from lightpaint.target.target import Target
@@ -54,10 +54,7 @@ def static_view(
     source = data_uri(pixels, largest_png=MAX_PICTURE_BYTES, quality=85)
     painting = None
     if target is not None:
-        share = coverage(target.importance)
-        painting = over_unpainted(
-            transform.encode, target.image, share, basis.current_look, transform=transform
-        )
+        painting = target_picture(target, basis.current_look, transform=transform)
     mixer = mixer_html(basis, lighting, painting, transform=transform, max_pixels=MAX_PLANE_PIXELS)
     height, width = basis.size
     page = _page(mixer, mix_width=MIX_HEIGHT * width // height)

@@ -13,13 +13,14 @@ class Advice:
 
     kind: of the constraint; `reach` if there is none, but moving lights may help. names: its
     lights. gain: share of the error that disappears without it; null if more is needed. hold: the
-    weaker hold to set.
+    weaker hold to set. delta_e: mean ΔE over the paint now and without it; null if not known.
     """
 
     kind: str
     names: tuple[str, ...]
     gain: float | None
     hold: float | None
+    delta_e: tuple[float, float] | None = None
 
 
 @dataclass(frozen=True)

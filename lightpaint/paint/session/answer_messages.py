@@ -264,11 +264,11 @@ def advice(appearance: Appearance) -> Advice | None:
         return Advice("reach", (), None, None) if is_missed and not appearance.causes else None
     kind, names = cause.kind, tuple(cause.names)
     if kind != "hold":
-        return Advice(kind, names, None if cause.is_joint else cause.share, None)
+        return Advice(kind, names, None if cause.is_joint else cause.share, None, cause.delta_e)
     weaker = cause.loosening
     if weaker is None:
         return Advice(kind, names, None, 0.0)
-    return Advice(kind, names, weaker.share, weaker.hold)
+    return Advice(kind, names, weaker.share, weaker.hold, weaker.delta_e)
 
 
 def _closeness(analysis: Analysis) -> Closeness:
@@ -286,18 +286,18 @@ def _closeness(analysis: Analysis) -> Closeness:
 
 
 def preview_text(
-    closes: float, rest: UnpaintedChange | None, *, delta_e: tuple[float, float], is_at_cost: bool
+    delta_e: tuple[float, float], rest: UnpaintedChange | None, *, is_at_cost: bool
 ) -> tuple[str, bool]:
     """Describe the effect of a change before it is made, and whether it changes more than it gains.
 
-    closes: share of the error that it removes. rest: its change of unpainted parts. delta_e: over
-    the paint, before and after. is_at_cost: whether it changes the rest by more than it gains.
+    These are the numbers that the answer after the change has. delta_e: mean over the paint, before
+    and after. rest: the change of unpainted parts from the current scene, after it. is_at_cost:
+    whether the change does more to the rest than it gains.
     """
-    current, expected = map(spoken_amount, delta_e)
-    if closes >= 0.005:
-        text = (
-            f"Removes {spoken_percent(closes)} of the difference (ΔE {current} becomes {expected})"
-        )
+    now, then = delta_e
+    if round(then, 1) < round(now, 1):
+        before, after = spoken_amount(now), spoken_amount(then)
+        text = f"Comes closer to the paint (mean ΔE {after} instead of {before})"
     else:
         text = "The answer comes no closer"
     if rest is None or rest.worst < INVISIBLE:

@@ -14,7 +14,10 @@ from lightpaint.colour.display.view_transform import ViewTransform
 from lightpaint.lighting.analysis.analysis import analyse
 from lightpaint.lighting.analysis.appearance.display_difference import PaintComparison
 from lightpaint.lighting.analysis.appearance.error_place import NOTICED
-from lightpaint.lighting.analysis.appearance.unpainted_change import unpainted_change
+from lightpaint.lighting.analysis.appearance.unpainted_change import (
+    change_from_scene,
+    unpainted_change,
+)
 from lightpaint.lighting.analysis.noise.noise_correction import correct_noise
 from lightpaint.lighting.constraints.constraints import Constraints
 from lightpaint.lighting.fit import Colors
@@ -134,29 +137,19 @@ class SessionSnapshot:
             display_thumbnail(planes.mix(x), transform) for x in (weights, answer_weights)
         )
         if solution is None:
-            return ChangePreview(
-                before, afterwards, *preview_text(0.0, None, delta_e=(0, 0), is_at_cost=False)
-            )
+            return ChangePreview(before, afterwards, *preview_text((0, 0), None, is_at_cost=False))
         judged_view = view if view in self.painted_views else self.painted_views[0]
         view_solution = solution.views[self.painted_views.index(judged_view)]
-        look, target = (
-            PaintComparison.of_problem(view_solution.problem),
-            view_solution.problem.views.targets[0],
-        )
-        pictures = [self.bases[judged_view].mix(x) for x in (weights, answer_weights)]
-        closes = look.share_removed(*pictures)
-        elsewhere = unpainted_change(
-            look, self.bases[judged_view], target.importance > 0, *pictures
-        )
+        basis, [target] = self.bases[judged_view], view_solution.problem.views.targets
+        look = PaintComparison.of_problem(view_solution.problem)
+        pictures = [basis.mix(x) for x in (weights, answer_weights)]
         now, then = (look.mean(look.difference(look.pixels(picture))) for picture in pictures)
-        is_at_cost = (
-            elsewhere is not None and elsewhere.worst > NOTICED and elsewhere.delta_e > now - then
-        )
-        return ChangePreview(
-            before,
-            afterwards,
-            *preview_text(closes, elsewhere, delta_e=(now, then), is_at_cost=is_at_cost),
-        )
+        # As the sentence after the change will have it: from the current scene.
+        rest = change_from_scene(view_solution, look, answer_weights, pictures[1])
+        caused = unpainted_change(look, basis, target.importance > 0, *pictures)
+        is_at_cost = caused is not None and caused.worst > NOTICED and caused.delta_e > now - then
+        text = preview_text((now, then), rest, is_at_cost=is_at_cost)
+        return ChangePreview(before, afterwards, *text)
 
 
 @dataclass(frozen=True)

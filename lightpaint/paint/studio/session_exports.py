@@ -27,7 +27,7 @@ from lightpaint.progress import Progress
 from lightpaint.relit.relight import relight
 from lightpaint.relit.sequential_verification import verify_in_stages
 from lightpaint.report.clean_pictures import CleanLooks
-from lightpaint.report.verdict import agreement
+from lightpaint.report.verdict import spoken_distance
 from lightpaint.scene.scene_reader import load_scene
 from lightpaint.target.painting_file import write_painting
 from lightpaint.target.template import texts_of
@@ -156,6 +156,7 @@ def render_verification(
             predicted, relit, basis, lighting, spp=basis.origin.spp, progress=progress
         )
     picture = denoised(result.verified.image, basis.features)
-    verb = "confirms it" if result.agrees else "does NOT confirm it"
-    text = f"A render of {result.spp} samples per pixel {verb}: {agreement(result)}."
+    state = "equal within noise" if result.agrees else "NOT equal, by more than noise explains"
+    text = f"Rendered again with {result.spp} samples per pixel: {state}"
+    text += f" ({spoken_distance(result)})."
     return picture, text, result.agrees

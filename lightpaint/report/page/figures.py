@@ -23,10 +23,14 @@ from lightpaint.report.answer_pictures import (
     residual_of,
     residual_picture,
 )
+from lightpaint.report.phrases import spoken_percent
 from lightpaint.threads import parallel_map
 
 #: Ends of the importance map's legend, as `importance_picture` shows a mid grey.
 UNCOUNTED_COLOR, COUNTED_COLOR = "#393939", "#e8d8a2"
+
+#: Where a verification cannot tell, in display values: darker than no difference.
+UNMEASURED = 0.22
 
 #: Colours of a signed quantity from its lower to its upper end, for the legend.
 SIGNED = [f"rgb({red} {green} {blue})" for red, green, blue in to_8_bit(DIVERGING)]
@@ -198,8 +202,8 @@ def maps(
     figures = [
         figure(
             PagePicture("Residual", "False-colour map of the residual.", picture),
-            f"Luminance, answer − painting, as rendered{missed.spoken}. Hatched pixels do not "
-            "count.",
+            f"Luminance, answer − painting, as rendered{missed.spoken}. Grey, dim pixels do "
+            "not count.",
             signed_scale(missed.limit),
         ),
         _importance_map(solution.importance, current, transform=transform),
@@ -222,13 +226,33 @@ def _importance_map(importance: Floats, current: Floats, *, transform: ViewTrans
 
 def _verification_map(verification: Verification) -> str:
     """Return the figure of where the render disagrees with the answer."""
-    z = verification.z.mean(axis=-1, dtype=np.float64)
+    picture, share = verification_picture(verification)
+    unmeasured_text = (
+        f" Dark grey, {spoken_percent(share)} of the picture: too few samples of the render found "
+        "light there to tell."
+        if share
+        else ""
+    )
     return figure(
-        PagePicture("Verification", "False-colour map of z.", to_8_bit(diverging(z / LIMIT))),
+        PagePicture("Verification", "False-colour map of z.", picture),
         "Answer − render in standard errors, mean of the channels. Noise alone looks like even "
-        "grain; a shape in it is an error.",
+        f"grain; an orange or blue shape in it is an error.{unmeasured_text}",
         scale(SIGNED, f"−{LIMIT:g} answer darker", "0", f"answer brighter +{LIMIT:g}"),
     )
+
+
+def verification_picture(verification: Verification) -> tuple[npt.NDArray[np.uint8], float]:
+    """Return the map of where a render disagrees, (h, w, 3), and the share that it cannot tell.
+
+    What it cannot tell is grey, unless the render disagrees as a whole: then every difference is
+    shown.
+    """
+    z = verification.z.mean(axis=-1, dtype=np.float64)
+    colours, is_measured = diverging(z / LIMIT), verification.is_measured
+    if is_measured is None or not verification.agrees:
+        return to_8_bit(colours), 0.0
+    colours[~is_measured] = UNMEASURED
+    return to_8_bit(colours), float(1 - is_measured.mean())
 
 
 def figure(picture: PagePicture, caption: str, legend: str) -> str:

@@ -27,7 +27,7 @@ from lightpaint.lighting.analysis.appearance.appearance import Appearance
 from lightpaint.lighting.answer.lighting import Lighting
 from lightpaint.lighting.solution import Solution
 from lightpaint.relit.verification import Verification
-from lightpaint.report.answer_pictures import coverage, report_transform, unpainted_look
+from lightpaint.report.answer_pictures import paint_coverage, report_transform, unpainted_look
 from lightpaint.report.comparison import SURROUND, TEXT, shorten_to_width
 from lightpaint.report.page.figures import THUMBNAIL_WIDTH, data_uri, thumbnail
 from lightpaint.report.page.lights_table import change, hex_color
@@ -182,9 +182,9 @@ def basis_png(basis: Basis) -> bytes:
 
 @png_of.register
 def target_png(target: Target) -> bytes:
-    """Return the painting; dim and hatched where nothing was painted."""
+    """Return the painting; grey and dim where nothing was painted."""
     transform = target.transform or _transform(target.image)
-    share = _sized(coverage(target.importance)[..., None], WIDTH)
+    share = _sized(paint_coverage(target.importance)[..., None], WIDTH)
     image = _sized(target.image, WIDTH)
     paint, rest = transform.encode(image), unpainted_look(image, transform=transform)
     return png_bytes(to_8_bit(_wide(share * paint + (1 - share) * rest)))
@@ -250,7 +250,7 @@ def _on_grey(image: Floats, importance: Floats) -> Floats:
     """Return an image (h, w, 3), linear, with unpainted parts in a dim grey of their own
     luminance.
     """
-    share = coverage(importance)[..., None]
+    share = paint_coverage(importance)[..., None]
     return np.asarray(share * image + (1 - share) * 0.2 * luminance(image)[..., None])
 
 

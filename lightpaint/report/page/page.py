@@ -106,7 +106,6 @@ def report_page(
         "wipe": partial(
             _wipe,
             target,
-            solution,
             looks,
             raw,
             transform=transform,
@@ -199,7 +198,6 @@ def prepare_page(basis: Basis) -> None:
 
 def _wipe(
     target: Target,
-    solution: Solution,
     looks: CleanLooks,
     raw: CleanLooks,
     *,
@@ -220,8 +218,8 @@ def _wipe(
         picture("now", "The scene as it is.", looks.current, raw.current),
         PagePicture(
             "painting",
-            "What was painted. Unpainted pixels are grey, dim and hatched.",
-            target_picture(target, solution, looks.current, transform=transform, finish=to_8_bit),
+            f"What was painted. The rest is {'the current look' if target.over_look else 'grey'}.",
+            target_picture(target, looks.current, transform=transform, finish=to_8_bit),
         ),
         picture(
             "answer",
@@ -244,7 +242,7 @@ def _mixer(
     return mixer_html(
         basis,
         solution.lighting,
-        target_picture(target, solution, looks.current, transform=transform),
+        target_picture(target, looks.current, transform=transform),
         transform=transform,
         is_clean=looks.is_clean,
         scene=shlex.quote(_absolute_path(scene)) if scene.endswith(".xml") else None,

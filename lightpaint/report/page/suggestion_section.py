@@ -91,7 +91,8 @@ def _views_html(shown_view: str) -> str:
 def spoken_turn(turn: MoveSuggestion) -> str:
     """Return the gain of turning a light, in one sentence."""
     gain = spoken_fraction(turn.gain_share)
-    return f"Turning {turn.name} by {turn.turn:.0f}° would remove {gain} of the difference."
+    part = f"{gain} of the difference (in energy)"
+    return f"Turning {turn.name} by {turn.turn:.0f}° would remove {part}."
 
 
 def _turn_html(turn: MoveSuggestion | None, *, transform: ViewTransform, is_clean: bool) -> str:

@@ -494,20 +494,20 @@ def test_escape_gives_up_the_stroke_before_it_closes_anything(painter: Painter) 
 #: What the sentence advises, what its button is called, and the message that it comes to.
 HELPS: list[tuple[dict[str, Any], str, str, dict[str, Any]]] = [
     (
-        {"kind": "hold", "hold": 0.8, "gain": 0.35},
-        "Loosen: 35 % less difference",
+        {"kind": "hold", "hold": 0.8, "gain": 0.35, "delta_e": [11.2, 7.44]},
+        "Loosen: ΔE 7.4 instead of 11",
         "change_settings",
         {"hold": 0.8},
     ),
     (
-        {"kind": "colors", "gain": 0.6},
-        "Any colour: 60 % less difference",
+        {"kind": "colors", "gain": 0.6, "delta_e": [11.2, 4.5]},
+        "Any colour: ΔE 4.5 instead of 11",
         "change_settings",
         {"colors": "free"},
     ),
     (
-        {"kind": "off", "names": ["key"], "gain": 0.57},
-        "Turn on key: 57 % less difference",
+        {"kind": "off", "names": ["key"], "gain": 0.57, "delta_e": [11.2, 6.9]},
+        "Turn on key: ΔE 6.9 instead of 11",
         "constrain_lights",
         {"key": {}},
     ),
@@ -591,9 +591,21 @@ def test_a_render_of_what_was_there_before_is_said_to_be(painter: Painter) -> No
     painter.button("Analysis").click()
     painter.button("Verify").click()
     painter.stroke()
-    painter.tell(kind="verified", agrees=True, text="A render confirms it.", view=0, is_old=True)
+    painter.tell(
+        kind="verified",
+        agrees=True,
+        text="Rendered again: equal within noise.",
+        view=0,
+        is_old=True,
+    )
     assert "(of an earlier answer)" in painter.page.locator(".verified").inner_text()
-    painter.tell(kind="verified", agrees=True, text="A render confirms it.", view=0, is_old=False)
+    painter.tell(
+        kind="verified",
+        agrees=True,
+        text="Rendered again: equal within noise.",
+        view=0,
+        is_old=False,
+    )
     assert "earlier" not in painter.page.locator(".verified").inner_text()
 
 

@@ -13,10 +13,6 @@ import numpy as np
 from lightpaint.display_text import short_repr
 from lightpaint.images.estimate import Estimate
 from lightpaint.keywords import keywords
-from lightpaint.lighting.analysis.appearance.constraint_kinds import (
-    ConstraintKind,
-    ConstraintsByLight,
-)
 from lightpaint.lighting.analysis.appearance.display_difference import PaintComparison
 from lightpaint.lighting.analysis.appearance.error_place import (
     NOTICED,
@@ -34,7 +30,7 @@ from lightpaint.lighting.analysis.appearance.limiting_reasons import (
 from lightpaint.lighting.analysis.appearance.pixel_sample import LimitGroup
 from lightpaint.lighting.analysis.appearance.unpainted_change import (
     UnpaintedChange,
-    unpainted_change,
+    change_from_scene,
 )
 from lightpaint.lighting.analysis.diagnosis import (
     Diagnosis,
@@ -54,9 +50,6 @@ INVISIBLE, MIN_CHANGE = 1.0, 0.3
 
 #: Largest share of a great change that may be missing before the answer counts as far.
 FAR_SHARE = 0.5
-
-#: Kinds of constraints that fix the level of a light.
-FIXING_KINDS: tuple[ConstraintKind, ...] = ("off", "lock")
 
 
 @keywords()
@@ -217,7 +210,8 @@ def compare_appearance(
     appearance = Appearance(delta_e, max(delta_e - error, 0.0), look.mean(look.difference(now)))
     if len(problem.views) > 1:
         return appearance
-    appearance = replace(appearance, unpainted_change=_unpainted_change(solution, look, predicted))
+    rest = change_from_scene(solution, look, solution.weights, predicted.image)
+    appearance = replace(appearance, unpainted_change=rest)
     if not missed.any():
         return appearance
     place, share = place_with_most_error(look, missed, light, grain)
@@ -254,24 +248,3 @@ def _with_local_lights(appearance: Appearance, solution: Solution, place: Place)
         has_strong_light=has_strong_light,
         held_lights=tuple(name for name in local_lights if name in limits),
     )
-
-
-def _unpainted_change(
-    solution: Solution, look: PaintComparison, predicted: Estimate
-) -> UnpaintedChange | None:
-    """Return the change of unpainted pixels; None if they may change freely.
-
-    Both pictures are sums of the same planes, so noise does not count as change. Lights fixed by
-    the user are fixed in both.
-    """
-    [target], basis = solution.problem.views.targets, solution.basis
-    if not target.over_look or target.everything:
-        return None
-    kinds = ConstraintsByLight.of(solution.problem.constraints, basis.lights).kinds()
-    reference_weights = basis.current_weights.copy()
-    for kind in FIXING_KINDS:
-        fixed_lights = list(kinds.get(kind, ()))
-        reference_weights[fixed_lights] = solution.weights[fixed_lights]
-    is_current = np.array_equal(reference_weights, basis.current_weights)
-    now = basis.current_look if is_current else basis.mix(reference_weights)
-    return unpainted_change(look, basis, target.importance > 0, now, predicted.image)

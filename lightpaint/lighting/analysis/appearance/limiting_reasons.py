@@ -21,7 +21,7 @@ from lightpaint.lighting.analysis.appearance.display_difference import PaintComp
 from lightpaint.lighting.analysis.appearance.pixel_sample import LimitGroup, PixelSample
 from lightpaint.lighting.analysis.appearance.unpainted_change import (
     UnpaintedChange,
-    unpainted_change,
+    change_from_scene,
 )
 from lightpaint.lighting.analysis.noise.noise_correction import correct_noise
 from lightpaint.lighting.constraints.constraints import Constraints
@@ -38,6 +38,9 @@ TIE_SHARE = 0.9
 
 #: Share of the gain without all reasons that a single one must have; else the reasons are joint.
 SINGLE_SHARE = 0.5
+
+#: Number of reasons whose effect is measured with all pixels: as many as sentences name.
+MAX_MEASURED = 2
 
 #: Share of the gain of all lights under a constraint that a few of them must have to be named
 #: alone, and the most lights of such a few.
@@ -62,12 +65,17 @@ class Loosening:
     Attributes:
         hold: Its strength; 0 if no weaker one does.
         share: The share of the error over the paint that it removes, measured with all pixels.
-        unpainted_change: Its change of unpainted pixels, compared with the current answer.
+        unpainted_change: The change of unpainted pixels under it, from the current scene, as
+            `Appearance.unpainted_change` will have it.
+        delta_e: Mean ΔE over the paint of the answer, and of that under this hold; None if unknown.
+        present_hold: The hold that it replaces; None if unknown.
     """
 
     hold: float
     share: float
     unpainted_change: UnpaintedChange | None
+    delta_e: tuple[float, float] | None = None
+    present_hold: float | None = None
 
 
 @dataclass(frozen=True)
@@ -78,10 +86,12 @@ class Reason:
         kind: `hold`, `colors` or `views`; or the kind of a constraint.
         names: Of the lights under the constraint, or of the views; none otherwise.
         share: The share of the error over the paint that vanishes without this reason alone; for
-            joint reasons, without all of them. By a sample of the pixels, or of all pixels for the
-            first reason that is no hold.
+            joint reasons, without all of them. By all pixels for the first `MAX_MEASURED` reasons,
+            by a sample of them for the others, and for a hold, which has a `loosening`.
         is_joint: Whether it is one of several whose release only helps together.
         loosening: For a hold, a weaker one that helps.
+        delta_e: Mean ΔE over the paint of the answer, and of that without this reason alone; None
+            if not measured.
     """
 
     kind: Literal["hold", "colors", "views"] | ConstraintKind
@@ -89,6 +99,7 @@ class Reason:
     share: float = 1.0
     is_joint: bool = False
     loosening: Loosening | None = None
+    delta_e: tuple[float, float] | None = None
 
     @property
     def is_by_hand(self) -> bool:
@@ -126,7 +137,7 @@ def reasons_of(solution: Solution) -> tuple[Reason, ...]:
     if (not reasons or reasons[0].share < SINGLE_SHARE * everything) and len(sample.groups) > 1:
         return _joint_reasons(sample, everything)
     measured = [
-        x if k and x.kind != "hold" else _measure(solution, sample, x)
+        x if k >= MAX_MEASURED and x.kind != "hold" else _measure(solution, sample, x)
         for k, x in enumerate(reasons)
     ]
     return tuple(x for x in measured if x is not None)
@@ -160,8 +171,10 @@ def _measure(solution: Solution, sample: PixelSample, reason: Reason) -> Reason 
             if _is_for_sample(problem)
             else released_weights(solution, constraints=released)
         )
-    share = _share_removed(solution, weights)
-    return None if share < MIN_SHARE else replace(reason, share=share)
+    effect = _effect(solution, weights)
+    if effect.share < MIN_SHARE:
+        return None
+    return replace(reason, share=effect.share, delta_e=effect.delta_e)
 
 
 def _is_for_sample(problem: Problem) -> bool:
@@ -169,10 +182,25 @@ def _is_for_sample(problem: Problem) -> bool:
     return len(problem.basis.lights) > MAX_SOLVED_LIGHTS
 
 
-def _share_removed(solution: Solution, weights: Doubles) -> float:
-    """Return the share of the error of `solution` that other weights (n, 3) remove."""
+@dataclass(frozen=True)
+class _Effect:
+    """The effect of other weights: the removed share of the error, and mean ΔE before and after.
+
+    rest: the change of unpainted pixels from the current scene.
+    """
+
+    share: float
+    delta_e: tuple[float, float]
+    rest: UnpaintedChange | None
+
+
+def _effect(solution: Solution, weights: Doubles) -> _Effect:
+    """Return the effect of weights (n, 3) in place of those of `solution`, with all pixels."""
     look = PaintComparison.of_problem(solution.problem)
-    return look.share_removed(*(solution.basis.mix(x) for x in (solution.weights, weights)))
+    before, after = (solution.basis.mix(x) for x in (solution.weights, weights))
+    now, then = (look.mean(look.difference(look.pixels(x))) for x in (before, after))
+    rest = change_from_scene(solution, look, weights, after)
+    return _Effect(look.share_removed(before, after), (now, then), rest)
 
 
 def _sort_reasons(reasons: Sequence[Reason]) -> list[Reason]:
@@ -242,12 +270,8 @@ def _find_loosening(solution: Solution, sample: PixelSample, full_gain: float) -
         if _is_for_sample(sample.problem)
         else released_weights(solution, fit=replace(sample.problem.fit, hold=hold))
     )
-    [target] = solution.problem.views.targets
-    basis = solution.basis
-    image, loosened_image = basis.mix(solution.weights), basis.mix(weights)
-    look = PaintComparison.of_problem(solution.problem)
-    change = unpainted_change(look, basis, target.importance > 0, image, loosened_image)
-    return Loosening(hold, look.share_removed(image, loosened_image), change)
+    effect = _effect(solution, weights)
+    return Loosening(hold, effect.share, effect.rest, effect.delta_e, sample.problem.fit.hold)
 
 
 def _weaker_hold(sample: PixelSample, gain: float) -> float:

@@ -7,14 +7,22 @@ import numpy as np
 from lightpaint.arrays import Bools, Doubles, Floats, Indices
 from lightpaint.basis.basis import Basis
 from lightpaint.colour.color_difference import ciede2000
+from lightpaint.lighting.analysis.appearance.constraint_kinds import (
+    ConstraintKind,
+    ConstraintsByLight,
+)
 from lightpaint.lighting.analysis.appearance.display_difference import PaintComparison
 from lightpaint.lighting.analysis.appearance.object_miss import NO_NAME
+from lightpaint.lighting.solution import Solution
 
 #: Smallest unpainted share of the picture for a place to be mentioned.
 MIN_PLACE = 0.01
 
 #: Regions along each side of the picture: left, middle, right.
 REGIONS = 3
+
+#: Kinds of constraints that fix the level of a light.
+FIXING_KINDS: tuple[ConstraintKind, ...] = ("off", "lock")
 
 
 @dataclass(frozen=True)
@@ -32,6 +40,28 @@ class UnpaintedChange:
     worst: float
     object: str = ""
     region: tuple[int, int] = (1, 1)
+
+
+def change_from_scene(
+    solution: Solution, look: PaintComparison, weights: Doubles, picture: Floats
+) -> UnpaintedChange | None:
+    """Return the change of unpainted pixels from the current scene; None if they may change freely.
+
+    solution: has the painting and the constraints. look: at the painting. picture: (h, w, 3)
+    linear, under lights of weights (n, 3). Both pictures are sums of the same planes, so noise does
+    not count as change. Lights fixed by the user are fixed in both.
+    """
+    [target], basis = solution.problem.views.targets, solution.basis
+    if not target.over_look or target.everything:
+        return None
+    kinds = ConstraintsByLight.of(solution.problem.constraints, basis.lights).kinds()
+    reference_weights = basis.current_weights.copy()
+    for kind in FIXING_KINDS:
+        fixed_lights = list(kinds.get(kind, ()))
+        reference_weights[fixed_lights] = weights[fixed_lights]
+    is_current = np.array_equal(reference_weights, basis.current_weights)
+    now = basis.current_look if is_current else basis.mix(reference_weights)
+    return unpainted_change(look, basis, target.importance > 0, now, picture)
 
 
 def unpainted_change(

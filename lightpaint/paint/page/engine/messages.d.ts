@@ -314,13 +314,14 @@ export interface EditState {
  *
  * kind: of the constraint; `reach` if there is none, but moving lights may help. names: its
  * lights. gain: share of the error that disappears without it; null if more is needed. hold: the
- * weaker hold to set.
+ * weaker hold to set. delta_e: mean ΔE over the paint now and without it; null if not known.
  */
 export interface Advice {
   kind: string;
   names: string[];
   gain: number | null;
   hold: number | null;
+  delta_e: [number, number] | null;
 }
 
 /**

@@ -31,10 +31,10 @@ export const en = {
     moreLights: 'More lights',
     letLightsChange: 'Let lights change',
     lights: '{count} lights',
-    loosenTheHoldTo: 'Loosen the hold to {number}',
+    loosenTheHoldTo: 'Loosen the hold from {now} to {number}',
     ignoreUnpaintedParts: 'Ignore unpainted parts',
-    lessDifference: ': {value} % less difference',
-    removesOfTheDifference: ' removes {value} % of the difference between answer and painting',
+    deltaeInsteadOf: ': ΔE {after} instead of {before}',
+    bringsTheMeanDeltae: ' brings the mean ΔE over the paint from {before} to {after}',
     showsAPreviewFirst: '{name}{gain}. Shows a preview first.',
     letLightsMove: 'Let lights move',
     searchForPlacesAndDirectionsOf:

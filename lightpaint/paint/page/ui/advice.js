@@ -54,11 +54,12 @@ function nameOf({ kind, names }, ui, maxLength = Infinity) {
   return `${BUTTON_WORDS[kind][names.length === 1 ? 0 : 1]} ${lights}`;
 }
 
-/** Return the title of the preview. @param {Cause} cause @param {string} name */
-function titleOf({ kind, hold }, name) {
+/** Return the title of the preview. @param {Cause} cause @param {string} name @param {Ui} ui */
+function titleOf({ kind, hold }, name, ui) {
   if (kind !== 'hold') return name;
+  const now = numberText(ui.effectiveSettings.hold, 2);
   return hold
-    ? fill(words.advice.loosenTheHoldTo, { number: numberText(hold, 2) })
+    ? fill(words.advice.loosenTheHoldTo, { now, number: numberText(hold, 2) })
     : words.advice.ignoreUnpaintedParts;
 }
 
@@ -105,16 +106,18 @@ export function AdviceButton({ ui, app }) {
   const change = advice && changeOf(advice, ui, app.session);
   if (!advice || !change) return null;
   const name = nameOf(advice, ui);
+  // The numbers beside the sentence: ΔE as it is, and as it will be.
+  const [before, after] = (advice.delta_e ?? []).map((x) => numberText(x, 2));
   /** @param {string} text */
   const withGain = (text) =>
-    advice.gain === null ? '' : fill(text, { value: Math.round(100 * advice.gain) });
-  const gain = withGain(words.advice.lessDifference);
+    after === undefined || after === before ? '' : fill(text, { before, after });
+  const gain = withGain(words.advice.deltaeInsteadOf);
   return html`<${Button} label=${`${nameOf(advice, ui, BUTTON_NAME_MAX_LENGTH)}${gain}`} class="help"
     tip=${fill(words.advice.showsAPreviewFirst, {
       name,
-      gain: withGain(words.advice.removesOfTheDifference),
+      gain: withGain(words.advice.bringsTheMeanDeltae),
     })}
-    act=${() => app.session.preview(titleOf(advice, name), change)} />`;
+    act=${() => app.session.preview(titleOf(advice, name, ui), change)} />`;
 }
 
 /** The button that lets lights move, where their current places come no closer.
