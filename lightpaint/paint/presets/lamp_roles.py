@@ -201,6 +201,13 @@ class LampRoles:
         """(n,) how far from the left, below 0, or the right, above, a lamp lights, -1 to 1."""
         return np.array([self._side(x) for x in self.light])
 
+    @cached_property
+    def middles(self) -> Doubles:
+        """(n,) where the light of a lamp falls: -1 at the left of the picture, 1 at its right."""
+        x = np.linspace(-1, 1, self.light.shape[2])
+        columns = self.light.sum(axis=1, dtype=np.float64)
+        return np.asarray(columns @ x / np.maximum(columns.sum(axis=1), 1e-30))
+
     def level(self, lamps: Bools) -> float:
         """Return the light of lamps where they shine, relative to that of the brighter half."""
         light = self.light[lamps].sum(axis=0)

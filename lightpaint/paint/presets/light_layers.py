@@ -89,6 +89,12 @@ def white_tint(basis: Basis, lamps: Bools, amounts: Doubles, white: Doubles | No
     return np.asarray(gains / luminance(gains))
 
 
+def is_divided(basis: Basis, lamps: Bools) -> bool:
+    """Return True if some lamps that are on belong to a group, and others do not."""
+    is_on = basis.current_weights.any(axis=1)
+    return bool((is_on & lamps).any() and (is_on & ~lamps).any())
+
+
 def limited_gain(gain: float) -> float:
     """Return a gain within the stops by which a layer changes light."""
     return float(np.clip(gain, 2.0**MIN_STOPS, 2.0**MAX_STOPS))

@@ -19,6 +19,7 @@ from lightpaint.paint.layers.selection import FULL, selection_mask
 from lightpaint.paint.presets.lamp_roles import LampRoles
 from lightpaint.paint.presets.light_layers import (
     LampGroup,
+    is_divided,
     layers_of,
     limited_gain,
     masks_of,
@@ -53,7 +54,7 @@ class PresetLayers:
         """
         shares = [
             light_share(canvas.basis, group.lamps, factor)
-            if _is_divided(canvas.basis, group.lamps)
+            if is_divided(canvas.basis, group.lamps)
             else _area(areas, change.area)
             for group, change in zip(self.groups, self.changes, strict=True)
         ]
@@ -76,7 +77,7 @@ def find_layers(preset: LightingPreset, canvas: Canvas, subject: str | None) -> 
         chosen |= lamps[-1]
     rest = _group(preset.rest, basis, roles, ~chosen)
     found = [(x, k) for x, k in zip(preset.changes, lamps, strict=True) if k.any()]
-    if not _is_divided(basis, chosen):
+    if not is_divided(basis, chosen):
         found = list(zip(preset.changes, lamps, strict=True))[-1:]
     groups = tuple(_group(x, basis, roles, k) for x, k in found)
     return PresetLayers(rest, [x for x, _ in found], groups, name)
@@ -88,12 +89,6 @@ def _group(change: LampRequest, basis: Basis, roles: LampRoles, lamps: Bools) ->
     white = None if change.kelvin is None else kelvin_to_rgb(change.kelvin)
     tint = white_tint(basis, lamps if lamps.any() else ~lamps, roles.amounts, white)
     return LampGroup(change.name, lamps, limited_gain(change.level / level), tint)
-
-
-def _is_divided(basis: Basis, lamps: Bools) -> bool:
-    """Return True if some lamps that are on belong to a group, and others do not."""
-    is_on = basis.current_weights.any(axis=1)
-    return bool((is_on & lamps).any() and (is_on & ~lamps).any())
 
 
 def _area(areas: ViewAreas, name: Area) -> Mask:

@@ -6,7 +6,7 @@ from functools import cached_property
 import numpy as np
 import numpy.typing as npt
 
-from lightpaint.arrays import Bools, Floats
+from lightpaint.arrays import Bools, Doubles, Floats
 from lightpaint.colour.color import luminance
 from lightpaint.images.resampling import resampled
 from lightpaint.paint.presets.view_areas import soft_bands, soft_spot
@@ -17,6 +17,19 @@ TONE_SIDE = 64
 #: Stops below the bright quarter of a picture at which all is equally dark: 8 bits tell no more.
 DARKEST = 7.0
 
+#: Quantiles of luminance that say how deep shadows are and how high lights.
+QUANTILES = (0.1, 0.25, 0.5, 0.75, 0.95, 0.97)
+
+#: Quantiles of luminance from which on parts are the brightest, and up to which they are dark.
+LIT_QUANTILE, DARK_QUANTILE = 0.88, 0.35
+
+#: Stops below the highlights down to which a part is nearly as bright.
+NEARLY_BRIGHT = 1.5
+
+#: Power of the mean by which the colour of light is told from that of surfaces (Finlayson and
+#: Trezzi 2004): the higher, the more the brightest pixels count, which are of the palest surfaces.
+SHADES_POWER = 6.0
+
 Weights = npt.NDArray[np.floating]
 
 
@@ -26,6 +39,27 @@ class Tone:
 
     level: float
     chroma: npt.NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class LightTones:
+    """The light of a picture.
+
+    levels: log2 of luminance at QUANTILES. lit, shadows: (3,), log2 of RGB over luminance of the
+    light in its brightest parts, and in its darker ones. sides: the first at its left and at its
+    right. bright_share: share of the picture that is nearly as bright as its highlights.
+    """
+
+    levels: Doubles
+    lit: Doubles
+    shadows: Doubles
+    sides: tuple[Doubles, Doubles]
+    bright_share: float
+
+    @property
+    def contrast(self) -> float:
+        """Stops from shadows to lit parts."""
+        return float(self.levels[-2] - self.levels[1])
 
 
 class Tones:
@@ -59,6 +93,39 @@ class Tones:
         chroma = np.log2(self._light) - levels[..., None]
         shares = counts / total
         return Tone(float((shares * levels).sum()), np.einsum("yx,yxc->c", shares, chroma))
+
+    @cached_property
+    def light_tones(self) -> LightTones:
+        """The light of the picture."""
+        known = self.share > 0.5
+        known = known if known.any() else np.ones_like(known)
+        levels = self._levels[known]
+        bright, dark = (float(np.quantile(levels, x)) for x in (LIT_QUANTILE, DARK_QUANTILE))
+        quantiles = np.quantile(levels, QUANTILES)
+        left = np.broadcast_to(np.arange(self.size[1]) < self.size[1] / 2, self.size)
+        middle = float(np.median(levels))
+        return LightTones(
+            quantiles,
+            self._illuminant(known & (self._levels >= bright)),
+            self._illuminant(known & (self._levels <= dark)),
+            (
+                self._illuminant(known & left & (self._levels >= middle)),
+                self._illuminant(known & ~left & (self._levels >= middle)),
+            ),
+            float(np.mean(levels > quantiles[-1] - NEARLY_BRIGHT)),
+        )
+
+    @cached_property
+    def level(self) -> float:
+        """Mean of log2 luminance."""
+        return float((self.share * self._levels).sum() / max(float(self.share.sum()), 1e-6))
+
+    def _illuminant(self, where: Bools) -> Doubles:
+        """Return the colour of the light in some pixels, (3,), by shades of grey."""
+        light = self._light[where] if where.any() else self._light.reshape(-1, 3)
+        means = np.mean((light / float(light.max())) ** SHADES_POWER, axis=0)
+        color = np.maximum(means ** (1 / SHADES_POWER), 1e-2)
+        return np.asarray(np.log2(color / luminance(color)))
 
     @cached_property
     def whole(self) -> Weights:
