@@ -17,10 +17,10 @@ A preset is judged by the lighting of a painting that somebody made of what it i
 what it asks for, and the answer.
 
 With --known the references are of another place: `courtyard.py`, under six lightings. Its light
-alone, on grey surfaces, says by how many stops lit parts are above shadows, and by how many they are
-warmer, as log2 of red over blue. Judged is whether the light of the scene, its picture divided by
-its albedo, moves there: the mean of each before, as asked for, in the answer, and as it is in the
-reference; and the share of the way, by projection over all references.
+alone, on grey surfaces, says by how many stops lit parts are above shadows, and by how many they
+are warmer, as log2 of red over blue. Judged is whether the light of the scene, its picture divided
+by its albedo, moves there: both before, as asked for, in the answer, and in the reference; and the
+share of the way, by projection over all references.
 """
 
 import argparse

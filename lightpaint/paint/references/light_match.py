@@ -32,7 +32,7 @@ NEUTRAL_KELVIN = 5300.0
 SAME_PLACE = (0.3, 0.8)
 
 #: Most and least stops by which the light of lamps changes, and a channel of it.
-MAX_STOPS, MIN_STOPS, MAX_TINT = 4.0, -5.0, 2.2
+MAX_STOPS, MIN_STOPS, MAX_TINT = 4.0, -5.0, 4.2
 
 #: Changes that nobody sees: these are not asked for.
 SEEN_STOPS, SEEN_TINT = 0.08, 0.04
@@ -40,6 +40,10 @@ SEEN_STOPS, SEEN_TINT = 0.08, 0.04
 #: Share of a reference that is nearly as bright as its highlights, up to which its key is a pool of
 #: light; and the least contrast of such a reference, in stops.
 POOL_SHARE, POOL_STOPS = 0.3, 2.5
+
+#: Contrast of light, in stops, below which a reference has no key, and below which it is softer
+#: than lamps alone may make a picture.
+EVEN_STOPS, SOFT_STOPS = 0.35, 1.0
 
 #: Difference of the colours of light at the left and at the right, in stops of a channel, from
 #: which on a reference has a key of each.
@@ -78,6 +82,21 @@ def has_two_keys(reference: LightTones) -> bool:
     return float(np.abs(left - right).max()) >= TWO_KEYS
 
 
+def contrast_of_light(reference: LightTones) -> float:
+    """Return the stops from shadows to lit parts that are of the light of a reference."""
+    return max(reference.contrast - SURFACE_STOPS, LEAST_STOPS) + _cool_shadows(reference)
+
+
+def is_even(reference: LightTones) -> bool:
+    """Return True if a reference shows hardly any key."""
+    return contrast_of_light(reference) < EVEN_STOPS
+
+
+def is_soft(reference: LightTones) -> bool:
+    """Return True if a reference is soft: its shadows and lit parts are compared, too."""
+    return contrast_of_light(reference) < SOFT_STOPS
+
+
 def match_light(
     reference: LightTones, picture: LightTones, light: LightTones, key: float, fill: float
 ) -> LightMatch:
@@ -91,13 +110,12 @@ def match_light(
     """
     other = _otherness(reference, picture)
     now = float(np.log2((key + fill) / fill)) if fill and key else 0.0
-    meant = max(reference.contrast - SURFACE_STOPS, LEAST_STOPS) + _cool_shadows(reference)
+    meant = contrast_of_light(reference)
     stops = now + other * (meant - now) + (1 - other) * (reference.contrast - picture.contrast)
     lit = (key + fill) * 2.0 ** -_darker(reference, picture)
     new_fill = lit * 2.0 ** -max(stops, LEAST_STOPS)
-    half = 0.5 * other
-    shadows = half * light.shadows + (1 - half) * picture.shadows
-    bright = half * light.lit + (1 - half) * picture.lit
+    shadows = other * light.shadows + (1 - other) * picture.shadows
+    bright = other * light.lit + (1 - other) * picture.lit
     theirs = reference.sides if has_two_keys(reference) else (reference.lit,)
     return LightMatch(
         _stops(lit - new_fill, key),

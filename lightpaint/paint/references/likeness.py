@@ -90,6 +90,15 @@ WHOLE_AREA = LightArea(
     "Everything", lambda tones: tones.whole, lambda view: view.whole, has_level=False
 )
 
+#: Shadows and lit parts of the present picture.
+TONE_AREAS = tuple(
+    LightArea(name, seen, mask, has_color=False, max_stops=1.5)
+    for name, seen, mask in (
+        ("Shadows", lambda tones: tones.shadows, lambda view: view.shadows),
+        ("Lit parts", lambda tones: tones.lit, lambda view: view.lit),
+    )
+)
+
 #: The bands are compared by brightness alone: their colours are those of floors and ceilings.
 BAND_AREAS = tuple(
     LightArea(name, partial(_band, k), partial(_view_band, k), has_color=False, max_stops=0.45)

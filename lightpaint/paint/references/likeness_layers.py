@@ -30,6 +30,8 @@ from lightpaint.paint.references.light_match import (
     gains_of,
     has_pool,
     has_two_keys,
+    is_even,
+    is_soft,
     match_light,
 )
 from lightpaint.paint.references.likeness import (
@@ -37,6 +39,7 @@ from lightpaint.paint.references.likeness import (
     CHANGED_RADIUS,
     PART_AREAS,
     SEEN_RADIUS,
+    TONE_AREAS,
     WHOLE_AREA,
     LightArea,
     find_changes,
@@ -84,7 +87,7 @@ def _open_likeness(
         reference,
         light,
         areas,
-        compared_areas(request),
+        compared_areas(request, reference),
         matches_brightness=request.matches_brightness,
         keeps_brightness=request.areas == "parts",
     )
@@ -162,7 +165,11 @@ def key_lamps(canvas: Canvas, roles: LampRoles, reference: LightTones) -> list[B
         pair = [usable & side for side in (left, ~left)]
         if all(x.any() for x in pair):
             return pair
-    key = (roles.candle if has_pool(reference) else roles.sun) & usable
+    key = roles.sun & usable
+    if has_pool(reference):
+        key = roles.candle & usable
+    elif is_even(reference) and (roles.hard & usable).any():
+        key = roles.hard & usable
     keys = [key, key] if has_two_keys(reference) else [key]
     return keys
 
@@ -204,15 +211,14 @@ def _masks(canvas: Canvas, makers: Sequence[Callable[[Canvas, ViewAreas], Mask]]
     return [maker(canvas, found) * selected for maker in makers]
 
 
-def compared_areas(request: LookLike) -> Sequence[LightArea]:
+def compared_areas(request: LookLike, reference: Tones) -> Sequence[LightArea]:
     """Return the areas that a request compares, beside key and fill; the lowest layers first.
 
     Raises PaintError for pairs without any.
     """
-    if request.areas == "whole":
-        return ()
-    if request.areas == "regions":
-        return BAND_AREAS
+    if request.areas in ("whole", "regions"):
+        tones = TONE_AREAS if is_soft(reference.light_tones) else ()
+        return (*tones, *(BAND_AREAS if request.areas == "regions" else ()))
     if request.areas == "parts":
         return (WHOLE_AREA, *PART_AREAS)
     if not request.pairs:
