@@ -162,7 +162,7 @@ def _white_changes() -> Doubles:
 
 
 def _otherness(reference: LightTones, picture: LightTones) -> float:
-    """Return 0 for pictures of one place under much the same light, 1 for others."""
+    """Return 0 for pictures of much the same light, 1 for others."""
     levels = reference.levels - picture.levels
     differences = (
         levels - np.median(levels),

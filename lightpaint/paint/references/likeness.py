@@ -90,20 +90,23 @@ WHOLE_AREA = LightArea(
     "Everything", lambda tones: tones.whole, lambda view: view.whole, has_level=False
 )
 
-#: Shadows and lit parts of the present picture.
-TONE_AREAS = tuple(
-    LightArea(name, seen, mask, has_color=False, max_stops=1.5)
-    for name, seen, mask in (
-        ("Shadows", lambda tones: tones.shadows, lambda view: view.shadows),
-        ("Lit parts", lambda tones: tones.lit, lambda view: view.lit),
-    )
+TONE_AREAS = (
+    LightArea("Shadows", lambda tones: tones.shadows, lambda view: view.shadows),
+    LightArea("Lit parts", lambda tones: tones.lit, lambda view: view.lit),
 )
 
-#: The bands are compared by brightness alone: their colours are those of floors and ceilings.
 BAND_AREAS = tuple(
-    LightArea(name, partial(_band, k), partial(_view_band, k), has_color=False, max_stops=0.45)
+    LightArea(name, partial(_band, k), partial(_view_band, k))
     for k, name in enumerate(("Top", "Middle", "Bottom"))
 )
+
+
+def of_another_place(areas: Sequence[LightArea], max_stops: float) -> tuple[LightArea, ...]:
+    """Return areas that are compared with another place, by brightness alone and up to some stops.
+
+    Their colours there are those of other floors and ceilings.
+    """
+    return tuple(replace(area, has_color=False, max_stops=max_stops) for area in areas)
 
 
 def spot_area(name: str, there: Point, here: Point, seen: float, changed: float) -> LightArea:

@@ -43,11 +43,20 @@ from lightpaint.paint.references.likeness import (
     WHOLE_AREA,
     LightArea,
     find_changes,
+    of_another_place,
     spot_area,
 )
 from lightpaint.paint.references.reference_table import ReferenceTable
 from lightpaint.paint.references.tones import LightTones, Tones
 from lightpaint.paint.store.canvas_pixels import Pixels, Region
+
+#: Correlation of the edges of two pictures from which on they show one place: pictures of the
+#: shipped scenes under other lightings have .8 and more, those of other places .15 at most.
+SAME_PLACE = 0.5
+
+#: Most stops by which tones and bands of the picture are made brighter or darker for a reference
+#: of another place.
+TONE_STOPS, BAND_STOPS = 1.5, 0.45
 
 #: Approximate pixels of the longer side of the picture in which changes are found.
 FINDING_SIDE = 160
@@ -80,14 +89,15 @@ def _open_likeness(
     first = canvases.next_layer
     layers: list[Layer] = []
     makers: list[Callable[[Canvas, ViewAreas], Mask]] = []
-    is_of_light = request.areas in ("whole", "regions")
-    if is_of_light:
+    seen = Tones(light, areas.whole > 0).light_tones
+    is_same_place = reference.light_tones.resembles(seen) >= SAME_PLACE
+    if request.areas in ("whole", "regions") and not is_same_place:
         light = _add_light(canvas, request, reference, light, areas, layers, makers)
     changes = find_changes(
         reference,
         light,
         areas,
-        compared_areas(request, reference),
+        compared_areas(request, reference, is_same_place=is_same_place),
         matches_brightness=request.matches_brightness,
         keeps_brightness=request.areas == "parts",
     )
@@ -211,14 +221,20 @@ def _masks(canvas: Canvas, makers: Sequence[Callable[[Canvas, ViewAreas], Mask]]
     return [maker(canvas, found) * selected for maker in makers]
 
 
-def compared_areas(request: LookLike, reference: Tones) -> Sequence[LightArea]:
+def compared_areas(
+    request: LookLike, reference: Tones, *, is_same_place: bool
+) -> Sequence[LightArea]:
     """Return the areas that a request compares, beside key and fill; the lowest layers first.
 
     Raises PaintError for pairs without any.
     """
     if request.areas in ("whole", "regions"):
+        bands = BAND_AREAS if request.areas == "regions" else ()
+        if is_same_place:
+            return (WHOLE_AREA, *TONE_AREAS, *bands)
         tones = TONE_AREAS if is_soft(reference.light_tones) else ()
-        return (*tones, *(BAND_AREAS if request.areas == "regions" else ()))
+        other_tones = of_another_place(tones, TONE_STOPS)
+        return (*other_tones, *of_another_place(bands, BAND_STOPS))
     if request.areas == "parts":
         return (WHOLE_AREA, *PART_AREAS)
     if not request.pairs:

@@ -23,6 +23,9 @@ QUANTILES = (0.1, 0.25, 0.5, 0.75, 0.95, 0.97)
 #: Quantiles of luminance from which on parts are the brightest, and up to which they are dark.
 LIT_QUANTILE, DARK_QUANTILE = 0.88, 0.35
 
+#: Height and width of the small picture by whose edges two places are told apart.
+DETAIL_SIZE = (24, 36)
+
 #: Stops below the highlights down to which a part is nearly as bright.
 NEARLY_BRIGHT = 1.5
 
@@ -47,7 +50,8 @@ class LightTones:
 
     levels: log2 of luminance at QUANTILES. lit, shadows: (3,), log2 of RGB over luminance of the
     light in its brightest parts, and in its darker ones. sides: the first at its left and at its
-    right. bright_share: share of the picture that is nearly as bright as its highlights.
+    right. bright_share: share of the picture that is nearly as bright as its highlights. detail:
+    its edges in a small picture, of mean 0 and variance 1, by which places are told apart.
     """
 
     levels: Doubles
@@ -55,6 +59,13 @@ class LightTones:
     shadows: Doubles
     sides: tuple[Doubles, Doubles]
     bright_share: float
+
+    detail: Doubles
+
+    def resembles(self, other: "LightTones") -> float:
+        """Return the correlation of the edges of two pictures, one of them mirrored or not."""
+        mirrored = other.detail[:, ::-1]
+        return max(float(np.mean(self.detail * x)) for x in (other.detail, mirrored))
 
     @property
     def contrast(self) -> float:
@@ -113,6 +124,7 @@ class Tones:
                 self._illuminant(known & ~left & (self._levels >= middle)),
             ),
             float(np.mean(levels > quantiles[-1] - NEARLY_BRIGHT)),
+            _detail(self._levels),
         )
 
     @cached_property
@@ -154,3 +166,17 @@ class Tones:
     def _quantile(self, values: npt.NDArray[np.floating], share: float) -> float:
         known = values[self.share > 0.5]
         return float(np.quantile(known, share)) if known.size else 0.0
+
+
+def _detail(levels: Doubles) -> Doubles:
+    """Return what a picture of levels, resampled to DETAIL_SIZE, has beyond its surroundings."""
+    planes = np.repeat(levels[..., None], 3, axis=2).astype(np.float32)
+    small = resampled(planes, DETAIL_SIZE)[..., 0].astype(np.float64)
+    rows, columns = (
+        np.abs(np.subtract.outer(np.arange(n), np.arange(n))) <= 2 for n in small.shape
+    )
+    across = columns / columns.sum(axis=0)
+    down = rows / rows.sum(axis=1, keepdims=True)
+    detail = small - down @ small @ across
+    detail -= detail.mean()
+    return np.asarray(detail / max(float(detail.std()), 1e-9))
