@@ -43,11 +43,11 @@ POOL_SHARE, POOL_STOPS = 0.3, 2.5
 
 #: Contrast of light, in stops, below which a reference has no key, and below which it is softer
 #: than lamps alone may make a picture.
-EVEN_STOPS, SOFT_STOPS = 0.35, 1.0
+EVEN_STOPS, SOFT_STOPS = 0.25, 1.0
 
 #: Difference of the colours of light at the left and at the right, in stops of a channel, from
-#: which on a reference has a key of each.
-TWO_KEYS = 1.0
+#: which on a reference has a key of each; and the least contrast of their light, in stops.
+TWO_KEYS, TWO_KEYS_STOPS = 1.0, 1.0
 
 
 @dataclass(frozen=True)
@@ -84,7 +84,8 @@ def has_two_keys(reference: LightTones) -> bool:
 
 def contrast_of_light(reference: LightTones) -> float:
     """Return the stops from shadows to lit parts that are of the light of a reference."""
-    return max(reference.contrast - SURFACE_STOPS, LEAST_STOPS) + _cool_shadows(reference)
+    least = TWO_KEYS_STOPS if has_two_keys(reference) else LEAST_STOPS
+    return max(reference.contrast - SURFACE_STOPS, least) + _cool_shadows(reference)
 
 
 def is_even(reference: LightTones) -> bool:
@@ -116,12 +117,15 @@ def match_light(
     new_fill = lit * 2.0 ** -max(stops, LEAST_STOPS)
     shadows = other * light.shadows + (1 - other) * picture.shadows
     bright = other * light.lit + (1 - other) * picture.lit
-    theirs = reference.sides if has_two_keys(reference) else (reference.lit,)
+    theirs: tuple[Doubles, ...] = (reference.lit,)
+    fill_color = reference.shadows - shadows
+    if has_two_keys(reference):
+        theirs, fill_color = reference.sides, np.mean(reference.sides, axis=0) - bright
     return LightMatch(
         _stops(lit - new_fill, key),
         _stops(new_fill, fill),
         tuple(_limited(x - bright) for x in theirs),
-        _limited(reference.shadows - shadows),
+        _limited(fill_color),
     )
 
 

@@ -29,6 +29,9 @@ DETAIL_SIZE = (24, 36)
 #: Stops below the highlights down to which a part is nearly as bright.
 NEARLY_BRIGHT = 1.5
 
+#: Share of a side that has to be nearly as bright, to have a key of its own.
+LEAST_SIDE = 0.1
+
 #: Power of the mean by which the colour of light is told from that of surfaces (Finlayson and
 #: Trezzi 2004): the higher, the more the brightest pixels count, which are of the palest surfaces.
 SHADES_POWER = 6.0
@@ -114,16 +117,13 @@ class Tones:
         bright, dark = (float(np.quantile(levels, x)) for x in (LIT_QUANTILE, DARK_QUANTILE))
         quantiles = np.quantile(levels, QUANTILES)
         left = np.broadcast_to(np.arange(self.size[1]) < self.size[1] / 2, self.size)
-        middle = float(np.median(levels))
+        is_bright = known & (self._levels > quantiles[-1] - NEARLY_BRIGHT)
         return LightTones(
             quantiles,
             self._illuminant(known & (self._levels >= bright)),
             self._illuminant(known & (self._levels <= dark)),
-            (
-                self._illuminant(known & left & (self._levels >= middle)),
-                self._illuminant(known & ~left & (self._levels >= middle)),
-            ),
-            float(np.mean(levels > quantiles[-1] - NEARLY_BRIGHT)),
+            (self._side(is_bright, left), self._side(is_bright, ~left)),
+            float(is_bright.sum() / known.sum()),
             _detail(self._levels),
         )
 
@@ -131,6 +131,13 @@ class Tones:
     def level(self) -> float:
         """Mean of log2 luminance."""
         return float((self.share * self._levels).sum() / max(float(self.share.sum()), 1e-6))
+
+    def _side(self, is_bright: Bools, side: Bools) -> Doubles:
+        """Return the colour of the light, (3,), in the bright parts of a side; of all if it has
+        hardly any.
+        """
+        found = is_bright & side
+        return self._illuminant(found if found.sum() >= LEAST_SIDE * side.sum() else is_bright)
 
     def _illuminant(self, where: Bools) -> Doubles:
         """Return the colour of the light in some pixels, (3,), by shades of grey."""
