@@ -13,12 +13,15 @@ import pytest
 from PIL import Image
 
 import lightpaint as lp
-from lightpaint.colour.color import luminance
+from lightpaint.basis.lights import Lights
+from lightpaint.colour.color import kelvin_to_rgb, luminance
 from lightpaint.errors import ImageError, PaintError
 from lightpaint.paint import protocol
 from lightpaint.paint.protocol import LookLike, PlacePair
+from lightpaint.paint.references.light_match import contrast_of_light, match_light
 from lightpaint.paint.references.reference_file import MAX_SIDE, read_reference
 from lightpaint.paint.references.reference_table import MAX_REFERENCES, ReferenceTable
+from lightpaint.paint.references.tones import LightTones
 from lightpaint.paint.session.session import Session
 from lightpaint.paint.store.history_steps import Identity
 from lightpaint.paint.store.store import MemoryStore, Store
@@ -259,6 +262,83 @@ def test_regions_are_of_all_views_and_places_of_one(make_basis: Any, areas: str)
     ask(session, looks[1] * np.array([1.3, 1, 0.5]), areas, view=1)
     first, second = (view.importance.any() for view in session.views)
     assert (first, second) == (areas == "regions", True)
+
+
+def lit_room(make_basis: Any) -> lp.Basis:
+    """A wall under an even sky, with a patch of sun at its left and one of a spot at its right."""
+    x = np.mgrid[:H, :W][1] / W
+    lamps = {
+        "sky": ("constant", 0.5 * np.ones((H, W))),
+        "sun": ("directional", np.where(x < 0.25, 0.5, 0.005)),
+        "spot": ("spot", np.where(np.abs(x - 0.85) < 0.1, 0.4, 0.004)),
+    }
+    images = [light[..., None] * np.ones(3) for _, light in lamps.values()]
+    basis: lp.Basis = make_basis(
+        images=np.array(images), names=list(lamps), emission=[[0.3] * 3] * 3
+    )
+    lights = [
+        replace(light, plugin=plugin)
+        for light, (plugin, _) in zip(basis.lights, lamps.values(), strict=True)
+    ]
+    return replace(basis, lights=Lights.of(lights))
+
+
+def other_place(left: list[float], right: list[float]) -> np.ndarray:
+    """Return a picture of another place: a pattern, with other light at the left than the right."""
+    y, x = np.mgrid[:H, :W]
+    pattern = 0.8 + 0.2 * ((x // 3 + y // 5) % 2)
+    return np.where((x < 0.5 * W)[..., None], left, right) * pattern[..., None]
+
+
+def test_a_golden_hour_gives_the_sun_warm_light_and_dims_the_rest(make_basis: Any) -> None:
+    session = session_in(lit_room(make_basis))
+    ask(session, other_place([0.9, 0.55, 0.2], [0.06, 0.065, 0.08]))
+    view = session.views[0]
+    ratio = view.image / view.current
+    warmth = np.log2(ratio[..., 0] / ratio[..., 2])
+    assert warmth[:, :12].mean() > 1
+    assert abs(warmth[:, 24:40]).mean() < 0.5
+    asked = stops(session)
+    assert asked[:, 24:40].mean() < -1.2
+    assert asked[:, :12].mean() - asked[:, 24:40].mean() > 1.5
+    assert asked[:, -12:-8].mean() < -0.8
+    names = [layer.name for layer in session.views.layers.layers]
+    assert names[1:3] == ["Fill light", "Key light"]
+
+
+def test_light_of_two_colours_comes_from_lamps_at_both_sides(make_basis: Any) -> None:
+    session = session_in(lit_room(make_basis))
+    ask(session, other_place([0.8, 0.05, 0.5], [0.05, 0.4, 0.8]), "whole")
+    view = session.views[0]
+    ratio = np.log2(view.image / view.current)
+    left, right = ratio[:, :12].mean(axis=(0, 1)), ratio[:, -12:-8].mean(axis=(0, 1))
+    assert left[0] - left[1] > right[0] - right[1] + 1
+
+
+def light_of(levels: list[float], lit: list[float], shadows: list[float]) -> LightTones:
+    edges = np.zeros((2, 2))
+    sides = np.array(lit), np.array(lit)
+    return LightTones(np.array(levels), np.array(lit), np.array(shadows), sides, 0.5, edges)
+
+
+def test_key_and_fill_get_the_contrast_of_the_reference_and_lit_parts_stay() -> None:
+    reference = light_of([-4, -3, -1, -0.2, 0, 0], [0.8, -0.2, -1.5], [0.2, 0, -0.6])
+    picture = light_of([-3, -2.5, -2, -1, 0, 0.2], [0, 0, 0], [0, 0, 0])
+    match = match_light(reference, picture, picture, 0.3, 0.9)
+    key, fill = 0.3 * 2**match.key_stops, 0.9 * 2**match.fill_stops
+    np.testing.assert_allclose(key + fill, 0.3 + 0.9)
+    np.testing.assert_allclose(np.log2((key + fill) / fill), contrast_of_light(reference))
+    warmth = match.key_tints[0][0] - match.key_tints[0][2]
+    assert warmth == pytest.approx(2.3, abs=0.05)
+
+
+def test_a_change_of_white_has_no_green_in_it() -> None:
+    reference = light_of([-3, -2.5, -2, -1, 0, 0.2], [-0.3, 0.12, 0.35], [-0.3, 0.12, 0.35])
+    picture = light_of([-3, -2.5, -2, -1, 0, 0.2], [0, 0, 0], [0, 0, 0])
+    [tint] = match_light(reference, picture, picture, 0.3, 0.9).key_tints
+    kelvin = 1e6 / np.arange(60, 200)
+    whites = np.log2([kelvin_to_rgb(x) / kelvin_to_rgb(5300) for x in kelvin])
+    assert np.abs(whites - tint).max(axis=1).min() < 0.02
 
 
 def picture(size: tuple[int, int] = (24, 40)) -> np.ndarray:

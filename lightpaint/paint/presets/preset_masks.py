@@ -1,11 +1,13 @@
 """Presets on the views of a session: the masks of their layers, and what they ask for."""
 
 from collections.abc import Mapping, Sequence
-from dataclasses import replace
+from dataclasses import dataclass, replace
 
 import numpy as np
 
-from lightpaint.arrays import Floats
+from lightpaint.arrays import Bools, Floats
+from lightpaint.basis.basis import Basis
+from lightpaint.colour.color import kelvin_to_rgb
 from lightpaint.errors import PaintError
 from lightpaint.images.object_map import Objects
 from lightpaint.images.pixel_blocks import block_mean
@@ -14,23 +16,84 @@ from lightpaint.paint.layers.canvases import Canvases
 from lightpaint.paint.layers.composition import compose_layer
 from lightpaint.paint.layers.layer import MAX_NAME_LENGTH, Layer
 from lightpaint.paint.layers.selection import FULL, selection_mask
-from lightpaint.paint.presets.presets import LightingPreset, find_preset, layers_of
+from lightpaint.paint.presets.lamp_roles import LampRoles
+from lightpaint.paint.presets.light_layers import (
+    LampGroup,
+    is_divided,
+    layers_of,
+    limited_gain,
+    masks_of,
+    white_tint,
+)
+from lightpaint.paint.presets.presets import Area, LampRequest, LightingPreset, find_preset
 from lightpaint.paint.presets.view_areas import Mask, ViewAreas
+from lightpaint.paint.presets.view_light import find_roles, light_share
 from lightpaint.paint.store.canvas_pixels import Pixels, Region, slices
 
 #: Steps of coverage in a mask, which are not seen, and which a session file packs well.
-MASK_STEPS = 256
+MASK_STEPS = 4096
 
 
-def preset_masks(preset: LightingPreset, canvas: Canvas, subject: str | None) -> list[Mask]:
-    """Return the mask (h, w) of each of a preset's layers in a view, within its selection.
+@dataclass(frozen=True)
+class PresetLayers:
+    """A preset for the lamps of a scene: its layers before they have ids, and their areas."""
+
+    rest: LampGroup
+    changes: Sequence[LampRequest]
+    groups: tuple[LampGroup, ...]
+    subject: str | None
+
+    def layers(self, first_id: int, title: str) -> tuple[Layer, ...]:
+        """Return the layers, and last the group that holds them, with ids from `first_id`."""
+        return layers_of(self.groups, self.rest, first_id, title)
+
+    def masks(self, canvas: Canvas, areas: ViewAreas, factor: int = 1) -> list[Mask]:
+        """Return the mask (h, w) of each layer in a view.
+
+        areas: of the view, reduced by `factor`.
+        """
+        shares = [
+            light_share(canvas.basis, group.lamps, factor)
+            if is_divided(canvas.basis, group.lamps)
+            else _area(areas, change.area)
+            for group, change in zip(self.groups, self.changes, strict=True)
+        ]
+        usable = areas.whole
+        return [usable, *(x * usable for x in masks_of(self.groups, self.rest, shares))]
+
+
+def find_layers(preset: LightingPreset, canvas: Canvas, subject: str | None) -> PresetLayers:
+    """Return what a preset asks of the lamps of a scene, as one view shows what each does.
 
     subject: name of the object that it is about; None to take the most central one.
     """
+    roles, name = find_roles(canvas, subject)
     basis = canvas.basis
-    areas = ViewAreas(canvas.current, basis.emitters_seen, basis.features, basis.objects, subject)
-    selected = selected_mask(canvas)
-    return [adjustment.mask(areas) * selected for adjustment in preset.adjustments]
+    chosen = np.zeros(len(basis.lights), bool)
+    lamps = []
+    for change in preset.changes:
+        assert change.lamps is not None
+        lamps.append(change.lamps(roles) & ~basis.is_fixed & ~chosen)
+        chosen |= lamps[-1]
+    rest = _group(preset.rest, basis, roles, ~chosen)
+    found = [(x, k) for x, k in zip(preset.changes, lamps, strict=True) if k.any()]
+    if not is_divided(basis, chosen):
+        found = list(zip(preset.changes, lamps, strict=True))[-1:]
+    groups = tuple(_group(x, basis, roles, k) for x, k in found)
+    return PresetLayers(rest, [x for x, _ in found], groups, name)
+
+
+def _group(change: LampRequest, basis: Basis, roles: LampRoles, lamps: Bools) -> LampGroup:
+    """Return lamps with the gain and the tint that bring them to a level and a white."""
+    level = roles.level(lamps) or 1.0
+    white = None if change.kelvin is None else kelvin_to_rgb(change.kelvin)
+    tint = white_tint(basis, lamps if lamps.any() else ~lamps, roles.amounts, white)
+    return LampGroup(change.name, lamps, limited_gain(change.level / level), tint)
+
+
+def _area(areas: ViewAreas, name: Area) -> Mask:
+    """Return the mask (h, w) of an area."""
+    return {"whole": areas.whole, "lit": areas.lit, "subject": areas.subject}[name]
 
 
 def check_subject(canvases: Sequence[Canvas], subject: str | None) -> None:
@@ -53,9 +116,28 @@ def open_preset(canvases: Canvases, name: str, subject: str | None) -> list[tupl
     preset = find_preset(name)
     check_subject(list(canvases), subject)
     title = preset.title if subject is None else f"{preset.title}: {subject}"
-    layers = layers_of(preset, canvases.next_layer, title[:MAX_NAME_LENGTH])
-    masks = {k: preset_masks(preset, canvas, subject) for k, canvas in enumerate(canvases)}
+    found = find_layers(preset, _view_of(canvases, subject), subject)
+    layers = found.layers(canvases.next_layer, title[:MAX_NAME_LENGTH])
+    masks = {
+        k: [mask * selected_mask(canvas) for mask in found.masks(canvas, _areas(canvas, found))]
+        for k, canvas in enumerate(canvases)
+    }
     return open_group(canvases, layers, masks)
+
+
+def _view_of(canvases: Canvases, subject: str | None) -> Canvas:
+    """Return the first view that sees an object, or the first."""
+    for canvas in canvases:
+        objects = canvas.basis.objects
+        if objects is not None and subject in objects.names and objects.mask(subject).any():
+            return canvas
+    return canvases[0]
+
+
+def _areas(canvas: Canvas, found: PresetLayers) -> ViewAreas:
+    basis = canvas.basis
+    look, objects = canvas.current, basis.objects
+    return ViewAreas(look, basis.emitters_seen, basis.features, objects, found.subject)
 
 
 def open_group(
@@ -89,6 +171,11 @@ def selected_mask(canvas: Canvas) -> Mask | np.float32:
     return selected
 
 
+def reduction(canvas: Canvas, side: int) -> int:
+    """Return the side of the blocks of pixels that reduce a view to `side` pixels or so."""
+    return max(1, round(max(canvas.size) / side))
+
+
 def reduced_areas(
     canvas: Canvas, light: Floats, side: int, subject: str | None = None
 ) -> tuple[Floats, ViewAreas]:
@@ -96,7 +183,7 @@ def reduced_areas(
 
     side: approximate pixels of its longer side.
     """
-    factor = max(1, round(max(canvas.size) / side))
+    factor = reduction(canvas, side)
     basis = canvas.basis
     look = np.asarray(block_mean(light, factor), np.float32)
     height, width = look.shape[:2]
@@ -116,9 +203,10 @@ def requested_look(preset: LightingPreset, canvas: Canvas, side: int) -> Floats:
 
     side: approximate pixels of its longer side.
     """
-    look, areas = reduced_areas(canvas, canvas.current, side)
+    found = find_layers(preset, canvas, None)
+    look, areas = reduced_areas(canvas, canvas.current, side, found.subject)
     pixels = Pixels.unpainted(look)
-    for layer, adjustment in zip(layers_of(preset, 1, "")[:-1], preset.adjustments, strict=True):
-        mask = Pixels(np.zeros_like(look), adjustment.mask(areas))
-        pixels = compose_layer(layer, mask, pixels)
+    masks = found.masks(canvas, areas, reduction(canvas, side))
+    for layer, mask in zip(found.layers(1, "")[:-1], masks, strict=True):
+        pixels = compose_layer(layer, Pixels(np.zeros_like(look), mask), pixels)
     return pixels.image

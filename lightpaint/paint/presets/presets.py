@@ -1,136 +1,152 @@
-"""The presets: what each asks for, in stops and mired, and where."""
+"""The presets: how bright and which white the light of some lamps becomes, and of all others."""
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
+from functools import partial
+from typing import Literal
 
-import numpy as np
-
-from lightpaint.arrays import RGB, as_rgb
-from lightpaint.colour.color import kelvin_to_rgb, luminance
+from lightpaint.arrays import Bools
 from lightpaint.errors import PaintError
-from lightpaint.paint.layers.layer import Layer
-from lightpaint.paint.presets.view_areas import Mask, ViewAreas
+from lightpaint.paint.presets.lamp_roles import LampRoles
 
-#: Neutral white of warmer and cooler adjustments, in mired, and the range of whites.
-NEUTRAL_MIRED, MIRED_RANGE = 200.0, (1e6 / 15000, 500.0)
+#: The area in which a layer asks for light where no lamps can be told apart.
+Area = Literal["whole", "lit", "subject"]
 
 
 @dataclass(frozen=True)
-class Adjustment:
-    """A layer of a preset. stops: brighter. mired: warmer. mask: of its area in a view."""
+class LampRequest:
+    """A layer of a preset: what the light of some lamps becomes.
+
+    level: light where these lamps shine, relative to that of the brighter half of the picture now.
+    kelvin: their white; None to keep their colours. lamps: those; None for all that no other layer
+    is about. area: where it is asked for if a view has one lamp.
+    """
 
     name: str
-    stops: float
-    mired: float
-    mask: Callable[[ViewAreas], Mask]
+    level: float
+    kelvin: float | None = None
+    lamps: Callable[[LampRoles], Bools] | None = None
+    area: Area = "lit"
 
 
 @dataclass(frozen=True)
 class LightingPreset:
     """A request for a whole scene. description: what it does, for people.
 
-    adjustments: the lowest first. has_subject: whether it is about one object.
+    rest: the lowest layer, over the whole picture. changes: layers above it. has_subject: whether
+    it is about one object.
     """
 
     name: str
     title: str
     description: str
-    adjustments: Sequence[Adjustment]
+    rest: LampRequest
+    changes: Sequence[LampRequest]
     has_subject: bool = False
 
 
-def _whole(stops: float, mired: float = 0.0) -> Adjustment:
-    return Adjustment("Everything", stops, mired, lambda view: view.whole)
+def _rest(level: float, kelvin: float | None = None) -> LampRequest:
+    return LampRequest("Everything", level, kelvin, area="whole")
 
 
-def _shadows(stops: float, mired: float = 0.0) -> Adjustment:
-    return Adjustment("Shadows", stops, mired, lambda view: view.shadows)
+def _pools(level: float, kelvin: float, *, is_on_wall: bool = True) -> tuple[LampRequest, ...]:
+    """Return layers for pools of light. is_on_wall: whether spots on a wall are among them."""
+
+    def lamps(roles: LampRoles, number: int) -> Bools:
+        pool = roles.pool(number)
+        return pool if is_on_wall else pool & ~roles.is_on_wall
+
+    return tuple(
+        LampRequest(name, level, kelvin, partial(lamps, number=k), "subject")
+        for k, name in enumerate(("First pool", "Second pool", "Third pool"))
+    )
 
 
-def _lit(stops: float, mired: float = 0.0) -> Adjustment:
-    return Adjustment("Lit parts", stops, mired, lambda view: view.lit)
+def _sky(level: float, kelvin: float) -> LampRequest:
+    return LampRequest("Sky", level, kelvin, lambda roles: roles.is_wash, "whole")
 
 
 _ALL = (
     LightingPreset(
         "moonlight",
         "Moonlight",
-        "Dark and blue, with deep shadows",
-        (_whole(-1.6, -110), _shadows(-0.8, -20)),
+        "A deep blue night with a cold moon from one side",
+        _rest(0.12, 25000),
+        (
+            _sky(0.22, 25000),
+            LampRequest("Disc", 0.8, 12000, lambda roles: roles.disc, "subject"),
+            LampRequest("Moon", 0.45, 15000, lambda roles: roles.sun),
+        ),
     ),
     LightingPreset(
         "golden_hour",
         "Golden hour",
-        "Low warm sun: lit parts bright and golden, shadows cool",
-        (_whole(-0.2, 50), _lit(0.6, 40), _shadows(-0.4, -50)),
+        "A low golden sun from one side, everything else dim and cool",
+        _rest(0.16, 7000),
+        (_sky(0.35, 3300), LampRequest("Low sun", 0.95, 2450, lambda roles: roles.sun)),
     ),
     LightingPreset(
         "overcast",
         "Overcast",
-        "Soft and even, hardly any shadow",
-        (_whole(-0.1, -15), _shadows(0.8), _lit(-0.8)),
+        "Soft, even and cool, with hardly any shadow",
+        _rest(0.04, 7500),
+        (LampRequest("Soft light", 0.75, 7500, lambda roles: roles.is_soft, "whole"),),
     ),
     LightingPreset(
         "noir",
         "Noir",
-        "Hard contrast: little light, and much darkness",
-        (_whole(-0.8), _shadows(-2.6), _lit(0.8)),
+        "A few hard pools of light in the dark",
+        _rest(0.025, 6500),
+        _pools(1.0, 5500),
     ),
     LightingPreset(
         "candle",
         "Candlelight",
-        "A warm pool around the subject in a dark room",
-        (
-            _whole(-1.8, 150),
-            Adjustment("Around the subject", 1.6, 30, lambda view: view.around_subject),
-        ),
+        "One warm flame at the subject, and a dark room",
+        _rest(0.03, 2200),
+        (LampRequest("Flame", 0.7, 2000, lambda roles: roles.candle, "subject"),),
         has_subject=True,
     ),
     LightingPreset(
         "gallery",
         "Gallery",
-        "Objects stand out from quiet walls",
-        (
-            Adjustment("Surroundings", -0.7, 0, lambda view: view.surroundings),
-            Adjustment("Exhibits", 0.7, 10, lambda view: view.exhibits),
-        ),
+        "Exhibits in clear accents before quiet walls",
+        _rest(0.12),
+        (LampRequest("Exhibits", 0.85, 4000, lambda roles: roles.on_exhibits, "subject"),),
     ),
     LightingPreset(
         "shop_window",
         "Shop window",
-        "The subject brilliant, its surroundings half as bright",
-        (
-            Adjustment("The rest", -1.0, 10, lambda view: view.rest),
-            Adjustment("Subject", 1.2, -10, lambda view: view.subject),
-        ),
+        "The subject brilliant and white, its surroundings dim and warm",
+        _rest(0.16, 2900),
+        (LampRequest("Subject", 1.4, 5600, lambda roles: roles.on_subject, "subject"),),
         has_subject=True,
     ),
     LightingPreset(
         "three_point",
         "Three-point",
-        "Key from the left, fill from the right, a quiet background",
+        "A warm key on the subject, a cool fill from its other side, a dark background",
+        _rest(0.06),
         (
-            Adjustment("Background", -1.3, 0, lambda view: view.rest),
-            Adjustment("Key", 1.0, 15, lambda view: view.subject_left),
-            Adjustment("Fill", 0.2, -20, lambda view: view.subject_right),
+            LampRequest("Fill", 0.25, 8500, lambda roles: roles.fill, "subject"),
+            LampRequest("Key", 1.0, 3600, lambda roles: roles.key, "subject"),
         ),
         has_subject=True,
     ),
     LightingPreset(
         "only_object",
         "Only this object",
-        "The subject as it is, all else nearly dark",
-        (
-            Adjustment("The rest", -3.0, 0, lambda view: view.rest),
-            Adjustment("Subject", 0.3, 0, lambda view: view.subject),
-        ),
+        "The subject alone in the light, all else nearly dark",
+        _rest(0.02),
+        (LampRequest("Subject", 0.9, None, lambda roles: roles.on_subject, "subject"),),
         has_subject=True,
     ),
     LightingPreset(
         "night",
         "Day to night",
-        "Dusk at half strength, night at full: dark and blue, lit parts warm",
-        (_whole(-2.4, -90), _lit(1.4, 110)),
+        "Dusk at half strength, night at full: dark and blue, with pools of warm lamplight",
+        _rest(0.12, 18000),
+        _pools(0.7, 2600, is_on_wall=False),
     ),
 )
 
@@ -143,31 +159,3 @@ def find_preset(name: str) -> LightingPreset:
     if name not in PRESETS:
         raise PaintError(f"there is no preset {name!r:.40}: expected {', '.join(PRESETS)}")
     return PRESETS[name]
-
-
-def layers_of(preset: LightingPreset, first_id: int, title: str) -> tuple[Layer, ...]:
-    """Return the layers of a preset, and last the group that holds them, with ids from `first_id`.
-
-    title: name of the group.
-    """
-    group = first_id + len(preset.adjustments)
-    layers = [
-        Layer(
-            first_id + k,
-            "adjust",
-            adjustment.name,
-            group=group,
-            gain=2.0**adjustment.stops,
-            tint=warmer(adjustment.mired),
-        )
-        for k, adjustment in enumerate(preset.adjustments)
-    ]
-    return (*layers, Layer(group, "group", title))
-
-
-def warmer(mired: float) -> RGB:
-    """Return the gains of luminance 1 that make neutral white warmer, or cooler below 0."""
-    low, high = MIRED_RANGE
-    target = kelvin_to_rgb(1e6 / float(np.clip(NEUTRAL_MIRED + mired, low, high)))
-    gains = target / kelvin_to_rgb(1e6 / NEUTRAL_MIRED)
-    return as_rgb(gains / luminance(gains))

@@ -4,7 +4,7 @@ from functools import cached_property
 
 import numpy as np
 import numpy.typing as npt
-from PIL import Image
+from PIL import Image, ImageFilter
 
 from lightpaint.arrays import Bools, Floats
 from lightpaint.colour.color import luminance
@@ -27,6 +27,9 @@ MIN_ALBEDO = 0.05
 #: Least share of the picture that an object in it covers which a preset is about, and the largest,
 #: above which it is a wall or a floor.
 OBJECT_SHARES = (0.003, 0.12)
+
+#: Least share of an object that is left without its outermost pixels: others are lines or twigs.
+SOLID_SHARE = 0.12
 
 #: Heights in a picture, 0 at its top and 1 at its bottom, between which its upper part ends and its
 #: lower part begins.
@@ -78,40 +81,37 @@ class ViewAreas:
             return self._usable(self._middle)
         return self._usable(np.asarray(self._objects.mask(name), np.float32))
 
-    @property
-    def rest(self) -> Mask:
-        """All but the subject."""
-        return self._usable(1 - self.subject)
-
-    @property
-    def subject_left(self) -> Mask:
-        """The subject, fading out from its left to its right."""
-        return self._across(self.subject)
-
-    @property
-    def subject_right(self) -> Mask:
-        """The subject, fading out from its right to its left."""
-        subject = self.subject
-        return subject - self._across(subject)
-
-    @property
-    def exhibits(self) -> Mask:
-        """Objects that are neither walls nor floors; the middle of the picture without objects."""
+    @cached_property
+    def exhibit_names(self) -> tuple[str, ...]:
+        """Names of objects that stand free in the picture, neither walls, floors nor details."""
         if self._objects is None:
-            return self._usable(self._middle)
-        index = self._objects.index
-        exhibits = [k for k, _ in self._shares() if k >= 0]
-        return self._usable(np.isin(index, exhibits).astype(np.float32))
+            return ()
+        names = dict.fromkeys(self._objects.names)
+        return tuple(name for name in names if self._is_exhibit(self._objects.mask(name)))
 
-    @property
-    def surroundings(self) -> Mask:
-        """All but the exhibits."""
-        return self._usable(1 - self.exhibits)
+    def mask_of(self, name: str) -> Mask:
+        """Return the mask of an object."""
+        assert self._objects is not None
+        return self._usable(np.asarray(self._objects.mask(name), np.float32))
 
-    @property
-    def around_subject(self) -> Mask:
-        """A soft pool around the subject."""
-        return self._usable(self._pool(self.subject))
+    def distance_of(self, name: str) -> float:
+        """Return the mean distance of an object from the middle, in sides of the picture."""
+        rows, columns = np.nonzero(self.mask_of(name))
+        if not rows.size:
+            return 1.0
+        height, width = self._look.shape[:2]
+        across = (columns + 0.5) / width - 0.5
+        return float(np.hypot((rows + 0.5) / height - 0.5, across).mean())
+
+    def _is_exhibit(self, mask: Bools) -> bool:
+        low, high = OBJECT_SHARES
+        if not low <= mask.mean() <= high:
+            return False
+        if mask[0].any() or mask[-1].any() or mask[:, 0].any() or mask[:, -1].any():
+            return False
+        picture = Image.fromarray(mask.astype(np.uint8) * 255)
+        core = np.asarray(picture.filter(ImageFilter.MinFilter(3))) > 0
+        return bool(core.sum() >= SOLID_SHARE * mask.sum())
 
     @property
     def bands(self) -> tuple[Mask, Mask, Mask]:
@@ -125,28 +125,12 @@ class ViewAreas:
 
     @cached_property
     def subject_name(self) -> str | None:
-        """Name of the chosen object, or of the most central one of its size; None without one."""
+        """Name of the chosen object, or of the most central exhibit; None without one."""
         if self._objects is None:
             return None
         if self._chosen is not None:
             return self._chosen if self._chosen in self._objects.names else None
-        height, width = self._objects.index.shape
-        y, x = np.mgrid[:height, :width]
-        distance = np.hypot((y + 0.5) / height - 0.5, (x + 0.5) / width - 0.5)
-        nearest = min(
-            ((float(distance[self._objects.index == k].mean()), k) for k, _ in self._shares()),
-            default=None,
-        )
-        return None if nearest is None else self._objects.names[nearest[1]]
-
-    def _shares(self) -> list[tuple[int, float]]:
-        """Return objects of the size of an exhibit, and the share of the picture of each."""
-        assert self._objects is not None
-        index = self._objects.index
-        counts = np.bincount(index[index >= 0], minlength=len(self._objects.names))
-        low, high = OBJECT_SHARES
-        shares = counts / index.size
-        return [(k, float(s)) for k, s in enumerate(shares) if low <= s <= high]
+        return min(self.exhibit_names, key=self.distance_of, default=None)
 
     @cached_property
     def _level(self) -> Mask:
@@ -168,28 +152,6 @@ class ViewAreas:
         y, x = np.mgrid[:height, :width]
         distance = np.hypot((y + 0.5) / height - 0.55, (x + 0.5) / width - 0.5)
         return np.asarray(np.clip(1.5 - 4 * distance, 0, 1), np.float32)
-
-    def _across(self, mask: Mask) -> Mask:
-        """Return a mask that fades out from its left end to its right."""
-        columns = np.flatnonzero(mask.any(axis=0))
-        if not columns.size:
-            return mask
-        first, last = int(columns[0]), int(columns[-1])
-        ramp = 1 - (np.arange(mask.shape[1]) - first + 0.5) / (last - first + 1)
-        return np.asarray(mask * np.clip(ramp, 0, 1).astype(np.float32), np.float32)
-
-    def _pool(self, mask: Mask) -> Mask:
-        """Return a soft ellipse around a mask, twice as wide and high."""
-        rows, columns = np.flatnonzero(mask.any(axis=1)), np.flatnonzero(mask.any(axis=0))
-        if not rows.size:
-            return mask
-        y, x = np.mgrid[: mask.shape[0], : mask.shape[1]]
-        radii = [max(2.0, side[-1] - side[0] + 1.0) for side in (rows, columns)]
-        distance = np.hypot(
-            (y - (rows[0] + rows[-1]) / 2) / radii[0],
-            (x - (columns[0] + columns[-1]) / 2) / radii[1],
-        )
-        return np.asarray(np.clip(2 - 2 * distance, 0, 1), np.float32)
 
     def _usable(self, mask: npt.NDArray[np.floating]) -> Mask:
         """Return a mask without pixels in which an emitter is seen."""

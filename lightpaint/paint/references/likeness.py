@@ -2,6 +2,7 @@
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
+from functools import partial
 
 import numpy as np
 
@@ -43,13 +44,16 @@ class LightArea:
     """An area that is compared, and changed.
 
     seen: weights of its pixels in a picture, or in the reference by `seen_there`. mask: where it is
-    changed. has_level: whether brightness is compared, and not only colour.
+    changed. has_level, has_color: whether its brightness and its colour are compared.
+    max_stops: most by which it is made brighter or darker.
     """
 
     name: str
     seen: Callable[[Tones], Weights]
     mask: Callable[[ViewAreas], Mask]
     has_level: bool = True
+    has_color: bool = True
+    max_stops: float = MAX_STOPS
     seen_there: Callable[[Tones], Weights] | None = None
 
 
@@ -74,17 +78,35 @@ class AreaChange:
         return Layer(number, "adjust", self.area.name, group=group, gain=gain, tint=tint)
 
 
-WHOLE_AREAS = (
-    LightArea("Everything", lambda tones: tones.whole, lambda view: view.whole, has_level=False),
+def _band(number: int, tones: Tones) -> Weights:
+    return tones.bands[number]
+
+
+def _view_band(number: int, view: ViewAreas) -> Mask:
+    return view.bands[number]
+
+
+WHOLE_AREA = LightArea(
+    "Everything", lambda tones: tones.whole, lambda view: view.whole, has_level=False
+)
+
+TONE_AREAS = (
     LightArea("Shadows", lambda tones: tones.shadows, lambda view: view.shadows),
     LightArea("Lit parts", lambda tones: tones.lit, lambda view: view.lit),
 )
 
-BAND_AREAS = (
-    LightArea("Top", lambda tones: tones.bands[0], lambda view: view.bands[0]),
-    LightArea("Middle", lambda tones: tones.bands[1], lambda view: view.bands[1]),
-    LightArea("Bottom", lambda tones: tones.bands[2], lambda view: view.bands[2]),
+BAND_AREAS = tuple(
+    LightArea(name, partial(_band, k), partial(_view_band, k))
+    for k, name in enumerate(("Top", "Middle", "Bottom"))
 )
+
+
+def of_another_place(areas: Sequence[LightArea], max_stops: float) -> tuple[LightArea, ...]:
+    """Return areas that are compared with another place, by brightness alone and up to some stops.
+
+    Their colours there are those of other floors and ceilings.
+    """
+    return tuple(replace(area, has_color=False, max_stops=max_stops) for area in areas)
 
 
 def spot_area(name: str, there: Point, here: Point, seen: float, changed: float) -> LightArea:
@@ -130,7 +152,7 @@ def find_changes(
             stops, tint = _difference(reference, tones, area, matches_brightness)
             changes[k] = AreaChange(
                 area,
-                float(np.clip(changes[k].stops + stops, -MAX_STOPS, MAX_STOPS)),
+                float(np.clip(changes[k].stops + stops, -area.max_stops, area.max_stops)),
                 np.clip(changes[k].tint + tint, -MAX_TINT, MAX_TINT),
             )
     if keeps_brightness and not matches_brightness:
@@ -172,7 +194,7 @@ def _difference(
         assert whole_there is not None
         assert whole_here is not None
         stops = (there.level - whole_there.level) - (here.level - whole_here.level)
-    return stops, there.chroma - here.chroma
+    return stops, there.chroma - here.chroma if area.has_color else np.zeros(3)
 
 
 def _changed(light: Floats, changes: Sequence[AreaChange], masks: Sequence[Mask]) -> Floats:

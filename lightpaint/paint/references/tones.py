@@ -6,7 +6,7 @@ from functools import cached_property
 import numpy as np
 import numpy.typing as npt
 
-from lightpaint.arrays import Bools, Floats
+from lightpaint.arrays import Bools, Doubles, Floats
 from lightpaint.colour.color import luminance
 from lightpaint.images.resampling import resampled
 from lightpaint.paint.presets.view_areas import soft_bands, soft_spot
@@ -17,6 +17,25 @@ TONE_SIDE = 64
 #: Stops below the bright quarter of a picture at which all is equally dark: 8 bits tell no more.
 DARKEST = 7.0
 
+#: Quantiles of luminance that say how deep shadows are and how high lights.
+QUANTILES = (0.1, 0.25, 0.5, 0.75, 0.95, 0.97)
+
+#: Quantiles of luminance from which on parts are the brightest, and up to which they are dark.
+LIT_QUANTILE, DARK_QUANTILE = 0.88, 0.35
+
+#: Height and width of the small picture by whose edges two places are told apart.
+DETAIL_SIZE = (24, 36)
+
+#: Stops below the highlights down to which a part is nearly as bright.
+NEARLY_BRIGHT = 1.5
+
+#: Share of a side that has to be nearly as bright, to have a key of its own.
+LEAST_SIDE = 0.1
+
+#: Power of the mean by which the colour of light is told from that of surfaces (Finlayson and
+#: Trezzi 2004): the higher, the more the brightest pixels count, which are of the palest surfaces.
+SHADES_POWER = 6.0
+
 Weights = npt.NDArray[np.floating]
 
 
@@ -26,6 +45,35 @@ class Tone:
 
     level: float
     chroma: npt.NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class LightTones:
+    """The light of a picture.
+
+    levels: log2 of luminance at QUANTILES. lit, shadows: (3,), log2 of RGB over luminance of the
+    light in its brightest parts, and in its darker ones. sides: the first at its left and at its
+    right. bright_share: share of the picture that is nearly as bright as its highlights. detail:
+    its edges in a small picture, of mean 0 and variance 1, by which places are told apart.
+    """
+
+    levels: Doubles
+    lit: Doubles
+    shadows: Doubles
+    sides: tuple[Doubles, Doubles]
+    bright_share: float
+
+    detail: Doubles
+
+    def resembles(self, other: "LightTones") -> float:
+        """Return the correlation of the edges of two pictures, one of them mirrored or not."""
+        mirrored = other.detail[:, ::-1]
+        return max(float(np.mean(self.detail * x)) for x in (other.detail, mirrored))
+
+    @property
+    def contrast(self) -> float:
+        """Stops from shadows to lit parts."""
+        return float(self.levels[-2] - self.levels[1])
 
 
 class Tones:
@@ -61,6 +109,44 @@ class Tones:
         return Tone(float((shares * levels).sum()), np.einsum("yx,yxc->c", shares, chroma))
 
     @cached_property
+    def light_tones(self) -> LightTones:
+        """The light of the picture."""
+        known = self.share > 0.5
+        known = known if known.any() else np.ones_like(known)
+        levels = self._levels[known]
+        bright, dark = (float(np.quantile(levels, x)) for x in (LIT_QUANTILE, DARK_QUANTILE))
+        quantiles = np.quantile(levels, QUANTILES)
+        left = np.broadcast_to(np.arange(self.size[1]) < self.size[1] / 2, self.size)
+        is_bright = known & (self._levels > quantiles[-1] - NEARLY_BRIGHT)
+        return LightTones(
+            quantiles,
+            self._illuminant(known & (self._levels >= bright)),
+            self._illuminant(known & (self._levels <= dark)),
+            (self._side(is_bright, left), self._side(is_bright, ~left)),
+            float(is_bright.sum() / known.sum()),
+            _detail(self._levels),
+        )
+
+    @cached_property
+    def level(self) -> float:
+        """Mean of log2 luminance."""
+        return float((self.share * self._levels).sum() / max(float(self.share.sum()), 1e-6))
+
+    def _side(self, is_bright: Bools, side: Bools) -> Doubles:
+        """Return the colour of the light, (3,), in the bright parts of a side; of all if it has
+        hardly any.
+        """
+        found = is_bright & side
+        return self._illuminant(found if found.sum() >= LEAST_SIDE * side.sum() else is_bright)
+
+    def _illuminant(self, where: Bools) -> Doubles:
+        """Return the colour of the light in some pixels, (3,), by shades of grey."""
+        light = self._light[where] if where.any() else self._light.reshape(-1, 3)
+        means = np.mean((light / float(light.max())) ** SHADES_POWER, axis=0)
+        color = np.maximum(means ** (1 / SHADES_POWER), 1e-2)
+        return np.asarray(np.log2(color / luminance(color)))
+
+    @cached_property
     def whole(self) -> Weights:
         """All pixels."""
         return np.ones(self.size)
@@ -87,3 +173,17 @@ class Tones:
     def _quantile(self, values: npt.NDArray[np.floating], share: float) -> float:
         known = values[self.share > 0.5]
         return float(np.quantile(known, share)) if known.size else 0.0
+
+
+def _detail(levels: Doubles) -> Doubles:
+    """Return what a picture of levels, resampled to DETAIL_SIZE, has beyond its surroundings."""
+    planes = np.repeat(levels[..., None], 3, axis=2).astype(np.float32)
+    small = resampled(planes, DETAIL_SIZE)[..., 0].astype(np.float64)
+    rows, columns = (
+        np.abs(np.subtract.outer(np.arange(n), np.arange(n))) <= 2 for n in small.shape
+    )
+    across = columns / columns.sum(axis=0)
+    down = rows / rows.sum(axis=1, keepdims=True)
+    detail = small - down @ small @ across
+    detail -= detail.mean()
+    return np.asarray(detail / max(float(detail.std()), 1e-9))

@@ -1,0 +1,271 @@
+"""Roles of lamps in a picture: hard or soft light, from which side, on which object."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from functools import cached_property
+
+import numpy as np
+import numpy.typing as npt
+
+from lightpaint.arrays import Bools, Doubles, Floats
+from lightpaint.paint.presets.view_areas import Mask
+
+#: Kinds of emitters that always are hard light, always soft light, and light of the sky or the sun.
+HARD_KINDS = frozenset({"spot", "point", "directional", "projector", "directionalarea"})
+SOFT_KINDS = frozenset({"constant"})
+DAYLIGHT_KINDS = frozenset({"constant", "directional", "envmap", "sunsky", "sky", "sun"})
+
+#: Stops by which the brightest tenth of a hard light stands above its middle; and the share of it
+#: that falls on the brightest tenth of the picture.
+HARD_STOPS, HARD_SHARE = 2.2, 0.6
+
+#: Length of the mean normal of lit surfaces from which on they are one wall, and the largest part
+#: of it that may point up or down; a wash on a wall lights at least this share of the picture.
+WALL_NORMAL, WALL_TILT, WALL_SHARE = 0.85, 0.35, 0.08
+
+#: Least share of the light of the picture of a lamp that counts.
+LEAST_AMOUNT = 0.005
+
+#: How much more a lamp lights an object than it lights the picture, to be an accent on it.
+ACCENT = 2.0
+
+#: Share of the picture from which on a lamp is no accent on an exhibit among others.
+ACCENT_SHARE = 0.16
+
+#: Share of the highest such ratio from which on a lamp is an accent on the same object.
+NEARLY = 0.6
+
+#: Cosine between the pictures of lamps that shine alike.
+ALIKE = 0.75
+
+#: Pools of light in a dark picture: share of it that they light together, and their number.
+POOLS_SHARE, MAX_POOLS = 0.25, 3
+
+
+@dataclass(frozen=True)
+class LampRoles:
+    """The part that each of n lamps plays in one picture, all at their current levels.
+
+    light: (n, h, w) luminance that arrives at surfaces, 0 where none is known. kinds: plugins of
+    the emitters. subject, exhibits: masks (h, w) of the objects that a preset may be about. normal:
+    (h, w, 3) of the surfaces; None if unknown. right: (3,), direction of the camera's right; None
+    if unknown. seen: (n,) light in pixels in which an emitter is seen; None if unknown.
+    """
+
+    light: Floats
+    kinds: Sequence[str]
+    subject: Mask
+    exhibits: Sequence[Mask]
+    normal: Floats | None = None
+    right: Doubles | None = None
+    seen: Doubles | None = None
+
+    def about(self, subject: Mask) -> "LampRoles":
+        """Return the roles for another subject."""
+        return replace(self, subject=subject)
+
+    def ratios(self, mask: Mask) -> Doubles:
+        """Return how much more each lamp lights a mask (h, w) than the picture, (n,)."""
+        weight = max(float(mask.sum(dtype=np.float64)), 1e-30)
+        there = np.array([float((x * mask).sum(dtype=np.float64)) / weight for x in self.light])
+        means = self.light.mean(axis=(1, 2), dtype=np.float64)
+        return np.asarray(np.where(self.amounts > 0, there / np.maximum(means, 1e-30), 0))
+
+    def flatness(self, mask: Mask) -> float:
+        """Return 1 for an object all of whose surface looks one way, 0 for one that looks all."""
+        return float(np.linalg.norm(self._lit_normal(mask)))
+
+    @cached_property
+    def amounts(self) -> Doubles:
+        """(n,) share of the light of the picture."""
+        sums = self.light.reshape(len(self.light), -1).sum(axis=1, dtype=np.float64)
+        return np.asarray(sums / max(float(sums.sum()), 1e-30))
+
+    @cached_property
+    def coverage(self) -> Doubles:
+        """(n,) share of the picture that a lamp lights: 1 for even light."""
+        return np.array([_coverage(x) for x in self.light])
+
+    @cached_property
+    def counts(self) -> Bools:
+        """(n,) lamps that are on and matter."""
+        return self.amounts >= LEAST_AMOUNT
+
+    @cached_property
+    def is_soft(self) -> Bools:
+        """(n,) lamps of even light: skies, coves, panels, washes of a wall."""
+        flags = []
+        for k, kind in enumerate(self.kinds):
+            flat = self.light[k].ravel()
+            top = np.sort(flat)[-max(1, flat.size // 10) :]
+            middle, high = np.quantile(flat, (0.5, 0.9))
+            stops = np.log2(max(high, 1e-30) / max(middle, 1e-30))
+            is_even = stops < HARD_STOPS and top.sum() < HARD_SHARE * flat.sum()
+            is_soft = kind in SOFT_KINDS or (kind not in HARD_KINDS and is_even)
+            flags.append(is_soft or bool(self.is_wash[k]) or self._from_below(k))
+        return np.array(flags, bool)
+
+    @cached_property
+    def is_on_wall(self) -> Bools:
+        """(n,) lamps that light one wall and nothing else, as those of a backdrop."""
+        return np.array([self._is_on_wall(x) for x in self.light], bool)
+
+    @cached_property
+    def is_wash(self) -> Bools:
+        """(n,) lamps that light one wall widely, as those of a cyclorama."""
+        return self.is_on_wall & (self.coverage >= WALL_SHARE)
+
+    @property
+    def disc(self) -> Bools:
+        """(n,) lamps that light one small spot of a wall, as a moon on a backdrop."""
+        return self.is_on_wall & ~self.is_wash & self.counts
+
+    @cached_property
+    def is_daylight(self) -> Bools:
+        """(n,) lamps that stand for the sky or the sun."""
+        kinds = np.array([kind in DAYLIGHT_KINDS for kind in self.kinds], bool)
+        return kinds | self.is_wash | (self.is_soft & (self.coverage > 0.3))
+
+    @property
+    def hard(self) -> Bools:
+        """(n,) lamps of hard light."""
+        return ~self.is_soft & (self.amounts > 0)
+
+    @cached_property
+    def sun(self) -> Bools:
+        """(n,) the lamps that shine as a low sun or the moon would: hard, wide, from one side."""
+        hard = self.hard & self.counts
+        directional = hard & np.array([kind in ("directional", "sun") for kind in self.kinds])
+        candidates = directional if directional.any() else hard if hard.any() else self.amounts > 0
+        score = np.sqrt(self.amounts * self.coverage) * (0.05 + np.abs(self.sides))
+        return self._with_alike(int(np.argmax(np.where(candidates, score, -1))))
+
+    @cached_property
+    def _pools(self) -> list[int]:
+        """The lamps of the smallest pools of light, a few of them."""
+        found: list[int] = []
+        covered = 0.0
+        candidates = self.counts & self.hard
+        for k in np.argsort(np.where(candidates, self.coverage, 9)):
+            covered += self.coverage[k]
+            if found and (not candidates[k] or covered > POOLS_SHARE or len(found) == MAX_POOLS):
+                break
+            found.append(int(k))
+        return found
+
+    def pool(self, number: int) -> Bools:
+        """Return the lamp of one of the smallest pools of light, (n,), from 0; none beyond them."""
+        found = self._pools[number : number + 1]
+        return np.isin(np.arange(len(self.light)), found)
+
+    @cached_property
+    def candle(self) -> Bools:
+        """(n,) a lamp that is seen in the picture; without one, those on the subject."""
+        if self.seen is not None and self.seen.any():
+            score = np.where(self.hard, self.seen, 0)
+            if score.any():
+                return np.asarray(np.arange(len(score)) == np.argmax(score), bool)
+        return self.on_subject
+
+    @cached_property
+    def on_subject(self) -> Bools:
+        """(n,) the lamps that light the subject more than the picture; at least one."""
+        found = self._accents(self.subject)
+        return found if found.any() else self._nearest(self.subject)
+
+    @cached_property
+    def on_exhibits(self) -> Bools:
+        """(n,) the lamps that light an exhibit more than the picture; at least one."""
+        found = np.zeros(len(self.light), bool)
+        for mask in self.exhibits:
+            found |= self._accents(mask) & (self.coverage < ACCENT_SHARE)
+        return found if found.any() else self.on_subject
+
+    @cached_property
+    def key(self) -> Bools:
+        """(n,) the lamp on the subject that lights it most."""
+        light = np.where(self.on_subject, self.ratios(self.subject) * self.amounts, -1)
+        return np.asarray(np.arange(len(light)) == np.argmax(light), bool)
+
+    @cached_property
+    def fill(self) -> Bools:
+        """(n,) the lamp that lights the subject most from the other side than the key."""
+        light = self.ratios(self.subject) * self.amounts
+        sides = np.array([self._side(x * self.subject) for x in self.light])
+        across = np.abs(sides - float(sides[self.key][0]))
+        score = np.where(self.key | self.is_on_wall, 0, across * np.sqrt(light))
+        return np.asarray((np.arange(len(light)) == np.argmax(score)) & (score > 0), bool)
+
+    @cached_property
+    def sides(self) -> Doubles:
+        """(n,) how far from the left, below 0, or the right, above, a lamp lights, -1 to 1."""
+        return np.array([self._side(x) for x in self.light])
+
+    @cached_property
+    def middles(self) -> Doubles:
+        """(n,) where the light of a lamp falls: -1 at the left of the picture, 1 at its right."""
+        x = np.linspace(-1, 1, self.light.shape[2])
+        columns = self.light.sum(axis=1, dtype=np.float64)
+        return np.asarray(columns @ x / np.maximum(columns.sum(axis=1), 1e-30))
+
+    def level(self, lamps: Bools) -> float:
+        """Return the light of lamps where they shine, relative to that of the brighter half."""
+        light = self.light[lamps].sum(axis=0)
+        covered = _coverage(light)
+        return float(light.mean()) / covered / self._bright if covered and self._bright else 0.0
+
+    @cached_property
+    def _bright(self) -> float:
+        """Mean light of the brighter half of the picture."""
+        total = self.light.sum(axis=0, dtype=np.float64)
+        total = np.sort(total[total > 0])
+        return float(total[len(total) // 2 :].mean()) if total.size else 0.0
+
+    def _accents(self, mask: Mask) -> Bools:
+        """Return the lamps that are aimed at a mask: nearly the highest ratio; none by chance."""
+        ratio = self.ratios(mask)
+        there = ratio * self.amounts
+        usable = self.hard & (there > 0.03 * there.sum())
+        if (usable & ~self.is_daylight).any():
+            usable &= ~self.is_daylight
+        highest = float(np.max(np.where(usable, ratio, 0), initial=0))
+        return np.asarray(usable & (ratio >= max(ACCENT, NEARLY * highest)), bool)
+
+    def _nearest(self, mask: Mask) -> Bools:
+        """Return the lamp that lights a mask most, compared with the picture."""
+        ratio = self.ratios(mask)
+        return np.asarray(np.arange(len(ratio)) == np.argmax(ratio * np.sqrt(self.amounts)), bool)
+
+    def _with_alike(self, k: int) -> Bools:
+        flat = self.light.reshape(len(self.light), -1)
+        lengths = np.sqrt((flat * flat).sum(axis=1, dtype=np.float64))
+        cosine = (flat @ flat[k]) / np.maximum(lengths * lengths[k], 1e-30)
+        return np.asarray(cosine >= ALIKE, bool)
+
+    def _side(self, light: Floats) -> float:
+        total = float(light.sum(dtype=np.float64))
+        if not total:
+            return 0.0
+        if self.normal is None or self.right is None:
+            x = np.linspace(-1, 1, light.shape[1], dtype=np.float32)
+            return 0.5 * float((light * x).sum(dtype=np.float64)) / total
+        return float(self._lit_normal(light) @ self.right)
+
+    def _lit_normal(self, light: Floats) -> Doubles:
+        total = max(float(light.sum(dtype=np.float64)), 1e-30)
+        if self.normal is None:
+            return np.zeros(3)
+        return np.asarray(np.einsum("yx,yxc->c", light, self.normal, dtype=np.float64) / total)
+
+    def _is_on_wall(self, light: Floats) -> bool:
+        normal = self._lit_normal(light)
+        return bool(np.linalg.norm(normal) > WALL_NORMAL and abs(normal[1]) < WALL_TILT)
+
+    def _from_below(self, k: int) -> bool:
+        return bool(self._lit_normal(self.light[k])[1] < -0.1)
+
+
+def _coverage(light: npt.NDArray[np.floating]) -> float:
+    """Return the share of the picture that light covers: 1 for even light, 0 without any."""
+    total, square = light.sum(dtype=np.float64), (light * light).sum(dtype=np.float64)
+    return float(total * total / (square * light.size)) if square else 0.0
