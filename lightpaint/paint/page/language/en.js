@@ -703,6 +703,17 @@ export const en = {
       other: '{count} strokes painted here could not be sent, and are lost.',
     },
   },
+  insetPicture: {
+    makeLarge: 'Make it large: {name}',
+    pressToMakeItLarge: 'Press to make it large. Drag it, or press arrow keys, for another corner.',
+  },
+  panels: {
+    grip: 'Drag this panel to another place',
+    place: '{name}: {place} of {count} panels',
+    reset: 'Panels',
+    resetDescription: 'Drag their titles, or press Alt and an arrow key there, for another order.',
+    asAtFirst: 'Order as at first',
+  },
   pictureStage: {
     painting: 'Painting',
     answer: 'Answer',

@@ -149,6 +149,7 @@ import { initialSelection } from './selection/selection_settings.js';
  * @property {import("./look_comparison.js").Mix | null} mix of looks that are compared
  * @property {Record<string, boolean>} open what is unfolded
  * @property {boolean} side whether the panels are there
+ * @property {string} panelNote where a panel was moved to by key, for screen readers
  * @property {null | "settings"} panel what lies over the panels
  * @property {number | null} tour step of the tour that is shown
  * @property {string | null} tourFold what this step has unfolded and folds again
@@ -283,6 +284,7 @@ export function initialState() {
     side: true,
     panel: null,
     tour: null,
+    panelNote: '',
     tourFold: null,
     dialog: null,
     search: '',
