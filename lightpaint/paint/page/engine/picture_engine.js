@@ -125,7 +125,9 @@ class PictureEngine extends Emitter {
     const { ratio, params } = this.screen;
     const panes = this.screen.panes();
     const [px, py] = [x * ratio, y * ratio];
-    return zoomAround(params, hitTest(panes, px, py)?.pane ?? panes[0], px, py, factor);
+    // A small picture in a corner is always whole.
+    const hit = params.layout === 'inset' ? null : hitTest(panes, px, py);
+    return zoomAround(params, hit?.pane ?? panes[0], px, py, factor);
   }
 
   /** Return the light of a picture at a pixel. @param {Kind} kind @param {number} x

@@ -31,9 +31,11 @@
  * @typedef {object} Display
  * @property {Kind} left
  * @property {Kind} right
- * @property {"side" | "wipe" | "blink"} layout
+ * @property {"side" | "wipe" | "blink" | "inset"} layout
  * @property {number} wipe
  * @property {"left" | "right"} blink
+ * @property {"left" | "right"} large the large picture where the other one is small in a corner
+ * @property {import("../../../viewer/drawing/view.js").Corner} corner that the small one lies in
  * @property {number} zoom
  * @property {[number, number]} pan
  * @property {number} stops

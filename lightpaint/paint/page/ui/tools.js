@@ -215,7 +215,7 @@ export function togglePanels(store) {
  * @returns {T} */
 export const nextValue = (values, value) => values[(values.indexOf(value) + 1) % values.length];
 
-export const LAYOUTS = /** @type {const} */ (['side', 'wipe', 'blink']);
+export const LAYOUTS = /** @type {const} */ (['side', 'wipe', 'blink', 'inset']);
 export const OVERLAYS = /** @type {const} */ ([
   null,
   'missed',

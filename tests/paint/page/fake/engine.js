@@ -106,6 +106,15 @@ export class FakeEngine {
         placed(left, 0, 0, cut, height, all),
       ];
     }
+    if (layout === 'inset') {
+      const { large, corner = 'bottom-right' } = this.shown;
+      const [big, small] = large === 'left' ? [left, right] : [right, left];
+      const [across, down] = [0.3 * width, (0.3 * width * h) / w];
+      const x = corner.endsWith('left') ? 12 : width - 12 - across;
+      const y = corner.startsWith('top') ? 12 : height - 12 - down;
+      const whole = { ...placed(small, x, y, across, down), scale: across / w, left: x, top: y };
+      return [placed(big, 0, 0, width, height), whole];
+    }
     const [half, low] = [(width - 4) / 2, (height - 4) / 2];
     if (Math.min(half / w, height / h) >= Math.min(width / w, low / h)) {
       return [placed(left, 0, 0, half, height), placed(right, half + 4, 0, half, height)];
