@@ -831,6 +831,7 @@ export const en = {
     growShrinkFeatherSelectByNumbers:
       'Grow, shrink, feather; select by numbers, brightness, or what a light lights',
     tolerance: 'Tolerance',
+    objects: 'Objects: {names}',
     howFarFromTheClickedColour:
       'How far from the clicked colour, in ΔE of the picture as it is shown',
   },
