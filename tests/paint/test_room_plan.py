@@ -28,7 +28,8 @@ ROOM = """<scene version="3.0.0">
     <point name="center" x="-2" y="0.7" z="-1"/></shape>
   <shape type="cube" id="beam"><transform name="to_world"><scale x="2" y="0.1" z="0.1"/>
     <translate y="2.8"/></transform></shape>
-  <shape type="cube" id="neighbour"><transform name="to_world"><translate x="9"/></transform></shape>
+  <shape type="cube" id="neighbour"><transform name="to_world"><translate x="9"/>
+    </transform></shape>
   <shape type="rectangle" id="lamp_panel"><transform name="to_world"><translate x="1" y="1"/>
     </transform><emitter type="area" id="lamp"><rgb name="radiance" value="1"/></emitter></shape>
   <emitter type="constant" id="sky"><rgb name="radiance" value="1"/></emitter>
@@ -70,7 +71,8 @@ def test_the_outline_of_a_rectangle_has_its_corners(
 def test_parts_of_a_mesh_are_told_apart() -> None:
     """Two squares of two triangles each, whose corners are stored twice, beside a lone triangle."""
     square = np.array([[0, 0, 0], [1, 0, 0], [1, 1, 0], [0, 0, 0], [1, 1, 0], [0, 1, 0]], float)
-    vertices = np.concatenate([square, square + [5, 0, 0], square[:3] + [0, 0, 9]])
+    beside, behind = np.array([5.0, 0, 0]), np.array([0, 0, 9.0])
+    vertices = np.concatenate([square, square + beside, square[:3] + behind])
     faces = np.arange(15).reshape(5, 3)
     parts = mesh_parts(vertices, faces)
     assert len(set(parts[:6])) == len(set(parts[6:12])) == len(set(parts[12:])) == 1

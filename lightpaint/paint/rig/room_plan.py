@@ -1,13 +1,12 @@
-"""What pages draw of the room beside its lights: outlines of objects from above, and how skies turn."""
+"""What pages draw of the room beside lights: outlines of objects from above, and how skies turn."""
 
-from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
 import numpy.typing as npt
 
 from lightpaint.arrays import Doubles
-from lightpaint.paint.protocol import PlanObject, SkyAxes
+from lightpaint.paint.protocol import Place, PlanObject, SkyAxes
 from lightpaint.scene.lights.texels.sky import Sky
 from lightpaint.scene.scene import Scene
 from lightpaint.scene.surfaces import names_by_shape
@@ -18,12 +17,12 @@ MAX_OUTLINES, MAX_CORNERS = 200, 32
 #: Part of the plan from which an object encloses the room: its outline is that of the room.
 ENCLOSING_SHARE = 0.6
 
-#: Parts of the room's height: what hangs above the first is left out, such as a ceiling; so is what is
-#: thinner than the second and larger than a part of the plan, such as the floor of another room.
+#: Parts of the room's height: what hangs above the first is left out, such as a ceiling; so is what
+#: is thinner than the second and larger than a part of the plan, such as another room's floor.
 MAX_LOWEST, MIN_THICKNESS, MAX_THIN_SHARE = 0.6, 0.03, 0.05
 
-#: Most parts of one mesh that have an outline each; of more, they have one together. So they have in
-#: a mesh of more faces than these.
+#: Most parts of one mesh that have an outline each; more have one together, and so have those of a
+#: mesh of more faces than these.
 MAX_PARTS, MAX_SPLIT_FACES = 24, 200_000
 
 #: Points along each side of a grid over a surface that has no vertices.
@@ -149,5 +148,5 @@ def sky_axes(scene: Scene) -> tuple[SkyAxes, ...]:
     return tuple(axes.values())
 
 
-def _rows(matrix: Doubles) -> tuple[Sequence[float], ...]:
+def _rows(matrix: npt.NDArray[np.floating]) -> tuple[Place, ...]:
     return tuple(tuple(map(float, row)) for row in matrix)

@@ -1,4 +1,4 @@
-"""One picture with the other small in a corner: what is large, where the small one lies, and paint."""
+"""One picture with the other small in a corner: which is large, where the other lies, and paint."""
 
 from typing import Any
 

@@ -41,7 +41,7 @@ def painter(new_painter: Any) -> Painter:
 
 
 def test_objects_stand_where_lights_do(painter: Painter) -> None:
-    """By one scale: the room's corners are those of its outline, and −z is up, away from the camera."""
+    """By one scale: the corners of the room are those of its outline, and the view is upwards."""
     corners = painter.page.evaluate(
         """() => ['.room', ...[1, 2, 3].map((k) => `.plan-objects polygon:nth-of-type(${k})`)].map(
           (name) => [...document.querySelector(name).points].map(({ x, y }) => [x, y]))"""

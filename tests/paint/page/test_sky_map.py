@@ -72,7 +72,9 @@ def test_a_sun_shines_from_its_place(page: Any) -> None:
     added = sun(page, size, (row, column), 3)[..., 0] * solid_angles(size)
     directions = np.array([[texel_direction(x, y, size) for x in range(64)] for y in range(33)])
     mean = np.einsum("rc,rck->k", added, directions)
-    expected = np.array(texel_direction(column, row, size))  # type: ignore[arg-type]
+    polar, azimuth = np.pi * row / 32, 2 * np.pi * (column + 0.5) / 64
+    sine = np.sin(polar)
+    expected = np.array([sine * np.sin(azimuth), np.cos(polar), -sine * np.cos(azimuth)])
     angle = np.degrees(np.arccos(mean / np.linalg.norm(mean) @ expected))
     assert angle < 0.5
     spread = np.degrees(np.arccos(np.clip(directions @ expected, -1, 1)))[added > 0]
@@ -96,7 +98,7 @@ def test_directions_are_those_of_the_scene(page: Any) -> None:
 
 
 def test_a_gradient_changes_stops_evenly(page: Any) -> None:
-    """From a row to another one; beyond them both paints go on. Half way lies the geometric mean."""
+    """From a row to another; beyond both the paints go on. Half way lies their geometric mean."""
     paints = [{"colour": [1, 1, 1], "stops": -1}, {"colour": [1, 0.5, 0.25], "stops": 3}]
     image = sky_image(COLUMNS, ROWS)
     pairs = page.evaluate(
@@ -132,8 +134,9 @@ def unfold(painter: Painter, *, has_rig: bool = True) -> None:
         """(camera) => window.host.tell({ kind: 'rig', cameras: [camera], up: 1, low: [0, 0, 0],
           high: [1, 1, 1], surfaces: [], objects: [], skies: [{ name: 'sky',
           from_world: [[1, 0, 0], [0, 1, 0], [0, 0, 1]] }],
-          lights: window.host.room.lights.map(() => ({ position: null, direction: null, target: null,
-            cutoff: null, beam: null, rail: null, immovable_reason: 'it is a texel' })) })""",
+          lights: window.host.room.lights.map(() => ({ position: null, direction: null,
+            target: null, cutoff: null, beam: null, rail: null,
+            immovable_reason: 'a texel' })) })""",
         CAMERA,
     )
     painter.still()
