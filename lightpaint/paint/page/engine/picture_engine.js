@@ -6,7 +6,8 @@
  */
 import { luminance } from '../../../viewer/drawing/colour.js';
 import { VALUES } from '../../../viewer/drawing/half_floats.js';
-import { DEFAULT_TOOL, LABELS, Stroke, adjustArea } from './stroke.js';
+import { neutralTint, pixelsAround } from './neutral.js';
+import { DEFAULT_TOOL, LABELS, Stroke, adjustArea, tintArea } from './stroke.js';
 import { Emitter, SocketHost } from './socket_host.js';
 import { CpuView } from '../../../viewer/drawing/cpu.js';
 import { union } from '../../../viewer/drawing/cpu_picture.js';
@@ -234,7 +235,7 @@ class PictureEngine extends Emitter {
   begin(point) {
     if (this.stroke) this.end();
     const { place } = this;
-    if (!place || place.strokes.isSessionLost || ['pick', 'select'].includes(this.tool.tool)) return;
+    if (!place || place.strokes.isSessionLost || ['pick', 'select', 'neutral'].includes(this.tool.tool)) return;
     if (!this.layers.isReadyFor(this.tool, point)) this.mirror.layers.needPixels();
     if (this.mirror.layers.isLoading) return this.beginLate(point);
     const canvas = this.layers.begin(this.tool, point);
@@ -325,6 +326,24 @@ class PictureEngine extends Emitter {
     this.drawChange([adjustArea(canvas, adjustment)]);
     const layer = this.layers.end();
     place.strokes.end(layer?.name ?? LABELS.adjust, layer);
+  }
+
+  /** Make what is painted around a place neutral, by a layer over everything or over the selection.
+   * @param {Point} point @returns {boolean} false where no tint does that */
+  neutralize(point) {
+    if (this.stroke) this.end();
+    const { place, mirror, layers } = this;
+    if (!place || place.strokes.isSessionLost || !mirror.drawnPainting) return true;
+    const tint = neutralTint(pixelsAround(mirror.drawnPainting.image, this.screen.size, point));
+    if (!tint) return false;
+    const canvas = layers.begin(NUMBERS_TOOL, point, -1);
+    if (!canvas) return true;
+    layers.givenName = layers.neutralName(point);
+    place.strokes.begin(canvas, () => layers.layer);
+    this.drawChange([tintArea(canvas, tint)]);
+    const layer = layers.end();
+    place.strokes.end(layer?.name ?? LABELS.neutral, layer);
+    return true;
   }
 
   // Layers

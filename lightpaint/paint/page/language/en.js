@@ -448,6 +448,8 @@ export const en = {
     delete: 'Delete',
   },
   layerStrokes: {
+    neutralAt: '{whole}, neutral at {area}',
+    neutral: '{whole}, neutral',
     spotOn: 'Spot on {area}',
     spot: 'Spot',
     selection: 'Selection',
@@ -760,6 +762,7 @@ export const en = {
     without: 'without {names}',
   },
   pointerInput: {
+    nothingNeutral: 'Nothing is neutral here: it is black, or has light of one colour alone.',
     adjustNeedsADragToType:
       'Adjust needs a drag. To type values instead, press By numbers above the pictures.',
     itBeginsHereMoveToWhere: 'It begins here. Move to where it ends, and press Enter again.',
@@ -1137,6 +1140,7 @@ export const en = {
     nothingIsPaintedInThisView: 'Nothing is painted in this view. It follows the others.',
   },
   stroke: {
+    neutral: 'neutral',
     brush: 'brush',
     eraser: 'eraser',
     weight: 'importance',
@@ -1187,6 +1191,11 @@ export const en = {
     appliedAsOneStrokeWhichCan: 'Applied as one stroke, which can be undone',
   },
   tools: {
+    neutral: 'Neutral',
+    neutralPressWhatShould: 'Neutral: press what should be white or grey, and the rest follows',
+    clickWhatShouldHaveNoColour: 'Click what should be white or grey, in either picture. The whole picture, or what is selected, gets its tint.',
+    pressWhatShouldBeNeutral: 'Press what should be neutral',
+    theWholePictureFollows: 'The whole picture, or what is selected, gets the tint that takes its colour away.',
     brush: 'Brush',
     brushPaintLight: 'Brush: paint light',
     eraser: 'Eraser',

@@ -50,7 +50,7 @@
  * @property {number} master factor of the answer's weights, but for fixed lights
  */
 
-/** @typedef {"brush" | "eraser" | "weight" | "pick" | "fill" | "line" | "adjust" | "select" | "gradient"} Tool */
+/** @typedef {"brush" | "eraser" | "weight" | "pick" | "fill" | "line" | "adjust" | "select" | "gradient" | "neutral"} Tool */
 
 /**
  * The tool in the hand. `rgb`: linear light of the colour, including its stops. `size`: diameter in
@@ -100,6 +100,8 @@
  * @property {(from: Point, to: Point) => void} line a straight stroke, whole
  * @property {(adjustment: {stops: number, mired: number, object: number | null}) => void} adjust
  *   brighter and warmer by so much, in an object or, for null, in the whole picture
+ * @property {(point: Point) => boolean} neutralize makes what is painted around a place neutral, in the
+ *   selection or the whole picture; false where no tint does that
  * @property {(kind: Kind, x: number, y: number) => RGB} lightAt
  * @property {(kind: Kind, x: number, y: number, light?: RGB) => RGB} paintAt what to paint with, in the manner
  *   that is in the hand, to have that light there

@@ -345,6 +345,12 @@ export class FakeEngine {
     this.strokes += 1;
     this.send(true);
   }
+  neutralize(point) {
+    this.calls.push(['neutralize', point]);
+    this.strokes += 1;
+    this.send(true);
+    return this.image[3 * this.at(point.x, point.y)] > 0;
+  }
   at(x, y) {
     return (
       Math.min(this.room.h - 1, Math.max(0, Math.floor(y))) * this.room.w +
