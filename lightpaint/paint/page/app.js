@@ -24,6 +24,7 @@ import { Banner, Tips, Toasts, RunningTasks } from './ui/notices.js';
 import { dragPanel, stepPanel } from './ui/panels/panel_move.js';
 import { orderedPanels } from './ui/panels/panel_order.js';
 import { RoomPlan } from './ui/room_plan.js';
+import { ScopesPanel } from './ui/scopes/scopes_panel.js';
 import { SelectionFields } from './ui/selection/selection_fields.js';
 import { selectionUpdate } from './ui/selection/selection_settings.js';
 import { ReferencePaste } from './ui/references/reference_files.js';
@@ -191,6 +192,7 @@ const Watched = {
   LightList: watched(LightList),
   LightListActions: watched(LightListActions),
   RoomPlan: watched(RoomPlan),
+  ScopesPanel: watched(ScopesPanel),
   AnalysisPanel: watched(AnalysisPanel),
 };
 
@@ -266,6 +268,7 @@ function Side({ ui, app }) {
     )}
     ${ui.areLampsMarked && renderFold('plan', words.app.plan, html`<${Watched.RoomPlan} ui=${ui} app=${app} />`)}
     ${renderFold('history', words.app.history, html`<${Watched.HistoryPanel} ui=${ui} app=${app} />`)}
+    ${renderFold('scopes', words.app.scopes, html`<${Watched.ScopesPanel} ui=${ui} app=${app} />`)}
     ${renderFold('truth', words.app.analysis, html`<${Watched.AnalysisPanel} ui=${ui} app=${app} />`)}`;
   return html`<aside class="side" aria-label=${words.app.panels}
     onPointerDown=${(/** @type {PointerEvent} */ event) => dragPanel(event, store)}

@@ -66,6 +66,8 @@ export const DEFAULTS = Object.freeze({
  *   (n, 3) light of each plane at a pixel, at unit emission
  * @property {(kind: Kind, x: number, y: number) => [number, number, number]} lightAt
  *   linear light of a picture at a pixel
+ * @property {() => {data: Float32Array, width: number, height: number, channels: number} | null} mixedLight
+ *   linear light of the solution, maybe at reduced size; null before there is any
  * @property {() => boolean} hasLostContext whether the context lost all that was set, so that it has to be set again
  * @property {() => number} memory bytes held for pictures
  * @property {() => void} close

@@ -7,6 +7,7 @@
 import { luminance } from '../../../viewer/drawing/colour.js';
 import { VALUES } from '../../../viewer/drawing/half_floats.js';
 import { neutralTint, pixelsAround } from './neutral.js';
+import { sampledLight } from './displayed_codes.js';
 import { DEFAULT_TOOL, LABELS, Stroke, adjustArea, tintArea } from './stroke.js';
 import { Emitter, SocketHost } from './socket_host.js';
 import { CpuView } from '../../../viewer/drawing/cpu.js';
@@ -185,12 +186,40 @@ class PictureEngine extends Emitter {
 
   /** Return the display codes of light at an exposure. @param {RGB} rgb @param {number} stops */
   codes(rgb, stops) {
+    const rgba = new Uint8ClampedArray(4);
+    this.encoderAt(stops).pixels(Float32Array.from(rgb), rgba, 0, 1);
+    return [...rgba.subarray(0, 3)];
+  }
+
+  /** @param {number} stops @returns {Encoder} */
+  encoderAt(stops) {
     const { lut } = this.mirror;
     if (this.encoder?.lut !== lut || this.encoder.stops !== stops)
       this.encoder = new Encoder(lut, stops);
-    const rgba = new Uint8ClampedArray(4);
-    this.encoder.pixels(Float32Array.from(rgb), rgba, 0, 1);
-    return [...rgba.subarray(0, 3)];
+    return this.encoder;
+  }
+
+  /** Return the display codes of a picture as it is displayed, whole and at reduced size; null before
+   * there is one. @param {'painting' | 'solution' | 'present'} kind */
+  displayedCodes(kind) {
+    const source = this.lightOf(kind);
+    if (!source) return null;
+    const { light, width, height } = sampledLight(source);
+    const data = new Uint8ClampedArray(4 * width * height);
+    this.encoderAt(this.mirror.display?.stops ?? 0).pixels(light, data, 0, width * height);
+    return { data, width, height };
+  }
+
+  /** @param {'painting' | 'solution' | 'present'} kind
+   * @returns {import("./displayed_codes.js").LightSource | null} */
+  lightOf(kind) {
+    const { canvas, drawnPainting, isReady } = this.mirror;
+    if (!isReady || !canvas || !drawnPainting) return null;
+    const { width, height, present } = canvas;
+    if (kind === 'painting') return { data: drawnPainting.image, width, height, channels: 3 };
+    if (this.screen.substitute(kind) === 'present')
+      return { data: present, width, height, channels: 3, isHalf: true };
+    return this.screen.view?.mixedLight() ?? null;
   }
 
   /** @param {number} x @param {number} y @returns {[number, number] | null} */

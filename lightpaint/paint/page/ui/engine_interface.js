@@ -124,6 +124,8 @@
  *   'current' | 'width' | 'summary' | 'select' | 'change'>} selections what strokes keep to
  * @property {() => void} onMaskChange called when a stroke changes a mask
  * @property {() => number} maxImportance the greatest painted importance, at least 1
+ * @property {(kind: "painting" | "solution" | "present") => import("./scopes/scope_arithmetic.js").Codes | null}
+ *   displayedCodes of a picture as it is displayed, whole and at reduced size; null before there is one
  * @property {(rgb: RGB, stops: number) => number[]} codes that light is shown with, at an exposure
  * @property {(name: string, listener: (event: any) => void) => void} on "message": an answer to a
  *   stroke; "loading": {done, total, isFirst} pictures, where some of

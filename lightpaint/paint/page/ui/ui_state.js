@@ -5,6 +5,7 @@ import { INITIAL_LAMPS } from './lamps/lamp_state.js';
 import { fromKelvin } from './paint_colour.js';
 import { DEFAULT_PREFERENCES } from './preferences.js';
 import { INITIAL_REFERENCES } from './references/reference_state.js';
+import { INITIAL_SCOPES } from './scopes/scope_state.js';
 import { initialGradient } from './selection/gradient_settings.js';
 import { initialSelection } from './selection/selection_settings.js';
 
@@ -41,6 +42,7 @@ import { initialSelection } from './selection/selection_settings.js';
 /**
  * @typedef {import("./lamps/lamp_state.js").LampState & import("./preferences.js").Preferences
  *   & import("./references/reference_state.js").ReferenceState
+ *   & import("./scopes/scope_state.js").ScopeState
  *   & import("./images/image_state.js").ImageState & BaseUi} Ui
  *
  * @typedef {object} BaseUi
@@ -296,5 +298,6 @@ export function initialState() {
     ...INITIAL_IMAGES,
     ...DEFAULT_PREFERENCES,
     ...INITIAL_REFERENCES,
+    ...INITIAL_SCOPES,
   };
 }

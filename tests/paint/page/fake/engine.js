@@ -376,6 +376,14 @@ export class FakeEngine {
     return this.importance ?? 1;
   }
 
+  displayedCodes(kind) {
+    this.calls.push(['displayedCodes', kind]);
+    const { w: width, h: height } = this.room;
+    const gain = 2 ** this.shown.stops;
+    const data = new Uint8ClampedArray(4 * width * height).fill(255);
+    this.picture(kind).forEach((value, i) => (data[4 * Math.floor(i / 3) + (i % 3)] = encode(value * gain)));
+    return { data, width, height };
+  }
   codes(rgb, stops) {
     return rgb.map((x) => Math.round(encode(x * 2 ** stops)));
   }
