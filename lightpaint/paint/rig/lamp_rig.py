@@ -121,7 +121,7 @@ class LampRig:
 
     @cached_property
     def skies(self) -> tuple[SkyAxes, ...]:
-        """How the skies among its images are turned. The rig is open."""
+        """Axes of the skies among its images. The rig is open."""
         with in_this_thread():
             return sky_axes(self.scene)
 

@@ -1,4 +1,4 @@
-"""What pages draw of the room beside lights: outlines of objects from above, and how skies turn."""
+"""Outlines of a scene's objects from above, and the axes of its skies, for pages to draw."""
 
 from typing import Any
 
@@ -135,7 +135,7 @@ def _rounded(corners: Doubles) -> tuple[tuple[float, float], ...]:
 
 
 def sky_axes(scene: Scene) -> tuple[SkyAxes, ...]:
-    """Return how the skies among the images of a scene's lights are turned. The scene is loaded."""
+    """Return the axes of the skies among the images of a scene's lights. The scene is loaded."""
     axes: dict[str, SkyAxes] = {}
     for emitter in scene.emitters:
         texel = emitter.texel
