@@ -9,7 +9,7 @@ from painter_page import Painter
 #: The window of a common laptop.
 LAPTOP = {"width": 1440, "height": 900}
 
-DEFAULT = ["Colour", "Adjust by numbers", "Layers", "Lights", "History", "Analysis"]
+DEFAULT = ["Colour", "Adjust by numbers", "Layers", "Lights", "History", "Scopes", "Analysis"]
 
 MODULE = "async (given) => { const m = await import('/ui/panels/panel_order.js');"
 
@@ -70,10 +70,11 @@ def test_panels_are_moved_by_key_and_by_drag_and_stay_there(new_painter: Any) ->
         "Adjust by numbers",
         "Layers",
         "History",
+        "Scopes",
         "Analysis",
     ]
     assert lights.evaluate("(one) => one === document.activeElement")
-    assert painter.page.get_by_text("Lights: 2 of 6 panels").count() == 1
+    assert painter.page.get_by_text("Lights: 2 of 7 panels").count() == 1
     head = painter.page.locator(".is-truth .fold-head h2").bounding_box()
     target = painter.page.locator(".is-colour .fold-head").bounding_box()
     painter.page.mouse.move(head["x"] + 60, head["y"] + 10)

@@ -6,7 +6,7 @@ import { VALUES } from '../../../viewer/drawing/half_floats.js';
  *   isHalf?: boolean}} LightSource */
 
 /** Largest number of columns that are looked at. */
-export const MAX_COLUMNS = 256;
+export const MAX_COLUMNS = 384;
 
 /** Return the light of every so manieth pixel of every so manieth row. @param {LightSource} source
  * @param {number} [maxColumns] @returns {{light: Float32Array, width: number, height: number}} */

@@ -101,5 +101,5 @@ export function clippedPart(counts, code) {
 export function traceAlpha({ counts }) {
   const most = counts.reduce((a, b) => Math.max(a, b), 0);
   const full = Math.log2(1 + most) || 1;
-  return Uint8ClampedArray.from(counts, (count) => (count ? 70 + (185 * Math.log2(1 + count)) / full : 0));
+  return Uint8ClampedArray.from(counts, (count) => (count ? 110 + (145 * Math.log2(1 + count)) / full : 0));
 }
