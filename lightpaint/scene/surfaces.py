@@ -176,11 +176,19 @@ def _names_by_index(loaded: Any, names: Sequence[str]) -> dict[int, str]:
     import mitsuba as mi
 
     shapes = loaded.shapes()
-    ids = [shape.id() for shape in shapes]
-    names_or_ids = [shape_id or name for shape_id, name in zip(ids, names, strict=False)]
-    if len(names) != len(shapes):
-        names_or_ids = ids
+    names_or_ids = names_by_shape(loaded, names)
     if not dr.is_jit_v(mi.Float):
         return {k + 1: name for k, name in enumerate(names_or_ids)}
     indices = [int(dr.reinterpret_array(mi.UInt32, mi.ShapePtr(shape))[0]) for shape in shapes]
     return dict(zip(indices, names_or_ids, strict=True))
+
+
+def names_by_shape(loaded: Any, names: Sequence[str]) -> list[str]:
+    """Return the name of each shape of a loaded scene, "" for one without a name.
+
+    names: names of all shapes in their order, including unnamed ones.
+    """
+    ids = [shape.id() for shape in loaded.shapes()]
+    if len(names) != len(ids):
+        return ids
+    return [shape_id or name for shape_id, name in zip(ids, names, strict=True)]

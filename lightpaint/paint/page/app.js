@@ -21,7 +21,10 @@ import {
 } from './ui/browser_storage.js';
 import { initialState } from './ui/ui_state.js';
 import { Banner, Tips, Toasts, RunningTasks } from './ui/notices.js';
+import { dragPanel, stepPanel } from './ui/panels/panel_move.js';
+import { orderedPanels } from './ui/panels/panel_order.js';
 import { RoomPlan } from './ui/room_plan.js';
+import { ScopesPanel } from './ui/scopes/scopes_panel.js';
 import { SelectionFields } from './ui/selection/selection_fields.js';
 import { selectionUpdate } from './ui/selection/selection_settings.js';
 import { ReferencePaste } from './ui/references/reference_files.js';
@@ -189,6 +192,7 @@ const Watched = {
   LightList: watched(LightList),
   LightListActions: watched(LightListActions),
   RoomPlan: watched(RoomPlan),
+  ScopesPanel: watched(ScopesPanel),
   AnalysisPanel: watched(AnalysisPanel),
 };
 
@@ -240,9 +244,9 @@ function Side({ ui, app }) {
     /** @type {any} */ extra = null,
     isOpen = Boolean(ui.open[name]),
   ) =>
-    html`<${Fold} title=${title} class=${`is-${name}`} open=${isOpen} extra=${extra}
+    html`<${Fold} key=${name} name=${name} title=${title} class=${`is-${name}`} open=${isOpen} extra=${extra}
       toggle=${() => store.set({ open: { ...ui.open, [name]: !isOpen } })}>${content}</${Fold}>`;
-  return html`<aside class="side" aria-label=${words.app.panels}>
+  const panels = html`
     ${renderFold('colour', words.app.colour, html`<${Watched.ColourPanel} ui=${ui} app=${app} />`)}
     ${renderFold('ask', words.app.adjustByNumbers, html`<${Watched.AdjustPanel} ui=${ui} app=${app} />`)}
     ${
@@ -256,7 +260,6 @@ function Side({ ui, app }) {
       html`<${Watched.LayerCount} ui=${ui} /><${PresetsButton} app=${app} />`,
       ui.open.layers ?? hasLayers(ui),
     )}
-    ${renderFold('history', words.app.history, html`<${Watched.HistoryPanel} ui=${ui} app=${app} />`)}
     ${renderFold(
       'lights',
       words.app.lights,
@@ -264,6 +267,13 @@ function Side({ ui, app }) {
       html`<${Watched.LightListActions} ui=${ui} app=${app} />`,
     )}
     ${ui.areLampsMarked && renderFold('plan', words.app.plan, html`<${Watched.RoomPlan} ui=${ui} app=${app} />`)}
-    ${renderFold('truth', words.app.analysis, html`<${Watched.AnalysisPanel} ui=${ui} app=${app} />`)}
+    ${renderFold('history', words.app.history, html`<${Watched.HistoryPanel} ui=${ui} app=${app} />`)}
+    ${renderFold('scopes', words.app.scopes, html`<${Watched.ScopesPanel} ui=${ui} app=${app} />`)}
+    ${renderFold('truth', words.app.analysis, html`<${Watched.AnalysisPanel} ui=${ui} app=${app} />`)}`;
+  return html`<aside class="side" aria-label=${words.app.panels}
+    onPointerDown=${(/** @type {PointerEvent} */ event) => dragPanel(event, store)}
+    onKeyDown=${(/** @type {KeyboardEvent} */ event) => stepPanel(event, store)}>
+    ${orderedPanels(panels, ui.panelOrder)}
+    <span class="only-read" role="status">${ui.panelNote}</span>
   </aside>`;
 }

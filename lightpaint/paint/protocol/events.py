@@ -21,9 +21,11 @@ from lightpaint.paint.protocol.message_parts import (
     LightPlace,
     LookInfo,
     Place,
+    PlanObject,
     PresetInfo,
     ReferenceInfo,
     SampleCount,
+    SkyAxes,
     StepInfo,
     TableInfo,
     Tone,
@@ -257,7 +259,8 @@ class Rig(Message, kind="rig"):
 
     lights: in the order of the state. cameras: of each view; null for one that is no pinhole. up:
     the axis nearest to upwards, 0, 1 or 2. low, high: corners of a box around the visible scene and
-    all lights. surfaces: names of rails, surfaces and shapes that new lights may hang on.
+    all lights. surfaces: names of rails, surfaces and shapes that new lights may hang on. objects:
+    those within that box, the largest first. skies: of images that are skies.
     """
 
     lights: tuple[LightPlace, ...]
@@ -266,6 +269,8 @@ class Rig(Message, kind="rig"):
     low: Place
     high: Place
     surfaces: tuple[str, ...]
+    objects: tuple[PlanObject, ...]
+    skies: tuple[SkyAxes, ...]
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)

@@ -74,6 +74,30 @@ class LightPlace:
 
 
 @dataclass(frozen=True)
+class PlanObject:
+    """An object of the scene, seen from above.
+
+    corners: of its outline, which is convex, in the two axes beside the upward one, in their order.
+    """
+
+    name: str
+    corners: tuple[tuple[float, float], ...]
+
+
+@dataclass(frozen=True)
+class SkyAxes:
+    """The turn of the map of a sky.
+
+    name: of the image. from_world: three rows of a matrix that takes a direction from the scene to
+    the map's own axes: its first row is up (0, 1, 0), and column x of n is at the azimuth
+    2π (x + 1/2) / n from −z towards x.
+    """
+
+    name: str
+    from_world: tuple[Place, ...]
+
+
+@dataclass(frozen=True)
 class Camera:
     """A camera without a lens. Pixel (x, y) sees origin + s · (x · x_axis + y · y_axis + forward).
 

@@ -14,16 +14,17 @@ from lightpaint.arrays import Doubles
 from lightpaint.basis.basis import Basis
 from lightpaint.basis.lights import Lights
 from lightpaint.errors import PaintError, SceneError
-from lightpaint.paint.protocol import Camera, LightPlace
+from lightpaint.paint.protocol import Camera, LightPlace, PlanObject, SkyAxes
 from lightpaint.paint.rig.added_lights import (
     POSE_KEYS,
     light_of_new,
     new_emitter,
     site_of_new,
 )
-from lightpaint.paint.rig.cameras import camera_of, in_this_thread
+from lightpaint.paint.rig.cameras import camera_of, in_this_thread, up_axis
 from lightpaint.paint.rig.moved_bases import one_light_basis, with_planes_of
 from lightpaint.paint.rig.rig_view import RigView, open_view
+from lightpaint.paint.rig.room_plan import plan_objects, sky_axes
 from lightpaint.paint.session.moved_lights import Placed, added_names
 from lightpaint.paint.subject import Subject
 from lightpaint.placement.freedom import Freedom
@@ -108,6 +109,21 @@ class LampRig:
             np.max([x.max(axis=0) for x in seen], axis=0),
         )
         return low.astype(float), high.astype(float)
+
+    @cached_property
+    def plan_objects(self) -> tuple[PlanObject, ...]:
+        """Outlines of objects from above, within `bounds`, the largest first. The rig is open."""
+        assert self.views is not None
+        low, high = self.bounds or (np.zeros(3), np.ones(3))
+        view = self.views[0]
+        with in_this_thread():
+            return plan_objects(view.scene, view.loaded, up_axis(self.cameras), low, high)
+
+    @cached_property
+    def skies(self) -> tuple[SkyAxes, ...]:
+        """Axes of the skies among its images. The rig is open."""
+        with in_this_thread():
+            return sky_axes(self.scene)
 
     @property
     def extent(self) -> float:

@@ -31,6 +31,8 @@ def rig_state(rig: LampRig, placed: Placed) -> Rig:
         low=tuple(map(float, low)),
         high=tuple(map(float, high)),
         surfaces=rig.surfaces,
+        objects=rig.plan_objects,
+        skies=rig.skies,
     )
 
 

@@ -47,6 +47,8 @@ export class CpuView {
     this.mixMs = 0;
     this.step = 1;
     this.wasLive = false;
+    /** @type {Params | null} */
+    this.lastParams = null;
   }
 
   /** @param {number} count */
@@ -100,6 +102,7 @@ export class CpuView {
   draw(params) {
     const { context, canvas } = this;
     const { draftStep = 1 } = params;
+    this.lastParams = params;
     if (!params.live) this.step = 1;
     else if (!this.wasLive || draftStep > this.step)
       this.step = Math.max(this.liveStep(), draftStep);
@@ -218,6 +221,12 @@ export class CpuView {
     const start = 3 * (y * this.size[1] + x);
     const light = this.layers.get(kind)?.light;
     return light ? [light[start], light[start + 1], light[start + 2]] : [0, 0, 0];
+  }
+
+  mixedLight() {
+    if (!this.lastParams) return null;
+    const { light, width, height } = this.updateMixLayer('solution', this.lastParams);
+    return light.length ? { data: light, width, height, channels: 3 } : null;
   }
 
   hasLostContext() {

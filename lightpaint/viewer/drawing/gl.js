@@ -236,6 +236,18 @@ export class GlView {
     return [rgba[0], rgba[1], rgba[2]];
   }
 
+  mixedLight() {
+    if (this.hasLostContext()) return null;
+    this.planes.mix('solution');
+    const [height, width] = this.size;
+    const { texture } = this.planes.mixes.solution;
+    if (!texture) return null;
+    this.planes.bindTarget(texture, width, height);
+    const data = new Float32Array(4 * width * height);
+    this.gl.readPixels(0, 0, width, height, this.gl.RGBA, this.gl.FLOAT, data);
+    return { data, width, height, channels: 4 };
+  }
+
   hasLostContext() {
     return this.isLost || this.gl.isContextLost();
   }

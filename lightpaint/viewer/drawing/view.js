@@ -17,14 +17,17 @@
 
 /**
  * What is drawn. left, right: the pictures. layout: side by side (or stacked, if they are larger
- * so), the left one in front up to the wipe, or one alone (blink: 'left' or 'right'). zoom: 1 fits.
+ * so), the left one in front up to the wipe, one alone (blink: 'left' or 'right'), or one (large)
+ * with all of the other small in a corner. zoom: 1 fits.
  * pan: offset of the centre, in picture pixels. stops: exposure. live: whether more frames follow
  * soon, so that speed matters more than sharpness. draftStep: between the pixels and rows that are
  * worth drawing while live; others repeat these.
- * @typedef {{left: Kind, right: Kind, layout: 'side' | 'wipe' | 'blink', wipe: number,
+ * @typedef {{left: Kind, right: Kind, layout: 'side' | 'wipe' | 'blink' | 'inset', wipe: number,
  *   blink: 'left' | 'right', zoom: number, pan: [number, number], stops: number,
- *   overlay: Overlay, live: boolean, draftStep?: number}} Params
+ *   overlay: Overlay, live: boolean, draftStep?: number, large?: 'left' | 'right',
+ *   corner?: Corner}} Params
  */
+/** @typedef {'top-left' | 'top-right' | 'bottom-left' | 'bottom-right'} Corner */
 
 /** @type {Readonly<Params>} */
 export const DEFAULTS = Object.freeze({
@@ -63,6 +66,8 @@ export const DEFAULTS = Object.freeze({
  *   (n, 3) light of each plane at a pixel, at unit emission
  * @property {(kind: Kind, x: number, y: number) => [number, number, number]} lightAt
  *   linear light of a picture at a pixel
+ * @property {() => {data: Float32Array, width: number, height: number, channels: number} | null} mixedLight
+ *   linear light of the solution, maybe at reduced size; null before there is any
  * @property {() => boolean} hasLostContext whether the context lost all that was set, so that it has to be set again
  * @property {() => number} memory bytes held for pictures
  * @property {() => void} close
@@ -76,6 +81,10 @@ export const DEFAULTS = Object.freeze({
 
 /** Device pixels between two panes. */
 const GAP = 4;
+
+/** Largest part of the width and the height that a small picture in a corner takes, and its distance
+ * from the edges as a part of the shorter one. */
+const [INSET_SHARE, INSET_MARGIN] = [0.32, 0.02];
 
 /** Device pixels per picture pixel from which pixels are shown as squares. */
 export const SQUARES = 2;
@@ -99,6 +108,13 @@ export function panes(params, canvas, size) {
       fitPane(params.left, frontBox, area, params, size),
     ].filter((pane) => pane.width > 0);
   }
+  if (params.layout === 'inset') {
+    const isLeftLarge = params.large === 'left';
+    const [large, small] = isLeftLarge ? [params.left, params.right] : [params.right, params.left];
+    const box = insetBox(area, size, params.corner ?? 'bottom-right');
+    const whole = { ...params, zoom: 1, pan: /** @type {[number, number]} */ ([0, 0]) };
+    return [fitPane(large, area, area, params, size), fitPane(small, box, box, whole, size)];
+  }
   const columnWidth = Math.max(1, Math.floor((width - GAP) / 2));
   const rowHeight = Math.max(1, Math.floor((height - GAP) / 2));
   const isSideBySide = fit([columnWidth, height], size) >= fit([width, rowHeight], size);
@@ -110,6 +126,20 @@ export function panes(params, canvas, size) {
     fitPane(params.left, first, first, params, size),
     fitPane(params.right, second, second, params, size),
   ];
+}
+
+/** Return where the small picture lies, in whole pixels. @param {Box} area
+ * @param {[height: number, width: number]} size of the picture @param {Corner} corner
+ * @returns {Box} */
+function insetBox(area, [height, width], corner) {
+  const scale = Math.min((INSET_SHARE * area.width) / width, (INSET_SHARE * area.height) / height);
+  const box = { width: Math.max(1, Math.round(scale * width)), height: Math.max(1, Math.round(scale * height)) };
+  const margin = Math.round(INSET_MARGIN * Math.min(area.width, area.height));
+  return {
+    ...box,
+    x: area.x + (corner.endsWith('left') ? margin : area.width - margin - box.width),
+    y: area.y + (corner.startsWith('top') ? margin : area.height - margin - box.height),
+  };
 }
 
 /** Return the picture and its pixel, not rounded, at a place of the canvas; null between pictures.

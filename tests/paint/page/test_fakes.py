@@ -38,11 +38,12 @@ ASKED = {
     "export": {"outputs": ["target", "lighting"]},
     "verify": {"run": True},
     "explain": {"view": 0},
+    "show_rig": {},
     "take_over": {},
 }
 
 #: Requests of a rig, layers and a selection, which the session that tests make up does not have.
-RIG = {"move", "point", "show_rig", "place", "add_light", "remove_light", "change_layers", "select"}
+RIG = {"move", "point", "place", "add_light", "remove_light", "change_layers", "select"}
 RIG |= {"compare_looks", "import_layers", "add_reference"}
 
 

@@ -45,7 +45,7 @@ def test_keys_of_paint_programs(painter: Painter) -> None:
     press("Control+Shift+Z")
     assert painter.requests("undo")
     assert painter.requests("redo")
-    for layout in ("wipe", "blink", "side"):
+    for layout in ("wipe", "blink", "inset", "side"):
         press("v")
         assert painter.ui("display")["layout"] == layout
     press("c")

@@ -322,7 +322,7 @@ def test_a_lasso_selects_the_marks_that_it_encloses(new_painter: Any) -> None:
           const lights = store.value.lights.map((_, k) => place(4 + 3.5 * k, 5 + 17 * (k % 2)));
           store.set({ areLampsMarked: true,
             rig: { kind: 'rig', lights, cameras: [camera], up: 1, low: [0, 0, 0], high: [48, 27, 9],
-              surfaces: [] } });
+              surfaces: [], objects: [], skies: [] } });
         }"""
     )
     marks = page.locator(".lamp[data-lamp]")

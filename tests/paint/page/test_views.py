@@ -111,6 +111,33 @@ def test_views_agree(page: Any, pictures: Any, overlay: str | None):
         assert changed == [overlay in ("importance", "falsecolor"), overlay != "importance"]
 
 
+@pytest.mark.parametrize("kind", ["cpu", "gl"])
+def test_a_view_gives_the_light_of_its_mix(page: Any, pictures: Any, kind: str):
+    """Row by row from the top, in halves on a GPU; what it shows stays the same."""
+    before = draw_panes(page, kind, pictures)
+    mix = page.evaluate(
+        "() => { const mix = window.view.mixedLight(); return { ...mix, data: [...mix.data] }; }"
+    )
+    light = np.reshape(mix["data"], (mix["height"], mix["width"], mix["channels"]))[..., :3]
+    np.testing.assert_allclose(light, mix_planes(pictures), rtol=N * 2.0**-11)
+    after = page.evaluate("() => bench.shown({})")
+    codes_after = np.reshape(after, (H, 2 * W + GAP, 4))[:, :W, :3]
+    np.testing.assert_array_equal(codes_after, before[0])
+
+
+@pytest.mark.parametrize("kind", ["cpu", "gl"])
+def test_the_small_picture_lies_over_the_large_one(page: Any, pictures: Any, kind: str):
+    """In its corner is an even painting, and around it are the pixels of the answer."""
+    pictures["painting"][:] = (0.1, 0.3, 0.5)
+    draw_panes(page, kind, pictures)
+    rgba = page.evaluate("() => bench.shown({ layout: 'inset', corner: 'top-left', zoom: 1 })")
+    shown = np.reshape(rgba, (H, 2 * W + GAP, 4))[..., :3]
+    left = (2 * W + GAP - W) // 2
+    answer = codes(mix_planes(pictures))
+    assert np.abs(shown[12:, left + 20 : left + W] - answer[12:, 20:]).max() <= 1
+    assert np.abs(shown[2:8, 2:12] - codes(pictures["painting"])[0, 0]).max() <= 1
+
+
 @pytest.mark.nightly
 @pytest.mark.parametrize("kind", ["cpu", "gl"])
 def test_wipe_blink_and_zoom(page: Any, pictures: Any, kind: str):

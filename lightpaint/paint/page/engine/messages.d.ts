@@ -107,6 +107,28 @@ export interface LightPlace {
 }
 
 /**
+ * An object of the scene, seen from above.
+ *
+ * corners: of its outline, which is convex, in the two axes beside the upward one, in their order.
+ */
+export interface PlanObject {
+  name: string;
+  corners: [number, number][];
+}
+
+/**
+ * The turn of the map of a sky.
+ *
+ * name: of the image. from_world: three rows of a matrix that takes a direction from the scene to
+ * the map's own axes: its first row is up (0, 1, 0), and column x of n is at the azimuth
+ * 2π (x + 1/2) / n from −z towards x.
+ */
+export interface SkyAxes {
+  name: string;
+  from_world: number[][];
+}
+
+/**
  * A camera without a lens. Pixel (x, y) sees origin + s · (x · x_axis + y · y_axis + forward).
  *
  * is_parallel: all rays have the direction `forward` and begin at
@@ -758,7 +780,8 @@ export interface PreviewResult {
  *
  * lights: in the order of the state. cameras: of each view; null for one that is no pinhole. up:
  * the axis nearest to upwards, 0, 1 or 2. low, high: corners of a box around the visible scene and
- * all lights. surfaces: names of rails, surfaces and shapes that new lights may hang on.
+ * all lights. surfaces: names of rails, surfaces and shapes that new lights may hang on. objects:
+ * those within that box, the largest first. skies: of images that are skies.
  */
 export interface Rig {
   kind: 'rig';
@@ -769,6 +792,8 @@ export interface Rig {
   low: number[];
   high: number[];
   surfaces: string[];
+  objects: PlanObject[];
+  skies: SkyAxes[];
   arrays: {  };
 }
 

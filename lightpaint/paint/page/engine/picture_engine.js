@@ -6,7 +6,9 @@
  */
 import { luminance } from '../../../viewer/drawing/colour.js';
 import { VALUES } from '../../../viewer/drawing/half_floats.js';
-import { DEFAULT_TOOL, LABELS, Stroke, adjustArea } from './stroke.js';
+import { neutralTint, pixelsAround } from './neutral.js';
+import { sampledLight } from './displayed_codes.js';
+import { DEFAULT_TOOL, LABELS, Stroke, adjustArea, tintArea } from './stroke.js';
 import { Emitter, SocketHost } from './socket_host.js';
 import { CpuView } from '../../../viewer/drawing/cpu.js';
 import { union } from '../../../viewer/drawing/cpu_picture.js';
@@ -125,7 +127,9 @@ class PictureEngine extends Emitter {
     const { ratio, params } = this.screen;
     const panes = this.screen.panes();
     const [px, py] = [x * ratio, y * ratio];
-    return zoomAround(params, hitTest(panes, px, py)?.pane ?? panes[0], px, py, factor);
+    // A small picture in a corner is always whole.
+    const hit = params.layout === 'inset' ? null : hitTest(panes, px, py);
+    return zoomAround(params, hit?.pane ?? panes[0], px, py, factor);
   }
 
   /** Return the light of a picture at a pixel. @param {Kind} kind @param {number} x
@@ -182,12 +186,40 @@ class PictureEngine extends Emitter {
 
   /** Return the display codes of light at an exposure. @param {RGB} rgb @param {number} stops */
   codes(rgb, stops) {
+    const rgba = new Uint8ClampedArray(4);
+    this.encoderAt(stops).pixels(Float32Array.from(rgb), rgba, 0, 1);
+    return [...rgba.subarray(0, 3)];
+  }
+
+  /** @param {number} stops @returns {Encoder} */
+  encoderAt(stops) {
     const { lut } = this.mirror;
     if (this.encoder?.lut !== lut || this.encoder.stops !== stops)
       this.encoder = new Encoder(lut, stops);
-    const rgba = new Uint8ClampedArray(4);
-    this.encoder.pixels(Float32Array.from(rgb), rgba, 0, 1);
-    return [...rgba.subarray(0, 3)];
+    return this.encoder;
+  }
+
+  /** Return the display codes of a picture as it is displayed, whole and at reduced size; null before
+   * there is one. @param {'painting' | 'solution' | 'present'} kind */
+  displayedCodes(kind) {
+    const source = this.lightOf(kind);
+    if (!source) return null;
+    const { light, width, height } = sampledLight(source);
+    const data = new Uint8ClampedArray(4 * width * height);
+    this.encoderAt(this.mirror.display?.stops ?? 0).pixels(light, data, 0, width * height);
+    return { data, width, height };
+  }
+
+  /** @param {'painting' | 'solution' | 'present'} kind
+   * @returns {import("./displayed_codes.js").LightSource | null} */
+  lightOf(kind) {
+    const { canvas, drawnPainting, isReady } = this.mirror;
+    if (!isReady || !canvas || !drawnPainting) return null;
+    const { width, height, present } = canvas;
+    if (kind === 'painting') return { data: drawnPainting.image, width, height, channels: 3 };
+    if (this.screen.substitute(kind) === 'present')
+      return { data: present, width, height, channels: 3, isHalf: true };
+    return this.screen.view?.mixedLight() ?? null;
   }
 
   /** @param {number} x @param {number} y @returns {[number, number] | null} */
@@ -232,7 +264,7 @@ class PictureEngine extends Emitter {
   begin(point) {
     if (this.stroke) this.end();
     const { place } = this;
-    if (!place || place.strokes.isSessionLost || ['pick', 'select'].includes(this.tool.tool)) return;
+    if (!place || place.strokes.isSessionLost || ['pick', 'select', 'neutral'].includes(this.tool.tool)) return;
     if (!this.layers.isReadyFor(this.tool, point)) this.mirror.layers.needPixels();
     if (this.mirror.layers.isLoading) return this.beginLate(point);
     const canvas = this.layers.begin(this.tool, point);
@@ -323,6 +355,24 @@ class PictureEngine extends Emitter {
     this.drawChange([adjustArea(canvas, adjustment)]);
     const layer = this.layers.end();
     place.strokes.end(layer?.name ?? LABELS.adjust, layer);
+  }
+
+  /** Make what is painted around a place neutral, by a layer over everything or over the selection.
+   * @param {Point} point @returns {boolean} false where no tint does that */
+  neutralize(point) {
+    if (this.stroke) this.end();
+    const { place, mirror, layers } = this;
+    if (!place || place.strokes.isSessionLost || !mirror.drawnPainting) return true;
+    const tint = neutralTint(pixelsAround(mirror.drawnPainting.image, this.screen.size, point));
+    if (!tint) return false;
+    const canvas = layers.begin(NUMBERS_TOOL, point, -1);
+    if (!canvas) return true;
+    layers.givenName = layers.neutralName(point);
+    place.strokes.begin(canvas, () => layers.layer);
+    this.drawChange([tintArea(canvas, tint)]);
+    const layer = layers.end();
+    place.strokes.end(layer?.name ?? LABELS.neutral, layer);
+    return true;
   }
 
   // Layers

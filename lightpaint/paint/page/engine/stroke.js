@@ -10,7 +10,7 @@ import { words } from '../language/language.js';
 /** @typedef {import("./paint_canvas.js").PaintCanvas} PaintCanvas */
 /** @typedef {import("./message_frames.js").Region} Region */
 /** @typedef {import("./message_frames.js").RGB} RGB */
-/** @typedef {'brush' | 'eraser' | 'weight' | 'pick' | 'fill' | 'line' | 'adjust' | 'select' | 'gradient'} Tool */
+/** @typedef {'brush' | 'eraser' | 'weight' | 'pick' | 'fill' | 'line' | 'adjust' | 'select' | 'gradient' | 'neutral'} Tool */
 
 /**
  * rgb: linear light of the paint. size: diameter in pixels of the picture. importance: factor of
@@ -142,6 +142,15 @@ export class Stroke {
     for (const region of mergeRegions(regions)) this.canvas.apply(region, this.effect);
     return regions;
   }
+}
+
+/** Give everything a tint at the same luminance, as one stroke. @param {PaintCanvas} canvas
+ * @param {RGB} tint @returns {Region} */
+export function tintArea(canvas, tint) {
+  canvas.begin();
+  const region = flood(canvas);
+  canvas.apply(region, { kind: 'adjust', gain: 1, tint });
+  return region;
 }
 
 /** Make an object, or for null everything, brighter and warmer, as one stroke.

@@ -32,7 +32,7 @@ export function drawRings(
   rings.hidden = !pane;
   if (!pane) return;
   const isPoint =
-    ['pick', 'fill', 'select', 'gradient'].includes(ui.tool) ||
+    ['pick', 'fill', 'select', 'gradient', 'neutral'].includes(ui.tool) ||
     (ui.tool === 'adjust' && ui.adjustedArea !== 'spot');
   const size = isPoint ? 14 : Math.max(4, ui.size * pane.scale);
   place(ownRing, x, y, size, ui.hardness);

@@ -221,17 +221,20 @@ export function TruncatedText({ text, maxLength, class: name, tag: Tag = 'span' 
 }
 
 /**
- * A collapsible section of the side bar. The caller keeps whether it is open.
- * @param {{title: string, open: boolean, toggle: () => void, children?: any, extra?: any,
- *   class?: string}} props
+ * A collapsible section of the side bar, which has a name there and can be moved. The caller keeps whether it is open.
+ * @param {{title: string, name: string, open: boolean, toggle: () => void, children?: any,
+ *   extra?: any, class?: string}} props
  */
-export function Fold({ title, open, toggle, children, extra, class: name }) {
+export function Fold({ title, name, open, toggle, children, extra, class: classes }) {
   const id = useId();
-  return html`<section class=${`fold ${name ?? ''} ${open ? 'is-open' : ''}`} aria-label=${title}>
+  return html`<section class=${`fold ${classes ?? ''} ${open ? 'is-open' : ''}`} aria-label=${title}
+    data-panel=${name}>
     <div class="fold-head">
-      <h2><button type="button" aria-expanded=${String(open)} aria-controls=${id} onClick=${toggle}>
+      <h2><button type="button" aria-expanded=${String(open)} aria-controls=${id} onClick=${toggle}
+        aria-keyshortcuts="Alt+ArrowUp Alt+ArrowDown">
         <${Icon} name="fold" /><span>${title}</span></button></h2>
       ${extra}
+      <span class="fold-grip" aria-hidden="true" data-tip=${words.panels.grip}><${Icon} name="grip" /></span>
     </div>
     <div class="fold-body" id=${id} hidden=${!open}>${open && children}</div>
   </section>`;

@@ -31,9 +31,11 @@
  * @typedef {object} Display
  * @property {Kind} left
  * @property {Kind} right
- * @property {"side" | "wipe" | "blink"} layout
+ * @property {"side" | "wipe" | "blink" | "inset"} layout
  * @property {number} wipe
  * @property {"left" | "right"} blink
+ * @property {"left" | "right"} large the large picture where the other one is small in a corner
+ * @property {import("../../../viewer/drawing/view.js").Corner} corner that the small one lies in
  * @property {number} zoom
  * @property {[number, number]} pan
  * @property {number} stops
@@ -48,7 +50,7 @@
  * @property {number} master factor of the answer's weights, but for fixed lights
  */
 
-/** @typedef {"brush" | "eraser" | "weight" | "pick" | "fill" | "line" | "adjust" | "select" | "gradient"} Tool */
+/** @typedef {"brush" | "eraser" | "weight" | "pick" | "fill" | "line" | "adjust" | "select" | "gradient" | "neutral"} Tool */
 
 /**
  * The tool in the hand. `rgb`: linear light of the colour, including its stops. `size`: diameter in
@@ -98,6 +100,8 @@
  * @property {(from: Point, to: Point) => void} line a straight stroke, whole
  * @property {(adjustment: {stops: number, mired: number, object: number | null}) => void} adjust
  *   brighter and warmer by so much, in an object or, for null, in the whole picture
+ * @property {(point: Point) => boolean} neutralize makes what is painted around a place neutral, in the
+ *   selection or the whole picture; false where no tint does that
  * @property {(kind: Kind, x: number, y: number) => RGB} lightAt
  * @property {(kind: Kind, x: number, y: number, light?: RGB) => RGB} paintAt what to paint with, in the manner
  *   that is in the hand, to have that light there
@@ -120,6 +124,8 @@
  *   'current' | 'width' | 'summary' | 'select' | 'change'>} selections what strokes keep to
  * @property {() => void} onMaskChange called when a stroke changes a mask
  * @property {() => number} maxImportance the greatest painted importance, at least 1
+ * @property {(kind: "painting" | "solution" | "present") => import("./scopes/scope_arithmetic.js").Codes | null}
+ *   displayedCodes of a picture as it is displayed, whole and at reduced size; null before there is one
  * @property {(rgb: RGB, stops: number) => number[]} codes that light is shown with, at an exposure
  * @property {(name: string, listener: (event: any) => void) => void} on "message": an answer to a
  *   stroke; "loading": {done, total, isFirst} pictures, where some of

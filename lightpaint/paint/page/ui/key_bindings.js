@@ -8,6 +8,7 @@ export const DEFAULT_KEYS = {
   eraser: 'e',
   weight: 'w',
   pick: 'i',
+  neutral: 'u',
   fill: 'g',
   line: 'l',
   adjust: 'a',

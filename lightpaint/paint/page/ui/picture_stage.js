@@ -11,6 +11,7 @@ import { useStageInput } from './stage_input.js';
 import { comparedLooks, isPending, mixName } from './look_comparison.js';
 import { gainOf, paintOf, effectiveDisplay } from './display_state.js';
 import { PointerLabel } from './pointer_label.js';
+import { InsetFrame, aroundInset, splitPanes } from './inset_picture.js';
 import { LayerMask } from './layers/layer_mask.js';
 import { MaskNote } from './layers/layer_panel.js';
 import { ObjectOutline } from './object_outline.js';
@@ -187,10 +188,11 @@ export function Stage({ ui, app }) {
     [ui.size, ui.tool, ui.hardness, ui.display],
   );
   useStageInput(frame, pointer, app);
-  const panes = ui.ready ? engine.panes() : [];
+  const allPanes = ui.ready ? engine.panes() : [];
+  const { main: panes, inset } = splitPanes(ui.display, allPanes);
   const fit = panes.length ? panes[0].scale / ui.display.zoom : null;
   useLayoutEffect(() => store.set({ fit }), [fit?.toPrecision(6)]);
-  return html`<div class=${`stage is-${ui.tool} ${ui.dragAdjustment ? 'is-asking' : ''} ${ui.clickAction ? 'is-pointing' : ''} ${ui.drag ? 'is-dragging' : ''}`} ref=${frame} tabindex="0" role="application" inert=${Boolean(ui.mix?.more)}
+  return html`<div class=${`stage is-${ui.tool} ${ui.dragAdjustment ? 'is-asking' : ''} ${ui.clickAction ? 'is-pointing' : ''} ${ui.drag ? 'is-dragging' : ''} ${inset ? 'has-inset' : ''}`} ref=${frame} style=${aroundInset(inset)} tabindex="0" role="application" inert=${Boolean(ui.mix?.more)}
     aria-label=${words.pictureStage.picturesArrowKeysMoveTheBrush} aria-describedby="lp-status">
     ${ui.ready && html`<${ObjectOutline} ui=${ui} engine=${engine} panes=${panes} />`}
     ${ui.ready && html`<${SelectionOutline} ui=${ui} engine=${engine} panes=${panes} />`}
@@ -199,8 +201,9 @@ export function Stage({ ui, app }) {
     <div class="rings" ref=${rings} hidden aria-hidden="true">
       <i class="ring" style=${{ '--paint': toHex(ui.colour) }}></i><i class="ring is-twin"></i>
     </div>
-    ${panes.map(
-      (pane, k) => html`<${Tag} key=${k} ui=${ui} app=${app} pane=${pane} panes=${panes} />`,
+    ${inset && html`<${InsetFrame} inset=${inset} name=${nameOf(ui, inset.kind)} corner=${ui.display.corner} store=${store} />`}
+    ${allPanes.map(
+      (pane, k) => html`<${Tag} key=${k} ui=${ui} app=${app} pane=${pane} panes=${allPanes} />`,
     )}
     ${ui.ready && html`<${GradientHandles} ui=${ui} app=${app} panes=${panes} />`}
     ${ui.ready && html`<${LampMarks} ui=${ui} app=${app} panes=${panes} />`}

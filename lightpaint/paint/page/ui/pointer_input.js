@@ -94,6 +94,11 @@ export class Pointer {
       return;
     }
     if (!this.canPaint()) return;
+    if (tool === 'neutral') {
+      this.neutralize(point);
+      this.pane = null;
+      return;
+    }
     rememberPaint(this.store);
     this.store.set({ hint: false });
     if (event.shiftKey && this.lastPoint && !['adjust', 'gradient'].includes(tool)) {
@@ -170,6 +175,7 @@ export class Pointer {
     if (tool === 'select') return this.selecting.press({ ...point, kind: pane.kind }, isLine);
     if (tool === 'adjust') return this.say(words.pointerInput.adjustNeedsADragToType);
     if (!this.canPaint()) return;
+    if (tool === 'neutral') return this.neutralize(point);
     rememberPaint(this.store);
     this.store.set({ hint: false });
     if (tool === 'gradient') return this.dabGradient(point);
@@ -179,6 +185,12 @@ export class Pointer {
       this.engine.end();
     }
     this.lastPoint = point;
+  }
+
+  /** Make a place neutral, or say why not. @param {Point} point */
+  neutralize(point) {
+    this.store.set({ hint: false });
+    if (!this.engine.neutralize(point)) this.say(words.pointerInput.nothingNeutral);
   }
 
   /** Draw a gradient by key: Enter sets its start, then its end. @param {Point} point */

@@ -6,6 +6,7 @@ import { MoveButton } from './advice.js';
 import { endOnEscape } from './escape_key.js';
 import { dot, subtract, add, normalize, onRail } from './lamp_geometry.js';
 import { placeOf, shiftedTo } from './lamp_marks.js';
+import { PlanObjects } from './plan_objects.js';
 import { DRAG_MIN_PIXELS } from './lamps/mark_drag.js';
 import { atFullBrightness, luminance, toHex } from './paint_colour.js';
 import { words } from '../language/language.js';
@@ -20,7 +21,7 @@ import { words } from '../language/language.js';
  *   stop: () => void}} PlanDrag */
 
 /** Height of the plan and its margin, in CSS pixels; its width follows from the panel. */
-const [WIDTH, HEIGHT, MARGIN] = [270, 130, 10];
+const [WIDTH, HEIGHT, MARGIN] = [270, 170, 10];
 
 /** Height of a light added in the plan, relative to the room's. */
 const NEW_LIGHT_HEIGHT = 0.85;
@@ -174,6 +175,7 @@ export function RoomPlan({ ui, app }) {
       onPointerDown=${hang} onPointerMove=${dragLight}
       onPointerUp=${endDrag} onPointerCancel=${endDrag}>
       <polygon class="room" points=${outline} />
+      <${PlanObjects} rig=${rig} toPlan=${plan.toPlan} room=${outline} />
       <${CameraMark} ui=${ui} toPlan=${plan.toPlan} />
       ${Object.entries(ui.trial?.positions ?? {}).map(([name, position]) => {
         const [x, y] = plan.toPlan(position);

@@ -1,5 +1,6 @@
 /** Turns actions of a person into requests to the session. */
 
+import { exposureOf } from './images/light_images.js';
 import { ImageActions } from './images/image_actions.js';
 import { LampMoves } from './lamp_moves.js';
 import { ManyLights } from './lamps/many_lights.js';
@@ -203,6 +204,20 @@ export class SessionController extends SessionLink {
     const { areLampsMarked, rig } = this.store.value;
     this.store.set({ areLampsMarked: !areLampsMarked, clickAction: null });
     if (!areLampsMarked && !rig) void this.send('show_rig');
+  }
+
+  /** Have the places of lights and cameras sent, if there is a scene and they are not known. */
+  showRig() {
+    const { rig, state } = this.store.value;
+    if (!rig && state?.can_render) void this.send('show_rig');
+  }
+
+  /** Keep the exposure at which the map of an image is shown, unless it is kept already.
+   * @param {import("./images/image_state.js").LightImage} image */
+  keepExposure(image) {
+    this.store.set((ui) => ({
+      mapExposures: { ...ui.mapExposures, [image.name]: exposureOf(ui, image) },
+    }));
   }
 
   /** Move a light. The page shows the numbers at once, so that the next one goes with them, and

@@ -179,6 +179,9 @@ function PageSettings({ ui, app }) {
       <${Choice} label=${words.settingsPanel.theme} value=${ui.theme} choices=${THEMES}
         change=${(/** @type {import("./theme.js").Theme} */ theme) => app.store.set({ theme })} />
     </${Row}>
+    <${Row} title=${words.panels.reset} description=${words.panels.resetDescription}>
+      <${Button} label=${words.panels.asAtFirst} disabled=${!ui.panelOrder.length}
+        act=${() => app.store.set({ panelOrder: [] })} /></${Row}>
     <${Row} title=${words.settingsPanel.tour} description=${words.settingsPanel.tourDescription}>
       <${Button} label=${words.settingsPanel.showTheTour} act=${() => startTour(app.store)} /></${Row}>
     ${

@@ -2,6 +2,7 @@
 
 import { saveLook } from './look_actions.js';
 import { showPrevious } from './previous_answer.js';
+import { swapInset } from './inset_picture.js';
 import { chooseSelect, updateSelection } from './selection/selection_settings.js';
 import { words } from '../language/language.js';
 import { endTour } from './tour.js';
@@ -234,11 +235,11 @@ export const SHORTCUTS = [
       {
         command: 'blink',
         description: words.shortcuts.switchThePictureInBlink,
-        act: ({ store }) =>
-          updateDisplay(store, {
-            layout: 'blink',
-            blink: store.value.display.blink === 'left' ? 'right' : 'left',
-          }),
+        act: ({ store }) => {
+          const { layout, blink } = store.value.display;
+          if (layout === 'inset') return swapInset(store);
+          updateDisplay(store, { layout: 'blink', blink: blink === 'left' ? 'right' : 'left' });
+        },
       },
       {
         command: 'previous',

@@ -35,6 +35,12 @@ export const TOOLS = [
     tip: words.tools.pickerTakePaintFromAPicture,
   },
   {
+    tool: 'neutral',
+    label: words.tools.neutral,
+    icon: 'neutral',
+    tip: words.tools.neutralPressWhatShould,
+  },
+  {
     tool: 'fill',
     label: words.tools.fill,
     icon: 'fill',
@@ -71,6 +77,7 @@ const HINTS = /** @type {Record<Tool, string>} */ ({
   eraser: words.tools.removesPaintUnpaintedPartsStay,
   weight: words.tools.paintWhereTheAnswerMustMatch,
   pick: words.tools.clickEitherPictureTheLightThere,
+  neutral: words.tools.clickWhatShouldHaveNoColour,
   fill: words.tools.clickAnObjectToPaintAll,
   line: words.tools.dragFromOneEndOfThe,
   adjust: words.tools.dragOnAPictureUpBrighter,
@@ -103,6 +110,10 @@ const FIRST_HINTS = {
   pick: {
     title: words.tools.pickLightFromAPicture,
     text: words.tools.itBecomesThePaintThenChoose,
+  },
+  neutral: {
+    title: words.tools.pressWhatShouldBeNeutral,
+    text: words.tools.theWholePictureFollows,
   },
   fill: {
     title: PAINT_HINT.title,
@@ -215,7 +226,7 @@ export function togglePanels(store) {
  * @returns {T} */
 export const nextValue = (values, value) => values[(values.indexOf(value) + 1) % values.length];
 
-export const LAYOUTS = /** @type {const} */ (['side', 'wipe', 'blink']);
+export const LAYOUTS = /** @type {const} */ (['side', 'wipe', 'blink', 'inset']);
 export const OVERLAYS = /** @type {const} */ ([
   null,
   'missed',

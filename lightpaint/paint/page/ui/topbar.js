@@ -16,6 +16,7 @@ const LAYOUTS = [
   { value: 'side', label: words.topbar.sideBySide, icon: 'side' },
   { value: 'wipe', label: words.topbar.wipe, icon: 'wipe' },
   { value: 'blink', label: words.topbar.blink, icon: 'blink' },
+  { value: 'inset', label: words.topbar.inset, icon: 'inset' },
 ];
 
 /** The layouts, with their keys. @param {Ui} ui */
@@ -25,7 +26,7 @@ const layoutsOf = (ui) =>
     keys: shortcutsOf(
       ui,
       'layout',
-      ...(choice.value === 'blink' ? /** @type {const} */ (['blink']) : []),
+      ...(['blink', 'inset'].includes(choice.value) ? /** @type {const} */ (['blink']) : []),
     ),
   }));
 

@@ -6,6 +6,7 @@ import { INITIAL_LAMPS } from './lamps/lamp_state.js';
 import { fromKelvin } from './paint_colour.js';
 import { DEFAULT_PREFERENCES } from './preferences.js';
 import { INITIAL_REFERENCES } from './references/reference_state.js';
+import { INITIAL_SCOPES } from './scopes/scope_state.js';
 import { initialGradient } from './selection/gradient_settings.js';
 import { initialSelection } from './selection/selection_settings.js';
 
@@ -42,6 +43,7 @@ import { initialSelection } from './selection/selection_settings.js';
 /**
  * @typedef {import("./lamps/lamp_state.js").LampState & import("./preferences.js").Preferences
  *   & import("./references/reference_state.js").ReferenceState
+ *   & import("./scopes/scope_state.js").ScopeState
  *   & import("./images/image_state.js").ImageState & import("./answer_choices.js").ChoiceState
  *   & BaseUi} Ui
  *
@@ -153,6 +155,7 @@ import { initialSelection } from './selection/selection_settings.js';
  * @property {import("./look_comparison.js").Mix | null} mix of looks that are compared
  * @property {Record<string, boolean>} open what is unfolded
  * @property {boolean} side whether the panels are there
+ * @property {string} panelNote where a panel was moved to by key, for screen readers
  * @property {null | "settings"} panel what lies over the panels
  * @property {number | null} tour step of the tour that is shown
  * @property {string | null} tourFold what this step has unfolded and folds again
@@ -171,6 +174,8 @@ const DEFAULT_DISPLAY = {
   layout: 'side',
   wipe: 0.5,
   blink: 'left',
+  large: 'right',
+  corner: 'bottom-right',
   zoom: 1,
   pan: [0, 0],
   stops: 0,
@@ -287,6 +292,7 @@ export function initialState() {
     mix: null,
     open: { colour: true, lights: true, plan: true, truth: false },
     side: true,
+    panelNote: '',
     panel: null,
     tour: null,
     tourFold: null,
@@ -299,5 +305,6 @@ export function initialState() {
     ...DEFAULT_PREFERENCES,
     ...INITIAL_REFERENCES,
     ...INITIAL_CHOICES,
+    ...INITIAL_SCOPES,
   };
 }

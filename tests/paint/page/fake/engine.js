@@ -106,6 +106,15 @@ export class FakeEngine {
         placed(left, 0, 0, cut, height, all),
       ];
     }
+    if (layout === 'inset') {
+      const { large, corner = 'bottom-right' } = this.shown;
+      const [big, small] = large === 'left' ? [left, right] : [right, left];
+      const [across, down] = [0.3 * width, (0.3 * width * h) / w];
+      const x = corner.endsWith('left') ? 12 : width - 12 - across;
+      const y = corner.startsWith('top') ? 12 : height - 12 - down;
+      const whole = { ...placed(small, x, y, across, down), scale: across / w, left: x, top: y };
+      return [placed(big, 0, 0, width, height), whole];
+    }
     const [half, low] = [(width - 4) / 2, (height - 4) / 2];
     if (Math.min(half / w, height / h) >= Math.min(width / w, low / h)) {
       return [placed(left, 0, 0, half, height), placed(right, half + 4, 0, half, height)];
@@ -336,6 +345,12 @@ export class FakeEngine {
     this.strokes += 1;
     this.send(true);
   }
+  neutralize(point) {
+    this.calls.push(['neutralize', point]);
+    this.strokes += 1;
+    this.send(true);
+    return this.image[3 * this.at(point.x, point.y)] > 0;
+  }
   at(x, y) {
     return (
       Math.min(this.room.h - 1, Math.max(0, Math.floor(y))) * this.room.w +
@@ -361,6 +376,14 @@ export class FakeEngine {
     return this.importance ?? 1;
   }
 
+  displayedCodes(kind) {
+    this.calls.push(['displayedCodes', kind]);
+    const { w: width, h: height } = this.room;
+    const gain = 2 ** this.shown.stops;
+    const data = new Uint8ClampedArray(4 * width * height).fill(255);
+    this.picture(kind).forEach((value, i) => (data[4 * Math.floor(i / 3) + (i % 3)] = encode(value * gain)));
+    return { data, width, height };
+  }
   codes(rgb, stops) {
     return rgb.map((x) => Math.round(encode(x * 2 ** stops)));
   }

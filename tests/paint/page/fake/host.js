@@ -436,6 +436,9 @@ export class FakeHost {
     );
     return { kind: 'started', task: 'preview' };
   }
+  show_rig() {
+    return { kind: 'started', task: 'rig' };
+  }
   take_over() {
     return this.state();
   }

@@ -38,6 +38,8 @@ export class LayerStrokes {
     this.canvas = null;
     /** Whether it makes a layer. */
     this.isNew = false;
+    /** Name of the layer that it makes; null for one that says what it does. @type {string | null} */
+    this.givenName = null;
     /** What was active before it. */
     this.previous = { activeId: PAINTING_ID, isWishDone: false };
     /** Ids of all layers, as they were last. @type {Set<number>} */
@@ -256,11 +258,20 @@ export class LayerStrokes {
     canvas?.end();
     this.canvas = null;
     if (!(canvas instanceof LayerCanvas)) return null;
-    const layer = { ...canvas.layer, name: this.nameOf(canvas.layer, isNew) };
+    const layer = { ...canvas.layer, name: this.givenName ?? this.nameOf(canvas.layer, isNew) };
+    this.givenName = null;
     canvas.layer = layer;
     this.mirror.show(withLayers(this.mirror.list, [layer]));
     this.mirror.listener.onChange();
     return plainLayer(layer);
+  }
+
+  /** Return the name of a layer that makes a place neutral. @param {Point} place */
+  neutralName({ x, y }) {
+    const { layerStrokes: texts } = words;
+    const whole = this.selection ? texts.selection : texts.wholePicture;
+    const area = areaName(this.objectName(this.mirror.picture?.painting.objectAt(x, y) ?? -1));
+    return area ? fill(texts.neutralAt, { whole, area }) : fill(texts.neutral, { whole });
   }
 
   /** Return the name of the step that a stroke makes: what it asks for, or where it paints.

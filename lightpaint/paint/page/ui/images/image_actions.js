@@ -59,6 +59,15 @@ export class ImageActions {
     this.set(changes, label, isFinal);
   }
 
+  /** Give each of some texels a radiance. @param {Map<number, RGB>} radiances
+   * @param {string} label what that is @param {boolean} isFinal */
+  paintEach(radiances, label, isFinal) {
+    const ui = this.session.store.value;
+    const changes = new Map([...radiances].filter(([k]) => !findTie(ui, k)));
+    if (changes.size) this.set(changes, `${lightsText(ui, [...changes.keys()])}, ${label}`, isFinal);
+    else if (isFinal) this.session.toast(words.images.tiedTexelsKeepTheirColours);
+  }
+
   /** Change constraints on all texels of an image, and keep the others of each.
    * @param {LightImage} image @param {Constraints} change undefined for what is gone */
   constrain(image, change) {

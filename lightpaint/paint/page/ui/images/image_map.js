@@ -2,7 +2,6 @@
 
 import { encode } from '../../../../viewer/drawing/colour.js';
 import { html, useLayoutEffect, useRef } from '../../vendor/preact.js';
-import { mapStops } from './light_images.js';
 
 /** @typedef {import("../engine_interface.js").RGB} RGB */
 /** @typedef {import("./image_state.js").LightImage} LightImage */
@@ -33,11 +32,11 @@ export function drawMap(canvas, { places, lights }, weights, stops) {
   canvas.getContext('2d')?.putImageData(pixels, 0, 0);
 }
 
-/** The picture of an image in its row. @param {{image: LightImage, weights: RGB[]}} props */
-export function ImageMap({ image, weights }) {
+/** The picture of an image in its row. @param {{image: LightImage, weights: RGB[], stops: number}} props */
+export function ImageMap({ image, weights, stops }) {
   const ref = useRef(/** @type {HTMLCanvasElement | null} */ (null));
   useLayoutEffect(() => {
-    if (ref.current) drawMap(ref.current, image, weights, mapStops(image, weights));
+    if (ref.current) drawMap(ref.current, image, weights, stops);
   });
   return html`<canvas class="thumb image-map" ref=${ref} aria-hidden="true"></canvas>`;
 }

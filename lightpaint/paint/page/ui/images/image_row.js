@@ -18,7 +18,7 @@ import { fill, fillCount, words } from '../../language/language.js';
 import { heldTexels } from './image_actions.js';
 import { ImageConstraints } from './image_constraints.js';
 import { ImageMap } from './image_map.js';
-import { meanOf, wholeLight } from './light_images.js';
+import { exposureOf, meanOf, wholeLight } from './light_images.js';
 import { TexelMap } from './texel_map.js';
 
 /** @typedef {import("../engine_interface.js").RGB} RGB */
@@ -48,7 +48,7 @@ export function ImageRow({ image, ui, app }) {
   return html`<div class=${`light is-image ${isMute ? 'is-dim' : ''} ${isOpen ? 'is-open' : ''} ${isSelected ? 'is-selected' : ''}`}
       role="group" aria-label=${name} data-light=${name}>
     <div class="light-thumb">
-      <${ImageMap} image=${image} weights=${ui.weights} />
+      <${ImageMap} image=${image} weights=${ui.weights} stops=${exposureOf(ui, image)} />
       <${Share} share=${share} pointerShare=${pointerShare} />
       ${held.length > 0 && html`<span class="badge" data-tip=${heldText}>${fill(words.images.locked, { count: held.length })}</span>`}
       <button type="button" class="pick" role="checkbox" aria-checked=${String(isSelected)}

@@ -37,7 +37,7 @@ const sums = new WeakMap();
 /** Return the part of an image that each of its lights covers: the sum of those of its places, of
  * which there are many where some texels are finer. @param {LightImage} image
  * @returns {Map<number, number>} */
-function coverage({ places, shares }) {
+export function coverage({ places, shares }) {
   let sum = sums.get(places);
   if (!sum) {
     sum = new Map();
@@ -98,6 +98,11 @@ export function wholeLight(image, lights) {
   const present = meanOf(image, (k) => lights[k].present);
   return { ...lights[image.lights[0]], name: image.name, label: image.name, present };
 }
+
+/** Return the exposure at which the map of an image is shown: the one that is kept, or one that fits.
+ * @param {import("../ui_state.js").Ui} ui @param {LightImage} image */
+export const exposureOf = ({ mapExposures, weights }, image) =>
+  mapExposures[image.name] ?? mapStops(image, weights);
 
 /** Return the exposure in stops that shows an image, all but its brightest texels.
  * @param {LightImage} image @param {RGB[]} weights */

@@ -1,38 +1,110 @@
 /** The texels of an image, to be painted, locked and released on its map. */
 
 import { Hex, Hsv, MIXERS, Rgb, White } from '../colour_mixers.js';
-import { Choice, Slider, useId } from '../controls.js';
+import { Button, Choice, Slider, useId } from '../controls.js';
 import { signedText, whiteText } from '../format.js';
 import { stopsOf } from '../level_field.js';
 import { atFullBrightness, toHex, toKelvin } from '../paint_colour.js';
-import { html, useLayoutEffect, useRef, useState } from '../../vendor/preact.js';
+import { html, useEffect, useLayoutEffect, useMemo, useRef, useState } from '../../vendor/preact.js';
 import { fill, words } from '../../language/language.js';
 import { drawMap } from './image_map.js';
-import { blockAt, firstPlaces, mapStops, wholeLight } from './light_images.js';
-import { MAX_STOPS, MIN_STOPS, applyTool, clamp, pick, placeAt, useTexelStroke } from './texel_stroke.js';
+import { blockAt, exposureOf, firstPlaces, mapStops, wholeLight } from './light_images.js';
+import { SkyMarks, directionText, skyViewOf } from './sky_marks.js';
+import {
+  MAX_STOPS,
+  MIN_STOPS,
+  applyTool,
+  clamp,
+  pick,
+  placeAt,
+  pointAt,
+  useTexelStroke,
+} from './texel_stroke.js';
 
 /** @typedef {import("../engine_interface.js").RGB} RGB */
 /** @typedef {import("../ui_state.js").Ui} Ui */
 /** @typedef {import("../shortcuts.js").App} App */
 /** @typedef {import("./image_state.js").LightImage} LightImage */
 /** @typedef {import("./texel_stroke.js").Place} Place */
+/** @typedef {import("./texel_arithmetic.js").MapPoint} MapPoint */
 
 const TOOLS = [
   { value: 'paint', label: words.images.paint, tip: words.images.paintTexels },
+  { value: 'fill', label: words.images.fill, tip: words.images.fillTexels },
+  { value: 'gradient', label: words.images.gradient, tip: words.images.gradientTexels },
+  { value: 'sun', label: words.images.sun, tip: words.images.addASun },
   { value: 'lock', label: words.images.lock, tip: words.images.lockTexels },
   { value: 'release', label: words.images.release, tip: words.images.releaseTexels },
 ];
 
+/** The tools that use paint. @type {Ui["texelTool"][]} */
+const PAINT_TOOLS = ['paint', 'fill', 'gradient', 'sun'];
+
+/** Return the tools of an image: a sun is for skies, around which directions go. @param {boolean} isSky */
+const toolsOf = (isSky) => TOOLS.filter(({ value }) => isSky || value !== 'sun');
+
 /** @param {{image: LightImage, ui: Ui, app: App, held: number[]}} props */
 export function TexelMap({ image, ui, app, held }) {
   const [place, setPlace] = useState(/** @type {Place | null} */ (null));
+  const sky = useMemo(() => skyViewOf(ui, image), [ui.rig, ui.view, image]);
+  const isSky = ui.rig ? sky !== null : image.aspect === 2;
+  useEffect(() => {
+    app.session.keepExposure(image);
+    app.session.showRig();
+  }, []);
   return html`<div class="texels">
-    <${Grid} image=${image} ui=${ui} app=${app} held=${held} place=${place} setPlace=${setPlace} />
-    <p class="faint texel-text">${place ? texelText(image, ui, held, place) : words.images.dragToPaint}</p>
-    <${Choice} label=${words.images.drag} value=${ui.texelTool} choices=${TOOLS}
+    <${Grid} image=${image} ui=${ui} app=${app} held=${held} place=${place} setPlace=${setPlace} sky=${sky} />
+    <p class="faint texel-text">${place ? texelText(image, ui, held, place, sky) : words.images.dragToPaint}</p>
+    <${MapExposure} image=${image} ui=${ui} app=${app} />
+    <${Choice} label=${words.images.drag} value=${ui.texelTool} choices=${toolsOf(isSky)}
       change=${(/** @type {Ui["texelTool"]} */ texelTool) => app.store.set({ texelTool })} />
-    ${ui.texelTool === 'paint' && html`<${Paint} ui=${ui} app=${app} />`}
+    ${PAINT_TOOLS.includes(ui.texelTool) && html`<${Paint} ui=${ui} app=${app} />`}
+    ${ui.texelTool === 'gradient' && html`<${SecondPaint} ui=${ui} app=${app} />`}
+    ${
+      ui.texelTool === 'sun' &&
+      html`<${Slider} label=${words.images.diameter} value=${ui.sunDiameter} min=${0.5} max=${60} step=${0.5}
+      digits=${1} resetValue=${4} unit="°" tip=${words.images.diameterOfTheSun} curve=${RATIO}
+      change=${(/** @type {number} */ sunDiameter) => app.store.set({ sunDiameter })} />`
+    }
   </div>`;
+}
+
+/** Diameters are seen as ratios. */
+const RATIO = {
+  toPosition: (/** @type {number} */ x) => Math.log2(x),
+  toValue: (/** @type {number} */ t) => Math.round(2 * 2 ** t) / 2,
+};
+
+/** How bright the map is shown, which stays so while the image changes. @param {{image: LightImage, ui: Ui, app: App}} props */
+function MapExposure({ image, ui, app }) {
+  const stops = exposureOf(ui, image);
+  // In stops from what shows the image of the scene, so that 0 is where it begins.
+  const base = mapStops(image, ui.lights.map(({ present }) => present));
+  const set = (/** @type {number} */ value) =>
+    app.store.set(({ mapExposures }) => ({ mapExposures: { ...mapExposures, [image.name]: value } }));
+  return html`<div class="row map-exposure">
+    <${Slider} label=${words.images.exposure} value=${stops - base} min=${-8} max=${8} step=${0.1} digits=${1}
+      unit=${words.images.st} resetValue=${0} tip=${words.images.exposureOfTheMap}
+      change=${(/** @type {number} */ value) => set(base + value)} />
+    <${Button} label=${words.images.fit} tip=${words.images.fitTheExposure}
+      act=${() => set(mapStops(image, ui.weights))} />
+  </div>`;
+}
+
+/** What a gradient becomes at its end. @param {{ui: Ui, app: App}} props */
+function SecondPaint({ ui, app }) {
+  const { texelColour: colour, texelStops: stops, secondTexelPaint: second } = ui;
+  const swap = () =>
+    app.store.set({
+      texelColour: second.colour,
+      texelStops: second.stops,
+      secondTexelPaint: { colour, stops },
+    });
+  return html`<div class="row second-paint"><span class="faint">${words.images.becomes}</span>
+    <span class="dot" aria-hidden="true" style=${{ background: toHex(second.colour) }}></span>
+    <span>${fill(words.manyLights.st, { signed: signedText(second.stops) })}</span>
+    <span class="spring"></span>
+    <${Button} label=${words.images.swap} act=${swap} tip=${words.images.swapTheEnds} /></div>`;
 }
 
 /** The colour and the brightness of the paint. @param {{ui: Ui, app: App}} props */
@@ -59,11 +131,14 @@ function Paint({ ui, app }) {
 
 /** The map, on which the pointer and the keys reach each texel.
  * @param {{image: LightImage, ui: Ui, app: App, held: number[], place: Place | null,
- *   setPlace: (place: Place | null) => void}} props */
-function Grid({ image, ui, app, held, place, setPlace }) {
+ *   setPlace: (place: Place | null) => void, sky: import("./sky_marks.js").SkyView | null}} props */
+function Grid({ image, ui, app, held, place, setPlace, sky }) {
   const id = useId();
   const canvas = useRef(/** @type {HTMLCanvasElement | null} */ (null));
   const [key, setKey] = useState(/** @type {Place} */ ([0, 0]));
+  const [point, setPoint] = useState(/** @type {MapPoint | null} */ (null));
+  // By key, Enter sets where a gradient begins, then where it ends.
+  const [gradientStart, setGradientStart] = useState(/** @type {Place | null} */ (null));
   const [rows, columns] = [image.places.length, image.places[0].length];
   const stroke = useTexelStroke(image, ui, app, (next) => {
     setKey(next);
@@ -71,13 +146,14 @@ function Grid({ image, ui, app, held, place, setPlace }) {
   });
   useLayoutEffect(() => {
     if (!canvas.current) return;
-    drawMap(canvas.current, image, ui.weights, stroke.stops() ?? mapStops(image, ui.weights));
+    drawMap(canvas.current, image, ui.weights, exposureOf(ui, image));
   });
   const texelAt = (/** @type {Place} */ [row, column]) => image.places[row][column];
   const move = (/** @type {PointerEvent} */ event) => {
     const next = placeAt(event, rows, columns);
     if (String(next) !== String(place)) setPlace(next);
-    stroke.move(next);
+    stroke.move(next, event);
+    setPoint(pointAt(event, rows, columns));
   };
   const press = (/** @type {KeyboardEvent} */ event) => {
     const step = KEY_STEPS[event.key];
@@ -94,7 +170,12 @@ function Grid({ image, ui, app, held, place, setPlace }) {
       setKey(next);
       setPlace(next);
     } else if (event.altKey) pick(image, ui, app, texelAt(key));
-    else applyTool(image, ui, app, [texelAt(key)].filter((k) => k >= 0), true);
+    else if (ui.texelTool === 'gradient' && !gradientStart) setGradientStart(key);
+    else {
+      const texels = [texelAt(key)].filter((k) => k >= 0);
+      applyTool(image, ui, app, { texels, start: gradientStart ?? key, end: key }, true);
+      setGradientStart(null);
+    }
   };
   const cellId = `${id}-${key.join('-')}`;
   return html`<div class="texel-map" role="grid" tabindex="0" aria-label=${fill(words.images.map, { name: image.name })}
@@ -102,15 +183,46 @@ function Grid({ image, ui, app, held, place, setPlace }) {
     style=${{ aspectRatio: String(image.aspect) }} onKeyDown=${press}
     onFocus=${() => setPlace(key)} onBlur=${() => setPlace(null)}
     onPointerDown=${stroke.begin} onPointerMove=${move} onPointerUp=${stroke.end} onPointerCancel=${stroke.end}
-    onPointerLeave=${() => stroke.stops() === null && setPlace(null)}>
+    onPointerLeave=${() => {
+      if (stroke.current()) return;
+      setPlace(null);
+      setPoint(null);
+    }}>
     <canvas class="image-map" ref=${canvas} aria-hidden="true"></canvas>
+    ${ui.texelTool === 'sun' && point && html`<i class="texel-sun" aria-hidden="true" style=${sunStyle(point, rows, columns, ui.sunDiameter)}></i>`}
+    ${ui.texelTool === 'gradient' && html`<${GradientLine} start=${stroke.current()?.start ?? gradientStart} end=${stroke.current()?.end ?? key} rows=${rows} columns=${columns} />`}
     <${Locks} image=${image} held=${held} />
+    <${SkyMarks} sky=${sky} image=${image} />
     ${place && html`<i class="texel-here" aria-hidden="true" style=${cellStyle(image, place)}></i>`}
     <div role="row" aria-rowindex=${key[0] + 1}>
       <div key=${cellId} id=${cellId} role="gridcell" class="texel-key" aria-colindex=${key[1] + 1}
-        aria-label=${texelText(image, ui, held, key)} style=${cellStyle(image, key)}></div>
+        aria-label=${texelText(image, ui, held, key, sky)} style=${cellStyle(image, key)}></div>
     </div>
   </div>`;
+}
+
+/** The line of a gradient that is drawn. @param {{start: MapPoint | null, end: MapPoint, rows: number,
+ *   columns: number}} props */
+function GradientLine({ start, end, rows, columns }) {
+  if (!start) return null;
+  const [x1, y1, x2, y2] = [start, end].flatMap(([row, column]) => [
+    (100 * (column + 0.5)) / columns,
+    (100 * (row + 0.5)) / rows,
+  ]);
+  return html`<svg class="sky-marks texel-gradient" viewBox="0 0 100 100" preserveAspectRatio="none" aria-hidden="true">
+    <line x1=${x1} y1=${y1} x2=${x2} y2=${y2} /></svg>`;
+}
+
+/** Return where a sun lies on the map, wider towards the poles as the map is. @param {MapPoint} place
+ * @param {number} rows @param {number} columns @param {number} diameter in degrees */
+function sunStyle([row, column], rows, columns, diameter) {
+  const sine = Math.sin((Math.PI * Math.min(rows - 1.1, Math.max(0.1, row))) / (rows - 1));
+  return {
+    left: `${(100 * (column + 0.5)) / columns}%`,
+    top: `${(100 * (row + 0.5)) / rows}%`,
+    width: `${Math.min(100, diameter / 3.6 / Math.max(0.05, sine))}%`,
+    height: `${(diameter / 1.8) * ((rows - 1) / rows)}%`,
+  };
 }
 
 /** A mark on each locked texel. @param {{image: LightImage, held: number[]}} props */
@@ -154,10 +266,11 @@ function stepped(index, step, first, count) {
 }
 
 /** Return a texel in words. @param {LightImage} image @param {Ui} ui @param {number[]} held
- * @param {Place} place */
-function texelText(image, ui, held, [row, column]) {
+ * @param {Place} place @param {import("./sky_marks.js").SkyView | null} sky */
+function texelText(image, ui, held, [row, column], sky) {
   const k = image.places[row][column];
   const where = { column: column + 1, row: row + 1 };
+  const direction = directionText(sky, image, [row, column]);
   if (k < 0) return fill(words.images.notAdjusted, where);
   const rgb = ui.weights[k] ?? ui.lights[k].present;
   const stops = stopsOf(rgb, wholeLight(image, ui.lights));
@@ -167,6 +280,7 @@ function texelText(image, ui, held, [row, column]) {
     stops === null
       ? words.lightRow.off
       : `${colour} · ${fill(words.manyLights.st, { signed: signedText(stops) })}`;
-  const text = fill(words.images.texel, { ...where, light });
+  const parts = [light, direction].filter(Boolean).join(' · ');
+  const text = fill(words.images.texel, { ...where, light: parts });
   return held.includes(k) ? fill(words.images.texelLocked, { text }) : text;
 }

@@ -1,20 +1,24 @@
-/** A stroke over the map of an image: it paints, locks or releases the texels that it passes. */
+/** A stroke over the map of an image: it paints, locks or releases the texels that it passes, draws a
+ * gradient, fills a half of a sky, or places a sun. */
 
 import { endOnEscape } from '../escape_key.js';
 import { presentLevel, stopsOf } from '../level_field.js';
-import { scaled } from '../lamps/lamp_colours.js';
 import { atFullBrightness, luminance } from '../paint_colour.js';
 import { useEffect, useRef } from '../../vendor/preact.js';
-import { mapStops, wholeLight } from './light_images.js';
+import { words } from '../../language/language.js';
+import { wholeLight } from './light_images.js';
+import { aboveHorizon, skyViewOf } from './sky_marks.js';
+import { gradientLights, radianceOf, sunLights, texelsToFill } from './texel_arithmetic.js';
 
 /** @typedef {import("../engine_interface.js").RGB} RGB */
 /** @typedef {import("../ui_state.js").Ui} Ui */
 /** @typedef {import("../shortcuts.js").App} App */
 /** @typedef {import("./image_state.js").LightImage} LightImage */
 /** @typedef {[row: number, column: number]} Place */
-/** A stroke that goes on. stops: exposure at its start, which would change under the brush. weights:
- * the answer at its start. ignoreKeys: ends its listening to keys.
- * @typedef {{texels: Set<number>, last: Place, stops: number, weights: RGB[],
+/** @typedef {import("./texel_arithmetic.js").MapPoint} MapPoint */
+/** A stroke that goes on. start, end: where it began and where it is now, between texels. weights: the
+ * answer at its start. ignoreKeys: ends its listening to keys.
+ * @typedef {{texels: Set<number>, last: Place, start: MapPoint, end: MapPoint, weights: RGB[],
  *   ignoreKeys: () => void}} TexelStroke */
 
 /** Ends of the brightness of paint, in stops from the mean of the image in the scene. */
@@ -30,8 +34,10 @@ export function useTexelStroke(image, ui, app, visit) {
   const stroke = useRef(/** @type {TexelStroke | null} */ (null));
   const [rows, columns] = [image.places.length, image.places[0].length];
   const texelAt = (/** @type {Place} */ [row, column]) => image.places[row][column];
-  const apply = (/** @type {boolean} */ isFinal) =>
-    applyTool(image, ui, app, [...(stroke.current?.texels ?? [])], isFinal);
+  const apply = (/** @type {boolean} */ isFinal) => {
+    const { current } = stroke;
+    if (current) applyTool(image, ui, app, { ...current, texels: [...current.texels] }, isFinal);
+  };
   const release = () => {
     stroke.current?.ignoreKeys();
     stroke.current = null;
@@ -39,7 +45,8 @@ export function useTexelStroke(image, ui, app, visit) {
   const cancel = () => {
     const current = stroke.current;
     release();
-    if (current && app.store.value.texelTool === 'paint') app.session.many.cancel(current.weights);
+    if (current && ['paint', 'gradient'].includes(app.store.value.texelTool))
+      app.session.many.cancel(current.weights);
   };
   // The map may go away under the brush, and hears of no end then.
   useEffect(() => cancel, []);
@@ -52,14 +59,17 @@ export function useTexelStroke(image, ui, app, visit) {
     element.setPointerCapture(event.pointerId);
     element.focus({ preventScroll: true });
     const texels = new Set([texelAt(start)].filter((k) => k >= 0));
-    const [{ weights }, ignoreKeys] = [ui, endOnEscape(cancel)];
-    stroke.current = { texels, last: start, stops: mapStops(image, weights), weights, ignoreKeys };
+    const [{ weights }, ignoreKeys, point] = [ui, endOnEscape(cancel), pointAt(event, rows, columns)];
+    stroke.current = { texels, last: start, start: point, end: point, weights, ignoreKeys };
     visit(start);
     return apply(false);
   };
-  const move = (/** @type {Place} */ next) => {
+  const move = (/** @type {Place} */ next, /** @type {PointerEvent} */ event) => {
     const current = stroke.current;
-    if (!current || String(next) === String(current.last)) return;
+    if (!current) return;
+    current.end = pointAt(event, rows, columns);
+    if (app.store.value.texelTool === 'gradient') apply(false);
+    if (String(next) === String(current.last)) return;
     for (const passed of placesBetween(current.last, next))
       if (texelAt(passed) >= 0) current.texels.add(texelAt(passed));
     current.last = next;
@@ -70,7 +80,7 @@ export function useTexelStroke(image, ui, app, visit) {
     if (stroke.current) apply(true);
     release();
   };
-  return { begin, move, end, stops: () => stroke.current?.stops ?? null };
+  return { begin, move, end, current: () => stroke.current };
 }
 
 /** Return the nearest of `count` indices. @param {number} index @param {number} count */
@@ -86,6 +96,17 @@ export function placeAt(event, rows, columns) {
   ];
 }
 
+/** Return the place under the pointer, also between the middles of texels. @param {PointerEvent} event
+ * @param {number} rows @param {number} columns @returns {MapPoint} */
+export function pointAt(event, rows, columns) {
+  const box = /** @type {Element} */ (event.currentTarget).getBoundingClientRect();
+  const within = (/** @type {number} */ share) => Math.min(1, Math.max(0, share));
+  return [
+    rows * within((event.clientY - box.top) / box.height) - 0.5,
+    columns * within((event.clientX - box.left) / box.width) - 0.5,
+  ];
+}
+
 /** Return the places from one to another, without the first. @param {Place} from @param {Place} to
  * @returns {Place[]} */
 function placesBetween(from, to) {
@@ -97,15 +118,29 @@ function placesBetween(from, to) {
   ]);
 }
 
-/** Apply the chosen tool to texels. @param {LightImage} image @param {Ui} ui @param {App} app
- * @param {number[]} texels @param {boolean} isFinal false while a stroke goes on */
-export function applyTool(image, ui, app, texels, isFinal) {
+/** Apply the chosen tool. @param {LightImage} image @param {Ui} ui @param {App} app
+ * @param {{texels: number[], start: MapPoint, end: MapPoint}} stroke @param {boolean} isFinal false
+ * while the stroke goes on */
+export function applyTool(image, ui, app, { texels, start, end }, isFinal) {
   const { images, many } = app.session;
-  if (!texels.length) return;
-  if (ui.texelTool === 'paint') {
-    const level = presentLevel(wholeLight(image, ui.lights)) * 2 ** ui.texelStops;
-    images.paint(texels, scaled(ui.texelColour, level / luminance(ui.texelColour)), isFinal);
-  } else if (isFinal && ui.texelTool === 'lock') many.lock(texels);
+  const { texelTool, texelColour, texelStops, secondTexelPaint } = ui;
+  const mean = presentLevel(wholeLight(image, ui.lights));
+  const paint = { colour: texelColour, stops: texelStops };
+  if (texelTool === 'gradient') {
+    const paints = /** @type {[typeof paint, typeof paint]} */ ([paint, secondTexelPaint]);
+    images.paintEach(gradientLights(image, start, end, paints, mean), words.images.gradientStep, isFinal);
+  } else if (texelTool === 'fill') {
+    if (!isFinal) return;
+    const filled = texelsToFill(image, end, aboveHorizon(skyViewOf(ui, image), image));
+    images.paint(filled, radianceOf(paint, mean), true);
+  } else if (texelTool === 'sun') {
+    if (!isFinal) return;
+    const added = sunLights(image, end, ui.sunDiameter, paint, mean);
+    const sum = [...added].map(([k, rgb]) => [k, rgb.map((value, c) => value + ui.weights[k][c])]);
+    images.paintEach(new Map(/** @type {[number, RGB][]} */ (sum)), words.images.sunStep, true);
+  } else if (!texels.length) return;
+  else if (texelTool === 'paint') images.paint(texels, radianceOf(paint, mean), isFinal);
+  else if (isFinal && texelTool === 'lock') many.lock(texels);
   else if (isFinal) void many.unlock(texels);
 }
 

@@ -1,0 +1,152 @@
+"""Outlines of a scene's objects from above, and the axes of its skies, for pages to draw."""
+
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+
+from lightpaint.arrays import Doubles
+from lightpaint.paint.protocol import Place, PlanObject, SkyAxes
+from lightpaint.scene.lights.texels.sky import Sky
+from lightpaint.scene.scene import Scene
+from lightpaint.scene.surfaces import names_by_shape
+
+#: Most outlines of a plan, the largest, and most corners of each.
+MAX_OUTLINES, MAX_CORNERS = 200, 32
+
+#: Part of the plan from which an object encloses the room: its outline is that of the room.
+ENCLOSING_SHARE = 0.6
+
+#: Parts of the room's height: what hangs above the first is left out, such as a ceiling; so is what
+#: is thinner than the second and larger than a part of the plan, such as another room's floor.
+MAX_LOWEST, MIN_THICKNESS, MAX_THIN_SHARE = 0.6, 0.03, 0.05
+
+#: Most parts of one mesh that have an outline each; more have one together, and so have those of a
+#: mesh of more faces than these.
+MAX_PARTS, MAX_SPLIT_FACES = 24, 200_000
+
+#: Points along each side of a grid over a surface that has no vertices.
+SURFACE_SAMPLES = 24
+
+
+def plan_objects(
+    scene: Scene, loaded: Any, up: int, low: Doubles, high: Doubles
+) -> tuple[PlanObject, ...]:
+    """Return the outlines of a loaded scene's shapes from above, the largest first.
+
+    up: the upward axis. low, high: corners of the box that the plan shows. Parts of meshes have
+    outlines of their own. Those that lie outside the box, enclose it, hang high in it or are a
+    floor are left out, and so is what emits light.
+    """
+    across = [axis for axis in range(3) if axis != up]
+    plan_area, height = float(np.prod((high - low)[across])), float((high - low)[up])
+    found = []
+    for shape, name in zip(loaded.shapes(), names_by_shape(loaded, scene.shape_names), strict=True):
+        if shape.is_emitter() or not name:
+            continue
+        for part in _parts(shape):
+            corners = outline(part[:, across])
+            middle = (corners.min(axis=0) + corners.max(axis=0)) / 2
+            is_inside = bool(((middle >= low[across]) & (middle <= high[across])).all())
+            lowest, thickness = float(part[:, up].min()), float(np.ptp(part[:, up]))
+            size = polygon_area(corners)
+            is_thin = thickness < MIN_THICKNESS * height
+            most = plan_area * (MAX_THIN_SHARE if is_thin else ENCLOSING_SHARE)
+            if is_inside and lowest - low[up] < MAX_LOWEST * height and size < most:
+                found.append((size, name, corners))
+    found.sort(key=lambda entry: -entry[0])
+    return tuple(PlanObject(name, _rounded(corners)) for _, name, corners in found[:MAX_OUTLINES])
+
+
+def outline(points: Doubles) -> Doubles:
+    """Return the corners of the convex hull of points (n, 2), counterclockwise, (k, 2).
+
+    They are the points that lie furthest in each of MAX_CORNERS directions: all corners of a hull
+    whose angles are not almost straight. Points at one place up to rounding are one corner.
+    """
+    step = 1e-5 * max(float(np.ptp(points, axis=0).max()), 1e-30)
+    points = np.round(points / step) * step
+    angles = 2 * np.pi * np.arange(MAX_CORNERS) / MAX_CORNERS + 1e-3
+    furthest = np.argmax(points @ np.stack([np.cos(angles), np.sin(angles)]), axis=0)
+    return np.array(list(dict.fromkeys(map(tuple, points[furthest].tolist()))))
+
+
+def polygon_area(corners: Doubles) -> float:
+    """Return the area of a polygon of corners (k, 2), counterclockwise."""
+    x, y = corners.T
+    return float(x @ np.roll(y, -1) - y @ np.roll(x, -1)) / 2
+
+
+def _parts(shape: Any) -> list[Doubles]:
+    """Return the points of each part of a shape in world space, (n, 3) each."""
+    if not shape.is_mesh():
+        return [_surface_points(shape)]
+    vertices = np.array(shape.vertex_positions_buffer(), float).reshape(-1, 3)
+    faces = np.array(shape.faces_buffer(), int).reshape(-1, 3)
+    if len(faces) > MAX_SPLIT_FACES:
+        return [vertices]
+    part_of = mesh_parts(vertices, faces)
+    numbers = np.unique(part_of)
+    if len(numbers) > MAX_PARTS:
+        return [vertices]
+    return [vertices[part_of == number] for number in numbers]
+
+
+def mesh_parts(vertices: Doubles, faces: npt.NDArray[np.int_]) -> npt.NDArray[np.int_]:
+    """Return a number for each vertex, equal for vertices that faces connect, (n,).
+
+    vertices: (n, 3); those at one place count as one. faces: (m, 3), indices of their corners.
+    """
+    place = np.unique(vertices, axis=0, return_inverse=True)[1].reshape(-1)
+    corners = place[faces]
+    part_of = np.arange(place.max(initial=-1) + 1)
+    while True:
+        smallest = part_of[corners].min(axis=1)
+        joined = part_of.copy()
+        np.minimum.at(joined, corners, smallest[:, None])
+        # What a face joins is joined for all that was one part with its corners before.
+        np.minimum.at(joined, part_of[corners], smallest[:, None])
+        joined = joined[joined]
+        if (joined == part_of).all():
+            return np.asarray(part_of[place])
+        part_of = joined
+
+
+def _surface_points(shape: Any) -> Doubles:
+    """Return points on a shape without vertices, (n, 3), among them those furthest out."""
+    import drjit as dr
+    import mitsuba as mi
+
+    side = np.linspace(0, 1, SURFACE_SAMPLES, dtype=np.float32)
+    grid = np.stack(np.meshgrid(side, side)).reshape(2, -1)
+    samples = [mi.Point2f(grid)] if dr.is_jit_v(mi.Float) else [mi.Point2f(x) for x in grid.T]
+    try:
+        points = [np.array(shape.sample_position(0.0, sample).p, float) for sample in samples]
+        return np.concatenate([x.reshape(3, -1) for x in points], axis=1).T
+    except (RuntimeError, NotImplementedError):
+        box = shape.bbox()  # all that an instance of a group has
+    low, high = np.array(box.min, float).ravel(), np.array(box.max, float).ravel()
+    choices = np.array(np.meshgrid(*[[0, 1]] * 3)).reshape(3, -1).T
+    return np.where(choices, high, low)
+
+
+def _rounded(corners: Doubles) -> tuple[tuple[float, float], ...]:
+    return tuple((float(f"{x:.5g}"), float(f"{y:.5g}")) for x, y in corners)
+
+
+def sky_axes(scene: Scene) -> tuple[SkyAxes, ...]:
+    """Return the axes of the skies among the images of a scene's lights. The scene is loaded."""
+    axes: dict[str, SkyAxes] = {}
+    for emitter in scene.emitters:
+        texel = emitter.texel
+        if texel is None or not isinstance(texel.domain, Sky) or texel.image in axes:
+            continue
+        props, to_world = scene.parsed.state.nodes[emitter.node].props, np.eye(3)
+        if "to_world" in props:
+            to_world = np.array(props["to_world"].matrix, float).reshape(4, 4)[:3, :3]
+        axes[texel.image] = SkyAxes(texel.image, _rows(np.linalg.inv(to_world)))
+    return tuple(axes.values())
+
+
+def _rows(matrix: npt.NDArray[np.floating]) -> tuple[Place, ...]:
+    return tuple(tuple(map(float, row)) for row in matrix)
