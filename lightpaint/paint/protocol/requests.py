@@ -94,15 +94,18 @@ class Preview(Message, kind="preview"):
 
 @dataclass(frozen=True)
 class Export(Message, kind="export"):
-    """Write results to the folder of the session, or stop that. Answered by `started`, later by
+    """Write results to a folder of the session, or stop that. Answered by `started`, later by
     `exported`, which names the files written, even if stopped.
 
     outputs: `target`: a painting of each painted view; `layers`: its layers; `picture`: the
-    displayed answer in each view.
+    displayed answer in each view. name: of a new folder in `exports/` for these files; a number
+    follows a name that is taken, so that no earlier export is replaced. "" for the folder of the
+    session itself, whose earlier files of the same names are replaced.
     """
 
     outputs: tuple[Literal["target", "picture", "lighting", "relit", "report", "layers"], ...]
     run: bool = True
+    name: str = ""
 
 
 @dataclass(frozen=True)

@@ -1187,15 +1187,18 @@ export interface DropLook {
 }
 
 /**
- * Write results to the folder of the session, or stop that. Answered by `started`, later by
+ * Write results to a folder of the session, or stop that. Answered by `started`, later by
  * `exported`, which names the files written, even if stopped.
  *
  * outputs: `target`: a painting of each painted view; `layers`: its layers; `picture`: the
- * displayed answer in each view.
+ * displayed answer in each view. name: of a new folder in `exports/` for these files; a number
+ * follows a name that is taken, so that no earlier export is replaced. "" for the folder of the
+ * session itself, whose earlier files of the same names are replaced.
  */
 export interface Export {
   outputs: ('target' | 'picture' | 'lighting' | 'relit' | 'report' | 'layers')[];
   run?: boolean;
+  name?: string;
 }
 
 /**

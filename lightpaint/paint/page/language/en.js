@@ -205,6 +205,11 @@ export const en = {
     thisBrowserDoesNotLetThe: 'This browser does not let the page copy. Select the text instead.',
     copied: 'Copied',
   },
+  exports: {
+    name: 'Name',
+    nameTip:
+      'Of a new folder in exports/. Earlier exports stay: a number follows a name that is taken.',
+  },
   format: {
     asNow: 'as now',
     st: '{signed} st',

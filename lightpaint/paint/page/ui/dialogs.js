@@ -3,6 +3,7 @@
 import { html, useState } from '../vendor/preact.js';
 import { ProgressBar } from './progress_bar.js';
 import { Button, Checkbox, Dialog } from './controls.js';
+import { ExportName, suggestedName } from './exports/export_name.js';
 import { percentText, progressText, relativePath } from './format.js';
 import { LooksDialog } from './looks_dialog.js';
 import { PresetsDialog } from './presets_dialog.js';
@@ -68,10 +69,12 @@ function ExportDialog({ ui, app, close }) {
   const [outputs, setOutputs] = useState(
     available.map(({ key }) => key).filter((key) => !UNTICKED.includes(key)),
   );
+  const [name, setName] = useState(() => suggestedName(ui));
   const isBusy = ui.isExporting;
   const { exportResult } = ui;
   const folder = ui.state?.folder ?? '';
   return html`<${Dialog} title=${words.dialogs.export} close=${close} class="export">
+    <${ExportName} name=${name} change=${setName} />
     ${available.map(
       ({ key, label, description }) => html`<div class="export-row" key=${key}>
       <${Checkbox} label=${label} checked=${outputs.includes(key)} change=${(
@@ -85,8 +88,8 @@ function ExportDialog({ ui, app, close }) {
     }
     <div class="row"><span class="faint folder">${fill(words.dialogs.to, { folder })}</span>
       <${CopyButton} text=${folder} tip=${words.dialogs.copyTheFoldersPath} app=${app} />
-      <${Button} label=${isBusy ? words.dialogs.exporting : words.dialogs.export} primary disabled=${isBusy || !outputs.length}
-        act=${() => app.session.exportFiles(outputs)} /></div>
+      <${Button} label=${isBusy ? words.dialogs.exporting : words.dialogs.export} primary disabled=${isBusy || !outputs.length || !name.trim()}
+        act=${() => app.session.exportFiles(outputs, name.trim())} /></div>
     ${
       isBusy &&
       html`<div class="row"><span class="faint folder">${words.dialogs.youCanCloseThisWindow}</span>

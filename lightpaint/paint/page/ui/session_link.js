@@ -241,10 +241,11 @@ export class SessionLink {
     return TASK_RESETS.place;
   }
 
-  /** Export files, or stop the export. @param {Requests["export"]["outputs"]} outputs empty to stop */
-  exportFiles(outputs) {
+  /** Export files, or stop the export. @param {Requests["export"]["outputs"]} outputs empty to stop
+   * @param {string} [name] of the new folder for them */
+  exportFiles(outputs, name = '') {
     if (outputs.length) this.store.set({ isExporting: true, exportResult: null });
-    return this.send('export', { outputs, run: outputs.length > 0 });
+    return this.send('export', { outputs, run: outputs.length > 0, ...(name && { name }) });
   }
 
   /** @param {string} text @param {'info' | 'warn'} [tone] */

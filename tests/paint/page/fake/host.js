@@ -396,12 +396,12 @@ export class FakeHost {
     this.looks = this.looks.filter(({ id }) => id !== look);
     return this.kept();
   }
-  export({ outputs, run = true }) {
+  export({ outputs, run = true, name = '' }) {
     if (this.isWriting) return { kind: 'started', task: run ? 'export' : 'stop' };
     const files = this.unpainted ? outputs.filter((one) => !['target', 'report'].includes(one)) : outputs;
     return {
       kind: 'exported',
-      files: files.map((one) => `/shows/gallery-evening/${one}`),
+      files: files.map((one) => `/shows/gallery-evening/${name && `exports/${name}/`}${one}`),
       command: files.includes('target')
         ? 'lightpaint solve gallery.xml gallery-evening/target.exr'
         : '',
