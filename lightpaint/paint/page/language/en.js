@@ -760,6 +760,10 @@ export const en = {
     forPresetsAboutOneObject: 'For presets about one object',
     moonlightNoirGalleryAndOthers: 'Moonlight, noir, gallery and others',
   },
+  originalScene: {
+    hold: 'Hold: the original scene, in place of the answer',
+    name: 'Original scene',
+  },
   previousAnswer: {
     holdTheAnswerBeforeTheLast: 'Hold: the answer before the last step',
   },
@@ -1061,6 +1065,7 @@ export const en = {
     nextViewIfThereAre: 'next view, if there are several',
     switchThePictureInBlink: 'switch the picture in blink',
     holdTheAnswerBeforeThe: 'hold: the answer before the last step',
+    holdTheOriginalScene: 'hold: the original scene',
     lowerDisplayExposure: 'lower display exposure',
     raiseDisplayExposure: 'raise display exposure',
     denoiseOnOrOff: 'denoise on or off',

@@ -91,6 +91,7 @@ import { initialSelection } from './selection/selection_settings.js';
  * @property {{undo: string[], redo: string[], count?: number}} history labels of steps, and their count
  * @property {boolean} isPreviousHeld whether the answer before the last step is asked for
  * @property {RGB[] | null} previousWeights that answer, while it is shown
+ * @property {boolean} isOriginalHeld whether the original scene is shown in place of the answer
  * @property {Look[]} looks
  * @property {{look: number, version: number, steps: number} | null} lastLook last saved or loaded, with
  *   the version and the number of steps then
@@ -227,6 +228,7 @@ export function initialState() {
     history: { undo: [], redo: [] },
     isPreviousHeld: false,
     previousWeights: null,
+    isOriginalHeld: false,
     looks: [],
     lastLook: null,
     basis: null,
