@@ -23,6 +23,7 @@ from lightpaint.paint.protocol.message_parts import (
     Place,
     PresetInfo,
     ReferenceInfo,
+    RenderInfo,
     SampleCount,
     StepInfo,
     TableInfo,
@@ -36,6 +37,7 @@ from lightpaint.paint.protocol.task_events import (
     PlacingResult,
     PreviewResult,
     ProgressReport,
+    RenderList,
     TaskStarted,
     TaskStopped,
     TrialPlaces,
@@ -66,7 +68,8 @@ class SessionState(EditState, Message, kind="state"):
     version: of this protocol. size: height and width of the first view, and `objects` the names of
     its objects.
     lut: the grid of the tables `lut/NAME` of all `transforms`. resources: pictures, with a number
-    that grows when one is replaced. verifications: the last one of each view. is_new: whether
+    that grows when one is replaced. verifications: the last one of each view. renders: the final
+    renders, as in `renders`. is_new: whether
     the session has no steps yet. stroke: number of the last stroke that arrived. command: solves
     for the exported paintings. is_back: the client had the session before, and no other client
     since; also true if unasked. weights: (lights, 3) float64, the last answer.
@@ -97,6 +100,7 @@ class SessionState(EditState, Message, kind="state"):
     answer: Findings
     weights: Doubles
     is_back: bool = True
+    renders: tuple[RenderInfo, ...] = ()
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -304,6 +308,7 @@ EVENTS: Mapping[str, type[Any]] = {
         TaskStarted,
         TaskStopped,
         ExportResult,
+        RenderList,
         VerificationResult,
         Explanation,
         PreviewResult,

@@ -229,6 +229,30 @@ class ReferenceInfo:
     name: str
 
 
+@dataclass(frozen=True, kw_only=True)
+class RenderInfo:
+    """A final render. Its small picture is `render/ID`, (h, w, 3) uint8, and the bytes of its files
+    are `render_file/ID/NAME`, uint8, once it is done.
+
+    name: as requested. height: null until it is known. state: `waiting` for an earlier one; the
+    others speak for themselves. done, total: its passes. text: why it has failed. files: paths of
+    those that were written.
+    """
+
+    id: int
+    name: str
+    view: int
+    width: int
+    height: int | None = None
+    spp: int
+    formats: tuple[str, ...]
+    state: Literal["waiting", "rendering", "done", "stopped", "failed"] = "waiting"
+    done: int = 0
+    total: int = 0
+    text: str = ""
+    files: tuple[str, ...] = ()
+
+
 @dataclass(frozen=True)
 class PlacePair:
     """Two places that should look alike: (x, y) as shares of width and height, 0 to 1."""

@@ -8,15 +8,15 @@ import numpy as np
 import numpy.typing as npt
 
 from lightpaint.paint.protocol.base import OPTIONAL, Message
-from lightpaint.paint.protocol.message_parts import Place
+from lightpaint.paint.protocol.message_parts import Place, RenderInfo
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class ProgressReport(Message, kind="progress"):
     """The progress of a long task. Unasked.
 
-    task: `export`, `basis`, `sampling` for samples added where the paint needs them, or the
-    renderer's name for the task.
+    task: `export`, `final` for a final render, `basis`, `sampling` for samples added where the
+    paint needs them, or the renderer's name for the task.
     """
 
     task: str
@@ -75,6 +75,15 @@ class ExportResult(Message, kind="exported"):
     command: str
     is_stopped: bool | None = field(default=None, metadata=OPTIONAL)
     is_unpainted: bool | None = field(default=None, metadata=OPTIONAL)
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class RenderList(Message, kind="renders"):
+    """The final renders since the painter was started, the oldest first: the answer to requests
+    about them, and unasked when one changes its state.
+    """
+
+    renders: tuple[RenderInfo, ...]
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)

@@ -140,7 +140,7 @@ class BackgroundJobs:
             raise PaintError(f"no view {view}: there are {len(self._subjects)}")
         return self._subjects[view]
 
-    def _exact_answer(
+    def exact_answer(
         self, check: Callable[[], None]
     ) -> tuple[tuple[Subject, ...], SessionSnapshot, Lighting]:
         """Return the subjects with their current lights, the paintings, and the exact answer under
@@ -186,7 +186,7 @@ class BackgroundJobs:
             # A stop also ends the exact solve, which may take long.
             with cancellable(check):
                 layers = self._access.layers() if "layers" in message.outputs else ()
-                subjects, snapshot, lighting = self._exact_answer(check)
+                subjects, snapshot, lighting = self.exact_answer(check)
                 with self._write_lock, self._export_folder(message.name) as folder:
                     check()
                     outputs = message.outputs
@@ -239,7 +239,7 @@ class BackgroundJobs:
             check()
             self._publisher.report_progress(label, done, total, unit)
 
-        subjects, snapshot, lighting = self._exact_answer(check)
+        subjects, snapshot, lighting = self.exact_answer(check)
         progress: Progress = report
         picture, text, agrees = render_verification(
             subjects[view], snapshot.bases[view], lighting, progress

@@ -60,10 +60,8 @@ def _make_folder(parent: Path, name: str) -> Path:
         try:
             folder.mkdir(parents=True)
         except FileExistsError:
-            if not parent.is_dir():  # a file has its name, so no number helps
-                raise OutputError(f"cannot make {folder}: {parent} is a file") from None
+            continue
         except OSError as error:
             raise OutputError(f"cannot make {folder}: {error.strerror}") from None
-        else:
-            return folder
+        return folder
     raise AssertionError

@@ -27,6 +27,7 @@ from lightpaint.paint.store.canvas_pixels import Pixels
 from lightpaint.paint.store.session_requests import SessionRequests
 from lightpaint.paint.studio.background_jobs import BackgroundJobs
 from lightpaint.paint.studio.exact_answers import ExactAnswers
+from lightpaint.paint.studio.final_renders import FinalRenders
 from lightpaint.paint.studio.layer_imports import LayerImports
 from lightpaint.paint.studio.reference_imports import ReferenceImports
 
@@ -60,6 +61,7 @@ class RequestHandler:
         self._subjects = mover.rig.subjects
         self._imports = LayerImports(access, publisher, threads, exact_answers.notify)
         self._references = ReferenceImports(access, publisher, threads)
+        self._renders = FinalRenders(publisher, threads, self._subjects, jobs.exact_answer)
         self._placer = LightPlacer(access, publisher, mover.rig, threads, self._hang_lights)
 
     def state(self) -> SessionState | SessionPending:
@@ -124,6 +126,8 @@ class RequestHandler:
                     return self._comparison.handle(message)
                 case protocol.Export() | protocol.Verify() | protocol.Explain():
                     return self._jobs.handle(message)
+                case protocol.RenderFinal() | protocol.StopRender() | protocol.DropRender():
+                    return self._renders.handle(message)
                 case protocol.ImportLayers():
                     return self._imports.handle(message, arrays)
                 case protocol.AddReference() | protocol.DropReference():
@@ -210,6 +214,7 @@ class RequestHandler:
                 self._access.looks,
                 target_spp=self._subjects[0].target_spp,
             ),
+            "renders": self._renders.infos,
             "verifications": self._jobs.verifications(session.version),
             "command": self._jobs.solve_command(sensors, session.requests),
         }

@@ -411,7 +411,8 @@ def test_files_are_written_and_their_command_shown(painter: Painter) -> None:
     painter.page.context.grant_permissions(["clipboard-read", "clipboard-write"])
     painter.button("Copy the folder's path").click()
     painter.button("Copied").wait_for()
-    assert painter.page.evaluate("navigator.clipboard.readText()") == "/shows/gallery-evening"
+    copied = painter.page.evaluate("navigator.clipboard.readText()")
+    assert copied == "/shows/gallery-evening/exports"
     assert painter.page.get_by_text("lightpaint solve gallery.xml").is_visible()
     assert not painter.page.get_by_text("Nothing is painted yet").count()
     painter.page.evaluate("() => { host.unpainted = true; }")

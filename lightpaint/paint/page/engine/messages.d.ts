@@ -262,6 +262,29 @@ export interface ReferenceInfo {
 }
 
 /**
+ * A final render. Its small picture is `render/ID`, (h, w, 3) uint8, and the bytes of its files
+ * are `render_file/ID/NAME`, uint8, once it is done.
+ *
+ * name: as requested. height: null until it is known. state: `waiting` for an earlier one; the
+ * others speak for themselves. done, total: its passes. text: why it has failed. files: paths of
+ * those that were written.
+ */
+export interface RenderInfo {
+  id: number;
+  name: string;
+  view: number;
+  width: number;
+  height: number | null;
+  spp: number;
+  formats: string[];
+  state: 'waiting' | 'rendering' | 'done' | 'stopped' | 'failed';
+  done: number;
+  total: number;
+  text: string;
+  files: string[];
+}
+
+/**
  * Two places that should look alike: (x, y) as shares of width and height, 0 to 1.
  */
 export interface PlacePair {
@@ -374,7 +397,8 @@ export interface Findings {
  * version: of this protocol. size: height and width of the first view, and `objects` the names of
  * its objects.
  * lut: the grid of the tables `lut/NAME` of all `transforms`. resources: pictures, with a number
- * that grows when one is replaced. verifications: the last one of each view. is_new: whether
+ * that grows when one is replaced. verifications: the last one of each view. renders: the final
+ * renders, as in `renders`. is_new: whether
  * the session has no steps yet. stroke: number of the last stroke that arrived. command: solves
  * for the exported paintings. is_back: the client had the session before, and no other client
  * since; also true if unasked. weights: (lights, 3) float64, the last answer.
@@ -418,6 +442,7 @@ export interface SessionState {
   command: string;
   answer: Findings;
   is_back: boolean;
+  renders: RenderInfo[];
   arrays: { weights: Picture };
 }
 
@@ -620,8 +645,8 @@ export interface ReferenceList {
 /**
  * The progress of a long task. Unasked.
  *
- * task: `export`, `basis`, `sampling` for samples added where the paint needs them, or the
- * renderer's name for the task.
+ * task: `export`, `final` for a final render, `basis`, `sampling` for samples added where the
+ * paint needs them, or the renderer's name for the task.
  */
 export interface ProgressReport {
   kind: 'progress';
@@ -666,6 +691,17 @@ export interface ExportResult {
   command: string;
   is_stopped?: boolean;
   is_unpainted?: boolean;
+  arrays: {  };
+}
+
+/**
+ * The final renders since the painter was started, the oldest first: the answer to requests
+ * about them, and unasked when one changes its state.
+ */
+export interface RenderList {
+  kind: 'renders';
+  reply?: number;
+  renders: RenderInfo[];
   arrays: {  };
 }
 
@@ -1202,6 +1238,37 @@ export interface Export {
 }
 
 /**
+ * Render the answer of now with the renderer, in the background, into a new folder in
+ * `renders/`. Answered by `renders`, which follows again whenever a render changes its state.
+ *
+ * name: of the folder; a number follows one that is taken. width: of the picture in pixels; the
+ * height follows from the scene. spp: samples per pixel. formats: `exr`, linear light as rendered,
+ * its noise, and denoised; `png`, 16 bits, denoised, through the view and exposure of the scene.
+ * view: index of the view.
+ */
+export interface RenderFinal {
+  name: string;
+  width: number;
+  spp: number;
+  formats?: ('exr' | 'png')[];
+  view?: number;
+}
+
+/**
+ * Stop a final render, which writes nothing then. Answered by `renders`.
+ */
+export interface StopRender {
+  render: number;
+}
+
+/**
+ * Take a final render that has ended off the list; its files stay. Answered by `renders`.
+ */
+export interface DropRender {
+  render: number;
+}
+
+/**
  * Render the answer in a view, or stop that. Answered by `started`, later by `verified`, or by
  * `stopped` once the render has ended.
  */
@@ -1270,6 +1337,7 @@ export interface Events {
   started: TaskStarted;
   stopped: TaskStopped;
   exported: ExportResult;
+  renders: RenderList;
   verified: VerificationResult;
   explained: Explanation;
   previewed: PreviewResult;
@@ -1321,6 +1389,9 @@ export interface Requests {
   compare_looks: CompareLooks;
   drop_look: DropLook;
   export: Export;
+  render_final: RenderFinal;
+  stop_render: StopRender;
+  drop_render: DropRender;
   verify: Verify;
   explain: Explain;
   take_over: TakeOver;

@@ -2,6 +2,7 @@
 
 import { html, useEffect, useRef, useState } from '../vendor/preact.js';
 import { Button } from './controls.js';
+import { runningRender } from './exports/render_state.js';
 import { progressText } from './format.js';
 import { Icon } from './icons.js';
 import { keysText } from './key_names.js';
@@ -95,6 +96,13 @@ function runningTasks(ui, { session }) {
       name: words.notices.exportingFiles,
       progress: exportProgress ?? unknownProgress,
       stop: () => void session.exportFiles([]),
+    });
+  const render = runningRender(ui);
+  if (render && ui.dialog !== 'render')
+    tasks.push({
+      name: words.finalRender.rendering,
+      progress: ui.renderProgress ?? unknownProgress,
+      stop: () => void session.send('stop_render', { render: render.id }),
     });
   if (verificationProgress && !isOpen)
     tasks.push({

@@ -12,6 +12,7 @@ import {
   stateUpdate,
   verificationUpdate,
 } from './state_updates.js';
+import { endedTexts, rendersUpdate } from './exports/render_state.js';
 import { relativePath } from './format.js';
 import { referencesUpdate } from './references/reference_state.js';
 import { updateDisplay } from './tools.js';
@@ -44,6 +45,7 @@ const EVENT_KINDS = [
   'looks',
   'references',
   'exported',
+  'renders',
   'verified',
   'explained',
   'previewed',
@@ -143,6 +145,7 @@ export class SessionLink {
       references: (/** @type {HostEvents['references']} */ m) =>
         referencesUpdate(m, this.store.value),
       exported: (/** @type {HostEvents['exported']} */ m) => this.takeExport(m),
+      renders: (/** @type {HostEvents['renders']} */ m) => this.takeRenders(m),
       verified: (/** @type {HostEvents['verified']} */ m) =>
         verificationUpdate(m, this.store.value),
       explained: (/** @type {HostEvents['explained']} */ m) =>
@@ -223,6 +226,15 @@ export class SessionLink {
     );
     if (dialog !== 'export') this.toast(exportText(names, Boolean(isStopped)));
     return { exportResult: message, ...TASK_RESETS.export };
+  }
+
+  /** Take the final renders, and report those that have ended, unless their dialog does.
+   * @param {HostEvents["renders"]} message @returns {Partial<Ui>} */
+  takeRenders(message) {
+    const { value } = this.store;
+    for (const { text, tone } of value.dialog === 'render' ? [] : endedTexts(message.renders, value))
+      this.toast(text, tone);
+    return rendersUpdate(message, value);
   }
 
   /** Take the places of lights. A search that began before they were known shows where lights were.

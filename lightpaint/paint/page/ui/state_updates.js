@@ -6,6 +6,7 @@
 /** @typedef {import('../engine/messages.js').Events} Events */
 
 import { stateOfView } from '../engine/message_frames.js';
+import { rendersUpdate } from './exports/render_state.js';
 import { comparedLooks, resetMix } from './look_comparison.js';
 import { withLights } from './images/light_images.js';
 import { words } from '../language/language.js';
@@ -59,6 +60,7 @@ export function stateUpdate(message, /** @type {import('./ui_state.js').Ui} */ p
     looks,
     resources: message.resources ?? {},
     references: message.references ?? [],
+    ...rendersUpdate(message, previous),
     hint: Boolean(message.is_new),
     connection: 'open',
     closure: null,
@@ -303,6 +305,7 @@ export function progressUpdate({ task, done, total, unit }, ui) {
     return ui.placementProgress
       ? { placementProgress: estimateTime(changes, ui.placementProgress) }
       : {};
+  if (task === 'final') return { renderProgress: estimateTime(changes, ui.renderProgress) };
   // The brush interrupts it, so the remaining time is unknown.
   if (task === 'sampling') return { samplingProgress: done < total ? changes : null };
   if (/verif/i.test(task))

@@ -2,6 +2,7 @@
 
 import { INITIAL_IMAGES } from './images/image_state.js';
 import { INITIAL_LAMPS } from './lamps/lamp_state.js';
+import { INITIAL_RENDERS } from './exports/render_state.js';
 import { fromKelvin } from './paint_colour.js';
 import { DEFAULT_PREFERENCES } from './preferences.js';
 import { INITIAL_REFERENCES } from './references/reference_state.js';
@@ -41,7 +42,8 @@ import { initialSelection } from './selection/selection_settings.js';
 /**
  * @typedef {import("./lamps/lamp_state.js").LampState & import("./preferences.js").Preferences
  *   & import("./references/reference_state.js").ReferenceState
- *   & import("./images/image_state.js").ImageState & BaseUi} Ui
+ *   & import("./images/image_state.js").ImageState & import("./exports/render_state.js").RenderState
+ *   & BaseUi} Ui
  *
  * @typedef {object} BaseUi
  * @property {boolean} ready whether the session has said what there is
@@ -153,7 +155,7 @@ import { initialSelection } from './selection/selection_settings.js';
  * @property {null | "settings"} panel what lies over the panels
  * @property {number | null} tour step of the tour that is shown
  * @property {string | null} tourFold what this step has unfolded and folds again
- * @property {null | "keys" | "export" | "looks" | "presets"} dialog
+ * @property {null | "keys" | "export" | "render" | "looks" | "presets"} dialog
  * @property {string} search
  * @property {"scene" | "name" | "share" | "change"} sort
  * @property {number[]} openLights lights whose controls are open
@@ -294,5 +296,6 @@ export function initialState() {
     ...INITIAL_IMAGES,
     ...DEFAULT_PREFERENCES,
     ...INITIAL_REFERENCES,
+    ...INITIAL_RENDERS,
   };
 }
