@@ -25,6 +25,7 @@ from lightpaint.paint.protocol.message_parts import (
     ReferenceInfo,
     RenderInfo,
     SampleCount,
+    SearchInfo,
     StepInfo,
     TableInfo,
     Tone,
@@ -34,6 +35,7 @@ from lightpaint.paint.protocol.message_parts import (
 from lightpaint.paint.protocol.task_events import (
     Explanation,
     ExportResult,
+    PlacingEstimate,
     PlacingResult,
     PreviewResult,
     ProgressReport,
@@ -202,12 +204,13 @@ class StepList(Message, kind="steps"):
     """The last steps of the history, in order, including undone ones: the answer to `list_steps`.
 
     earlier: number of steps before them. done: id of the last step that is not undone; 0 at the
-    beginning.
+    beginning. searches: those after a step that still exists, the oldest first.
     """
 
     steps: tuple[StepInfo, ...]
     earlier: int
     done: int
+    searches: tuple[SearchInfo, ...] = ()
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -314,6 +317,7 @@ EVENTS: Mapping[str, type[Any]] = {
         PreviewResult,
         Rig,
         TrialPlaces,
+        PlacingEstimate,
         PlacingResult,
         Notice,
         Failure,

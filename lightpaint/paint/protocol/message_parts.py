@@ -207,6 +207,24 @@ class StepInfo:
 
 
 @dataclass(frozen=True)
+class SearchInfo:
+    """A search for places of lights that has ended, beside the steps of the history.
+
+    after: id of the last step when it ended, which is its own if it found something; 0 for none.
+    title: what was searched for. text: what came of it. tried: sentences on what was tried. stamp:
+    time in seconds since 1970.
+    """
+
+    id: int
+    after: int
+    title: str
+    text: str
+    tried: tuple[str, ...]
+    stamp: float
+    seconds: float
+
+
+@dataclass(frozen=True)
 class PresetInfo:
     """A preset: a request for a whole scene. Its picture is `preset/NAME`.
 

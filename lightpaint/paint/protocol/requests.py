@@ -15,6 +15,7 @@ from lightpaint.paint.protocol.light_requests import (
     AddLight,
     ConstrainLight,
     ConstrainLights,
+    EstimatePlaces,
     MoveLights,
     PlaceLights,
     PointLight,
@@ -221,6 +222,7 @@ AnyRequest = (
     | AddLight
     | RemoveLight
     | PlaceLights
+    | EstimatePlaces
     | ShowRig
     | TieLights
     | ChangeSettings

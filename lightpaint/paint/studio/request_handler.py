@@ -119,7 +119,8 @@ class RequestHandler:
                 case protocol.MixLooks() | protocol.DropLook() | protocol.Propose():
                     return [looks.handle(message)]
                 case protocol.ListSteps():
-                    return [session.history.list_steps(message.count)]
+                    steps = session.history.list_steps(message.count)
+                    return [replace(steps, searches=self._placer.notes.listed())]
                 case protocol.ShowPrevious():
                     return [PreviousAnswer(weights=session.history.previous_weights())]
                 case protocol.CompareLooks():
@@ -138,6 +139,8 @@ class RequestHandler:
                     return self._mover.show_rig()
                 case protocol.PlaceLights():
                     return self._placer.handle(message)
+                case protocol.EstimatePlaces():
+                    return self._placer.estimate(message)
                 case protocol.PointLight():
                     messages = session.handle(self._mover.move_of(message), arrays)
                 case protocol.AddLight():

@@ -46,7 +46,7 @@ ASKED = {
 
 #: Requests of a rig, layers and a selection, which the session that tests make up does not have.
 RIG = {"move", "point", "show_rig", "place", "add_light", "remove_light", "change_layers", "select"}
-RIG |= {"compare_looks", "import_layers", "add_reference"}
+RIG |= {"estimate_place", "compare_looks", "import_layers", "add_reference"}
 
 
 def check(message: dict[str, Any]) -> None:

@@ -241,6 +241,23 @@ export interface StepInfo {
 }
 
 /**
+ * A search for places of lights that has ended, beside the steps of the history.
+ *
+ * after: id of the last step when it ended, which is its own if it found something; 0 for none.
+ * title: what was searched for. text: what came of it. tried: sentences on what was tried. stamp:
+ * time in seconds since 1970.
+ */
+export interface SearchInfo {
+  id: number;
+  after: number;
+  title: string;
+  text: string;
+  tried: string[];
+  stamp: number;
+  seconds: number;
+}
+
+/**
  * A preset: a request for a whole scene. Its picture is `preset/NAME`.
  *
  * has_subject: whether it is about one object.
@@ -597,7 +614,7 @@ export interface PictureData {
  * The last steps of the history, in order, including undone ones: the answer to `list_steps`.
  *
  * earlier: number of steps before them. done: id of the last step that is not undone; 0 at the
- * beginning.
+ * beginning. searches: those after a step that still exists, the oldest first.
  */
 export interface StepList {
   kind: 'steps';
@@ -605,6 +622,7 @@ export interface StepList {
   steps: StepInfo[];
   earlier: number;
   done: number;
+  searches: SearchInfo[];
   arrays: {  };
 }
 
@@ -777,6 +795,21 @@ export interface TrialPlaces {
   reply?: number;
   positions: Record<string, number[]>;
   directions: Record<string, number[]>;
+  arrays: {  };
+}
+
+/**
+ * What a search for places would do: the answer to `estimate_place`.
+ *
+ * text: the lights, and what each may do. seconds: about how long it takes, at least and at most.
+ * is_measured: whether an earlier search of this session tells the pace of this machine.
+ */
+export interface PlacingEstimate {
+  kind: 'place_estimate';
+  reply?: number;
+  text: string;
+  seconds: [number, number];
+  is_measured: boolean;
   arrays: {  };
 }
 
@@ -1116,10 +1149,24 @@ export interface RemoveLight {
  *
  * new_type: type of lights to add, instead of moving existing ones; null for none. max_count:
  * maximum number of them. surfaces: names of rails, surfaces and shapes that they may hang on;
- * none for anywhere free.
+ * none for anywhere free. keeps_best: for a stop: whether the best that was found by then becomes
+ * a step, once it is judged; otherwise every light stays where it is.
  */
 export interface PlaceLights {
   run?: boolean;
+  new_type?: 'spot' | 'point' | 'panel' | null;
+  max_count?: number;
+  surfaces?: string[];
+  keeps_best?: boolean;
+}
+
+/**
+ * A request to say what a search for places would do, and about how long it would take.
+ * Answered by `place_estimate`.
+ *
+ * new_type, max_count, surfaces: as in `place`.
+ */
+export interface EstimatePlaces {
   new_type?: 'spot' | 'point' | 'panel' | null;
   max_count?: number;
   surfaces?: string[];
@@ -1343,6 +1390,7 @@ export interface Events {
   previewed: PreviewResult;
   rig: Rig;
   trial: TrialPlaces;
+  place_estimate: PlacingEstimate;
   placed: PlacingResult;
   notice: Notice;
   failed: Failure;
@@ -1377,6 +1425,7 @@ export interface Requests {
   add_light: AddLight;
   remove_light: RemoveLight;
   place: PlaceLights;
+  estimate_place: EstimatePlaces;
   show_rig: ShowRig;
   tie: TieLights;
   change_settings: ChangeSettings;

@@ -980,6 +980,19 @@ export const en = {
     polygon: 'polygon',
     all: 'all',
   },
+  searches: {
+    estimating: 'Estimating the time …',
+    about: 'About {time}.',
+    measured: 'About {time}, as an earlier search here.',
+    fromTo: '{low} to {high}',
+    goesOn:
+      'You can go on looking and painting meanwhile, and stop at any time: with the best so far, or with every light where it is.',
+    begin: 'Begin',
+    keepBest: 'Stop with the best so far',
+    keepBestTip: 'End the search: the best that was found by now is checked and becomes a step',
+    judging: 'Checking the best so far',
+    took: 'Took {time}. Tried:',
+  },
   sessionController: {
     unlockLights: 'unlock {count} lights',
   },

@@ -9,6 +9,7 @@ import { FinalRenderDialog } from './exports/final_render.js';
 import { percentText, progressText, relativePath } from './format.js';
 import { LooksDialog } from './looks_dialog.js';
 import { PresetsDialog } from './presets_dialog.js';
+import { MoveDialog } from './searches/move_dialog.js';
 import { ShortcutsDialog } from './shortcuts_dialog.js';
 import { fill, words } from '../language/language.js';
 
@@ -22,6 +23,7 @@ export function Dialogs({ ui, app }) {
   if (ui.dialog === 'export') return html`<${ExportDialog} ui=${ui} app=${app} close=${close} />`;
   if (ui.dialog === 'render')
     return html`<${FinalRenderDialog} ui=${ui} app=${app} close=${close} />`;
+  if (ui.dialog === 'move') return html`<${MoveDialog} app=${app} close=${close} />`;
   if (ui.dialog === 'looks') return html`<${LooksDialog} ui=${ui} app=${app} close=${close} />`;
   if (ui.dialog === 'presets') return html`<${PresetsDialog} ui=${ui} app=${app} close=${close} />`;
   return null;

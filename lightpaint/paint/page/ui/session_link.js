@@ -250,7 +250,7 @@ export class SessionLink {
    * @param {HostEvents["placed"]} message @returns {Partial<Ui>} */
   takePlacement({ text }) {
     this.toast(text);
-    return TASK_RESETS.place;
+    return { ...TASK_RESETS.place, searchCount: this.store.value.searchCount + 1 };
   }
 
   /** Export files, or stop the export. @param {Requests["export"]["outputs"]} outputs empty to stop

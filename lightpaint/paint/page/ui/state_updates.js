@@ -18,7 +18,7 @@ export const TASK_RESETS = {
   verify: { verificationProgress: null },
   explain: { isExplaining: false },
   preview: { preview: null },
-  place: { placementProgress: null, trial: null },
+  place: { placementProgress: null, isPlacementEnding: false, trial: null },
   reference: { isReferenceComing: false },
 };
 

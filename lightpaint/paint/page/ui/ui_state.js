@@ -81,6 +81,8 @@ import { initialSelection } from './selection/selection_settings.js';
  *   aimPixel?: [number, number]} | null} drag where a light is that the pointer drags; at: the pixel that
  *   it points at
  * @property {Progress | null} placementProgress how far a search for places of the lights is
+ * @property {boolean} isPlacementEnding whether the search ends with the best so far
+ * @property {number} searchCount searches for places that have ended while the page was open
  * @property {Progress | null} samplingProgress how near the lights are to the precision sought
  * @property {{positions: Record<string, number[]>, directions: Record<string, number[]>} | null} trial
  *   places that a search tries now, by name of light
@@ -155,7 +157,7 @@ import { initialSelection } from './selection/selection_settings.js';
  * @property {null | "settings"} panel what lies over the panels
  * @property {number | null} tour step of the tour that is shown
  * @property {string | null} tourFold what this step has unfolded and folds again
- * @property {null | "keys" | "export" | "render" | "looks" | "presets"} dialog
+ * @property {null | "keys" | "export" | "render" | "move" | "looks" | "presets"} dialog
  * @property {string} search
  * @property {"scene" | "name" | "share" | "change"} sort
  * @property {number[]} openLights lights whose controls are open
@@ -220,6 +222,8 @@ export function initialState() {
     lamp: null,
     drag: null,
     placementProgress: null,
+    isPlacementEnding: false,
+    searchCount: 0,
     samplingProgress: null,
     trial: null,
     newLight: { type: 'spot', surface: 'click', count: 1 },
