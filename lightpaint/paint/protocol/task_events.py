@@ -125,7 +125,7 @@ class TrialPlaces(Message, kind="trial"):
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class PlacingEstimate(Message, kind="place_estimate"):
-    """What a search for places would do: the answer to `estimate_place`.
+    """The extent of a search for places, and its time: the answer to `estimate_place`.
 
     text: the lights, and what each may do. seconds: about how long it takes, at least and at most.
     is_measured: whether an earlier search of this session tells the pace of this machine.

@@ -1,4 +1,4 @@
-"""How long a search for poses takes: an estimate from what it will do, before it starts.
+"""The time that a search for poses takes: an estimate from what it will do, before it starts.
 
 Nearly all time goes into light along frozen paths for trial poses: about as many of them for each
 light and round, each over all pixels of the small film.
@@ -22,7 +22,7 @@ BEGIN_S = 8.0
 
 @dataclass(frozen=True)
 class SearchSize:
-    """What a search has to do.
+    """The work of a search.
 
     lights: number of those that may move. new: number of those that may be added. pixels: of the
     small films of all views together.

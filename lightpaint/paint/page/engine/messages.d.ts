@@ -799,7 +799,7 @@ export interface TrialPlaces {
 }
 
 /**
- * What a search for places would do: the answer to `estimate_place`.
+ * The extent of a search for places, and its time: the answer to `estimate_place`.
  *
  * text: the lights, and what each may do. seconds: about how long it takes, at least and at most.
  * is_measured: whether an earlier search of this session tells the pace of this machine.
