@@ -454,6 +454,8 @@ def moving_lights(hand: Hand) -> None:
     hand.drag(on(0.03, 0.27), on(0.13, 0.34), on(0.25, 0.41), on(0.1, 0.37))
     hand.wait()
     hand.press("Let lights move")
+    page.get_by_role("button", name="Begin", disabled=False).wait_for()
+    hand.press("Begin")
     working = page.get_by_role("button", name="Stop, move nothing")
     working.wait_for(timeout=1000 * PATIENCE_S)
     first = len(hand.frames)

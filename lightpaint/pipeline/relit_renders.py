@@ -1,23 +1,39 @@
 """Renders of a scene under a lighting, in a folder with the relit scene."""
 
+import tempfile
 from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
+from lightpaint.arrays import Floats
 from lightpaint.basis.render.separate_renders import emitters_seen
 from lightpaint.colour.display.exposure import choose_exposure
-from lightpaint.images.denoiser import denoised, denoiser_text
-from lightpaint.images.estimate import Estimate, write_estimate
-from lightpaint.images.formats.png import write_png
+from lightpaint.colour.display.view_transform import ViewTransform
+from lightpaint.images.denoiser import Features, denoised, denoiser_text
+from lightpaint.images.estimate import HALF_DIFFERENCE, Estimate, write_estimate
+from lightpaint.images.formats.exr import ExrPart, rgb_channels, write_parts
+from lightpaint.images.formats.png import write_png, write_png_16
 from lightpaint.lighting.answer.lighting import Lighting
 from lightpaint.pipeline.job.remarks import remarks_of_pictures
-from lightpaint.pipeline.results.answer_folder import answer_files, new_answer
+from lightpaint.pipeline.results.answer_folder import (
+    RELIT,
+    answer_files,
+    new_answer,
+    reload_relit,
+)
 from lightpaint.pipeline.results.result_folder import ResultFolder
 from lightpaint.progress import Progress, listener, silent
+from lightpaint.relit.relight import relight
+from lightpaint.scene.properties.film import with_width
 from lightpaint.scene.quality_presets import on_film
 from lightpaint.scene.scene import Scene
 from lightpaint.scene.scene_render import Stream, render
 from lightpaint.scene.surfaces import render_features
+from lightpaint.target.template import texts_of
+
+#: EXR layer of a final render without its noise.
+DENOISED = "denoised"
 
 
 def relit_folder(
@@ -79,3 +95,54 @@ def relight_look(
             texts = denoiser_text(features, raw="relit.exr")
             stops = choose_exposure(clean, emitters_seen(relit))
             write_png(folder / view / "relit.png", clean, stops=stops, texts=texts)
+
+
+@dataclass(frozen=True)
+class FinalPicture:
+    """A render of a scene under a lighting, for use elsewhere.
+
+    image: as rendered. clean: (h, w, 3) linear, denoised. features: what guided the denoiser.
+    """
+
+    image: Estimate
+    clean: Floats
+    features: Features
+
+
+def render_final(
+    scene: Scene,
+    lighting: Lighting,
+    *,
+    width: int,
+    spp: int,
+    seed: int = 0,
+    progress: Progress = silent,
+) -> FinalPicture:
+    """Render a scene under a lighting at another size; the picture has the same frame.
+
+    width: in pixels; the height follows from the film of the scene's file. spp: samples per pixel.
+    Raises LightpaintError if the lighting does not fit the scene.
+    """
+    with tempfile.TemporaryDirectory(prefix="lightpaint-") as place:
+        relit = relight(scene, lighting, Path(place) / RELIT)
+        if relit.sensor != scene.sensor:
+            relit = reload_relit(relit, relit.path, scene.sensor)
+        relit = replace(relit, film=with_width(relit.film, width))
+        options: dict[str, Any] = {"seed": seed, "stream": Stream.VERIFICATION}
+        image = render(relit, spp=spp, label="final", progress=progress, **options)
+        features = render_features(relit, seed=seed)
+    return FinalPicture(image, denoised(image.image, features, quality="high"), features)
+
+
+def write_final_exr(path: Path, picture: FinalPicture) -> None:
+    """Write the light of a final render: as rendered, its noise, and denoised as a layer."""
+    channels = rgb_channels(picture.image.image)
+    channels |= rgb_channels(picture.image.half_difference, HALF_DIFFERENCE)
+    channels |= rgb_channels(picture.clean, DENOISED)
+    write_parts(path, [ExrPart("rgb", channels, {})])
+
+
+def write_final_png(path: Path, picture: FinalPicture, transform: ViewTransform) -> None:
+    """Write a final render, denoised, as a display shows it: 16 bits a channel."""
+    texts = texts_of(transform) | denoiser_text(picture.features, raw="render.exr")
+    write_png_16(path, transform.encode(picture.clean), texts=texts)

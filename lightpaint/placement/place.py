@@ -63,6 +63,7 @@ def place(
     seed: int = 0,
     progress: Progress = silent,
     watch: Callable[[Mapping[str, Site]], None] | None = None,
+    is_enough: Callable[[], bool] | None = None,
 ) -> Placement:
     """Search for the poses of lights that bring `solution` closest to its painting.
 
@@ -85,6 +86,8 @@ def place(
         seed: Of the paths and the trial places.
         progress: Receives progress.
         watch: Receives the trial poses, by the names of their lights.
+        is_enough: Ends the search once it returns True, with the best poses so far, which are
+            judged as usual but have no error bars.
 
     Raises:
         SceneError: For lights that do not exist or cannot move like this, freedoms without a free
@@ -129,11 +132,16 @@ def place(
         poses = PoseSearch(coarse, paths, PoseRules(paths), seed=seed)
         if watch is not None:
             poses.steps.watch = lambda arrangement: watch(_sites_by_name(arrangement, names))
+        if is_enough is not None:
+            poses.steps.is_enough = is_enough
         judge = PlacementJudge(fine, poses.steps.with_fit(fine), paths)
         stages = _Stages(progress, TURNS * len(movables), STARTS * len(slots), STEPS)
         start, best = _searched(poses, judge, movables, slots, stages)
         judge = judge.without_noise(best)
-        result = _Result.of(judge.worthwhile(start, best), judge, paths, large[0])
+        found = judge.worthwhile(start, best)
+        # Error bars take a quarter of the time, which nobody has who ends a search early.
+        with_errors = not poses.is_enough()
+        result = _Result.of(found, judge, paths, large[0], with_errors=with_errors)
         stages.end()
         return result
 
@@ -157,7 +165,15 @@ class _Result:
     size: tuple[int, int]
 
     @classmethod
-    def of(cls, found: Found, judge: PlacementJudge, paths: SearchPaths, view: Scene) -> "_Result":
+    def of(
+        cls,
+        found: Found,
+        judge: PlacementJudge,
+        paths: SearchPaths,
+        view: Scene,
+        *,
+        with_errors: bool,
+    ) -> "_Result":
         """Return what was found, with what the first view says about it."""
         order, sites = _additions(found), found.arrangement.sites
         places = [site.position or (0.0, 0.0, 0.0) for site in sites]
@@ -167,7 +183,9 @@ class _Result:
             for movable, site in zip(found.arrangement.movables, sites, strict=True)
         )
         errors = (
-            judge.errors(found.arrangement) if is_changed else [PoseError(None, None)] * len(sites)
+            judge.errors(found.arrangement)
+            if is_changed and with_errors
+            else [PoseError(None, None)] * len(sites)
         )
         return cls(
             found,

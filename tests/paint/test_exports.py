@@ -10,8 +10,10 @@ from PIL import Image
 from renderer import write_room
 
 import lightpaint as lp
+from lightpaint.errors import OutputError, PaintError
 from lightpaint.images.denoiser import denoised
 from lightpaint.lighting.answer.lighting import Lighting
+from lightpaint.paint.studio.export_folders import folder_name, new_folder
 from lightpaint.paint.studio.session_exports import answer_png, render_verification
 from lightpaint.paint.subject_factory import make_subject
 from lightpaint.pipeline.job.settings import Settings
@@ -57,3 +59,60 @@ def test_a_picture_of_the_answer_is_what_the_view_shows(
     target = lp.read_target(path)
     assert target.transform == transform
     np.testing.assert_allclose(transform.encode(target.image), display, atol=1e-3)
+
+
+NAMES = {
+    "Evening": "Evening",
+    "  warm \n evening ": "warm evening",
+    "A → B, 50 %": "A → B, 50 %",
+    "../../etc/passwd": "-..-etc-passwd",
+    ".hidden": "hidden",
+    "act 1: storm?": "act 1- storm-",
+    "a\u202eb\x1b": "ab",
+    "ends with a point.": "ends with a point",
+}
+
+
+@pytest.mark.parametrize("name", NAMES)
+def test_a_name_of_an_export_is_that_of_one_folder(tmp_path: Path, name: str) -> None:
+    assert folder_name(name) == NAMES[name]
+    with new_folder(tmp_path, name) as folder:
+        assert folder == tmp_path / NAMES[name]
+        assert folder.is_dir()
+
+
+def test_a_long_name_is_cut_between_characters() -> None:
+    cut = folder_name("ä" * 300)
+    assert set(cut) == {"ä"}
+    assert len(cut.encode()) <= 160
+
+
+@pytest.mark.parametrize("name", ["", " ", "...", "///", "\x1b"])
+def test_a_name_without_letters_is_refused(tmp_path: Path, name: str) -> None:
+    with (
+        pytest.raises(PaintError, match="give this export another name"),
+        new_folder(tmp_path, name),
+    ):
+        pass
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_a_taken_name_gets_a_number_and_an_empty_folder_goes(tmp_path: Path) -> None:
+    exports = tmp_path / "exports"
+    names = []
+    for content in ("first", "second", "third"):
+        with new_folder(exports, "evening") as folder:
+            (folder / "answer.png").write_text(content)
+        names.append(folder.name)
+    assert names == ["evening", "evening 2", "evening 3"]
+    assert (exports / "evening" / "answer.png").read_text() == "first"
+    with new_folder(exports, "evening") as folder:
+        pass
+    assert folder.name == "evening 4"
+    assert not folder.exists()
+    with new_folder(tmp_path / "none", "evening"):
+        pass
+    assert not (tmp_path / "none").exists()
+    (tmp_path / "file").touch()
+    with pytest.raises(OutputError, match="cannot make"), new_folder(tmp_path / "file", "a"):
+        pass

@@ -4,8 +4,9 @@ import json
 import math
 import re
 import shlex
+import threading
 import time
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from pathlib import Path
 from threading import RLock
@@ -24,8 +25,10 @@ from lightpaint.errors import LightpaintError
 from lightpaint.paint import protocol
 from lightpaint.paint.rig import lamp_rig
 from lightpaint.paint.rig.rig_state import rig_state
+from lightpaint.paint.rig.search_notes import SearchNotes
 from lightpaint.paint.session.request_changes import changed_requests
 from lightpaint.paint.store.session_requests import SessionRequests
+from lightpaint.paint.store.store import Store
 from lightpaint.scene.properties.pose import Site
 from lightpaint.scene.scene_reader import load_scene
 
@@ -426,6 +429,82 @@ def test_a_search_for_places_can_be_stopped(moving: MovingStudio) -> None:
     moving.send(protocol.PlaceLights(run=False))
     assert place_lights(moving)["text"] == "Stopped: every light stays where it was."
     assert moving.studio.session.requests.poses == {}
+
+
+def paint_moved_bulb(moving: MovingStudio, position: tuple[float, float, float]) -> None:
+    """Paint the look with the bulb elsewhere."""
+    moved_scene = moving.scene.moved({"bulb": lp.Pose(position=position)})
+    painted_basis = lp.render_basis(moved_scene, spp=64, seed=5)
+    look = painted_basis.mix(painted_basis.current_weights)
+    moving.send(
+        protocol.Paint(0, (0, look.shape[0], 0, look.shape[1]), True),
+        image=look,
+        importance=np.ones(look.shape[:2], np.float32),
+    )
+
+
+@pytest.mark.usefixtures("without_reasons")
+def test_a_search_ends_with_the_best_so_far_and_leaves_a_note(
+    dim_room: MovingStudio, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """What was found by then becomes a step, and the note is there when the session opens again."""
+    moving, position = dim_room, (-0.1, 1.2, 0.6)
+    paint_moved_bulb(moving, position)
+    old = moving.scene.light("bulb").members[0].site
+    move = lp.Move("bulb", old, Site(position), gain_share=0.5)
+    placement = lp.Placement((moving.scene,), (move,), (), 0.1, 0.05)
+    has_begun = threading.Event()
+
+    def search(*_: Any, is_enough: Callable[[], bool], **__: Any) -> lp.Placement:
+        has_begun.set()
+        moving.wait(is_enough)
+        return placement
+
+    monkeypatch.setattr("lightpaint.paint.rig.light_placer.place", search)
+    moving.send(protocol.PlaceLights())
+    assert has_begun.wait(60)
+    moving.send(protocol.PlaceLights(run=False, keeps_best=True))
+    text = place_lights(moving)["text"]
+    assert text.startswith("Stopped with the best so far: bulb")
+    assert "ΔE" in text
+    store = moving.studio.session.store
+    [listed] = moving.send(protocol.ListSteps())
+    [note] = listed.fields["searches"]
+    assert (note["title"], note["text"]) == ("let lights move", text)
+    assert note["after"] == store.last_id == listed.fields["steps"][-1]["id"]
+    [tried] = note["tried"]
+    assert tried.startswith("bulb: slide by up to ")
+    moving.send(protocol.Undo())
+    assert moving.send(protocol.ListSteps())[0].fields["searches"]  # its step can be done again
+    identity = store.identity
+    moving.close()
+    with Store.open(moving.folder / "session.db", identity) as opened:
+        assert [x.text for x in SearchNotes(opened).listed()] == [text]
+
+
+def test_a_search_in_vain_says_so_in_the_history_and_is_no_step(
+    dim_room: MovingStudio, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    moving = dim_room
+    stroke(moving)
+    nothing = lp.Placement((moving.scene,), (), (), 0.1, 0.1)
+    monkeypatch.setattr("lightpaint.paint.rig.light_placer.place", lambda *_, **__: nothing)
+    [before] = moving.send(protocol.EstimatePlaces())
+    assert before.fields["text"].startswith("bulb: slide by up to ")
+    low, high = before.fields["seconds"]
+    assert 0 < low < high
+    assert not before.fields["is_measured"]
+    moving.send(protocol.PlaceLights())
+    assert place_lights(moving)["text"].startswith("Nothing better within these freedoms")
+    [listed] = moving.send(protocol.ListSteps())
+    assert listed.fields["searches"][0]["text"].startswith("Nothing better within these freedoms")
+    assert len(listed.fields["steps"]) == 1
+    [after] = moving.send(protocol.EstimatePlaces())
+    assert after.fields["is_measured"]
+    [new] = moving.send(protocol.EstimatePlaces("spot", 2))
+    assert new.fields["text"] == "At most 2 new spots, anywhere free."
+    with pytest.raises(LightpaintError, match="max_count is 9"):
+        moving.send(protocol.EstimatePlaces("spot", 9))
 
 
 def test_what_cannot_be_placed_is_said(moving: MovingStudio) -> None:

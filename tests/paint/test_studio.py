@@ -144,6 +144,32 @@ def test_what_is_not_of_a_painting_is_exported_without_one(client: StudioClient,
     assert notice.fields["task"] == "export"
 
 
+@pytest.mark.usefixtures("without_reasons")
+def test_a_named_export_replaces_no_earlier_one(client: StudioClient, tmp_path: Path):
+    """Its command names the painting beside it."""
+
+    def export(name: str) -> dict[str, Any]:
+        client.exact()
+        client.messages[:] = [m for m in client.messages if m.kind != "exported"]
+        client.studio.handle(protocol.Export(("target", "lighting"), name=name), {})
+        return client.wait(lambda m: m.kind == "exported").fields
+
+    for k, folder in enumerate(("Act 1", "Act 1 2")):
+        client.paint(k + 1, 0.3 + 0.5 * k)
+        exported = export("Act 1")
+        place = tmp_path / "exports" / folder
+        assert exported["files"] == [str(place / x) for x in ("painting.exr", "lighting.json")]
+        assert str(place / "painting.exr") in exported["command"]
+    first, second = (
+        lp.read_target(tmp_path / "exports" / folder / "painting.exr").image[5, 5, 0]
+        for folder in ("Act 1", "Act 1 2")
+    )
+    np.testing.assert_allclose([first, second], [0.3, 0.8], atol=1e-3)  # half floats
+    assert not (tmp_path / "painting.exr").exists()
+    with pytest.raises(lp.LightpaintError, match="another name"):
+        client.studio.handle(protocol.Export(("lighting",), name="/"), {})
+
+
 def test_a_stroke_whose_end_was_never_heard_is_kept_at_the_end(
     client: StudioClient, tmp_path: Path
 ):

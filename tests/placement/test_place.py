@@ -53,6 +53,34 @@ def test_a_lamp_is_found_where_the_painting_has_it(room: Scene) -> None:
     assert site.position == pytest.approx(placement.moves[0].new.position, rel=1e-6)
 
 
+def test_a_search_that_is_enough_ends_with_the_best_so_far(room: Scene) -> None:
+    """After a few trials of the first light, which nothing but those has come nearer by."""
+    painted = room.moved({"bulb": lp.Pose(position=(0.3, 1.3, 0.2))})
+    basis = lp.render_basis(room, spp=64, seed=1)
+    goal = lp.render_basis(painted, spp=64, seed=2).current_look
+    solution = lp.solve(basis, lp.Target.of(goal), space="linear", hold=0)
+    freedoms = {name: lp.Freedom(within=1.5) for name in ("bulb", "beam")}
+    tried: list[dict[str, Site]] = []
+
+    def search(most: int) -> lp.Placement:
+        tried.clear()
+        return lp.place(
+            room,
+            basis,
+            solution,
+            freedoms,
+            watch=lambda sites: tried.append(dict(sites)),
+            is_enough=lambda: len(tried) >= most,
+        )
+
+    early = search(4)
+    assert len(tried) == 4
+    assert early.missed_after <= early.missed_before
+    assert all(move.place_error is None for move in early.moves)
+    assert search(0).moves == ()
+    assert tried == []
+
+
 @pytest.mark.nightly
 def test_a_panel_is_found_where_the_painting_has_it(tmp_path: Path) -> None:
     """A long one, so that its outline counts; the camera sees it, and what it hides."""

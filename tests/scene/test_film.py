@@ -16,7 +16,15 @@ from lightpaint.images.pixel_blocks import block_mean, enlarged, whole_factor
 from lightpaint.pipeline.job.remarks import remarks_of_film, remarks_of_target
 from lightpaint.pipeline.job.settings import Settings
 from lightpaint.progress import silent
-from lightpaint.scene.properties.film import Film, even_reductions, reduced, reduction, reduction_to
+from lightpaint.scene.properties.film import (
+    MAX_PIXELS,
+    Film,
+    even_reductions,
+    reduced,
+    reduction,
+    reduction_to,
+    with_width,
+)
 from lightpaint.scene.quality_presets import PRESETS, on_film, samples
 from lightpaint.scene.runtime.variant import use_variant
 from lightpaint.scene.scene_reader import load_scene
@@ -262,3 +270,43 @@ def test_equal_sensors_without_ids_are_a_clear_error(tmp_path: Path) -> None:
     path = write_room(tmp_path, sensors=2 * sensor)
     with pytest.raises(SceneError, match="two sensors are equal and have no id"):
         load_scene(path, sensor=1)
+
+
+FILMS = st.builds(
+    lambda size, share, start: Film(
+        0,
+        size,
+        tuple(max(1, int(side * part)) for side, part in zip(size, share, strict=True)),
+        tuple(
+            int((side - max(1, int(side * part))) * at)
+            for side, part, at in zip(size, share, start, strict=True)
+        ),
+    ),
+    st.tuples(st.integers(2, 4000), st.integers(2, 4000)),
+    st.tuples(st.floats(0.1, 1), st.floats(0.1, 1)),
+    st.tuples(st.floats(0, 1), st.floats(0, 1)),
+)
+
+
+@given(FILMS, st.integers(16, 8000))
+def test_a_film_of_another_width_has_the_same_frame(film: Film, width: int) -> None:
+    """Each side of its frame is where that of the film is, up to a pixel."""
+    if width * width * film.crop_size[1] > MAX_PIXELS * film.crop_size[0]:
+        return
+    wide = with_width(film, width)
+    assert wide.pixels[0] == width
+    factor = width / film.crop_size[0]
+    for axis in (0, 1):
+        low, high = (wide.crop_offset[axis], wide.crop_offset[axis] + wide.crop_size[axis])
+        assert abs(low - factor * film.crop_offset[axis]) <= 0.5
+        end = factor * (film.crop_offset[axis] + film.crop_size[axis])
+        assert abs(high - end) <= 1
+        assert high <= wide.size[axis]
+        assert abs(wide.size[axis] - factor * film.size[axis]) <= 1.5
+
+
+def test_a_whole_multiple_of_a_film_is_exact() -> None:
+    film = Film(1, (640, 360), (320, 100), (40, 20), block=5)
+    assert with_width(film, 960) == Film(1, (1920, 1080), (960, 300), (120, 60))
+    with pytest.raises(SceneError, match="at most"):
+        with_width(film, 2**16)

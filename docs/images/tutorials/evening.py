@@ -109,7 +109,8 @@ def main() -> None:
         clone(folder, "gallery")
         with painter(folder, "scenes/gallery/scene.xml", "-o", "evening", f"--spp={SPP}") as hand:
             evening(Designer(hand))
-        shutil.copy(folder / "evening" / "lighting.json", FILES / "evening.lighting.json")
+        lighting = folder / "evening" / "exports" / "Evening" / "lighting.json"
+        shutil.copy(lighting, FILES / "evening.lighting.json")
         for path in sorted((folder / "evening").rglob("*")):
             print(path.relative_to(folder), path.stat().st_size)
 

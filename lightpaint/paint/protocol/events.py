@@ -24,7 +24,9 @@ from lightpaint.paint.protocol.message_parts import (
     PlanObject,
     PresetInfo,
     ReferenceInfo,
+    RenderInfo,
     SampleCount,
+    SearchInfo,
     SkyAxes,
     StepInfo,
     TableInfo,
@@ -35,9 +37,11 @@ from lightpaint.paint.protocol.message_parts import (
 from lightpaint.paint.protocol.task_events import (
     Explanation,
     ExportResult,
+    PlacingEstimate,
     PlacingResult,
     PreviewResult,
     ProgressReport,
+    RenderList,
     TaskStarted,
     TaskStopped,
     TrialPlaces,
@@ -68,7 +72,8 @@ class SessionState(EditState, Message, kind="state"):
     version: of this protocol. size: height and width of the first view, and `objects` the names of
     its objects.
     lut: the grid of the tables `lut/NAME` of all `transforms`. resources: pictures, with a number
-    that grows when one is replaced. verifications: the last one of each view. is_new: whether
+    that grows when one is replaced. verifications: the last one of each view. renders: the final
+    renders, as in `renders`. is_new: whether
     the session has no steps yet. stroke: number of the last stroke that arrived. command: solves
     for the exported paintings. is_back: the client had the session before, and no other client
     since; also true if unasked. weights: (lights, 3) float64, the last answer.
@@ -102,6 +107,7 @@ class SessionState(EditState, Message, kind="state"):
     weights: Doubles
     is_back: bool = True
     choices: tuple[AnswerChoice, ...] = ()
+    renders: tuple[RenderInfo, ...] = ()
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -203,12 +209,13 @@ class StepList(Message, kind="steps"):
     """The last steps of the history, in order, including undone ones: the answer to `list_steps`.
 
     earlier: number of steps before them. done: id of the last step that is not undone; 0 at the
-    beginning.
+    beginning. searches: those after a step that still exists, the oldest first.
     """
 
     steps: tuple[StepInfo, ...]
     earlier: int
     done: int
+    searches: tuple[SearchInfo, ...] = ()
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -326,11 +333,13 @@ EVENTS: Mapping[str, type[Any]] = {
         TaskStarted,
         TaskStopped,
         ExportResult,
+        RenderList,
         VerificationResult,
         Explanation,
         PreviewResult,
         Rig,
         TrialPlaces,
+        PlacingEstimate,
         PlacingResult,
         Notice,
         Failure,

@@ -152,10 +152,25 @@ class PlaceLights(Message, kind="place"):
 
     new_type: type of lights to add, instead of moving existing ones; null for none. max_count:
     maximum number of them. surfaces: names of rails, surfaces and shapes that they may hang on;
-    none for anywhere free.
+    none for anywhere free. keeps_best: for a stop: whether the best that was found by then becomes
+    a step, once it is judged; otherwise every light stays where it is.
     """
 
     run: bool = True
+    new_type: Literal["spot", "point", "panel"] | None = None
+    max_count: int = 1
+    surfaces: tuple[str, ...] = ()
+    keeps_best: bool = False
+
+
+@dataclass(frozen=True)
+class EstimatePlaces(Message, kind="estimate_place"):
+    """A request to say what a search for places would do, and about how long it would take.
+    Answered by `place_estimate`.
+
+    new_type, max_count, surfaces: as in `place`.
+    """
+
     new_type: Literal["spot", "point", "panel"] | None = None
     max_count: int = 1
     surfaces: tuple[str, ...] = ()

@@ -231,6 +231,24 @@ class StepInfo:
 
 
 @dataclass(frozen=True)
+class SearchInfo:
+    """A search for places of lights that has ended, beside the steps of the history.
+
+    after: id of the last step when it ended, which is its own if it found something; 0 for none.
+    title: what was searched for. text: what came of it. tried: sentences on what was tried. stamp:
+    time in seconds since 1970.
+    """
+
+    id: int
+    after: int
+    title: str
+    text: str
+    tried: tuple[str, ...]
+    stamp: float
+    seconds: float
+
+
+@dataclass(frozen=True)
 class PresetInfo:
     """A preset: a request for a whole scene. Its picture is `preset/NAME`.
 
@@ -251,6 +269,30 @@ class ReferenceInfo:
 
     id: int
     name: str
+
+
+@dataclass(frozen=True, kw_only=True)
+class RenderInfo:
+    """A final render. Its small picture is `render/ID`, (h, w, 3) uint8, and the bytes of its files
+    are `render_file/ID/NAME`, uint8, once it is done.
+
+    name: as requested. height: null until it is known. state: `waiting` for an earlier one; the
+    others speak for themselves. done, total: its passes. text: why it has failed. files: paths of
+    those that were written.
+    """
+
+    id: int
+    name: str
+    view: int
+    width: int
+    height: int | None = None
+    spp: int
+    formats: tuple[str, ...]
+    state: Literal["waiting", "rendering", "done", "stopped", "failed"] = "waiting"
+    done: int = 0
+    total: int = 0
+    text: str = ""
+    files: tuple[str, ...] = ()
 
 
 @dataclass(frozen=True)

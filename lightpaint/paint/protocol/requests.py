@@ -15,6 +15,7 @@ from lightpaint.paint.protocol.light_requests import (
     AddLight,
     ConstrainLight,
     ConstrainLights,
+    EstimatePlaces,
     MoveLights,
     PlaceLights,
     PointLight,
@@ -53,6 +54,9 @@ from lightpaint.paint.protocol.painting_requests import (
 
 #: Version of this protocol; a page of another version is told to reload.
 VERSION = 3
+
+#: Widths of final renders in pixels, and their maximum samples per pixel.
+MIN_RENDER_WIDTH, MAX_RENDER_WIDTH, MAX_RENDER_SPP = 16, 2**14, 2**16
 
 
 @dataclass(frozen=True)
@@ -95,15 +99,58 @@ class Preview(Message, kind="preview"):
 
 @dataclass(frozen=True)
 class Export(Message, kind="export"):
-    """Write results to the folder of the session, or stop that. Answered by `started`, later by
+    """Write results to a folder of the session, or stop that. Answered by `started`, later by
     `exported`, which names the files written, even if stopped.
 
     outputs: `target`: a painting of each painted view; `layers`: its layers; `picture`: the
-    displayed answer in each view.
+    displayed answer in each view. name: of a new folder in `exports/` for these files; a number
+    follows a name that is taken, so that no earlier export is replaced. "" for the folder of the
+    session itself, whose earlier files of the same names are replaced.
     """
 
     outputs: tuple[Literal["target", "picture", "lighting", "relit", "report", "layers"], ...]
     run: bool = True
+    name: str = ""
+
+
+@dataclass(frozen=True)
+class RenderFinal(Message, kind="render_final"):
+    """Render the answer of now with the renderer, in the background, into a new folder in
+    `renders/`. Answered by `renders`, which follows again whenever a render changes its state.
+
+    name: of the folder; a number follows one that is taken. width: of the picture in pixels; the
+    height follows from the scene. spp: samples per pixel. formats: `exr`, linear light as rendered,
+    its noise, and denoised; `png`, 16 bits, denoised, through the view and exposure of the scene.
+    view: index of the view.
+    """
+
+    name: str
+    width: int
+    spp: int
+    formats: tuple[Literal["exr", "png"], ...] = ("exr", "png")
+    view: int = 0
+
+    def __post_init__(self) -> None:
+        if not MIN_RENDER_WIDTH <= self.width <= MAX_RENDER_WIDTH:
+            raise ValueError(f"width is {MIN_RENDER_WIDTH} to {MAX_RENDER_WIDTH} pixels")
+        if not 2 <= self.spp <= MAX_RENDER_SPP:
+            raise ValueError(f"spp is 2 to {MAX_RENDER_SPP} samples per pixel")
+        if not self.formats:
+            raise ValueError("formats: expected exr, png or both")
+
+
+@dataclass(frozen=True)
+class StopRender(Message, kind="stop_render"):
+    """Stop a final render, which writes nothing then. Answered by `renders`."""
+
+    render: int
+
+
+@dataclass(frozen=True)
+class DropRender(Message, kind="drop_render"):
+    """Take a final render that has ended off the list; its files stay. Answered by `renders`."""
+
+    render: int
 
 
 @dataclass(frozen=True)
@@ -177,6 +224,7 @@ AnyRequest = (
     | AddLight
     | RemoveLight
     | PlaceLights
+    | EstimatePlaces
     | ShowRig
     | TieLights
     | ChangeSettings
@@ -189,6 +237,9 @@ AnyRequest = (
     | CompareLooks
     | DropLook
     | Export
+    | RenderFinal
+    | StopRender
+    | DropRender
     | Verify
     | Explain
     | TakeOver

@@ -8,15 +8,15 @@ import numpy as np
 import numpy.typing as npt
 
 from lightpaint.paint.protocol.base import OPTIONAL, Message
-from lightpaint.paint.protocol.message_parts import Place
+from lightpaint.paint.protocol.message_parts import Place, RenderInfo
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class ProgressReport(Message, kind="progress"):
     """The progress of a long task. Unasked.
 
-    task: `export`, `basis`, `sampling` for samples added where the paint needs them, or the
-    renderer's name for the task.
+    task: `export`, `final` for a final render, `basis`, `sampling` for samples added where the
+    paint needs them, or the renderer's name for the task.
     """
 
     task: str
@@ -78,6 +78,15 @@ class ExportResult(Message, kind="exported"):
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
+class RenderList(Message, kind="renders"):
+    """The final renders since the painter was started, the oldest first: the answer to requests
+    about them, and unasked when one changes its state.
+    """
+
+    renders: tuple[RenderInfo, ...]
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
 class Explanation(Message, kind="explained"):
     """The reasons why a view is not closer to its painting; the picture `beyond` shows where.
     Unasked.
@@ -112,6 +121,19 @@ class TrialPlaces(Message, kind="trial"):
 
     positions: Mapping[str, Place]
     directions: Mapping[str, Place]
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class PlacingEstimate(Message, kind="place_estimate"):
+    """The extent of a search for places, and its time: the answer to `estimate_place`.
+
+    text: the lights, and what each may do. seconds: about how long it takes, at least and at most.
+    is_measured: whether an earlier search of this session tells the pace of this machine.
+    """
+
+    text: str
+    seconds: tuple[float, float]
+    is_measured: bool
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)

@@ -5,12 +5,15 @@ from collections.abc import Callable, Mapping
 from dataclasses import replace
 from typing import Any
 
+from lightpaint.display_text import some_names
 from lightpaint.errors import LightpaintError, PaintError
 from lightpaint.lighting.solution import Solution
 from lightpaint.paint.background_threads import BackgroundThreads, StoppedError
 from lightpaint.paint.protocol import (
+    EstimatePlaces,
     Message,
     PlaceLights,
+    PlacingEstimate,
     PlacingResult,
     TaskStarted,
     TrialPlaces,
@@ -19,6 +22,7 @@ from lightpaint.paint.publisher import Publisher
 from lightpaint.paint.rig.added_lights import free_name, values_of
 from lightpaint.paint.rig.lamp_rig import LampRig
 from lightpaint.paint.rig.moved_subjects import of_moved_scenes
+from lightpaint.paint.rig.search_notes import SearchNotes
 from lightpaint.paint.session.moved_lights import Placed
 from lightpaint.paint.session.snapshot import SessionSnapshot
 from lightpaint.paint.session_access import SessionAccess
@@ -28,6 +32,7 @@ from lightpaint.placement.new_lights import NewLights
 from lightpaint.placement.place import place
 from lightpaint.placement.placement import Move, Placement
 from lightpaint.placement.rigging.rigged_lights import freedom_on
+from lightpaint.placement.search.search_time import SearchSize, usual_pace
 from lightpaint.progress import cancellable
 from lightpaint.scene.properties.pose import Pose, Site
 from lightpaint.scene.runtime.render_lock import MITSUBA
@@ -38,6 +43,11 @@ SLIDE, TURN = 0.15, 60.0
 
 #: Maximum number of lights that one search adds.
 MAX_NEW = 4
+
+#: What a search says that has tried everything in vain.
+NOTHING_BETTER = (
+    "Nothing better within these freedoms: no change reliably removes a hundredth of the error."
+)
 
 #: Seconds between updates of the trial places that pages show during a search.
 WATCH_S = 0.15
@@ -65,6 +75,16 @@ class LightPlacer:
         self._access, self._publisher, self._rig, self._threads = access, publisher, rig, threads
         self._hang_lights = hang_lights
         self._request: PlaceLights | None = None
+        self._ended_request: PlaceLights | None = None  # it ends with the best so far
+        self._pace: float | None = None  # of the last search that was not ended early
+        self._notes: SearchNotes | None = None
+
+    @property
+    def notes(self) -> SearchNotes:
+        """Notes on the searches of the session. Raises PaintError before there is a basis."""
+        if self._notes is None:
+            self._notes = SearchNotes(self._access.session.store)
+        return self._notes
 
     def handle(self, request: PlaceLights) -> list[Message]:
         """Start the search, or stop it. Raises LightpaintError if there is nothing to search for.
@@ -72,8 +92,29 @@ class LightPlacer:
         A new search replaces a running one.
         """
         if not request.run:
-            self._request = None
+            if request.keeps_best:
+                self._ended_request = self._request
+            else:
+                self._request = None
             return [TaskStarted(task="stop")]
+        self._checked_snapshot(request)
+        # Created here, in the thread of requests, since a search ends in its own.
+        _ = self.notes
+        self._request = request
+        self._threads.start_low_priority(lambda: self._run(request), "place")
+        return [TaskStarted(task="place")]
+
+    def estimate(self, request: EstimatePlaces) -> list[Message]:
+        """Return what a search would do and how long it takes. Raises as `handle` does."""
+        search = PlaceLights(True, request.new_type, request.max_count, request.surfaces)
+        snapshot = self._checked_snapshot(search)
+        low, high = self._size(search, snapshot).seconds(self._pace or usual_pace())
+        text = " ".join(self._attempts(search, snapshot))
+        is_measured = self._pace is not None
+        return [PlacingEstimate(text=text, seconds=(low, high), is_measured=is_measured)]
+
+    def _checked_snapshot(self, request: PlaceLights) -> SessionSnapshot:
+        """Return the snapshot. Raises LightpaintError if there is nothing to search for."""
         snapshot = self._access.snapshot()
         if not snapshot.painted_views:
             raise PaintError("nothing is painted yet: paint first, so that the search has a goal")
@@ -81,9 +122,26 @@ class LightPlacer:
             self._new_lights(request, snapshot)
         elif not self._freedoms(snapshot):
             raise PaintError("no light is free to move: unlock a point, a spot or a sun")
-        self._request = request
-        self._threads.start_low_priority(lambda: self._run(request), "place")
-        return [TaskStarted(task="place")]
+        return snapshot
+
+    def _size(self, request: PlaceLights, snapshot: SessionSnapshot) -> SearchSize:
+        """Return what a search has to do."""
+        is_move = request.new_type is None
+        lights, new = (len(self._freedoms(snapshot)), 0) if is_move else (0, request.max_count)
+        sizes = [snapshot.bases[k].size for k in snapshot.painted_views]
+        return SearchSize.of(lights, new, sum(height * width for height, width in sizes))
+
+    def _attempts(self, request: PlaceLights, snapshot: SessionSnapshot) -> list[str]:
+        """Return sentences on what a search tries: which lights, and what they may do."""
+        if request.new_type is not None:
+            count, surfaces = request.max_count, request.surfaces
+            where = f"on {some_names(surfaces)}" if surfaces else "anywhere free"
+            plural = "s" * (count > 1)
+            return [f"At most {count} new {request.new_type}{plural}, {where}."]
+        by_freedom: dict[str, list[str]] = {}
+        for name, freedom in self._freedoms(snapshot).items():
+            by_freedom.setdefault(_freedom_text(freedom), []).append(name)
+        return [f"{some_names(names)}: {text}." for text, names in by_freedom.items()]
 
     def _freedoms(self, snapshot: SessionSnapshot) -> dict[str, Freedom]:
         """Return the freedom of each movable light: from the lights file, or near its place.
@@ -120,7 +178,23 @@ class LightPlacer:
         return NewLights(kind, count=request.max_count, freedom=freedom, name=name)
 
     def _run(self, request: PlaceLights) -> None:
-        snapshot = self._access.snapshot()
+        """Search, publish the result and note it."""
+        snapshot, began_s = self._access.snapshot(), time.monotonic()
+        attempts, size = self._attempts(request, snapshot), self._size(request, snapshot)
+        text, names = self._result(request, snapshot)
+        seconds = time.monotonic() - began_s
+        has_ended_early = self._request is not request or self._ended_request is request
+        if not has_ended_early:
+            self._pace = size.pace_of(seconds)
+        is_move = request.new_type is None
+        title = "let lights move" if is_move else f"find places for a new {request.new_type}"
+        self.notes.add(title, text, attempts, seconds)
+        self._publisher.publish(PlacingResult(text=text, names=names))
+
+    def _result(
+        self, request: PlaceLights, snapshot: SessionSnapshot
+    ) -> tuple[str, tuple[str, ...]]:
+        """Search and hang the lights; return what came of it, and the names of these lights."""
 
         def check() -> None:
             if self._request is not request:
@@ -140,19 +214,17 @@ class LightPlacer:
                 current_delta_e, placed_delta_e = self._differences(snapshot, solution, placed)
                 check()
         except StoppedError:
-            if self._request is None:  # otherwise a page would wait for the next one
-                self._publish("Stopped: every light stays where it was.")
-            return
+            if self._request is not None:  # a page waits for the next one
+                raise
+            return "Stopped: every light stays where it was.", ()
         except _OutdatedError:
-            self._publish(_outdated(request))
-            return
+            return _outdated(request), ()
         except LightpaintError as error:
-            self._publish(f"No light was {_done(request)}: {error}")
-            return
+            return f"No light was {_done(request)}: {error}", ()
+        is_early = self._ended_request is request
         if not placed:
-            reason = "none reliably removes a hundredth of the error"
-            self._publish(f"No light was {_done(request)}: {reason}.")
-            return
+            early_text = "Stopped: nothing better was found until then."
+            return early_text if is_early else NOTHING_BETTER, ()
         if placed_delta_e >= current_delta_e:
             # The search measures light, which may differ from the visible error, for example in the
             # dark.
@@ -160,14 +232,13 @@ class LightPlacer:
                 f"what was found is no closer to the eye (ΔE {placed_delta_e:.1f} "
                 f"instead of {current_delta_e:.1f})"
             )
-            self._publish(f"No light was {_done(request)}: {reason}.")
-            return
+            return f"No light was {_done(request)}: {reason}.", ()
         label = f"{'move' if request.new_type is None else 'add'} {', '.join(placed)}"
         if not self._hang_lights(label, placed, snapshot.requests.placed):
-            self._publish(_outdated(request))
-            return
+            return _outdated(request), ()
         summary = "; ".join(map(str, (*placement.moves, *placement.additions)))
-        self._publish(f"{summary}.", tuple(placed))
+        gain = f"ΔE {current_delta_e:.1f} → {placed_delta_e:.1f}"
+        return f"{'Stopped with the best so far: ' * is_early}{summary}. {gain}.", tuple(placed)
 
     def _differences(
         self, snapshot: SessionSnapshot, solution: Solution, placed: Placed
@@ -184,9 +255,6 @@ class LightPlacer:
         placed_solution = state.solution()
         assert placed_solution is not None
         return snapshot.delta_e(solution), state.delta_e(placed_solution)
-
-    def _publish(self, text: str, names: tuple[str, ...] = ()) -> None:
-        self._publisher.publish(PlacingResult(text=text, names=names))
 
     def _searched(
         self, request: PlaceLights, snapshot: SessionSnapshot, check: Callable[[], None]
@@ -224,7 +292,14 @@ class LightPlacer:
         check()
         scenes = [subjects[k].loaded_scene for k in views]
         placement = place(
-            scenes, moved.bases, solution, freedoms, new=new, progress=report, watch=watch
+            scenes,
+            moved.bases,
+            solution,
+            freedoms,
+            new=new,
+            progress=report,
+            watch=watch,
+            is_enough=lambda: self._ended_request is request,
         )
         return solution, placement
 
@@ -235,6 +310,19 @@ def _trial(sites: Mapping[str, Site]) -> TrialPlaces:
         positions={name: x.position for name, x in sites.items() if x.position is not None},
         directions={name: x.direction for name, x in sites.items() if x.direction is not None},
     )
+
+
+def _freedom_text(freedom: Freedom) -> str:
+    """Return what a light may do: `slide by up to 0.6, turn by up to 60°`."""
+    parts = []
+    if freedom.slides:
+        distance = freedom.within
+        parts.append("slide" if distance is None else f"slide by up to {distance:.2g}")
+    if freedom.turn:
+        parts.append(f"turn by up to {freedom.turn:.0f}°")
+    if freedom.cone is not None:
+        parts.append("open or close its cone")
+    return ", ".join(parts) or "stay"
 
 
 def _done(request: PlaceLights) -> str:

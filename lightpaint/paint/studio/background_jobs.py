@@ -1,7 +1,7 @@
 """Long tasks of a session in threads of their own: exports, verification, previews and others."""
 
 from collections.abc import Callable, Iterable, Sequence
-from contextlib import suppress
+from contextlib import AbstractContextManager, nullcontext, suppress
 from dataclasses import replace
 from functools import partial
 from pathlib import Path
@@ -32,6 +32,7 @@ from lightpaint.paint.session.snapshot import SessionSnapshot
 from lightpaint.paint.session_access import SessionAccess
 from lightpaint.paint.store.history_steps import name_in_view
 from lightpaint.paint.store.session_requests import SessionRequests
+from lightpaint.paint.studio.export_folders import EXPORTS, folder_name, new_folder
 from lightpaint.paint.subject import Subject, painting_path
 from lightpaint.progress import Progress, cancellable
 
@@ -98,6 +99,8 @@ class BackgroundJobs:
         elif not message.run:
             self._stop_count += 1
             return [TaskStarted(task="stop")]
+        elif message.name:
+            folder_name(message.name)
         task_name, work = starters[type(message)]
         self._threads.start_low_priority(lambda: work(message), task_name)
         return [TaskStarted(task=task_name)]
@@ -112,10 +115,16 @@ class BackgroundJobs:
         self._threads.start_low_priority(lambda: self._run_preview(message, requests), "preview")
         return [TaskStarted(task="preview")]
 
-    def solve_command(self, sensors: Sequence[str], requests: SessionRequests) -> str:
-        """Return the command that solves exported paintings to the same answer; "" if none."""
+    def solve_command(
+        self, sensors: Sequence[str], requests: SessionRequests, folder: Path | None = None
+    ) -> str:
+        """Return the command that solves exported paintings to the same answer; "" if none.
+
+        folder: with these paintings; by default that of the session.
+        """
         subject = self._subjects[0]
-        paths = {sensor: str(painting_path(subject.folder, sensor)) for sensor in sensors}
+        folder = folder or subject.folder
+        paths = {sensor: str(painting_path(folder, sensor)) for sensor in sensors}
         return subject.command(paths, requests) if paths else ""
 
     def verifications(self, version: int) -> tuple[VerificationResult, ...]:
@@ -131,7 +140,7 @@ class BackgroundJobs:
             raise PaintError(f"no view {view}: there are {len(self._subjects)}")
         return self._subjects[view]
 
-    def _exact_answer(
+    def exact_answer(
         self, check: Callable[[], None]
     ) -> tuple[tuple[Subject, ...], SessionSnapshot, Lighting]:
         """Return the subjects with their current lights, the paintings, and the exact answer under
@@ -177,15 +186,16 @@ class BackgroundJobs:
             # A stop also ends the exact solve, which may take long.
             with cancellable(check):
                 layers = self._access.layers() if "layers" in message.outputs else ()
-                subjects, snapshot, lighting = self._exact_answer(check)
-                with self._write_lock:
+                subjects, snapshot, lighting = self.exact_answer(check)
+                with self._write_lock, self._export_folder(message.name) as folder:
                     check()
                     outputs = message.outputs
+                    subjects = tuple(replace(subject, folder=folder) for subject in subjects)
                     for file in export(subjects, snapshot, lighting, outputs, report, layers):
                         files.append(file)  # one by one: a stop keeps those already written
                     if snapshot.requests.placed and WRITES_PAINTING & set(message.outputs):
                         places = snapshot.requests.placed
-                        files.append(write_places(subjects[0].folder, self._mover.rig, places))
+                        files.append(write_places(folder, self._mover.rig, places))
         except StoppedError:
             if self._stop_count != stop_count:
                 result = ExportResult(files=_absolute_names(files), command="", is_stopped=True)
@@ -197,10 +207,15 @@ class BackgroundJobs:
         sensors = snapshot.painted_sensors if has_painting and not is_missing else ()
         result = ExportResult(
             files=_absolute_names(files),
-            command=self.solve_command(sensors, snapshot.requests),
+            command=self.solve_command(sensors, snapshot.requests, folder),
             is_unpainted=is_missing,
         )
         self._publisher.publish(result)
+
+    def _export_folder(self, name: str) -> AbstractContextManager[Path]:
+        """Return a new folder for the files of an export; without a name that of the session."""
+        session_folder = self._subjects[0].folder
+        return new_folder(session_folder / EXPORTS, name) if name else nullcontext(session_folder)
 
     def _run_verify(self, request: protocol.Verify) -> None:
         def check() -> None:
@@ -224,7 +239,7 @@ class BackgroundJobs:
             check()
             self._publisher.report_progress(label, done, total, unit)
 
-        subjects, snapshot, lighting = self._exact_answer(check)
+        subjects, snapshot, lighting = self.exact_answer(check)
         progress: Progress = report
         picture, text, agrees = render_verification(
             subjects[view], snapshot.bases[view], lighting, progress

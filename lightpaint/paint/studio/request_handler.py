@@ -29,6 +29,7 @@ from lightpaint.paint.store.session_requests import SessionRequests
 from lightpaint.paint.studio.answer_choices import ChoiceSolver
 from lightpaint.paint.studio.background_jobs import BackgroundJobs
 from lightpaint.paint.studio.exact_answers import ExactAnswers
+from lightpaint.paint.studio.final_renders import FinalRenders
 from lightpaint.paint.studio.layer_imports import LayerImports
 from lightpaint.paint.studio.reference_imports import ReferenceImports
 
@@ -65,6 +66,7 @@ class RequestHandler:
         self._subjects = mover.rig.subjects
         self._imports = LayerImports(access, publisher, threads, exact_answers.notify)
         self._references = ReferenceImports(access, publisher, threads)
+        self._renders = FinalRenders(publisher, threads, self._subjects, jobs.exact_answer)
         self._placer = LightPlacer(access, publisher, mover.rig, threads, self._hang_lights)
 
     def state(self) -> SessionState | SessionPending:
@@ -123,13 +125,16 @@ class RequestHandler:
                 case protocol.MixLooks() | protocol.DropLook() | protocol.Propose():
                     return [looks.handle(message)]
                 case protocol.ListSteps():
-                    return [session.history.list_steps(message.count)]
+                    steps = session.history.list_steps(message.count)
+                    return [replace(steps, searches=self._placer.notes.listed())]
                 case protocol.ShowPrevious():
                     return [PreviousAnswer(weights=session.history.previous_weights())]
                 case protocol.CompareLooks():
                     return self._comparison.handle(message)
                 case protocol.Export() | protocol.Verify() | protocol.Explain():
                     return self._jobs.handle(message)
+                case protocol.RenderFinal() | protocol.StopRender() | protocol.DropRender():
+                    return self._renders.handle(message)
                 case protocol.ImportLayers():
                     return self._imports.handle(message, arrays)
                 case protocol.AddReference() | protocol.DropReference():
@@ -140,6 +145,8 @@ class RequestHandler:
                     return self._mover.show_rig()
                 case protocol.PlaceLights():
                     return self._placer.handle(message)
+                case protocol.EstimatePlaces():
+                    return self._placer.estimate(message)
                 case protocol.PointLight():
                     messages = session.handle(self._mover.move_of(message), arrays)
                 case protocol.AddLight():
@@ -228,6 +235,7 @@ class RequestHandler:
                 self._access.looks,
                 target_spp=self._subjects[0].target_spp,
             ),
+            "renders": self._renders.infos,
             "verifications": self._jobs.verifications(session.version),
             "command": self._jobs.solve_command(sensors, session.requests),
         }

@@ -66,7 +66,9 @@ class NewLightSearch:
         found: list[Arrangement] = []
         for _ in range(STARTS):
             found.append(self._grown(start, progress))
-            if found[-1].missed <= max(ENOUGH * start.missed, NOTHING * self._fit.norm2):
+            if self._search.is_enough() or found[-1].missed <= max(
+                ENOUGH * start.missed, NOTHING * self._fit.norm2
+            ):
                 break
         return min(found, key=self._judge.missed) if len(found) > 1 else found[0]
 
@@ -74,6 +76,8 @@ class NewLightSearch:
         """Return an arrangement with the worthwhile new lights of one search."""
         arrangement, self._free = start, list(self._slots)
         while self._free and arrangement.missed > NOTHING * self._fit.norm2:
+            if self._search.is_enough():
+                break
             more = self._worthwhile(arrangement, self._with_one_more(arrangement))
             progress()
             if more is None:
@@ -118,7 +122,11 @@ class NewLightSearch:
         place = 0
         for _ in range(MOST_TRIALS):
             order = self._least_first(arrangement)
-            if place >= len(order) - 1 or arrangement.missed <= NOTHING * self._fit.norm2:
+            if (
+                self._search.is_enough()
+                or place >= len(order) - 1
+                or arrangement.missed <= NOTHING * self._fit.norm2
+            ):
                 break
             better = self._search.tried(arrangement, order[place])
             place += 1

@@ -67,12 +67,18 @@ class PoseSearch:
         self.steps = PoseSteps(fit, self.spread, rules.permit)
         self._rng = np.random.default_rng(seed)
 
+    def is_enough(self) -> bool:
+        """Return whether the search is to end with the best so far."""
+        return self.steps.is_enough()
+
     def by_blocks(self, start: Arrangement, progress: Callable[[], None]) -> Arrangement:
         """Return an arrangement after trying each light over its whole freedom."""
         best = start
         for _ in range(TURNS):
             before = best.missed
             for k in range(len(best.movables)):
+                if self.is_enough():
+                    return best
                 best = self.tried(best, k)
                 progress()
             if best.missed > (1 - WORTH_A_TURN) * before:
@@ -86,6 +92,8 @@ class PoseSearch:
         others = self.fit.fitted(with_columns(start.fitted.columns, black))
         best = start
         for site, fitted in self.candidates(start.without(k, others), [movable]).get(0, []):
+            if self.is_enough():
+                break
             moved = self.steps.descend(
                 start.with_site(k, site, fitted), self.paths.compare, SHORT_STEPS, moving=[k]
             )
@@ -117,6 +125,8 @@ class PoseSearch:
         poses = sorted(poses, key=lambda pose: -pose[0])[:COMPARED]
         trials: list[tuple[float, Site, int, Fitted]] = []
         for _, site, j in poses:
+            if self.is_enough():
+                break
             fitted = self._fitted_with(others, movables[j], site)
             trials.append((fitted.missed, site, j, fitted))
         chosen: list[tuple[float, Site, int, Fitted]] = []

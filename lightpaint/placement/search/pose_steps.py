@@ -58,6 +58,7 @@ class PoseSteps:
     ) -> None:
         self._fit, self._permits = fit, permits
         self.watch: Callable[[Arrangement], None] = lambda _: None
+        self.is_enough: Callable[[], bool] = lambda: False
         self._spread = spread
         self.first_step = FIRST_STEP * spread
         self._unit = spread / 3
@@ -65,7 +66,7 @@ class PoseSteps:
     def with_fit(self, fit: PlacementFit) -> "PoseSteps":
         """Return the same steps for a fit on another film."""
         steps = PoseSteps(fit, self._spread, self._permits)
-        steps.watch = self.watch
+        steps.watch, steps.is_enough = self.watch, self.is_enough
         return steps
 
     def fitted(self, movables: Sequence[Movable], sites: Sequence[Site], at: ViewPaths) -> Fitted:
@@ -96,6 +97,8 @@ class PoseSteps:
         """
         step, last, ridge = first_share * self.first_step, LAST_SHARE * self.first_step, RIDGE
         for _ in range(steps):
+            if self.is_enough():
+                break
             before = arrangement.missed
             arrangement, ridge = self.step(arrangement, at, step, ridge, moving=moving)
             self.watch(arrangement)
@@ -117,7 +120,7 @@ class PoseSteps:
         """
         for k, movable in enumerate(arrangement.movables):
             light, site = movable.light, arrangement.sites[k]
-            if not light.freedom.slides:
+            if not light.freedom.slides or self.is_enough():
                 continue
             if isinstance(site, PanelSite):
                 for eye in at.eyes:

@@ -161,6 +161,27 @@ def reduced(film: Film, factor: int) -> Film:
     )
 
 
+def with_width(film: Film, width: int) -> Film:
+    """Return a film whose picture has this width and the same frame; the height is rounded.
+
+    Its pixels are film pixels, without blocks. Raises SceneError for more than MAX_PIXELS.
+    """
+    factor = width / film.crop_size[0]
+    sides = [round(side * factor) for side in (*film.size, *film.crop_size, *film.crop_offset)]
+    crop_size = width, max(1, sides[3])
+    if crop_size[0] * crop_size[1] > MAX_PIXELS:
+        raise SceneError(
+            f"a picture of {crop_size[0]}x{crop_size[1]} pixels: expected at most {MAX_PIXELS}"
+        )
+    offset = sides[4], sides[5]
+    # The crop window lies within the film, also after rounding.
+    size = (
+        max(sides[0], crop_size[0] + offset[0]),
+        max(sides[1], crop_size[1] + offset[1]),
+    )
+    return replace(film, size=size, crop_size=crop_size, crop_offset=offset, block=1)
+
+
 def check_film(path: Path, film: Film, spp: int) -> None:
     """Raise SceneError for an invalid film size, or too many samples per pixel."""
     width, height = film.crop_size

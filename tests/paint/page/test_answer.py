@@ -401,16 +401,18 @@ def test_files_are_written_and_their_command_shown(painter: Painter) -> None:
     painter.button("Export").click()
     painter.page.get_by_label("Report").uncheck()
     painter.page.get_by_role("dialog").get_by_role("button", name="Export", exact=True).click()
-    assert painter.requests("export")[-1]["outputs"] == ["target", "picture", "lighting", "relit"]
+    outputs = ["target", "picture", "lighting", "relit"]
+    request = painter.requests("export")[-1]
+    assert (request["outputs"], request["name"]) == (outputs, "gallery")
     window = painter.page.get_by_role("dialog")
-    assert window.locator(".exported li").all_inner_texts() == [
-        "target", "picture", "lighting", "relit",
-    ]  # fmt: skip
+    files = window.locator(".exported li").all_inner_texts()
+    assert files == [f"exports/gallery/{name}" for name in outputs]
     assert window.inner_text().count("/shows/gallery-evening") == 1
     painter.page.context.grant_permissions(["clipboard-read", "clipboard-write"])
     painter.button("Copy the folder's path").click()
     painter.button("Copied").wait_for()
-    assert painter.page.evaluate("navigator.clipboard.readText()") == "/shows/gallery-evening"
+    copied = painter.page.evaluate("navigator.clipboard.readText()")
+    assert copied == "/shows/gallery-evening/exports"
     assert painter.page.get_by_text("lightpaint solve gallery.xml").is_visible()
     assert not painter.page.get_by_text("Nothing is painted yet").count()
     painter.page.evaluate("() => { host.unpainted = true; }")
@@ -420,6 +422,24 @@ def test_files_are_written_and_their_command_shown(painter: Painter) -> None:
     painter.page.get_by_role("checkbox", name="Layers").check()  # not by itself: it takes room
     painter.page.get_by_role("dialog").get_by_role("button", name="Export", exact=True).click()
     assert painter.requests("export")[-1]["outputs"][-1] == "layers"
+
+
+def test_an_export_has_the_name_of_the_look_that_equals_the_answer(painter: Painter) -> None:
+    painter.stroke()
+    painter.page.keyboard.press("Control+s")
+    painter.page.locator(".look-name", has_text="Look 1").click()
+    painter.page.get_by_role("textbox", name="Name of Look 1").fill("Evening")
+    painter.page.keyboard.press("Enter")
+    painter.button("Load Evening").wait_for()
+    painter.button("Export").click()
+    window = painter.page.get_by_role("dialog")
+    name, export = window.get_by_label("Name"), window.get_by_role("button", name="Export")
+    assert name.input_value() == "Evening"
+    name.fill("Evening, warmer")
+    export.click()
+    assert painter.requests("export")[-1]["name"] == "Evening, warmer"
+    name.fill("  ")
+    assert export.is_disabled()
 
 
 @pytest.mark.nightly

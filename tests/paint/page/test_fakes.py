@@ -36,6 +36,9 @@ ASKED = {
     "drop_reference": {"reference": 1},
     "start_over": {},
     "export": {"outputs": ["target", "lighting"]},
+    "render_final": {"name": "Act 1", "width": 1920, "spp": 64, "formats": ["png"]},
+    "stop_render": {"render": 1},
+    "drop_render": {"render": 1},
     "verify": {"run": True},
     "explain": {"view": 0},
     "show_rig": {},
@@ -44,7 +47,7 @@ ASKED = {
 
 #: Requests of a rig, layers and a selection, which the session that tests make up does not have.
 RIG = {"move", "point", "place", "add_light", "remove_light", "change_layers", "select"}
-RIG |= {"compare_looks", "import_layers", "add_reference"}
+RIG |= {"estimate_place", "compare_looks", "import_layers", "add_reference"}
 
 
 def check(message: dict[str, Any]) -> None:

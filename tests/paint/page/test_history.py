@@ -125,3 +125,56 @@ def test_the_answer_before_the_last_step_shows_while_a_key_or_button_is_held(
     shown.wait_for(state="detached")
     page.wait_for_function("() => window.engine.shown.solutionWeights === null")
     assert len(painter.requests("show_previous")) == 1
+
+
+@pytest.mark.parametrize("by", ["key", nightly("button")])
+def test_the_original_scene_shows_while_a_key_or_button_is_held(painter: Painter, by: str) -> None:
+    """In place of the answer, wherever that is, and whichever lights are shown alone."""
+    page = painter.page
+    painter.stroke()
+    painter.still()
+    if by == "key":
+        page.locator(".stage").focus()
+        press, release = lambda: page.keyboard.down("y"), lambda: page.keyboard.up("y")
+    else:
+        painter.button("Hold: the original scene").hover()
+        press, release = page.mouse.down, page.mouse.up
+    pairs = {
+        "painting solution": ["painting", "present"],
+        "present solution": ["present", "present"],
+        "solution verified": ["present", "verified"],
+        "present painting": ["present", "painting"],
+    }
+    names = page.locator(".tag")
+    for pair, shown in pairs.items():
+        left, right = pair.split(" ")
+        page.evaluate(
+            "([left, right]) => painter.store.set(({ display }) => ({ solo: [0],"
+            " display: { ...display, left, right } }))",
+            [left, right],
+        )
+        painter.still()
+        press()
+        painter.still()
+        assert page.evaluate("() => [engine.shown.left, engine.shown.right]") == shown
+        assert "Original scene" in names.all_inner_texts()
+        release()
+        painter.still()
+        assert page.evaluate("() => [engine.shown.left, engine.shown.right]") == [left, right]
+        assert "Original scene" not in names.all_inner_texts()
+
+
+def test_the_original_scene_shows_in_blink_and_ends_with_the_window(painter: Painter) -> None:
+    page = painter.page
+    page.locator(".stage").focus()
+    page.keyboard.press("k")
+    page.keyboard.press("k")
+    painter.still()
+    assert page.evaluate("() => engine.shown.blink") == "left"
+    page.keyboard.down("y")
+    painter.still()
+    assert page.evaluate("() => [engine.shown.blink, engine.shown.right]") == ["right", "present"]
+    page.evaluate("() => window.dispatchEvent(new Event('blur'))")
+    painter.still()
+    assert page.evaluate("() => [engine.shown.blink, engine.shown.right]") == ["left", "solution"]
+    page.keyboard.up("y")

@@ -118,6 +118,7 @@ STATES: dict[str, Callable[[Painter], None]] = {
     "settings": show("{ panel: 'settings' }"),
     "shortcuts": show("{ dialog: 'keys' }"),
     "export": show("{ dialog: 'export' }"),
+    "render": show("{ dialog: 'render' }"),
     "looks": show("{ dialog: 'looks' }"),
     "presets": show("{ dialog: 'presets' }"),
     "lights": show("{ selectedLights: [0, 1], master: 0.5, solo: [0], openLights: [0] }"),

@@ -518,8 +518,9 @@ def test_what_is_kept_is_there_again_and_solved_alike_from_its_files(
     )
     assert completed.returncode == 0, completed.stderr
     session = served_painter.studio.session
+    [exported_lighting] = served_painter.folder.glob("exports/*/lighting.json")
     for path in (
-        served_painter.folder / "lighting.json",
+        exported_lighting,
         served_painter.folder / "again" / "lighting.json",
     ):
         emission = lp.read_lighting(path).emission
@@ -667,10 +668,11 @@ def test_two_views_are_painted_and_have_one_answer(
     assert not user.page.get_by_label("Report").is_visible()  # of bases without their scene
     user.page.get_by_role("dialog").get_by_role("button", name="Export", exact=True).click()
     user.page.locator(".exported li", has_text="painting-side.exr").wait_for()
-    paintings = [two_views.folder / f"painting-{view.name}.exr" for view in views]
+    [folder] = (two_views.folder / "exports").iterdir()
+    paintings = [folder / f"painting-{view.name}.exr" for view in views]
     bases = [view.basis for view in views]
     solution = correct_noise(lp.solve(bases, [lp.read_target(path) for path in paintings]))
-    weights = lp.read_lighting(two_views.folder / "lighting.json").weights_for(bases[0])
+    weights = lp.read_lighting(folder / "lighting.json").weights_for(bases[0])
     np.testing.assert_allclose(weights, solution.weights, rtol=1e-9)
 
 

@@ -161,10 +161,10 @@ def test_a_held_key_may_be_another(new_painter: Any) -> None:
     painter: Painter = new_painter()
     painter.stroke()
     painter.page.wait_for_function("() => painter.store.value.history.undo.length")
-    painter.page.evaluate("() => painter.store.set({ keyBindings: { previous: 'y' } })")
-    painter.page.keyboard.down("y")
+    painter.page.evaluate("() => painter.store.set({ keyBindings: { previous: 'j' } })")
+    painter.page.keyboard.down("j")
     painter.still()
     assert painter.ui("isPreviousHeld") is True
-    painter.page.keyboard.up("y")
+    painter.page.keyboard.up("j")
     painter.still()
     assert painter.ui("isPreviousHeld") is False

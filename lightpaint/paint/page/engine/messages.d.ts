@@ -263,6 +263,23 @@ export interface StepInfo {
 }
 
 /**
+ * A search for places of lights that has ended, beside the steps of the history.
+ *
+ * after: id of the last step when it ended, which is its own if it found something; 0 for none.
+ * title: what was searched for. text: what came of it. tried: sentences on what was tried. stamp:
+ * time in seconds since 1970.
+ */
+export interface SearchInfo {
+  id: number;
+  after: number;
+  title: string;
+  text: string;
+  tried: string[];
+  stamp: number;
+  seconds: number;
+}
+
+/**
  * A preset: a request for a whole scene. Its picture is `preset/NAME`.
  *
  * has_subject: whether it is about one object.
@@ -281,6 +298,29 @@ export interface PresetInfo {
 export interface ReferenceInfo {
   id: number;
   name: string;
+}
+
+/**
+ * A final render. Its small picture is `render/ID`, (h, w, 3) uint8, and the bytes of its files
+ * are `render_file/ID/NAME`, uint8, once it is done.
+ *
+ * name: as requested. height: null until it is known. state: `waiting` for an earlier one; the
+ * others speak for themselves. done, total: its passes. text: why it has failed. files: paths of
+ * those that were written.
+ */
+export interface RenderInfo {
+  id: number;
+  name: string;
+  view: number;
+  width: number;
+  height: number | null;
+  spp: number;
+  formats: string[];
+  state: 'waiting' | 'rendering' | 'done' | 'stopped' | 'failed';
+  done: number;
+  total: number;
+  text: string;
+  files: string[];
 }
 
 /**
@@ -411,7 +451,8 @@ export interface Findings {
  * version: of this protocol. size: height and width of the first view, and `objects` the names of
  * its objects.
  * lut: the grid of the tables `lut/NAME` of all `transforms`. resources: pictures, with a number
- * that grows when one is replaced. verifications: the last one of each view. is_new: whether
+ * that grows when one is replaced. verifications: the last one of each view. renders: the final
+ * renders, as in `renders`. is_new: whether
  * the session has no steps yet. stroke: number of the last stroke that arrived. command: solves
  * for the exported paintings. is_back: the client had the session before, and no other client
  * since; also true if unasked. weights: (lights, 3) float64, the last answer.
@@ -460,6 +501,7 @@ export interface SessionState {
   answer: Findings;
   is_back: boolean;
   choices: AnswerChoice[];
+  renders: RenderInfo[];
   arrays: { weights: Picture };
 }
 
@@ -620,7 +662,7 @@ export interface PictureData {
  * The last steps of the history, in order, including undone ones: the answer to `list_steps`.
  *
  * earlier: number of steps before them. done: id of the last step that is not undone; 0 at the
- * beginning.
+ * beginning. searches: those after a step that still exists, the oldest first.
  */
 export interface StepList {
   kind: 'steps';
@@ -628,6 +670,7 @@ export interface StepList {
   steps: StepInfo[];
   earlier: number;
   done: number;
+  searches: SearchInfo[];
   arrays: {  };
 }
 
@@ -683,8 +726,8 @@ export interface AnswerChoices {
 /**
  * The progress of a long task. Unasked.
  *
- * task: `export`, `basis`, `sampling` for samples added where the paint needs them, or the
- * renderer's name for the task.
+ * task: `export`, `final` for a final render, `basis`, `sampling` for samples added where the
+ * paint needs them, or the renderer's name for the task.
  */
 export interface ProgressReport {
   kind: 'progress';
@@ -729,6 +772,17 @@ export interface ExportResult {
   command: string;
   is_stopped?: boolean;
   is_unpainted?: boolean;
+  arrays: {  };
+}
+
+/**
+ * The final renders since the painter was started, the oldest first: the answer to requests
+ * about them, and unasked when one changes its state.
+ */
+export interface RenderList {
+  kind: 'renders';
+  reply?: number;
+  renders: RenderInfo[];
   arrays: {  };
 }
 
@@ -807,6 +861,21 @@ export interface TrialPlaces {
   reply?: number;
   positions: Record<string, number[]>;
   directions: Record<string, number[]>;
+  arrays: {  };
+}
+
+/**
+ * The extent of a search for places, and its time: the answer to `estimate_place`.
+ *
+ * text: the lights, and what each may do. seconds: about how long it takes, at least and at most.
+ * is_measured: whether an earlier search of this session tells the pace of this machine.
+ */
+export interface PlacingEstimate {
+  kind: 'place_estimate';
+  reply?: number;
+  text: string;
+  seconds: [number, number];
+  is_measured: boolean;
   arrays: {  };
 }
 
@@ -1158,10 +1227,24 @@ export interface RemoveLight {
  *
  * new_type: type of lights to add, instead of moving existing ones; null for none. max_count:
  * maximum number of them. surfaces: names of rails, surfaces and shapes that they may hang on;
- * none for anywhere free.
+ * none for anywhere free. keeps_best: for a stop: whether the best that was found by then becomes
+ * a step, once it is judged; otherwise every light stays where it is.
  */
 export interface PlaceLights {
   run?: boolean;
+  new_type?: 'spot' | 'point' | 'panel' | null;
+  max_count?: number;
+  surfaces?: string[];
+  keeps_best?: boolean;
+}
+
+/**
+ * A request to say what a search for places would do, and about how long it would take.
+ * Answered by `place_estimate`.
+ *
+ * new_type, max_count, surfaces: as in `place`.
+ */
+export interface EstimatePlaces {
   new_type?: 'spot' | 'point' | 'panel' | null;
   max_count?: number;
   surfaces?: string[];
@@ -1265,15 +1348,49 @@ export interface DropLook {
 }
 
 /**
- * Write results to the folder of the session, or stop that. Answered by `started`, later by
+ * Write results to a folder of the session, or stop that. Answered by `started`, later by
  * `exported`, which names the files written, even if stopped.
  *
  * outputs: `target`: a painting of each painted view; `layers`: its layers; `picture`: the
- * displayed answer in each view.
+ * displayed answer in each view. name: of a new folder in `exports/` for these files; a number
+ * follows a name that is taken, so that no earlier export is replaced. "" for the folder of the
+ * session itself, whose earlier files of the same names are replaced.
  */
 export interface Export {
   outputs: ('target' | 'picture' | 'lighting' | 'relit' | 'report' | 'layers')[];
   run?: boolean;
+  name?: string;
+}
+
+/**
+ * Render the answer of now with the renderer, in the background, into a new folder in
+ * `renders/`. Answered by `renders`, which follows again whenever a render changes its state.
+ *
+ * name: of the folder; a number follows one that is taken. width: of the picture in pixels; the
+ * height follows from the scene. spp: samples per pixel. formats: `exr`, linear light as rendered,
+ * its noise, and denoised; `png`, 16 bits, denoised, through the view and exposure of the scene.
+ * view: index of the view.
+ */
+export interface RenderFinal {
+  name: string;
+  width: number;
+  spp: number;
+  formats?: ('exr' | 'png')[];
+  view?: number;
+}
+
+/**
+ * Stop a final render, which writes nothing then. Answered by `renders`.
+ */
+export interface StopRender {
+  render: number;
+}
+
+/**
+ * Take a final render that has ended off the list; its files stay. Answered by `renders`.
+ */
+export interface DropRender {
+  render: number;
 }
 
 /**
@@ -1346,11 +1463,13 @@ export interface Events {
   started: TaskStarted;
   stopped: TaskStopped;
   exported: ExportResult;
+  renders: RenderList;
   verified: VerificationResult;
   explained: Explanation;
   previewed: PreviewResult;
   rig: Rig;
   trial: TrialPlaces;
+  place_estimate: PlacingEstimate;
   placed: PlacingResult;
   notice: Notice;
   failed: Failure;
@@ -1386,6 +1505,7 @@ export interface Requests {
   add_light: AddLight;
   remove_light: RemoveLight;
   place: PlaceLights;
+  estimate_place: EstimatePlaces;
   show_rig: ShowRig;
   tie: TieLights;
   change_settings: ChangeSettings;
@@ -1398,6 +1518,9 @@ export interface Requests {
   compare_looks: CompareLooks;
   drop_look: DropLook;
   export: Export;
+  render_final: RenderFinal;
+  stop_render: StopRender;
+  drop_render: DropRender;
   verify: Verify;
   explain: Explain;
   take_over: TakeOver;

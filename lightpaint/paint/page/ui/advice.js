@@ -126,7 +126,7 @@ export function MoveButton({ ui, app }) {
   if (!ui.state?.can_render || ui.placementProgress) return null;
   return html`<${Button} label=${words.advice.letLightsMove} class="help"
     tip=${words.advice.searchForPlacesAndDirectionsOf}
-    act=${() => app.session.placeLights()} />`;
+    act=${() => app.store.set({ dialog: 'move' })} />`;
 }
 
 /** The answer before and after a change, for the user to apply or cancel.

@@ -3,9 +3,13 @@
 import { html, useState } from '../vendor/preact.js';
 import { ProgressBar } from './progress_bar.js';
 import { Button, Checkbox, Dialog } from './controls.js';
+import { ExportKind } from './exports/export_kind.js';
+import { ExportName, suggestedName } from './exports/export_name.js';
+import { FinalRenderDialog } from './exports/final_render.js';
 import { percentText, progressText, relativePath } from './format.js';
 import { LooksDialog } from './looks_dialog.js';
 import { PresetsDialog } from './presets_dialog.js';
+import { MoveDialog } from './searches/move_dialog.js';
 import { ShortcutsDialog } from './shortcuts_dialog.js';
 import { fill, words } from '../language/language.js';
 
@@ -17,6 +21,9 @@ export function Dialogs({ ui, app }) {
   const close = () => app.store.set({ dialog: null });
   if (ui.dialog === 'keys') return html`<${ShortcutsDialog} ui=${ui} app=${app} close=${close} />`;
   if (ui.dialog === 'export') return html`<${ExportDialog} ui=${ui} app=${app} close=${close} />`;
+  if (ui.dialog === 'render')
+    return html`<${FinalRenderDialog} ui=${ui} app=${app} close=${close} />`;
+  if (ui.dialog === 'move') return html`<${MoveDialog} app=${app} close=${close} />`;
   if (ui.dialog === 'looks') return html`<${LooksDialog} ui=${ui} app=${app} close=${close} />`;
   if (ui.dialog === 'presets') return html`<${PresetsDialog} ui=${ui} app=${app} close=${close} />`;
   return null;
@@ -68,10 +75,13 @@ function ExportDialog({ ui, app, close }) {
   const [outputs, setOutputs] = useState(
     available.map(({ key }) => key).filter((key) => !UNTICKED.includes(key)),
   );
+  const [name, setName] = useState(() => suggestedName(ui));
   const isBusy = ui.isExporting;
   const { exportResult } = ui;
   const folder = ui.state?.folder ?? '';
   return html`<${Dialog} title=${words.dialogs.export} close=${close} class="export">
+    <${ExportKind} value="export" app=${app} />
+    <${ExportName} name=${name} change=${setName} />
     ${available.map(
       ({ key, label, description }) => html`<div class="export-row" key=${key}>
       <${Checkbox} label=${label} checked=${outputs.includes(key)} change=${(
@@ -83,10 +93,10 @@ function ExportDialog({ ui, app, close }) {
       ui.master !== 1 &&
       html`<p>${fill(words.dialogs.theMasterIsAtPictureLighting, { percent: percentText(ui.master) })}</p>`
     }
-    <div class="row"><span class="faint folder">${fill(words.dialogs.to, { folder })}</span>
-      <${CopyButton} text=${folder} tip=${words.dialogs.copyTheFoldersPath} app=${app} />
-      <${Button} label=${isBusy ? words.dialogs.exporting : words.dialogs.export} primary disabled=${isBusy || !outputs.length}
-        act=${() => app.session.exportFiles(outputs)} /></div>
+    <div class="row"><span class="faint folder">${fill(words.dialogs.to, { folder: `${folder}/exports` })}</span>
+      <${CopyButton} text=${`${folder}/exports`} tip=${words.dialogs.copyTheFoldersPath} app=${app} />
+      <${Button} label=${isBusy ? words.dialogs.exporting : words.dialogs.export} primary disabled=${isBusy || !outputs.length || !name.trim()}
+        act=${() => app.session.exportFiles(outputs, name.trim())} /></div>
     ${
       isBusy &&
       html`<div class="row"><span class="faint folder">${words.dialogs.youCanCloseThisWindow}</span>

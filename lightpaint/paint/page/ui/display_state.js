@@ -1,6 +1,7 @@
 /** What the pictures show: the chosen display with temporary changes, and the light of the paint. */
 
 import { comparedDisplay } from './look_comparison.js';
+import { withOriginal } from './original_scene.js';
 
 /** @typedef {import("./engine_interface.js").RGB} RGB */
 /** @typedef {import("./engine_interface.js").Display} Display */
@@ -22,6 +23,7 @@ export function effectiveDisplay(ui) {
     display.solutionWeights = ui.previousWeights;
     if (display.left !== 'solution') display.right = 'solution';
   }
+  if (ui.isOriginalHeld) return withOriginal(display);
   const k = ui.hoveredLight;
   if (k !== null) {
     const gain = gainOf(ui, k);

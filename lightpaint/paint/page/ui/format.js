@@ -48,11 +48,11 @@ export function progressText({ done, total, remainingSeconds: remaining }) {
   const share = `${Math.floor((100 * Math.min(done, total)) / total)} %`;
   return remaining === undefined
     ? share
-    : fill(words.format.left, { share, time: timeText(remaining) });
+    : fill(words.format.left, { share, time: durationText(remaining) });
 }
 
-/** Rounded to the precision of the estimate. @param {number} seconds */
-function timeText(seconds) {
+/** Return a time, rounded to the precision of an estimate. @param {number} seconds */
+export function durationText(seconds) {
   if (seconds < 60)
     return fill(words.format.s, {
       value: Math.max(1, seconds < 10 ? Math.round(seconds) : 5 * Math.round(seconds / 5)),

@@ -3,6 +3,7 @@
 import { html, useEffect, useLayoutEffect, useRef, useState } from '../vendor/preact.js';
 import { Button, Checkbox } from './controls.js';
 import { clockText, dateText } from './format.js';
+import { SearchRow } from './searches/search_row.js';
 import { Thumbnail } from './thumbnail.js';
 import { fill, words } from '../language/language.js';
 
@@ -36,7 +37,7 @@ function useSteps(ui, { session }, count) {
     return () => {
       isOutdated = true;
     };
-  }, [ui.history, ui.ready, ui.closure, count]);
+  }, [ui.history, ui.ready, ui.closure, ui.searchCount, count]);
   return list;
 }
 
@@ -46,7 +47,7 @@ export function HistoryPanel({ ui, app }) {
   const [hasMilestonesOnly, setMilestonesOnly] = useState(false);
   const list = useSteps(ui, app, count);
   const element = useRef(/** @type {HTMLElement | null} */ (null));
-  const { steps = [], earlier = 0, done = 0 } = list ?? {};
+  const { steps = [], earlier = 0, done = 0, searches = [] } = list ?? {};
   const all = earlier ? steps : [BEGINNING, ...steps];
   const doneIndex = all.findIndex(({ id }) => id === done);
   const rows = all
@@ -56,12 +57,18 @@ export function HistoryPanel({ ui, app }) {
   useLayoutEffect(() => {
     element.current?.querySelector('[aria-current]')?.scrollIntoView({ block: 'nearest' });
   }, [done, list === null]);
-  if (!ui.history.count && !ui.history.redo.length)
+  if (!ui.history.count && !ui.history.redo.length && !searches.length)
     return html`<p class="faint panel-note">${words.historyPanel.everyStepIsListedHereWith}</p>`;
   return html`<ul class="steps" ref=${element} aria-label=${words.historyPanel.stepsTheLastOnTop}>
       ${rows.map(
-        ({ step, isUndone, isCurrent }) => html`<${StepRow} key=${step.id} step=${step} ui=${ui}
+        ({ step, isUndone, isCurrent }) => [
+          ...searches
+            .filter(({ after }) => after === step.id)
+            .map((search) => html`<${SearchRow} key=${`search ${search.id}`} search=${search} />`)
+            .reverse(),
+          html`<${StepRow} key=${step.id} step=${step} ui=${ui}
           app=${app} isUndone=${isUndone} isCurrent=${isCurrent} />`,
+        ],
       )}
       ${
         earlier > 0 &&

@@ -36,6 +36,7 @@ export const DEFAULT_KEYS = {
   nextView: 'n',
   blink: 'k',
   previous: 'q',
+  original: 'y',
   lowerExposure: ',',
   raiseExposure: '.',
   denoise: 'c',

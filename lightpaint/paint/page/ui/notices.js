@@ -2,6 +2,7 @@
 
 import { html, useEffect, useRef, useState } from '../vendor/preact.js';
 import { Button } from './controls.js';
+import { runningRender } from './exports/render_state.js';
 import { progressText } from './format.js';
 import { Icon } from './icons.js';
 import { keysText } from './key_names.js';
@@ -65,11 +66,12 @@ function ReconnectButton({ ui, app }) {
  */
 export function RunningTasks({ ui, app }) {
   if (!ui.ready) return null;
-  return html`${runningTasks(ui, app).map(({ name, progress, text, stop, stopText, stopTip }) => {
+  return html`${runningTasks(ui, app).map(({ name, progress, text, end, stop, stopText, stopTip }) => {
     const progressLabel = progressText(progress);
     const label = [name, progressLabel].filter(Boolean).join(': ');
     return html`<div class="working" key=${name}><${ProgressBar} progress=${progress} label=${name} />
       <span>${ui.probe ? progressLabel || name : text ? `${label}. ${text}` : label}</span>
+      ${end && html`<${Button} label=${words.searches.keepBest} tip=${words.searches.keepBestTip} act=${end} />`}
       ${
         stop &&
         html`<${Button} icon=${stopText ? undefined : 'close'} label=${stopText}
@@ -79,7 +81,7 @@ export function RunningTasks({ ui, app }) {
 }
 
 /** @typedef {{name: string, progress: {done: number, total: number, remainingSeconds?: number},
- *   text?: string, stop?: () => void, stopText?: string, stopTip?: string}} Task */
+ *   text?: string, end?: () => void, stop?: () => void, stopText?: string, stopTip?: string}} Task */
 
 /** Return the tasks that no panel shows, and at most one of those that start by themselves.
  * @param {Ui} ui
@@ -96,6 +98,13 @@ function runningTasks(ui, { session }) {
       progress: exportProgress ?? unknownProgress,
       stop: () => void session.exportFiles([]),
     });
+  const render = runningRender(ui);
+  if (render && ui.dialog !== 'render')
+    tasks.push({
+      name: words.finalRender.rendering,
+      progress: ui.renderProgress ?? unknownProgress,
+      stop: () => void session.send('stop_render', { render: render.id }),
+    });
   if (verificationProgress && !isOpen)
     tasks.push({
       name: words.notices.verifying,
@@ -106,6 +115,8 @@ function runningTasks(ui, { session }) {
     tasks.push({
       name: words.notices.searchingForPlaces,
       progress: ui.placementProgress,
+      text: ui.isPlacementEnding ? words.searches.judging : undefined,
+      end: ui.isPlacementEnding ? undefined : () => void session.endPlacing(),
       stopText: words.notices.stopMoveNothing,
       stopTip: words.notices.stopTheSearchEveryLightStays,
       stop: () => void session.placeLights(false),

@@ -61,6 +61,7 @@ function nameOf(ui, kind) {
     return look ? lookText(ui, look) : NAMES.solution;
   }
   if (kind === 'solution' && ui.previousWeights) return words.pictureStage.answerBeforeTheLastStep;
+  if (kind === 'present' && ui.isOriginalHeld) return words.originalScene.name;
   const gap = kind === 'solution' || kind === 'painting' ? missingText(ui, kind) : null;
   if (gap) return `${NAMES[kind]}: ${gap}`;
   if (isPartial(ui, kind)) return `${NAMES.solution}: ${visibleNames(ui)}`;
@@ -138,6 +139,7 @@ export function Stage({ ui, app }) {
       ui.hoveredLight,
       ui.mix,
       ui.previousWeights,
+      ui.isOriginalHeld,
       ui.ready,
       ui.weights,
       ui.master,
@@ -246,7 +248,7 @@ function Tag({ ui, app, pane, panes }) {
   };
   const hasHidden = isPartial(ui, pane.kind);
   const showAll = () => app.store.set({ solo: [], mute: [] });
-  return html`<span class=${`tag ${hasHidden ? 'is-part' : ''}`} style=${style}>
+  return html`<span class=${`tag ${hasHidden ? 'is-part' : ''} ${ui.isOriginalHeld && pane.kind === 'present' ? 'is-original' : ''}`} style=${style}>
     <span>${nameOf(ui, pane.kind)}</span>
     ${
       hasHidden &&

@@ -249,6 +249,12 @@ export class SessionController extends SessionLink {
     return this.send('place', { run });
   }
 
+  /** End the search for places with the best so far. */
+  endPlacing() {
+    this.store.set({ isPlacementEnding: true });
+    return this.send('place', { run: false, keeps_best: true });
+  }
+
   /** Add a light, and choose it. @param {Requests["add_light"]} fields */
   async addLight(fields) {
     this.store.set({ clickAction: null });

@@ -12,6 +12,7 @@ import {
   stateUpdate,
   verificationUpdate,
 } from './state_updates.js';
+import { endedTexts, rendersUpdate } from './exports/render_state.js';
 import { relativePath } from './format.js';
 import { choicesUpdate } from './answer_choices.js';
 import { referencesUpdate } from './references/reference_state.js';
@@ -46,6 +47,7 @@ const EVENT_KINDS = [
   'references',
   'choices',
   'exported',
+  'renders',
   'verified',
   'explained',
   'previewed',
@@ -146,6 +148,7 @@ export class SessionLink {
         referencesUpdate(m, this.store.value),
       choices: (/** @type {HostEvents['choices']} */ m) => choicesUpdate(m, this.store.value),
       exported: (/** @type {HostEvents['exported']} */ m) => this.takeExport(m),
+      renders: (/** @type {HostEvents['renders']} */ m) => this.takeRenders(m),
       verified: (/** @type {HostEvents['verified']} */ m) =>
         verificationUpdate(m, this.store.value),
       explained: (/** @type {HostEvents['explained']} */ m) =>
@@ -228,6 +231,15 @@ export class SessionLink {
     return { exportResult: message, ...TASK_RESETS.export };
   }
 
+  /** Take the final renders, and report those that have ended, unless their dialog does.
+   * @param {HostEvents["renders"]} message @returns {Partial<Ui>} */
+  takeRenders(message) {
+    const { value } = this.store;
+    for (const { text, tone } of value.dialog === 'render' ? [] : endedTexts(message.renders, value))
+      this.toast(text, tone);
+    return rendersUpdate(message, value);
+  }
+
   /** Take the places of lights. A search that began before they were known shows where lights were.
    * @param {HostEvents["rig"]} rig @returns {Partial<Ui>} */
   takeRig(rig) {
@@ -241,13 +253,14 @@ export class SessionLink {
    * @param {HostEvents["placed"]} message @returns {Partial<Ui>} */
   takePlacement({ text }) {
     this.toast(text);
-    return TASK_RESETS.place;
+    return { ...TASK_RESETS.place, searchCount: this.store.value.searchCount + 1 };
   }
 
-  /** Export files, or stop the export. @param {Requests["export"]["outputs"]} outputs empty to stop */
-  exportFiles(outputs) {
+  /** Export files, or stop the export. @param {Requests["export"]["outputs"]} outputs empty to stop
+   * @param {string} [name] of the new folder for them */
+  exportFiles(outputs, name = '') {
     if (outputs.length) this.store.set({ isExporting: true, exportResult: null });
-    return this.send('export', { outputs, run: outputs.length > 0 });
+    return this.send('export', { outputs, run: outputs.length > 0, ...(name && { name }) });
   }
 
   /** @param {string} text @param {'info' | 'warn'} [tone] */

@@ -1,6 +1,7 @@
 /** The table of keyboard shortcuts, for the keyboard and for the dialog that lists them. */
 
 import { saveLook } from './look_actions.js';
+import { showOriginal } from './original_scene.js';
 import { showPrevious } from './previous_answer.js';
 import { swapInset } from './inset_picture.js';
 import { chooseSelect, updateSelection } from './selection/selection_settings.js';
@@ -245,6 +246,12 @@ export const SHORTCUTS = [
         command: 'previous',
         description: words.shortcuts.holdTheAnswerBeforeThe,
         act: (app) => void showPrevious(app),
+        isOnce: true,
+      },
+      {
+        command: 'original',
+        description: words.shortcuts.holdTheOriginalScene,
+        act: showOriginal,
         isOnce: true,
       },
       {

@@ -6,6 +6,7 @@
 /** @typedef {import('../engine/messages.js').Events} Events */
 
 import { stateOfView } from '../engine/message_frames.js';
+import { rendersUpdate } from './exports/render_state.js';
 import { comparedLooks, resetMix } from './look_comparison.js';
 import { withLights } from './images/light_images.js';
 import { words } from '../language/language.js';
@@ -17,7 +18,7 @@ export const TASK_RESETS = {
   verify: { verificationProgress: null },
   explain: { isExplaining: false },
   preview: { preview: null },
-  place: { placementProgress: null, trial: null },
+  place: { placementProgress: null, isPlacementEnding: false, trial: null },
   reference: { isReferenceComing: false },
 };
 
@@ -63,6 +64,7 @@ export function stateUpdate(message, /** @type {import('./ui_state.js').Ui} */ p
     references: message.references ?? [],
     choices: message.choices ?? [],
     choicesVersion: -1,
+    ...rendersUpdate(message, previous),
     hint: Boolean(message.is_new),
     connection: 'open',
     closure: null,
@@ -309,6 +311,7 @@ export function progressUpdate({ task, done, total, unit }, ui) {
     return ui.placementProgress
       ? { placementProgress: estimateTime(changes, ui.placementProgress) }
       : {};
+  if (task === 'final') return { renderProgress: estimateTime(changes, ui.renderProgress) };
   // The brush interrupts it, so the remaining time is unknown.
   if (task === 'sampling') return { samplingProgress: done < total ? changes : null };
   if (/verif/i.test(task))

@@ -3,6 +3,7 @@
 import { html } from '../vendor/preact.js';
 import { Button, Checkbox, Choice, Select, Slider, TruncatedText } from './controls.js';
 import { signedText } from './format.js';
+import { OriginalButton } from './original_scene.js';
 import { PreviousButton } from './previous_answer.js';
 import { showPixels } from './shortcuts.js';
 import { togglePanels, updateDisplay } from './tools.js';
@@ -45,6 +46,7 @@ export function TopBar({ ui, app }) {
       <${Button} icon="redo" tip=${redo ? fill(words.topbar.redo, { redo }) : words.topbar.redoNothing} keys=${shortcutsOf(ui, 'redo')}
         disabled=${!redo} act=${() => session.send('redo')} />
       <${PreviousButton} ui=${ui} app=${app} />
+      <${OriginalButton} ui=${ui} app=${app} />
     </div>
     <div class="spring"></div>
     <${Choice} label=${words.topbar.layout} icons value=${display.layout} choices=${layoutsOf(ui)}

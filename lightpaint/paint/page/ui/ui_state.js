@@ -3,6 +3,7 @@
 import { INITIAL_CHOICES } from './answer_choices.js';
 import { INITIAL_IMAGES } from './images/image_state.js';
 import { INITIAL_LAMPS } from './lamps/lamp_state.js';
+import { INITIAL_RENDERS } from './exports/render_state.js';
 import { fromKelvin } from './paint_colour.js';
 import { DEFAULT_PREFERENCES } from './preferences.js';
 import { INITIAL_REFERENCES } from './references/reference_state.js';
@@ -44,7 +45,8 @@ import { initialSelection } from './selection/selection_settings.js';
  * @typedef {import("./lamps/lamp_state.js").LampState & import("./preferences.js").Preferences
  *   & import("./references/reference_state.js").ReferenceState
  *   & import("./scopes/scope_state.js").ScopeState
- *   & import("./images/image_state.js").ImageState & import("./answer_choices.js").ChoiceState
+ *   & import("./answer_choices.js").ChoiceState
+ *   & import("./images/image_state.js").ImageState & import("./exports/render_state.js").RenderState
  *   & BaseUi} Ui
  *
  * @typedef {object} BaseUi
@@ -85,6 +87,8 @@ import { initialSelection } from './selection/selection_settings.js';
  *   aimPixel?: [number, number]} | null} drag where a light is that the pointer drags; at: the pixel that
  *   it points at
  * @property {Progress | null} placementProgress how far a search for places of the lights is
+ * @property {boolean} isPlacementEnding whether the search ends with the best so far
+ * @property {number} searchCount searches for places that have ended while the page was open
  * @property {Progress | null} samplingProgress how near the lights are to the precision sought
  * @property {{positions: Record<string, number[]>, directions: Record<string, number[]>} | null} trial
  *   places that a search tries now, by name of light
@@ -97,6 +101,7 @@ import { initialSelection } from './selection/selection_settings.js';
  * @property {{undo: string[], redo: string[], count?: number}} history labels of steps, and their count
  * @property {boolean} isPreviousHeld whether the answer before the last step is asked for
  * @property {RGB[] | null} previousWeights that answer, while it is shown
+ * @property {boolean} isOriginalHeld whether the original scene is shown in place of the answer
  * @property {Look[]} looks
  * @property {{look: number, version: number, steps: number} | null} lastLook last saved or loaded, with
  *   the version and the number of steps then
@@ -159,7 +164,7 @@ import { initialSelection } from './selection/selection_settings.js';
  * @property {null | "settings"} panel what lies over the panels
  * @property {number | null} tour step of the tour that is shown
  * @property {string | null} tourFold what this step has unfolded and folds again
- * @property {null | "keys" | "export" | "looks" | "presets"} dialog
+ * @property {null | "keys" | "export" | "render" | "move" | "looks" | "presets"} dialog
  * @property {string} search
  * @property {"scene" | "name" | "share" | "change"} sort
  * @property {number[]} openLights lights whose controls are open
@@ -228,6 +233,8 @@ export function initialState() {
     lamp: null,
     drag: null,
     placementProgress: null,
+    isPlacementEnding: false,
+    searchCount: 0,
     samplingProgress: null,
     trial: null,
     newLight: { type: 'spot', surface: 'click', count: 1 },
@@ -238,6 +245,7 @@ export function initialState() {
     history: { undo: [], redo: [] },
     isPreviousHeld: false,
     previousWeights: null,
+    isOriginalHeld: false,
     looks: [],
     lastLook: null,
     basis: null,
@@ -306,5 +314,6 @@ export function initialState() {
     ...INITIAL_REFERENCES,
     ...INITIAL_CHOICES,
     ...INITIAL_SCOPES,
+    ...INITIAL_RENDERS,
   };
 }

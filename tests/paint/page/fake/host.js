@@ -26,6 +26,7 @@ export class FakeHost {
       stroke: 0,
     });
     this.references = [];
+    this.renders = [];
     this.weights = room.lights.map(({ present }) => [...present]);
     this.constraints = {};
     this.ties = [];
@@ -124,6 +125,7 @@ export class FakeHost {
       stroke: 0,
       looks: this.looks,
       references: this.references,
+      renders: this.renders,
       presets: [
         ['moonlight', 'Moonlight', false],
         ['only_object', 'Only this object', true],
@@ -396,17 +398,40 @@ export class FakeHost {
     this.looks = this.looks.filter(({ id }) => id !== look);
     return this.kept();
   }
-  export({ outputs, run = true }) {
+  export({ outputs, run = true, name = '' }) {
     if (this.isWriting) return { kind: 'started', task: run ? 'export' : 'stop' };
     const files = this.unpainted ? outputs.filter((one) => !['target', 'report'].includes(one)) : outputs;
     return {
       kind: 'exported',
-      files: files.map((one) => `/shows/gallery-evening/${one}`),
+      files: files.map((one) => `/shows/gallery-evening/${name && `exports/${name}/`}${one}`),
       command: files.includes('target')
         ? 'lightpaint solve gallery.xml gallery-evening/target.exr'
         : '',
       is_unpainted: files.length < outputs.length,
     };
+  }
+  render_final({ name, width, spp, formats, view = 0 }) {
+    const id = 1 + Math.max(0, ...this.renders.map((render) => render.id));
+    const state = this.renders.some((render) => render.state === 'rendering')
+      ? 'waiting'
+      : 'rendering';
+    const asked = { id, name, width, spp, formats, view, state };
+    this.renders = [
+      ...this.renders,
+      { ...asked, height: null, done: 0, total: 0, text: '', files: [] },
+    ];
+    return { kind: 'renders', renders: this.renders };
+  }
+  stop_render({ render }) {
+    return this.changeRender(render, { state: 'stopped' });
+  }
+  drop_render({ render }) {
+    this.renders = this.renders.filter(({ id }) => id !== render);
+    return { kind: 'renders', renders: this.renders };
+  }
+  changeRender(render, changes) {
+    this.renders = this.renders.map((one) => (one.id === render ? { ...one, ...changes } : one));
+    return { kind: 'renders', renders: this.renders };
   }
   verify({ run }) {
     return run

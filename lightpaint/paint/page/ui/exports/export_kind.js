@@ -1,0 +1,18 @@
+/** The choice between the two dialogs of the export button: files, and a final render. */
+
+import { html } from '../../vendor/preact.js';
+import { Choice } from '../controls.js';
+import { words } from '../../language/language.js';
+
+/** @typedef {import("../shortcuts.js").App} App */
+
+const KINDS = [
+  { value: 'export', label: words.exports.files },
+  { value: 'render', label: words.finalRender.title },
+];
+
+/** @param {{value: "export" | "render", app: App}} props */
+export function ExportKind({ value, app }) {
+  const change = (/** @type {"export" | "render"} */ dialog) => app.store.set({ dialog });
+  return html`<${Choice} label=${words.exports.kind} value=${value} choices=${KINDS} change=${change} />`;
+}

@@ -1,0 +1,27 @@
+/** The name of an export, which becomes that of its folder. */
+
+import { html } from '../../vendor/preact.js';
+import { currentLook } from '../look_actions.js';
+import { words } from '../../language/language.js';
+
+/** @typedef {import("../ui_state.js").Ui} Ui */
+
+/** Characters of the longest name of an export. */
+const MAX_LENGTH = 80;
+
+/** Return a name for an export of the answer: that of the look which equals it, or of the scene.
+ * @param {Ui} ui @returns {string} */
+export function suggestedName(ui) {
+  const current = currentLook(ui);
+  const look = ui.looks.find(({ id }) => id === current);
+  return look?.name ?? ui.state?.scene ?? '';
+}
+
+/** @param {{name: string, change: (name: string) => void}} props */
+export function ExportName({ name, change }) {
+  return html`<label class="field export-name" data-tip=${words.exports.nameTip}>
+    <span class="name">${words.exports.name}</span>
+    <input type="text" value=${name} maxlength=${MAX_LENGTH} autocomplete="off" spellcheck="false"
+      onInput=${(/** @type {any} */ event) => change(event.currentTarget.value)} />
+  </label>`;
+}

@@ -1,0 +1,161 @@
+/** The dialog for final renders: at any size, in the background, with the files that they became. */
+
+import { html, useState } from '../../vendor/preact.js';
+import { Button, Checkbox, Dialog, NumberField } from '../controls.js';
+import { percentText, progressText, relativePath } from '../format.js';
+import { ProgressBar } from '../progress_bar.js';
+import { Thumbnail } from '../thumbnail.js';
+import { ExportKind } from './export_kind.js';
+import { ExportName, suggestedName } from './export_name.js';
+import { runningRender } from './render_state.js';
+import { fill, words } from '../../language/language.js';
+
+/** @typedef {import("../ui_state.js").Ui} Ui */
+/** @typedef {import("../shortcuts.js").App} App */
+/** @typedef {import("./render_state.js").Render} Render */
+/** @typedef {import("../../engine/messages.js").Requests["render_final"]} Request */
+
+const texts = words.finalRender;
+
+/** Widths that are one press away, in pixels. */
+const WIDTHS = [
+  { width: 1280, label: texts.hd },
+  { width: 1920, label: texts.fullHd },
+  { width: 3840, label: texts.uhd },
+];
+
+/** Least and largest width, as the session takes it, and samples per pixel. */
+const [MIN_WIDTH, MAX_WIDTH, MAX_SPP] = [16, 2 ** 14, 2 ** 16];
+
+/** What a render has at first; later what the last one had while the page was open.
+ * @type {{width: number, spp: number, formats: Request["formats"]}} */
+let lastSettings = { width: 1920, spp: 256, formats: ['exr', 'png'] };
+
+/** @type {{format: "exr" | "png", label: string, description: string}[]} */
+const FORMATS = [
+  { format: 'exr', label: texts.exr, description: texts.exrDescription },
+  { format: 'png', label: texts.png, description: texts.pngDescription },
+];
+
+/** @param {{ui: Ui, app: App, close: () => void}} props */
+export function FinalRenderDialog({ ui, app, close }) {
+  const canRender = Boolean(ui.state?.can_render);
+  return html`<${Dialog} title=${words.dialogs.export} close=${close} class="export">
+    <${ExportKind} value="render" app=${app} />
+    ${canRender ? null : html`<p>${texts.noScene}</p>`}
+    <${RenderSettings} ui=${ui} app=${app} disabled=${!canRender} />
+    ${ui.renders.length > 0 && html`<${RenderList} ui=${ui} app=${app} />`}
+  </${Dialog}>`;
+}
+
+/** @param {{ui: Ui, app: App, disabled: boolean}} props */
+function RenderSettings({ ui, app, disabled }) {
+  const [name, setName] = useState(() => suggestedName(ui));
+  const [settings, setSettings] = useState(lastSettings);
+  const { width, spp } = settings;
+  const formats = settings.formats ?? [];
+  const set = (/** @type {Partial<typeof lastSettings>} */ changes) => {
+    lastSettings = { ...settings, ...changes };
+    setSettings(lastSettings);
+  };
+  const [rows, columns] = /** @type {[number, number]} */ (ui.state?.size ?? [9, 16]);
+  const height = Math.max(1, Math.round((width * rows) / columns));
+  const toggle = (/** @type {"exr" | "png"} */ format, /** @type {boolean} */ isOn) =>
+    set({ formats: isOn ? [...formats, format] : formats.filter((other) => other !== format) });
+  const begin = () =>
+    app.session.send('render_final', { name: name.trim(), width, spp, formats, view: ui.view });
+  const folder = ui.state?.folder ?? '';
+  return html`<fieldset class="render-settings" disabled=${disabled}>
+    <${ExportName} name=${name} change=${setName} />
+    <div class="row"><${NumberField} label=${texts.width} value=${width} min=${MIN_WIDTH} max=${MAX_WIDTH} digits=${0}
+        disabled=${disabled} change=${(/** @type {number} */ value) => set({ width: value })} />
+      <span>${fill(texts.byHeight, { height })}</span>
+      ${WIDTHS.map(
+        (choice) => html`<${Button} key=${choice.width} label=${choice.label} pressed=${choice.width === width}
+          disabled=${disabled} act=${() => set({ width: choice.width })} />`,
+      )}</div>
+    <div class="row"><${NumberField} label=${texts.samples} value=${spp} min=${2} max=${MAX_SPP} digits=${0} step=${64}
+        disabled=${disabled} change=${(/** @type {number} */ value) => set({ spp: value })}
+        tip=${texts.samplesTip} /><span class="faint">${texts.perPixel}</span></div>
+    ${FORMATS.map(
+      ({ format, label, description }) => html`<div class="export-row" key=${format}>
+        <${Checkbox} label=${label} checked=${formats.includes(format)} disabled=${disabled}
+          change=${(/** @type {boolean} */ isOn) => toggle(format, isOn)} />
+        <span class="faint">${description}</span></div>`,
+    )}
+    ${ui.views.length > 1 && html`<p>${fill(texts.ofView, { view: ui.views[ui.view].name })}</p>`}
+    ${ui.master !== 1 && html`<p>${fill(texts.isDimmed, { percent: percentText(ui.master) })}</p>`}
+    <div class="row"><span class="faint folder">${fill(words.dialogs.to, { folder: `${folder}/renders` })}</span>
+      <${Button} icon="camera" label=${texts.render} primary act=${begin}
+        disabled=${disabled || !name.trim() || !formats.length} /></div>
+    <p class="faint">${texts.goesOn}</p>
+  </fieldset>`;
+}
+
+/** The renders since the painter was started, the newest on top. @param {{ui: Ui, app: App}} props */
+function RenderList({ ui, app }) {
+  return html`<ul class="renders" aria-label=${texts.list}>${[...ui.renders]
+    .reverse()
+    .map((render) => html`<${RenderRow} key=${render.id} render=${render} ui=${ui} app=${app} />`)}</ul>`;
+}
+
+/** @param {{render: Render, ui: Ui, app: App}} props */
+function RenderRow({ render, ui, app }) {
+  const { id, name, width, height, spp, state } = render;
+  const isDone = state === 'done';
+  const isOpen = state === 'waiting' || state === 'rendering';
+  const size = height ? fill(texts.size, { width, height }) : fill(texts.sizeOfWidth, { width });
+  return html`<li class=${`render is-${state}`}>
+    ${isDone && html`<${Thumbnail} name=${`render/${id}`} generation=${id} app=${app} />`}
+    <div>
+      <div class="row"><strong>${name}</strong><span class="faint">${size}, ${fill(texts.spp, { spp })}</span>
+        <span class="spring"></span>
+        ${
+          isOpen
+            ? html`<${Button} icon="close" label=${words.dialogs.stop} tip=${texts.stopTip}
+              act=${() => app.session.send('stop_render', { render: id })} />`
+            : html`<${Button} icon="trash" tip=${fill(texts.drop, { name })}
+              act=${() => app.session.send('drop_render', { render: id })} />`
+        }</div>
+      <${RenderStatus} render=${render} ui=${ui} app=${app} />
+    </div>
+  </li>`;
+}
+
+/** @param {{render: Render, ui: Ui, app: App}} props */
+function RenderStatus({ render, ui, app }) {
+  const { id, state, text, files } = render;
+  if (state === 'rendering') {
+    const progress = ui.renderProgress ?? { done: 0, total: 0 };
+    const isDenoising = progress.total > 0 && progress.done >= progress.total;
+    return html`<div class="row" role="status"><${ProgressBar} progress=${progress} label=${texts.rendering} />
+      <span class="faint">${isDenoising ? texts.denoising : progressText(progress)}</span></div>`;
+  }
+  if (state === 'failed') return html`<p>${text}</p>`;
+  if (state === 'waiting')
+    return html`<p class="faint">${runningRender(ui)?.id === id ? texts.solving : texts.waiting}</p>`;
+  if (state === 'stopped') return html`<p class="faint">${texts.stopped}</p>`;
+  const folder = ui.state?.folder ?? '';
+  return html`<ul class="render-files">${files.map((file) => {
+    const path = relativePath(file, folder);
+    const fileName = path.split(/[/\\]/).at(-1) ?? path;
+    return html`<li key=${file}><code>${path}</code>
+      <${Button} icon="export" tip=${fill(texts.download, { name: fileName })}
+        act=${() => void download(app, `render_file/${id}/${fileName}`, `${render.name} ${fileName}`)} /></li>`;
+  })}</ul>`;
+}
+
+/** Save a file of a render where the browser saves files. @param {App} app @param {string} name of it
+ * in the session @param {string} fileName */
+async function download({ session }, name, fileName) {
+  try {
+    const { data } = await session.host.fetch(name);
+    const link = document.createElement('a');
+    link.href = URL.createObjectURL(new Blob([/** @type {any} */ (data)]));
+    link.download = fileName;
+    link.click();
+    URL.revokeObjectURL(link.href);
+  } catch (error) {
+    session.toast(error instanceof Error ? error.message : String(error), 'warn');
+  }
+}

@@ -1,0 +1,47 @@
+/** The state of the interface that is about final renders. */
+
+import { relativePath } from '../format.js';
+import { fill, words } from '../../language/language.js';
+
+/** @typedef {import("../../engine/messages.js").RenderInfo} Render */
+/** @typedef {import("../ui_state.js").Ui} Ui */
+
+/**
+ * @typedef {object} RenderState
+ * @property {Render[]} renders the oldest first
+ * @property {import("../ui_state.js").Progress | null} renderProgress of the one that is rendered now
+ */
+
+/** @type {RenderState} */
+export const INITIAL_RENDERS = { renders: [], renderProgress: null };
+
+/** Return the render that the renderer works on, or will next. @param {{renders: Render[]}} ui */
+export const runningRender = ({ renders }) =>
+  renders.find(({ state }) => state === 'rendering') ??
+  renders.find(({ state }) => state === 'waiting');
+
+/** Take the list of renders. @param {{renders?: readonly Render[]}} message
+ * @param {RenderState} previous @returns {RenderState} */
+export function rendersUpdate({ renders: list = [] }, previous) {
+  const renders = [...list];
+  const running = runningRender({ renders });
+  if (!running) return { renders, renderProgress: null };
+  const isSame = running.id === runningRender(previous)?.id && previous.renderProgress;
+  const { done, total } = running;
+  const progress = { task: 'final', done, total, unit: 'passes' };
+  return { renders, renderProgress: isSame ? previous.renderProgress : progress };
+}
+
+/** Return what there is to say of renders that have ended since. @param {readonly Render[]} renders
+ * @param {Ui} previous @returns {{text: string, tone: "info" | "warn"}[]} */
+export function endedTexts(renders, { renders: before, state }) {
+  const isNew = (/** @type {Render} */ { id, state: now }) =>
+    before.some((render) => render.id === id && render.state !== now);
+  const ended = renders.filter((render) => isNew(render) && ['done', 'failed'].includes(render.state));
+  return ended.map(({ name, state: now, files, text }) => {
+    if (now === 'failed')
+      return { text: fill(words.finalRender.hasFailed, { name, text }), tone: 'warn' };
+    const paths = files.map((file) => relativePath(file, state?.folder ?? '')).join(', ');
+    return { text: fill(words.finalRender.isDone, { name, paths }), tone: 'info' };
+  });
+}

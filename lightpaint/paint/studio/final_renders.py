@@ -1,0 +1,201 @@
+"""Final renders of a session's answers: in the background, one at a time, kept over reloads."""
+
+from collections.abc import Callable, Mapping
+from contextlib import suppress
+from dataclasses import replace
+from pathlib import Path
+from threading import Lock
+from typing import Any
+
+import numpy as np
+
+from lightpaint.errors import PaintError
+from lightpaint.files import check_writable
+from lightpaint.lighting.answer.lighting import Lighting
+from lightpaint.paint import protocol
+from lightpaint.paint.background_threads import BackgroundThreads, StoppedError, error_text
+from lightpaint.paint.protocol import Message, RenderInfo, RenderList
+from lightpaint.paint.publisher import Publisher
+from lightpaint.paint.session.picture_table import Picture, display_thumbnail
+from lightpaint.paint.session.snapshot import SessionSnapshot
+from lightpaint.paint.studio.export_folders import RENDERS, folder_name, new_folder
+from lightpaint.paint.subject import Subject
+from lightpaint.progress import cancellable
+from lightpaint.scene.runtime.render_lock import MITSUBA
+
+#: Approximate pixels of the longer side of a render's small picture.
+PREVIEW_SIDE = 480
+
+#: States in which nothing happens any more.
+ENDED = ("done", "stopped", "failed")
+
+#: The exact answer, with the scenes that it is for; its argument raises to stop.
+ExactAnswer = Callable[[Callable[[], None]], tuple[tuple[Subject, ...], SessionSnapshot, Lighting]]
+
+
+class FinalRenders:
+    """The final renders that pages have requested since the painter was started.
+
+    subjects: the views. exact_answer: as `BackgroundJobs.exact_answer`.
+
+    Attributes:
+        infos: Their descriptions, the oldest first.
+    """
+
+    def __init__(
+        self,
+        publisher: Publisher,
+        threads: BackgroundThreads,
+        subjects: tuple[Subject, ...],
+        exact_answer: ExactAnswer,
+    ) -> None:
+        self._publisher, self._threads = publisher, threads
+        self._subjects, self._exact_answer = subjects, exact_answer
+        self._infos: dict[int, RenderInfo] = {}
+        self._previews: dict[int, Picture] = {}
+        self._change, self._turn = Lock(), Lock()
+        publisher.pictures.offer_family("render", self._preview)
+        publisher.pictures.offer_family("render_file", self._file)
+
+    @property
+    def infos(self) -> tuple[RenderInfo, ...]:
+        return tuple(self._infos.values())
+
+    def handle(
+        self, message: protocol.RenderFinal | protocol.StopRender | protocol.DropRender
+    ) -> list[Message]:
+        """Start a render, stop one, or take one off the list, and return the list.
+
+        Raises PaintError for a render that is impossible or unknown, and OutputError for one that
+        cannot be written.
+        """
+        match message:
+            case protocol.RenderFinal():
+                info = self._start(message)
+                self._threads.start_low_priority(lambda: self._run(info.id, message), "final")
+            case protocol.StopRender(number):
+                self._find(number)
+                self._change_info(number, state="stopped")
+            case protocol.DropRender(number):
+                if self._find(number).state not in ENDED:
+                    raise PaintError(f"render {number} is not finished: stop it first")
+                with self._change:
+                    del self._infos[number]
+                    self._previews.pop(number, None)
+        return [RenderList(renders=self.infos)]
+
+    def _start(self, request: protocol.RenderFinal) -> RenderInfo:
+        """Add a render to the list. Raises PaintError, and OutputError if it cannot be written."""
+        if request.view >= len(self._subjects):
+            raise PaintError(f"no view {request.view}: there are {len(self._subjects)}")
+        if self._subjects[request.view].scene is None:
+            raise PaintError("there is no scene to render: it was opened from a saved basis")
+        folder_name(request.name)
+        check_writable(self._subjects[request.view].folder / RENDERS)
+        with self._change:
+            number = max(self._infos, default=0) + 1
+            info = RenderInfo(
+                id=number,
+                name=request.name,
+                view=request.view,
+                width=request.width,
+                spp=request.spp,
+                formats=request.formats,
+            )
+            self._infos[number] = info
+        return info
+
+    def _run(self, number: int, request: protocol.RenderFinal) -> None:
+        def check() -> None:
+            if self._is_ended(number) or not self._publisher.is_open:
+                raise StoppedError
+
+        try:
+            with suppress(StoppedError), cancellable(check):
+                # That of now, also if it is rendered only after others.
+                subjects, snapshot, lighting = self._exact_answer(check)
+                with self._turn, MITSUBA.low_priority():
+                    check()
+                    subject = subjects[request.view]
+                    self._render(number, request, subject, snapshot, lighting)
+        except Exception as error:
+            self._update(number, state="failed", text=error_text(error))
+
+    def _render(
+        self,
+        number: int,
+        request: protocol.RenderFinal,
+        subject: Subject,
+        snapshot: SessionSnapshot,
+        lighting: Lighting,
+    ) -> None:
+        """Render the answer in a view, and write it to a new folder."""
+        # Imported here: they load all rooms, and painting needs only a few.
+        from lightpaint.pipeline.relit_renders import (
+            render_final,
+            write_final_exr,
+            write_final_png,
+        )
+        from lightpaint.pipeline.results.answer_folder import LIGHTING, write_answer
+
+        def report(label: str, done: int, total: int, unit: str = "passes") -> None:
+            if not self._change_info(number, done=done, total=total):
+                raise StoppedError
+            self._publisher.report_progress(label, done, total, unit)
+
+        self._update(number, state="rendering")
+        picture = render_final(
+            subject.loaded_scene, lighting, width=request.width, spp=request.spp, progress=report
+        )
+        files: list[Path] = []
+        with new_folder(subject.folder / RENDERS, request.name) as folder:
+            if "exr" in request.formats:
+                files.append(folder / "render.exr")
+                write_final_exr(files[-1], picture)
+            if "png" in request.formats:
+                files.append(folder / "render.png")
+                write_final_png(files[-1], picture, snapshot.transform)
+            write_answer(folder, lighting)
+            files.append(folder / LIGHTING)
+        self._previews[number] = display_thumbnail(picture.clean, snapshot.transform, PREVIEW_SIDE)
+        names = tuple(str(file.absolute()) for file in files)
+        self._update(number, state="done", height=picture.image.size[0], files=names)
+
+    def _is_ended(self, number: int) -> bool:
+        info = self._infos.get(number)
+        return info is None or info.state in ENDED
+
+    def _change_info(self, number: int, **changes: Any) -> bool:
+        """Change the description of a render; one that has ended stays, and False is returned."""
+        with self._change:
+            if self._is_ended(number):
+                return False
+            self._infos[number] = replace(self._infos[number], **changes)
+            return True
+
+    def _update(self, number: int, **changes: Any) -> None:
+        """Change the description of a render, and tell pages. Not for the thread of requests."""
+        if self._change_info(number, **changes):
+            self._publisher.publish_made(lambda: RenderList(renders=self.infos))
+
+    def _find(self, number: int) -> RenderInfo:
+        if number not in self._infos:
+            raise PaintError(f"there is no render {number}")
+        return self._infos[number]
+
+    def _preview(self, name: str) -> Picture:
+        if not name.isdecimal() or int(name) not in self._previews:
+            raise PaintError(f"there is no picture {f'render/{name}'[:40]!r}")
+        return self._previews[int(name)]
+
+    def _file(self, name: str) -> Picture:
+        """Return the bytes of a finished render's file, uint8. name: as in `2/render.png`."""
+        number, _, file_name = name.partition("/")
+        known = self._infos.get(int(number)) if number.isdecimal() else None
+        files: Mapping[str, str] = {Path(x).name: x for x in known.files} if known else {}
+        if file_name not in files:
+            raise PaintError(f"there is no file {f'render_file/{name}'[:40]!r}")
+        try:
+            return np.fromfile(files[file_name], np.uint8)
+        except OSError as error:
+            raise PaintError(f"cannot read {files[file_name]}: {error.strerror}") from None

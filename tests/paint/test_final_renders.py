@@ -1,0 +1,152 @@
+"""Final renders of a session: what they show, where they go, and that they outlive a page."""
+
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from moving import MovingStudio, stroke
+from PIL import Image
+from renderer import mitsuba_render, write_room
+
+import lightpaint as lp
+from lightpaint.errors import OutputError, PaintError
+from lightpaint.images.estimate import read_estimate
+from lightpaint.images.formats.exr import read_parts
+from lightpaint.lighting.answer.lighting import Lighting
+from lightpaint.paint import protocol
+from lightpaint.pipeline import relit_renders
+from lightpaint.pipeline.relit_renders import DENOISED, render_final
+
+#: Samples that take much longer than a test.
+ENDLESS_SPP = 2**16
+
+
+def renders(moving: MovingStudio) -> list[dict[str, Any]]:
+    """The list as the last event has it."""
+    events = [m.fields["renders"] for m in moving.messages if m.kind == "renders"]
+    return list(events[-1]) if events else []
+
+
+def wait_for(moving: MovingStudio, state: str, number: int) -> dict[str, Any]:
+    def find() -> Any:
+        return next((x for x in renders(moving) if x["id"] == number and x["state"] == state), None)
+
+    found = moving.wait(find)
+    assert isinstance(found, dict)
+    return found
+
+
+def request(width: int = 48, spp: int = 16, **fields: Any) -> protocol.RenderFinal:
+    return protocol.RenderFinal("Evening", width, spp, **fields)
+
+
+def test_a_larger_render_has_the_same_frame(tmp_path: Path) -> None:
+    """Its blocks are the pixels that Mitsuba renders at the film's own size, with doubled lights.
+
+    Tolerance: five standard errors of both, of 16 neighbours' variance, and clamped pixels.
+    """
+    scene = lp.load_scene(write_room(tmp_path))
+    basis = lp.render_basis(scene, spp=16)
+    lighting = Lighting.of_weights(basis, 2 * basis.current_weights)
+    picture = render_final(scene, lighting, width=48, spp=256)
+    assert picture.image.size == (40, 48)
+    blocks = picture.image.reduced(2)
+    expected = 2 * mitsuba_render(scene, seed=11, spp=2048)
+    errors = np.sqrt(blocks.variance() + 1e-6)
+    assert np.mean(np.abs(blocks.image - expected) < 5 * errors) > 0.98
+    np.testing.assert_allclose(blocks.image.mean(), expected.mean(), rtol=0.02)  # noise
+
+
+def test_a_final_render_is_written_as_light_and_as_a_display_shows_it(
+    moving: MovingStudio, tmp_path: Path
+) -> None:
+    stroke(moving, 1)
+    for number, folder in ((1, "Evening"), (2, "Evening 2")):
+        [listed] = moving.send(request())
+        assert listed.fields["renders"][-1]["state"] in ("waiting", "rendering")
+        info = wait_for(moving, "done", number)
+        place = tmp_path / "renders" / folder
+        names = ["render.exr", "render.png", "lighting.json"]
+        assert info["files"] == [str(place / x) for x in names]
+        assert (info["width"], info["height"]) == (48, 40)
+    estimate, _ = read_estimate(place / "render.exr")
+    [part] = read_parts(place / "render.exr")
+    clean, transform = part.rgb(DENOISED), moving.studio.session.transform
+    assert estimate.size == (40, 48)
+    assert np.abs(estimate.half_difference).max() > 0
+    with Image.open(place / "render.png") as opened:
+        assert opened.mode.startswith("RGB")
+    target = lp.read_target(place / "render.png")
+    assert target.transform == transform
+    levels = transform.encode(target.image), transform.encode(clean)
+    np.testing.assert_allclose(*levels, atol=1.5 / 65535 + 1e-4)  # 16 bits, and the inverse curve
+    lighting = lp.read_lighting(place / "lighting.json")
+    weights = lighting.weights_for(moving.studio.session.basis)
+    np.testing.assert_allclose(weights, moving.studio.session.weights, rtol=1e-6)
+
+
+def test_a_page_that_opens_later_finds_the_renders_and_their_files(moving: MovingStudio) -> None:
+    moving.send(request(formats=("png",)))
+    info = wait_for(moving, "done", 1)
+    state = moving.studio.state().fields
+    assert state["renders"] == [info]
+    png, _ = map(Path, info["files"])
+    content = moving.studio.resource("render_file/1/render.png")
+    assert content.tobytes() == png.read_bytes()
+    height, width, channels = moving.studio.resource("render/1").shape
+    assert (height / width, channels) == (pytest.approx(40 / 48, rel=0.02), 3)
+    for name in ("render_file/1/../session.db", "render_file/1/render.exr", "render_file/2/a",
+                 "render_file/x", "render/2", "render/"):  # fmt: skip
+        with pytest.raises(PaintError, match="there is no"):
+            moving.studio.resource(name)
+    [listed] = moving.send(protocol.DropRender(1))
+    assert listed.fields["renders"] == []
+    assert png.exists()
+
+
+def test_a_final_render_can_be_stopped_and_leaves_nothing(
+    moving: MovingStudio, tmp_path: Path
+) -> None:
+    moving.send(request(width=256, spp=ENDLESS_SPP))
+    moving.send(request())
+    wait_for(moving, "rendering", 1)
+    moving.wait(lambda: any(m.fields.get("task") == "final" for m in moving.messages))
+    running, waiting = moving.studio.state().fields["renders"]
+    assert (running["state"], waiting["state"]) == ("rendering", "waiting")
+    assert running["total"] > running["done"]
+    with pytest.raises(PaintError, match="stop it first"):
+        moving.send(protocol.DropRender(1))
+    [listed] = moving.send(protocol.StopRender(1))
+    assert listed.fields["renders"][0]["state"] == "stopped"
+    wait_for(moving, "done", 2)
+    assert [x.name for x in (tmp_path / "renders").iterdir()] == ["Evening"]
+    moving.send(protocol.StopRender(2))  # has ended already
+    assert renders(moving)[1]["state"] == "done"
+
+
+def test_a_render_that_cannot_be_written_says_why(
+    moving: MovingStudio, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    (tmp_path / "renders").touch()
+    with pytest.raises(OutputError, match=r"cannot write into .*renders"):
+        moving.send(request())  # before hours of rendering
+    (tmp_path / "renders").unlink()
+
+    def fail(*_: Any) -> None:
+        raise OutputError("the disk is full")
+
+    monkeypatch.setattr(relit_renders, "write_final_png", fail)
+    moving.send(request())
+    assert wait_for(moving, "failed", 1)["text"] == "the disk is full"
+    refused: dict[str, Callable[[], protocol.RenderFinal]] = {
+        "no view 3": lambda: request(view=3),
+        "another name": lambda: protocol.RenderFinal("/", 48, 16),
+    }
+    for text, make in refused.items():
+        with pytest.raises(PaintError, match=text):
+            moving.send(make())
+    for width, spp, formats in ((1, 16, ("png",)), (48, 1, ("png",)), (48, 16, ())):
+        with pytest.raises(ValueError, match=r"is 16 to|is 2 to|expected exr"):
+            protocol.RenderFinal("a", width, spp, formats)  # type: ignore[arg-type]
