@@ -11,7 +11,7 @@ from typing import Literal
 
 import numpy as np
 
-from lightpaint.arrays import Doubles
+from lightpaint.arrays import Doubles, Floats
 from lightpaint.images.bands import is_large
 from lightpaint.lighting.analysis.appearance.constraint_kinds import ConstraintKind
 from lightpaint.lighting.analysis.appearance.display_difference import PaintComparison
@@ -100,14 +100,16 @@ class Reason:
         return "constraints"
 
 
-def reasons_of(solution: Solution) -> tuple[Reason, ...]:
+def reasons_of(solution: Solution, area: Floats | None = None) -> tuple[Reason, ...]:
     """Find the reasons that keep the lights from the painting of one view, the most important
     first.
 
     Constraints by a person go before reasons that tie with them. If no single reason has half of
-    the gain of all, they are joint: first the one without which the others gain least.
+    the gain of all, they are joint: first the one without which the others gain least. area:
+    (h, w) from 0 to 1, the part of the paint whose error counts; None for all paint.
     """
-    sample = PixelSample.of(solution)
+    sample = PixelSample.of(solution, area)
+    look = _comparison(solution, area)
     if not sample.groups or sample.current_error <= 0:
         return ()
     everything = sample.share(sample.groups)
@@ -123,16 +125,24 @@ def reasons_of(solution: Solution) -> tuple[Reason, ...]:
     if (not reasons or reasons[0].share < SINGLE_SHARE * everything) and len(sample.groups) > 1:
         return _joint_reasons(sample, everything)
     measured = [
-        x if k and x.kind != "hold" else _measure(solution, sample, x)
+        x if k and x.kind != "hold" else _measure(solution, sample, look, x)
         for k, x in enumerate(reasons)
     ]
     return tuple(x for x in measured if x is not None)
 
 
-def _measure(solution: Solution, sample: PixelSample, reason: Reason) -> Reason | None:
+def _comparison(solution: Solution, area: Floats | None) -> PaintComparison:
+    """Return the comparison with the paint, or with a part of it, with all pixels."""
+    look = PaintComparison.of_problem(solution.problem)
+    return look if area is None else look.within(area)
+
+
+def _measure(
+    solution: Solution, sample: PixelSample, look: PaintComparison, reason: Reason
+) -> Reason | None:
     """Measure the effect of removing a reason, of a hold that of a weaker one, with all pixels.
 
-    Return None if it is too small.
+    look: the comparison with the paint in question. Return None if it is too small.
     """
     problem = sample.problem
     if reason.kind == "views":
@@ -140,7 +150,7 @@ def _measure(solution: Solution, sample: PixelSample, reason: Reason) -> Reason 
     if reason.kind == "hold":
         if problem.fit.unpainted or not problem.fit.hold:
             return reason  # unpainted pixels have a weight of their own
-        loosening = _find_loosening(solution, sample, reason.share)
+        loosening = _find_loosening(solution, sample, look, reason.share)
         return None if loosening.share < MIN_SHARE else replace(reason, loosening=loosening)
     if reason.kind == "colors":
         weights = (
@@ -157,7 +167,7 @@ def _measure(solution: Solution, sample: PixelSample, reason: Reason) -> Reason 
             if _is_for_sample(problem)
             else released_weights(solution, constraints=released)
         )
-    share = _share_removed(solution, weights)
+    share = _share_removed(solution, look, weights)
     return None if share < MIN_SHARE else replace(reason, share=share)
 
 
@@ -166,9 +176,8 @@ def _is_for_sample(problem: Problem) -> bool:
     return len(problem.basis.lights) > MAX_SOLVED_LIGHTS
 
 
-def _share_removed(solution: Solution, weights: Doubles) -> float:
+def _share_removed(solution: Solution, look: PaintComparison, weights: Doubles) -> float:
     """Return the share of the error of `solution` that other weights (n, 3) remove."""
-    look = PaintComparison.of_problem(solution.problem)
     return look.share_removed(*(solution.basis.mix(x) for x in (solution.weights, weights)))
 
 
@@ -231,7 +240,9 @@ def _joint_reasons(sample: PixelSample, everything: float) -> tuple[Reason, ...]
     return tuple(reasons)
 
 
-def _find_loosening(solution: Solution, sample: PixelSample, full_gain: float) -> Loosening:
+def _find_loosening(
+    solution: Solution, sample: PixelSample, look: PaintComparison, full_gain: float
+) -> Loosening:
     """Find and measure the strongest hold with `LOOSENED_SHARE` of `full_gain`, that of none."""
     hold = _weaker_hold(sample, LOOSENED_SHARE * full_gain)
     weights = (
@@ -242,7 +253,6 @@ def _find_loosening(solution: Solution, sample: PixelSample, full_gain: float) -
     [target] = solution.problem.views.targets
     basis = solution.basis
     image, loosened_image = basis.mix(solution.weights), basis.mix(weights)
-    look = PaintComparison.of_problem(solution.problem)
     change = unpainted_change(look, basis, target.importance > 0, image, loosened_image)
     return Loosening(hold, look.share_removed(image, loosened_image), change)
 
