@@ -5,7 +5,6 @@ from collections.abc import Sequence
 from lightpaint.display_text import some_names
 from lightpaint.lighting.analysis.appearance.appearance import Appearance
 from lightpaint.lighting.analysis.appearance.delivery import (
-    MIN_DELIVERED,
     Delivery,
     main_deliveries,
     newest_delivery,
@@ -15,8 +14,9 @@ from lightpaint.lighting.analysis.appearance.delivery import (
 #: Maximum number of wishes in a list of sentences.
 MAX_WISHES = 6
 
-#: What may bring a wish that no light in its place can bring.
+#: What may bring a wish: where no light reaches it, or none without lighting too much else.
 REACH_ADVICE = "A light that hangs or points elsewhere may reach it."
+SPILL_ADVICE = "More importance, or a light that reaches it alone, may bring more."
 
 
 def spoken_deliveries(deliveries: Sequence[Delivery]) -> str:
@@ -67,16 +67,12 @@ def spoken_delivery(delivery: Delivery) -> str:
 
 
 def spoken_unreached(delivery: Delivery) -> str:
-    """Return `Lantern is out of reach (8 %)`, or `The colour of Lantern is out of reach (43 %)`."""
-    brightness, color = delivery.brightness, delivery.color
-    name = wish_name(delivery)
-    if brightness is None or color is None:
-        return f"{name} is out of reach ({delivery.spoken_shares})"
-    if brightness >= MIN_DELIVERED:
-        return f"The colour of {name} is out of reach ({spoken_share(color)})"
-    if color >= MIN_DELIVERED:
-        return f"The brightness of {name} is out of reach ({spoken_share(brightness)})"
-    return f"{name} is out of reach ({delivery.spoken_shares})"
+    """Return `Lantern is out of reach (8 % came)`, or `Night is out of reach in colour (…)`."""
+    brightness, color, name = delivery.brightness, delivery.color, wish_name(delivery)
+    if brightness is None or color is None or delivery.lacks_brightness == delivery.lacks_color:
+        return f"{name} is out of reach ({delivery.spoken_shares} came)"
+    part, share = ("colour", color) if delivery.lacks_color else ("brightness", brightness)
+    return f"{name} is out of reach in {part} ({spoken_share(share)} came)"
 
 
 def spoken_newest(appearance: Appearance) -> str:
@@ -89,10 +85,3 @@ def spoken_newest(appearance: Appearance) -> str:
     if worst is not None and newest.kind == "group" and worst.group == newest.name:
         return ""
     return f"{spoken_delivery(newest)}."
-
-
-def lacks_only_color(delivery: Delivery) -> bool:
-    """Return whether enough of the brightness came, or none was asked, but not of the colour."""
-    brightness, color = delivery.brightness, delivery.color
-    has_light = brightness is None or brightness >= MIN_DELIVERED
-    return has_light and color is not None and color < MIN_DELIVERED

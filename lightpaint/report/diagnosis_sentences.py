@@ -2,6 +2,7 @@
 
 from collections.abc import Sequence
 
+from lightpaint.display_text import some_names
 from lightpaint.lighting.analysis.appearance.appearance import Appearance
 from lightpaint.lighting.analysis.appearance.limiting_reasons import Reason
 from lightpaint.lighting.analysis.diagnosis import Diagnosis, error_shares
@@ -85,7 +86,10 @@ def bound_sentences(
     bounds only without reasons. any_color: how to allow any colour.
     """
     if appearance is not None and appearance.reasons:
-        sentences = [spoken_cause(reason, any_color=any_color) for reason in appearance.reasons]
+        about = spoken_about(appearance)
+        sentences = [
+            spoken_cause(reason, any_color=any_color, about=about) for reason in appearance.reasons
+        ]
         return [sentence for sentence in sentences if sentence][:2]
     d = diagnosis
     most = [bound for bound in d.bounds[:1] if d.gain_share(bound) >= MIN_SHARE]
@@ -118,12 +122,20 @@ JOINT_RELEASE_CLAUSES = {
 }
 
 
-def spoken_cause(reason: Reason, *, weaker: str = "a hold of", any_color: str = ANY_COLOR) -> str:
+def spoken_about(appearance: Appearance) -> str:
+    """Return ` in Moonlight`, the wish that shares of reasons are about; "" for all paint."""
+    return f" in {some_names([appearance.reasons_wish])}" if appearance.reasons_wish else ""
+
+
+def spoken_cause(
+    reason: Reason, *, weaker: str = "a hold of", any_color: str = ANY_COLOR, about: str = ""
+) -> str:
     """Name a cause that limits the answer, and the gain of releasing it; "" for views.
 
     weaker: the words before the strength of a weaker hold. any_color: as in `bound_sentences`.
+    about: ` in Moonlight` if the gain is that of one wish.
     """
-    gain_text = f"would remove {spoken_percent(reason.share)} of the difference"
+    gain_text = f"would remove {spoken_percent(reason.share)} of the difference{about}"
     if reason.is_joint:
         gain_text += ", if the other constraints were lifted too"
     if reason.kind in RELEASE_CLAUSES:
@@ -141,7 +153,7 @@ def spoken_cause(reason: Reason, *, weaker: str = "a hold of", any_color: str = 
     cost = "" if unpainted_change is None else f", and change {spoken_changed(unpainted_change)}"
     return (
         f"A weaker hold on unpainted parts ({weaker} {loosening.hold:g}) would remove {share} of "
-        f"the difference{cost}."
+        f"the difference{about}{cost}."
     )
 
 

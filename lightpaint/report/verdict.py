@@ -8,14 +8,14 @@ from lightpaint.display_text import some_names
 from lightpaint.images.estimate import Estimate
 from lightpaint.keywords import keywords
 from lightpaint.lighting.analysis.appearance.appearance import CLOSE, Appearance, compare_appearance
-from lightpaint.lighting.analysis.appearance.delivery import Delivery
+from lightpaint.lighting.analysis.appearance.delivery import Delivery, main_deliveries
 from lightpaint.lighting.analysis.appearance.limiting_reasons import Reason
 from lightpaint.lighting.solution import Solution
 from lightpaint.relit.detection_power import ERROR
 from lightpaint.relit.verification import Verification
 from lightpaint.report.delivery_sentences import (
     REACH_ADVICE,
-    lacks_only_color,
+    SPILL_ADVICE,
     named_worst_wish,
     spoken_deliveries,
     spoken_delivery,
@@ -85,7 +85,10 @@ def verdict(
         headline(appearance),
         f"{spoken_delta_e(appearance, known=bool(predicted.half_difference.any()))}.",
     ]
-    if deliveries := spoken_deliveries(appearance.deliveries):
+    is_told = named_worst_wish(appearance) is not None  # by the headline
+    if (deliveries := spoken_deliveries(appearance.deliveries)) and not (
+        is_told and len(main_deliveries(appearance.deliveries)) == 1
+    ):
         sentences.append(deliveries)
     if not solution.certificate.converged:
         sentences.append("The solve stopped before it converged.")
@@ -139,11 +142,13 @@ def spoken_lack(appearance: Appearance, wish: Delivery) -> str:
         return f"{spoken_delivery(wish)}: {_spoken_causes(appearance)}."
     if appearance.place is None:
         return f"{spoken_delivery(wish)}."
-    if lacks_only_color(wish) and appearance.local_lights:
+    if wish.lacks_color and not wish.lacks_brightness and appearance.local_lights:
         reason = f"{_spoken_some(appearance.local_lights)[0]} would colour too much else"
     else:
         reason = _spoken_reach(appearance)
-    return f"{spoken_unreached(wish)}: {reason}. {REACH_ADVICE}"
+    is_reached = bool(appearance.local_lights) and appearance.has_strong_light
+    advice = SPILL_ADVICE if is_reached and appearance.reasons_wish else REACH_ADVICE
+    return f"{spoken_unreached(wish)}: {reason}. {advice}"
 
 
 def _paint_headline(appearance: Appearance) -> str:

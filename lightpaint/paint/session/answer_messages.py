@@ -316,12 +316,15 @@ def advice(appearance: Appearance) -> Advice | None:
         is_missed = not appearance.is_close and appearance.place is not None
         return Advice("reach", (), None, None) if is_missed and not appearance.causes else None
     kind, names = cause.kind, tuple(cause.names)
+    # The gain of a part of the paint is not that of the preview, which is about all of it.
+    is_of_all = not appearance.reasons_wish
     if kind != "hold":
-        return Advice(kind, names, None if cause.is_joint else cause.share, None)
+        gain = cause.share if is_of_all and not cause.is_joint else None
+        return Advice(kind, names, gain, None)
     weaker = cause.loosening
     if weaker is None:
         return Advice(kind, names, None, 0.0)
-    return Advice(kind, names, weaker.share, weaker.hold)
+    return Advice(kind, names, weaker.share if is_of_all else None, weaker.hold)
 
 
 def _closeness(analysis: Analysis) -> Closeness:

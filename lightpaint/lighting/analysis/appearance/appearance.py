@@ -91,8 +91,8 @@ class Appearance:
         deliveries: How much of each wish came, the lowest first: of each layer or stroke, and of
             each group after its layers.
         lit_delta_e: The mean CIEDE2000 of the lit parts of the paint, as washes.
-
-    Place, lights and reasons are those of `worst_wish`, if there is one.
+        reasons_wish: The name of the wish that place, lights and reasons are about: of `worst_wish`
+            if it is a part of the paint. "" if they are about all of it.
 
     Examples:
         >>> appearance = lp.compare_appearance(lp.solve(basis, target))
@@ -113,15 +113,22 @@ class Appearance:
     unpainted_change: UnpaintedChange | None = None
     deliveries: tuple[Delivery, ...] = ()
     lit_delta_e: float = 0.0
+    reasons_wish: str = ""
 
     __repr__ = short_repr
 
     @property
     def causes(self) -> tuple[Reason, ...]:
-        """The reasons that a headline may name: without one of them a third of the error
-        vanishes.
+        """The reasons that a headline may name: without one of them a third of the error vanishes,
+        or lights could have the colour that `worst_wish` lacks.
         """
-        return tuple(reason for reason in self.reasons if reason.share >= HEADLINE_SHARE)
+        worst = self.worst_wish
+        lacks_color = worst is not None and worst.lacks_color
+        return tuple(
+            reason
+            for reason in self.reasons
+            if reason.share >= HEADLINE_SHARE or (lacks_color and reason.kind == "colors")
+        )
 
     @property
     def limit_groups(self) -> tuple[LimitGroup, ...]:
@@ -259,6 +266,7 @@ def compare_appearance(
         return appearance
     if (area := _worst_area(appearance, delivered)) is not None:
         look = look.within(area)
+        appearance = replace(appearance, reasons_wish=delivered.name_of_part(appearance.worst_wish))
     return _with_reasons(appearance, solution, look, predicted, area, diagnosis)
 
 

@@ -37,6 +37,9 @@ MIN_ASKED = 2.0
 #: Luminance, relative to white, below which the colour of light fades to grey: that of L* 4.
 DARK = 0.0044
 
+#: Share of the lit paint from which a wish is nearly all of it.
+MOST = 0.95
+
 #: The least share of a change that has to come for a wish to have come.
 MIN_DELIVERED = 0.75
 
@@ -90,6 +93,16 @@ class Delivery:
     def is_met(self) -> bool:
         """True if at least three quarters of each asked change came."""
         return self.least is None or self.least >= MIN_DELIVERED
+
+    @property
+    def lacks_color(self) -> bool:
+        """True if less than three quarters of the asked change of colour came."""
+        return self.color is not None and self.color < MIN_DELIVERED
+
+    @property
+    def lacks_brightness(self) -> bool:
+        """True if less than three quarters of the asked change of brightness came."""
+        return self.brightness is not None and self.brightness < MIN_DELIVERED
 
     @property
     def spoken(self) -> str:
@@ -148,12 +161,18 @@ class DeliveryReport:
 
     deliveries: the lowest wish first; a layer follows its parts, and a group its layers. areas: of
     each of them, (h, w) from 0 to 1; none for several views. lit_delta_e: the mean CIEDE2000 of lit
-    painted parts, as washes.
+    painted parts, as washes. lit_pixels: their size.
     """
 
     deliveries: tuple[Delivery, ...]
     areas: tuple[Floats, ...]
     lit_delta_e: float
+    lit_pixels: float
+
+    def name_of_part(self, delivery: Delivery | None) -> str:
+        """Return the name of a wish that is a part of the paint; "" if it is nearly all of it."""
+        is_part = delivery is not None and delivery.lit_pixels < MOST * self.lit_pixels
+        return delivery.name if delivery is not None and is_part else ""
 
 
 def measure_deliveries(solution: Solution, predicted: Estimate) -> DeliveryReport:
@@ -185,8 +204,8 @@ def measure_deliveries(solution: Solution, predicted: Estimate) -> DeliveryRepor
     differences = [_mean_delta_e(part) for part in painted]
     mean = float(np.average(differences, weights=pixels)) if any(pixels) else 0.0
     if len(views) > 1:
-        return DeliveryReport(merge_views(found), (), mean)
-    return DeliveryReport(tuple(found), tuple(areas), mean)
+        return DeliveryReport(merge_views(found), (), mean, sum(pixels))
+    return DeliveryReport(tuple(found), tuple(areas), mean, sum(pixels))
 
 
 def _asked_light(target: Target, now: Floats, got: Floats) -> Floats:
