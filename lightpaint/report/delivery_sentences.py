@@ -12,7 +12,7 @@ from lightpaint.lighting.analysis.appearance.delivery import (
 )
 
 #: Maximum number of wishes in a list of sentences.
-MAX_WISHES = 6
+MAX_WISHES = 4
 
 #: What may bring a wish: where no light reaches it, or none without lighting too much else.
 REACH_ADVICE = "A light that hangs or points elsewhere may reach it."
@@ -22,15 +22,17 @@ SPILL_ADVICE = "More importance, or a light that reaches it alone, may bring mor
 def spoken_deliveries(deliveries: Sequence[Delivery]) -> str:
     """Return how much of each wish came, one short sentence each; "" without wishes.
 
-    Wishes that ask for nothing visible are left out, and of many the last ones.
+    Wishes that ask for nothing visible are left out, and of many those of which most came.
     """
     entries = [entry for entry in main_deliveries(deliveries) if entry.least is not None]
     if len(entries) == 1 and is_unnamed(entries[0]):
         shares = entries[0].spoken_shares
         return f"{shares[:1].upper()}{shares[1:]} of what was asked for came."
-    texts = [f"{wish_name(entry)}: {entry.spoken_shares}." for entry in entries[:MAX_WISHES]]
-    rest = len(entries) - MAX_WISHES
-    return " ".join([*texts, f"And {rest} more."] if rest > 0 else texts)
+    by_share = sorted(entries, key=lambda entry: entry.least or 0.0)
+    shown = [entry for entry in entries if entry in by_share[:MAX_WISHES]]
+    texts = [f"{spoken_delivery(entry)}." for entry in shown]
+    rest = len(entries) - len(shown)
+    return " ".join([*texts, f"Of {rest} more, more came."] if rest > 0 else texts)
 
 
 def named_worst_wish(appearance: Appearance) -> Delivery | None:
@@ -56,27 +58,21 @@ def wish_name(delivery: Delivery) -> str:
 
 
 def spoken_delivery(delivery: Delivery) -> str:
-    """Return `Moonlight came to 98 % in brightness and 43 % in colour`."""
-    brightness, color, name = delivery.brightness, delivery.color, wish_name(delivery)
-    if brightness is None or color is None:
-        return f"{name} came to {delivery.spoken_shares}"
-    return (
-        f"{name} came to {spoken_share(brightness)} in brightness and {spoken_share(color)} in "
-        "colour"
-    )
+    """Return `Moonlight: brightness 98 %, colour 43 %`."""
+    return f"{wish_name(delivery)}: {delivery.spoken_shares}"
 
 
 def spoken_unreached(delivery: Delivery) -> str:
-    """Return `Lantern is out of reach (8 % came)`, or `Night is out of reach in colour (…)`."""
+    """Return `Lantern: out of reach (8 % came)`, or `Night: out of reach in colour (43 % came)`."""
     brightness, color, name = delivery.brightness, delivery.color, wish_name(delivery)
     if brightness is None or color is None or delivery.lacks_brightness == delivery.lacks_color:
-        return f"{name} is out of reach ({delivery.spoken_shares} came)"
+        return f"{name}: out of reach ({delivery.spoken_shares} came)"
     part, share = ("colour", color) if delivery.lacks_color else ("brightness", brightness)
-    return f"{name} is out of reach in {part} ({spoken_share(share)} came)"
+    return f"{name}: out of reach in {part} ({spoken_share(share)} came)"
 
 
 def spoken_newest(appearance: Appearance) -> str:
-    """Return how much of the newest wish came, `Lantern came to 95 %.`; "" if it is the worst, or
+    """Return how much of the newest wish came, `Lantern: 95 %.`; "" if it is the worst, or
     asks for nothing visible.
     """
     newest, worst = newest_delivery(appearance.deliveries), appearance.worst_wish

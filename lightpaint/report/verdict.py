@@ -139,7 +139,7 @@ def spoken_lack(appearance: Appearance, wish: Delivery) -> str:
     Place, lights and reasons of the appearance are those of the wish.
     """
     if appearance.causes:
-        return f"{spoken_delivery(wish)}: {_spoken_causes(appearance)}."
+        return f"{spoken_delivery(wish)}, since {_spoken_causes(appearance)}."
     if appearance.place is None:
         return f"{spoken_delivery(wish)}."
     if wish.lacks_color and not wish.lacks_brightness and appearance.local_lights:
@@ -148,7 +148,7 @@ def spoken_lack(appearance: Appearance, wish: Delivery) -> str:
         reason = _spoken_reach(appearance)
     is_reached = bool(appearance.local_lights) and appearance.has_strong_light
     advice = SPILL_ADVICE if is_reached and appearance.reasons_wish else REACH_ADVICE
-    return f"{spoken_unreached(wish)}: {reason}. {advice}"
+    return f"{spoken_unreached(wish)}, since {reason}. {advice}"
 
 
 def _paint_headline(appearance: Appearance) -> str:

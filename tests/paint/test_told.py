@@ -143,8 +143,8 @@ def test_a_sketch_speaks_of_the_wish_that_lacks_most():
     rim = Delivery("Rim", 0.95, None, layers=(6,), kind="layer")
     appearance = Appearance(6.0, 0.0, 20.0, PLACE, deliveries=(moon, rim), reasons=(COLORS, SIDE))
     text = (
-        "Moonlight came to 98 % in brightness and 43 % in colour: lights keep their colours. The "
-        "settings allow any colour. Rim came to 95 %."
+        "Moonlight: brightness 98 %, colour 43 %, since lights keep their colours. The "
+        "settings allow any colour. Rim: 95 %."
     )
     assert sketch_headline(appearance) == f"{text} Most of the way (70 %)."
     # A warning goes first.

@@ -31,33 +31,34 @@ def _seen(delta_e: float, *deliveries: Delivery, **fields: Any) -> Appearance:
     [
         (
             _seen(2.0, MOON, reasons=(Reason("colors"),)),
-            "Moonlight came to 98 % in brightness and 43 % in colour: lights keep their colours. "
+            "Moonlight: brightness 98 %, colour 43 %, since lights keep their colours. "
             "On the whole it is close.",
         ),
         (
             _seen(2.0, MOON, LANTERN, local_lights=(), reasons_wish="Lantern"),
-            "Lantern is out of reach (8 % came): no light reaches it. A light that hangs or points "
-            "elsewhere may reach it. On the whole it is close.",
+            "Lantern: out of reach (8 % came), since no light reaches it. A light that hangs or "
+            "points elsewhere may reach it. On the whole it is close.",
         ),
         (
             _seen(5.0, LANTERN, RIM, local_lights=("sun",), reasons_wish="Lantern"),
-            "Lantern is out of reach (8 % came): sun would light too much else. More importance, "
-            "or a light that reaches it alone, may bring more. Rim came to 95 %. On the whole: "
-            "most of the way.",
+            "Lantern: out of reach (8 % came), since sun would light too much else. "
+            "More importance, or a light that reaches it alone, may bring more. Rim: 95 %. "
+            "On the whole: most of the way.",
         ),
         (
             _seen(5.0, LANTERN, RIM, reasons=(Reason("lock", ("lamp",)),)),
-            "Lantern came to 8 %: lamp is locked. Rim came to 95 %. On the whole: most of the way.",
+            "Lantern: 8 %, since lamp is locked. Rim: 95 %. On the whole: most of the way.",
         ),
         (
             _seen(2.0, replace(MOON, color=0.7), local_lights=("sun", "sky")),
-            "Moonlight is out of reach in colour (70 % came): sun and sky would colour too much "
-            "else. A light that hangs or points elsewhere may reach it. On the whole it is close.",
+            "Moonlight: out of reach in colour (70 % came), since sun and sky would colour too "
+            "much else. A light that hangs or points elsewhere may reach it. On the whole it is "
+            "close.",
         ),
         # A part of a group counts where the whole came.
         (
             _seen(2.0, SHADOWS, replace(MOON, color=0.9), reasons=(Reason("colors"),)),
-            "Shadows of Moonlight came to 90 % in brightness and 20 % in colour: lights keep their "
+            "Shadows of Moonlight: brightness 90 %, colour 20 %, since lights keep their "
             "colours. On the whole it is close.",
         ),
         (_seen(2.0, replace(MOON, color=0.76), RIM), "Close: it looks as painted."),
@@ -103,8 +104,14 @@ def test_wishes_are_listed():
     assert spoken_deliveries([PAINTING]) == (
         "Brightness 90 %, colour 50 % of what was asked for came."
     )
-    many = [replace(LANTERN, name=f"Lamp {k}", layers=(k,)) for k in range(9)]
-    assert spoken_deliveries(many).endswith("Lamp 5: 8 %. And 3 more.")
+    shares = (0.5, 0.9, 0.1, 0.7, 0.8, 0.3)
+    many = [
+        replace(LANTERN, name=f"Lamp {k}", brightness=share, layers=(k,))
+        for k, share in enumerate(shares)
+    ]
+    assert spoken_deliveries(many) == (
+        "Lamp 0: 50 %. Lamp 2: 10 %. Lamp 3: 70 %. Lamp 5: 30 %. Of 2 more, more came."
+    )
     nothing = replace(LANTERN, brightness=None)
     assert spoken_deliveries([nothing, RIM]) == "95 % of what was asked for came."
     other_way = replace(LANTERN, brightness=-0.3)

@@ -34,8 +34,8 @@ class Closeness:
 
 @dataclass(frozen=True)
 class WishDelivery:
-    """How much of a wish came: of a `layer`, of a `group` of layers, or of a `wish`, which is a
-    stroke in a layer.
+    """The share of a wish that came: of a `layer`, of a `group` of layers, or of a `wish`, which is
+    a stroke in a layer.
 
     layers: ids of its layers. brightness, color: share of the asked change that came; null if none
     was asked. delta_e: of its lit parts, against the painting.

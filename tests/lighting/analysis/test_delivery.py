@@ -231,6 +231,13 @@ def test_strokes_of_one_layer_are_named_by_where_they_lie(make_basis: Any):
         "Painting": "layer",
     }
     assert [x.kind for x in main_deliveries(report.deliveries)] == ["wish", "wish"]
+    # Without layers, the place is the name.
+    flat = measure_deliveries(
+        solve(basis, replace(target, wishes=())),
+        Estimate(now.astype(np.float32), np.zeros_like(now)),
+    )
+    assert {x.name for x in flat.deliveries} == {"Small vase", "Top left"}
+    assert {x.kind for x in flat.deliveries} == {"wish"}
 
 
 def test_views_count_by_what_they_ask_for():

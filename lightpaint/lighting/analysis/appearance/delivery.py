@@ -1,4 +1,4 @@
-"""How much of each wish came: of the change of brightness, and of the change of colour.
+"""The delivery of wishes: how much came of each change of brightness, and of colour.
 
 A wish asks for a change from the current look N to the painting A; the answer made G of it. All are
 washes (`washes.py`). Brightness is L*; colour is a*b* of all three at the luminance of A, so that
@@ -47,7 +47,7 @@ MIN_DELIVERED = 0.75
 @keywords()
 @dataclass(frozen=True)
 class Delivery:
-    """How much of one wish came.
+    """The share of one wish that came.
 
     Attributes:
         name: The name of the wish for people, or of its layer or group.
@@ -157,7 +157,7 @@ def newest_delivery(deliveries: Sequence[Delivery]) -> Delivery | None:
 
 @dataclass(frozen=True)
 class DeliveryReport:
-    """How much of each wish came, and how far all lit paint is from the painting.
+    """The delivery of each wish, and the distance of all lit paint from the painting.
 
     deliveries: the lowest wish first; a layer follows its parts, and a group its layers. areas: of
     each of them, (h, w) from 0 to 1; none for several views. lit_delta_e: the mean CIEDE2000 of lit

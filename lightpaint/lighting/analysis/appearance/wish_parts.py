@@ -15,6 +15,9 @@ from lightpaint.target.wish import Wish
 #: A group of layers, a layer, or a part of a layer or of a painting without layers.
 WishKind = Literal["wish", "layer", "group"]
 
+#: Share of the picture from which an area lies in no ninth of it.
+LARGE = 0.5
+
 #: Names of the thirds of a picture, from the top and from the left.
 ROWS, COLUMNS = ("top", "middle", "bottom"), ("left", "middle", "right")
 
@@ -57,19 +60,27 @@ def _joint_area(wishes: Sequence[Wish]) -> Floats:
 
 
 def _names(wishes: Sequence[Wish], objects: Objects | None) -> list[str]:
-    """Return names that differ: `Painting, vase` for a part of a layer."""
+    """Return names that differ: `Strokes, vase` for a part of a layer; only the place, with a
+    capital, for a part of a painting without layers.
+    """
     counts = Counter((wish.layer, wish.name) for wish in wishes)
     names: list[str] = []
     for wish in wishes:
         is_part = counts[wish.layer, wish.name] > 1
-        name = f"{wish.name}, {_place_name(wish.area, objects)}" if is_part else wish.name
+        name = wish.name
+        if is_part:
+            place = _place_name(wish.area, objects)
+            is_flat = wish.layer is None
+            name = f"{place[:1].upper()}{place[1:]}" if is_flat else f"{wish.name}, {place}"
         alike = sum(x == name or x.startswith(f"{name} (") for x in names)
         names.append(f"{name} ({alike + 1})" if alike and is_part else name)
     return names
 
 
 def _place_name(area: Floats, objects: Objects | None) -> str:
-    """Return the object that an area, (h, w), mostly lies on, or its third: `vase`, `top left`."""
+    """Return where an area, (h, w), lies: `vase` for an object, `top left` for a ninth."""
+    if area.mean() > LARGE:
+        return "most of the picture"
     if objects is not None:
         index = objects.index.ravel().astype(np.intp)
         if name := object_with_most(objects, index, area.ravel().astype(np.float64)):
