@@ -126,3 +126,4 @@ def test_the_report_has_a_bar_for_each_part():
     assert "width: 100.00%" in page
     assert wishes_section(None) == ""
     assert wishes_section(_seen(2.0)) == ""
+    assert wishes_section(_seen(2.0, PAINTING)) == ""

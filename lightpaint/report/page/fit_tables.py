@@ -19,7 +19,7 @@ from lightpaint.lighting.loss.painting import ignored_paint
 from lightpaint.lighting.solution import Solution
 from lightpaint.relit.detection_power import ERROR
 from lightpaint.relit.verification import Verification, limit_of_tests
-from lightpaint.report.delivery_sentences import wish_name
+from lightpaint.report.delivery_sentences import is_unnamed, wish_name
 from lightpaint.report.measures import (
     count_at_least_pixels,
     error_in_codes,
@@ -37,10 +37,13 @@ WISH_HEADINGS = ("wish", "brightness", "colour", "mean ΔE")
 
 
 def wishes_section(appearance: Appearance | None) -> str:
-    """Return the section on how much of each wish came; "" if none asks for anything visible."""
+    """Return the section on how much of each wish came; "" if none asks for anything visible.
+
+    The verdict says it of an only one without a name.
+    """
     deliveries = () if appearance is None else appearance.deliveries
     entries = [entry for entry in deliveries if entry.least is not None]
-    if not entries:
+    if not entries or (len(entries) == 1 and is_unnamed(entries[0])):
         return ""
     rows = [
         row(
