@@ -22,12 +22,16 @@ SPILL_ADVICE = "More importance, or a light that reaches it alone, may bring mor
 def spoken_deliveries(deliveries: Sequence[Delivery]) -> str:
     """Return how much of each wish came, one short sentence each; "" without wishes.
 
-    Wishes that ask for nothing visible are left out, and of many those of which most came.
+    Wishes that ask for nothing visible are left out, and of many those of which most came. Parts of
+    a painting without layers are only told apart if one of them lacks something.
     """
     entries = [entry for entry in main_deliveries(deliveries) if entry.least is not None]
     if len(entries) == 1 and is_unnamed(entries[0]):
         shares = entries[0].spoken_shares
         return f"{shares[:1].upper()}{shares[1:]} of what was asked for came."
+    if len(entries) > 1 and all(entry.is_met and not entry.layers for entry in entries):
+        least = min(entry.least for entry in entries if entry.least is not None)
+        return f"Of each of {len(entries)} wishes at least {spoken_share(least)} came."
     by_share = sorted(entries, key=lambda entry: entry.least or 0.0)
     shown = [entry for entry in entries if entry in by_share[:MAX_WISHES]]
     texts = [f"{spoken_delivery(entry)}." for entry in shown]

@@ -112,6 +112,11 @@ def test_wishes_are_listed():
     assert spoken_deliveries(many) == (
         "Lamp 0: 50 %. Lamp 2: 10 %. Lamp 3: 70 %. Lamp 5: 30 %. Of 2 more, more came."
     )
+    parts = [replace(RIM, name=name, kind="wish", layers=()) for name in ("Vase", "Top left")]
+    assert spoken_deliveries(parts) == "Of each of 2 wishes at least 95 % came."
+    assert spoken_deliveries([replace(parts[0], brightness=0.5), parts[1]]) == (
+        "Vase: 50 %. Top left: 95 %."
+    )
     nothing = replace(LANTERN, brightness=None)
     assert spoken_deliveries([nothing, RIM]) == "95 % of what was asked for came."
     other_way = replace(LANTERN, brightness=-0.3)
