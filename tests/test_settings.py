@@ -43,7 +43,7 @@ WRONG = {
 
 RIGHT = {
     "hold": (None, 0, 0.3, np.float64(2)),
-    "colors": (None, "free", "gentle", "white"),
+    "colors": (None, "free", "gentle", "white", "own"),
     "literal": (True, False),
     "unpainted": (0, 0.5, np.float64(2)),
     "method": ("polished", "gauss-seidel"),

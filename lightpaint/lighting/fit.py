@@ -15,8 +15,9 @@ from lightpaint.validation import SWITCH, Check, a, check_fields, number, one_of
 #: The space of the comparison with the painting: light, or display values.
 Space = Literal["linear", "display"]
 
-#: The colours that lamps may take: any; their own unless the painting clearly needs others; whites.
-Colors = Literal["free", "gentle", "white"]
+#: The colours that lamps may take: any; their own unless the painting clearly needs others; whites;
+#: their own.
+Colors = Literal["free", "gentle", "white", "own"]
 
 #: Weight of all unpainted pixels relative to all painted ones, for a painting over the current
 #: look: benchmarks/intent.py compares other values.
@@ -44,7 +45,8 @@ class Fit:
         hold: Total weight of unpainted pixels, which are held to the current look, relative to that
             of painted ones. 0 releases them.
         colors: `free`; `gentle`, to change a lamp's colour only if the fit gains by it, and only to
-            whites and painted colours; `white`, on Planck's locus between 2200 and 9000 K.
+            whites and painted colours; `white`, on Planck's locus between 2200 and 9000 K; `own`,
+            to dim lamps and leave each the colour it has.
         unpainted: Instead of `hold`, the weight of each unpainted pixel.
         literal: Whether every target is fitted literally, except for options set here.
         method: `polished`, to a certified optimum, or `gauss-seidel`, the paper's iteration alone,
@@ -83,6 +85,12 @@ class Fit:
         "transform": a(ViewTransform, "a ViewTransform, like ViewTransform('agx', 1.0)"),
         "emitters": one_of(Emitters),
     }
+
+    @property
+    def is_sketch(self) -> bool:
+        """True if the painting says what is meant, and not what light arrives: once resolved."""
+        is_held = self.transform is not None or bool(self.hold) or self.colors == "gentle"
+        return is_held and not self.literal
 
     @property
     def brightness(self) -> float:

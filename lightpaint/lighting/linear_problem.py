@@ -11,10 +11,13 @@ from lightpaint.basis.lights import Lights
 from lightpaint.colour.display.view_transform import ViewTransform
 from lightpaint.display_text import short_repr
 from lightpaint.lighting.constraints.constraints import Constraints
+from lightpaint.lighting.constraints.own_colors import keep_own_colors, own_color_labels
+from lightpaint.lighting.constraints.start_lighting import start_weights
 from lightpaint.lighting.constraints.white_lights import whiten_open_lights
 from lightpaint.lighting.fit import Fit
+from lightpaint.lighting.loss.expected_lights import ExpectedLights
 from lightpaint.lighting.loss.image_prior import image_prior
-from lightpaint.lighting.loss.weight_penalty import weight_pull
+from lightpaint.lighting.loss.weight_penalty import pull_near_start, weight_pull
 from lightpaint.lighting.normal_equations import NormalEquations
 from lightpaint.lighting.unknowns.constraint_reduction import reduce_to
 from lightpaint.lighting.unknowns.gamuts import Gamuts
@@ -29,7 +32,7 @@ class LinearProblem:
     equations: M and b of the squares; corrected: the same without the share `noise_removed` of the
     noise, None if none was removed. constraints: on the lights. reduction: the unknowns that these
     leave; full: the same with the lights that `sparse` has not chosen. fit: with nothing left open.
-    dimming: see `weight_pull`. tether: a further pull on the weights, to lights at other frames;
+    expected: see `weight_pull`. tether: a further pull on the weights, to lights at other frames;
     None for a problem that stands alone.
     """
 
@@ -40,7 +43,8 @@ class LinearProblem:
     reduction: Reduction
     full: Reduction
     fit: Fit
-    dimming: Doubles | None
+    expected: ExpectedLights | None
+    contrast: NormalEquations | None
     tether: NormalEquations | None
 
     if TYPE_CHECKING:  # properties of one kind of problem, fields of the other
@@ -107,21 +111,33 @@ class LinearProblem:
         return self.full.is_free & self.equations.reached.any(axis=1) & is_lamp
 
     @cached_property
+    def reference(self) -> Doubles:
+        """(n, 3), the lighting to start from: the current one, unless another was set by hand."""
+        return start_weights(self.constraints.start, self.lights)
+
+    @cached_property
     def pull(self) -> NormalEquations | None:
-        """The penalty for leaving the current lighting, its colours, or the lights at other frames;
-        None if there is none.
+        """The penalty for leaving the current lighting, the expected colours, the contrasts or the
+        lights at other frames; None if there is none.
         """
-        prior = image_prior(self.lights, self.power, self.fit, self.painted_share)
+        prior = image_prior(self.lights, self.power, self.fit, self.painted_share, self.expected)
         pull = weight_pull(
             self.power,
-            self.lights.current_weights,
+            self.reference,
             self.fit,
             prefer_current=self.constraints.prefer_current,
             painted_share=self.painted_share,
             keeps_color=self.keeps_color,
-            dimming=self.dimming,
+            expected=self.expected,
         )
-        pulls = [x for x in (pull, prior, self.tether) if x is not None]
+        near = pull_near_start(
+            self.power,
+            self.reference,
+            self.fit,
+            near=self.constraints.near,
+            painted_share=self.painted_share,
+        )
+        pulls = [x for x in (pull, near, prior, self.contrast, self.tether) if x is not None]
         return reduce(add, pulls) if pulls else None
 
     def with_pull(self, equations: NormalEquations) -> NormalEquations:
@@ -163,7 +179,8 @@ class SummedProblem(LinearProblem):
     spp: int | None = None
     corrected: NormalEquations | None = None
     noise_removed: float = 0.0
-    dimming: Doubles | None = None
+    expected: ExpectedLights | None = None
+    contrast: NormalEquations | None = None
     tether: NormalEquations | None = None
 
     __repr__ = short_repr
@@ -203,4 +220,8 @@ def reduce_lights(
     # Pulls to the colours of lights and images couple the channels.
     is_joined = fit.colors == "gentle" or bool(texel_lights(lights).any())
     reduction = replace(reduce_to(constraints, lights), is_joined=is_joined)
+    if fit.colors == "own":
+        labels = own_color_labels(reduction.labels, constraints, lights)
+        dimmers = reduce_to(keep_own_colors(constraints, lights), lights)
+        return replace(dimmers, is_joined=is_joined, labels=labels)
     return reduction if gamuts is None else reduction.with_gamuts(gamuts)

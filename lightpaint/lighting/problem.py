@@ -18,9 +18,12 @@ from lightpaint.errors import BasisError, ConstraintError, TargetError
 from lightpaint.keywords import keywords
 from lightpaint.lighting.constraints.constraints import Constraints
 from lightpaint.lighting.constraints.constraints_file import constraints_of
+from lightpaint.lighting.constraints.start_lighting import held_at_start, start_weights
 from lightpaint.lighting.fit import Fit, Space, resolve_for_targets
 from lightpaint.lighting.joined_views import Views, joint_basis
 from lightpaint.lighting.linear_problem import LinearProblem, reduce_lights
+from lightpaint.lighting.loss.contrast import contrast_rows, contrast_term
+from lightpaint.lighting.loss.expected_lights import ExpectedLights, Wash
 from lightpaint.lighting.loss.lit_pixels import LitPixels
 from lightpaint.lighting.loss.loss import Loss, Squares
 from lightpaint.lighting.loss.painting import (
@@ -79,8 +82,9 @@ class Problem(LinearProblem):
         corrected: The equations without that share of the noise; None if none was removed.
         noise_removed: The share of the noise in `equations` that `corrected` lacks.
         refinement: The last step that improved an answer, if there was one.
-        dimming: (n,), the factor by which an earlier answer dims lights, which strengthens the
-            pull to their colours; None without one.
+        expected: The lights that the paintings let one expect, where lights keep to them; None
+            where they may take any colour.
+        contrast: The term that keeps the contrasts between wishes; None without one.
         block_side: Pixels along the side of the blocks behind `corrected`; 1 for single pixels.
         tether: A further pull on the weights, to those at other frames of a shot; None without.
 
@@ -103,7 +107,8 @@ class Problem(LinearProblem):
     corrected: NormalEquations | None = None
     noise_removed: float = 0.0
     refinement: Refinement | None = None
-    dimming: Doubles | None = None
+    expected: ExpectedLights | None = None
+    contrast: NormalEquations | None = None
     block_side: int = 1
     tether: NormalEquations | None = None
 
@@ -131,8 +136,8 @@ class Problem(LinearProblem):
             raise ConstraintError(
                 f"the constraints are a {type(constraints).__name__}: give Constraints.of(...)"
             )
-        whole, parts = joint_basis(bases)
-        all_constraints = constraints_of(whole.requests).and_then(constraints or Constraints())
+        all_constraints = constraints_of(bases[0].requests).and_then(constraints or Constraints())
+        whole, parts = joint_basis([held_at_start(x, all_constraints.start) for x in bases])
         views, fit = _resolve_views(parts, targets, fit or Fit(), resize=resize)
         squares = joint_squares(views, unpainted=unpainted_weight_of(views, fit))
         loss = choose_loss(
@@ -142,7 +147,9 @@ class Problem(LinearProblem):
             painted=lambda: target_light(views),
             current=lambda: whole.current_look,
         )
-        reduction = reduce_lights(all_constraints, whole.lights, fit, gamuts_for(whole, views, fit))
+        reference = start_weights(all_constraints.start, whole.lights)
+        gamuts = gamuts_for(whole, views, fit, reference)
+        reduction = reduce_lights(all_constraints, whole.lights, fit, gamuts)
         return cls(
             basis=whole,
             views=views,
@@ -152,8 +159,9 @@ class Problem(LinearProblem):
             constraints=all_constraints,
             reduction=reduction,
             full=reduction,
-            start=whole.current_weights if start is None else start,
+            start=reference if start is None else start,
             fit=fit,
+            **_wash_fields(views, fit, reference),
         )
 
     @property
@@ -207,8 +215,8 @@ class Problem(LinearProblem):
 
     @property
     def is_constrained(self) -> bool:
-        """True if anything limits the lights: constraints, or whites only."""
-        return bool(self.constraints) or self.fit.colors == "white"
+        """True if anything limits the lights: constraints, or whites or own colours only."""
+        return bool(self.constraints) or self.fit.colors in ("white", "own")
 
     @cached_property
     def local_reduction(self) -> Reduction:
@@ -272,8 +280,38 @@ def _resolve_views(
     return Views(bases, tuple(resolved)), fit
 
 
-def gamuts_for(basis: Basis, views: Views, fit: Fit) -> Gamuts | None:
-    """Return the colours that each light may take; None if `fit` does not limit them."""
+def wash_of(views: Views) -> Wash:
+    """Return the paintings of views and their lights, averaged over blocks of pixels."""
+    return Wash.joined([Wash.of(*view) for view in zip(views.bases, views.targets, strict=True)])
+
+
+def expected_for(
+    views: Views, fit: Fit, own: Doubles, wash: Wash | None = None
+) -> ExpectedLights | None:
+    """Return the lights that paintings let one expect; None if `fit` leaves colours free.
+
+    own: (n, 3), weights with the colours that lights have. wash: that of the views, if it is known.
+    """
+    if fit.colors != "gentle":
+        return None
+    return ExpectedLights.of(wash or wash_of(views), own)
+
+
+def _wash_fields(views: Views, fit: Fit, own: Doubles) -> dict[str, Any]:
+    """Return what a sketch lets one expect, and its contrasts, as fields of a problem."""
+    if not fit.is_sketch:
+        return {}
+    wash = wash_of(views)
+    strength = sum(float(x.importance.sum(dtype=np.float64)) for x in views.targets)
+    contrast = contrast_term(contrast_rows(wash, fit.transform), strength)
+    return {"expected": expected_for(views, fit, own, wash), "contrast": contrast}
+
+
+def gamuts_for(basis: Basis, views: Views, fit: Fit, own: Doubles | None = None) -> Gamuts | None:
+    """Return the colours that each light may take; None if `fit` does not limit them.
+
+    own: (n, 3), weights with the colours that lights have, by default the current ones.
+    """
     if fit.colors != "gentle":
         return None
     views_of_paint = [
@@ -281,7 +319,8 @@ def gamuts_for(basis: Basis, views: Views, fit: Fit) -> Gamuts | None:
         for view_basis, target in zip(views.bases, views.targets, strict=True)
     ]
     painted = partial(PaintedLight.of, views_of_paint)
-    return Gamuts(painted, basis.power, basis.current_weights, texel_lights(basis.lights))
+    own = basis.current_weights if own is None else own
+    return Gamuts(painted, basis.power, own, texel_lights(basis.lights))
 
 
 def _color_importance(target: Target) -> Floats:

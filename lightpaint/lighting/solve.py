@@ -20,7 +20,7 @@ from lightpaint.lighting.loss.lit_pixels import DeferredSquares, LitPixels
 from lightpaint.lighting.loss.pixel_bins import BinnedPixels, bin_pixels, block_side
 from lightpaint.lighting.loss.reweighting import Descent, WeightTerms, descend, total_loss
 from lightpaint.lighting.loss.warm_start import find_near_optimum
-from lightpaint.lighting.loss.weight_penalty import dimming_factors, pull_to_current
+from lightpaint.lighting.loss.weight_penalty import pull_to_current
 from lightpaint.lighting.normal_equations import NormalEquations
 from lightpaint.lighting.problem import Problem
 from lightpaint.lighting.solution import Solution
@@ -89,48 +89,12 @@ def solve(
 def solution_of(problem: Problem, *, start: Doubles | None = None) -> Solution:
     """Solve a problem. start: (n, 3), where to begin, its own start by default.
 
-    If its loss is not linear, rounds of linear problems lead to the optimum. Lamps that keep their
-    colour and come out dim get a stronger pull to it, and the problem is solved once more.
+    If its loss is not linear, rounds of linear problems lead to the optimum.
     """
     begin = problem.start if start is None else start
-    blocks = _blocks_of(problem)
-    solution = _solve_once(problem, begin, blocks)
-    if not problem.keeps_color.any() or problem.fit.colors != "gentle":
-        return solution
-    dimming = dimming_factors(problem.basis.current_weights, solution.weights)
-    if problem.dimming is not None or (dimming[problem.keeps_color] == 1).all():
-        return solution
-    dimmed = replace(solution.problem, dimming=dimming)
-    certificate, tried = solution.certificate, solution.tried
-    begin, reached = solution.weights, solution.reached
-    if problem.is_linear:
-        nearer = _solve_under_reduction(dimmed, begin)
-    else:
-        # The squares of this solution are as large as several pictures, and others follow.
-        dimmed = replace(dimmed, squares=problem.squares)
-        del solution
-        nearer = _descend(dimmed, begin, reached, blocks, is_near=True)
-    result = nearer.with_certificate_fields(
-        curve=certificate.curve, rounds=certificate.rounds + nearer.certificate.rounds
-    )
-    return replace(result, tried=tried)
-
-
-def _blocks_of(problem: Problem) -> BinnedPixels | None:
-    """Return the blocks of pixels to fit; None for single pixels."""
-    if problem.is_linear:
-        return None
-    side = block_side(problem.views.bases, problem.loss.transform)
-    return bin_pixels(problem.views, problem.loss, side) if side > 1 else None
-
-
-def _solve_once(problem: Problem, begin: Doubles, blocks: BinnedPixels | None) -> Solution:
-    """Solve a problem with the pull that it has.
-
-    begin: (n, 3). blocks: see `_blocks_of`.
-    """
     if problem.is_linear:
         return _solve_squares(problem, begin)
+    blocks = _blocks_of(problem)
     # The literal squares come first; they also show what each light reaches.
     all_lights = replace(problem, constraints=_without_sparse(problem.constraints))
     first = _solve_squares(replace(all_lights, loss=problem.squares), begin)
@@ -150,6 +114,12 @@ def _solve_once(problem: Problem, begin: Doubles, blocks: BinnedPixels | None) -
         )
         first = chosen
     return solution.with_certificate_fields(curve=first.certificate.curve)
+
+
+def _blocks_of(problem: Problem) -> BinnedPixels | None:
+    """Return the blocks of pixels to fit; None for single pixels."""
+    side = block_side(problem.views.bases, problem.loss.transform)
+    return bin_pixels(problem.views, problem.loss, side) if side > 1 else None
 
 
 def solve_again(solution: Solution, problem: Problem) -> Solution:
@@ -300,8 +270,8 @@ def _least_loss(
 
 
 def nearest_to_current(problem: Problem) -> Doubles:
-    """Return the weights (n, 3) nearest to the current ones that constraints allow."""
-    current = problem.basis.current_weights
+    """Return the weights (n, 3) nearest to those to start from that constraints allow."""
+    current = problem.reference
     pull = pull_to_current(problem.basis.power, current)
     return solve_reduced(pull, problem.reduction, current).weights
 

@@ -119,6 +119,7 @@ JOINT_RELEASE_CLAUSES = {
     "colors": "Lights keep their colours; {any_color}",
     "sparse": "The number of lights is limited; allowing more",
     "prefer_current": "Lights are pulled towards their current setting; leaving them free",
+    "near": "Lights stay near the lighting that you started from; leaving them free",
 }
 
 

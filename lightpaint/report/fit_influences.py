@@ -19,6 +19,8 @@ def fit_clauses(solution: Solution) -> tuple[str, ...]:
         clauses.append("lights are pulled to their own colour (gentle)")
     elif fit.colors == "white":
         clauses.append("lights are white")
+    elif fit.colors == "own":
+        clauses.append("lights keep their own colour (own)")
     if certificate.noise_removed:
         clauses.append("noise is corrected")
     return tuple(clauses)

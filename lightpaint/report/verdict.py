@@ -46,6 +46,7 @@ REASON_CLAUSES: dict[str, tuple[str, str]] = {
     "tie": ("{} is tied to other lights", "{} are tied together"),
     "sparse": ("the number of lights is limited",) * 2,
     "prefer_current": ("lights are pulled towards their current setting",) * 2,
+    "near": ("lights stay near the lighting that you started from",) * 2,
     "views": ("view {} asks for different light", "views {} ask for different light"),
 }
 

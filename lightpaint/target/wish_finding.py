@@ -5,7 +5,7 @@ things. They lie in one picture; what tells them apart is what is asked: the rat
 to the current look, in stops of each channel.
 """
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -39,50 +39,59 @@ def find_wishes(target: Target, current_look: Floats) -> tuple[Wish, ...]:
     """Return the wishes of a painting, the lowest first, with separate strokes told apart.
 
     current_look: (h, w, 3) linear, the current look at the size of the target. The areas of all
-    wishes together add up to at most 1 in each pixel.
+    wishes together add up to at most 1 in each pixel. Pictures of some ten thousand pixels suffice.
     """
     layers = target.wishes or (
         Wish(target.name, np.minimum(target.importance, 1), has_strokes=True),
     )
+    return split_wishes(layers, target.image, target.importance, current_look)
+
+
+def split_wishes(
+    layers: Sequence[Wish], image: Floats, importance: Floats, current_look: Floats
+) -> tuple[Wish, ...]:
+    """Return layers with their separate strokes told apart, the lowest first.
+
+    image, current_look: (h, w, 3) linear, painted and now; importance: (h, w).
+    """
+    if not any(layer.has_strokes for layer in layers):
+        return tuple(layers)
+    ratio = asked_ratio(image, importance, current_look)
     wishes: list[Wish] = []
     for layer in layers:
-        wishes += _split(layer, target, current_look) if layer.has_strokes else [layer]
+        wishes += _split(layer, ratio, importance) if layer.has_strokes else [layer]
     return tuple(wishes)
 
 
-def asked_ratio(target: Target, current_look: Floats) -> Doubles:
+def asked_ratio(image: Floats, importance: Floats, current_look: Floats) -> Doubles:
     """Return what is asked for in stops of each channel, (h, w, 3), as a wash.
 
-    current_look: (h, w, 3) linear. 0 where the painting is the look, or where both are black.
+    For the arguments see `split_wishes`. 0 where the painting is the look, or where both are black.
     """
     dark = DARK * float(np.mean(current_look))
-    asked, now = (np.maximum(x, 0).astype(np.float64) + dark for x in (target.image, current_look))
+    asked, now = (np.maximum(x, 0).astype(np.float64) + dark for x in (image, current_look))
     ratio = np.log2(asked / now) if dark else np.zeros(asked.shape)
     radius = SMOOTHING * ratio.shape[1]
-    counts = (target.importance > 0).astype(np.float64)
+    counts = (importance > 0).astype(np.float64)
     total = gaussian_filter(counts, radius)
     wash = np.dstack([gaussian_filter(x * counts, radius) for x in np.moveaxis(ratio, -1, 0)])
-    return np.asarray(
-        np.where(total > 0, 1, 0)[..., None] * wash / np.maximum(total, 1e-6)[..., None]
-    )
+    return np.asarray((counts / np.maximum(total, 1e-6))[..., None] * wash)
 
 
-def _split(layer: Wish, target: Target, current_look: Floats) -> Iterator[Wish]:
+def _split(layer: Wish, ratio: Doubles, importance: Floats) -> Iterator[Wish]:
     """Split a layer into its strokes, and these into places that ask for something else."""
-    painted = (layer.area >= PAINTED) & (target.importance > 0)
-    ratio = asked_ratio(target, current_look)
+    painted = (layer.area >= PAINTED) & (importance > 0)
     least = MIN_SHARE * painted.size
-    strokes = [
-        x for x in _connected(painted, round(JOINING * painted.shape[1])) if x.sum() >= least
-    ]
+    strokes = _connected(painted, round(JOINING * painted.shape[1]))
+    strokes = sorted((x for x in strokes if x.sum() >= least), key=lambda x: -int(x.sum()))
     if not strokes:
         yield layer
         return
     owner, parts = np.zeros(painted.shape, int), 0
-    for stroke in sorted(strokes, key=lambda x: -int(x.sum()))[:MAX_WISHES]:
+    for stroke in strokes[:MAX_WISHES]:
         parts += 1
         owner[stroke] = parts
-        for place in _distinct_places(stroke, ratio, least)[: MAX_WISHES - parts]:
+        for place in _distinct_places(stroke, ratio, least)[: max(MAX_WISHES - parts, 0)]:
             parts += 1
             owner[place] = parts
     for k in range(1, parts + 1):

@@ -22,6 +22,7 @@ FITS: dict[str, dict[str, Any]] = {
     "held": {"hold": 1.0},
     "gentle": {"colors": "gentle"},
     "white": {"colors": "white"},
+    "own": {"colors": "own"},
     "display": {"transform": lp.ViewTransform("srgb")},
     "constraints": {
         "constraints": lp.Constraints.of(

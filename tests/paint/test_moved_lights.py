@@ -47,8 +47,8 @@ BALL = (0.3, 0.3, 0.2)
 )
 def test_a_step_is_named_by_what_it_changes(pose: Any, label: str) -> None:
     lights = Lights([BasisLight("beam", "spot", "intensity", "W/sr", (1.0, 1.0, 1.0), "")])
-    requests = SessionRequests()
-    assert changed_requests(requests, lights, protocol.MoveLights({"beam": pose}))[0] == label
+    requests, move = SessionRequests(), protocol.MoveLights({"beam": pose})
+    assert changed_requests(requests, lights, move, lights.current_weights)[0] == label
 
 
 def test_a_drag_that_is_cancelled_leaves_no_trace(moving: MovingStudio) -> None:

@@ -4,16 +4,16 @@ import re
 import sqlite3
 import threading
 import time
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from contextlib import contextmanager
 from dataclasses import replace
-from functools import partial
 from pathlib import Path
 from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
 import pytest
+from studio_client import StudioClient
 
 import lightpaint as lp
 from lightpaint.basis.cache.denoised_planes import (
@@ -21,7 +21,6 @@ from lightpaint.basis.cache.denoised_planes import (
     cache_denoised_planes,
     read_denoised_planes,
 )
-from lightpaint.cli.commands.paint_command import command_for_paintings
 from lightpaint.lighting.analysis.noise.noise_correction import correct_noise
 from lightpaint.paint import protocol, subject
 from lightpaint.paint.background_threads import SOLVE_DELAY_S
@@ -37,56 +36,6 @@ from lightpaint.paint.studio.studio import Studio
 from lightpaint.paint.subject import Subject
 
 SIZE = (18, 32)
-
-
-class StudioClient:
-    """A studio of saved bases, and all that it says."""
-
-    def __init__(self, folder: Path, *bases: lp.Basis, scene: Any = None) -> None:
-        command = partial(command_for_paintings, "room.basis.exr")
-        options = {"command": lambda paths, requests: command(paths, (), requests), "scene": scene}
-        subjects = [
-            Subject(f"view {k}", folder, basis=view_basis, **options)
-            for k, view_basis in enumerate(bases)
-        ]
-        self.messages: list[Message] = []
-        self.studio = Studio(
-            subjects, lambda view_basis: Store.open(folder / "session.db", view_basis)
-        )
-        self.studio.on_message = self.messages.append
-        self.studio.start()
-        self.wait(lambda m: m.kind == "state")
-
-    def wait(self, is_match: Callable[[Message], Any], seconds: float = 60) -> Message:
-        """Return the first message, from now or from before, that matches."""
-        deadline = time.monotonic() + seconds
-        while time.monotonic() < deadline:
-            for message in list(self.messages):
-                if is_match(message):
-                    return message
-            time.sleep(0.01)
-        raise AssertionError([m.kind for m in self.messages])
-
-    def exact(self) -> Message:
-        """The exact answer to what was done last."""
-        version = self.studio.session.version
-        return self.wait(
-            lambda m: (
-                m.kind == "answer" and "headline" in m.fields and m.fields["version"] == version
-            )
-        )
-
-    def paint(
-        self, stroke: int, light: float, region: Any = (3, 12, 4, 15), *, view: int = 0
-    ) -> Message:
-        """A stroke, whole."""
-        shape = region[1] - region[0], region[3] - region[2]
-        arrays = {
-            "image": np.full((*shape, 3), light, np.float32),
-            "importance": np.ones(shape, np.float32),
-        }
-        [answer] = self.studio.handle(protocol.Paint(stroke, region, True, view=view), arrays)
-        return answer
 
 
 @pytest.fixture

@@ -16,7 +16,7 @@ from lightpaint.colour.display.view_transform import TransformChoice
 from lightpaint.errors import OutputError
 from lightpaint.lighting.constraints.constraints import Constraints
 from lightpaint.paint.server.address import Reach
-from lightpaint.paint.store.session_requests import SessionRequests
+from lightpaint.paint.store.session_requests import DEFAULT_NEAR, SessionRequests
 from lightpaint.pipeline.job.settings import Settings
 from lightpaint.pipeline.job.sources import BasisFile, GroupsFile, SceneFile
 
@@ -183,6 +183,10 @@ def options_of(requests: SessionRequests) -> list[str]:
         options += [option for key in constraint for option in _options(name, key, constraint)]
     for names in requests.ties:
         options.append(f"--tie {quote(','.join(names))}")
+    for name, emission in requests.start.items():
+        options.append(f"--start {quote(f'{name}={_value_text(emission)}')}")
+    if requests.start and "near" not in requests.values:
+        options.append(f"--near {DEFAULT_NEAR:g}")
     for key, value in requests.values.items():
         option = f"--{key.replace('_', '-')}"
         options.append(option if value is True else f"{option} {value}")

@@ -106,6 +106,23 @@ def _add_preferences(group: argparse._ArgumentGroup) -> None:
         " does not determine then stay as they are (default: %(default)s)",
     )
     group.add_argument(
+        "--start",
+        type=arguments.light_value,
+        action="append",
+        default=[],
+        metavar="NAME=R,G,B",
+        help="start from this emission of a light instead of the current one: unpainted parts are "
+        "held to the look of the lighting to start from, and lamps to its colours",
+    )
+    group.add_argument(
+        "--near",
+        type=arguments.number(may_be_zero=True),
+        default=0.0,
+        metavar="STRENGTH",
+        help="stay near the current lighting, or that of --start, with this strength relative to "
+        "the paint, like 0.1 (default: %(default)s)",
+    )
+    group.add_argument(
         "--sparse",
         type=arguments.at_least(1),
         metavar="K",

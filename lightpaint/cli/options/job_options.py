@@ -189,6 +189,8 @@ def constraints_of(options: Namespace) -> Constraints:
         tie=options.tie,
         prefer_current=options.prefer_current,
         sparse=options.sparse,
+        start=dict(options.start),
+        near=options.near,
         where=BY_OPTION,
     )
 

@@ -112,10 +112,11 @@ def add_fit(parser: argparse.ArgumentParser) -> None:
     )
     parser.add_argument(
         "--colors",
-        choices=("free", "gentle", "white"),
+        choices=("free", "gentle", "white", "own"),
         help="colours that lights may take. free: any; gentle: their current ones, unless the "
-        "painting needs others; white: 2200 to 9000 K (default: gentle if the current look "
-        "was painted over, or painted through a view, else free)",
+        "painting needs others; white: 2200 to 9000 K; own: their current ones, so that lights "
+        "only dim (default: gentle if the current look was painted over, or painted through a "
+        "view, else free)",
     )
     parser.add_argument(
         "--space",

@@ -145,7 +145,6 @@ def without_constraints(solution: Solution) -> Solution | None:
         constraints=Constraints(),
         reduction=free,
         full=free,
-        dimming=None,
         fit=replace(problem.fit, method="polished"),
     )
     return solution_of(anew, start=solution.weights)

@@ -35,7 +35,8 @@ class Certificate:
         rounds: The number of linear problems solved in turn, the last of which is certified.
         hold: Weight of unpainted pixels, which holds them to the current look, relative to painted
             ones.
-        colors: The freedom of lamps to change their colour: `free`, `gentle` or `white`.
+        colors: The freedom of lamps to change their colour: `free`, `gentle`, `white` or
+            `own`.
         noise_removed: Share of the noise that was removed from the equations.
         delta_e: Mean CIEDE2000 between the prediction and the painting, over the paint.
         delta_e_noise: The part of it that noise explains.

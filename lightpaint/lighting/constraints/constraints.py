@@ -6,7 +6,7 @@ docs/formats.md lists them.
 """
 
 from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import Any
 
 from lightpaint.arrays import RGB
@@ -25,6 +25,7 @@ from lightpaint.lighting.constraints.values import (
     parse_limits,
     parse_lock,
     parse_primaries,
+    parse_start,
     parse_strength,
     parse_whites,
 )
@@ -127,6 +128,10 @@ class Constraints:
         prefer_current: Strength of the pull towards the current lighting. At 1 a change of a light
             costs as much as its effect on the whole picture, painted or not.
         sparse: Maximum number of lights that may be on.
+        start: Emissions by name of light, set by hand: the lighting to start from, in place of the
+            scene's. Unpainted parts are held to its look, and lamps to its colours.
+        near: Strength of a pull to the lighting to start from, relative to the paint. At 1 a change
+            of a light costs as much as its effect on a picture painted all over would count.
 
     Examples:
         >>> constraints = lp.Constraints.of({"panel": {"lock": True}})
@@ -141,16 +146,21 @@ class Constraints:
     ties: tuple[Tie, ...] = ()
     prefer_current: float = 0.0
     sparse: int | None = None
+    start: Mapping[str, RGB] = field(default_factory=dict)
+    near: float = 0.0
 
     def __repr__(self) -> str:
         parts = [f"{name} {_label(table)}" for name, table, _ in self.lights]
         parts += [f"tie {' + '.join(tie.lights)}" for tie in self.ties]
         parts += [f"prefer_current {self.prefer_current:g}"] if self.prefer_current else []
         parts += [] if self.sparse is None else [f"sparse {self.sparse}"]
+        parts += [f"start {' + '.join(self.start)}"] if self.start else []
+        parts += [f"near {self.near:g}"] if self.near else []
         return f"Constraints({some_of(parts, '; ', room=600)})"
 
     def __bool__(self) -> bool:
-        return bool(self.lights or self.ties or self.prefer_current or self.sparse is not None)
+        is_any_set = bool(self.prefer_current or self.start or self.near)
+        return is_any_set or bool(self.lights or self.ties or self.sparse is not None)
 
     @classmethod
     @keywords()
@@ -161,12 +171,15 @@ class Constraints:
         tie: Sequence[Any] = (),
         prefer_current: float = 0.0,
         sparse: int | None = None,
+        start: Mapping[str, Any] | None = None,
+        near: float = 0.0,
         where: str = "",
     ) -> "Constraints":
         """Make constraints from the tables of a lights file.
 
         light: name or pattern → keys and values (`{"key": {"color": "3200K"}}`).
         tie: lists of names, or tables with `lights` and `color`; one list of names is one tie.
+        start: emissions by name of light, (r, g, b), set by hand.
         where: the name of the source in errors.
 
         Raises ConstraintError, naming the light, the key and what is expected.
@@ -189,6 +202,8 @@ class Constraints:
             _parse_ties(tie, f"{lead}tie"),
             parse_strength(prefer_current, f"{lead}prefer_current"),
             parse_count(sparse, f"{lead}sparse"),
+            parse_start(start or {}, f"{lead}start"),
+            parse_strength(near, f"{lead}near"),
         )
 
     def and_then(self, others: "Constraints") -> "Constraints":
@@ -204,6 +219,8 @@ class Constraints:
             tuple(x for x in self.ties if set(x.lights) not in tied) + others.ties,
             others.prefer_current or self.prefer_current,
             self.sparse if others.sparse is None else others.sparse,
+            {**self.start, **others.start},
+            others.near or self.near,
         )
 
 

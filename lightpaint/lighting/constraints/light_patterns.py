@@ -58,6 +58,19 @@ def tied_lights(
     return ties
 
 
+def lights_of_open_color(constraints: Constraints, lights: Sequence[BasisLight]) -> list[int]:
+    """Return the indices of lights that may take any colour under `constraints`."""
+    tied = tied_lights(constraints, lights)
+    return [
+        k
+        for k, (light, constraint) in enumerate(
+            zip(lights, constraints_by_light(constraints, lights), strict=True)
+        )
+        if not (light.is_fixed or light.is_scalar or k in tied)
+        and (constraint is None or not (constraint.is_fixed or constraint.primaries is not None))
+    ]
+
+
 def _match_lights(
     name: str, lights: Sequence[BasisLight], where: str, *, only_keeps: bool = False
 ) -> list[int]:

@@ -93,7 +93,7 @@ def parse_level(value: Any, where: str, expected: str = "") -> Level:
         return Level(number / 100, is_share=True) if text.endswith("%") else Level(number)
     if is_number(value) and is_amount(value):
         return Level(float(value))
-    if _is_rgb(value):
+    if is_emission(value):
         return Level(as_rgb(value))
     raise ConstraintError(f"{where} is {value!r}: {expected}, of at most {BRIGHTEST:g}")
 
@@ -161,7 +161,7 @@ def parse_color(value: Any, where: str, *, duv: float = 0.0) -> RGB:
             rgb = hex_to_rgb(value)
         elif isinstance(value, str) and value.strip().upper().endswith("K"):
             return _parse_kelvin(float(value.strip()[:-1]), duv, where)
-        elif _is_rgb(value):
+        elif is_emission(value):
             rgb = np.array(value, dtype=np.float64)
         else:
             raise ColorError(f"{value!r} is not a colour")
@@ -197,6 +197,18 @@ def parse_strength(value: Any, where: str) -> float:
     return float(value)
 
 
+def parse_start(start: Any, where: str) -> dict[str, RGB]:
+    """Return emissions, three numbers, by name of light. Raises ConstraintError."""
+    if not isinstance(start, Mapping):
+        raise ConstraintError(f"{where} is {start!r}: expected emissions by name of light")
+    for name, emission in start.items():
+        if not is_emission(emission):
+            raise ConstraintError(
+                f"{where}.{name} is {emission!r}: expected an emission of three numbers >= 0"
+            )
+    return {str(name): as_rgb(emission) for name, emission in start.items()}
+
+
 def parse_count(value: Any, where: str) -> int | None:
     """Return the largest number of lights; None for any number."""
     if value is not None and not (type(value) is int and value > 0):
@@ -221,7 +233,8 @@ def _text(value: Any) -> str:
     return f"{value:g}" if is_number(value) else str(value)
 
 
-def _is_rgb(value: Any) -> bool:
+def is_emission(value: Any) -> bool:
+    """Return whether a value is three numbers >= 0, of an emission or a colour."""
     return (
         isinstance(value, Sequence)
         and not isinstance(value, str)

@@ -13,28 +13,26 @@ Only painted views count. Each has its own sums, so that a stroke costs no more 
 view.
 """
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from functools import partial, reduce
 from operator import add
 from typing import Any
 
-from lightpaint.arrays import Doubles
+from lightpaint.arrays import RGB, Doubles
 from lightpaint.basis.basis import Basis
 from lightpaint.basis.light_images import texel_lights
 from lightpaint.lighting.constraints.constraints import Constraints
+from lightpaint.lighting.constraints.start_lighting import start_weights
 from lightpaint.lighting.fit import Fit, Space
 from lightpaint.lighting.linear_problem import reduce_lights
 from lightpaint.lighting.live.live_sums import MAX_FILM_PIXELS, Films, SmallFilm
 from lightpaint.lighting.live.live_view import LiveView
+from lightpaint.lighting.loss.contrast import contrast_rows, contrast_term
+from lightpaint.lighting.loss.expected_lights import ExpectedLights, Wash
 from lightpaint.lighting.loss.image_prior import image_prior
 from lightpaint.lighting.loss.painting import unpainted_weight
 from lightpaint.lighting.loss.pixel_bins import block_side
-from lightpaint.lighting.loss.weight_penalty import (
-    dimming_factors,
-    pull_to_current,
-    strengthen,
-    weight_pull,
-)
+from lightpaint.lighting.loss.weight_penalty import pull_near_start, pull_to_current, weight_pull
 from lightpaint.lighting.normal_equations import NormalEquations
 from lightpaint.lighting.unknowns.gamut_bounds import solve_near_sides
 from lightpaint.lighting.unknowns.gamuts import Gamuts, PaintedLight
@@ -56,11 +54,6 @@ WHITE_WIDTH = 8
 #: Painted pixels that determine the colours lights may take, about.
 GAMUT_PIXELS = 2**8
 
-#: A pull on the weights, if there is one.
-_Pull = NormalEquations | None
-#: Views, with the pulls to the current lighting and to its colours, and what images should be.
-_Pulls = tuple[tuple[LiveView, ...], _Pull, _Pull, _Pull]
-
 
 class LiveSolver:
     """The lighting for paintings that change under a brush, updated in place.
@@ -73,17 +66,21 @@ class LiveSolver:
         self._views = tuple(views)
         self._basis = views[0].basis
         self._films: tuple[tuple[LiveView, ...], Films] | None = None
+        self._start: Mapping[str, RGB] = {}
         self.constrain(fit, constraints)
 
     def constrain(self, fit: Fit, constraints: Constraints) -> None:
         """Change fit and constraints. Raises ConstraintError for impossible ones."""
         reduction = reduce_lights(constraints, self._basis.lights, fit)
+        self._reference = start_weights(constraints.start, self._basis.lights)
         self._fit, self._constraints, self._reduction = fit, constraints, reduction
-        self._pulls: _Pulls | None = None
         self._untouched: Doubles | None = None
         self._within, self._gamuts_of = reduction, tuple[LiveView, ...]()
         self._is_kept_to = False  # whether the last answer kept to the constraints
+        self._films = None if self._start != constraints.start else self._films
+        self._start = constraints.start
         for view in self._views:
+            view.set_start(constraints.start)
             view.set_transform(fit.transform)
 
     def follow_planes(self) -> Basis:
@@ -92,7 +89,9 @@ class LiveSolver:
         Returns the first view's basis.
         """
         self._basis = self._views[0].basis
-        self._pulls, self._untouched, self._gamuts_of = None, None, ()
+        self._untouched, self._gamuts_of = None, ()
+        if self._start:  # whose look has these planes, too
+            self._films = None
         if self._films is not None:
             self._films[1].join()
         return self._basis
@@ -102,7 +101,7 @@ class LiveSolver:
         for view in self._views:
             if self.mode == "linear":
                 view.tiles()
-            else:
+            if self.mode != "linear" or self._fit.is_sketch:
                 self._film(view)
 
     @property
@@ -135,17 +134,9 @@ class LiveSolver:
         def allowed(weights: Doubles) -> Doubles:
             return clip_to_gamuts(reduction, snap_to_whites(reduction, weights))
 
+        pull = self._pull(views)
         if self.mode == "linear" and not while_moving:
-            equations = reduce(add, (x.tiles().equations(unpainted) for x in views))
-            pull = self._pull(views, self._basis.current_weights)
-            weights = best(equations, start)
-            if self._fit.colors != "gentle":
-                return weights
-            # Solve again, as `solve` does, with a stronger pull to the colours of lights that came
-            # out dim.
-            pull = self._pull(views, weights)
-            return best(equations, weights)
-        pull = self._pull(views, start)
+            return best(reduce(add, (x.tiles().equations(unpainted) for x in views)), start)
         films = self._joint_films(views)
         pixels = films.pixels(unpainted, self._fit.transform)
         # After a change of the painting the last answer may be worse than the current lighting.
@@ -155,7 +146,7 @@ class LiveSolver:
     def _unpainted_answer(self) -> Doubles:
         """Return the answer without paint, (n, 3)."""
         if self._untouched is None:
-            self._untouched = unpainted_weights(self._views, self._reduction)
+            self._untouched = _nearest(self._reference, self._views, self._reduction)
         return self._untouched
 
     def _with_gamuts(self, views: tuple[LiveView, ...]) -> Reduction:
@@ -169,7 +160,7 @@ class LiveSolver:
         if confined.gamuts is None or self._gamuts_of != views:
             painted = partial(PaintedLight.of, [x.painting for x in views], max_pixels=GAMUT_PIXELS)
             is_texel = texel_lights(self._basis.lights)
-            gamuts = Gamuts(painted, _power(views), self._basis.current_weights, is_texel)
+            gamuts = Gamuts(painted, _power(views), self._reference, is_texel)
             confined, self._gamuts_of = self._reduction.with_gamuts(gamuts), views
         else:
             confined.gamuts.refresh()
@@ -189,38 +180,36 @@ class LiveSolver:
         options: dict[str, Any] = {"steps": WHITE_STEPS, "method": method}
         return next_whites(equations, reduction, start, **options)[1].weights
 
-    def _pull(self, views: tuple[LiveView, ...], before: Doubles) -> NormalEquations | None:
-        """Return the pull on the weights, as `Problem.pull`; the part of the colours is cached.
-
-        before: (n, 3), an answer that tells which lights are dim.
-        """
-        if self._pulls is None or self._pulls[0] != views:
-            power = _power(views)
-            keeps_color = self._reduction.is_free & power.any(axis=1)
-            keeps_color &= ~texel_lights(self._basis.lights)
-            current, prefer = self._basis.current_weights, self._constraints.prefer_current
-
-            def pull_to(prefer: float, share: float) -> NormalEquations | None:
-                return weight_pull(
-                    power,
-                    current,
-                    self._fit,
-                    prefer_current=prefer,
-                    painted_share=share,
-                    keeps_color=keeps_color,
-                )
-
-            prior = image_prior(self._basis.lights, power, self._fit, 1.0)
-            self._pulls = views, pull_to(prefer, 0.0), pull_to(0.0, 1.0), prior
-        _, to_current, to_colors, prior = self._pulls
+    def _pull(self, views: tuple[LiveView, ...]) -> NormalEquations | None:
+        """Return the pull on the weights, as `Problem.pull`."""
+        power, lights = _power(views), self._basis.lights
         # The total importance, relative to the number of pixels.
-        pixels = sum(view.pixels for view in views)
-        share = sum(float(view.counts[0]) for view in views) / pixels
-        if to_colors is not None:
-            dimming = dimming_factors(self._basis.current_weights, before)
-            to_colors = strengthen(to_colors.scaled(share), dimming)
-        prior = None if prior is None else prior.scaled(share)
-        pulls = [pull for pull in (to_current, to_colors, prior) if pull is not None]
+        total = sum(float(view.counts[0]) for view in views)
+        share = total / sum(view.pixels for view in views)
+        expected, contrast = None, None
+        if self._fit.is_sketch:
+            wash = Wash.joined([self._film(view).wash(view.layers) for view in views])
+            contrast = contrast_term(contrast_rows(wash, self._fit.transform), total)
+            if self._fit.colors == "gentle":
+                expected = ExpectedLights.of(wash, self._reference)
+        pull = weight_pull(
+            power,
+            self._reference,
+            self._fit,
+            prefer_current=self._constraints.prefer_current,
+            painted_share=share,
+            keeps_color=self._reduction.is_free & power.any(axis=1) & ~texel_lights(lights),
+            expected=expected,
+        )
+        near = pull_near_start(
+            power,
+            self._reference,
+            self._fit,
+            near=self._constraints.near,
+            painted_share=share,
+        )
+        prior = image_prior(lights, power, self._fit, share, expected)
+        pulls = [x for x in (pull, near, prior, contrast) if x is not None]
         return reduce(add, pulls) if pulls else None
 
     def _joint_films(self, views: tuple[LiveView, ...]) -> Films:
@@ -240,11 +229,6 @@ class LiveSolver:
 def _power(views: Sequence[LiveView]) -> Doubles:
     """Return ‖Φᵢ‖² of all views together, (n, 3)."""
     return reduce(add, (view.basis.power for view in views))
-
-
-def unpainted_weights(views: Sequence[LiveView], reduction: Reduction) -> Doubles:
-    """Return the weights (n, 3) nearest to the current ones that constraints allow."""
-    return _nearest(views[0].basis.current_weights, views, reduction)
 
 
 def _nearest(weights: Doubles, views: Sequence[LiveView], reduction: Reduction) -> Doubles:

@@ -12,9 +12,11 @@ from lightpaint.colour.display.view_transform import ViewTransform
 from lightpaint.images.pixel_blocks import block_mean, block_sums, enlarged
 from lightpaint.lighting.live.tiles import MAX_CHEAP_LIGHTS, TiledEquations
 from lightpaint.lighting.loss.channel_loss import PaintedPixels, join_pixels
+from lightpaint.lighting.loss.expected_lights import Wash, wish_shares
 from lightpaint.lighting.loss.loss import STRIP_PIXELS
 from lightpaint.lighting.loss.reweighting import interpolate
 from lightpaint.lighting.normal_equations import NormalEquations
+from lightpaint.target.wish import Wish
 from lightpaint.threads import one_thread, parallel_map
 
 #: Maximum number of pixels of an averaged picture in display space: those of one strip.
@@ -22,6 +24,9 @@ MAX_FILM_PIXELS = STRIP_PIXELS
 
 #: Round-off, in float32, of an importance and its complement, whose sum is 1.
 IMPORTANCE_ROUND_OFF = 1e-6
+
+#: Returns the wishes of a painting's layers, with areas averaged over blocks of this side.
+LayerWishes = Callable[[int], Sequence[Wish]]
 
 #: Shares of a step to try in display space. An answer is one step from the last one.
 STEP_SHARES = (1.0, 0.5, 0.25)
@@ -188,6 +193,23 @@ class SmallFilm:
         """Return the averaged picture (h', w', 3) of a lighting, linear. weights: (n, 3)."""
         mixed = np.stack([w @ rows for w, rows in zip(weights.T, self.rows, strict=True)], axis=-1)
         return np.asarray(mixed.reshape(*self._size, 3), np.float32)
+
+    def wash(self, layers: LayerWishes) -> Wash:
+        """Return the paint, the look under it and the light of each lamp, averaged.
+
+        layers: returns the wishes of its layers, averaged over blocks of a side.
+        """
+        counts = self._counts
+        importance = np.minimum(self._a / np.where(counts > 0, counts, 1), 1)
+        painted, look = (x.T.reshape(*self._size, 3) for x in (self._painted, self._current))
+        small_importance = importance.reshape(self._size)
+        wishes = wish_shares(layers(self._side), painted, small_importance, look)
+        return Wash(self.rows, self._painted, self._current, importance, counts, wishes)
+
+    @cached_property
+    def _counts(self) -> Doubles:
+        """Number of pixels in each block without emitters, (p,)."""
+        return block_sums((~self._seen).astype(np.float64), self._side).ravel()
 
     def pixels(self, rest_weight: float, transform: ViewTransform | None) -> PaintedPixels:
         """Return the loss of these pixels; an average counts as much as all pixels in it."""

@@ -1,13 +1,19 @@
 """A view of a live painting, with sums that follow the brush."""
 
-from collections.abc import Collection
+from collections.abc import Collection, Mapping
 
 import numpy as np
 
-from lightpaint.arrays import Doubles, Floats, Slices
+from lightpaint.arrays import RGB, Doubles, Floats, Slices
 from lightpaint.basis.basis import Basis
 from lightpaint.colour.display.view_transform import ViewTransform
-from lightpaint.lighting.live.live_sums import MAX_FILM_PIXELS, PaintedTiles, SmallFilm
+from lightpaint.lighting.constraints.start_lighting import held_at_start
+from lightpaint.lighting.live.live_sums import (
+    MAX_FILM_PIXELS,
+    LayerWishes,
+    PaintedTiles,
+    SmallFilm,
+)
 from lightpaint.lighting.loss.paint_on_emitters import (
     affected_region,
     dark_threshold,
@@ -22,11 +28,19 @@ class LiveView:
     """A view whose painting changes under a brush, updated in place.
 
     image: (h, w, 3) linear; importance: (h, w). Painters write to these arrays, and then call
-    `update`.
+    `update`. layers: returns the wishes of its layers; by default, it has none.
     """
 
-    def __init__(self, basis: Basis, image: Floats, importance: Floats) -> None:
+    def __init__(
+        self,
+        basis: Basis,
+        image: Floats,
+        importance: Floats,
+        layers: LayerWishes = lambda _side: (),
+    ) -> None:
+        self._own_basis, self._start = basis, dict[str, RGB]()
         self.basis, self._image, self._importance = basis, image, importance
+        self.layers = layers
         self._counted = importance.copy()
         self._dark = dark_threshold(basis.current_look, basis.emitters_seen)
         self._transform: ViewTransform | None = None
@@ -71,9 +85,19 @@ class LiveView:
 
     def replace_planes(self, basis: Basis, lights: Collection[int]) -> None:
         """Continue with a basis in which the planes of some lights, by number, are others."""
-        self.basis, self._light = basis, None
+        self._own_basis, self._light = basis, None
+        self.basis = held_at_start(basis, self._start)
+        if self._start:  # whose look has the planes
+            self._display = None
         if self._display is not None:
             self._display.replace_planes(basis, lights)
+
+    def set_start(self, start: Mapping[str, RGB]) -> None:
+        """Set the lighting to start from, emissions by name: its look holds what is unpainted."""
+        if dict(start) != self._start:
+            self._start = dict(start)
+            self.basis = held_at_start(self._own_basis, self._start)
+            self._light, self._display = None, None
 
     def tiles(self) -> PaintedTiles:
         """Return the sums in linear light."""

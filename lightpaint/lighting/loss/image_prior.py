@@ -14,12 +14,14 @@ from lightpaint.arrays import Doubles
 from lightpaint.basis.light_images import light_images, texel_lights
 from lightpaint.basis.lights import Lights
 from lightpaint.lighting.fit import Fit
+from lightpaint.lighting.loss.expected_lights import ExpectedLights
 from lightpaint.lighting.loss.weight_penalty import pull_to_colors, pull_to_current
 from lightpaint.lighting.normal_equations import NormalEquations
 
 #: Strengths of the pulls to an even image, to its current colours, and to the current image.
 SMOOTHNESS, COLOR, STAYING = 1e-4, 1e-3, 1e-3
-#: Strength of the pull to the current colours where lights keep theirs (`colors` is `gentle`).
+#: Strength of the pull to the current colours where lights keep theirs (`colors` is `gentle`), and
+#: the painting asks for no others.
 GENTLE_COLOR = 1e-2
 #: Strength of the pulls at texels that are split again, relative to those at a level above: as much
 #: light in a ninth of the area is nine times as bright, and its square costs nine times as much.
@@ -30,15 +32,20 @@ SEEN_SHARE = 1e-3
 
 
 def image_prior(
-    lights: Lights, power: Doubles, fit: Fit, painted_share: float
+    lights: Lights,
+    power: Doubles,
+    fit: Fit,
+    painted_share: float,
+    expected: ExpectedLights | None = None,
 ) -> NormalEquations | None:
     """Return the penalty for all images in texels among `lights`; None if there are none.
 
-    power: (n, 3), ‖Φᵢ‖² of the lights' pictures. painted_share: see `weight_pull`.
+    power: (n, 3), ‖Φᵢ‖² of the lights' pictures. painted_share, expected: see `weight_pull`.
 
     For radiances f of an image, energy E of the picture of an even white one and current chroma c,
     it is E times the mean of s |∇f|² + COLOR |f − Y(f) c|² + STAYING (f − f₀)² over the image, on
-    which lengths are such that its area is 4π; s is SMOOTHNESS times that of the domain.
+    which lengths are such that its area is 4π; s is SMOOTHNESS times that of the domain. Where the
+    painting asks for other colours, c is the chroma of these.
     """
     images, strength = light_images(lights), fit.brightness * painted_share
     if not images or strength <= 0:
@@ -69,5 +76,9 @@ def image_prior(
     even = NormalEquations(M, np.zeros((3, n)), np.zeros(3))
     current = lights.current_weights
     staying = pull_to_current(STAYING * shares, current)
-    color = GENTLE_COLOR if fit.colors == "gentle" else COLOR
-    return even + staying + pull_to_colors(color * shares, current, texel_lights(lights))
+    if fit.colors != "gentle":
+        return even + staying + pull_to_colors(COLOR * shares, current, texel_lights(lights))
+    expected = expected or ExpectedLights.unchanged(current)
+    color = (GENTLE_COLOR + expected.clarity * (COLOR - GENTLE_COLOR))[:, None]
+    colors = pull_to_colors(color * shares, expected.emission, texel_lights(lights))
+    return even + staying + colors

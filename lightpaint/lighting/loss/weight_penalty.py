@@ -9,11 +9,13 @@ import numpy as np
 from lightpaint.arrays import Bools, Doubles
 from lightpaint.colour.color import LUMINANCE, luminance
 from lightpaint.lighting.fit import Fit
+from lightpaint.lighting.loss.expected_lights import ExpectedLights
 from lightpaint.lighting.normal_equations import NormalEquations
 
-#: Strength of the pull to the current colours: the share of a hue's effect on the picture that
+#: Strength of the pull to the expected colours, of lights of which the painting asks for no other
+#: colour, and of lights of which it clearly does: the share of a hue's effect on the picture that
 #: counts as an error, scaled by the share of painted pixels.
-COLOR_PULL = 1.5
+COLOR_PULL, CLEAR_PULL = 1.5, 0.02
 
 #: Largest factor of dimming that strengthens the pull to a light's colour.
 MAX_DIMMING = 100.0
@@ -27,33 +29,34 @@ def weight_pull(
     prefer_current: float,
     painted_share: float,
     keeps_color: Bools,
-    dimming: Doubles | None = None,
+    expected: ExpectedLights | None = None,
 ) -> NormalEquations | None:
     """Return the sum of all pulls on the weights; None without any.
 
     power, current: (n, 3), ‖Φᵢ‖² of the lights' pictures, and their current weights.
     prefer_current: see `Constraints`. painted_share: total importance relative to the number of
-    pixels, which scales the pull to the current colours. keeps_color: (n,), lights to which that
-    pull applies.
-    dimming: (n,), see `dimming_factors`; None if no light is known to be dim.
+    pixels, which scales the pull to the expected colours. keeps_color: (n,), lights to which that
+    pull applies. expected: the lights that the painting lets one expect; None for the current ones.
     """
-    gentle = COLOR_PULL * fit.brightness * painted_share if fit.colors == "gentle" else 0.0
+    gentle = fit.brightness * painted_share if fit.colors == "gentle" else 0.0
     added = (
         [pull_to_current(prefer_current * fit.brightness * power, current)]
         if prefer_current
         else []
     )
     if gentle:
-        dim = 1.0 if dimming is None else dimming[:, None]
-        added.append(pull_to_colors(gentle * dim * power, current, keeps_color))
+        expected = expected or ExpectedLights.unchanged(current)
+        strength = COLOR_PULL + expected.clarity * (CLEAR_PULL - COLOR_PULL)
+        strength *= gentle * dimming_factors(current, expected.emission)
+        added.append(pull_to_colors(strength[:, None] * power, expected.emission, keeps_color))
     return None if not added else added[0] if len(added) == 1 else added[0] + added[1]
 
 
 def dimming_factors(current: Doubles, weights: Doubles) -> Doubles:
     """Return the factor (n,) by which weights (n, 3) are dimmer than the current ones, or 1.
 
-    The pull to a light's colour is quadratic in its light, and would vanish for a dim light. This
-    factor makes it linear.
+    The pull to a light's colour is quadratic in its light, and would vanish for one that is
+    expected to be dim. This factor makes it linear.
     """
     current_luminance, luminances = (
         np.asarray(luminance(x), np.float64) for x in (current, weights)
@@ -71,25 +74,32 @@ def pull_to_current(power: Doubles, current: Doubles) -> NormalEquations:
     return NormalEquations(M, (power * current).T, (power * current**2).sum(axis=0))
 
 
-def pull_to_colors(power: Doubles, current: Doubles, lights: Bools) -> NormalEquations:
-    """Return the pull s Σᵢ ‖Φᵢ (wᵢ − Y(wᵢ) cᵢ)‖² of `lights`, (n,), to their current colours.
+def pull_near_start(
+    power: Doubles, start: Doubles, fit: Fit, *, near: float, painted_share: float
+) -> NormalEquations | None:
+    """Return the pull s Σᵢ ‖Φᵢ‖² (wᵢ − startᵢ)² to the lighting to start from; None without any.
 
-    power: (n, 3), s ‖Φᵢ‖². cᵢ is the current emission at luminance 1, white for a light that is
-    off. Dimming costs nothing; a change of hue costs its effect in each channel.
+    s is `near` times the share of painted pixels, so that it is small beside what the paint asks of
+    the lights that reach it, and settles what the paint leaves open. power, start: (n, 3).
+    """
+    strength = near * fit.brightness * painted_share
+    return pull_to_current(strength * power, start) if strength > 0 else None
+
+
+def pull_to_colors(power: Doubles, colors: Doubles, lights: Bools) -> NormalEquations:
+    """Return the pull s Σᵢ ‖Φᵢ (wᵢ − Y(wᵢ) cᵢ)‖² of `lights`, (n,), to colours.
+
+    power: (n, 3), s ‖Φᵢ‖². cᵢ is the emission of these colours, (n, 3), at luminance 1, and white
+    for a light that is off. Dimming costs nothing; a change of hue costs its effect in each
+    channel.
     """
     n = len(power)
-    M, across = np.zeros((3, n, n)), np.zeros((n, 3, 3))
-    for k in np.flatnonzero(lights):
-        now = float(luminance(current[k]))
-        color = current[k] / now if now > 0 else np.ones(3)
-        hue = np.eye(3) - np.outer(color, LUMINANCE)
-        across[k] = hue.T @ (power[k, :, None] * hue)
-        M[:, k, k] = np.diag(across[k])
-        np.fill_diagonal(across[k], 0)
+    now = np.asarray(luminance(colors), np.float64)[:, None]
+    chroma = np.where(now > 0, colors / np.where(now > 0, now, 1), 1.0)
+    hue = np.eye(3) - chroma[:, :, None] * LUMINANCE
+    across = np.einsum("ndc,nd,nde->nce", hue, power * lights[:, None], hue)
+    M = np.zeros((3, n, n))
+    each = np.arange(n)
+    M[:, each, each] = np.einsum("ncc->cn", across)
+    across[:, range(3), range(3)] = 0
     return NormalEquations(M, np.zeros((3, n)), np.zeros(3), across)
-
-
-def strengthen(pull: NormalEquations, dimming: Doubles) -> NormalEquations:
-    """Return the pull of `pull_to_colors`, multiplied for each light. dimming: (n,)."""
-    across = None if pull.coupling is None else dimming[:, None, None] * pull.coupling
-    return NormalEquations(dimming[:, None] * pull.M, pull.b, pull.target_norm2, across)

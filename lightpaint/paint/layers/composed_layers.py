@@ -7,6 +7,7 @@ import numpy as np
 
 from lightpaint.arrays import Bools, Floats
 from lightpaint.errors import PaintError
+from lightpaint.images.pixel_blocks import block_sums
 from lightpaint.paint.layers.composition import (
     AlbedoSource,
     GradientPixels,
@@ -83,6 +84,7 @@ class ComposedLayers:
         }
         self._shown = self._with_accents(layers)
         self._lower = LowerLayers(self.current)
+        self._coverages: dict[tuple[int, int], tuple[tuple[ShownLayer, int], Floats]] = {}
         self.target = (
             compose(self._shown, self.current, self.full_region)
             if stored is None
@@ -104,10 +106,13 @@ class ComposedLayers:
         """Return the accent of a layer; 1 for a hidden one."""
         return next((shown.accent for shown in self._shown if shown.layer.id == number), 1.0)
 
-    def wishes(self) -> tuple[Wish, ...]:
-        """Return what each visible layer covers and no layer above it, the lowest first."""
+    def wishes(self, side: int = 1) -> tuple[Wish, ...]:
+        """Return what each visible layer covers and no layer above it, the lowest first.
+
+        side: of the blocks of pixels that areas are averaged over.
+        """
         shown = [x for x in self._shown if x.layer.kind != "weigh"]
-        areas = [self._coverage(x) for x in shown]
+        areas = [self._coverage(x, side) for x in shown]
         return tuple(
             Wish(
                 self._stack[x.layer.id].name,
@@ -120,11 +125,18 @@ class ComposedLayers:
             if area.any()
         )
 
-    def _coverage(self, shown: ShownLayer) -> Floats:
-        """Return how much of each pixel a layer covers, (h, w) from 0 to 1."""
+    def _coverage(self, shown: ShownLayer, side: int) -> Floats:
+        """Return how much of each block of pixels a layer covers, (h', w') from 0 to 1."""
+        key, revision = (shown.layer.id, side), shown.pixels.revision
+        if side > 1 and key in self._coverages and self._coverages[key][0] == (shown, revision):
+            return self._coverages[key][1]
         coverage = np.zeros(self.size, np.float32)
         if not is_empty(bounds := shown.pixels.bounds):
             coverage[slices(bounds)] = np.minimum(shown.pixels.coverage(bounds), 1)
+        if side > 1:
+            pixels = block_sums(np.ones(self.size, np.float32), side)
+            coverage = np.asarray(block_sums(coverage, side) / pixels, np.float32)
+            self._coverages[key] = (shown, revision), coverage
         return coverage
 
     def _group_name(self, number: int) -> str:

@@ -10,6 +10,8 @@ of views but the first as `plane/3@1`.
 
 from lightpaint.paint.protocol.answer_parts import (
     Advice,
+    AnswerChoice,
+    AnswerColors,
     Closeness,
     Findings,
     LightAnswer,
@@ -19,6 +21,7 @@ from lightpaint.paint.protocol.base import Message
 from lightpaint.paint.protocol.events import (
     EVENTS,
     Acknowledgement,
+    AnswerChoices,
     AnswerUpdate,
     CanvasPatch,
     Closing,
@@ -46,6 +49,7 @@ from lightpaint.paint.protocol.light_requests import (
     RemoveLight,
     SetMaster,
     ShowRig,
+    StartFromLamps,
     TieLights,
 )
 from lightpaint.paint.protocol.message_parts import (
@@ -131,6 +135,9 @@ __all__ = [
     "AddLight",
     "AddReference",
     "Advice",
+    "AnswerChoice",
+    "AnswerChoices",
+    "AnswerColors",
     "AnswerUpdate",
     "AnyRequest",
     "ApplyPreset",
@@ -208,6 +215,7 @@ __all__ = [
     "SetMaster",
     "ShowPrevious",
     "ShowRig",
+    "StartFromLamps",
     "StartOver",
     "StepInfo",
     "StepList",

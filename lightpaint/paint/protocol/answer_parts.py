@@ -1,6 +1,7 @@
 """Records inside events that say how close an answer is, and what each light does for it."""
 
 from dataclasses import dataclass, field
+from typing import Literal
 
 from lightpaint.arrays import RGB
 from lightpaint.paint.protocol.base import OPTIONAL
@@ -30,6 +31,23 @@ class Closeness:
     delta_e: float
     delta_e_present: float
     sentences: tuple[str, ...]
+
+
+#: The choices of `colors` whose answers can be compared: each lamp as it is, as the paint asks, and
+#: any colour.
+AnswerColors = Literal["own", "gentle", "free"]
+
+
+@dataclass(frozen=True)
+class AnswerChoice:
+    """The exact answer with one choice of `colors`. Its picture is `choice/COLORS`, in each view.
+
+    is_chosen: whether it is the answer itself. delta_e: its mean ΔE over the paint.
+    """
+
+    colors: AnswerColors
+    is_chosen: bool
+    delta_e: float
 
 
 @dataclass(frozen=True)

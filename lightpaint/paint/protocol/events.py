@@ -11,7 +11,7 @@ import numpy as np
 import numpy.typing as npt
 
 from lightpaint.arrays import Doubles, Floats
-from lightpaint.paint.protocol.answer_parts import Findings
+from lightpaint.paint.protocol.answer_parts import AnswerChoice, Findings
 from lightpaint.paint.protocol.base import OPTIONAL, Message
 from lightpaint.paint.protocol.message_parts import (
     Camera,
@@ -70,6 +70,8 @@ class SessionState(EditState, Message, kind="state"):
     the session has no steps yet. stroke: number of the last stroke that arrived. command: solves
     for the exported paintings. is_back: the client had the session before, and no other client
     since; also true if unasked. weights: (lights, 3) float64, the last answer.
+
+    choices: as the last `choices` had them; empty once the session has changed since.
     """
 
     version: int
@@ -97,6 +99,7 @@ class SessionState(EditState, Message, kind="state"):
     answer: Findings
     weights: Doubles
     is_back: bool = True
+    choices: tuple[AnswerChoice, ...] = ()
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -236,6 +239,19 @@ class ReferenceList(Message, kind="references"):
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
+class AnswerChoices(Message, kind="choices"):
+    """The answers with other light colours, to choose from. Unasked, once the exact answer rests.
+
+    version: of the session. choices: from the least freedom to the most; empty without paint, and
+    where no light can change its colour. resources: numbers of their pictures.
+    """
+
+    version: int
+    choices: tuple[AnswerChoice, ...]
+    resources: Mapping[str, int]
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
 class Rig(Message, kind="rig"):
     """The places of all lights. Sent after every move, once requested.
 
@@ -300,6 +316,7 @@ EVENTS: Mapping[str, type[Any]] = {
         PreviousAnswer,
         LookList,
         ReferenceList,
+        AnswerChoices,
         ProgressReport,
         TaskStarted,
         TaskStopped,

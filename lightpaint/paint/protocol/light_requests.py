@@ -49,6 +49,16 @@ class SetMaster(Message, kind="set_master"):
     level: float
 
 
+@dataclass(frozen=True)
+class StartFromLamps(Message, kind="start_from_lamps"):
+    """The lights as they are now become the lighting that the solve starts from and stays near, and
+    locked ones are released; or this ends. One step. Answered by `answer`. The setting `near` says
+    how near.
+    """
+
+    is_on: bool = True
+
+
 #: Largest step between the pixels of a dragged light's picture.
 MAX_STEP = 8
 
@@ -61,6 +71,9 @@ def _check_step(step: int) -> None:
 @dataclass(frozen=True)
 class MoveLights(Message, kind="move"):
     """New places, targets and cones of lights, by name. Answered by `answer`; `rig` follows.
+
+    A light that is moved keeps its level from then on, as if it were locked, until it is released
+    or put back.
 
     poses: changed fields of `lightpaint.Pose`: position, target, cutoff and beam; an empty object
     restores a light's place from the scene; without any pose, a drag ends and its light goes back.

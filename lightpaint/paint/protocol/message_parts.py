@@ -258,7 +258,8 @@ class EditState:
     weight. selection: the part of the painting that strokes keep to.
 
     earlier: constraints of lights that are locked or off, by name, from before they were, to be
-    sent when they are released.
+    sent when they are released. kept: names of those that are locked only since they were moved.
+    is_started: whether the solve starts from lamps that were set by hand.
     """
 
     history: HistoryInfo | None = field(default=None, metadata=OPTIONAL)
@@ -273,6 +274,8 @@ class EditState:
     master: float | None = field(default=None, metadata=OPTIONAL)
     selection: SelectionInfo | None = field(default=None, metadata=OPTIONAL)
     earlier: Mapping[str, Mapping[str, Any]] | None = field(default=None, metadata=OPTIONAL)
+    kept: tuple[str, ...] | None = field(default=None, metadata=OPTIONAL)
+    is_started: bool | None = field(default=None, metadata=OPTIONAL)
 
 
 #: Tone of a message to the user.

@@ -21,6 +21,7 @@ from lightpaint.paint.protocol.light_requests import (
     RemoveLight,
     SetMaster,
     ShowRig,
+    StartFromLamps,
     TieLights,
 )
 from lightpaint.paint.protocol.painting_requests import (
@@ -67,8 +68,8 @@ class Hello(Message, kind="hello"):
 class ChangeSettings(Message, kind="change_settings"):
     """Settings of the answer, as in `Fit`. Answered by `answer`.
 
-    settings: of hold, space, colors, literal, prefer_current, sparse; null for the default that
-    follows from the painting.
+    settings: of hold, space, colors, literal, prefer_current, near, sparse; null for the default
+    that follows from the painting.
     """
 
     settings: Mapping[str, Any]
@@ -170,6 +171,7 @@ AnyRequest = (
     | ConstrainLight
     | ConstrainLights
     | SetMaster
+    | StartFromLamps
     | MoveLights
     | PointLight
     | AddLight

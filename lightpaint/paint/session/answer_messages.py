@@ -204,12 +204,17 @@ def wish_deliveries(analyses: Sequence[Analysis]) -> tuple[WishDelivery, ...]:
     )
 
 
-def unpainted_text(*, is_asked: bool, is_white: bool, is_moved: bool = False) -> str:
+def unpainted_text(
+    *, is_asked: bool, is_white: bool, is_moved: bool = False, is_started: bool = False
+) -> str:
     """Describe the answer while nothing is painted, or all paint is undone.
 
     is_asked: whether there are constraints. is_white: whether all lights have to be white.
-    is_moved: whether lights were moved or added.
+    is_moved: whether lights were moved or added. is_started: whether the solve starts from lamps
+    that were set by hand.
     """
+    if is_started:
+        return "Nothing is painted: the answer is your lamps, as you set them."
     stay = "the answer is the current lighting"
     if is_moved:
         stay += ", from where you put the lights"

@@ -40,6 +40,8 @@ def edit_state(history: History, live_answer: LiveAnswer, views: Canvases) -> di
         ),
         "master": requests.master,
         "earlier": dict(requests.earlier),
+        "kept": requests.kept,
+        "is_started": bool(requests.start),
         "selection": SelectionInfo(
             tuple(view.selection.bounds for view in views),
             sum(view.selection.revision for view in views),
@@ -75,6 +77,8 @@ def unpainted_headline(live_answer: LiveAnswer) -> str:
     is_other = not np.allclose(live_answer.weights, live_answer.basis.current_weights)
     is_asked = bool(live_answer.requests.lights) or (is_other and not is_white)
     is_moved = bool(live_answer.requests.placed)
+    if live_answer.requests.start and not live_answer.requests.lights:
+        return unpainted_text(is_asked=False, is_white=False, is_started=True)
     return unpainted_text(is_asked=is_asked, is_white=is_white, is_moved=is_moved)
 
 

@@ -3,10 +3,17 @@
 from collections.abc import Iterable, Mapping, Sequence
 from typing import Any
 
+import numpy as np
+
+from lightpaint.arrays import Doubles
 from lightpaint.basis.lights import Lights
+from lightpaint.colour.color import luminance
 from lightpaint.errors import PaintError
 from lightpaint.paint import protocol
 from lightpaint.paint.store.session_requests import TITLES, SessionRequests
+
+#: Part of its level in the scene at which a light counts as off.
+OFF = 1e-4
 
 #: Messages that change the requests in effect.
 RequestChange = (
@@ -16,16 +23,17 @@ RequestChange = (
     | protocol.RemoveLight
     | protocol.TieLights
     | protocol.SetMaster
+    | protocol.StartFromLamps
     | protocol.ChangeSettings
 )
 
 
 def changed_requests(
-    requests: SessionRequests, lights: Lights, message: RequestChange
+    requests: SessionRequests, lights: Lights, message: RequestChange, weights: Doubles
 ) -> tuple[str, SessionRequests]:
     """Return the label of a change for undo, and the requests after it.
 
-    Raises LightpaintError if it is impossible.
+    weights: (n, 3), the answer before. Raises LightpaintError if it is impossible.
     """
     match message:
         case protocol.ConstrainLight():
@@ -37,6 +45,7 @@ def changed_requests(
             return message.label or ", ".join(message.constraints), changed
         case protocol.MoveLights():
             changed = move_lights(requests, lights, message.poses)
+            changed = keep_moved_lights(changed, lights, message.poses, weights)
             return _label_of_moves(message.poses), changed
         case protocol.RemoveLight():
             return f"remove {message.name}", remove_light(requests, lights, message.name)
@@ -45,6 +54,13 @@ def changed_requests(
         case protocol.SetMaster():
             changed = requests.with_master(message.level)
             return f"master {100 * message.level:.0f} %", changed
+        case protocol.StartFromLamps():
+            if not message.is_on:
+                return "start from the scene", requests.with_start({})
+            pairs = zip(lights, weights, strict=True)
+            start = {light.name: emission for light, emission in pairs if not light.is_fixed}
+            start = {name: emission.tolist() for name, emission in start.items()}
+            return "start from my lamps", requests.with_start(start)
         case protocol.ChangeSettings():
             changed = requests.with_values(message.settings)
             return ", ".join(TITLES[key] for key in message.settings), changed
@@ -95,6 +111,32 @@ def move_lights(
     """Return the requests with the poses of some lights replaced, by their names."""
     _check_names(poses, lights)
     return requests.with_poses(poses)
+
+
+def keep_moved_lights(
+    requests: SessionRequests,
+    lights: Lights,
+    poses: Mapping[str, Mapping[str, Any]],
+    weights: Doubles,
+) -> SessionRequests:
+    """Return requests in which lights that a person has moved keep their level, until released.
+
+    Those put back in their place are released. A light that the answer had switched off gets its
+    level in the scene: somebody who aims it wants to see it. poses: the changes, by name. weights:
+    (n, 3), of the answer before.
+    """
+    for name, change in poses.items():
+        light = lights[lights.names.index(name)]
+        if not change:
+            requests = requests.without_kept(name) if name in requests.kept else requests
+        elif not (light.is_fixed or requests.holds(name)):
+            emission = weights[lights.names.index(name)]
+            if luminance(emission) <= OFF * luminance(np.array(light.emission)):
+                emission = np.array(light.emission)
+            if emission.any():
+                level = float(emission[0]) if light.is_scalar else emission.tolist()
+                requests = requests.with_kept(name, level)
+    return requests
 
 
 def remove_light(requests: SessionRequests, lights: Lights, name: str) -> SessionRequests:

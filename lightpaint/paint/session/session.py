@@ -101,6 +101,11 @@ class Session:
         return self._edits.version
 
     @property
+    def ground(self) -> int:
+        """A number that grows when another look lies under the painting."""
+        return self._edits.ground
+
+    @property
     def basis(self) -> Basis:
         """Basis of the first view; its lights are those of all views."""
         return self.views[0].basis
@@ -280,7 +285,8 @@ class Session:
         if isinstance(message, protocol.MoveLights) and not message.poses:
             self._edits.reset_slider()
             return self.answer_update(poses=dict(self.requests.poses))
-        label, requests = changed_requests(self.requests, self.basis.lights, message)
+        lights, weights = self.basis.lights, self.weights
+        label, requests = changed_requests(self.requests, lights, message, weights)
         if is_move:
             self._edits.check_places(requests.placed)
         if getattr(message, "is_final", True):

@@ -8,9 +8,11 @@ import numpy.typing as npt
 
 from lightpaint.arrays import Doubles, Floats
 from lightpaint.basis.basis import Basis
+from lightpaint.basis.denoised_mixes import denoise_mix
 from lightpaint.colour.display.view_transform import ViewTransform
 from lightpaint.errors import LightpaintError, PaintError
 from lightpaint.lighting.constraints.constraints import Constraints
+from lightpaint.lighting.constraints.start_lighting import start_weights
 from lightpaint.paint import protocol
 from lightpaint.paint.layers.layer import PAINTING_ID
 from lightpaint.paint.layers.layer_stack import LayerStack
@@ -38,6 +40,7 @@ class SessionEdits:
         views: Canvas of each view.
         live_answer: Requests, and the last answer.
         history, references: The steps, and the reference pictures.
+        ground: A number that grows when another look lies under the painting.
         version: A number that grows with every change.
         stroke: Number of the last stroke that arrived.
     """
@@ -53,7 +56,8 @@ class SessionEdits:
         constraints: Constraints,
         plane_source: PlaneSource,
     ) -> None:
-        self.version, self.stroke = 0, -1
+        self.version, self.stroke, self.ground = 0, -1, 0
+        self._scene_looks, self._shown_start = list(current_looks), dict[str, Sequence[float]]()
         self._store, self._transform, self._kept_step = store, transform, 0
         self._answered_step: int | None = None
         try:
@@ -76,6 +80,7 @@ class SessionEdits:
         self.history = History(store, self.views, self.live_answer)
         self.references = ReferenceTable(store, transform)
         self._update_answer()
+        self.ground = 0  # pages get all pictures of a new session
 
     @property
     def bases(self) -> tuple[Basis, ...]:
@@ -295,8 +300,11 @@ class SessionEdits:
         except DamagedError:  # the store remarks on it
             self.mend()
             self.views.improve(moved, current_looks)
+        self._scene_looks, self._shown_start = list(current_looks), {}
         self.live_answer.set_views(self.views.live)
+        ground = self.ground
         self._update_answer()
+        self.ground = ground  # pages get all pictures of new bases
 
     def renew_planes(self, names: Sequence[str]) -> None:
         """Take the planes of moved lights again after they have been rendered."""
@@ -307,6 +315,21 @@ class SessionEdits:
     def _update_answer(self) -> None:
         self.version += 1
         self._moved_lights.follow(self.live_answer.requests.placed, self.views, self.live_answer)
+        self._follow_start()
         self.live_answer.solve()
         if not self.is_open and self._answered_step != self._store.last_id:
             self.keep_answer()
+
+    def _follow_start(self) -> None:
+        """Lay the look of the lighting to start from under the painting, unless it is there."""
+        start = dict(self.live_answer.requests.start)
+        if start == self._shown_start:
+            return
+        self._shown_start = start
+        bases, looks = [view.basis for view in self.views], self._scene_looks
+        if start:
+            weights = start_weights(self.live_answer.constraints().start, bases[0].lights)
+            looks = [denoise_mix(basis, weights) for basis in bases]
+        self.views.improve(bases, looks)
+        self.live_answer.set_views(self.views.live)
+        self.ground += 1

@@ -17,6 +17,7 @@ from lightpaint.lighting.analysis.appearance.error_place import NOTICED
 from lightpaint.lighting.analysis.appearance.unpainted_change import unpainted_change
 from lightpaint.lighting.analysis.noise.noise_correction import correct_noise
 from lightpaint.lighting.constraints.constraints import Constraints
+from lightpaint.lighting.fit import Colors
 from lightpaint.lighting.problem import Problem
 from lightpaint.lighting.solution import Solution
 from lightpaint.lighting.solve import solution_of
@@ -69,10 +70,18 @@ class SessionSnapshot:
 
     def solution(self) -> Solution | None:
         """Return the exact answer; None if nothing is painted. Raises LightpaintError."""
-        if not self.painted_views:
-            return None
-        solution = solution_of(self._problem(constraints=self.constraints, fit=self.settings))
-        if self.settings.corrects_noise(is_known=self.bases[0].knows_noise):
+        return self._exact_solution(self.settings) if self.painted_views else None
+
+    def solution_with(self, colors: Colors) -> Solution:
+        """Return the exact answer with another choice of light colours, of a painted session.
+
+        Raises ConstraintError if a constraint excludes it.
+        """
+        return self._exact_solution(replace(self.settings, colors=colors))
+
+    def _exact_solution(self, settings: Settings) -> Solution:
+        solution = solution_of(self._problem(constraints=self.constraints, fit=settings))
+        if settings.corrects_noise(is_known=self.bases[0].knows_noise):
             solution = correct_noise(solution)
         return solution
 

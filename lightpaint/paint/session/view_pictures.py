@@ -63,10 +63,7 @@ def offer_view(
             table.withdraw(name)
             name = name_in_view(f"plane/{k}", view.view)
         offer(f"thumb/{k}", partial(_thumbnail, table, name, basis))
-    offer("present", lambda: as_halves(view.current))
-    # Layers lie on it, and the page composes them to the bit.
-    offer("ground", lambda: view.current.copy())
-    offer("look", lambda: picture_table.display_thumbnail(view.current, transform))
+    offer_ground(table, view, transform)
     offer("painting", lambda: view.image.copy())
     offer("importance", lambda: view.importance.copy())
     if basis.features is not None:
@@ -75,6 +72,18 @@ def offer_view(
     if basis.objects is not None:
         index = basis.objects.index
         offer("objects", lambda: index.astype(np.int16))
+
+
+def offer_ground(table: PictureTable, view: Canvas, transform: ViewTransform) -> None:
+    """Offer the look under the painting of a view, in several forms."""
+
+    def offer(name: str, make: Any) -> None:
+        table.offer(name_in_view(name, view.view), make)
+
+    offer("present", lambda: as_halves(view.current))
+    # Layers lie on it, and the page composes them to the bit.
+    offer("ground", lambda: view.current.copy())
+    offer("look", lambda: picture_table.display_thumbnail(view.current, transform))
 
 
 def offer_layers(table: PictureTable, views: Canvases) -> None:

@@ -17,7 +17,11 @@ from lightpaint.pipeline.job.settings import Settings
 from lightpaint.validation import is_amount, is_number
 
 #: Settings of the answer: those of its fit, and those of all lights together.
-FIT_KEYS, ALL_LIGHTS_KEYS = ("hold", "space", "colors", "literal"), ("prefer_current", "sparse")
+FIT_KEYS = ("hold", "space", "colors", "literal")
+ALL_LIGHTS_KEYS = ("prefer_current", "near", "sparse")
+
+#: Strength of the pull to lamps that somebody started from, if nobody has set another.
+DEFAULT_NEAR = 0.1
 
 #: Keys that hold a light at a level.
 HOLD_KEYS = ("lock", "off")
@@ -32,6 +36,7 @@ TITLES = {
     "colors": "Light colours",
     "literal": "Read the paint as",
     "prefer_current": "Lights that make little difference",
+    "near": "Near my lamps",
     "sparse": "Number of lights",
 }
 
@@ -47,6 +52,9 @@ class SessionRequests:
     emission, as in a `NewEmitter`.
     master: factor of all lights but fixed ones, applied to the answer.
     earlier: constraints of held lights, by name, which apply again once they are released.
+    kept: names of the lights that are locked only since they were moved.
+    start: emissions by name of light, set by hand, that the solve starts from; none for those of
+    the scene.
     """
 
     lights: Mapping[str, Mapping[str, Any]] = field(default_factory=dict)
@@ -56,6 +64,8 @@ class SessionRequests:
     added: Mapping[str, Mapping[str, Any]] = field(default_factory=dict)
     master: float = 1.0
     earlier: Mapping[str, Mapping[str, Any]] = field(default_factory=dict)
+    kept: tuple[str, ...] = ()
+    start: Mapping[str, Sequence[float]] = field(default_factory=dict)
 
     @classmethod
     def of(cls, data: Mapping[str, Any]) -> "SessionRequests":
@@ -65,7 +75,9 @@ class SessionRequests:
         added = {name: dict(light) for name, light in data.get("added", {}).items()}
         lights, values = dict(data.get("lights", {})), dict(data.get("values", {}))
         earlier = {name: dict(entry) for name, entry in data.get("earlier", {}).items()}
-        requests = cls(lights, ties, values, poses, added, earlier=earlier)
+        kept = tuple(data.get("kept", ()))
+        start = {name: tuple(emission) for name, emission in data.get("start", {}).items()}
+        requests = cls(lights, ties, values, poses, added, earlier=earlier, kept=kept, start=start)
         return requests.with_master(data.get("master", 1.0))
 
     def as_json(self) -> dict[str, Any]:
@@ -81,6 +93,8 @@ class SessionRequests:
             **({"added": added} if added else {}),
             **({"master": self.master} if self.master != 1 else {}),
             **({"earlier": {k: dict(v) for k, v in self.earlier.items()}} if self.earlier else {}),
+            **({"kept": list(self.kept)} if self.kept else {}),
+            **({"start": {k: list(v) for k, v in self.start.items()}} if self.start else {}),
         }
 
     @property
@@ -109,7 +123,38 @@ class SessionRequests:
         tied = next((names for names in self.ties if name in names), ())
         lights = _hold_once({**self.lights, name: requested}, (name, *tied))
         before = {k: v for k, v in self.lights.get(name, {}).items() if k not in HOLD_KEYS}
-        return replace(self, lights=lights)._with_earlier({name: before, **self.earlier})
+        kept = tuple(other for other in self.kept if other != name)
+        changed = replace(self, lights=lights, kept=kept)
+        return changed._with_earlier({name: before, **self.earlier})
+
+    def with_kept(self, name: str, emission: Any) -> "SessionRequests":
+        """Return these requests with a light, which is not held, locked since it was moved.
+
+        emission: three numbers, or one for a light that has only one.
+        """
+        locked = self.with_light(name, {"lock": emission})
+        return replace(locked, kept=(*locked.kept, name))
+
+    def without_kept(self, name: str) -> "SessionRequests":
+        """Return these requests with such a light released."""
+        return self.with_light(name, self.earlier.get(name, {}))
+
+    def with_start(self, start: Mapping[str, Sequence[float]]) -> "SessionRequests":
+        """Return these requests with a lighting to start from, emissions by name; locked lights are
+        released. Without any, the solve starts from the scene again, and nothing is near.
+        """
+        locked = [name for name, entry in self.lights.items() if _holds(entry) and "lock" in entry]
+        released = self
+        for name in locked if start else ():
+            released = released.with_light(name, self.earlier.get(name, {}))
+        values = {key: value for key, value in self.values.items() if start or key != "near"}
+        emissions = {name: tuple(emission) for name, emission in start.items()}
+        return replace(released, start=emissions, values=values)
+
+    def holds(self, name: str) -> bool:
+        """Return whether a light is held at a level, by itself or with others on its dimmer."""
+        tied = next((names for names in self.ties if name in names), ())
+        return any(_holds(self.lights.get(x, {})) for x in (name, *tied))
 
     def with_earlier(self, earlier: Mapping[str, Mapping[str, Any]]) -> "SessionRequests":
         """Return these requests with other constraints that apply to held lights once they are
@@ -119,8 +164,8 @@ class SessionRequests:
 
     def _with_earlier(self, earlier: Mapping[str, Mapping[str, Any]]) -> "SessionRequests":
         is_held = {name for name, entry in self.lights.items() if _holds(entry)}
-        kept = {name: entry for name, entry in earlier.items() if entry and name in is_held}
-        return replace(self, earlier=kept)
+        remaining = {name: entry for name, entry in earlier.items() if entry and name in is_held}
+        return replace(self, earlier=remaining, kept=tuple(x for x in self.kept if x in is_held))
 
     def with_poses(self, poses: Mapping[str, Mapping[str, Any]]) -> "SessionRequests":
         """Return these requests with changed poses of lights; an empty change puts one back."""
@@ -147,6 +192,8 @@ class SessionRequests:
             poses=others(self.poses),
             added=others(self.added),
             earlier=others(self.earlier),
+            kept=tuple(x for x in self.kept if x != name),
+            start={key: value for key, value in self.start.items() if key != name},
         )
 
     def with_ties(self, ties: Sequence[Sequence[str]]) -> "SessionRequests":
@@ -201,6 +248,8 @@ class SessionRequests:
     def constraints(self) -> Constraints:
         """Return the constraints on the lights. Raises ConstraintError for invalid ones."""
         joint = {key: self.values[key] for key in ALL_LIGHTS_KEYS if key in self.values}
+        if self.start:
+            joint = {"near": DEFAULT_NEAR, **joint, "start": self.start}
         return Constraints.of(self.lights, tie=self.ties, **joint)
 
     def settings(self, base: Settings) -> Settings:

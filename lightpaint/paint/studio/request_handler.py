@@ -22,9 +22,11 @@ from lightpaint.paint.rig.look_comparison import LookComparison
 from lightpaint.paint.session.moved_lights import Placed
 from lightpaint.paint.session.session import Session
 from lightpaint.paint.session.session_state import state_fields
+from lightpaint.paint.session.view_pictures import offer_ground
 from lightpaint.paint.session_access import SessionAccess
 from lightpaint.paint.store.canvas_pixels import Pixels
 from lightpaint.paint.store.session_requests import SessionRequests
+from lightpaint.paint.studio.answer_choices import ChoiceSolver
 from lightpaint.paint.studio.background_jobs import BackgroundJobs
 from lightpaint.paint.studio.exact_answers import ExactAnswers
 from lightpaint.paint.studio.layer_imports import LayerImports
@@ -41,6 +43,7 @@ class RequestHandler:
         comparison: Shows looks whose lights hang elsewhere.
         jobs: Exports, verifies, explains and previews.
         exact_answers: Looks for a new answer after each change.
+        choices: Has the answers with other light colours.
         threads: Runs searches for places of lights.
     """
 
@@ -52,11 +55,13 @@ class RequestHandler:
         comparison: LookComparison,
         jobs: BackgroundJobs,
         exact_answers: ExactAnswers,
+        choices: ChoiceSolver,
         threads: BackgroundThreads,
     ) -> None:
         self._access, self._publisher = access, publisher
         self._mover, self._jobs, self._exact_answers = mover, jobs, exact_answers
-        self._comparison = comparison
+        self._comparison, self._choices = comparison, choices
+        self._shown_ground = 0  # number of the look under the painting that pages have
         self._subjects = mover.rig.subjects
         self._imports = LayerImports(access, publisher, threads, exact_answers.notify)
         self._references = ReferenceImports(access, publisher, threads)
@@ -78,7 +83,8 @@ class RequestHandler:
                 progress = self._publisher.last_progress  # of the first picture
                 return SessionPending(**fields, text=self._access.failure_text, progress=progress)
             findings = self._exact_answers.findings_of(session)
-            fields |= {"answer": findings, "weights": session.weights}
+            choices = self._choices.choices_at(session.version)
+            fields |= {"answer": findings, "weights": session.weights, "choices": choices}
             return SessionState(**fields, **self._state_fields(session), **session.edit_state)
 
     def greet(self, *, is_back: bool) -> Message:
@@ -158,11 +164,23 @@ class RequestHandler:
     ) -> list[Message]:
         """Show the lights that a request has moved, and return its answers.
 
-        These are the whole state if lights were added or removed. send: receives messages about
+        These are the whole state if lights were added or removed, or if another look lies under the
+        painting. send: receives messages about
         moved lights; by default they are published at once. view: as in `LightMover.follow`.
         """
         has_others = self._mover.follow(send or self._publisher.publish, view)
+        has_others |= self._offer_new_ground()
         return [self.state(), *self._mover.rig_messages()] if has_others else messages
+
+    def _offer_new_ground(self) -> bool:
+        """Offer the look under the painting if it is another; return whether it is."""
+        session = self._access.session
+        if session.ground == self._shown_ground:
+            return False
+        self._shown_ground = session.ground
+        for view in session.views:
+            offer_ground(self._publisher.pictures, view, session.transform)
+        return True
 
     def _hang_lights(self, label: str, placed: Placed, before: Placed) -> bool:
         """Move lights and add others, by name, in one step, and notify pages.

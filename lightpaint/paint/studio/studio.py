@@ -11,6 +11,7 @@ from typing import Any
 import numpy.typing as npt
 
 from lightpaint.lighting.answer.lighting import Lighting
+from lightpaint.lighting.solution import Solution
 from lightpaint.paint import protocol
 from lightpaint.paint.background_threads import (
     BackgroundThreads,
@@ -37,6 +38,7 @@ from lightpaint.paint.store.canvas_pixels import Pixels
 from lightpaint.paint.store.history_steps import Identity
 from lightpaint.paint.store.session_requests import SessionRequests
 from lightpaint.paint.store.store import Store
+from lightpaint.paint.studio.answer_choices import ChoiceSolver
 from lightpaint.paint.studio.background_jobs import BackgroundJobs
 from lightpaint.paint.studio.background_sampling import BackgroundSampling
 from lightpaint.paint.studio.exact_answers import ExactAnswers, OutdatedError, raise_outdated
@@ -97,7 +99,8 @@ class Studio:
             warn=self._publish_save_state,
         )
         self._sampling = BackgroundSampling(self.subjects, access, self._bases, publisher)
-        self._exact_answers = ExactAnswers(access, publisher, self._sampling.give)
+        self._choices = ChoiceSolver(access, publisher, denoiser.clean_planes)
+        self._exact_answers = ExactAnswers(access, publisher, self._follow_exact)
         self._write_retry = UnsavedRetry(lambda: self.store, self._publish_save_state)
         self._comparison = LookComparison(access, publisher, self._mover, threads)
         self._requests = RequestHandler(
@@ -109,6 +112,7 @@ class Studio:
                 access, publisher, self._mover, threads, clean_planes=denoiser.clean_planes
             ),
             self._exact_answers,
+            self._choices,
             threads,
         )
 
@@ -140,12 +144,14 @@ class Studio:
         """Start to obtain the bases."""
         self._threads.start(self._obtain_bases, "obtain")
         self._threads.start(self._exact_answers.run, "settle")
+        self._threads.start_low_priority(self._choices.run, "choices")
         self._threads.start(self._write_retry.run, "write")
 
     def close(self) -> None:
         """End the session; all work is kept, even a stroke whose end never arrived."""
         self.publisher.close()
         self._exact_answers.stop()
+        self._choices.stop()
         self._sampling.stop()
         self._mover.stop()
         self._comparison.stop()
@@ -211,6 +217,11 @@ class Studio:
         """Report whether the work can be written."""
         self.on_unsaved(text)
         self.publisher.publish(Notice(text=text, tone=tone))
+
+    def _follow_exact(self, snapshot: SessionSnapshot, solution: Solution) -> None:
+        """Start the work that follows an exact answer and its analysis."""
+        self._choices.give(snapshot, solution)
+        self._sampling.give(snapshot, solution)
 
     def _obtain_bases(self) -> None:
         """Obtain bases of more and more samples, and denoise each."""

@@ -33,7 +33,7 @@ class Settings(Fit):
             `Fit`.
         hold: Weight of all unpainted pixels relative to all painted ones; None decides by the
             painting.
-        colors: `free`, `gentle` or `white`; None decides by the painting.
+        colors: `free`, `gentle`, `white` or `own`; None decides by the painting.
         unpainted: Weight of each unpainted pixel, instead of `hold`.
         literal: True to fit the target exactly as given and leave noise in the equations, unless
             another setting says otherwise.

@@ -16,6 +16,7 @@ COLOR_MEANINGS: dict[Colors, str] = {
     "free": "any colour",
     "gentle": "their own colour, unless the painting clearly asks for another",
     "white": "whites, from warm to cool",
+    "own": "their own colour; they only dim",
 }
 
 #: Headings of the table.

@@ -32,6 +32,41 @@ def test_a_light_is_moved_by_hand_and_freed(painter: Painter) -> None:
     assert newest_constraints(painter) == {"lock": [0, 0, 0]}
 
 
+def test_a_moved_light_says_why_it_stays_and_a_press_releases_it(painter: Painter) -> None:
+    row = painter.page.locator('[data-light="key"]')
+    assert row.locator(".kept").count() == 0
+    constraints = {"key": {"lock": [1, 1, 1]}}
+    painter.tell(kind="answer", version=9, exact=False, constraints=constraints, kept=["key"])
+    kept = row.get_by_role("button", name="Release key: the solve sets it again")
+    assert kept.inner_text() == "kept"
+    assert "You moved it" in kept.get_attribute("data-tip")
+    assert row.locator(".badge").count() == 0  # it is said once
+    kept.click()
+    assert painter.requests("constrain_light")[-1]["constraints"] == {}
+    painter.tell(kind="answer", version=10, exact=False, constraints={}, kept=[])
+    assert row.locator(".kept").count() == 0
+
+
+def test_the_solve_starts_from_lamps_that_were_set(painter: Painter) -> None:
+    lamps = painter.page.locator(".start-lamps")
+    assert lamps.count() == 0  # nothing was set by hand
+    painter.slide("key, stops from now", "ArrowRight")
+    painter.button("Start from my lamps").click()
+    assert painter.requests("start_from_lamps") == [{"kind": "start_from_lamps", "is_on": True}]
+    painter.tell(kind="answer", version=9, exact=False, constraints={}, is_started=True)
+    slider = painter.page.get_by_role("slider", name="Near my lamps")
+    assert float(slider.input_value()) == pytest.approx(100 / 3, abs=1)
+    slider.focus()
+    slider.press("End")
+    assert painter.requests("change_settings")[-1]["settings"] == {"near": 10}
+    slider.press("Home")
+    assert painter.requests("change_settings")[-1]["settings"] == {"near": 0.01}
+    lamps.get_by_role("button", name="Start from the scene again").click()
+    assert painter.requests("start_from_lamps")[-1]["is_on"] is False
+    painter.tell(kind="answer", version=10, exact=False, constraints={}, is_started=False)
+    assert lamps.count() == 0
+
+
 @pytest.mark.nightly
 def test_a_level_is_typed_in_stops_or_percent(painter: Painter) -> None:
     current = painter.page.evaluate("() => window.painter.store.value.lights[0].present")

@@ -26,9 +26,8 @@ from lightpaint.lighting.loss.reweighting import (
     run_rounds,
 )
 from lightpaint.lighting.loss.warm_start import sample_pixels
-from lightpaint.lighting.loss.weight_penalty import dimming_factors
 from lightpaint.lighting.normal_equations import NormalEquations
-from lightpaint.lighting.problem import Problem, gamuts_for
+from lightpaint.lighting.problem import Problem, expected_for, gamuts_for
 from lightpaint.lighting.solution import Solution
 from lightpaint.lighting.unknowns.reduced_problem import solve_reduced
 from lightpaint.lighting.unknowns.reduction import only_knobs
@@ -64,7 +63,7 @@ class ColorChoice:
     Examples:
         >>> [analysis] = lp.analyse(lp.solve(basis, target, colors="gentle"))
         >>> [choice.colors for choice in analysis.color_choices]
-        ['free', 'gentle', 'white']
+        ['free', 'gentle', 'white', 'own']
     """
 
     colors: Colors
@@ -85,7 +84,7 @@ Choices = tuple[ColorChoice, ...]
 def color_choices(
     solution: Solution, delta_e: Sequence[float], best: Mapping[Colors, Doubles] | None = None
 ) -> tuple[Choices, ...]:
-    """Return, for each view, the answers of `free`, `gentle` and `white`.
+    """Return, for each view, the answers of `free`, `gentle`, `white` and `own`.
 
     delta_e: of the answer, for each view. best: the result of `best_by_colors`, if known. Empty if
     no light may change its colour, and for pictures without colour.
@@ -99,12 +98,18 @@ def color_choices(
     )
 
 
+def can_change_colors(solution: Solution) -> bool:
+    """Return whether any light may change its colour, and the pictures show colour."""
+    problem = solution.problem
+    is_grey = problem.equations.reached.any(axis=0).sum() < 2
+    return bool(not is_grey and _with_colors(problem, "free").keeps_color.any())
+
+
 def best_by_colors(solution: Solution) -> dict[Colors, Doubles]:
     """Solve with each choice of `colors`; return weights, (n, 3), none if there is no choice."""
     problem = solution.problem
-    is_grey = problem.equations.reached.any(axis=0).sum() < 2
     best: dict[Colors, Doubles] = {}
-    if is_grey or not _with_colors(problem, "free").keeps_color.any():
+    if not can_change_colors(solution):
         return best
     solve_problem = _solver(solution)
     for colors in get_args(Colors):
@@ -115,20 +120,6 @@ def best_by_colors(solution: Solution) -> dict[Colors, Doubles]:
 
 def _solver(solution: Solution) -> Callable[[Problem], Doubles]:
     """Return a function that solves the problem with other colours for its weights (n, 3)."""
-    single_solver = _single_solver(solution)
-
-    def best(problem: Problem) -> Doubles:
-        weights = single_solver(problem)
-        if problem.fit.colors != "gentle" or problem.dimming is not None:
-            return weights
-        dimming = dimming_factors(problem.basis.current_weights, weights)
-        return single_solver(replace(problem, dimming=dimming))
-
-    return best
-
-
-def _single_solver(solution: Solution) -> Callable[[Problem], Doubles]:
-    """Return the same function with the pull to colours that a problem has."""
     loss, weights, solved = solution.problem.loss, solution.weights, solution.problem.solved
 
     def squares(problem: Problem) -> tuple[Problem, Doubles]:
@@ -173,13 +164,14 @@ def _with_colors(problem: Problem, colors: Colors) -> Problem:
     Raises ConstraintError if a light cannot have it.
     """
     fit = replace(problem.fit, colors=colors)
-    gamuts = gamuts_for(problem.basis, problem.views, fit)
+    gamuts = gamuts_for(problem.basis, problem.views, fit, problem.reference)
     full = reduce_lights(problem.constraints, problem.lights, fit, gamuts)
     reduction = full
     if problem.reduction is not problem.full:
         knobs = enumerate(problem.reduction.knobs)
         reduction = only_knobs(full, [k for k, x in knobs if any(u.upper > 0 for u in x.unknowns)])
-    return replace(problem, fit=fit, full=full, reduction=reduction)
+    expected = problem.expected or expected_for(problem.views, fit, problem.reference)
+    return replace(problem, fit=fit, full=full, reduction=reduction, expected=expected)
 
 
 def _view_choices(view: Solution, delta_e: float, answers: Mapping[Colors, Doubles]) -> Choices:

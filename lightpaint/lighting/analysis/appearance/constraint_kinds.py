@@ -10,7 +10,12 @@ from lightpaint.lighting.constraints.constraints import COLOR_KEYS, Constraints
 from lightpaint.lighting.constraints.light_patterns import tables_by_light, tied_lights
 
 #: Kinds of constraints: of single lights, of those on one dimmer, and of all together.
-ConstraintKind = Literal["off", "lock", "limits", "colour", "tie", "sparse", "prefer_current"]
+ConstraintKind = Literal[
+    "off", "lock", "limits", "colour", "tie", "sparse", "prefer_current", "near"
+]
+
+#: Those of all lights together.
+ALL_LIGHTS_KINDS: tuple[ConstraintKind, ...] = ("sparse", "prefer_current", "near")
 
 #: Kinds of constraints on single lights.
 SINGLE_LIGHT_KINDS: tuple[ConstraintKind, ...] = ("off", "lock", "limits", "colour")
@@ -57,6 +62,7 @@ class ConstraintsByLight:
         all_lights = tuple(k for k, light in enumerate(self.lights) if not light.is_fixed)
         by_kind["sparse"] = all_lights if self.constraints.sparse is not None else ()
         by_kind["prefer_current"] = all_lights if self.constraints.prefer_current else ()
+        by_kind["near"] = all_lights if self.constraints.near else ()
         return {kind: table for kind, table in by_kind.items() if table}
 
     def units(self, lights: Sequence[int]) -> list[list[int]]:
@@ -73,6 +79,8 @@ class ConstraintsByLight:
             return replace(self.constraints, sparse=None)
         if kind == "prefer_current":
             return replace(self.constraints, prefer_current=0.0)
+        if kind == "near":
+            return replace(self.constraints, near=0.0)
         if kind == "tie":
             tied = tied_lights(self.constraints, self.lights)
             removed = {id(tied[k][0]) for k in lights}

@@ -13,7 +13,10 @@ import numpy as np
 
 from lightpaint.arrays import Doubles, Floats
 from lightpaint.images.bands import is_large
-from lightpaint.lighting.analysis.appearance.constraint_kinds import ConstraintKind
+from lightpaint.lighting.analysis.appearance.constraint_kinds import (
+    ALL_LIGHTS_KINDS,
+    ConstraintKind,
+)
 from lightpaint.lighting.analysis.appearance.display_difference import PaintComparison
 from lightpaint.lighting.analysis.appearance.pixel_sample import LimitGroup, PixelSample
 from lightpaint.lighting.analysis.appearance.unpainted_change import (
@@ -201,7 +204,7 @@ def _constraint_reasons(sample: PixelSample) -> list[Reason]:
         whole = sample.share_without(kind, lights)
         if whole < MIN_SHARE:
             continue
-        if kind in ("sparse", "prefer_current"):
+        if kind in ALL_LIGHTS_KINDS:
             reasons.append(Reason(kind, (), whole))
             continue
         chosen, gained = lights, whole

@@ -14,6 +14,7 @@ from lightpaint.basis.derived_planes import block_means
 from lightpaint.images.estimate import Estimate
 from lightpaint.images.pixel_blocks import block_mean, block_sums, whole_factor
 from lightpaint.lighting.analysis.appearance.constraint_kinds import (
+    ALL_LIGHTS_KINDS,
     ConstraintKind,
     ConstraintsByLight,
 )
@@ -162,7 +163,7 @@ class PixelSample:
 
     def light_names(self, kind: ConstraintKind, lights: Collection[int]) -> tuple[str, ...]:
         """Return names of lights under one kind of constraint; none for kinds that apply to all."""
-        if kind in ("sparse", "prefer_current"):
+        if kind in ALL_LIGHTS_KINDS:
             return ()
         return tuple(self.by_light.lights[k].name for k in lights)
 

@@ -289,7 +289,8 @@ export interface ResolvedFit {
  * weight. selection: the part of the painting that strokes keep to.
  *
  * earlier: constraints of lights that are locked or off, by name, from before they were, to be
- * sent when they are released.
+ * sent when they are released. kept: names of those that are locked only since they were moved.
+ * is_started: whether the solve starts from lamps that were set by hand.
  */
 export interface EditState {
   history?: HistoryInfo;
@@ -304,6 +305,8 @@ export interface EditState {
   master?: number;
   selection?: SelectionInfo;
   earlier?: Record<string, Record<string, any>>;
+  kept?: string[];
+  is_started?: boolean;
 }
 
 /**
@@ -329,6 +332,17 @@ export interface Closeness {
   delta_e: number;
   delta_e_present: number;
   sentences: string[];
+}
+
+/**
+ * The exact answer with one choice of `colors`. Its picture is `choice/COLORS`, in each view.
+ *
+ * is_chosen: whether it is the answer itself. delta_e: its mean ΔE over the paint.
+ */
+export interface AnswerChoice {
+  colors: 'own' | 'gentle' | 'free';
+  is_chosen: boolean;
+  delta_e: number;
 }
 
 /**
@@ -396,6 +410,8 @@ export interface Findings {
  * the session has no steps yet. stroke: number of the last stroke that arrived. command: solves
  * for the exported paintings. is_back: the client had the session before, and no other client
  * since; also true if unasked. weights: (lights, 3) float64, the last answer.
+ *
+ * choices: as the last `choices` had them; empty once the session has changed since.
  */
 export interface SessionState {
   kind: 'state';
@@ -412,6 +428,8 @@ export interface SessionState {
   master?: number;
   selection?: SelectionInfo;
   earlier?: Record<string, Record<string, any>>;
+  kept?: string[];
+  is_started?: boolean;
   version: number;
   scene: string;
   folder: string;
@@ -436,6 +454,7 @@ export interface SessionState {
   command: string;
   answer: Findings;
   is_back: boolean;
+  choices: AnswerChoice[];
   arrays: { weights: Picture };
 }
 
@@ -489,6 +508,8 @@ export interface AnswerUpdate {
   master?: number;
   selection?: SelectionInfo;
   earlier?: Record<string, Record<string, any>>;
+  kept?: string[];
+  is_started?: boolean;
   version: number;
   stroke: number;
   exact: boolean;
@@ -518,6 +539,8 @@ export interface CanvasPatch {
   master?: number;
   selection?: SelectionInfo;
   earlier?: Record<string, Record<string, any>>;
+  kept?: string[];
+  is_started?: boolean;
   region: Region;
   view: number;
   views: number[];
@@ -546,6 +569,8 @@ export interface SelectionUpdate {
   master?: number;
   selection?: SelectionInfo;
   earlier?: Record<string, Record<string, any>>;
+  kept?: string[];
+  is_started?: boolean;
   arrays: {  };
 }
 
@@ -633,6 +658,21 @@ export interface ReferenceList {
   kind: 'references';
   reply?: number;
   references: ReferenceInfo[];
+  arrays: {  };
+}
+
+/**
+ * The answers with other light colours, to choose from. Unasked, once the exact answer rests.
+ *
+ * version: of the session. choices: from the least freedom to the most; empty without paint, and
+ * where no light can change its colour. resources: numbers of their pictures.
+ */
+export interface AnswerChoices {
+  kind: 'choices';
+  reply?: number;
+  version: number;
+  choices: AnswerChoice[];
+  resources: Record<string, number>;
   arrays: {  };
 }
 
@@ -1037,7 +1077,19 @@ export interface SetMaster {
 }
 
 /**
+ * The lights as they are now become the lighting that the solve starts from and stays near, and
+ * locked ones are released; or this ends. One step. Answered by `answer`. The setting `near` says
+ * how near.
+ */
+export interface StartFromLamps {
+  is_on?: boolean;
+}
+
+/**
  * New places, targets and cones of lights, by name. Answered by `answer`; `rig` follows.
+ *
+ * A light that is moved keeps its level from then on, as if it were locked, until it is released
+ * or put back.
  *
  * poses: changed fields of `lightpaint.Pose`: position, target, cutoff and beam; an empty object
  * restores a light's place from the scene; without any pose, a drag ends and its light goes back.
@@ -1125,8 +1177,8 @@ export interface TieLights {
 /**
  * Settings of the answer, as in `Fit`. Answered by `answer`.
  *
- * settings: of hold, space, colors, literal, prefer_current, sparse; null for the default that
- * follows from the painting.
+ * settings: of hold, space, colors, literal, prefer_current, near, sparse; null for the default
+ * that follows from the painting.
  */
 export interface ChangeSettings {
   settings: Record<string, any>;
@@ -1282,6 +1334,7 @@ export interface Events {
   previous: PreviousAnswer;
   looks: LookList;
   references: ReferenceList;
+  choices: AnswerChoices;
   progress: ProgressReport;
   started: TaskStarted;
   stopped: TaskStopped;
@@ -1320,6 +1373,7 @@ export interface Requests {
   constrain_light: ConstrainLight;
   constrain_lights: ConstrainLights;
   set_master: SetMaster;
+  start_from_lamps: StartFromLamps;
   move: MoveLights;
   point: PointLight;
   add_light: AddLight;

@@ -78,6 +78,25 @@ export const en = {
     grey: 'grey',
     unpainted: 'unpainted',
   },
+  startLamps: {
+    startFromMyLamps: 'Start from my lamps',
+    theSolveImprovesThem:
+      'The lamps as they are now become the start: the solve improves them and stays near. Locked ones are released',
+    nearMyLamps: 'Near my lamps',
+    howNear:
+      'How near the solve stays to the lamps that you started from, where the paint does not say otherwise',
+    startFromTheScene: 'Start from the scene again',
+  },
+  answerChoices: {
+    lightColours: 'Light colours of the answer',
+    own: 'Own colours',
+    ownTip: 'Lamps keep the colours they have, and only get brighter or dimmer.',
+    asPainted: 'As painted',
+    asPaintedTip: 'Lamps take the whites and colours that the painting asks for.',
+    bold: 'Bold',
+    boldTip: 'Lamps may take any colour.',
+    withDifference: '{label}: mean ΔE {number} from the painting',
+  },
   answerLine: {
     meanColourDifferenceFromThe:
       'Mean colour difference from the painting (ΔE 2000), and what it was with the current lighting. 1 is just visible, 5 is obvious.',
@@ -555,6 +574,10 @@ export const en = {
     deselectFound: 'Deselect the {count} found',
   },
   lightRow: {
+    kept: 'kept',
+    release: 'Release {label}: the solve sets it again',
+    keptSinceItWasMoved:
+      'You moved it, so it keeps its level, and the others are solved around it. A press releases it: the solve sets it again',
     selectForOneActionOnSeveral:
       'Select, for one action on several lights; with Shift all from the last one',
     select: 'Select {label}',
@@ -959,6 +982,8 @@ export const en = {
     theirOwnUnlessThePaintAsks: 'Their own, unless the paint asks for another',
     white: 'White',
     whitesFrom2200To9000K: 'Whites from 2200 to 9000 K',
+    own: 'Own',
+    onlyTheirOwn: 'Only the colours they have: lamps only get brighter or dimmer',
     hold: 'Hold',
     theyStayNearTheirCurrentLook: 'They stay near their current look',
     ignore: 'Ignore',
@@ -980,6 +1005,7 @@ export const en = {
     describedFree: 'any colour',
     describedGentle: 'their own, unless the paint asks for another',
     describedWhite: 'whites from 2200 to 9000 K',
+    describedOwn: 'only the colours they have',
     close: 'Close',
     unpaintedParts: 'Unpainted parts',
     colourSpaceOfTheMatch: 'Colour space of the match',

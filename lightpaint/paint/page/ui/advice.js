@@ -36,6 +36,7 @@ const ALL_LIGHTS_WORDS = {
   colors: words.advice.anyColour,
   sparse: words.advice.moreLights,
   prefer_current: words.advice.letLightsChange,
+  near: words.advice.letLightsChange,
 };
 
 /** Characters of a light's name on a button, which shares its line with a sentence. */
@@ -74,6 +75,7 @@ function changeOf({ kind, names, hold }, ui, session) {
     return ui.effectiveSettings.hold === hold ? null : settingChange('hold', hold);
   if (kind === 'colors')
     return ui.effectiveSettings.colors === 'free' ? null : settingChange('colors', 'free');
+  if (kind === 'near') return ui.settings.near === 0 ? null : settingChange('near', 0);
   if (kind === 'sparse' || kind === 'prefer_current')
     return ui.settings[kind] ? settingChange(kind, null) : null;
   if (kind === 'tie') {

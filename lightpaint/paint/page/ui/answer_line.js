@@ -2,6 +2,7 @@
 
 import { html } from '../vendor/preact.js';
 import { AdviceButton } from './advice.js';
+import { AnswerChoices } from './answer_choices.js';
 import { Button, TruncatedText, reveal } from './controls.js';
 import { lightText, numberText, shortenName } from './format.js';
 import { imageOf } from './images/light_images.js';
@@ -69,6 +70,7 @@ export function AnswerLine({ ui, app }) {
       }
     </p>
     <${AdviceButton} ui=${ui} app=${app} />
+    <${AnswerChoices} ui=${ui} app=${app} />
     ${
       ui.ready &&
       html`<${Button} label=${words.answerLine.saveLook} icon="plus" keys=${shortcutsOf(ui, 'saveLook')}

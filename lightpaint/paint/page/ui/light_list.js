@@ -14,6 +14,7 @@ import {
   sortLights,
 } from './lamps/listed_lights.js';
 import { MasterDimmer } from './lamps/master_dimmer.js';
+import { StartLamps } from './lamps/start_lamps.js';
 import { GroupDimmer, SelectionPanel, levelsText } from './lamps/selection_panel.js';
 import { constraintsOf, lockedLights, findTie } from './tied_lights.js';
 import { lightCountText, percentText } from './format.js';
@@ -45,6 +46,7 @@ export function LightList({ ui, app }) {
     key === 'Enter' && indices.length && store.set({ selectedLights: indices });
   return html`<div class=${`lights ${isAnswerHidden(ui) ? 'is-unseen' : ''}`}>
     ${ui.lights.length > 1 && html`<${MasterDimmer} ui=${ui} app=${app} />`}
+    <${StartLamps} ui=${ui} app=${app} />
     ${
       ui.lights.length > 1 &&
       html`<div class="lights-tools">
@@ -115,7 +117,7 @@ function renderRow(ui, app, k, isMany) {
   const light = ui.lights[k];
   const isOpen = ui.openLights.includes(k);
   return html`<${LightRow} key=${light.name} k=${k} light=${light} app=${app}
-    rgb=${ui.weights[k] ?? light.present} answer=${ui.lightAnswers[k]} constraints=${constraintsOf(ui, k)} tie=${findTie(ui, k)}
+    rgb=${ui.weights[k] ?? light.present} answer=${ui.lightAnswers[k]} isKept=${ui.kept.includes(light.name)} constraints=${constraintsOf(ui, k)} tie=${findTie(ui, k)}
     isSelected=${ui.selectedLights.includes(k)} isLive=${ui.isLive} isSolo=${ui.solo.includes(k)} isMute=${ui.mute.includes(k)} isOpen=${isOpen}
     pointerShare=${ui.probe?.shares[k]} hasSlider=${isOpen || !isMany}
     picture=${nameInView(`thumb/${k}`, ui.view)} thumb=${ui.resources[nameInView(`thumb/${k}`, ui.view)]}

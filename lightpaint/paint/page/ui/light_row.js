@@ -26,7 +26,7 @@ import { fill, words } from '../language/language.js';
 /** @typedef {import("./shortcuts.js").App} App */
 /**
  * @typedef {{k: number, light: Light, app: App, rgb: RGB, answer?: LightAnswer, constraints?: Constraints,
- *   tie?: string[], isLive: boolean, isSelected: boolean, isSolo: boolean, isMute: boolean, isOpen: boolean,
+ *   tie?: string[], isKept: boolean, isLive: boolean, isSelected: boolean, isSolo: boolean, isMute: boolean, isOpen: boolean,
  *   pointerShare?: number, hasSlider: boolean, picture: string, thumb?: number, allLights?: Light[],
  *   ui?: import("./ui_state.js").Ui}} Props
  */
@@ -137,8 +137,12 @@ export class LightRow extends Component {
         style=${{ background: level > 0 ? toHex(atFullBrightness(rgb)) : 'none' }}></span>
       <span class="values" data-tip=${level > 0 ? fullText : undefined}
         >${level > 0 ? value : words.lightRow.off}</span>
-      <span class=${`error ${isLive ? 'is-old' : ''}`} aria-hidden=${isLive ? 'true' : undefined}
-        >${level > 0 || !this.props.hasSlider ? error : ''}</span>
+      ${
+        this.props.isKept
+          ? html`<${KeptButton} ...${this.props} />`
+          : html`<span class=${`error ${isLive ? 'is-old' : ''}`} aria-hidden=${isLive ? 'true' : undefined}
+        >${level > 0 || !this.props.hasSlider ? error : ''}</span>`
+      }
       ${!this.props.hasSlider && html`<span class="stops">${stopsText(stopsOf(rgb, light))}</span>`}
     </div>`;
   }
@@ -191,7 +195,8 @@ export function Share({ share, pointerShare }) {
 }
 
 /** Remarks below the picture, where they do not change the height of the row.
- * @param {{light: Light, answer?: LightAnswer, constraints?: Constraints, tie?: string[]}} props */
+ * @param {{light: Light, answer?: LightAnswer, constraints?: Constraints, tie?: string[],
+ *   isKept: boolean}} props */
 function Badge(props) {
   const { answer, constraints = {}, tie } = props;
   const remarks = listRemarks(props);
@@ -210,6 +215,14 @@ function Badge(props) {
     >${isHeldBack ? words.lightRow.heldBack : `${remarks[0][0]}${moreText}`}</span>`;
 }
 
+/** The reason why a light that was moved stays as it is; a press lets the solve set it again.
+ * @param {Props} props */
+function KeptButton({ k, light, app }) {
+  return html`<button type="button" class="kept" aria-label=${fill(words.lightRow.release, { label: light.label })}
+    data-tip=${words.lightRow.keptSinceItWasMoved} onClick=${() => app.session.unlockLight(k)}
+    >${words.lightRow.kept}</button>`;
+}
+
 /** @param {import("./ui_state.js").UiStore} store @param {number} k */
 function toggleRow(store, k) {
   store.set(({ openLights }) => ({
@@ -223,14 +236,19 @@ function toggleRow(store, k) {
 const colourConstraint = ({ color, kelvin, primaries }) => color ?? kelvin ?? primaries;
 
 /** Return a short and a long text for each remark.
- * @param {{light: Light, answer?: LightAnswer, constraints?: Constraints, tie?: string[]}} props
+ * @param {{light: Light, answer?: LightAnswer, constraints?: Constraints, tie?: string[],
+ *   isKept: boolean}} props
  * @returns {string[][]} */
-function listRemarks({ light, answer, constraints = {}, tie }) {
+function listRemarks({ light, answer, constraints = {}, tie, isKept }) {
   /** @type {[unknown, string, string][]} */
   const remarks = [
     [light.is_fixed, words.lightRow.fixed, words.lightRow.itStaysAsItIsIn],
     [constraints.off, words.lightRow.off, words.lightRow.youSwitchedItOff],
-    [constraints.lock !== undefined, words.lightRow.locked, words.lightRow.youLockedItAtThisLevel],
+    [
+      constraints.lock !== undefined && !isKept,
+      words.lightRow.locked,
+      words.lightRow.youLockedItAtThisLevel,
+    ],
     [constraints.limits, words.lightRow.limits, words.lightRow.youLimitedItsLevel],
     [colourConstraint(constraints), words.lightRow.colour, words.lightRow.youLimitedItsColour],
     [

@@ -13,6 +13,7 @@ import {
   verificationUpdate,
 } from './state_updates.js';
 import { relativePath } from './format.js';
+import { choicesUpdate } from './answer_choices.js';
 import { referencesUpdate } from './references/reference_state.js';
 import { updateDisplay } from './tools.js';
 import { fill, words } from '../language/language.js';
@@ -43,6 +44,7 @@ const EVENT_KINDS = [
   'failed',
   'looks',
   'references',
+  'choices',
   'exported',
   'verified',
   'explained',
@@ -142,6 +144,7 @@ export class SessionLink {
       looks: (/** @type {HostEvents['looks']} */ m) => looksUpdate(m, this.store.value),
       references: (/** @type {HostEvents['references']} */ m) =>
         referencesUpdate(m, this.store.value),
+      choices: (/** @type {HostEvents['choices']} */ m) => choicesUpdate(m, this.store.value),
       exported: (/** @type {HostEvents['exported']} */ m) => this.takeExport(m),
       verified: (/** @type {HostEvents['verified']} */ m) =>
         verificationUpdate(m, this.store.value),

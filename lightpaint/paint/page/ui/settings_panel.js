@@ -40,6 +40,7 @@ const COLOURS = [
     label: words.settingsPanel.white,
     tip: words.settingsPanel.whitesFrom2200To9000K,
   },
+  { value: 'own', label: words.settingsPanel.own, tip: words.settingsPanel.onlyTheirOwn },
 ];
 const HOLDS = [
   { value: 'auto', label: words.settingsPanel.automatic, tip: AUTOMATIC_TIP },
@@ -94,6 +95,7 @@ const DESCRIPTIONS = {
     free: words.settingsPanel.describedFree,
     gentle: words.settingsPanel.describedGentle,
     white: words.settingsPanel.describedWhite,
+    own: words.settingsPanel.describedOwn,
   },
 };
 

@@ -48,6 +48,8 @@ export function stateUpdate(message, /** @type {import('./ui_state.js').Ui} */ p
     images: withLights(message.images ?? []),
     constraints: message.constraints ?? {},
     earlier: message.earlier ?? {},
+    kept: message.kept ?? [],
+    isStarted: message.is_started ?? false,
     ties: message.ties ?? [],
     settings: message.settings ?? {},
     effectiveSettings: message.effective_settings ?? {},
@@ -59,6 +61,8 @@ export function stateUpdate(message, /** @type {import('./ui_state.js').Ui} */ p
     looks,
     resources: message.resources ?? {},
     references: message.references ?? [],
+    choices: message.choices ?? [],
+    choicesVersion: -1,
     hint: Boolean(message.is_new),
     connection: 'open',
     closure: null,
@@ -264,12 +268,14 @@ export function answerUpdate(message, ui) {
     'history',
     'constraints',
     'earlier',
+    'kept',
     'ties',
     'settings',
     'poses',
   ])) {
     if (message[key]) changes[key] = message[key];
   }
+  if (message.is_started !== undefined) changes.isStarted = message.is_started;
   if (message.master !== undefined) changes.master = message.master ?? 1;
   if (message.effective_settings) changes.effectiveSettings = message.effective_settings;
   if (message.added_lights) changes.addedLights = message.added_lights;

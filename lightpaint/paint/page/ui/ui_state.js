@@ -1,5 +1,6 @@
 /** The state of the interface: data from the session, and settings of the page itself. */
 
+import { INITIAL_CHOICES } from './answer_choices.js';
 import { INITIAL_IMAGES } from './images/image_state.js';
 import { INITIAL_LAMPS } from './lamps/lamp_state.js';
 import { fromKelvin } from './paint_colour.js';
@@ -42,7 +43,8 @@ import { initialSelection } from './selection/selection_settings.js';
 /**
  * @typedef {import("./lamps/lamp_state.js").LampState & import("./preferences.js").Preferences
  *   & import("./references/reference_state.js").ReferenceState
- *   & import("./images/image_state.js").ImageState & BaseUi} Ui
+ *   & import("./images/image_state.js").ImageState & import("./answer_choices.js").ChoiceState
+ *   & BaseUi} Ui
  *
  * @typedef {object} BaseUi
  * @property {boolean} ready whether the session has said what there is
@@ -70,6 +72,8 @@ import { initialSelection } from './selection/selection_settings.js';
  * @property {boolean} isJudgementCurrent whether the statements on the answer are on the last one
  * @property {Record<string, Constraints>} constraints
  * @property {Record<string, Constraints>} earlier those of held lights from before they were held
+ * @property {boolean} isStarted whether the solve starts from lamps that were set by hand
+ * @property {string[]} kept names of lights that are held only since they were moved
  * @property {string[][]} ties
  * @property {Record<string, Record<string, any>>} poses of lights that were moved, by name
  * @property {string[]} addedLights names of lights that the scene does not have
@@ -211,6 +215,8 @@ export function initialState() {
     isJudgementCurrent: true,
     constraints: {},
     earlier: {},
+    kept: [],
+    isStarted: false,
     ties: [],
     poses: {},
     addedLights: [],
@@ -295,5 +301,6 @@ export function initialState() {
     ...INITIAL_IMAGES,
     ...DEFAULT_PREFERENCES,
     ...INITIAL_REFERENCES,
+    ...INITIAL_CHOICES,
   };
 }

@@ -1,0 +1,161 @@
+"""What a painting lets one expect of each light, before anything is solved.
+
+A moonlit picture was painted blue wherever a lamp shines, so that each lamp is expected to become
+blue. Of one in an unpainted corner, nothing else than its own colour is. This expectation is where
+the pull to colours leads, and it says how strong that pull may be: a small change of colour is
+within the error of paint, a large one was meant.
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from math import ceil
+
+import numpy as np
+from scipy.linalg import block_diag
+
+from lightpaint.arrays import Doubles, Floats
+from lightpaint.basis.basis import Basis
+from lightpaint.basis.derived_planes import block_means
+from lightpaint.colour.color import luminance
+from lightpaint.images.pixel_blocks import block_sums
+from lightpaint.target.target import Target
+from lightpaint.target.wish import Wish
+from lightpaint.target.wish_finding import split_wishes
+
+#: Approximate number of blocks of pixels over which the light of a painting is compared.
+BLOCKS = 2**13
+
+#: Light below which a ratio says little, relative to the mean of the look.
+DARK = 0.01
+
+#: Change of colour, in stops between channels, from which paint means it, and how sharply:
+#: benchmarks/intent.py paints hues that are off by 0.25, benchmarks/briefs.py moods of 1 to 3.
+MEANT_STOPS, SHARPNESS = 0.6, 6
+
+
+@dataclass(frozen=True)
+class Wash:
+    """A painting, the look under it and the light of each lamp, averaged over blocks of pixels.
+
+    rows: (3, n, p), Φ. painted, look: (3, p), linear. importance: (p,), the share of a block that
+    is painted. counts: (p,), the number of its pixels that count. wishes: (k, p), the share of a
+    block that each wish covers.
+    """
+
+    rows: Floats
+    painted: Floats
+    look: Floats
+    importance: Doubles
+    counts: Doubles
+    wishes: Floats
+
+    @classmethod
+    def of(cls, basis: Basis, target: Target) -> "Wash":
+        """Average a view. target: at the size of the basis."""
+        height, width = basis.size
+        side = max(1, ceil((height * width / BLOCKS) ** 0.5))
+        counted = (~basis.emitters_seen).astype(np.float64)
+        weight = np.minimum(target.importance, 1) * counted
+        counts, painted_counts = block_sums(counted, side), block_sums(weight, side)
+
+        def mean(image: Floats, weight: Doubles, total: Doubles) -> Doubles:
+            sums = block_sums(image * weight[..., None], side)
+            return np.asarray(sums / np.where(total > 0, total, 1)[..., None])
+
+        look = mean(basis.current_look, counted, counts)
+        importance = painted_counts / np.where(counts > 0, counts, 1)
+        # Where nothing is painted, nothing is asked for.
+        painted = np.where(
+            importance[..., None] > 0, mean(target.image, weight, painted_counts), look
+        )
+        pixels = block_sums(np.ones(basis.size), side)
+        layers = [
+            replace(wish, area=(block_sums(wish.area, side) / pixels).astype(np.float32))
+            for wish in target.wishes
+        ]
+        rows = block_means(basis.planes, counted, side).pixels(slice(None)).transpose(2, 0, 1)
+        wishes = wish_shares(layers, painted, importance, look)
+        return cls(
+            np.ascontiguousarray(rows),
+            painted.reshape(-1, 3).T,
+            look.reshape(-1, 3).T,
+            importance.ravel(),
+            counts.ravel(),
+            wishes,
+        )
+
+    @classmethod
+    def joined(cls, views: Sequence["Wash"]) -> "Wash":
+        """Return the washes of several views behind each other."""
+        if len(views) == 1:
+            return views[0]
+        names = "rows", "painted", "look", "importance", "counts"
+        joined = (np.concatenate([getattr(x, k) for x in views], axis=-1) for k in names)
+        return cls(*joined, block_diag(*(x.wishes for x in views)))
+
+    def asked(self) -> Doubles:
+        """Return the change that is asked for in each block, (3, p), in stops; 0 without paint."""
+        weight = self.importance * self.counts
+        dark = DARK * float(np.average(self.look.mean(axis=0), weights=self.counts + 1e-12))
+        if not dark > 0:
+            return np.zeros(self.look.shape)
+        asked, now = (np.maximum(x, 0).astype(np.float64) + dark for x in (self.painted, self.look))
+        return np.where(weight > 0, np.log2(asked / now), 0)
+
+
+def wish_shares(
+    layers: Sequence[Wish], painted: Floats, importance: Doubles, look: Floats
+) -> Doubles:
+    """Return the share of each block of pixels that wishes cover, (k, p).
+
+    layers: with an area of a value for each block, (h, w); none for a painting without layers.
+    painted, look: (h, w, 3) linear; importance: (h, w).
+    """
+    whole = Wish("painting", importance.astype(np.float32), has_strokes=True)
+    wishes = split_wishes(layers or [whole], painted, importance, look)
+    return np.array([wish.area.ravel() for wish in wishes], np.float64)
+
+
+@dataclass(frozen=True)
+class ExpectedLights:
+    """The emission that a painting lets one expect, and how clearly it asks for other colours.
+
+    emission: (n, 3). clarity: (n,), from 0, where a light is expected to keep its colour, to 1,
+    where the painting decides.
+    """
+
+    emission: Doubles
+    clarity: Doubles
+
+    @classmethod
+    def of(cls, wash: Wash, current: Doubles) -> "ExpectedLights":
+        """Expect lights of a painting. current: (n, 3), their current emission.
+
+        The change of light i in channel c is the mean change that is asked for, weighted by how
+        much of the light in each pixel a unit of it makes: Σ D a Φᵢ / L / Σ Φᵢ / L, with the change
+        a in stops and the look L. Its colour changes by the part of this that is clearly meant.
+        """
+        dark = DARK * float(np.mean(wash.look)) or 1.0
+        stops = wash.asked()
+        share = wash.counts / (np.maximum(wash.look, 0) + dark)
+        asked_share = wash.importance * share
+        spread = np.ptp(stops, axis=0)
+        sums = np.stack([rows @ x for rows, x in zip(wash.rows, share, strict=True)], axis=-1)
+        moved = np.stack(
+            [rows @ x for rows, x in zip(wash.rows, asked_share * stops, strict=True)], axis=-1
+        )
+        squares = sum(rows @ x for rows, x in zip(wash.rows, asked_share * spread**2, strict=True))
+        reached = sums.sum(axis=1)
+        change = moved / np.where(sums > 0, sums, 1)
+        amount = np.sqrt(np.maximum(squares / np.where(reached > 0, reached, 1), 0))
+        excess = (amount / MEANT_STOPS) ** SHARPNESS
+        clarity = np.asarray(excess / (1 + excess), np.float64)
+        level = luminance(change)[:, None]
+        return cls(
+            np.asarray(current * 2.0 ** (level + clarity[:, None] * (change - level))), clarity
+        )
+
+    @classmethod
+    def unchanged(cls, current: Doubles) -> "ExpectedLights":
+        """Expect lights to stay as they are. current: (n, 3)."""
+        return cls(current, np.zeros(len(current)))

@@ -1,0 +1,74 @@
+/** Small pictures of the answers with other light colours, beside the sentence: a click chooses one. */
+
+import { nameInView } from '../engine/message_frames.js';
+import { html } from '../vendor/preact.js';
+import { numberText } from './format.js';
+import { Thumbnail } from './thumbnail.js';
+import { fill, words } from '../language/language.js';
+
+/** @typedef {import("./ui_state.js").Ui} Ui */
+/** @typedef {import("./shortcuts.js").App} App */
+/** @typedef {import("../engine/messages.js").AnswerChoice} AnswerChoice */
+
+/**
+ * @typedef {object} ChoiceState
+ * @property {readonly AnswerChoice[]} choices the answers with other light colours
+ * @property {number} choicesVersion of the session, of which they are
+ */
+
+/** @type {ChoiceState} */
+export const INITIAL_CHOICES = { choices: [], choicesVersion: -1 };
+
+/** From the least freedom of the lamps to the most. */
+const CHOICES = /** @type {const} */ ([
+  { colors: 'own', label: words.answerChoices.own, tip: words.answerChoices.ownTip },
+  { colors: 'gentle', label: words.answerChoices.asPainted, tip: words.answerChoices.asPaintedTip },
+  { colors: 'free', label: words.answerChoices.bold, tip: words.answerChoices.boldTip },
+]);
+
+/** Take the choices of the session. @param {import("../engine/messages.js").Events["choices"]} message
+ * @param {Ui} ui @returns {Partial<Ui>} */
+export function choicesUpdate({ version, choices, resources }, ui) {
+  return {
+    choices,
+    choicesVersion: version,
+    resources: { ...ui.resources, ...resources },
+  };
+}
+
+/** @param {{ui: Ui, app: App}} props */
+export function AnswerChoices({ ui, app }) {
+  if (!ui.ready) return null;
+  const isUnpainted = ui.deltaE === null && !ui.isLive && ui.isJudgementCurrent;
+  const isOld = ui.isLive || ui.version > ui.choicesVersion;
+  return html`<div class=${`choices ${isOld ? 'is-old' : ''}`} role="group"
+    aria-label=${words.answerChoices.lightColours}>
+    ${CHOICES.map((choice) => {
+      const answer = isUnpainted
+        ? undefined
+        : ui.choices.find(({ colors }) => colors === choice.colors);
+      return html`<${ChoiceButton} key=${choice.colors} ...${choice} answer=${answer} ui=${ui} app=${app} />`;
+    })}
+  </div>`;
+}
+
+/** @param {{colors: string, label: string, tip: string, answer?: AnswerChoice, ui: Ui, app: App}} props */
+function ChoiceButton({ colors, label, tip, answer, ui, app }) {
+  const isChosen = ui.effectiveSettings.colors === colors;
+  const picture = nameInView(`choice/${colors}`, ui.view);
+  const number = answer ? numberText(answer.delta_e, 2) : '';
+  const text = answer ? fill(words.answerChoices.withDifference, { label, number }) : label;
+  const choose = () => {
+    if (!isChosen) void app.session.changeSetting('colors', colors);
+  };
+  return html`<button type="button" class="answer-choice" aria-pressed=${String(isChosen)}
+    aria-label=${text} data-tip=${`${text}. ${tip}`} onClick=${choose}>
+    ${
+      answer
+        ? html`<${Thumbnail} key="picture" name=${picture} generation=${ui.resources[picture]} app=${app} />`
+        : html`<span key="none" class="thumb"></span>`
+    }
+    ${number && html`<b>${number}</b>`}
+    <span>${label}</span>
+  </button>`;
+}

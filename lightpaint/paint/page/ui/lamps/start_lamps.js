@@ -1,0 +1,45 @@
+/** The lamps as somebody has set them as a start, which the solve improves and stays near. */
+
+import { Button, Slider } from '../controls.js';
+import { lockedLights } from '../tied_lights.js';
+import { html } from '../../vendor/preact.js';
+import { words } from '../../language/language.js';
+
+/** @typedef {import("../shortcuts.js").App} App */
+/** @typedef {import("../ui_state.js").Ui} Ui */
+
+/** Strengths of the pull at both ends of the slider, and the one that it begins with: at the first
+ * it is not felt beside the paint, at the last the paint is hardly felt. */
+const [LEAST, MOST, DEFAULT] = [0.01, 10, 0.1];
+
+/** Strengths from the least to the most, in percent. */
+const CURVE = {
+  toPosition: (/** @type {number} */ near) =>
+    (100 * Math.log(Math.max(near, LEAST) / LEAST)) / Math.log(MOST / LEAST),
+  toValue: (/** @type {number} */ percent) =>
+    Number((LEAST * (MOST / LEAST) ** (percent / 100)).toPrecision(3)),
+};
+
+/** @param {{ui: Ui, app: App}} props */
+export function StartLamps({ ui, app }) {
+  const { session } = app;
+  if (!ui.isStarted)
+    return (
+      lockedLights(ui).length > 0 &&
+      html`<div class="start-lamps"><${Button} label=${words.startLamps.startFromMyLamps} class="wide"
+        tip=${words.startLamps.theSolveImprovesThem}
+        act=${() => session.send('start_from_lamps', { is_on: true })} /></div>`
+    );
+  const percent = CURVE.toPosition(ui.settings.near ?? DEFAULT);
+  const set = (/** @type {number} */ value, /** @type {boolean} */ isFinal) => {
+    const near = CURVE.toValue(value);
+    if (isFinal) void session.changeSetting('near', near);
+    else app.store.set({ settings: { ...ui.settings, near } });
+  };
+  return html`<div class="start-lamps" role="group" aria-label=${words.startLamps.startFromMyLamps}>
+    <${Slider} label=${words.startLamps.nearMyLamps} value=${percent} min=${0} max=${100} step=${1} unit="%"
+      resetValue=${CURVE.toPosition(DEFAULT)} tip=${words.startLamps.howNear} change=${set} />
+    <${Button} icon="close" tip=${words.startLamps.startFromTheScene}
+      act=${() => session.send('start_from_lamps', { is_on: false })} />
+  </div>`;
+}
