@@ -137,6 +137,7 @@ PARTS: dict[str, tuple[str, ...]] = {
     "colour.photometry": ("Photometry",),
     "lighting.analysis.ambiguity": ("Ambiguity",),
     "lighting.analysis.appearance.color_choices": ("ColorChoice",),
+    "lighting.analysis.appearance.delivery": ("Delivery",),
     "lighting.analysis.appearance.limiting_reasons": ("Reason", "Loosening"),
     "lighting.analysis.appearance.unpainted_change": ("UnpaintedChange",),
     "lighting.analysis.diagnosis": ("Place",),

@@ -9,6 +9,7 @@ from dataclass_schemas import Schema, list_of, schema_of, value_schema
 
 from lightpaint.basis.origin import Origin
 from lightpaint.lighting.analysis.appearance.color_choices import ColorChoice
+from lightpaint.lighting.analysis.appearance.delivery import Delivery
 from lightpaint.lighting.analysis.appearance.limiting_reasons import Reason
 from lightpaint.lighting.analysis.appearance.unpainted_change import UnpaintedChange
 from lightpaint.lighting.analysis.diagnosis import Place
@@ -52,6 +53,8 @@ def report_schema() -> Schema:
             **_all(_TEXTS, "held", "held_by_views"),
             reasons=_list(_reason(elsewhere)),
             elsewhere=elsewhere,
+            lit_delta_e=_AMOUNT,
+            wishes=_list(_wish()),
         ),
         "meant": _record(
             **{name: value_schema(hints[name]) for name in ("space", "hold", "colors")},
@@ -72,6 +75,13 @@ def report_schema() -> Schema:
     required = ["basis", "painting", "view", "seen", "meant", "fit", "lights"]
     head = {"format": {"const": FORMAT}, **_all(_TEXT, "lightpaint", "target", "command")}
     return {**_record(**head, **parts), "required": [*head, *required]}
+
+
+def _wish() -> Schema:
+    changes = ("brightness", "color", "asked_brightness", "asked_color")
+    return _record(
+        **_fields(Delivery, "name", "kind", "group", "delta_e"), **_all(_NUMBER, *changes)
+    )
 
 
 def _reason(elsewhere: Schema) -> Schema:

@@ -2,6 +2,7 @@
 
 from collections.abc import Sequence
 
+from lightpaint.display_text import some_names
 from lightpaint.lighting.analysis.appearance.appearance import Appearance
 from lightpaint.lighting.analysis.appearance.limiting_reasons import Loosening, Reason
 from lightpaint.lighting.analysis.diagnosis import Diagnosis, error_shares
@@ -85,7 +86,10 @@ def bound_sentences(
     bounds only without reasons. any_color: how to allow any colour.
     """
     if appearance is not None and appearance.reasons:
-        sentences = [spoken_cause(reason, any_color=any_color) for reason in appearance.reasons]
+        about = spoken_about(appearance)
+        sentences = [
+            spoken_cause(reason, any_color=any_color, about=about) for reason in appearance.reasons
+        ]
         return [sentence for sentence in sentences if sentence][:2]
     d = diagnosis
     most = [bound for bound in d.bounds[:1] if d.gain_share(bound) >= MIN_SHARE]
@@ -119,14 +123,21 @@ JOINT_RELEASE_CLAUSES = {
 }
 
 
-def spoken_cause(reason: Reason, *, weaker: str = "a hold of", any_color: str = ANY_COLOR) -> str:
+def spoken_about(appearance: Appearance) -> str:
+    """Return ` in Moonlight`, the wish that shares of reasons are about; "" for all paint."""
+    return f" in {some_names([appearance.reasons_wish])}" if appearance.reasons_wish else ""
+
+
+def spoken_cause(
+    reason: Reason, *, weaker: str = "a hold of", any_color: str = ANY_COLOR, about: str = ""
+) -> str:
     """Name a cause that limits the answer, and the gain of releasing it; "" for views.
 
     The gain is the mean ΔE without it or, if it is not known, the share of the error that the fit
     minimises. weaker: the words before the strength of a weaker hold. any_color: as in
-    `bound_sentences`.
+    `bound_sentences`. about: ` in Moonlight` if the share is that of one wish.
     """
-    gain_text = spoken_gain(reason)
+    gain_text = spoken_gain(reason, about)
     if reason.is_joint:
         gain_text += ", if the other constraints were lifted too"
     if reason.kind in RELEASE_CLAUSES:
@@ -145,17 +156,21 @@ def spoken_cause(reason: Reason, *, weaker: str = "a hold of", any_color: str = 
     cost = "" if rest is None else f", and change {spoken_changed(rest)}"
     return (
         f"A weaker hold on unpainted parts ({weaker} {loosening.hold:g}{instead_of}) "
-        f"{spoken_gain(loosening)}{cost}."
+        f"{spoken_gain(loosening, about)}{cost}."
     )
 
 
-def spoken_gain(release: Reason | Loosening) -> str:
-    """Return the gain of removing a reason: `would bring the mean ΔE from 5.9 to 4.5`."""
+def spoken_gain(release: Reason | Loosening, about: str = "") -> str:
+    """Return the gain of removing a reason: `would bring the mean ΔE from 5.9 to 4.5`.
+
+    about: as in `spoken_cause`.
+    """
     if release.delta_e is not None:
         now, then = (f"{x:.1f}" for x in release.delta_e)
         if float(then) < float(now):
             return f"would bring the mean ΔE from {now} to {then}"
-    return f"would remove {spoken_percent(release.share)} of the difference from the painting"
+    difference = f"difference{about}" if about else "difference from the painting"
+    return f"would remove {spoken_percent(release.share)} of the {difference}"
 
 
 def painting_noise_clause(diagnosis: Diagnosis) -> str:

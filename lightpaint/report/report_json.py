@@ -16,6 +16,7 @@ from lightpaint.colour.display.view_transform import ViewTransform
 from lightpaint.images.estimate import Estimate
 from lightpaint.lighting.analysis.appearance.appearance import Appearance, compare_appearance
 from lightpaint.lighting.analysis.appearance.color_choices import Choices, ColorChoice
+from lightpaint.lighting.analysis.appearance.delivery import Delivery
 from lightpaint.lighting.analysis.appearance.limiting_reasons import Reason
 from lightpaint.lighting.analysis.appearance.unpainted_change import UnpaintedChange
 from lightpaint.lighting.analysis.diagnosis import Diagnosis
@@ -147,7 +148,16 @@ def _appearance(appearance: Appearance) -> dict[str, Any]:
         "held_by_views": appearance.limiting_views or None,
         "reasons": [_reason(reason) for reason in appearance.reasons] or None,
         "elsewhere": _unpainted(appearance.unpainted_change),
+        "lit_delta_e": appearance.lit_delta_e,
+        "wishes": [_wish(delivery) for delivery in appearance.deliveries] or None,
     }
+
+
+def _wish(delivery: Delivery) -> dict[str, Any]:
+    """Return how much of a wish came; shares are absent if no visible change was asked."""
+    names = ("name", "kind", "brightness", "color", "delta_e", "asked_brightness", "asked_color")
+    numbers = {name: getattr(delivery, name) for name in names}
+    return numbers | {"group": delivery.group or None}
 
 
 def _reason(reason: Reason) -> dict[str, Any]:

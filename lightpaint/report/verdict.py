@@ -8,10 +8,20 @@ from lightpaint.display_text import some_names
 from lightpaint.images.estimate import Estimate
 from lightpaint.keywords import keywords
 from lightpaint.lighting.analysis.appearance.appearance import CLOSE, Appearance, compare_appearance
+from lightpaint.lighting.analysis.appearance.delivery import Delivery, main_deliveries
 from lightpaint.lighting.analysis.appearance.limiting_reasons import Reason
 from lightpaint.lighting.solution import Solution
 from lightpaint.relit.detection_power import ERROR
 from lightpaint.relit.verification import Verification
+from lightpaint.report.delivery_sentences import (
+    REACH_ADVICE,
+    SPILL_ADVICE,
+    named_worst_wish,
+    spoken_deliveries,
+    spoken_delivery,
+    spoken_newest,
+    spoken_unreached,
+)
 from lightpaint.report.phrases import (
     NO_CLOSER_TEXT,
     spoken_difference,
@@ -76,6 +86,11 @@ def verdict(
         headline(appearance),
         f"{spoken_delta_e(appearance, known=bool(predicted.half_difference.any()))}.",
     ]
+    is_told = named_worst_wish(appearance) is not None  # by the headline
+    if (deliveries := spoken_deliveries(appearance.deliveries)) and not (
+        is_told and len(main_deliveries(appearance.deliveries)) == 1
+    ):
+        sentences.append(deliveries)
     if not solution.certificate.converged:
         sentences.append("The solve stopped before it converged.")
     if verification is None:
@@ -108,11 +123,42 @@ def spoken_current(appearance: Appearance) -> str:
     )
 
 
+def _wish_headline(appearance: Appearance, wish: Delivery) -> str:
+    """Return sentences on the wish of which least came, on the newest one, and on the whole."""
+    newest = spoken_newest(appearance)
+    if appearance.is_nearly_equal:
+        whole = "On the whole it is close."
+    else:
+        progress = spoken_progress(appearance.share_met)
+        whole = f"On the whole: {progress[:1].lower()}{progress[1:]}."
+    return " ".join(filter(None, [spoken_lack(appearance, wish), newest, whole]))
+
+
+def spoken_lack(appearance: Appearance, wish: Delivery) -> str:
+    """Return sentences on a wish of which too little came: how much, why, and what may help.
+
+    Place, lights and reasons of the appearance are those of the wish.
+    """
+    if appearance.causes:
+        return f"{spoken_delivery(wish)}, since {_spoken_causes(appearance)}."
+    if appearance.place is None:
+        return f"{spoken_delivery(wish)}."
+    if wish.lacks_color and not wish.lacks_brightness and appearance.local_lights:
+        reason = f"{_spoken_some(appearance.local_lights)[0]} would colour too much else"
+    else:
+        reason = _spoken_reach(appearance)
+    is_reached = bool(appearance.local_lights) and appearance.has_strong_light
+    advice = SPILL_ADVICE if is_reached and appearance.reasons_wish else REACH_ADVICE
+    return f"{spoken_unreached(wish)}, since {reason}. {advice}"
+
+
 def _paint_headline(appearance: Appearance) -> str:
     if appearance.is_close and not (appearance.is_spot and appearance.place):
         # A mean ΔE of more than CLOSE is shown beside it, if noise is what is above.
         is_noisy = round(appearance.delta_e, 1) > CLOSE
         return f"Close: {'apart from noise, ' if is_noisy else ''}it looks as painted."
+    if (wish := named_worst_wish(appearance)) is not None:
+        return _wish_headline(appearance, wish)
     if appearance.place is None:
         return f"{_headline_start(appearance)}: too much of what was painted is out of reach."
     if appearance.is_far:
@@ -128,7 +174,7 @@ def _paint_headline(appearance: Appearance) -> str:
 
 
 def _headline_start(appearance: Appearance) -> str:
-    if appearance.is_close:
+    if appearance.is_nearly_equal:
         return "Close, but"
     if not appearance.is_far:
         far = spoken_progress(appearance.share_met)
@@ -155,10 +201,19 @@ def spoken_reason(appearance: Appearance) -> str:
     """Return the causes of the largest error as text: the main cause first."""
     assert appearance.place is not None
     if appearance.causes:
-        *first_phrases, last = (spoken_holding(reason) for reason in appearance.causes)
-        return f"{', '.join(first_phrases)}, and {last}" if first_phrases else last
+        return _spoken_causes(appearance)
     if not appearance.is_out_of_reach:
         return spoken_noise(appearance) or NO_MAIN_CAUSE
+    return _spoken_reach(appearance)
+
+
+def _spoken_causes(appearance: Appearance) -> str:
+    *first_phrases, last = (spoken_holding(reason) for reason in appearance.causes)
+    return f"{', '.join(first_phrases)}, and {last}" if first_phrases else last
+
+
+def _spoken_reach(appearance: Appearance) -> str:
+    """Return why no light brings what is missing in the place of most error."""
     if not appearance.local_lights:
         return "no light reaches it"
     names, is_one = _spoken_some(appearance.local_lights)

@@ -268,7 +268,7 @@ def test_what_holds_the_lights_is_said_with_its_option(
     constraints = Constraints.of(constraint_words, where=option_place)
     look = SimpleNamespace(
         solution=SimpleNamespace(problem=SimpleNamespace(constraints=constraints)),
-        analysis=SimpleNamespace(appearance=SimpleNamespace(reasons=(reason,))),
+        analysis=SimpleNamespace(appearance=SimpleNamespace(reasons=(reason,), reasons_wish="")),
     )
     [sentence] = _limit_sentences(look)  # type: ignore[arg-type]
     assert line in spoken(sentence)

@@ -8,6 +8,7 @@ import pytest
 
 import lightpaint as lp
 from lightpaint.lighting.analysis.appearance.appearance import Appearance
+from lightpaint.lighting.analysis.appearance.delivery import Delivery
 from lightpaint.lighting.analysis.appearance.limiting_reasons import Loosening, Reason
 from lightpaint.lighting.analysis.appearance.unpainted_change import UnpaintedChange
 from lightpaint.lighting.analysis.diagnosis import Place
@@ -15,13 +16,15 @@ from lightpaint.paint.protocol import Advice
 from lightpaint.paint.session.answer_messages import (
     ADVICE_TEXTS,
     advice,
+    answer_findings,
+    judge,
     preview_text,
     removable_reason,
     sketch_headline,
     unpainted_text,
     why_not_closer,
 )
-from lightpaint.report.diagnosis_sentences import spoken_cause
+from lightpaint.report.diagnosis_sentences import spoken_about, spoken_cause
 from lightpaint.report.verdict import headline
 
 OFF, HOLD = Reason("off", ("annex_window",), 0.57), Reason("hold", (), 0.5)
@@ -133,6 +136,54 @@ def test_a_button_says_what_it_lets_go_and_what_that_brings():
     advice_given = advice(joint)
     assert advice_given is not None
     assert advice_given.gain is None
+
+
+def test_a_sketch_speaks_of_the_wish_that_lacks_most():
+    moon = Delivery("Moonlight", 0.98, 0.43, layers=(3,), kind="group")
+    rim = Delivery("Rim", 0.95, None, layers=(6,), kind="layer")
+    appearance = Appearance(6.0, 0.0, 20.0, PLACE, deliveries=(moon, rim), reasons=(COLORS, SIDE))
+    text = (
+        "Moonlight: brightness 98 %, colour 43 %, since lights keep their colours. The "
+        "settings allow any colour. Rim: 95 %."
+    )
+    assert sketch_headline(appearance) == f"{text} Most of the way (70 %)."
+    # A warning goes first.
+    worse = replace(appearance, delta_e=23.0)
+    assert sketch_headline(worse) == (
+        f"Farther from the paint than the current lighting, which undo brings back. {text}"
+    )
+    # A painting without names says where light is missing, and how much came.
+    alone = replace(appearance, deliveries=(replace(moon, name="Painting", kind="layer"),))
+    assert sketch_headline(alone).endswith(
+        "The settings allow any colour. Brightness 98 %, colour 43 % of what was asked for came."
+    )
+    # The gain of one wish is not that of the preview.
+    assert advice(appearance) == Advice("colors", (), gain=0.5, hold=None)
+    of_part = replace(appearance, reasons_wish="Moonlight")
+    assert advice(of_part) == Advice("colors", (), gain=None, hold=None)
+    assert spoken_cause(COLORS, about=spoken_about(of_part)).endswith(
+        "would remove 50 % of the difference in Moonlight."
+    )
+
+
+def test_a_view_that_lacks_a_wish_goes_first(make_basis: Any):
+    """Its mean difference is smaller than that of the other view, whose wish came."""
+    basis = make_basis(images=np.ones((1, 12, 12, 3)), names=["lamp"], emission=[[0.1] * 3])
+    target = lp.Target.of(np.full((12, 12, 3), 0.4), name="t")
+    analyses = lp.analyse(lp.solve([basis, basis], [target, target]))
+    rim = Delivery(
+        "Rim", 0.95, None, layers=(6,), kind="layer", asked_brightness=5.0, lit_pixels=10.0
+    )
+    deliveries = (rim, replace(rim, brightness=0.1, lit_pixels=30.0))
+    seen = [
+        replace(analysis, appearance=replace(analysis.appearance, delta_e=delta_e, deliveries=(x,)))
+        for analysis, delta_e, x in zip(analyses, (9.0, 1.0), deliveries, strict=True)
+    ]
+    judgement = judge(seen, [0, 1])
+    assert judgement.worst.delta_e == 1.0
+    [entry] = judgement.complete(answer_findings([basis, basis], np.full((1, 3), 0.4))).deliveries
+    assert entry.layers == (6,)
+    assert entry.brightness == pytest.approx((10 * 0.95 + 30 * 0.1) / 40)
 
 
 def test_a_preview_says_what_it_brings_and_what_it_costs():

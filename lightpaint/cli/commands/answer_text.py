@@ -21,7 +21,12 @@ from lightpaint.lighting.answer.light_setting import LightSetting
 from lightpaint.pipeline.job.settings import Settings
 from lightpaint.pipeline.results.results import Look
 from lightpaint.report.answer_pictures import spoken_view
-from lightpaint.report.diagnosis_sentences import bound_sentences, error_sentences, spoken_cause
+from lightpaint.report.diagnosis_sentences import (
+    bound_sentences,
+    error_sentences,
+    spoken_about,
+    spoken_cause,
+)
 from lightpaint.report.fit_influences import fit_sentence
 from lightpaint.report.measures import energy_shares
 from lightpaint.report.page.color_section import closer_choice
@@ -110,7 +115,8 @@ def _limit_sentences(look: Look) -> list[str]:
 
 def _spoken_cause(look: Look, reason: Reason) -> str:
     """Return a reason in words, with the options to leave out."""
-    sentence = spoken_cause(reason, weaker="--hold")
+    about = spoken_about(look.analysis.appearance)
+    sentence = spoken_cause(reason, weaker="--hold", about=about)
     keys = KEYS_BY_KIND.get(reason.kind, ())
     options = [
         f"--{'limit' if key == 'limits' else key} {name}"

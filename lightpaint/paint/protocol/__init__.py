@@ -15,6 +15,7 @@ from lightpaint.paint.protocol.answer_parts import (
     Closeness,
     Findings,
     LightAnswer,
+    WishDelivery,
 )
 from lightpaint.paint.protocol.base import Message
 from lightpaint.paint.protocol.events import (
@@ -250,4 +251,5 @@ __all__ = [
     "VerificationResult",
     "Verify",
     "ViewInfo",
+    "WishDelivery",
 ]

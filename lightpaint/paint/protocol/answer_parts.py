@@ -52,6 +52,23 @@ class AnswerChoice:
 
 
 @dataclass(frozen=True)
+class WishDelivery:
+    """The share of a wish that came: of a `layer`, of a `group` of layers, or of a `wish`, which is
+    a stroke in a layer.
+
+    layers: ids of its layers. brightness, color: share of the asked change that came; null if none
+    was asked. delta_e: of its lit parts, against the painting.
+    """
+
+    name: str
+    kind: str
+    layers: tuple[int, ...]
+    brightness: float | None
+    color: float | None
+    delta_e: float
+
+
+@dataclass(frozen=True)
 class LightAnswer:
     """The answer for one light.
 
@@ -76,7 +93,8 @@ class Findings:
     """Properties of an answer; the sentences follow later than the lights.
 
     lights: in the order of the state. shares: of each light, by view, if there are several.
-    closeness: of each view; null for unpainted views.
+    closeness: of each view; null for unpainted views. deliveries: how much of each wish came, in
+    all views together.
     """
 
     lights: tuple[LightAnswer, ...] | None = field(default=None, metadata=OPTIONAL)
@@ -87,3 +105,4 @@ class Findings:
     delta_e_present: float | None = field(default=None, metadata=OPTIONAL)
     sentences: tuple[str, ...] | None = field(default=None, metadata=OPTIONAL)
     closeness: tuple[Closeness | None, ...] | None = field(default=None, metadata=OPTIONAL)
+    deliveries: tuple[WishDelivery, ...] | None = field(default=None, metadata=OPTIONAL)

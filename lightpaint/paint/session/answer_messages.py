@@ -12,9 +12,22 @@ from lightpaint.colour.color import LUMINANCE, luminance, rgb_to_hex
 from lightpaint.colour.photometry import photometry
 from lightpaint.lighting.analysis.analysis import Analysis
 from lightpaint.lighting.analysis.appearance.appearance import INVISIBLE, Appearance
+from lightpaint.lighting.analysis.appearance.delivery import Delivery, merge_views
 from lightpaint.lighting.analysis.appearance.limiting_reasons import Reason
 from lightpaint.lighting.analysis.appearance.unpainted_change import UnpaintedChange
-from lightpaint.paint.protocol import Advice, Closeness, Findings, LightAnswer, LightInfo
+from lightpaint.paint.protocol import (
+    Advice,
+    Closeness,
+    Findings,
+    LightAnswer,
+    LightInfo,
+    WishDelivery,
+)
+from lightpaint.report.delivery_sentences import (
+    named_worst_wish,
+    spoken_deliveries,
+    spoken_newest,
+)
 from lightpaint.report.diagnosis_sentences import (
     NO_ERROR,
     bound_sentences,
@@ -31,7 +44,7 @@ from lightpaint.report.phrases import (
     spoken_progress,
 )
 from lightpaint.report.uncertainty_sentences import spoken_errors
-from lightpaint.report.verdict import headline, spoken_missing, spoken_reason
+from lightpaint.report.verdict import headline, spoken_lack, spoken_missing, spoken_reason
 
 #: Distance from Planck's locus up to which a colour is called white, and part of the current light
 #: under which one is off.
@@ -122,12 +135,14 @@ class Judgement:
     """The analysis of an answer, for the page.
 
     worst: of the view with the largest error. closeness: of each view; None for unpainted ones.
-    lights: `error`, `is_constrained` and `is_unreached` of each, as in `LightAnswer`.
+    lights: `error`, `is_constrained` and `is_unreached` of each, as in `LightAnswer`. deliveries:
+    of all views together.
     """
 
     worst: Closeness
     closeness: tuple[Closeness | None, ...]
     lights: tuple[tuple[str | None, bool, bool], ...]
+    deliveries: tuple[WishDelivery, ...] = ()
 
     def complete(self, findings: Findings) -> Findings:
         """Return immediate findings with the results of the analysis."""
@@ -147,25 +162,45 @@ class Judgement:
             delta_e_present=worst.delta_e_present,
             sentences=worst.sentences,
             closeness=self.closeness,
+            deliveries=self.deliveries,
         )
 
 
 def judge(analyses: Sequence[Analysis], painted: Sequence[int]) -> Judgement:
     """Return the headline, the limiting constraints, and the certainty and lock of each light.
 
-    painted: the view of each analysis. The headline is that of the view with the largest error.
+    painted: the view of each analysis. The headline is that of the view with the largest error, of
+    those that lack a wish if there are any.
     """
     solution = analyses[0].solution
     errors = spoken_errors(analyses[0].uncertainty, len(solution.basis.names))
     settings = solution.lighting.lights
     by_view = {view: _closeness(entry) for view, entry in zip(painted, analyses, strict=True)}
     return Judgement(
-        worst=max(by_view.values(), key=lambda entry: entry.delta_e),
+        worst=by_view[_worst_view(painted, analyses)],
         closeness=tuple(by_view.get(k) for k in range(max(painted) + 1)),
         lights=tuple(
             (error, entry.is_active, not any(entry.reached))
             for error, entry in zip(errors, settings, strict=True)
         ),
+        deliveries=wish_deliveries(analyses),
+    )
+
+
+def _worst_view(painted: Sequence[int], analyses: Sequence[Analysis]) -> int:
+    def lack(k: int) -> tuple[bool, float]:
+        appearance = analyses[k].appearance
+        return appearance.worst_wish is not None, appearance.delta_e
+
+    return painted[max(range(len(analyses)), key=lack)]
+
+
+def wish_deliveries(analyses: Sequence[Analysis]) -> tuple[WishDelivery, ...]:
+    """Return how much of each wish came in all views together, for the list of layers."""
+    entries = [entry for analysis in analyses for entry in analysis.appearance.deliveries]
+    return tuple(
+        WishDelivery(x.name, x.kind, x.layers, x.brightness, x.color, x.delta_e)
+        for x in merge_views(entries)
     )
 
 
@@ -200,16 +235,39 @@ def sketch_headline(appearance: Appearance) -> str:
     if appearance.is_close:
         return headline(appearance)
     phrase = _progress_phrase(appearance)
+    if (wish := named_worst_wish(appearance)) is not None:
+        return _wish_text(appearance, wish, phrase)
     if appearance.place is None:
         return f"{phrase}. Paint what matters most, or give it more importance."
     # One reason at a time: the next one appears once this is resolved.
     first = replace(appearance, reasons=appearance.causes[:1])
     missing = spoken_missing(appearance)
     text = f"{phrase}. {missing[0].upper()}{missing[1:]} is missing: {spoken_reason(first)}."
+    shares = "" if appearance.worst_wish is None else spoken_deliveries(appearance.deliveries)
+    return " ".join(filter(None, [text, _advice_text(appearance), shares]))
+
+
+def _wish_text(appearance: Appearance, wish: Delivery, phrase: str) -> str:
+    """Describe the wish of which too little came, the newest one, and the progress.
+
+    phrase: the progress, which comes first if the answer is worse than the current lighting, or
+    changes the rest by more than it gains.
+    """
+    first = replace(appearance, reasons=appearance.causes[:1])
+    sentences = [
+        spoken_lack(first, wish),
+        _advice_text(appearance),
+        spoken_newest(appearance),
+    ]
+    is_warning = appearance.is_worse or appearance.is_at_cost
+    sentences.insert(0 if is_warning else len(sentences), f"{phrase}.")
+    return " ".join(filter(None, sentences))
+
+
+def _advice_text(appearance: Appearance) -> str:
+    """Return what to do about the first reason; "" if its button says it."""
     cause = removable_reason(appearance)
-    if cause is None or cause.kind not in ADVICE_TEXTS:
-        return text
-    return f"{text} {ADVICE_TEXTS[cause.kind]}"
+    return "" if cause is None else ADVICE_TEXTS.get(cause.kind, "")
 
 
 def _progress_phrase(appearance: Appearance) -> str:
@@ -263,12 +321,15 @@ def advice(appearance: Appearance) -> Advice | None:
         is_missed = not appearance.is_close and appearance.place is not None
         return Advice("reach", (), None, None) if is_missed and not appearance.causes else None
     kind, names = cause.kind, tuple(cause.names)
+    # The gain of a part of the paint is not that of the preview, which is about all of it.
+    is_of_all = not appearance.reasons_wish
     if kind != "hold":
-        return Advice(kind, names, None if cause.is_joint else cause.share, None, cause.delta_e)
+        gain = cause.share if is_of_all and not cause.is_joint else None
+        return Advice(kind, names, gain, None, cause.delta_e)
     weaker = cause.loosening
     if weaker is None:
         return Advice(kind, names, None, 0.0)
-    return Advice(kind, names, weaker.share, weaker.hold, weaker.delta_e)
+    return Advice(kind, names, weaker.share if is_of_all else None, weaker.hold, weaker.delta_e)
 
 
 def _closeness(analysis: Analysis) -> Closeness:

@@ -1,20 +1,25 @@
-"""The tables of the report besides that of lights: fit, renders, verification. Each returns HTML.
+"""The tables of the report besides that of lights: wishes, fit, renders, verification.
 
-Names of lights, targets and scenes come from other people's files and are escaped here.
+Each function returns HTML. Names of lights, targets and scenes come from other people's files and
+are escaped here.
 """
 
 import platform
+from html import escape
 
 import numpy as np
 
 from lightpaint.basis.basis import Basis
 from lightpaint.display_text import some_of
 from lightpaint.images.estimate import Estimate
+from lightpaint.lighting.analysis.appearance.appearance import Appearance
+from lightpaint.lighting.analysis.appearance.delivery import spoken_share
 from lightpaint.lighting.answer.software_versions import Software, version
 from lightpaint.lighting.loss.painting import ignored_paint
 from lightpaint.lighting.solution import Solution
 from lightpaint.relit.detection_power import ERROR
 from lightpaint.relit.verification import Verification, limit_of_tests
+from lightpaint.report.delivery_sentences import is_unnamed, wish_name
 from lightpaint.report.measures import (
     count_at_least_pixels,
     error_in_codes,
@@ -22,10 +27,44 @@ from lightpaint.report.measures import (
     noise_residual,
     relative_residual,
 )
-from lightpaint.report.page.html import facts, name_list, row
+from lightpaint.report.page.html import facts, name_list, row, share_cell, table
 from lightpaint.report.uncertainty_sentences import partly_reached
 from lightpaint.target.target import Target
 from lightpaint.version import __version__
+
+#: Headings of the table of wishes.
+WISH_HEADINGS = ("wish", "brightness", "colour", "mean ΔE")
+
+
+def wishes_section(appearance: Appearance | None) -> str:
+    """Return the section on how much of each wish came; "" if none asks for anything visible.
+
+    The verdict says it of an only one without a name.
+    """
+    deliveries = () if appearance is None else appearance.deliveries
+    entries = [entry for entry in deliveries if entry.least is not None]
+    if not entries or (len(entries) == 1 and is_unnamed(entries[0])):
+        return ""
+    rows = [
+        row(
+            escape(wish_name(entry)),
+            _delivered_cell(entry.brightness),
+            _delivered_cell(entry.color),
+            f"{entry.delta_e:.1f}",
+        )
+        for entry in entries
+    ]
+    return (
+        "<section><h2>What came of it</h2><p>How much of each painted change came, where it is "
+        "lit.</p>"
+        f"{table(WISH_HEADINGS, rows, kind='wishes')}</section>"
+    )
+
+
+def _delivered_cell(share: float | None) -> str:
+    if share is None:
+        return '<td class="share"></td>'
+    return share_cell(spoken_share(share), min(max(share, 0.0), 1.0))
 
 
 def fit_table(solution: Solution) -> str:

@@ -42,7 +42,13 @@ from lightpaint.report.page.color_section import colors_section
 from lightpaint.report.page.constraint_section import constraints_section
 from lightpaint.report.page.diagnosis_section import missed_section, sure_section
 from lightpaint.report.page.figures import PagePicture, maps, wipe
-from lightpaint.report.page.fit_tables import fit_table, render_table, verification_table, versions
+from lightpaint.report.page.fit_tables import (
+    fit_table,
+    render_table,
+    verification_table,
+    versions,
+    wishes_section,
+)
 from lightpaint.report.page.lights_table import lights_table, thumbnails_of
 from lightpaint.report.page.mixer import mixer_assets, mixer_html, planes_for_page
 from lightpaint.report.page.placement_section import placement_section
@@ -133,6 +139,7 @@ def report_page(
         **parts,
         **_texts(basis, target, solution, predicted, verification, appearance),
         exposure=_exposure(transform, predicted.image, looks.denoiser),
+        wishes=wishes_section(appearance),
         places=placement_section(hung, to_8_bit(transform.encode(looks.predicted)), basis.features),
         suggestions=suggestion_section(
             suggestions,

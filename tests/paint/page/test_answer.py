@@ -690,3 +690,42 @@ def test_a_double_click_begins_no_render(painter: Painter) -> None:
     assert painter.requests("verify") == []
     painter.button("Verify").click()
     assert painter.requests("verify")
+
+
+def test_a_bar_on_the_row_of_a_layer_says_how_much_of_its_wish_came(painter: Painter) -> None:
+    """On that of a group too; while somebody paints they are those of the last answer."""
+    painter.page.evaluate(
+        """() => { engine.makeLayers(4); painter.store.set({ side: true });
+          engine.changeLayers({ layers: [{ ...engine.layers[2], group: 4 }] }); }"""
+    )
+    painter.still()
+    shares = {"delta_e": 2.0, "name": "x"}
+    deliveries = [
+        {"kind": "wish", "layers": [1], "brightness": 0.1, "color": None, **shares},
+        {"kind": "layer", "layers": [1], "brightness": 0.98, "color": 0.43, **shares},
+        {"kind": "layer", "layers": [2], "brightness": None, "color": 1.3, **shares},
+        {"kind": "group", "layers": [2], "brightness": -0.2, "color": None, **shares},
+        {"kind": "layer", "layers": [3], "brightness": None, "color": None, **shares},
+    ]
+    lights = painter.page.evaluate("() => window.host.exact().lights")
+    answer = {"kind": "answer", "exact": True, "lights": lights, "delta_e": 2.0, "sentences": []}
+    painter.tell(**answer, version=100, headline="Nearly.", deliveries=deliveries)
+
+    def bars(layer: int) -> list[str]:
+        row = painter.page.locator(f"[data-layer='{layer}'] .layer-came")
+        return row.locator("b").evaluate_all("(all) => all.map(({ style }) => style.width)")
+
+    assert [bars(k) for k in (1, 2, 3, 4)] == [["98%", "43%"], ["100%"], [], ["0%"]]
+    came = painter.page.locator("[data-layer='1'] .layer-came")
+    assert came.get_attribute("aria-label") == (
+        "Of what it asks for, 98 % of the brightness and 43 % of the colour came"
+    )
+    assert came.locator("i.is-short").count() == 1
+    assert painter.page.locator("[data-layer='2'] .is-short").count() == 0
+    assert painter.page.locator("[data-layer='4'] .layer-came").get_attribute("aria-label") == (
+        "0 % of the change of brightness came"
+    )
+    painter.tell(kind="answer", version=101, exact=False)
+    assert "is-old" in came.get_attribute("class")
+    painter.tell(**answer, version=102, headline="Nothing is painted.")
+    assert came.count() == 0

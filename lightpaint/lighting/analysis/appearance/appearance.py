@@ -10,9 +10,16 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 
+from lightpaint.arrays import Floats
 from lightpaint.display_text import short_repr
 from lightpaint.images.estimate import Estimate
 from lightpaint.keywords import keywords
+from lightpaint.lighting.analysis.appearance.delivery import (
+    Delivery,
+    DeliveryReport,
+    measure_deliveries,
+    worst_delivery,
+)
 from lightpaint.lighting.analysis.appearance.display_difference import PaintComparison
 from lightpaint.lighting.analysis.appearance.error_place import (
     NOTICED,
@@ -74,6 +81,11 @@ class Appearance:
             `forbidden`, `noise`, `painting_noise`, and `compromise` of several views. Empty if not
             computed.
         unpainted_change: The change of the rest, for a painting over the current look.
+        deliveries: How much of each wish came, the lowest first: of each layer or stroke, and of
+            each group after its layers.
+        lit_delta_e: The mean CIEDE2000 of the lit parts of the paint, as washes.
+        reasons_wish: The name of the wish that place, lights and reasons are about: of `worst_wish`
+            if it is a part of the paint. "" if they are about all of it.
 
     Examples:
         >>> appearance = lp.compare_appearance(lp.solve(basis, target))
@@ -92,15 +104,24 @@ class Appearance:
     reasons: tuple[Reason, ...] = ()
     error_shares: Mapping[str, float] = field(default_factory=dict)
     unpainted_change: UnpaintedChange | None = None
+    deliveries: tuple[Delivery, ...] = ()
+    lit_delta_e: float = 0.0
+    reasons_wish: str = ""
 
     __repr__ = short_repr
 
     @property
     def causes(self) -> tuple[Reason, ...]:
-        """The reasons that a headline may name: without one of them a third of the error
-        vanishes.
+        """The reasons that a headline may name: without one of them a third of the error vanishes,
+        or lights could have the colour that `worst_wish` lacks.
         """
-        return tuple(reason for reason in self.reasons if reason.share >= HEADLINE_SHARE)
+        worst = self.worst_wish
+        lacks_color = worst is not None and worst.lacks_color
+        return tuple(
+            reason
+            for reason in self.reasons
+            if reason.share >= HEADLINE_SHARE or (lacks_color and reason.kind == "colors")
+        )
 
     @property
     def limit_groups(self) -> tuple[LimitGroup, ...]:
@@ -169,9 +190,21 @@ class Appearance:
         return self.error > max(INVISIBLE, (1 - MIN_CHANGE) * self.requested_change)
 
     @property
+    def worst_wish(self) -> Delivery | None:
+        """The wish of which least came, if less than three quarters did."""
+        return worst_delivery(self.deliveries)
+
+    @property
+    def is_nearly_equal(self) -> bool:
+        """True if the two look alike on the whole and in their lit parts; not if little was
+        requested and even less achieved.
+        """
+        return max(self.error, self.lit_delta_e) <= CLOSE and not self.is_in_vain
+
+    @property
     def is_close(self) -> bool:
-        """True if the two look alike; not if little was requested and even less achieved."""
-        return self.error <= CLOSE and not self.is_in_vain
+        """True if the two look alike, and at least three quarters of each wish came."""
+        return self.is_nearly_equal and self.worst_wish is None
 
     @property
     def is_far(self) -> bool:
@@ -207,7 +240,14 @@ def compare_appearance(
     delta_e, error = (
         float(np.average(x, weights=look.block_weights)) for x in (with_noise, missed)
     )
-    appearance = Appearance(delta_e, max(delta_e - error, 0.0), look.mean(look.difference(now)))
+    delivered = measure_deliveries(solution, predicted)
+    appearance = Appearance(
+        delta_e,
+        max(delta_e - error, 0.0),
+        look.mean(look.difference(now)),
+        deliveries=delivered.deliveries,
+        lit_delta_e=delivered.lit_delta_e,
+    )
     if len(problem.views) > 1:
         return appearance
     rest = change_from_scene(solution, look, solution.weights, predicted.image)
@@ -218,15 +258,41 @@ def compare_appearance(
     appearance = replace(appearance, place=place, is_spot=share >= SPOT)
     if appearance.is_close and not appearance.is_spot:
         return appearance
-    appearance = _with_local_lights(appearance, solution, place)
-    if (objects := solution.basis.objects) is not None:
-        appearance = replace(
-            appearance,
-            place=replace(place, object=object_with_most_error(look, objects, missed, light)),
-        )
+    if (area := _worst_area(appearance, delivered)) is not None:
+        look = look.within(area)
+        appearance = replace(appearance, reasons_wish=delivered.name_of_part(appearance.worst_wish))
+    return _with_reasons(appearance, solution, look, predicted, area, diagnosis)
+
+
+def _worst_area(appearance: Appearance, delivered: DeliveryReport) -> Floats | None:
+    """Return the area of the wish of which least came, (h, w); None if enough came of all."""
+    worst = appearance.worst_wish
+    entries = zip(delivered.deliveries, delivered.areas, strict=True)
+    return next((area for delivery, area in entries if delivery is worst), None)
+
+
+def _with_reasons(
+    appearance: Appearance,
+    solution: Solution,
+    look: PaintComparison,
+    predicted: Estimate,
+    area: Floats | None,
+    diagnosis: Diagnosis | None,
+) -> Appearance:
+    """Return the appearance with the place of most error, its lights and object, and the reasons.
+
+    look, area: of the paint in question; the area is None for all paint.
+    """
+    light, grain = look.pixels(predicted.image), look.pixels(predicted.half_difference)
+    _, missed = block_differences(look, light, grain)
+    if missed.any():
+        place, _ = place_with_most_error(look, missed, light, grain)
+        if (objects := solution.basis.objects) is not None:
+            place = replace(place, object=object_with_most_error(look, objects, missed, light))
+        appearance = _with_local_lights(replace(appearance, place=place), solution, place)
     return replace(
         appearance,
-        reasons=reasons_of(solution),
+        reasons=reasons_of(solution, area),
         error_shares=error_shares(diagnosis or diagnose(solution)),
     )
 

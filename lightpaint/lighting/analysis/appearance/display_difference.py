@@ -1,6 +1,6 @@
 """The visible difference of a picture from the paint: CIEDE2000, as displayed."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import Any
 
@@ -55,6 +55,13 @@ class PaintComparison:
             problem.loss.transform,
         )
 
+    def within(self, area: Floats) -> "PaintComparison":
+        """Return the comparison of a part of the paint, (H, W) from 0 to 1; of all of it if no
+        compared pixel lies there.
+        """
+        weight = self.weight * area[:: self.step, :: self.step]
+        return replace(self, weight=weight) if weight.any() else self
+
     @cached_property
     def counts(self) -> Bools:
         """(h, w), the painted pixels."""
@@ -103,9 +110,7 @@ class PaintComparison:
 
     def lab(self, pixels: Doubles) -> Doubles:
         """Return L*a*b* (p, 3) of light (p, 3) on the display."""
-        if self.transform.name == "srgb":  # encoding and decoding cancel
-            return lab(np.clip(pixels * 2.0**self.transform.stops, 0, 1))
-        return lab(decode_display(self.transform.encode(pixels)))
+        return lab(display_light(pixels, self.transform))
 
     def lab_goal(self, pixels: Doubles) -> Doubles:
         """Return L*a*b* (p, 3) of the goal."""
@@ -155,6 +160,13 @@ class PaintComparison:
         ends = zip((top, left), self.weight.shape, strict=True)
         bottom, right = (self.step * min(start // self.step + BLOCK, n) for start, n in ends)
         return top, left, bottom, right
+
+
+def display_light(pixels: Doubles, transform: ViewTransform) -> Doubles:
+    """Return the light that a display emits for light (..., 3), white = 1."""
+    if transform.name == "srgb":  # encoding and decoding cancel
+        return np.asarray(np.clip(pixels * 2.0**transform.stops, 0, 1))
+    return np.asarray(decode_display(transform.encode(pixels)), np.float64)
 
 
 def display_transform(problem: Problem) -> ViewTransform:

@@ -11,7 +11,7 @@ from typing import Literal
 
 import numpy as np
 
-from lightpaint.arrays import Doubles
+from lightpaint.arrays import Doubles, Floats
 from lightpaint.images.bands import is_large
 from lightpaint.lighting.analysis.appearance.constraint_kinds import (
     ALL_LIGHTS_KINDS,
@@ -114,14 +114,16 @@ class Reason:
         return "constraints"
 
 
-def reasons_of(solution: Solution) -> tuple[Reason, ...]:
+def reasons_of(solution: Solution, area: Floats | None = None) -> tuple[Reason, ...]:
     """Find the reasons that keep the lights from the painting of one view, the most important
     first.
 
     Constraints by a person go before reasons that tie with them. If no single reason has half of
-    the gain of all, they are joint: first the one without which the others gain least.
+    the gain of all, they are joint: first the one without which the others gain least. area:
+    (h, w) from 0 to 1, the part of the paint whose error counts; None for all paint.
     """
-    sample = PixelSample.of(solution)
+    sample = PixelSample.of(solution, area)
+    look = _comparison(solution, area)
     if not sample.groups or sample.current_error <= 0:
         return ()
     everything = sample.share(sample.groups)
@@ -137,16 +139,24 @@ def reasons_of(solution: Solution) -> tuple[Reason, ...]:
     if (not reasons or reasons[0].share < SINGLE_SHARE * everything) and len(sample.groups) > 1:
         return _joint_reasons(sample, everything)
     measured = [
-        x if k >= MAX_MEASURED and x.kind != "hold" else _measure(solution, sample, x)
+        x if k >= MAX_MEASURED and x.kind != "hold" else _measure(solution, sample, look, x)
         for k, x in enumerate(reasons)
     ]
     return tuple(x for x in measured if x is not None)
 
 
-def _measure(solution: Solution, sample: PixelSample, reason: Reason) -> Reason | None:
+def _comparison(solution: Solution, area: Floats | None) -> PaintComparison:
+    """Return the comparison with the paint, or with a part of it, with all pixels."""
+    look = PaintComparison.of_problem(solution.problem)
+    return look if area is None else look.within(area)
+
+
+def _measure(
+    solution: Solution, sample: PixelSample, look: PaintComparison, reason: Reason
+) -> Reason | None:
     """Measure the effect of removing a reason, of a hold that of a weaker one, with all pixels.
 
-    Return None if it is too small.
+    look: the comparison with the paint in question. Return None if it is too small.
     """
     problem = sample.problem
     if reason.kind == "views":
@@ -154,7 +164,7 @@ def _measure(solution: Solution, sample: PixelSample, reason: Reason) -> Reason 
     if reason.kind == "hold":
         if problem.fit.unpainted or not problem.fit.hold:
             return reason  # unpainted pixels have a weight of their own
-        loosening = _find_loosening(solution, sample, reason.share)
+        loosening = _find_loosening(solution, sample, look, reason.share)
         return None if loosening.share < MIN_SHARE else replace(reason, loosening=loosening)
     if reason.kind == "colors":
         weights = (
@@ -171,7 +181,7 @@ def _measure(solution: Solution, sample: PixelSample, reason: Reason) -> Reason 
             if _is_for_sample(problem)
             else released_weights(solution, constraints=released)
         )
-    effect = _effect(solution, weights)
+    effect = _effect(solution, look, weights)
     if effect.share < MIN_SHARE:
         return None
     return replace(reason, share=effect.share, delta_e=effect.delta_e)
@@ -194,12 +204,16 @@ class _Effect:
     rest: UnpaintedChange | None
 
 
-def _effect(solution: Solution, weights: Doubles) -> _Effect:
-    """Return the effect of weights (n, 3) in place of those of `solution`, with all pixels."""
-    look = PaintComparison.of_problem(solution.problem)
+def _effect(solution: Solution, look: PaintComparison, weights: Doubles) -> _Effect:
+    """Return the effect of weights (n, 3) in place of those of `solution`, with all pixels.
+
+    look: the comparison with the paint in question, whose error the share is of; mean ΔE is over
+    all paint.
+    """
+    whole = PaintComparison.of_problem(solution.problem)
     before, after = (solution.basis.mix(x) for x in (solution.weights, weights))
-    now, then = (look.mean(look.difference(look.pixels(x))) for x in (before, after))
-    rest = change_from_scene(solution, look, weights, after)
+    now, then = (whole.mean(whole.difference(whole.pixels(x))) for x in (before, after))
+    rest = change_from_scene(solution, whole, weights, after)
     return _Effect(look.share_removed(before, after), (now, then), rest)
 
 
@@ -262,7 +276,9 @@ def _joint_reasons(sample: PixelSample, everything: float) -> tuple[Reason, ...]
     return tuple(reasons)
 
 
-def _find_loosening(solution: Solution, sample: PixelSample, full_gain: float) -> Loosening:
+def _find_loosening(
+    solution: Solution, sample: PixelSample, look: PaintComparison, full_gain: float
+) -> Loosening:
     """Find and measure the strongest hold with `LOOSENED_SHARE` of `full_gain`, that of none."""
     hold = _weaker_hold(sample, LOOSENED_SHARE * full_gain)
     weights = (
@@ -270,7 +286,7 @@ def _find_loosening(solution: Solution, sample: PixelSample, full_gain: float) -
         if _is_for_sample(sample.problem)
         else released_weights(solution, fit=replace(sample.problem.fit, hold=hold))
     )
-    effect = _effect(solution, weights)
+    effect = _effect(solution, look, weights)
     return Loosening(hold, effect.share, effect.rest, effect.delta_e, sample.problem.fit.hold)
 
 

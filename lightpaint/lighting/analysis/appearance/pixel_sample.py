@@ -12,7 +12,7 @@ from lightpaint.arrays import Doubles, Floats
 from lightpaint.basis.basis import Basis
 from lightpaint.basis.derived_planes import block_means
 from lightpaint.images.estimate import Estimate
-from lightpaint.images.pixel_blocks import block_sums
+from lightpaint.images.pixel_blocks import block_mean, block_sums, whole_factor
 from lightpaint.lighting.analysis.appearance.constraint_kinds import (
     ALL_LIGHTS_KINDS,
     ConstraintKind,
@@ -56,36 +56,45 @@ class PixelSample:
     )
 
     @staticmethod
-    def of(solution: Solution) -> "PixelSample":
-        """Return a sample of the pixels that `solution`, or the solution it is a part of, met."""
+    def of(solution: Solution, area: Floats | None = None) -> "PixelSample":
+        """Return a sample of the pixels that `solution`, or the solution it is a part of, met.
+
+        area: (h, w), the part of the view's paint of which errors count; None for all of it.
+        """
         problem = (solution.whole or solution).problem
-        views = _average_blocks(problem.views, problem.block_side)
         view_index = next(
             k for k, basis in enumerate(problem.views.bases) if basis is solution.basis
         )
+        views = _average_blocks(problem.views, problem.block_side)
         painted = [(target.importance > 0).ravel() for target in views.targets]
         # One step for all views, so that each keeps its weight.
         total, rest = (sum(int((x == is_it).sum()) for x in painted) for is_it in (True, False))
         steps = max(total // SAMPLE_PIXELS, 1), max(rest // SAMPLE_PIXELS, 1)
-        bases, targets = [], []
+        bases, targets, places = [], [], []
         for basis, target, is_painted in zip(views.bases, views.targets, painted, strict=True):
             chosen = [
                 np.flatnonzero(x)[::step]
                 for x, step in zip((is_painted, ~is_painted), steps, strict=True)
             ]
-            sampled = _pixel_row(basis, target, np.sort(np.concatenate(chosen)))
+            places.append(np.sort(np.concatenate(chosen)))
+            sampled = _pixel_row(basis, target, places[-1])
             bases.append(sampled[0])
             targets.append(sampled[1])
         sensors = tuple(basis.origin.sensor for basis in views.bases)
         names = tuple(target.name for target in views.targets)
-        alone = Problem.of(bases[view_index], targets[view_index], fit=problem.fit)
+        look = PaintComparison.of_problem(
+            Problem.of(bases[view_index], targets[view_index], fit=problem.fit)
+        )
+        if area is not None:
+            factor = whole_factor(area.shape, views.bases[view_index].size) or 1
+            look = look.within(block_mean(area, factor).ravel()[None, places[view_index]])
         return PixelSample(
             problem,
             bases,
             targets,
             view_index,
             sensors if len(set(sensors)) == len(sensors) else names,
-            PaintComparison.of_problem(alone),
+            look,
             solution.weights,
         )
 
@@ -266,5 +275,6 @@ def _pixel_row(basis: Basis, target: Target, chosen: npt.NDArray[np.intp]) -> tu
         image=cut(target.image),
         importance=cut(target.importance),
         at_least=None if target.at_least is None else cut(target.at_least),
+        wishes=tuple(replace(wish, area=cut(wish.area)) for wish in target.wishes),
     )
     return row, target_row

@@ -409,6 +409,22 @@ export interface AnswerChoice {
 }
 
 /**
+ * The share of a wish that came: of a `layer`, of a `group` of layers, or of a `wish`, which is
+ * a stroke in a layer.
+ *
+ * layers: ids of its layers. brightness, color: share of the asked change that came; null if none
+ * was asked. delta_e: of its lit parts, against the painting.
+ */
+export interface WishDelivery {
+  name: string;
+  kind: string;
+  layers: number[];
+  brightness: number | null;
+  color: number | null;
+  delta_e: number;
+}
+
+/**
  * The answer for one light.
  *
  * stops: relative to its current emission; null if it is, or was, off. kelvin: null for a colour
@@ -431,7 +447,8 @@ export interface LightAnswer {
  * Properties of an answer; the sentences follow later than the lights.
  *
  * lights: in the order of the state. shares: of each light, by view, if there are several.
- * closeness: of each view; null for unpainted views.
+ * closeness: of each view; null for unpainted views. deliveries: how much of each wish came, in
+ * all views together.
  */
 export interface Findings {
   lights?: LightAnswer[];
@@ -442,6 +459,7 @@ export interface Findings {
   delta_e_present?: number;
   sentences?: string[];
   closeness?: (Closeness | null)[];
+  deliveries?: WishDelivery[];
 }
 
 /**
@@ -542,6 +560,7 @@ export interface AnswerUpdate {
   delta_e_present?: number;
   sentences?: string[];
   closeness?: (Closeness | null)[];
+  deliveries?: WishDelivery[];
   history?: HistoryInfo;
   constraints?: Record<string, Record<string, any>>;
   ties?: string[][];

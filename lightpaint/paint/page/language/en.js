@@ -477,6 +477,11 @@ export const en = {
     maskOf: 'Mask of',
     theBrushAddsTheEraserRemoves: ': the brush adds, the eraser removes.',
   },
+  layerDelivery: {
+    ofBrightness: '{value} % of the change of brightness came',
+    ofColour: '{value} % of the change of colour came',
+    ofBoth: 'Of what it asks for, {brightness} % of the brightness and {colour} % of the colour came',
+  },
   layerRow: {
     hide: 'hide {name}',
     show: 'show {name}',

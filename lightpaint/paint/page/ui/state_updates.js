@@ -154,11 +154,11 @@ function transformDisplay(transform) {
  * @param {any} answer @param {Ui} previous @returns {Partial<Ui>}
  */
 function answerFields(answer, previous) {
-  const { headline, lights, shares = null, closeness = null } = answer;
+  const { headline, lights, shares = null, closeness = null, deliveries = [] } = answer;
   /** @type {Partial<Ui>} */
   const changes = { isLive: false, isJudgementCurrent: headline !== undefined };
   if (headline !== undefined)
-    Object.assign(changes, { closeness }, closenessUpdate({ ...answer, closeness }, previous));
+    Object.assign(changes, { closeness, deliveries }, closenessUpdate({ ...answer, closeness }, previous));
   // Without paint there are no error bars and no reasons.
   const resetFields = changes.deltaE === null && !closeness ? UNKNOWN : {};
   if (lights) {

@@ -29,6 +29,7 @@ import { initialSelection } from './selection/selection_settings.js';
  *   before: import("./engine_interface.js").Picture | null, after: import("./engine_interface.js").Picture | null}}
  *   Preview */
 /** @typedef {import("../engine/messages.js").Closeness} Closeness */
+/** @typedef {import("../engine/messages.js").WishDelivery} WishDelivery */
 /** The effect of the next click: aim a light or hang a new one. edge: the place that casts the
  * shadow, once clicked.
  * @typedef {{light: number, mode: "aim" | "highlight" | "shadow", edge?: [number, number]}
@@ -59,6 +60,7 @@ import { initialSelection } from './selection/selection_settings.js';
  * @property {number} view that is shown
  * @property {{name: string, size: [number, number]}[]} views of the session
  * @property {(Closeness | null)[] | null} closeness how close each view is; null where nothing is painted
+ * @property {WishDelivery[]} deliveries how much of each wish came, by the last exact answer
  * @property {number[][] | null} shares of each light, in each view
  * @property {Record<number, any>} verifications renders, by view
  * @property {Light[]} lights
@@ -207,6 +209,7 @@ export function initialState() {
     view: 0,
     views: [],
     closeness: null,
+    deliveries: [],
     shares: null,
     verifications: {},
     lights: [],

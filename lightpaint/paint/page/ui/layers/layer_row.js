@@ -14,6 +14,7 @@ import {
   ungroupedLayers,
   withoutLayers,
 } from './layer_order.js';
+import { LayerDelivery } from './layer_delivery.js';
 import { fill, words } from '../../language/language.js';
 
 /** @typedef {import("../ui_state.js").Ui} Ui */
@@ -72,6 +73,7 @@ export function LayerRow({ ui, app, layer, isInner, isActive, isUnfolded, isChos
         onBlur=${hover(null)} onKeyDown=${(/** @type {KeyboardEvent} */ event) =>
           pressKey(event, app, layer)}>${name || words.layerRow.layer}</button>
       ${layer.strength !== 1 && html`<span class="faint">${Math.round(100 * layer.strength)} %</span>`}
+      <${LayerDelivery} ui=${ui} layer=${layer} />
       <span class="grip" aria-hidden="true" data-tip=${words.layerRow.dragToOrder}><${Icon} name="grip" /></span>
     </div>
     ${isUnfolded && html`<${LayerControls} ui=${ui} app=${app} layer=${layer} />`}

@@ -1,0 +1,381 @@
+"""The delivery of wishes: how much came of each change of brightness, and of colour.
+
+A wish asks for a change from the current look N to the painting A; the answer made G of it. All are
+washes (`washes.py`). Brightness is L*; colour is a*b* of all three at the luminance of A, so that
+colour counts for itself where brightness is missing. Of the asked change A − N, the share
+
+    Σ ω (A − N)·(G − N) / Σ ω |A − N|²
+
+came, with the weight ω of the wish in each pixel: its projection. A subject, smaller than the rest
+of the lit picture, may also stand out as was asked while all is darker or bluer, since eyes adapt:
+for that, A, N and G are single values, the mean over the wish less s times the mean over the rest,
+where s is the share of the rest in both. Of the two shares, the one nearer to 1 counts.
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from typing import NamedTuple
+
+import numpy as np
+
+from lightpaint.arrays import Doubles, Floats
+from lightpaint.colour.color import luminance
+from lightpaint.colour.color_difference import ciede2000, lab
+from lightpaint.display_text import visible
+from lightpaint.images.estimate import Estimate
+from lightpaint.keywords import keywords
+from lightpaint.lighting.analysis.appearance.display_difference import display_transform
+from lightpaint.lighting.analysis.appearance.washes import AreaWashes, Washes
+from lightpaint.lighting.analysis.appearance.wish_parts import WishKind, WishPart, wish_parts
+from lightpaint.lighting.solution import Solution
+from lightpaint.target.target import Target
+from lightpaint.target.wish_finding import find_wishes
+
+#: ΔE of a visible change: if a wish changes brightness by less, it asks for none.
+MIN_ASKED = 2.0
+
+#: Luminance, relative to white, below which the colour of light fades to grey: that of L* 4.
+DARK = 0.0044
+
+#: Share of the lit paint from which a wish is nearly all of it.
+MOST = 0.95
+
+#: The least share of a change that has to come for a wish to have come.
+MIN_DELIVERED = 0.75
+
+
+@keywords()
+@dataclass(frozen=True)
+class Delivery:
+    """The share of one wish that came.
+
+    Attributes:
+        name: The name of the wish for people, or of its layer or group.
+        brightness: The share of the asked change of brightness that came: 1 if all of it did, more
+            if too much did, below 0 if it went the other way. None if no visible one was asked.
+        color: The same of the change of colour.
+        delta_e: The mean CIEDE2000 of its lit parts against the painting, as washes.
+        asked_brightness: The change of brightness that it asks for, as ΔE.
+        asked_color: The change of colour that it asks for, as ΔE.
+        lit_pixels: The size of its lit parts.
+        layers: The ids of its layers in a painter's session; none for a painting without layers.
+        group: The name of its group of layers; "" without one.
+        kind: `group` for all layers of a group; `layer` for a whole layer; `wish` for a part of a
+            layer or of a painting without layers.
+
+    Examples:
+        >>> [delivery] = lp.compare_appearance(lp.solve(basis, target)).deliveries
+        >>> delivery.is_met
+        True
+    """
+
+    name: str
+    brightness: float | None
+    color: float | None
+    delta_e: float = 0.0
+    asked_brightness: float = 0.0
+    asked_color: float = 0.0
+    lit_pixels: float = 1.0
+    layers: tuple[int, ...] = ()
+    group: str = ""
+    kind: WishKind = "wish"
+
+    def __repr__(self) -> str:
+        return f"Delivery({self.spoken})"
+
+    @property
+    def least(self) -> float | None:
+        """The smaller of both shares; None if it asks for nothing visible."""
+        shares = [share for share in (self.brightness, self.color) if share is not None]
+        return min(shares, default=None)
+
+    @property
+    def is_met(self) -> bool:
+        """True if at least three quarters of each asked change came."""
+        return self.least is None or self.least >= MIN_DELIVERED
+
+    @property
+    def lacks_color(self) -> bool:
+        """True if less than three quarters of the asked change of colour came."""
+        return self.color is not None and self.color < MIN_DELIVERED
+
+    @property
+    def lacks_brightness(self) -> bool:
+        """True if less than three quarters of the asked change of brightness came."""
+        return self.brightness is not None and self.brightness < MIN_DELIVERED
+
+    @property
+    def spoken(self) -> str:
+        """`Moonlight: brightness 98 %, colour 43 %`; only the number if it asks for one of both."""
+        return f"{visible(self.name)}: {self.spoken_shares}"
+
+    @property
+    def spoken_shares(self) -> str:
+        """The same without the name."""
+        brightness, color = self.brightness, self.color
+        if brightness is not None and color is not None:
+            return f"brightness {spoken_share(brightness)}, colour {spoken_share(color)}"
+        share = brightness if color is None else color
+        return "no visible change" if share is None else spoken_share(share)
+
+
+def spoken_share(share: float) -> str:
+    """Return a delivered share as text, `43 %`; `0 %` if it went the other way."""
+    return f"{max(round(100 * share), 0)} %"
+
+
+def main_deliveries(deliveries: Sequence[Delivery]) -> list[Delivery]:
+    """Return the entries that people name: groups as a whole, and strokes for themselves."""
+    split = {layer for x in deliveries if x.kind == "wish" for layer in x.layers}
+    return [
+        x
+        for x in deliveries
+        if x.kind == "group"
+        or (not x.group and (x.kind == "wish" or not split.intersection(x.layers)))
+    ]
+
+
+def worst_delivery(deliveries: Sequence[Delivery]) -> Delivery | None:
+    """Return the entry of which least came, if less than three quarters did.
+
+    A part of a group counts if the group as a whole came.
+    """
+    for entries in (main_deliveries(deliveries), deliveries):
+        unmet = [
+            (x.least, k) for k, x in enumerate(entries) if x.least is not None and not x.is_met
+        ]
+        if unmet:
+            return entries[min(unmet)[1]]
+    return None
+
+
+def newest_delivery(deliveries: Sequence[Delivery]) -> Delivery | None:
+    """Return the entry of the newest layer; None for a painting without layers."""
+    layered = [x for x in main_deliveries(deliveries) if x.layers]
+    return max(layered, key=lambda x: max(x.layers), default=None)
+
+
+@dataclass(frozen=True)
+class DeliveryReport:
+    """The delivery of each wish, and the distance of all lit paint from the painting.
+
+    deliveries: the lowest wish first; a layer follows its parts, and a group its layers. areas: of
+    each of them, (h, w) from 0 to 1; none for several views. lit_delta_e: the mean CIEDE2000 of lit
+    painted parts, as washes. lit_pixels: their size.
+    """
+
+    deliveries: tuple[Delivery, ...]
+    areas: tuple[Floats, ...]
+    lit_delta_e: float
+    lit_pixels: float
+
+    def name_of_part(self, delivery: Delivery | None) -> str:
+        """Return the name of a wish that is a part of the paint; "" if it is nearly all of it."""
+        is_part = delivery is not None and delivery.lit_pixels < MOST * self.lit_pixels
+        return delivery.name if delivery is not None and is_part else ""
+
+
+def measure_deliveries(solution: Solution, predicted: Estimate) -> DeliveryReport:
+    """Measure how much of each wish came, in all views of `solution` together.
+
+    predicted: the picture of the answer, in the shape of the joint basis.
+    """
+    views, transform = solution.problem.views, display_transform(solution.problem)
+    found: list[Delivery] = []
+    areas: list[Floats] = []
+    painted: list[AreaWashes] = []
+    for k, (basis, target) in enumerate(zip(views.bases, views.targets, strict=True)):
+        now, got = (views.part(x, k) for x in (solution.basis.current_look, predicted.image))
+        is_painted = target.importance > 0
+        washes = Washes.of(
+            now,
+            _asked_light(target, now, got),
+            got,
+            counts=is_painted | ~basis.emitters_seen,
+            transform=transform,
+        )
+        painted.append(washes.of_area(np.minimum(target.importance, 1))[0])
+        for part in wish_parts(find_wishes(target, now), basis.objects):
+            wish, rest = washes.of_area(part.area * is_painted)
+            if wish.lit_pixels > 0:
+                found.append(_delivery(part, wish, rest))
+                areas.append(part.area)
+    pixels = [part.lit_pixels for part in painted]
+    differences = [_mean_delta_e(part) for part in painted]
+    mean = float(np.average(differences, weights=pixels)) if any(pixels) else 0.0
+    if len(views) > 1:
+        return DeliveryReport(merge_views(found), (), mean, sum(pixels))
+    return DeliveryReport(tuple(found), tuple(areas), mean, sum(pixels))
+
+
+def _asked_light(target: Target, now: Floats, got: Floats) -> Floats:
+    """Return the painted light (h, w, 3): where brighter is as good, also that of the answer; the
+    current look where nothing is painted.
+    """
+    asked = target.image
+    if target.at_least is not None:
+        asked = np.where(target.at_least, np.maximum(asked, got), asked)
+    return np.where((target.importance > 0)[..., None], asked, now)
+
+
+def _delivery(part: WishPart, wish: AreaWashes, rest: AreaWashes) -> Delivery:
+    """Measure one wish. rest: the washes of the rest of the picture."""
+    brightness, asked_brightness = _share_delivered(_brightness(wish), _brightness(rest))
+    color, asked_color = _share_delivered(_color(wish), _color(rest))
+    return Delivery(
+        part.name,
+        brightness,
+        color,
+        delta_e=_mean_delta_e(wish),
+        asked_brightness=asked_brightness,
+        asked_color=asked_color,
+        lit_pixels=wish.lit_pixels,
+        layers=part.layers,
+        group=part.group,
+        kind=part.kind,
+    )
+
+
+class _Colors(NamedTuple):
+    """Current, painted and reached colours, L*a*b* (p, 3) each, and their weight, (p,)."""
+
+    now: Doubles
+    asked: Doubles
+    got: Doubles
+    weight: Doubles
+
+    def mean(self) -> tuple[Doubles, Doubles, Doubles]:
+        """Return the three weighted means, (3,); 0 without weight."""
+        total = max(float(self.weight.sum()), 1e-12)
+        now, asked, got = (self.weight @ x / total for x in self[:3])
+        return now, asked, got
+
+
+def _brightness(washes: AreaWashes) -> _Colors:
+    """Return lit colours that differ in L* alone: all have the painted a*b*."""
+    is_lit = washes.weight > 0
+    asked = lab(washes.asked[is_lit])
+
+    def at_asked_color(light: Doubles) -> Doubles:
+        return np.concatenate([lab(light)[:, :1], asked[:, 1:]], axis=1)
+
+    now, got = (at_asked_color(x[is_lit]) for x in (washes.now, washes.got))
+    return _Colors(now, asked, got, washes.weight[is_lit])
+
+
+def _color(washes: AreaWashes) -> _Colors:
+    """Return lit colours that differ in a*b* alone: all have the painted luminance."""
+    is_lit = washes.weight > 0
+    level = luminance(washes.asked[is_lit])
+
+    def at_asked_level(light: Doubles) -> Doubles:
+        return lab((light + DARK) * (level / (luminance(light) + DARK))[:, None])
+
+    now, asked, got = (at_asked_level(x[is_lit]) for x in (washes.now, washes.asked, washes.got))
+    return _Colors(now, asked, got, washes.weight[is_lit])
+
+
+def _share_delivered(wish: _Colors, rest: _Colors) -> tuple[float | None, float]:
+    """Return the share of the asked change that came, None if it is invisible, and that change as
+    ΔE.
+
+    By pixels or, of a subject, against the rest of the picture, whichever is nearer to 1.
+    """
+    changes = [_change_by_pixels(wish)]
+    if wish.weight.sum() < rest.weight.sum():
+        changes.append(_change_by_contrast(wish, rest))
+    candidates = []
+    for change in changes:
+        energy = float(change.weight @ np.square(change.asked).sum(axis=1))
+        if change.delta_e >= MIN_ASKED and energy > 0:
+            along = float(change.weight @ (change.asked * change.got).sum(axis=1))
+            candidates.append((along / energy, change.delta_e))
+    return min(candidates, key=lambda share: abs(1 - share[0]), default=(None, 0.0))
+
+
+class _Change(NamedTuple):
+    """The asked change of colours, and the change that came, (p, 3) each, with their weight, (p,).
+
+    delta_e: the asked change, root mean square.
+    """
+
+    asked: Doubles
+    got: Doubles
+    weight: Doubles
+    delta_e: float
+
+
+def _change_by_pixels(wish: _Colors) -> _Change:
+    square = np.square(ciede2000(wish.now, wish.asked))
+    delta_e = float(np.sqrt(np.average(square, weights=wish.weight)))
+    return _Change(wish.asked - wish.now, wish.got - wish.now, wish.weight, delta_e)
+
+
+def _change_by_contrast(wish: _Colors, rest: _Colors) -> _Change:
+    """Return the change of the mean over a wish, relative to that over the rest."""
+    total = wish.weight.sum() + rest.weight.sum()
+    share = rest.weight.sum() / total
+    means = wish.mean()
+    now, asked, got = (
+        mean - share * of_rest for mean, of_rest in zip(means, rest.mean(), strict=True)
+    )
+    delta_e = float(ciede2000(means[1], means[1] - (asked - now)))
+    return _Change((asked - now)[None], (got - now)[None], np.ones(1), delta_e)
+
+
+def _mean_delta_e(washes: AreaWashes) -> float:
+    if not washes.lit_pixels:
+        return 0.0
+    difference = ciede2000(lab(washes.got), lab(washes.asked))
+    return float(np.average(difference, weights=washes.weight))
+
+
+def merge_views(deliveries: Sequence[Delivery]) -> tuple[Delivery, ...]:
+    """Merge the entries of each layer, and of each group, in several views.
+
+    Shares are weighted by the change that a view asks for, ΔE by pixels.
+    """
+    entries: dict[object, list[Delivery]] = {}
+    for k, delivery in enumerate(deliveries):
+        key: object = k
+        if delivery.kind != "wish":
+            key = delivery.name if delivery.kind == "group" else delivery.layers
+        entries.setdefault(key, []).append(delivery)
+    return tuple(_merged(same) for same in entries.values())
+
+
+def _merged(same: Sequence[Delivery]) -> Delivery:
+    if len(same) == 1:
+        return same[0]
+    pixels = np.array([delivery.lit_pixels for delivery in same])
+    brightness, asked_brightness = _merged_share(
+        [x.brightness for x in same], pixels, [x.asked_brightness for x in same]
+    )
+    color, asked_color = _merged_share(
+        [x.color for x in same], pixels, [x.asked_color for x in same]
+    )
+    return replace(
+        same[0],
+        brightness=brightness,
+        color=color,
+        delta_e=float(np.average([x.delta_e for x in same], weights=pixels)),
+        asked_brightness=asked_brightness,
+        asked_color=asked_color,
+        lit_pixels=float(pixels.sum()),
+        layers=tuple(dict.fromkeys(layer for x in same for layer in x.layers)),
+    )
+
+
+def _merged_share(
+    shares: Sequence[float | None], pixels: Doubles, asked: Sequence[float]
+) -> tuple[float | None, float]:
+    """Return the share of several views, and their asked change as ΔE."""
+    known = [
+        (x, n * e * e, n) for x, n, e in zip(shares, pixels, asked, strict=True) if x is not None
+    ]
+    if not known:
+        return None, 0.0
+    values, energies, counts = (np.array(column) for column in zip(*known, strict=True))
+    return float(np.average(values, weights=energies)), float(
+        np.sqrt(energies.sum() / counts.sum())
+    )

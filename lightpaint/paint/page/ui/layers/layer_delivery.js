@@ -1,0 +1,58 @@
+/** How much of a layer's wish came: a bar each for brightness and for colour, on its row. */
+
+import { html } from '../../vendor/preact.js';
+import { fill, words } from '../../language/language.js';
+
+/** @typedef {import("../ui_state.js").Ui} Ui */
+/** @typedef {import("../../engine/messages.js").Layer} Layer */
+/** @typedef {import("../../engine/messages.js").WishDelivery} WishDelivery */
+
+/** Least share of a change that has to come, as in `MIN_DELIVERED` of delivery.py. */
+const MIN_DELIVERED = 0.75;
+
+/** Return the entry of a layer or a group; undefined if there is none.
+ * @param {Ui} ui @param {Layer} layer */
+export function deliveryOf({ deliveries, layers }, layer) {
+  if (layer.kind !== 'group')
+    return deliveries.find(({ kind, layers: ids }) => kind === 'layer' && ids[0] === layer.id);
+  const members = layers.filter(({ group }) => group === layer.id).map(({ id }) => id);
+  return deliveries.find(
+    ({ kind, layers: ids }) => kind === 'group' && ids.some((id) => members.includes(id)),
+  );
+}
+
+/** @param {{ui: Ui, layer: Layer}} props */
+export function LayerDelivery({ ui, layer }) {
+  const delivery = layer.is_visible ? deliveryOf(ui, layer) : undefined;
+  if (!delivery) return null;
+  const { brightness, color } = delivery;
+  if (brightness === null && color === null) return null;
+  const text = deliveryText(delivery);
+  return html`<span class=${`layer-came ${ui.isJudgementCurrent ? '' : 'is-old'}`} role="img"
+    aria-label=${text} data-tip=${text}>
+    ${brightness !== null && html`<${Bar} share=${brightness} />`}
+    ${color !== null && html`<${Bar} share=${color} isColour />`}
+  </span>`;
+}
+
+/** @param {{share: number, isColour?: boolean}} props */
+function Bar({ share, isColour = false }) {
+  const kind = [isColour && 'is-colour', share < MIN_DELIVERED && 'is-short'];
+  const width = `${100 * Math.min(Math.max(share, 0), 1)}%`;
+  return html`<i class=${kind.filter(Boolean).join(' ')}><b style=${{ width }}></b></i>`;
+}
+
+/** Say how much came: `Came: brightness 98 %, colour 43 %`. @param {WishDelivery} delivery */
+export function deliveryText({ brightness, color }) {
+  const percent = (/** @type {number} */ share) => Math.max(Math.round(100 * share), 0);
+  if (brightness === null || color === null) {
+    const { ofBrightness, ofColour } = words.layerDelivery;
+    return brightness === null
+      ? fill(ofColour, { value: percent(color ?? 0) })
+      : fill(ofBrightness, { value: percent(brightness) });
+  }
+  return fill(words.layerDelivery.ofBoth, {
+    brightness: percent(brightness),
+    colour: percent(color),
+  });
+}

@@ -1,0 +1,134 @@
+"""Sentences on wishes: the headline names the worst and the newest one, and never praises."""
+
+from dataclasses import replace
+from typing import Any
+
+import pytest
+
+from lightpaint.lighting.analysis.appearance.appearance import Appearance
+from lightpaint.lighting.analysis.appearance.delivery import Delivery
+from lightpaint.lighting.analysis.appearance.limiting_reasons import Reason
+from lightpaint.lighting.analysis.diagnosis import Place
+from lightpaint.report.delivery_sentences import spoken_deliveries
+from lightpaint.report.page.fit_tables import wishes_section
+from lightpaint.report.verdict import headline
+
+PLACE = Place((1, 1), 0.9, (0, 0, 8, 8), (0.4, 0.4, 0.4), (0.1, 0.1, 0.1))
+
+MOON = Delivery("Moonlight", 0.98, 0.43, layers=(3, 4), kind="group", lit_pixels=900.0)
+SHADOWS = Delivery("Shadows", 0.9, 0.2, layers=(4,), group="Moonlight", kind="layer")
+LANTERN = Delivery("Lantern", 0.08, None, layers=(5,), kind="layer", lit_pixels=20.0)
+RIM = Delivery("Rim", 0.95, None, layers=(6,), kind="layer", lit_pixels=20.0)
+PAINTING = Delivery("Painting", 0.9, 0.5, layers=(0,), kind="layer")
+
+
+def _seen(delta_e: float, *deliveries: Delivery, **fields: Any) -> Appearance:
+    return replace(Appearance(delta_e, 0.0, 20.0, PLACE, deliveries=deliveries), **fields)
+
+
+@pytest.mark.parametrize(
+    ("appearance", "sentence"),
+    [
+        (
+            _seen(2.0, MOON, reasons=(Reason("colors"),)),
+            "Moonlight: brightness 98 %, colour 43 %, since lights keep their colours. "
+            "On the whole it is close.",
+        ),
+        (
+            _seen(2.0, MOON, LANTERN, local_lights=(), reasons_wish="Lantern"),
+            "Lantern: out of reach (8 % came), since no light reaches it. A light that hangs or "
+            "points elsewhere may reach it. On the whole it is close.",
+        ),
+        (
+            _seen(5.0, LANTERN, RIM, local_lights=("sun",), reasons_wish="Lantern"),
+            "Lantern: out of reach (8 % came), since sun would light too much else. "
+            "More importance, or a light that reaches it alone, may bring more. Rim: 95 %. "
+            "On the whole: most of the way.",
+        ),
+        (
+            _seen(5.0, LANTERN, RIM, reasons=(Reason("lock", ("lamp",)),)),
+            "Lantern: 8 %, since lamp is locked. Rim: 95 %. On the whole: most of the way.",
+        ),
+        (
+            _seen(2.0, replace(MOON, color=0.7), local_lights=("sun", "sky")),
+            "Moonlight: out of reach in colour (70 % came), since sun and sky would colour too "
+            "much else. A light that hangs or points elsewhere may reach it. On the whole it is "
+            "close.",
+        ),
+        # A part of a group counts where the whole came.
+        (
+            _seen(2.0, SHADOWS, replace(MOON, color=0.9), reasons=(Reason("colors"),)),
+            "Shadows of Moonlight: brightness 90 %, colour 20 %, since lights keep their "
+            "colours. On the whole it is close.",
+        ),
+        (_seen(2.0, replace(MOON, color=0.76), RIM), "Close: it looks as painted."),
+        # The only wish of a painting has no name that says more than where light is missing.
+        (
+            _seen(2.0, PAINTING, reasons=(Reason("colors"),)),
+            "Close, but the brighter light in the middle is missing: lights keep their colours.",
+        ),
+    ],
+)
+def test_the_headline_is_about_the_worst_and_the_newest_wish(appearance: Appearance, sentence: str):
+    assert headline(appearance) == sentence
+
+
+@pytest.mark.parametrize("share", [-1.0, 0.0, 0.5, 0.74])
+@pytest.mark.parametrize("part", ["brightness", "color"])
+def test_nothing_is_as_painted_that_lacks_a_wish(part: str, share: float):
+    for wish in (MOON, SHADOWS, LANTERN, PAINTING):
+        met = replace(wish, brightness=1.0, color=1.0)
+        assert "as painted" in headline(_seen(0.5, met, RIM))
+        assert "as painted" not in headline(_seen(0.5, replace(met, **{part: share}), RIM))
+
+
+def test_nothing_is_as_painted_whose_lit_parts_are_off():
+    """Half of it is black, and as painted."""
+    assert "as painted" in headline(_seen(2.0, RIM, lit_delta_e=2.9))
+    sentence = headline(_seen(2.0, RIM, lit_delta_e=4.0, local_lights=("lamp",)))
+    assert sentence.startswith("Nearly there, but the brighter light in the middle is out of reach")
+
+
+def test_colours_that_are_kept_are_named_where_a_colour_is_missing():
+    """Whatever else the difference is made of."""
+    kept = (Reason("colors", share=0.2),)
+    assert "lights keep their colours" in headline(_seen(2.0, MOON, reasons=kept))
+    dark = replace(MOON, brightness=0.3, color=0.9)
+    assert "lights keep their colours" not in headline(_seen(2.0, dark, reasons=kept))
+
+
+def test_wishes_are_listed():
+    text = "Moonlight: brightness 98 %, colour 43 %. Lantern: 8 %."
+    assert spoken_deliveries([SHADOWS, MOON, LANTERN]) == text
+    assert spoken_deliveries([]) == ""
+    assert spoken_deliveries([PAINTING]) == (
+        "Brightness 90 %, colour 50 % of what was asked for came."
+    )
+    shares = (0.5, 0.9, 0.1, 0.7, 0.8, 0.3)
+    many = [
+        replace(LANTERN, name=f"Lamp {k}", brightness=share, layers=(k,))
+        for k, share in enumerate(shares)
+    ]
+    assert spoken_deliveries(many) == (
+        "Lamp 0: 50 %. Lamp 2: 10 %. Lamp 3: 70 %. Lamp 5: 30 %. Of 2 more, more came."
+    )
+    parts = [replace(RIM, name=name, kind="wish", layers=()) for name in ("Vase", "Top left")]
+    assert spoken_deliveries(parts) == "Of each of 2 wishes at least 95 % came."
+    assert spoken_deliveries([replace(parts[0], brightness=0.5), parts[1]]) == (
+        "Vase: 50 %. Top left: 95 %."
+    )
+    nothing = replace(LANTERN, brightness=None)
+    assert spoken_deliveries([nothing, RIM]) == "95 % of what was asked for came."
+    other_way = replace(LANTERN, brightness=-0.3)
+    assert spoken_deliveries([MOON, other_way]).endswith("Lantern: 0 %.")
+
+
+def test_the_report_has_a_bar_for_each_part():
+    page = wishes_section(_seen(2.0, replace(MOON, name="<b>", color=1.4), LANTERN))
+    assert "&lt;b&gt;" in page
+    assert page.count('<i style="width: ') == 3
+    assert "width: 8.00%" in page
+    assert "width: 100.00%" in page
+    assert wishes_section(None) == ""
+    assert wishes_section(_seen(2.0)) == ""
+    assert wishes_section(_seen(2.0, PAINTING)) == ""
