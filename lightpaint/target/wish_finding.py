@@ -5,14 +5,17 @@ things. They lie in one picture; what tells them apart is what is asked: the rat
 to the current look, in stops of each channel.
 """
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 from dataclasses import replace
+from functools import partial
+from math import ceil
 
 import numpy as np
-from scipy.ndimage import binary_dilation, gaussian_filter, label
+import numpy.typing as npt
 
 from lightpaint.arrays import Bools, Doubles, Floats
 from lightpaint.colour.color import luminance
+from lightpaint.images.pixel_blocks import block_sums, enlarged
 from lightpaint.target.target import Target
 from lightpaint.target.wish import Wish
 
@@ -31,6 +34,9 @@ SMOOTHING, JOINING = 1 / 160, 1 / 80
 #: Light below which a ratio says little, relative to the mean of the look.
 DARK = 0.01
 
+#: Pixels, about, over which strokes are told apart; larger pictures are averaged.
+MAX_PIXELS = 2**14
+
 #: Importance, or coverage, that counts as painted.
 PAINTED = 0.02
 
@@ -39,7 +45,7 @@ def find_wishes(target: Target, current_look: Floats) -> tuple[Wish, ...]:
     """Return the wishes of a painting, the lowest first, with separate strokes told apart.
 
     current_look: (h, w, 3) linear, the current look at the size of the target. The areas of all
-    wishes together add up to at most 1 in each pixel. Pictures of some ten thousand pixels suffice.
+    wishes together add up to at most 1 in each pixel.
     """
     layers = target.wishes or (
         Wish(target.name, np.minimum(target.importance, 1), has_strokes=True),
@@ -56,10 +62,21 @@ def split_wishes(
     """
     if not any(layer.has_strokes for layer in layers):
         return tuple(layers)
-    ratio = asked_ratio(image, importance, current_look)
+    height, width = importance.shape
+    side = max(1, ceil((height * width / MAX_PIXELS) ** 0.5))
+    small = partial(_block_means, side=side)
+    small_importance = small(importance)
+    ratio = asked_ratio(small(image), small_importance, small(current_look))
     wishes: list[Wish] = []
     for layer in layers:
-        wishes += _split(layer, ratio, importance) if layer.has_strokes else [layer]
+        if not layer.has_strokes:
+            wishes.append(layer)
+            continue
+        owners, count = _owners((small(layer.area) >= PAINTED) & (small_importance > 0), ratio)
+        places = enlarged(owners, side)[:height, :width]
+        parts = (np.where(places == k, layer.area, 0) for k in range(1, count + 1))
+        found = [replace(layer, area=part.astype(np.float32)) for part in parts]
+        wishes += found or [layer]
     return tuple(wishes)
 
 
@@ -68,6 +85,8 @@ def asked_ratio(image: Floats, importance: Floats, current_look: Floats) -> Doub
 
     For the arguments see `split_wishes`. 0 where the painting is the look, or where both are black.
     """
+    from scipy.ndimage import gaussian_filter
+
     dark = DARK * float(np.mean(current_look))
     asked, now = (np.maximum(x, 0).astype(np.float64) + dark for x in (image, current_look))
     ratio = np.log2(asked / now) if dark else np.zeros(asked.shape)
@@ -78,25 +97,32 @@ def asked_ratio(image: Floats, importance: Floats, current_look: Floats) -> Doub
     return np.asarray((counts / np.maximum(total, 1e-6))[..., None] * wash)
 
 
-def _split(layer: Wish, ratio: Doubles, importance: Floats) -> Iterator[Wish]:
-    """Split a layer into its strokes, and these into places that ask for something else."""
-    painted = (layer.area >= PAINTED) & (importance > 0)
+def _owners(painted: Bools, ratio: Doubles) -> tuple[npt.NDArray[np.int64], int]:
+    """Number the strokes of a layer, and the places in them that ask for something else.
+
+    painted: (h, w). Returns the number of each pixel, (h, w), 0 for none, and the largest.
+    """
     least = MIN_SHARE * painted.size
     strokes = _connected(painted, round(JOINING * painted.shape[1]))
     strokes = sorted((x for x in strokes if x.sum() >= least), key=lambda x: -int(x.sum()))
-    if not strokes:
-        yield layer
-        return
-    owner, parts = np.zeros(painted.shape, int), 0
+    owners, count = np.zeros(painted.shape, np.int64), 0
     for stroke in strokes[:MAX_WISHES]:
-        parts += 1
-        owner[stroke] = parts
-        for place in _distinct_places(stroke, ratio, least)[: max(MAX_WISHES - parts, 0)]:
-            parts += 1
-            owner[place] = parts
-    for k in range(1, parts + 1):
-        area = np.where(owner == k, layer.area, 0).astype(np.float32)
-        yield replace(layer, area=area)
+        count += 1
+        owners[stroke] = count
+        for place in _distinct_places(stroke, ratio, least)[: max(MAX_WISHES - count, 0)]:
+            count += 1
+            owners[place] = count
+    return owners, count
+
+
+def _block_means(image: Floats, *, side: int) -> Doubles:
+    """Return means over blocks of pixels of an image, (h, w, …)."""
+    if side == 1:
+        return np.asarray(image, np.float64)
+    counts = block_sums(np.ones(image.shape[:2]), side)
+    return np.asarray(
+        block_sums(image, side) / counts.reshape(*counts.shape, *[1] * (image.ndim - 2))
+    )
 
 
 def _distinct_places(stroke: Bools, ratio: Doubles, least: float) -> list[Bools]:
@@ -113,6 +139,8 @@ def _distinct_places(stroke: Bools, ratio: Doubles, least: float) -> list[Bools]
 
 def _connected(mask: Bools, radius: int) -> list[Bools]:
     """Return the connected parts of a mask, joined over gaps up to about twice a radius."""
+    from scipy.ndimage import binary_dilation, label
+
     wide = binary_dilation(mask, iterations=radius) if radius > 0 else mask
     parts, count = label(wide, np.ones((3, 3)))
     return [mask & (parts == k) for k in range(1, count + 1)]

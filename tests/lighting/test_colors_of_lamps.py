@@ -95,4 +95,8 @@ def test_a_whole_picture_that_is_asked_cooler_or_warmer(
 def test_shipped_paintings(gallery: lp.Basis, name: str) -> None:
     target = lp.read_target(ROOT / "targets/gallery" / name).fitted_to(gallery.size, resize=True)
     duv = _duv(gallery, target, colors="gentle")
+    if name == "opening.png":  # its ceiling is painted rose
+        cove = gallery.names.index("cove")
+        assert duv[cove] < PINK
+        duv = np.delete(duv, cove)
     assert duv.min() > PINK

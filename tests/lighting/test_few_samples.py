@@ -92,7 +92,10 @@ def test_no_answer_is_worse_than_none(name: str):
         problem = lp.Problem.of(judge, target)
 
         def miss_of(weights: Any, problem: lp.Problem = problem) -> float:
-            return float(problem.objective(weights).sum())
+            # Contrasts of wishes count as well.
+            contrast = problem.contrast
+            asked = 0.0 if contrast is None else float(contrast.objective(weights).sum())
+            return float(problem.objective(weights).sum()) + asked
 
         black_miss = miss_of(np.zeros_like(judge.current_weights))
         current_miss = miss_of(judge.current_weights) * NOISE + 0.02 * black_miss

@@ -21,7 +21,7 @@ from lightpaint.lighting.loss.expected_lights import Wash
 from lightpaint.lighting.normal_equations import NormalEquations
 
 #: Strength of the contrast of all wishes together, relative to the importance of all paint.
-CONTRAST = 1.0
+CONTRAST = 0.5
 
 #: Smallest share of the rest of a picture that must be painted for a contrast to be asked for: an
 #: unpainted rest is held to the look, which was not meant as a contrast.

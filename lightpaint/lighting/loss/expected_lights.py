@@ -11,7 +11,6 @@ from dataclasses import dataclass, replace
 from math import ceil
 
 import numpy as np
-from scipy.linalg import block_diag
 
 from lightpaint.arrays import Doubles, Floats
 from lightpaint.basis.basis import Basis
@@ -91,7 +90,13 @@ class Wash:
             return views[0]
         names = "rows", "painted", "look", "importance", "counts"
         joined = (np.concatenate([getattr(x, k) for x in views], axis=-1) for k in names)
-        return cls(*joined, block_diag(*(x.wishes for x in views)))
+        pixels = np.cumsum([0, *(x.counts.size for x in views)])
+        wishes = np.zeros((sum(len(x.wishes) for x in views), pixels[-1]))
+        first = 0
+        for view, start in zip(views, pixels, strict=False):
+            wishes[first : first + len(view.wishes), start : start + view.counts.size] = view.wishes
+            first += len(view.wishes)
+        return cls(*joined, wishes)
 
     def asked(self) -> Doubles:
         """Return the change that is asked for in each block, (3, p), in stops; 0 without paint."""
