@@ -65,6 +65,14 @@ def test_a_click_gives_what_the_picture_shows(client: StudioClient):
     own, as_painted, bold = message.choices
     assert as_painted.delta_e == pytest.approx(exact.fields["delta_e"], rel=1e-6)
     assert own.delta_e > as_painted.delta_e > bold.delta_e
+    # The painting asks for one wish, whose colour white lamps do not bring.
+    [delivery] = exact.fields["deliveries"]
+    assert as_painted.brightness == pytest.approx(min(delivery["brightness"], 1))
+    assert as_painted.color == pytest.approx(min(delivery["color"], 1))
+    assert own.color == pytest.approx(0, abs=0.05)
+    assert own.worst is not None
+    assert own.worst.layers == tuple(delivery["layers"])
+    assert own.color < as_painted.color < bold.color
     studio = client.studio
     pictures = {x.colors: studio.resource(f"choice/{x.colors}").copy() for x in message.choices}
     assert set(message.resources) == {f"choice/{colors}" for colors in pictures}

@@ -40,18 +40,6 @@ AnswerColors = Literal["own", "gentle", "free"]
 
 
 @dataclass(frozen=True)
-class AnswerChoice:
-    """The exact answer with one choice of `colors`. Its picture is `choice/COLORS`, in each view.
-
-    is_chosen: whether it is the answer itself. delta_e: its mean ΔE over the paint.
-    """
-
-    colors: AnswerColors
-    is_chosen: bool
-    delta_e: float
-
-
-@dataclass(frozen=True)
 class WishDelivery:
     """The share of a wish that came: of a `layer`, of a `group` of layers, or of a `wish`, which is
     a stroke in a layer.
@@ -66,6 +54,24 @@ class WishDelivery:
     brightness: float | None
     color: float | None
     delta_e: float
+
+
+@dataclass(frozen=True)
+class AnswerChoice:
+    """The exact answer with one choice of `colors`. Its picture is `choice/COLORS`, in each view.
+
+    is_chosen: whether it is the answer itself. delta_e: its mean ΔE over the paint. brightness,
+    color: mean share of the asked changes that came, from 0 to 1, in which each wish counts alike;
+    null if none was asked. worst: the wish of which least came; null if at least three quarters of
+    each did.
+    """
+
+    colors: AnswerColors
+    is_chosen: bool
+    delta_e: float
+    brightness: float | None
+    color: float | None
+    worst: WishDelivery | None
 
 
 @dataclass(frozen=True)

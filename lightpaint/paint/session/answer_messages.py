@@ -198,10 +198,13 @@ def _worst_view(painted: Sequence[int], analyses: Sequence[Analysis]) -> int:
 def wish_deliveries(analyses: Sequence[Analysis]) -> tuple[WishDelivery, ...]:
     """Return how much of each wish came in all views together, for the list of layers."""
     entries = [entry for analysis in analyses for entry in analysis.appearance.deliveries]
-    return tuple(
-        WishDelivery(x.name, x.kind, x.layers, x.brightness, x.color, x.delta_e)
-        for x in merge_views(entries)
-    )
+    return tuple(wish_delivery(x) for x in merge_views(entries))
+
+
+def wish_delivery(delivery: Delivery) -> WishDelivery:
+    """Return one entry of that list."""
+    x = delivery
+    return WishDelivery(x.name, x.kind, x.layers, x.brightness, x.color, x.delta_e)
 
 
 def unpainted_text(

@@ -12,10 +12,16 @@ from lightpaint.basis.basis import Basis
 from lightpaint.basis.cache.denoised_planes import DenoisedPlanes
 from lightpaint.errors import ConstraintError
 from lightpaint.lighting.analysis.appearance.color_choices import can_change_colors
+from lightpaint.lighting.analysis.appearance.delivery import (
+    mean_shares,
+    measure_deliveries,
+    worst_delivery,
+)
 from lightpaint.lighting.solution import Solution
 from lightpaint.paint.background_threads import LatestWork
 from lightpaint.paint.protocol import AnswerChoice, AnswerChoices, AnswerColors
 from lightpaint.paint.publisher import Publisher
+from lightpaint.paint.session.answer_messages import wish_delivery
 from lightpaint.paint.session.picture_table import Picture, display_thumbnail
 from lightpaint.paint.session.snapshot import SessionSnapshot
 from lightpaint.paint.session_access import SessionAccess
@@ -126,4 +132,13 @@ def solve_choices(snapshot: SessionSnapshot, solution: Solution) -> dict[AnswerC
 
 def choice_figures(snapshot: SessionSnapshot, solution: Solution) -> dict[str, Any]:
     """Return the fields of `AnswerChoice` that say what an answer delivers."""
-    return {"delta_e": snapshot.delta_e(solution)}
+    picture = solution.basis.mix(solution.weights)
+    deliveries = measure_deliveries(solution, picture).deliveries
+    brightness, color = mean_shares(deliveries)
+    worst = worst_delivery(deliveries)
+    return {
+        "delta_e": snapshot.delta_e(solution),
+        "brightness": brightness,
+        "color": color,
+        "worst": None if worst is None else wish_delivery(worst),
+    }

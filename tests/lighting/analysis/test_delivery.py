@@ -8,13 +8,13 @@ import numpy as np
 import pytest
 
 from lightpaint.colour.display.view_transform import ViewTransform
-from lightpaint.images.estimate import Estimate
 from lightpaint.images.object_map import Objects
 from lightpaint.lighting.analysis.appearance.appearance import compare_appearance
 from lightpaint.lighting.analysis.appearance.delivery import (
     Delivery,
     DeliveryReport,
     main_deliveries,
+    mean_shares,
     measure_deliveries,
     merge_views,
     newest_delivery,
@@ -56,7 +56,7 @@ def _measure(
     """Delivery of an answer that is given, whatever would have been solved."""
     basis = make_basis(images=now[None], names=["lamp"], emission=[[1.0] * 3])
     solution = solve(basis, _painting(asked, *wishes))
-    return measure_deliveries(solution, Estimate(got.astype(np.float32), np.zeros_like(got)))
+    return measure_deliveries(solution, got.astype(np.float32))
 
 
 @pytest.mark.parametrize("share", [-0.5, 0.0, 0.25, 0.5, 1.0, 1.4])
@@ -165,8 +165,7 @@ def test_brighter_light_is_as_good_where_the_painting_is_white(make_basis: Any):
     target = _painting(_picture((WHOLE, _grey(80))), Wish("Day", WHOLE))
     target = replace(target, at_least=np.ones((*SIZE, 3), bool))
     solution = solve(basis, target)
-    got = Estimate(np.ones((*SIZE, 3), np.float32), np.zeros((*SIZE, 3), np.float32))
-    report = measure_deliveries(solution, got)
+    report = measure_deliveries(solution, np.ones((*SIZE, 3), np.float32))
     assert report.deliveries[0].brightness == pytest.approx(1)
     assert report.lit_delta_e == 0
 
@@ -223,9 +222,7 @@ def test_strokes_of_one_layer_are_named_by_where_they_lie(make_basis: Any):
     target = replace(
         _painting(asked, layer), importance=np.maximum(SUBJECT, corner).astype(np.float32)
     )
-    report = measure_deliveries(
-        solve(basis, target), Estimate(now.astype(np.float32), np.zeros_like(now))
-    )
+    report = measure_deliveries(solve(basis, target), now.astype(np.float32))
     names = {x.name: x.kind for x in report.deliveries}
     assert names == {
         "Painting, small vase": "wish",
@@ -234,10 +231,7 @@ def test_strokes_of_one_layer_are_named_by_where_they_lie(make_basis: Any):
     }
     assert [x.kind for x in main_deliveries(report.deliveries)] == ["wish", "wish"]
     # Without layers, the place is the name.
-    flat = measure_deliveries(
-        solve(basis, replace(target, wishes=())),
-        Estimate(now.astype(np.float32), np.zeros_like(now)),
-    )
+    flat = measure_deliveries(solve(basis, replace(target, wishes=())), now.astype(np.float32))
     assert {x.name for x in flat.deliveries} == {"Small vase", "Top left"}
     assert {x.kind for x in flat.deliveries} == {"wish"}
 
@@ -262,3 +256,19 @@ def test_two_views_are_one_delivery(make_basis: Any):
     [delivery] = appearance.deliveries
     assert delivery.brightness == pytest.approx(1, abs=0.02)
     assert delivery.lit_pixels == pytest.approx(2 * WHOLE.size)
+
+
+def test_all_wishes_together_count_alike():
+    def wish(layer: int, brightness: float | None, color: float | None, **options: Any) -> Delivery:
+        return Delivery("wish", brightness, color, layers=(layer,), kind="layer", **options)
+
+    large = wish(1, 0.9, 1.3, lit_pixels=50_000)
+    small = wish(2, 0.1, None, lit_pixels=50)
+    member, wrong = wish(3, 0.0, 0.0, group="Night"), wish(4, None, -0.4)
+    group = Delivery("Night", 0.5, 0.2, layers=(3,), group="Night", kind="group")
+    # A layer of a group counts with its group. 130 % is all, and the other way is nothing.
+    brightness, color = mean_shares([large, small, member, group, wrong])
+    assert brightness == pytest.approx((0.9 + 0.1 + 0.5) / 3)
+    assert color == pytest.approx((1 + 0.2 + 0) / 3)
+    assert mean_shares([wrong]) == (None, 0.0)
+    assert mean_shares([]) == (None, None)

@@ -8,10 +8,57 @@ from painter_page import Painter
 
 #: Of the answers that the session has solved.
 CHOICES = [
-    {"colors": "own", "is_chosen": False, "delta_e": 8.42},
-    {"colors": "gentle", "is_chosen": True, "delta_e": 2.31},
-    {"colors": "free", "is_chosen": False, "delta_e": 1.2},
+    {
+        "colors": "own",
+        "is_chosen": False,
+        "delta_e": 8.42,
+        "brightness": 0.8,
+        "color": 0.06,
+        "worst": {
+            "name": "Lantern",
+            "kind": "layer",
+            "layers": [1],
+            "brightness": 0.7,
+            "color": -0.3,
+            "delta_e": 12.0,
+        },
+    },
+    {
+        "colors": "gentle",
+        "is_chosen": True,
+        "delta_e": 2.31,
+        "brightness": 0.982,
+        "color": 0.9,
+        "worst": None,
+    },
+    {
+        "colors": "free",
+        "is_chosen": False,
+        "delta_e": 1.2,
+        "brightness": 1.0,
+        "color": 1.0,
+        "worst": None,
+    },
 ]
+
+#: What is said of each, and what is on its picture.
+SAID = {
+    "Own colours": (
+        "80 % of the asked brightness and 6 % of the asked colour came. "
+        "Least came of Lantern: 0 %. Mean ΔE 8.4 from the painting.",
+        "80 · 6 %",
+    ),
+    "As painted": (
+        "98 % of the asked brightness and 90 % of the asked colour came. "
+        "Mean ΔE 2.3 from the painting.",
+        "98 · 90 %",
+    ),
+    "Bold": (
+        "100 % of the asked brightness and 100 % of the asked colour came. "
+        "Mean ΔE 1.2 from the painting.",
+        "100 · 100 %",
+    ),
+}
 
 
 def _offer(painter: Painter, version: int) -> None:
@@ -36,9 +83,13 @@ def test_a_click_on_a_picture_is_one_request(painter: Painter) -> None:
     painter.stroke()
     painter.still()
     _offer(painter, painter.ui("version"))
-    for name, number in (("Own colours", "8.4"), ("As painted", "2.3"), ("Bold", "1.2")):
+    for name, (said, on_picture) in SAID.items():
         button = _button(painter, name)
-        assert f"mean ΔE {number} from the painting" in button.get_attribute("aria-label")
+        assert button.get_attribute("aria-label") == f"{name}. {said}"
+        assert said in button.get_attribute("data-tip")
+        numbers = button.locator("b")
+        assert numbers.text_content() == on_picture
+        assert ("is-short" in numbers.get_attribute("class")) == (name == "Own colours")
         shown = button.locator("canvas").evaluate(
             "(canvas) => [...canvas.getContext('2d').getImageData(0, 0, 1, 1).data]"
         )
@@ -65,6 +116,23 @@ def test_pictures_of_an_earlier_answer_are_dimmed(painter: Painter) -> None:
     assert "is-old" not in group.get_attribute("class")
 
 
+def test_a_share_that_nothing_was_asked_of_is_left_out(painter: Painter) -> None:
+    painter.stroke()
+    painter.still()
+    difference = "Mean ΔE 1.2 from the painting."
+    cases: list[tuple[float | None, float | None, list[str], str]] = [
+        (None, 0.9, ["90 %"], f"Bold. 90 % of the asked colour came. {difference}"),
+        (0.5, None, ["50 %"], f"Bold. 50 % of the asked brightness came. {difference}"),
+        (None, None, [], f"Bold. {difference}"),
+    ]
+    for brightness, color, on_picture, said in cases:
+        choice = {**CHOICES[2], "brightness": brightness, "color": color}
+        painter.tell(kind="choices", version=painter.ui("version"), choices=[choice], resources={})
+        button = _button(painter, "Bold")
+        assert button.locator("b").all_text_contents() == on_picture
+        assert button.get_attribute("aria-label") == said
+
+
 @pytest.mark.parametrize("viewport", [(1440, 900), (1240, 720), (1920, 1080)], ids=str)
 def test_they_move_nothing(new_painter: Any, viewport: tuple[int, int]) -> None:
     """What is around them stays where it is when they come."""
@@ -80,6 +148,11 @@ def test_they_move_nothing(new_painter: Any, viewport: tuple[int, int]) -> None:
     before = places()
     _offer(painter, painter.ui("version"))
     assert places() == before
+    for name in SAID:  # what is on a picture stays on it
+        numbers = _button(painter, name).locator("b").bounding_box()
+        picture = _button(painter, name).locator("canvas").bounding_box()
+        assert picture["x"] <= numbers["x"]
+        assert numbers["x"] + numbers["width"] <= picture["x"] + picture["width"] + 1
     overflow = painter.page.locator(".answer").evaluate(
         "(line) => [line.scrollWidth - line.clientWidth, line.scrollHeight - line.clientHeight]"
     )

@@ -240,7 +240,7 @@ def compare_appearance(
     delta_e, error = (
         float(np.average(x, weights=look.block_weights)) for x in (with_noise, missed)
     )
-    delivered = measure_deliveries(solution, predicted)
+    delivered = measure_deliveries(solution, predicted.image)
     appearance = Appearance(
         delta_e,
         max(delta_e - error, 0.0),

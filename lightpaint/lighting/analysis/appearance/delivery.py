@@ -22,7 +22,6 @@ from lightpaint.arrays import Doubles, Floats
 from lightpaint.colour.color import luminance
 from lightpaint.colour.color_difference import ciede2000, lab
 from lightpaint.display_text import visible
-from lightpaint.images.estimate import Estimate
 from lightpaint.keywords import keywords
 from lightpaint.lighting.analysis.appearance.display_difference import display_transform
 from lightpaint.lighting.analysis.appearance.washes import AreaWashes, Washes
@@ -149,6 +148,29 @@ def worst_delivery(deliveries: Sequence[Delivery]) -> Delivery | None:
     return None
 
 
+class MeanShares(NamedTuple):
+    """The shares of all wishes together, as `Delivery` has them; None if none was asked for."""
+
+    brightness: float | None
+    color: float | None
+
+
+def mean_shares(deliveries: Sequence[Delivery]) -> MeanShares:
+    """Return the mean shares of the entries that people name, from 0 to 1.
+
+    Each counts alike, whatever its size, and more than was asked counts as all of it.
+    """
+    entries = main_deliveries(deliveries)
+    return MeanShares(
+        _mean_share([x.brightness for x in entries]), _mean_share([x.color for x in entries])
+    )
+
+
+def _mean_share(shares: Sequence[float | None]) -> float | None:
+    known = [min(max(share, 0.0), 1.0) for share in shares if share is not None]
+    return float(np.mean(known)) if known else None
+
+
 def newest_delivery(deliveries: Sequence[Delivery]) -> Delivery | None:
     """Return the entry of the newest layer; None for a painting without layers."""
     layered = [x for x in main_deliveries(deliveries) if x.layers]
@@ -175,17 +197,17 @@ class DeliveryReport:
         return delivery.name if delivery is not None and is_part else ""
 
 
-def measure_deliveries(solution: Solution, predicted: Estimate) -> DeliveryReport:
+def measure_deliveries(solution: Solution, picture: Floats) -> DeliveryReport:
     """Measure how much of each wish came, in all views of `solution` together.
 
-    predicted: the picture of the answer, in the shape of the joint basis.
+    picture: that of the answer, in the shape of the joint basis.
     """
     views, transform = solution.problem.views, display_transform(solution.problem)
     found: list[Delivery] = []
     areas: list[Floats] = []
     painted: list[AreaWashes] = []
     for k, (basis, target) in enumerate(zip(views.bases, views.targets, strict=True)):
-        now, got = (views.part(x, k) for x in (solution.basis.current_look, predicted.image))
+        now, got = (views.part(x, k) for x in (solution.basis.current_look, picture))
         is_painted = target.importance > 0
         washes = Washes.of(
             now,

@@ -398,17 +398,6 @@ export interface Closeness {
 }
 
 /**
- * The exact answer with one choice of `colors`. Its picture is `choice/COLORS`, in each view.
- *
- * is_chosen: whether it is the answer itself. delta_e: its mean ΔE over the paint.
- */
-export interface AnswerChoice {
-  colors: 'own' | 'gentle' | 'free';
-  is_chosen: boolean;
-  delta_e: number;
-}
-
-/**
  * The share of a wish that came: of a `layer`, of a `group` of layers, or of a `wish`, which is
  * a stroke in a layer.
  *
@@ -422,6 +411,23 @@ export interface WishDelivery {
   brightness: number | null;
   color: number | null;
   delta_e: number;
+}
+
+/**
+ * The exact answer with one choice of `colors`. Its picture is `choice/COLORS`, in each view.
+ *
+ * is_chosen: whether it is the answer itself. delta_e: its mean ΔE over the paint. brightness,
+ * color: mean share of the asked changes that came, from 0 to 1, in which each wish counts alike;
+ * null if none was asked. worst: the wish of which least came; null if at least three quarters of
+ * each did.
+ */
+export interface AnswerChoice {
+  colors: 'own' | 'gentle' | 'free';
+  is_chosen: boolean;
+  delta_e: number;
+  brightness: number | null;
+  color: number | null;
+  worst: WishDelivery | null;
 }
 
 /**

@@ -95,7 +95,11 @@ export const en = {
     asPaintedTip: 'Lamps take the whites and colours that the painting asks for.',
     bold: 'Bold',
     boldTip: 'Lamps may take any colour.',
-    withDifference: '{label}: mean ΔE {number} from the painting',
+    ofBrightness: '{value} % of the asked brightness came.',
+    ofColour: '{value} % of the asked colour came.',
+    ofBoth: '{brightness} % of the asked brightness and {colour} % of the asked colour came.',
+    least: 'Least came of {name}: {value} %.',
+    meanDifference: 'Mean ΔE {number} from the painting.',
   },
   answerLine: {
     meanColourDifferenceFromThe:

@@ -3,6 +3,7 @@
 import { nameInView } from '../engine/message_frames.js';
 import { html } from '../vendor/preact.js';
 import { numberText } from './format.js';
+import { deliveryText, knownShares, percentOf } from './layers/layer_delivery.js';
 import { Thumbnail } from './thumbnail.js';
 import { fill, words } from '../language/language.js';
 
@@ -56,19 +57,39 @@ export function AnswerChoices({ ui, app }) {
 function ChoiceButton({ colors, label, tip, answer, ui, app }) {
   const isChosen = ui.effectiveSettings.colors === colors;
   const picture = nameInView(`choice/${colors}`, ui.view);
-  const number = answer ? numberText(answer.delta_e, 2) : '';
-  const text = answer ? fill(words.answerChoices.withDifference, { label, number }) : label;
+  const text = answer ? `${label}. ${deliveredText(answer)}` : `${label}.`;
+  const shares = answer ? sharesText(answer) : '';
   const choose = () => {
     if (!isChosen) void app.session.changeSetting('colors', colors);
   };
   return html`<button type="button" class="answer-choice" aria-pressed=${String(isChosen)}
-    aria-label=${text} data-tip=${`${text}. ${tip}`} onClick=${choose}>
+    aria-label=${text} data-tip=${`${text} ${tip}`} onClick=${choose}>
     ${
       answer
         ? html`<${Thumbnail} key="picture" name=${picture} generation=${ui.resources[picture]} app=${app} />`
         : html`<span key="none" class="thumb"></span>`
     }
-    ${number && html`<b>${number}</b>`}
+    ${shares && html`<b class=${answer?.worst ? 'is-short' : ''}>${shares}<i> %</i></b>`}
     <span>${label}</span>
   </button>`;
+}
+
+/** Return what came of brightness and of colour in percent, `98 · 43`; `98` if the painting asks for
+ * one of both, '' for neither. @param {AnswerChoice} answer */
+const sharesText = (answer) => knownShares(answer).map(percentOf).join(' · ');
+
+/** Say how much came, of which wish least, and how far the answer is. @param {AnswerChoice} answer */
+function deliveredText(answer) {
+  const { delta_e: deltaE, worst } = answer;
+  const least = percentOf(Math.min(...knownShares(answer)));
+  const worstShare = worst ? percentOf(Math.min(...knownShares(worst))) : least;
+  return [
+    knownShares(answer).length && deliveryText(answer, words.answerChoices),
+    worst &&
+      worstShare < least &&
+      fill(words.answerChoices.least, { name: worst.name, value: worstShare }),
+    fill(words.answerChoices.meanDifference, { number: numberText(deltaE, 2) }),
+  ]
+    .filter(Boolean)
+    .join(' ');
 }

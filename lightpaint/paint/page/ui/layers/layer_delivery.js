@@ -42,17 +42,19 @@ function Bar({ share, isColour = false }) {
   return html`<i class=${kind.filter(Boolean).join(' ')}><b style=${{ width }}></b></i>`;
 }
 
-/** Say how much came: `Came: brightness 98 %, colour 43 %`. @param {WishDelivery} delivery */
-export function deliveryText({ brightness, color }) {
-  const percent = (/** @type {number} */ share) => Math.max(Math.round(100 * share), 0);
-  if (brightness === null || color === null) {
-    const { ofBrightness, ofColour } = words.layerDelivery;
-    return brightness === null
-      ? fill(ofColour, { value: percent(color ?? 0) })
-      : fill(ofBrightness, { value: percent(brightness) });
-  }
-  return fill(words.layerDelivery.ofBoth, {
-    brightness: percent(brightness),
-    colour: percent(color),
-  });
+/** @typedef {{brightness: number | null, color: number | null}} Shares */
+
+/** Return a delivered share in whole percent; 0 if it went the other way. @param {number} share */
+export const percentOf = (share) => Math.max(Math.round(100 * share), 0);
+
+/** Return the shares that something was asked of, first that of brightness. @param {Shares} shares */
+export const knownShares = ({ brightness, color }) =>
+  [brightness, color].filter((share) => share !== null);
+
+/** Say how much came: `98 % of the brightness and 43 % of the colour came`. @param {Shares} shares
+ * @param {{ofBrightness: string, ofColour: string, ofBoth: string}} [texts] */
+export function deliveryText({ brightness, color }, texts = words.layerDelivery) {
+  if (brightness === null) return fill(texts.ofColour, { value: percentOf(color ?? 0) });
+  if (color === null) return fill(texts.ofBrightness, { value: percentOf(brightness) });
+  return fill(texts.ofBoth, { brightness: percentOf(brightness), colour: percentOf(color) });
 }
