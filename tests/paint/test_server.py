@@ -24,7 +24,14 @@ from starlette.websockets import WebSocketDisconnect
 
 from lightpaint.errors import PaintError
 from lightpaint.paint.message_frames import from_frame, to_frame
-from lightpaint.paint.protocol import VERSION, Message, Paint, PictureData, PictureUpdate
+from lightpaint.paint.protocol import (
+    VERSION,
+    AnswerChoices,
+    Message,
+    Paint,
+    PictureData,
+    PictureUpdate,
+)
 from lightpaint.paint.server import client, server
 from lightpaint.paint.server.address import Address, Reach
 from lightpaint.paint.server.guard import Guard
@@ -362,6 +369,11 @@ def test_a_picture_is_kept_by_its_generation_only(known_browser: ServedSession) 
             "immutable" in known_browser.browser.get("/data/present?g=2").headers["cache-control"]
         )
         assert known_browser.browser.get("/data/present?g=1").headers["cache-control"] == "no-store"
+        # Whatever else a message says, its pictures are new.
+        choices = AnswerChoices(version=1, choices=(), resources={"present": 3})
+        known_browser.session.on_message(choices)
+        assert receive(socket)["kind"] == "choices"
+        assert known_browser.browser.get("/data/present?g=2").headers["cache-control"] == "no-store"
 
 
 # What is said

@@ -4,8 +4,8 @@
 `state` lists. A region is rows and columns of a picture, `[top, bottom, left, right]`, the ends not
 included. Colours are linear Rec.709.
 
-Pictures are fetched, and not sent: `resources` in `state` and `renewed` say which there are, those
-of views but the first as `plane/3@1`.
+Pictures are fetched, and not sent: `resources` of `state` and of later messages say which there
+are, those of views but the first as `plane/3@1`.
 """
 
 from lightpaint.paint.protocol.answer_parts import (

@@ -9,7 +9,7 @@ An error in the session becomes an answer to the page, and never ends the connec
 
 import asyncio
 import traceback
-from collections.abc import Callable, Coroutine
+from collections.abc import Callable, Coroutine, Mapping
 from contextlib import suppress
 from functools import partial
 from typing import Any
@@ -24,7 +24,6 @@ from lightpaint.paint.protocol import (
     Closing,
     ConstrainLight,
     ConstrainLights,
-    DraggedPlane,
     Failure,
     Message,
     MoveLights,
@@ -32,7 +31,6 @@ from lightpaint.paint.protocol import (
     Observe,
     Paint,
     PictureData,
-    PictureUpdate,
     PointLight,
     Propose,
     SessionState,
@@ -221,11 +219,12 @@ class Connections:
 
     def _update_generations(self, message: Message) -> None:
         """Store the generation numbers of the pictures in a message."""
-        if isinstance(message, SessionState | PictureUpdate | DraggedPlane):
+        resources: Mapping[str, int] = getattr(message, "resources", {})
+        if resources:
             # A state may arrive after a message about a newer picture.
             newest = self.generations | {
                 name: max(generation, self.generations.get(name, generation))
-                for name, generation in message.resources.items()
+                for name, generation in resources.items()
             }
             self.generations = newest
 

@@ -46,6 +46,17 @@ UNPAINTED = "Nothing is painted: the answer is the current lighting."
 PAINTER = "document.getElementById('lightpaint').painter"
 
 
+#: Codes of what is on a canvas, of which the page itself reads nothing; none for another element.
+PIXELS_OF = """(element) => {
+  const { width = 0, height = 0 } = element;
+  if (!width) return [];
+  const copy = Object.assign(document.createElement('canvas'), { width, height });
+  const context = copy.getContext('2d', { willReadFrequently: true });
+  context.drawImage(element, 0, 0);
+  return Array.from(context.getImageData(0, 0, width, height).data);
+}"""
+
+
 def wait_until(is_so: Callable[[], Any], description: str, seconds: float = 60) -> Any:
     """What is looked for, once it is so."""
     end = time.monotonic() + seconds
@@ -526,6 +537,34 @@ def test_what_is_kept_is_there_again_and_solved_alike_from_its_files(
         emission = lp.read_lighting(path).emission
         weights = [emission[name] for name in session.basis.names]
         np.testing.assert_allclose(weights, session.weights, rtol=1e-9)
+
+
+def test_pictures_of_the_choices_follow_the_painting_after_a_reload(
+    served_painter: ServedPainter, open_page: Any
+) -> None:
+    user = open_page(served_painter, viewport={"width": 1280, "height": 800}).ready().press("0")
+    studio = served_painter.studio
+
+    def show_the_answers() -> None:
+        """What is on the three small pictures is what the session solved last."""
+        for k, colors in enumerate(("own", "gentle", "free")):
+
+            def is_shown(k: int = k, colors: str = colors) -> bool:
+                shown = user.page.locator(".answer-choice .thumb").nth(k).evaluate(PIXELS_OF)
+                solved = studio.resource(f"choice/{colors}")
+                return np.array_equal(np.reshape(shown, (-1, 4))[:, :3], solved.reshape(-1, 3))
+
+            wait_until(
+                lambda: studio.state().choices and is_shown(), f"another picture of {colors}"
+            )
+
+    user.stroke((60, 30), (80, 30)).still("brush")
+    show_the_answers()
+    user.page.reload()
+    user.ready()
+    show_the_answers()
+    user.press("x", "0").stroke((20, 20), (40, 20)).still("brush", "brush")
+    show_the_answers()
 
 
 @pytest.mark.nightly

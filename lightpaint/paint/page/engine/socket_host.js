@@ -166,8 +166,8 @@ export class SocketHost extends Emitter {
   /** @param {Message} message */
   receive(message) {
     const { kind, reply } = message;
-    if (kind === 'state' || kind === 'renewed' || kind === 'dragged')
-      this.generations = { ...this.generations, ...message.resources };
+    // By which a picture is fetched anew, and not taken from the browser's cache.
+    this.generations = { ...this.generations, ...message.resources };
     const isAlive = kind === 'state' || kind === 'waiting';
     if (isAlive) this.retryDelay = RETRY_DELAYS_MS.first;
     if (kind === 'state') this.generations = { ...message.resources };
