@@ -312,7 +312,7 @@ def gamuts_for(basis: Basis, views: Views, fit: Fit, own: Doubles | None = None)
 
     own: (n, 3), weights with the colours that lights have, by default the current ones.
     """
-    if fit.colors != "gentle":
+    if not fit.keeps_to_hues:
         return None
     views_of_paint = [
         (view_basis, target.image, _color_importance(target))
@@ -320,7 +320,8 @@ def gamuts_for(basis: Basis, views: Views, fit: Fit, own: Doubles | None = None)
     ]
     painted = partial(PaintedLight.of, views_of_paint)
     own = basis.current_weights if own is None else own
-    return Gamuts(painted, basis.power, own, texel_lights(basis.lights))
+    is_texel, is_bold = texel_lights(basis.lights), fit.colors == "free"
+    return Gamuts(painted, basis.power, own, is_texel, is_bold=is_bold)
 
 
 def _color_importance(target: Target) -> Floats:

@@ -154,13 +154,15 @@ class LiveSolver:
 
         Lights that the last answer confined to their gamuts are confined from the start.
         """
-        if self._fit.colors != "gentle":
+        if not self._fit.keeps_to_hues:
             return self._reduction
         confined = self._within
         if confined.gamuts is None or self._gamuts_of != views:
             painted = partial(PaintedLight.of, [x.painting for x in views], max_pixels=GAMUT_PIXELS)
             is_texel = texel_lights(self._basis.lights)
-            gamuts = Gamuts(painted, _power(views), self._reference, is_texel)
+            is_bold = self._fit.colors == "free"
+            power, own = _power(views), self._reference
+            gamuts = Gamuts(painted, power, own, is_texel, is_bold=is_bold)
             confined, self._gamuts_of = self._reduction.with_gamuts(gamuts), views
         else:
             confined.gamuts.refresh()

@@ -89,14 +89,14 @@ class Wash:
         if len(views) == 1:
             return views[0]
         names = "rows", "painted", "look", "importance", "counts"
-        joined = (np.concatenate([getattr(x, k) for x in views], axis=-1) for k in names)
+        joined = [np.concatenate([getattr(x, k) for x in views], axis=-1) for k in names]
         pixels = np.cumsum([0, *(x.counts.size for x in views)])
         wishes = np.zeros((sum(len(x.wishes) for x in views), pixels[-1]))
         first = 0
         for view, start in zip(views, pixels, strict=False):
             wishes[first : first + len(view.wishes), start : start + view.counts.size] = view.wishes
             first += len(view.wishes)
-        return cls(*joined, wishes)
+        return cls(*joined, wishes=wishes)
 
     def asked(self) -> Doubles:
         """Return the change that is asked for in each block, (3, p), in stops; 0 without paint."""
