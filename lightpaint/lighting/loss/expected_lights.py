@@ -1,4 +1,4 @@
-"""What a painting lets one expect of each light, before anything is solved.
+"""The expectation of each light that a painting gives, before anything is solved.
 
 A moonlit picture was painted blue wherever its lamps shine: then it is the painting that decides
 their colours. A lamp in an unpainted corner, or one under paint whose hue is a little off, is
