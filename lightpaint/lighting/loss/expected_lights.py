@@ -126,11 +126,13 @@ class ExpectedLights:
     """The emission that a painting lets one expect, and how clearly it asks for other colours.
 
     emission: (n, 3), in the current colours. clarity: (n,), from 0, where a light is expected to
-    keep its colour, to 1, where the painting decides.
+    keep its colour, to 1, where the painting decides. painted: (n, 3), the emission with all of the
+    mean change of colour that is painted where a light shines.
     """
 
     emission: Doubles
     clarity: Doubles
+    painted: Doubles
 
     @classmethod
     def of(cls, wash: Wash, current: Doubles) -> "ExpectedLights":
@@ -156,9 +158,12 @@ class ExpectedLights:
         amount = np.sqrt(np.maximum(squares / np.where(reached > 0, reached, 1), 0))
         excess = (amount / MEANT_STOPS) ** SHARPNESS
         clarity = np.asarray(excess / (1 + excess), np.float64)
-        return cls(np.asarray(current * 2.0 ** luminance(change)[:, None]), clarity)
+        emission, painted = (
+            np.asarray(current * 2.0**x) for x in (luminance(change)[:, None], change)
+        )
+        return cls(emission, clarity, painted)
 
     @classmethod
     def unchanged(cls, current: Doubles) -> "ExpectedLights":
         """Expect lights to stay as they are. current: (n, 3)."""
-        return cls(current, np.zeros(len(current)))
+        return cls(current, np.zeros(len(current)), current)
