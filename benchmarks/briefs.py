@@ -28,6 +28,7 @@ Constants in lightpaint were chosen on cases 0 to 11; docs/benchmarks.md reports
 import argparse
 import time
 from collections.abc import Iterator, Sequence
+from contextlib import suppress
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -40,6 +41,13 @@ from lightpaint.basis.cache.cached_render import obtain_basis
 from lightpaint.basis.exposure_meter import meter_exposure
 from lightpaint.colour.color import kelvin_to_rgb, luminance
 from lightpaint.colour.color_difference import delta_e
+from lightpaint.errors import PaintError
+from lightpaint.paint.presets.presets import PRESETS
+from lightpaint.paint.protocol import ApplyPreset
+from lightpaint.paint.session.session import Session
+from lightpaint.paint.store.history_steps import Identity
+from lightpaint.paint.store.store import MemoryStore
+from lightpaint.pipeline.job.settings import Settings
 from lightpaint.scene.lights.texels.texel import image_of
 from lightpaint.target.wish import Wish
 
@@ -229,6 +237,12 @@ def planck_uv(kelvin: float) -> np.ndarray:
     return np.asarray(colour.UCS_to_uv(colour.XYZ_to_UCS(xyz)))
 
 
+def warmer(mired: float) -> np.ndarray:
+    """Gains (3,) of luminance 1 that make a white of 5000 K warmer, or cooler below 0."""
+    gains = kelvin_to_rgb(1e6 / (200 + mired)) / kelvin_to_rgb(5000)
+    return np.asarray(gains / luminance(gains))
+
+
 def adjustable(basis: lp.Basis) -> list[list[int]]:
     """What a person thinks of as lamps: lights, and all texels of an image together."""
     lamps: dict[str, list[int]] = {}
@@ -340,42 +354,35 @@ def brief_of(
 
 
 def preset_briefs(basis: lp.Basis) -> Iterator[tuple[str, Brief]]:
-    """Yield what each preset without a subject asks of the whole picture."""
-    from lightpaint.paint.layers.composition import adjusted
-    from lightpaint.paint.presets.presets import PRESETS, layers_of
-    from lightpaint.paint.presets.view_areas import ViewAreas
-
+    """Yield what each preset asks of the whole picture, as the painter's layers."""
     current = basis.mix(basis.current_weights)
+    transform = lp.ViewTransform("srgb", meter_exposure(current, basis))
+    whole = np.ones(basis.size, bool)
     for preset in PRESETS.values():
-        if preset.has_subject:
-            continue
-        areas = ViewAreas(current, basis.emitters_seen, basis.features, basis.objects)
-        image, masks = current.astype(np.float32), []
-        for layer, adjustment in zip(layers_of(preset, 1, ""), preset.adjustments, strict=False):
-            mask = adjustment.mask(areas)
-            image = image + mask[..., None] * (adjusted(image, layer.gain, layer.tint) - image)
-            masks.append(mask)
-        whole = np.ones(basis.size, bool)
-        yield preset.title, brief_of(basis, current, image, image, [whole], masks)
+        store = MemoryStore(Identity.of([basis]))
+        session = Session([basis], [current], store, settings=Settings(), transform=transform)
+        with suppress(PaintError):  # a preset that finds nothing to be about
+            session.handle(ApplyPreset(preset.name), {})
+            target = session.target()
+            if target is not None:
+                yield preset.title, Brief(target.image, current, target, (whole,))
 
 
 def show_sculptures(basis: lp.Basis, settings: Sequence[str]) -> None:
     """Print answers to bright warm sculptures in a cool dark room, and one set by hand."""
-    from lightpaint.paint.presets.presets import warmer
-
     assert basis.objects is not None
     current = basis.mix(basis.current_weights)
     subject = np.zeros(basis.size, bool)
     for name in ("knot", "figure", "vase"):
         subject |= basis.objects.mask(name)
-    painted = current * 2**-1.5 * np.array(warmer(-40))
-    painted = np.where(subject[..., None], current * 2**-0.1 * np.array(warmer(30)), painted)
+    painted = current * 2**-1.5 * warmer(-40)
+    painted = np.where(subject[..., None], current * 2**-0.1 * warmer(30), painted)
     brief = brief_of(basis, current, painted, painted, [subject, ~subject], [subject, ~subject])
     by_hand = basis.current_weights.copy()
     for k, name in enumerate(basis.names):
         is_spot = name in ("spot_figure", "spot_knot", "spot_vase")
         stops, mired = (0.5, 150) if is_spot else (-1.5, -150)
-        by_hand[k] *= 2**stops * np.array(warmer(mired))
+        by_hand[k] *= 2**stops * warmer(mired)
     print(f"{'':24s}{'ΔE':>6s}{'contrast of L*, b*':>22s}{'b* of the rest':>16s}")
     rows = [("asked", brief.target.image), ("now", current), ("by hand", basis.mix(by_hand))]
     rows += [(s, basis.mix(weights(basis, brief.target, SETTINGS[s]))) for s in settings]

@@ -44,9 +44,10 @@ class Fit:
         space: `linear`, or `display` to come closest in display values.
         hold: Total weight of unpainted pixels, which are held to the current look, relative to that
             of painted ones. 0 releases them.
-        colors: `free`; `gentle`, to change a lamp's colour only if the fit gains by it, and only to
-            whites and painted colours; `white`, on Planck's locus between 2200 and 9000 K; `own`,
-            to dim lamps and leave each the colour it has.
+        colors: `free`, in display values within the hues that are white, painted or the lamps' own;
+            `gentle`, to change a lamp's colour only as far as another is painted where it shines,
+            and only to whites and painted colours; `white`, on Planck's locus between 2200 and
+            9000 K; `own`, to dim lamps and leave each the colour it has.
         unpainted: Instead of `hold`, the weight of each unpainted pixel.
         literal: Whether every target is fitted literally, except for options set here.
         method: `polished`, to a certified optimum, or `gauss-seidel`, the paper's iteration alone,
@@ -91,6 +92,16 @@ class Fit:
         """True if the painting says what is meant, and not what light arrives: once resolved."""
         is_meant = self.transform is not None or self.colors == "gentle"
         return is_meant and not self.literal
+
+    @property
+    def keeps_to_hues(self) -> bool:
+        """True if lights take no colours but whites, their own and painted ones: once resolved.
+
+        As a display shows it, a lamp that makes up for others with a colour that nobody painted
+        stands out as such; light is fitted by any.
+        """
+        is_shown = self.colors == "free" and self.transform is not None and not self.literal
+        return self.colors == "gentle" or is_shown
 
     @property
     def brightness(self) -> float:

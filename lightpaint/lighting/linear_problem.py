@@ -13,7 +13,7 @@ from lightpaint.display_text import short_repr
 from lightpaint.lighting.constraints.constraints import Constraints
 from lightpaint.lighting.constraints.own_colors import keep_own_colors, own_color_labels
 from lightpaint.lighting.constraints.start_lighting import start_weights
-from lightpaint.lighting.constraints.white_lights import whiten_open_lights
+from lightpaint.lighting.constraints.white_lights import WhiteLimits, whiten_open_lights
 from lightpaint.lighting.fit import Fit
 from lightpaint.lighting.loss.expected_lights import ExpectedLights
 from lightpaint.lighting.loss.image_prior import image_prior
@@ -209,14 +209,19 @@ class SummedProblem(LinearProblem):
 
 
 def reduce_lights(
-    constraints: Constraints, lights: Lights, fit: Fit, gamuts: Gamuts | None = None
+    constraints: Constraints,
+    lights: Lights,
+    fit: Fit,
+    gamuts: Gamuts | None = None,
+    whites: WhiteLimits | None = None,
 ) -> Reduction:
     """Reduce the lights to the unknowns that constraints and the options for colours leave.
 
-    gamuts: see `gamuts_for`. Raises ConstraintError for a light whose constraints exclude white.
+    gamuts: see `gamuts_for`. whites: see `whiten_open_lights`. Raises ConstraintError for a light
+    whose constraints exclude white.
     """
     if fit.colors == "white":
-        constraints = whiten_open_lights(constraints, lights)
+        constraints = whiten_open_lights(constraints, lights, whites)
     # Pulls to the colours of lights and images couple the channels.
     is_joined = fit.colors == "gentle" or bool(texel_lights(lights).any())
     reduction = replace(reduce_to(constraints, lights), is_joined=is_joined)

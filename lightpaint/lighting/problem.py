@@ -19,6 +19,7 @@ from lightpaint.keywords import keywords
 from lightpaint.lighting.constraints.constraints import Constraints
 from lightpaint.lighting.constraints.constraints_file import constraints_of
 from lightpaint.lighting.constraints.start_lighting import held_at_start, start_weights
+from lightpaint.lighting.constraints.white_lights import WhiteLimits, painted_whites
 from lightpaint.lighting.fit import Fit, Space, resolve_for_targets
 from lightpaint.lighting.joined_views import Views, joint_basis
 from lightpaint.lighting.linear_problem import LinearProblem, reduce_lights
@@ -149,7 +150,9 @@ class Problem(LinearProblem):
         )
         reference = start_weights(all_constraints.start, whole.lights)
         gamuts = gamuts_for(whole, views, fit, reference)
-        reduction = reduce_lights(all_constraints, whole.lights, fit, gamuts)
+        painted = _wash_fields(views, fit, reference)
+        whites = whites_for(painted.get("expected"), fit)
+        reduction = reduce_lights(all_constraints, whole.lights, fit, gamuts, whites)
         return cls(
             basis=whole,
             views=views,
@@ -161,7 +164,7 @@ class Problem(LinearProblem):
             full=reduction,
             start=reference if start is None else start,
             fit=fit,
-            **_wash_fields(views, fit, reference),
+            **painted,
         )
 
     @property
@@ -292,16 +295,25 @@ def expected_for(
 
     own: (n, 3), weights with the colours that lights have. wash: that of the views, if it is known.
     """
-    if fit.colors != "gentle":
+    if fit.colors not in ("gentle", "white"):
         return None
     return ExpectedLights.of(wash or wash_of(views), own)
 
 
+def whites_for(expected: ExpectedLights | None, fit: Fit) -> WhiteLimits | None:
+    """Return the ranges of lights that are to be white; None for others."""
+    if fit.colors != "white" or expected is None:
+        return None
+    return painted_whites(expected.painted)
+
+
 def _wash_fields(views: Views, fit: Fit, own: Doubles) -> dict[str, Any]:
     """Return what a sketch lets one expect, and its contrasts, as fields of a problem."""
-    if not fit.is_sketch:
+    if not (fit.is_sketch or fit.colors == "white"):
         return {}
     wash = wash_of(views)
+    if not fit.is_sketch:
+        return {"expected": expected_for(views, fit, own, wash)}
     strength = sum(float(x.importance.sum(dtype=np.float64)) for x in views.targets)
     contrast = contrast_term(contrast_rows(wash, fit.transform), strength)
     return {"expected": expected_for(views, fit, own, wash), "contrast": contrast}
@@ -312,7 +324,7 @@ def gamuts_for(basis: Basis, views: Views, fit: Fit, own: Doubles | None = None)
 
     own: (n, 3), weights with the colours that lights have, by default the current ones.
     """
-    if fit.colors != "gentle":
+    if not fit.keeps_to_hues:
         return None
     views_of_paint = [
         (view_basis, target.image, _color_importance(target))
@@ -320,7 +332,8 @@ def gamuts_for(basis: Basis, views: Views, fit: Fit, own: Doubles | None = None)
     ]
     painted = partial(PaintedLight.of, views_of_paint)
     own = basis.current_weights if own is None else own
-    return Gamuts(painted, basis.power, own, texel_lights(basis.lights))
+    is_texel, is_bold = texel_lights(basis.lights), fit.colors == "free"
+    return Gamuts(painted, basis.power, own, is_texel, is_bold=is_bold)
 
 
 def _color_importance(target: Target) -> Floats:

@@ -8,7 +8,7 @@ import pytest
 from scipy.optimize import minimize
 
 import lightpaint as lp
-from lightpaint.colour.color import LUMINANCE
+from lightpaint.colour.color import LUMINANCE, cct_and_duv, kelvin_to_rgb
 from lightpaint.errors import TargetError
 from lightpaint.lighting import problem
 from lightpaint.lighting.fit import DEFAULT_HOLD, Fit, resolve_for_targets
@@ -164,6 +164,34 @@ def test_white_is_what_kelvin_does(make_basis: Any):
     locked = lp.Constraints.of({"light 1": {"lock": True}})
     weights = lp.solve(basis, target, colors="white", constraints=locked).weights
     np.testing.assert_allclose(weights[1], basis.current_weights[1])
+
+
+@pytest.mark.parametrize(
+    ("kelvin", "least", "most"), [(6000, 5400, 6600), (16_000, 14_000, 18_000)]
+)
+def test_whites_reach_as_far_as_what_is_painted(
+    make_basis: Any, kelvin: float, least: float, most: float
+):
+    """Moonlight is painted at 12,000 K and more, beyond usual lamps."""
+    left = np.linspace(1, 0, 16) * np.ones((12, 1))
+    images = np.array([left, 1 - left])[..., None] * np.ones(3)
+    basis = make_basis(images=images, names=["a", "b"], emission=[(0.3, 0.3, 0.3), (0.1, 0.1, 0.1)])
+    moonlit = (basis.current_look * kelvin_to_rgb(kelvin)).astype(np.float32)
+    everywhere = np.ones(basis.size, np.float32)
+    target = lp.Target(
+        "moon",
+        moonlit,
+        everywhere,
+        everything=False,
+        transform=SRGB,
+        through_view=True,
+        over_look=True,
+    )
+    for colors in ("white", "gentle"):
+        for emission in lp.solve(basis, target, colors=colors).weights:
+            found = cct_and_duv(emission)
+            assert found is not None
+            assert least < found[0] < most, (colors, found)
 
 
 def test_the_answer_says_how_it_was_found(make_basis: Any, tmp_path: Any):

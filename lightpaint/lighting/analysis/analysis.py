@@ -19,7 +19,7 @@ from lightpaint.lighting.analysis.diagnosis import Diagnosis, diagnose
 from lightpaint.lighting.analysis.noise.uncertainty import Uncertainty, error_bars, with_error_bars
 from lightpaint.lighting.constraints.constraints import Constraints
 from lightpaint.lighting.linear_problem import reduce_lights
-from lightpaint.lighting.problem import gamuts_for
+from lightpaint.lighting.problem import gamuts_for, whites_for
 from lightpaint.lighting.solution import Solution
 from lightpaint.lighting.solve import solution_of
 
@@ -151,7 +151,8 @@ def without_constraints(solution: Solution) -> Solution | None:
     if not problem.constraints or solution.whole is not None:
         return None
     gamuts = gamuts_for(problem.basis, problem.views, problem.fit)
-    free = reduce_lights(Constraints(), problem.lights, problem.fit, gamuts)
+    whites = whites_for(problem.expected, problem.fit)
+    free = reduce_lights(Constraints(), problem.lights, problem.fit, gamuts, whites)
     anew = replace(
         problem,
         constraints=Constraints(),

@@ -23,6 +23,7 @@ from lightpaint.basis.basis import Basis
 from lightpaint.basis.light_images import texel_lights
 from lightpaint.lighting.constraints.constraints import Constraints
 from lightpaint.lighting.constraints.start_lighting import start_weights
+from lightpaint.lighting.constraints.white_lights import WhiteLimits, painted_whites
 from lightpaint.lighting.fit import Fit, Space
 from lightpaint.lighting.linear_problem import reduce_lights
 from lightpaint.lighting.live.live_sums import MAX_FILM_PIXELS, Films, SmallFilm
@@ -74,6 +75,7 @@ class LiveSolver:
         reduction = reduce_lights(constraints, self._basis.lights, fit)
         self._reference = start_weights(constraints.start, self._basis.lights)
         self._fit, self._constraints, self._reduction = fit, constraints, reduction
+        self._whites: WhiteLimits | None = None
         self._untouched: Doubles | None = None
         self._within, self._gamuts_of = reduction, tuple[LiveView, ...]()
         self._is_kept_to = False  # whether the last answer kept to the constraints
@@ -101,7 +103,7 @@ class LiveSolver:
         for view in self._views:
             if self.mode == "linear":
                 view.tiles()
-            if self.mode != "linear" or self._fit.is_sketch:
+            if self.mode != "linear" or self._fit.is_sketch or self._fit.colors == "white":
                 self._film(view)
 
     @property
@@ -126,6 +128,7 @@ class LiveSolver:
             self._is_kept_to = True
         painted, rest = reduce(add, (view.counts for view in views))
         unpainted = unpainted_weight(float(painted), float(rest), self._fit)
+        self._follow_whites(views)
         reduction = self._with_gamuts(views)
 
         def best(equations: NormalEquations, begin: Doubles) -> Doubles:
@@ -149,18 +152,36 @@ class LiveSolver:
             self._untouched = _nearest(self._reference, self._views, self._reduction)
         return self._untouched
 
+    def _follow_whites(self, views: tuple[LiveView, ...]) -> None:
+        """Let lights that are to be white reach as far as whites are painted."""
+        if self._fit.colors != "white":
+            return
+        expected = ExpectedLights.of(self._wash(views), self._reference)
+        whites = painted_whites(expected.painted)
+        if whites != self._whites:
+            self._whites = whites
+            lights = self._basis.lights
+            self._reduction = reduce_lights(self._constraints, lights, self._fit, whites=whites)
+            self._within = self._reduction
+
+    def _wash(self, views: tuple[LiveView, ...]) -> Wash:
+        """Return the paintings and their lights, averaged over the films."""
+        return Wash.joined([self._film(view).wash(view.layers) for view in views])
+
     def _with_gamuts(self, views: tuple[LiveView, ...]) -> Reduction:
         """Return the unknowns, with the gamuts that the painted views allow.
 
         Lights that the last answer confined to their gamuts are confined from the start.
         """
-        if self._fit.colors != "gentle":
+        if not self._fit.keeps_to_hues:
             return self._reduction
         confined = self._within
         if confined.gamuts is None or self._gamuts_of != views:
             painted = partial(PaintedLight.of, [x.painting for x in views], max_pixels=GAMUT_PIXELS)
             is_texel = texel_lights(self._basis.lights)
-            gamuts = Gamuts(painted, _power(views), self._reference, is_texel)
+            is_bold = self._fit.colors == "free"
+            power, own = _power(views), self._reference
+            gamuts = Gamuts(painted, power, own, is_texel, is_bold=is_bold)
             confined, self._gamuts_of = self._reduction.with_gamuts(gamuts), views
         else:
             confined.gamuts.refresh()
@@ -188,7 +209,7 @@ class LiveSolver:
         share = total / sum(view.pixels for view in views)
         expected, contrast = None, None
         if self._fit.is_sketch:
-            wash = Wash.joined([self._film(view).wash(view.layers) for view in views])
+            wash = self._wash(views)
             contrast = contrast_term(contrast_rows(wash, self._fit.transform), total)
             if self._fit.colors == "gentle":
                 expected = ExpectedLights.of(wash, self._reference)

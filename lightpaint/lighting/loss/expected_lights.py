@@ -1,4 +1,4 @@
-"""What a painting lets one expect of each light, before anything is solved.
+"""The expectation of each light that a painting gives, before anything is solved.
 
 A moonlit picture was painted blue wherever its lamps shine: then it is the painting that decides
 their colours. A lamp in an unpainted corner, or one under paint whose hue is a little off, is
@@ -89,14 +89,14 @@ class Wash:
         if len(views) == 1:
             return views[0]
         names = "rows", "painted", "look", "importance", "counts"
-        joined = (np.concatenate([getattr(x, k) for x in views], axis=-1) for k in names)
+        joined = [np.concatenate([getattr(x, k) for x in views], axis=-1) for k in names]
         pixels = np.cumsum([0, *(x.counts.size for x in views)])
         wishes = np.zeros((sum(len(x.wishes) for x in views), pixels[-1]))
         first = 0
         for view, start in zip(views, pixels, strict=False):
             wishes[first : first + len(view.wishes), start : start + view.counts.size] = view.wishes
             first += len(view.wishes)
-        return cls(*joined, wishes)
+        return cls(*joined, wishes=wishes)
 
     def asked(self) -> Doubles:
         """Return the change that is asked for in each block, (3, p), in stops; 0 without paint."""
@@ -126,11 +126,13 @@ class ExpectedLights:
     """The emission that a painting lets one expect, and how clearly it asks for other colours.
 
     emission: (n, 3), in the current colours. clarity: (n,), from 0, where a light is expected to
-    keep its colour, to 1, where the painting decides.
+    keep its colour, to 1, where the painting decides. painted: (n, 3), the emission with all of the
+    mean change of colour that is painted where a light shines.
     """
 
     emission: Doubles
     clarity: Doubles
+    painted: Doubles
 
     @classmethod
     def of(cls, wash: Wash, current: Doubles) -> "ExpectedLights":
@@ -156,9 +158,12 @@ class ExpectedLights:
         amount = np.sqrt(np.maximum(squares / np.where(reached > 0, reached, 1), 0))
         excess = (amount / MEANT_STOPS) ** SHARPNESS
         clarity = np.asarray(excess / (1 + excess), np.float64)
-        return cls(np.asarray(current * 2.0 ** luminance(change)[:, None]), clarity)
+        emission, painted = (
+            np.asarray(current * 2.0**x) for x in (luminance(change)[:, None], change)
+        )
+        return cls(emission, clarity, painted)
 
     @classmethod
     def unchanged(cls, current: Doubles) -> "ExpectedLights":
         """Expect lights to stay as they are. current: (n, 3)."""
-        return cls(current, np.zeros(len(current)))
+        return cls(current, np.zeros(len(current)), current)

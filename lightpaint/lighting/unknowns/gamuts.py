@@ -44,6 +44,10 @@ PAINTED_MARGIN = 0.01
 #: large, so that only paint that is a white of any temperature is taken for one.
 PAINTED_FACTOR = 10
 
+#: The same distance from whites and from painted colours for bold answers, which keep to hues
+#: alone: at the edge of what looks green.
+BOLD_MARGIN = 0.006
+
 #: Rounding of bounds, in (u', v'): too small to see, and it keeps bounds equal between strokes.
 REACH_STEP = 0.001
 
@@ -123,8 +127,8 @@ class Gamuts:
     never do, and under the brush each answer would wait for it.
 
     light: samples the painted pixels; call `refresh` after strokes. power, current: (n, 3), ‖Φᵢ‖²
-    of the lamps' pictures, and their current weights. exempt: (n,), lights of any
-    colour.
+    of the lamps' pictures, and their current weights. exempt: (n,), lights of any colour. is_bold:
+    whether whites of any temperature are allowed, and twice as much beyond what is painted.
     """
 
     def __init__(
@@ -133,7 +137,10 @@ class Gamuts:
         power: Doubles,
         current: Doubles,
         exempt: Bools | None = None,
+        *,
+        is_bold: bool = False,
     ) -> None:
+        self._is_bold = is_bold
         self._light, self._power, self._current = light, power, current
         self._exempt = np.zeros(len(current), bool) if exempt is None else exempt
         self._own = np.where(luminance(current)[:, None] > 0, current, 1.0)
@@ -156,6 +163,10 @@ class Gamuts:
             if self._needed is None:
                 self._needed = _NeededLight.of(self._light(), self._power, self._current)
             own_reach, needed = self._reach[light], self._needed.reach(light)
+            if self._is_bold:
+                reach = np.maximum(self._whites, needed) + BOLD_MARGIN
+                self._gamuts[light] = self._hull(light, np.maximum(own_reach, reach))
+                return self._gamuts[light]
             margin = np.clip(2 * (needed - own_reach + WHITE_MARGIN), WHITE_MARGIN, PAINTED_MARGIN)
             reach = np.maximum(own_reach, needed + margin)
             # Paint that is cooler or warmer asks for other whites, and for none that is greener.
@@ -163,11 +174,16 @@ class Gamuts:
             beyond_whites = np.maximum(needed - self._whites - self._tolerance, 0)
             whites = np.maximum(own_reach, self._whites + off_white)
             reach = np.minimum(reach, whites + PAINTED_FACTOR * beyond_whites)
-            reach = np.round(reach / REACH_STEP) * REACH_STEP
-            gamut, former_gamut = ColorHull(reach, self._own[light]), self._former_gamuts.get(light)
-            is_same = former_gamut is not None and np.array_equal(former_gamut.reach, reach)
-            self._gamuts[light] = former_gamut if former_gamut is not None and is_same else gamut
+            self._gamuts[light] = self._hull(light, reach)
         return self._gamuts[light]
+
+    def _hull(self, light: int, reach: Doubles) -> ColorHull:
+        """Return the gamut of a reach, (k,): the same object as before where it is equal."""
+        reach = np.round(reach / REACH_STEP) * REACH_STEP
+        former = self._former_gamuts.get(light)
+        if former is not None and np.array_equal(former.reach, reach):
+            return former
+        return ColorHull(reach, self._own[light])
 
     def refresh(self) -> None:
         """Discard gamuts, which are computed again on request. Equal ones stay the same objects."""

@@ -27,7 +27,7 @@ from lightpaint.lighting.loss.reweighting import (
 )
 from lightpaint.lighting.loss.warm_start import sample_pixels
 from lightpaint.lighting.normal_equations import NormalEquations
-from lightpaint.lighting.problem import Problem, expected_for, gamuts_for
+from lightpaint.lighting.problem import Problem, expected_for, gamuts_for, whites_for
 from lightpaint.lighting.solution import Solution
 from lightpaint.lighting.unknowns.reduced_problem import solve_reduced
 from lightpaint.lighting.unknowns.reduction import only_knobs
@@ -164,13 +164,15 @@ def _with_colors(problem: Problem, colors: Colors) -> Problem:
     Raises ConstraintError if a light cannot have it.
     """
     fit = replace(problem.fit, colors=colors)
+    expected = problem.expected or expected_for(problem.views, fit, problem.reference)
     gamuts = gamuts_for(problem.basis, problem.views, fit, problem.reference)
-    full = reduce_lights(problem.constraints, problem.lights, fit, gamuts)
+    full = reduce_lights(
+        problem.constraints, problem.lights, fit, gamuts, whites_for(expected, fit)
+    )
     reduction = full
     if problem.reduction is not problem.full:
         knobs = enumerate(problem.reduction.knobs)
         reduction = only_knobs(full, [k for k, x in knobs if any(u.upper > 0 for u in x.unknowns)])
-    expected = problem.expected or expected_for(problem.views, fit, problem.reference)
     return replace(problem, fit=fit, full=full, reduction=reduction, expected=expected)
 
 

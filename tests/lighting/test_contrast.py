@@ -1,0 +1,143 @@
+"""Contrasts of wishes: the ratio of a subject's light to the rest comes out as painted."""
+
+from typing import Any
+
+import numpy as np
+import pytest
+
+import lightpaint as lp
+from lightpaint.lighting.loss import contrast
+from lightpaint.lighting.loss.contrast import contrast_rows, contrast_term
+from lightpaint.lighting.loss.expected_lights import ExpectedLights, Wash
+from lightpaint.target.wish import Wish
+
+H, W = 24, 40
+
+
+def subject() -> np.ndarray:
+    mask = np.zeros((H, W), bool)
+    mask[10:14, 18:22] = True
+    return mask
+
+
+def room(make_basis: Any, spill: Any = 0.3) -> lp.Basis:
+    """A lamp over everything and a spot on the subject, which also spills over the rest."""
+    pools = [np.ones((H, W)), np.where(subject(), 1.0, spill)]
+    images = np.array([pool[..., None] * np.ones(3) for pool in pools])
+    basis: lp.Basis = make_basis(
+        images=images, names=["wash", "spot"], emission=[(0.3, 0.3, 0.3), (0.1, 0.1, 0.1)]
+    )
+    return basis
+
+
+def painting(basis: lp.Basis, image: np.ndarray, *, with_layers: bool = True) -> lp.Target:
+    area = subject().astype(np.float32)
+    wishes = (Wish("rest", 1 - area), Wish("subject", area)) if with_layers else ()
+    return lp.Target(
+        "painting",
+        image.astype(np.float32),
+        np.ones((H, W), np.float32),
+        everything=False,
+        transform=lp.ViewTransform("srgb", 0.0),
+        through_view=True,
+        over_look=True,
+        wishes=wishes,
+    )
+
+
+def test_the_term_vanishes_for_what_was_painted(make_basis: Any) -> None:
+    basis = room(make_basis)
+    meant = np.array([[0.1, 0.12, 0.2], [0.4, 0.3, 0.2]])
+    target = painting(basis, basis.mix(meant))
+    rows = contrast_rows(Wash.of(basis, target), target.transform)
+    assert rows.shape == (1, 3, 2)  # the rest is no subject
+    np.testing.assert_allclose(np.einsum("kcn,nc->kc", rows, meant), 0, atol=1e-6)
+    term = contrast_term(rows, 7.0)
+    assert term is not None
+    assert term.objective(2 * meant).max() < 1e-9  # contrast is of ratios
+    other = meant * [[1], [2]]
+    value = contrast.CONTRAST * 7.0 * np.einsum("kcn,nc->kc", rows, other)[0] ** 2
+    np.testing.assert_allclose(term.objective(other), value, rtol=1e-9)
+
+
+def test_rows_are_the_formula(make_basis: Any) -> None:
+    basis = room(make_basis)
+    image = np.where(subject()[..., None], 0.4, 0.1) * np.ones(3)
+    rows = contrast_rows(Wash.of(basis, painting(basis, image)), None)
+    # In linear light A is the painted light: 0.4 (1 / 0.4 − 1 / 0.1), 0.4 (1 / 0.4 − 0.3 / 0.1).
+    np.testing.assert_allclose(rows[0], np.tile([-3.0, -0.2], (3, 1)), rtol=1e-5)
+
+
+def test_a_small_subject_stands_out(make_basis: Any, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Its spot lights half of the room, too: pixels alone would leave the subject dark."""
+    spill = np.tile(np.arange(W) < W // 2, (H, 1)) * 0.8
+    basis = room(make_basis, spill)
+    image = np.where(subject()[..., None], 0.6, 0.1) * np.ones(3)
+
+    def ratio() -> float:
+        got = basis.mix(lp.solve(basis, painting(basis, image)).weights)[..., 1]
+        return float(got[subject()].mean() / got[~subject()].mean())
+
+    with_contrast = ratio()
+    monkeypatch.setattr(contrast, "CONTRAST", 0.0)
+    assert with_contrast > ratio() + 0.05
+
+
+def test_an_unpainted_rest_has_no_contrast(make_basis: Any) -> None:
+    basis = room(make_basis)
+    target = lp.Target(
+        "stroke",
+        np.full((H, W, 3), 0.6, np.float32),
+        subject().astype(np.float32),
+        everything=False,
+    )
+    assert not len(contrast_rows(Wash.of(basis, target), None))
+    assert contrast_term(np.zeros((0, 3, 2)), 1.0) is None
+
+
+def test_a_flat_painting_has_the_wishes_of_its_layers(make_basis: Any) -> None:
+    basis = room(make_basis)
+    image = np.where(subject()[..., None], 0.6, 0.1) * np.ones(3)
+    layered, flat = (
+        contrast_rows(Wash.of(basis, painting(basis, image, with_layers=x)), None)
+        for x in (True, False)
+    )
+    assert len(flat) == len(layered) == 1
+    # The border of a place that is found is soft by a pixel.
+    np.testing.assert_allclose(flat, layered, atol=0.35)
+
+
+@pytest.mark.parametrize(
+    ("stops", "least", "most"), [(0.0, 0.0, 0.0), (0.25, 0.0, 0.01), (2.0, 0.99, 1.0)]
+)
+def test_how_clearly_colours_are_asked_for(
+    make_basis: Any, stops: float, least: float, most: float
+) -> None:
+    """A hue that is a little off asks for nothing; a mood decides."""
+    basis = room(make_basis)
+    tint = 2.0 ** np.array([-stops / 2, 0, stops / 2])
+    wash = Wash.of(basis, painting(basis, basis.current_look * tint))
+    clarity = ExpectedLights.of(wash, basis.current_weights).clarity
+    assert clarity.min() >= least
+    assert clarity.max() <= most
+
+
+def test_lights_are_expected_as_dim_as_what_they_light(make_basis: Any) -> None:
+    basis = room(make_basis, spill=0.0)
+    image = basis.current_look * np.where(subject()[..., None], 0.25, 1.0)
+    wash = Wash.of(basis, painting(basis, image))
+    expected = ExpectedLights.of(wash, basis.current_weights).emission
+    ratio = np.log2(expected / basis.current_weights)[:, 1]
+    # The spot lights nothing else; the wash as much as its part of the blocks, in shares of light.
+    assert ratio[1] == pytest.approx(-2, abs=0.1)
+    assert -0.1 < ratio[0] < 0
+
+
+def test_views_keep_their_wishes_apart(make_basis: Any) -> None:
+    basis = room(make_basis)
+    image = np.where(subject()[..., None], 0.6, 0.1) * np.ones(3)
+    wash = Wash.of(basis, painting(basis, image))
+    joined = Wash.joined([wash, wash])
+    assert joined.wishes.shape == (4, 2 * wash.counts.size)
+    assert not (joined.wishes[:2, wash.counts.size :]).any()
+    assert not (joined.wishes[2:, : wash.counts.size]).any()

@@ -1,0 +1,57 @@
+"""The answer under the brush and the exact one are one picture, for every preset."""
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+from nightly import nightly
+
+import lightpaint as lp
+from lightpaint.basis.exposure_meter import meter_exposure
+from lightpaint.colour.color_difference import delta_e
+from lightpaint.errors import PaintError
+from lightpaint.paint import protocol
+from lightpaint.paint.presets.presets import PRESETS
+from lightpaint.paint.session.session import Session
+from lightpaint.paint.store.history_steps import Identity
+from lightpaint.paint.store.store import MemoryStore
+from lightpaint.pipeline.job.settings import Settings
+
+SCENES = Path(__file__).parents[2] / "scenes"
+
+#: Largest mean ΔE between the two: under the brush a few thousand blocks stand for all pixels.
+SAME = 0.6
+
+#: Answers under a brush that rests for a moment; each is one step from the last.
+STEPS = 8
+
+
+@pytest.mark.parametrize("name", ["gallery", nightly("stage")])
+def test_live_and_exact_answers_are_one_picture(name: str) -> None:
+    scene = lp.load_scene(SCENES / name / "scene.xml").reduced("80x45")
+    basis = lp.render_basis(scene, spp=128)
+    transform = lp.ViewTransform("srgb", meter_exposure(basis.current_look, basis))
+
+    def displayed(image: np.ndarray) -> np.ndarray:
+        return np.asarray(transform.decode(transform.encode(image)) * 2**transform.stops)
+
+    differences = {}
+    for preset in PRESETS:
+        store = MemoryStore(Identity.of([basis]))
+        session = Session(
+            [basis], [basis.current_look], store, settings=Settings(), transform=transform
+        )
+        try:
+            session.handle(protocol.ApplyPreset(preset), {})
+        except PaintError:  # it finds nothing to be about
+            continue
+        for _ in range(STEPS):
+            session.live_answer.solve()
+        exact = session.snapshot().solution()
+        assert exact is not None
+        live_picture, exact_picture = (basis.mix(x) for x in (session.weights, exact.weights))
+        differences[preset] = float(
+            delta_e(displayed(live_picture), displayed(exact_picture)).mean()
+        )
+    assert len(differences) >= 8
+    assert max(differences.values()) <= SAME, differences
