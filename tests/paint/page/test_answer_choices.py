@@ -148,6 +148,8 @@ def test_they_move_nothing(new_painter: Any, viewport: tuple[int, int]) -> None:
     before = places()
     _offer(painter, painter.ui("version"))
     assert places() == before
+    pictures = painter.page.locator(".answer-choice canvas").all()
+    assert len({picture.bounding_box()["width"] for picture in pictures}) == 1
     for name in SAID:  # what is on a picture stays on it
         numbers = _button(painter, name).locator("b").bounding_box()
         picture = _button(painter, name).locator("canvas").bounding_box()
