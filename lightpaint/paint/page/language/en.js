@@ -94,7 +94,7 @@ export const en = {
     asPainted: 'As painted',
     asPaintedTip: 'Lamps take the whites and colours that the painting asks for.',
     bold: 'Bold',
-    boldTip: 'Lamps may take any colour.',
+    boldTip: 'Lamps may take any hue that is white, painted or their own.',
     ofBrightness: '{value} % of the asked brightness came.',
     ofColour: '{value} % of the asked colour came.',
     ofBoth: '{brightness} % of the asked brightness and {colour} % of the asked colour came.',
