@@ -9,7 +9,7 @@ from lightpaint.lighting.constraints.constraints import Constraints
 from lightpaint.lighting.constraints.light_patterns import lights_of_open_color
 
 #: The range of usual lamps, in kelvin.
-LAMP_KELVINS = (2200.0, 9000.0)
+LAMP_KELVINS = (2200, 9000)
 
 #: Whites that the range is widened to where warmer or bluer ones are painted, up to moonlight.
 WARMER_KELVINS, BLUER_KELVINS = (2000.0,), (12_000.0, 16_000.0, 20_000.0, 25_000.0)

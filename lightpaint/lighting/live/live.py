@@ -153,7 +153,7 @@ class LiveSolver:
         return self._untouched
 
     def _follow_whites(self, views: tuple[LiveView, ...]) -> None:
-        """Let lights that are to be white reach as far as whites are painted."""
+        """Widen the ranges of lights that are to be white as far as whites are painted."""
         if self._fit.colors != "white":
             return
         expected = ExpectedLights.of(self._wash(views), self._reference)

@@ -29,7 +29,7 @@ DARK = 0.01
 
 #: Change of colour, in stops between channels, from which paint means it, and how sharply:
 #: benchmarks/intent.py paints hues that are off by 0.25, benchmarks/briefs.py moods of 1 to 3.
-MEANT_STOPS, SHARPNESS = 0.6, 6
+MEANT_STOPS, SHARPNESS = 0.5, 8
 
 
 @dataclass(frozen=True)
