@@ -22,6 +22,7 @@ class Wish:
         layer: Id of its layer in a painter's session; None for a painting without layers.
         group: Name of the group of its layer, such as a preset; "" without one.
         has_strokes: Whether separate strokes in it are wishes of their own.
+        is_exact: Whether its colours were given as numbers, and not painted by eye.
     """
 
     name: str
@@ -29,6 +30,7 @@ class Wish:
     layer: int | None = None
     group: str = ""
     has_strokes: bool = False
+    is_exact: bool = False
 
     def __post_init__(self) -> None:
         if self.area.ndim != 2:

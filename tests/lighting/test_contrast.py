@@ -1,5 +1,6 @@
 """Contrasts of wishes: the ratio of a subject's light to the rest comes out as painted."""
 
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -120,6 +121,20 @@ def test_how_clearly_colours_are_asked_for(
     clarity = ExpectedLights.of(wash, basis.current_weights).clarity
     assert clarity.min() >= least
     assert clarity.max() <= most
+
+
+def test_numbers_are_meant(make_basis: Any) -> None:
+    """A tint of a quarter of a stop by eye is an error, and by a slider it is a wish."""
+    basis = room(make_basis)
+    tint = 2.0 ** np.array([-0.125, 0, 0.125])
+    target = painting(basis, basis.current_look * tint)
+    exact = tuple(replace(wish, is_exact=True) for wish in target.wishes)
+    by_eye, by_numbers = (
+        ExpectedLights.of(Wash.of(basis, replace(target, wishes=x)), basis.current_weights)
+        for x in (target.wishes, exact)
+    )
+    assert by_eye.clarity.max() < 0.01
+    assert by_numbers.clarity.min() > 0.9
 
 
 def test_lights_are_expected_as_dim_as_what_they_light(make_basis: Any) -> None:

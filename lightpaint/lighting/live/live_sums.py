@@ -12,7 +12,7 @@ from lightpaint.colour.display.view_transform import ViewTransform
 from lightpaint.images.pixel_blocks import block_mean, block_sums, enlarged
 from lightpaint.lighting.live.tiles import MAX_CHEAP_LIGHTS, TiledEquations
 from lightpaint.lighting.loss.channel_loss import PaintedPixels, join_pixels
-from lightpaint.lighting.loss.expected_lights import Wash, wish_shares
+from lightpaint.lighting.loss.expected_lights import Wash, exact_share, wish_shares
 from lightpaint.lighting.loss.loss import STRIP_PIXELS
 from lightpaint.lighting.loss.reweighting import interpolate
 from lightpaint.lighting.normal_equations import NormalEquations
@@ -203,8 +203,10 @@ class SmallFilm:
         importance = np.minimum(self._a / np.where(counts > 0, counts, 1), 1)
         painted, look = (x.T.reshape(*self._size, 3) for x in (self._painted, self._current))
         small_importance = importance.reshape(self._size)
-        wishes = wish_shares(layers(self._side), painted, small_importance, look)
-        return Wash(self.rows, self._painted, self._current, importance, counts, wishes)
+        wishes = layers(self._side)
+        shares = wish_shares(wishes, painted, small_importance, look)
+        exact = exact_share(wishes, self._size)
+        return Wash(self.rows, self._painted, self._current, importance, counts, shares, exact)
 
     @cached_property
     def _counts(self) -> Doubles:

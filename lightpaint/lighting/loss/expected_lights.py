@@ -31,6 +31,9 @@ DARK = 0.01
 #: benchmarks/intent.py paints hues that are off by 0.25, benchmarks/briefs.py moods of 1 to 3.
 MEANT_STOPS, SHARPNESS = 0.5, 8
 
+#: Factor by which a colour that was given as numbers is meant more clearly than a painted one.
+EXACT_FACTOR = 4.0
+
 
 @dataclass(frozen=True)
 class Wash:
@@ -38,7 +41,7 @@ class Wash:
 
     rows: (3, n, p), Φ. painted, look: (3, p), linear. importance: (p,), the share of a block that
     is painted. counts: (p,), the number of its pixels that count. wishes: (k, p), the share of a
-    block that each wish covers.
+    block that each wish covers; exact: (p,), that of wishes whose colours were given as numbers.
     """
 
     rows: Floats
@@ -47,6 +50,7 @@ class Wash:
     importance: Doubles
     counts: Doubles
     wishes: Floats
+    exact: Doubles
 
     @classmethod
     def of(cls, basis: Basis, target: Target) -> "Wash":
@@ -81,6 +85,7 @@ class Wash:
             importance.ravel(),
             counts.ravel(),
             wishes,
+            exact_share(layers, look.shape[:2]),
         )
 
     @classmethod
@@ -88,15 +93,15 @@ class Wash:
         """Return the washes of several views behind each other."""
         if len(views) == 1:
             return views[0]
-        names = "rows", "painted", "look", "importance", "counts"
-        joined = [np.concatenate([getattr(x, k) for x in views], axis=-1) for k in names]
+        names = "rows", "painted", "look", "importance", "counts", "exact"
+        joined = {k: np.concatenate([getattr(x, k) for x in views], axis=-1) for k in names}
         pixels = np.cumsum([0, *(x.counts.size for x in views)])
         wishes = np.zeros((sum(len(x.wishes) for x in views), pixels[-1]))
         first = 0
         for view, start in zip(views, pixels, strict=False):
             wishes[first : first + len(view.wishes), start : start + view.counts.size] = view.wishes
             first += len(view.wishes)
-        return cls(*joined, wishes=wishes)
+        return cls(**joined, wishes=wishes)
 
     def asked(self) -> Doubles:
         """Return the change that is asked for in each block, (3, p), in stops; 0 without paint."""
@@ -106,6 +111,17 @@ class Wash:
             return np.zeros(self.look.shape)
         asked, now = (np.maximum(x, 0).astype(np.float64) + dark for x in (self.painted, self.look))
         return np.where(weight > 0, np.log2(asked / now), 0)
+
+
+def exact_share(layers: Sequence[Wish], size: tuple[int, int]) -> Doubles:
+    """Return the share of each block of pixels whose colours were given as numbers, (p,).
+
+    layers: see `wish_shares`. size: (h, w), in blocks.
+    """
+    areas = [wish.area for wish in layers if wish.is_exact]
+    return np.minimum(
+        np.sum(areas, axis=0, dtype=np.float64, initial=0) + np.zeros(size), 1
+    ).ravel()
 
 
 def wish_shares(
@@ -141,13 +157,13 @@ class ExpectedLights:
         The change of light i in channel c is the mean change that is asked for, weighted by how
         much of the light in each pixel a unit of it makes: Σ D a Φᵢ / L / Σ Φᵢ / L, with the change
         a in stops and the look L; its level is the luminance of that. The colour that is asked for
-        is the RMS of a's range over the channels, with the same weights.
+        is the RMS of a's range over the channels, with the same weights; numbers count as meant.
         """
         dark = DARK * float(np.mean(wash.look)) or 1.0
         stops = wash.asked()
         share = wash.counts / (np.maximum(wash.look, 0) + dark)
         asked_share = wash.importance * share
-        spread = np.ptp(stops, axis=0)
+        spread = np.ptp(stops, axis=0) * (1 + (EXACT_FACTOR - 1) * wash.exact)
         sums = np.stack([rows @ x for rows, x in zip(wash.rows, share, strict=True)], axis=-1)
         moved = np.stack(
             [rows @ x for rows, x in zip(wash.rows, asked_share * stops, strict=True)], axis=-1

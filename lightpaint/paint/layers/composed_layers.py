@@ -120,6 +120,7 @@ class ComposedLayers:
                 layer=x.layer.id,
                 group=self._group_name(x.layer.id),
                 has_strokes=x.layer.kind in ("pixels", "paint"),
+                is_exact=x.layer.kind == "adjust",
             )
             for x, area in zip(shown, separate(areas), strict=True)
             if area.any()
