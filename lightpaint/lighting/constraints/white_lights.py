@@ -33,7 +33,7 @@ def painted_whites(emission: Doubles) -> WhiteLimits:
 
 def _painted_white(color: Doubles) -> tuple[float, float]:
     white = cct_and_duv(color)
-    low, high = LAMP_KELVINS
+    low, high = map(float, LAMP_KELVINS)
     if white is None or abs(white[1]) > WHITE_DUV:
         return low, high
     kelvin, _ = white
