@@ -87,21 +87,22 @@ class Fit:
         "emitters": one_of(Emitters),
     }
 
-    @property
-    def is_sketch(self) -> bool:
-        """True if the painting says what is meant, and not what light arrives: once resolved."""
-        is_meant = self.transform is not None or self.colors == "gentle"
-        return is_meant and not self.literal
+    def reads_wishes(self, *, is_sketch: bool) -> bool:
+        """Return whether wishes have contrasts, and the paint says which colours it means.
 
-    @property
-    def keeps_to_hues(self) -> bool:
-        """True if lights take no colours but whites, their own and painted ones: once resolved.
+        is_sketch: whether it was painted over the current look or through a view of a display, and
+        not given as light. The fit is resolved.
+        """
+        return not self.literal and (is_sketch or self.colors == "gentle")
+
+    def keeps_to_hues(self, *, is_sketch: bool) -> bool:
+        """Return whether lights take no colours but whites, their own and painted ones.
 
         As a display shows it, a lamp that makes up for others with a colour that nobody painted
-        stands out as such; light is fitted by any.
+        stands out as such. is_sketch: as for `reads_wishes`.
         """
-        is_shown = self.colors == "free" and self.transform is not None and not self.literal
-        return self.colors == "gentle" or is_shown
+        is_shown = is_sketch and self.transform is not None and not self.literal
+        return self.colors == "gentle" or (self.colors == "free" and is_shown)
 
     @property
     def brightness(self) -> float:

@@ -309,14 +309,20 @@ def whites_for(expected: ExpectedLights | None, fit: Fit) -> WhiteLimits | None:
 
 def _wash_fields(views: Views, fit: Fit, own: Doubles) -> dict[str, Any]:
     """Return what a sketch lets one expect, and its contrasts, as fields of a problem."""
-    if not (fit.is_sketch or fit.colors == "white"):
+    reads_wishes = fit.reads_wishes(is_sketch=_are_sketches(views))
+    if not (reads_wishes or fit.colors == "white"):
         return {}
     wash = wash_of(views)
-    if not fit.is_sketch:
+    if not reads_wishes:
         return {"expected": expected_for(views, fit, own, wash)}
     strength = sum(float(x.importance.sum(dtype=np.float64)) for x in views.targets)
     contrast = contrast_term(contrast_rows(wash, fit.transform), strength)
     return {"expected": expected_for(views, fit, own, wash), "contrast": contrast}
+
+
+def _are_sketches(views: Views) -> bool:
+    """Return whether any view was painted over the current look, or as a display shows it."""
+    return any(target.over_look or target.through_view for target in views.targets)
 
 
 def gamuts_for(basis: Basis, views: Views, fit: Fit, own: Doubles | None = None) -> Gamuts | None:
@@ -324,7 +330,7 @@ def gamuts_for(basis: Basis, views: Views, fit: Fit, own: Doubles | None = None)
 
     own: (n, 3), weights with the colours that lights have, by default the current ones.
     """
-    if not fit.keeps_to_hues:
+    if not fit.keeps_to_hues(is_sketch=_are_sketches(views)):
         return None
     views_of_paint = [
         (view_basis, target.image, _color_importance(target))

@@ -44,7 +44,9 @@ def test_the_better_of_two_searches_is_kept(
     start: Any = SimpleNamespace(missed=1.0)
     found = [SimpleNamespace(missed=x) for x in small_film]
     errors = dict(zip(map(id, found), large_film, strict=True))
-    stub: Any = SimpleNamespace(fit=SimpleNamespace(norm2=1.0), steps=None, paths=None)
+    stub: Any = SimpleNamespace(
+        fit=SimpleNamespace(norm2=1.0), steps=None, paths=None, is_enough=lambda: False
+    )
     judge: Any = SimpleNamespace(missed=lambda arrangement: errors[id(arrangement)])
     ends = iter(found)
 
@@ -87,7 +89,9 @@ def test_lights_that_do_least_are_tried_first(helps: tuple[int, ...], expected: 
         Movable(FreeLight(f"new_{k}", site, lp.Freedom()), (k,), None, group)
         for k, site in enumerate(sites)
     )
-    stub: Any = SimpleNamespace(fit=fit, steps=None, paths=None, tried=better)
+    stub: Any = SimpleNamespace(
+        fit=fit, steps=None, paths=None, tried=better, is_enough=lambda: False
+    )
     search = Search(stub, [], stub)
     search._tried_again(Arrangement(movables, sites, fit.fitted(columns)))
     assert tried == expected

@@ -60,10 +60,19 @@ class LiveSolver:
     """The lighting for paintings that change under a brush, updated in place.
 
     views: of one lighting; report strokes to each by `update`. fit: with nothing left open, as
-    `resolve_for_targets` returns it. constraints: all constraints on the lights.
+    `resolve_for_targets` returns it. constraints: all constraints on the lights. is_sketch: as for
+    `Fit.reads_wishes`.
     """
 
-    def __init__(self, views: Sequence[LiveView], *, fit: Fit, constraints: Constraints) -> None:
+    def __init__(
+        self,
+        views: Sequence[LiveView],
+        *,
+        fit: Fit,
+        constraints: Constraints,
+        is_sketch: bool = False,
+    ) -> None:
+        self._is_sketch = is_sketch
         self._views = tuple(views)
         self._basis = views[0].basis
         self._films: tuple[tuple[LiveView, ...], Films] | None = None
@@ -103,7 +112,8 @@ class LiveSolver:
         for view in self._views:
             if self.mode == "linear":
                 view.tiles()
-            if self.mode != "linear" or self._fit.is_sketch or self._fit.colors == "white":
+            reads_wash = self._fit.reads_wishes(is_sketch=self._is_sketch)
+            if self.mode != "linear" or reads_wash or self._fit.colors == "white":
                 self._film(view)
 
     @property
@@ -173,7 +183,7 @@ class LiveSolver:
 
         Lights that the last answer confined to their gamuts are confined from the start.
         """
-        if not self._fit.keeps_to_hues:
+        if not self._fit.keeps_to_hues(is_sketch=self._is_sketch):
             return self._reduction
         confined = self._within
         if confined.gamuts is None or self._gamuts_of != views:
@@ -208,7 +218,7 @@ class LiveSolver:
         total = sum(float(view.counts[0]) for view in views)
         share = total / sum(view.pixels for view in views)
         expected, contrast = None, None
-        if self._fit.is_sketch:
+        if self._fit.reads_wishes(is_sketch=self._is_sketch):
             wash = self._wash(views)
             contrast = contrast_term(contrast_rows(wash, self._fit.transform), total)
             if self._fit.colors == "gentle":

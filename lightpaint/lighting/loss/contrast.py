@@ -49,7 +49,7 @@ def contrast_rows(wash: Wash, transform: ViewTransform | None) -> Doubles:
         painted_rest = float((rest * wash.importance).sum())
         if not 0 < own.sum() <= SUBJECT_SHARE * total:
             continue
-        if painted_rest < PAINTED_REST * rest.sum():
+        if painted_rest <= 0 or painted_rest < PAINTED_REST * rest.sum():
             continue
         means = [[(x @ part) / part.sum() for part in (own, rest)] for x in goal]
         lights = [[(x @ part) / part.sum() for part in (own, rest)] for x in wash.rows]

@@ -106,6 +106,14 @@ class ComposedLayers:
         """Return the accent of a layer; 1 for a hidden one."""
         return next((shown.accent for shown in self._shown if shown.layer.id == number), 1.0)
 
+    def loaded_wishes(self, side: int) -> tuple[Wish, ...]:
+        """Return the wishes under the brush; none while the pixels of a layer were not read yet.
+
+        side: as for `wishes`.
+        """
+        is_loaded = all(self._pixels[x.layer.id].is_loaded for x in self._shown)
+        return self.wishes(side) if is_loaded else ()
+
     def wishes(self, side: int = 1) -> tuple[Wish, ...]:
         """Return what each visible layer covers and no layer above it, the lowest first.
 

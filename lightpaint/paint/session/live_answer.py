@@ -52,7 +52,8 @@ class LiveAnswer:
         former_basis, self._basis = self._basis, views[0].basis
         if former_basis.names != self._basis.names:
             self.weights = weights_by_name(self.weights, former_basis.names, self._basis.lights)
-        self._live = LiveSolver(views, fit=self.fit, constraints=self._constraints(self.requests))
+        constraints = self._constraints(self.requests)
+        self._live = LiveSolver(views, fit=self.fit, constraints=constraints, is_sketch=True)
         self._live.prepare()
 
     def follow_planes(self) -> None:

@@ -43,9 +43,10 @@ def test_a_session_that_is_lost_or_taken(painter: Painter) -> None:
     assert not painter.page.get_by_role("alert").is_visible()
 
 
-#: Small pictures that are shown, and of those how many are there.
+#: Small pictures that are shown, but for those of answers to choose from, and how many are there.
 THUMBS = (
-    "() => { const all = [...document.querySelectorAll('.lightpaint .thumb')];"
+    "() => { const all = [...document.querySelectorAll('.lightpaint .thumb')]"
+    ".filter((one) => !one.closest('.answer-choice'));"
     " return [all.length, all.filter((one) => one.width > 1).length]; }"
 )
 
