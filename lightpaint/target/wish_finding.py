@@ -103,8 +103,8 @@ def _owners(painted: Bools, ratio: Doubles) -> tuple[npt.NDArray[np.int64], int]
     painted: (h, w). Returns the number of each pixel, (h, w), 0 for none, and the largest.
     """
     least = MIN_SHARE * painted.size
-    strokes = _connected(painted, round(JOINING * painted.shape[1]))
-    strokes = sorted((x for x in strokes if x.sum() >= least), key=lambda x: -int(x.sum()))
+    strokes = _connected(painted, round(JOINING * painted.shape[1]), least)
+    strokes = sorted(strokes, key=lambda x: -int(x.sum()))
     owners, count = np.zeros(painted.shape, np.int64), 0
     for stroke in strokes[:MAX_WISHES]:
         count += 1
@@ -132,15 +132,20 @@ def _distinct_places(stroke: Bools, ratio: Doubles, least: float) -> list[Bools]
     usual = np.median(ratio[stroke], axis=0)
     differs = np.abs(luminance(ratio - usual)) > DISTINCT_STOPS
     differs |= np.ptp(ratio - usual, axis=-1) > DISTINCT_STOPS
-    places = [x for x in _connected(stroke & differs, 0) if x.sum() >= least]
-    places = [x for x in places if x.sum() <= MAX_INNER_SHARE * stroke.sum()]
+    places = _connected(stroke & differs, 0, least)
+    most = MAX_INNER_SHARE * stroke.sum()
+    places = [x for x in places if x.sum() <= most]
     return sorted(places, key=lambda x: -float(np.abs(ratio[x] - usual).sum()))
 
 
-def _connected(mask: Bools, radius: int) -> list[Bools]:
-    """Return the connected parts of a mask, joined over gaps up to about twice a radius."""
+def _connected(mask: Bools, radius: int, least: float) -> list[Bools]:
+    """Return the connected parts of a mask of at least so many pixels, joined over gaps up to about
+    twice a radius.
+    """
     from scipy.ndimage import binary_dilation, label
 
     wide = binary_dilation(mask, iterations=radius) if radius > 0 else mask
     parts, count = label(wide, np.ones((3, 3)))
-    return [mask & (parts == k) for k in range(1, count + 1)]
+    parts = np.where(mask, parts, 0)
+    sizes = np.bincount(parts.ravel(), minlength=count + 1)
+    return [parts == k for k in range(1, count + 1) if sizes[k] >= least]

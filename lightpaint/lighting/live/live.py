@@ -176,7 +176,7 @@ class LiveSolver:
 
     def _wash(self, views: tuple[LiveView, ...]) -> Wash:
         """Return the paintings and their lights, averaged over the films."""
-        return Wash.joined([self._film(view).wash(view.layers) for view in views])
+        return self._joint_films(views).wash([view.layers for view in views])
 
     def _with_gamuts(self, views: tuple[LiveView, ...]) -> Reduction:
         """Return the unknowns, with the gamuts that the painted views allow.

@@ -234,6 +234,12 @@ class Films:
         rows = [film.rows for film in self._films]
         self._rows = rows[0] if len(rows) == 1 else np.concatenate(rows, axis=2)
 
+    def wash(self, layers: Sequence[LayerWishes]) -> Wash:
+        """Return the washes of all views behind each other. layers: of each, as for `SmallFilm`."""
+        with one_thread():
+            pairs = zip(self._films, layers, strict=True)
+            return Wash.joined([film.wash(wishes) for film, wishes in pairs])
+
     def pixels(self, rest_weight: float, transform: ViewTransform | None) -> PaintedPixels:
         """Return the loss of all pixels, as `SmallFilm.pixels` does."""
         parts = [film.pixels(rest_weight, transform) for film in self._films]
