@@ -78,7 +78,7 @@ CASES: list[tuple[str, dict[str, Any]]] = [
     ("colors", {"hold": 0.01, "colors": "white", "tint": 2.0}),
     (
         "limits",
-        {"hold": 0.01, "colors": "free", "constraints": {"left": {"limits": {"max": 0.1}}}},
+        {"hold": 0.01, "colors": "free", "constraints": {"left": {"limits": {"max": 0.02}}}},
     ),
 ]
 
