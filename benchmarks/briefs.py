@@ -22,7 +22,7 @@ thousandths), beyond what it has now and what is painted.
 --sculptures for the three sculptures of the gallery, bright and warm in a cool dark room, beside
 the lighting that somebody set by hand for it.
 
-Constants in lightpaint were chosen on cases 0 to 11; docs/benchmarks.md reports 12 to 23.
+docs/benchmarks.md reports cases 12 to 23, and says which chose the constants.
 """
 
 import argparse
@@ -244,7 +244,7 @@ def warmer(mired: float) -> np.ndarray:
 
 
 def adjustable(basis: lp.Basis) -> list[list[int]]:
-    """What a person thinks of as lamps: lights, and all texels of an image together."""
+    """Return the numbers of the lights of each lamp; all texels of an image are one."""
     lamps: dict[str, list[int]] = {}
     for k in np.flatnonzero(~basis.is_fixed).tolist():
         lamps.setdefault(image_of(basis.names[k]) or basis.names[k], []).append(k)

@@ -1,4 +1,4 @@
-"""What a button and its preview promise is what the answer after the click has."""
+"""Promises of buttons and previews: the answer after the click has the numbers that they gave."""
 
 from dataclasses import replace
 from typing import Any
