@@ -74,8 +74,17 @@ def run_batch(
                     run.journal.rewrite(plan.steps)
         if options.shares_folder:
             return run.outcome
-        run.outcome.rows = write_gallery(plan.folder, plan, run.journal.lines)
+        try:
+            run.outcome.rows = write_gallery(plan.folder, plan, run.journal.lines)
+        except LightpaintError as error:
+            if not is_disk_full(error):
+                raise
+            raise OutputError(f"{error}: {MAKE_ROOM}") from None
         return run.outcome
+
+
+#: What to do when nothing more can be written.
+MAKE_ROOM = "make room, and run the same command to continue"
 
 
 class _Run:
@@ -151,9 +160,7 @@ class _Run:
             return
         for result in solve_by_sums(tasks, self._engine, self._cache, self._listen):
             if result.is_disk_full:
-                raise OutputError(
-                    f"{result.failure}: make room, and run the same command to continue"
-                )
+                raise OutputError(f"{result.failure}: {MAKE_ROOM}")
             self._record(by_look[result.look], result)
 
     def _run_with_bases(self, steps: Sequence[PlanStep]) -> None:
@@ -211,9 +218,7 @@ class _Run:
             for result in _close_after(self._results(tasks)):
                 step = by_look[result.look]
                 if result.is_disk_full:
-                    raise OutputError(
-                        f"{result.failure}: make room, and run the same command to continue"
-                    )
+                    raise OutputError(f"{result.failure}: {MAKE_ROOM}")
                 if result.failure and self._may_retry(result):
                     self._listen.say(f"{result.look}: {result.failure}; trying again")
                     retries.append(step)
