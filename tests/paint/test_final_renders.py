@@ -1,7 +1,9 @@
 """Final renders of a session: what they show, where they go, and that they outlive a page."""
 
 from collections.abc import Callable
+from copy import copy
 from pathlib import Path
+from threading import Event
 from typing import Any
 
 import numpy as np
@@ -16,6 +18,7 @@ from lightpaint.images.estimate import read_estimate
 from lightpaint.images.formats.exr import read_parts
 from lightpaint.lighting.answer.lighting import Lighting
 from lightpaint.paint import protocol
+from lightpaint.paint.studio import final_renders
 from lightpaint.pipeline import relit_renders
 from lightpaint.pipeline.relit_renders import DENOISED, render_final
 
@@ -124,6 +127,40 @@ def test_a_final_render_can_be_stopped_and_leaves_nothing(
     assert [x.name for x in (tmp_path / "renders").iterdir()] == ["Evening"]
     moving.send(protocol.StopRender(2))  # has ended already
     assert renders(moving)[1]["state"] == "done"
+
+
+def test_final_renders_go_in_the_order_of_their_requests(
+    moving: MovingStudio, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Also if the exact answer of a later one is there first."""
+    is_second_answered = Event()
+    solve = final_renders.FinalRenders._run
+
+    def run(self: Any, number: int, message: protocol.RenderFinal) -> None:
+        exact_answer = self._exact_answer
+
+        def late(check: Callable[[], None]) -> Any:
+            answer = exact_answer(check)
+            assert is_second_answered.wait(60)
+            return answer
+
+        def early(check: Callable[[], None]) -> Any:
+            answer = exact_answer(check)
+            is_second_answered.set()
+            return answer
+
+        mine = copy(self)
+        mine._exact_answer = late if number == 1 else early
+        solve(mine, number, message)
+
+    monkeypatch.setattr(final_renders.FinalRenders, "_run", run)
+    moving.send(request())
+    moving.send(request())
+    wait_for(moving, "done", 2)
+    lists = [m.fields["renders"] for m in moving.messages if m.kind == "renders"]
+    states = {tuple(x["state"] for x in infos) for infos in lists if len(infos) == 2}
+    assert ("done", "done") in states
+    assert {first for first, second in states if second != "waiting"} == {"done"}
 
 
 def test_a_render_that_cannot_be_written_says_why(

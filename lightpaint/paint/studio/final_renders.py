@@ -4,7 +4,7 @@ from collections.abc import Callable, Mapping
 from contextlib import suppress
 from dataclasses import replace
 from pathlib import Path
-from threading import Lock
+from threading import Condition, Lock
 from typing import Any
 
 import numpy as np
@@ -25,6 +25,9 @@ from lightpaint.scene.runtime.render_lock import MITSUBA
 
 #: Approximate pixels of the longer side of a render's small picture.
 PREVIEW_SIDE = 480
+
+#: Seconds between two looks at whether a waiting render was stopped.
+_PATIENCE = 0.2
 
 #: States in which nothing happens any more.
 ENDED = ("done", "stopped", "failed")
@@ -53,7 +56,7 @@ class FinalRenders:
         self._subjects, self._exact_answer = subjects, exact_answer
         self._infos: dict[int, RenderInfo] = {}
         self._previews: dict[int, Picture] = {}
-        self._change, self._turn = Lock(), Lock()
+        self._change, self._turn = Condition(), Lock()
         publisher.pictures.offer_family("render", self._preview)
         publisher.pictures.offer_family("render_file", self._file)
 
@@ -114,12 +117,20 @@ class FinalRenders:
             with suppress(StoppedError), cancellable(check):
                 # That of now, also if it is rendered only after others.
                 subjects, snapshot, lighting = self._exact_answer(check)
+                self._wait_for_earlier(number, check)
                 with self._turn, MITSUBA.low_priority():
                     check()
                     subject = subjects[request.view]
                     self._render(number, request, subject, snapshot, lighting)
         except Exception as error:
             self._update(number, state="failed", text=error_text(error))
+
+    def _wait_for_earlier(self, number: int, check: Callable[[], None]) -> None:
+        """Wait until the renders that were requested before have ended; check raises to stop."""
+        with self._change:
+            while not all(x >= number or self._is_ended(x) for x in self._infos):
+                self._change.wait(_PATIENCE)
+                check()
 
     def _render(
         self,
@@ -171,6 +182,7 @@ class FinalRenders:
             if self._is_ended(number):
                 return False
             self._infos[number] = replace(self._infos[number], **changes)
+            self._change.notify_all()
             return True
 
     def _update(self, number: int, **changes: Any) -> None:
