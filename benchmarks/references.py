@@ -2,7 +2,7 @@
 
     python benchmarks/references.py [--scenes gallery stage] [--cases 4] [--first 0]
                                     [--methods whole regions parts pairs ...]
-    python benchmarks/references.py --known [--scenes gallery stage cornell]
+    python benchmarks/references.py --known [studio] [--scenes gallery stage table cornell]
 
 A reference is a picture of the scene, in 8 bits, under a lighting that is known: one that was found
 for a painting in `targets/`, or one of those that `benchmarks/intent.py` means. It shows the view
@@ -16,11 +16,13 @@ allows. `pairs` are the places, at most five, in which the reference differs mos
 A preset is judged by the lighting of a painting that somebody made of what it is called: before it,
 what it asks for, and the answer.
 
-With --known the references are of another place: `courtyard.py`, under six lightings. Its light
-alone, on grey surfaces, says by how many stops lit parts are above shadows, and by how many they
-are warmer, as log2 of red over blue. Judged is whether the light of the scene, its picture divided
-by its albedo, moves there: both before, as asked for, in the answer, and in the reference; and the
-share of the way, by projection over all references.
+With --known the references are of another place, of `known_places.py`, under six lightings. Its
+light alone, on grey surfaces, says by how many stops lit parts are above shadows, by how many they
+are warmer and how warm they are, as log2 of red over blue, and by how many stops of red over green
+lit parts at the left differ from those at the right. Judged is whether the light of the scene, its
+picture divided by its albedo where lamps reach it, moves there: before, as asked for, in the
+answer, and in the reference; the mean distance of the four before and in the answer; and the share
+of the way, by projection over all references.
 """
 
 import argparse
@@ -30,8 +32,8 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-from courtyard import references
 from intent import SCENES, SIZES, SPP, intentions
+from known_places import PLACES, references
 from scipy.ndimage import gaussian_filter
 
 import lightpaint as lp
@@ -46,7 +48,12 @@ from lightpaint.paint.store.store import MemoryStore
 from lightpaint.pipeline.job.settings import Settings
 
 #: Sensors by scene: that which is painted, and another one, if there is one.
-SENSORS = {"gallery": ("camera", None), "stage": ("balcony", "box"), "cornell": ("camera", None)}
+SENSORS = {
+    "gallery": ("camera", None),
+    "stage": ("balcony", "box"),
+    "table": ("guest", None),
+    "cornell": ("camera", None),
+}
 
 #: What is asked for by each method; None paints the reference itself.
 METHODS: dict[str, dict[str, Any] | None] = {
@@ -79,9 +86,13 @@ PART = 0.65
 #: Pairs of places, at most; and their least distance, in longer sides.
 PAIRS, DISTANCE = 5, 0.15
 
-#: What is measured of light: stops from shadows to lit parts, by which lit parts are warmer, and
-#: of warmth of the lit parts.
-MEASURES = ("contrast", "warm-cool", "warmth")
+#: What is measured of light: stops from shadows to lit parts, by which lit parts are warmer, of
+#: warmth of the lit parts, and of their difference from left to right in red over green.
+MEASURES = ("contrast", "warm-cool", "warmth", "left-right")
+
+#: Share of the median of the light of all lamps, each as strong as the others, from which on they
+#: reach a surface.
+REACHED = 0.2
 
 #: Shares of the picture that are lit parts and shadows.
 LIT, SHADOWS = 0.1, 0.3
@@ -101,14 +112,16 @@ def main() -> None:
     """Print a table for each scene."""
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("--scenes", nargs="+", default=list(SENSORS), choices=SENSORS)
-    parser.add_argument("--known", action="store_true", help="references of another place")
+    parser.add_argument(
+        "--known", nargs="?", const="studio", choices=PLACES, help="references of another place"
+    )
     parser.add_argument("--methods", nargs="+", default=list(METHODS), choices=METHODS)
     parser.add_argument("--cases", type=int, default=4, metavar="N")
     parser.add_argument("--first", type=int, default=0, metavar="K", help="number of the first")
     options = parser.parse_args()
     if options.known:
         for name in options.scenes:
-            judge_known(name, render(name, SENSORS[name][0]))
+            judge_known(name, options.known, render(name, SENSORS[name][0]))
         return
     for name in (name for name in options.scenes if name in PAINTINGS):
         basis, other = (
@@ -171,17 +184,17 @@ def judge_presets(
         print(f"{preset:14s}{file:16s}{columns}", flush=True)
 
 
-def judge_known(name: str, basis: lp.Basis) -> None:
-    """Print how far the light of a scene moves to the known light of references."""
+def judge_known(name: str, place: str, basis: lp.Basis) -> None:
+    """Print how far the light of a scene moves to the known light of references of a place."""
     transform = lp.ViewTransform("srgb", meter_exposure(basis.current_look, basis))
     assert basis.features is not None
     albedo = np.maximum(basis.features.albedo, 0.05)
-    usable = ~basis.emitters_seen & basis.features.normal.any(axis=-1)
+    usable = reached(basis, albedo)
     before = measures(basis.current_look / albedo, usable)
     ways = []
-    print(f"\n{name}, references of another place: before, asked for, answer, reference")
-    print(f"{'':14s}" + "".join(f"{x:>28s}" for x in MEASURES))
-    for title, known in references().items():
+    print(f"\n{name}, references of the {place}: before, asked for, answer, reference")
+    print(f"{'':14s}" + "".join(f"{x:>28s}" for x in MEASURES) + f"{'distance':>16s}")
+    for title, known in references(place).items():
         shown = np.round(255 * lp.ViewTransform().encode(known.picture)).astype(np.uint8)
         target = asked_target(basis, shown, {"areas": "regions"}, transform)
         asked = basis.current_look if target is None else target.image
@@ -191,7 +204,8 @@ def judge_known(name: str, basis: lp.Basis) -> None:
         rows = np.array([before, *after, theirs])
         ways.append(rows - before)
         columns = "".join("".join(f"{x:7.2f}" for x in column) for column in rows.T)
-        print(f"{title:14s}{columns}", flush=True)
+        first, last = (np.abs(x - theirs).mean() for x in (before, after[1]))
+        print(f"{title:14s}{columns}{first:9.2f} ->{last:5.2f}", flush=True)
     way = np.array(ways)
     power = np.maximum((way[:, 3] ** 2).sum(axis=0), 1e-9)
     shares = [(way[:, k] * way[:, 3]).sum(axis=0) / power for k in (1, 2)]
@@ -199,16 +213,37 @@ def judge_known(name: str, basis: lp.Basis) -> None:
         print(f"{title:14s}" + "".join(f"{100 * x:26.0f} %" for x in share), flush=True)
 
 
+def reached(basis: lp.Basis, albedo: np.ndarray) -> np.ndarray:
+    """Return the surfaces (h, w) that lamps reach: others stay black under any lighting."""
+    assert basis.features is not None
+    usable = ~basis.emitters_seen & basis.features.normal.any(axis=-1)
+    even = np.zeros(basis.size)
+    for k in range(len(basis.lights)):
+        plane = luminance(basis.planes.plane(k) * np.float32(1))
+        even += plane / max(float(plane.mean()), 1e-9)
+    even /= luminance(albedo)
+    return np.asarray(usable & (even > REACHED * np.median(even[usable])))
+
+
 def measures(light: np.ndarray, usable: np.ndarray) -> np.ndarray:
     """Return `MEASURES` of light that arrives at surfaces, (h, w, 3). usable: (h, w)."""
-    pixels = np.maximum(gaussian_filter(light, (1, 1, 0))[usable], 1e-9)
+    smooth = np.maximum(gaussian_filter(light, (1, 1, 0)), 1e-9)
+    pixels = smooth[usable]
     order = np.argsort(luminance(pixels))
     count = len(order)
     lit = pixels[order[-round(LIT * count) :]].mean(axis=0)
     shadows = pixels[order[: round(SHADOWS * count)]].mean(axis=0)
-    warmth, in_shadows = (float(np.log2(x[0] / max(x[2], 0.01 * x[0]))) for x in (lit, shadows))
+    warmth, in_shadows = (_stops(x[0], x[2]) for x in (lit, shadows))
     contrast = float(np.log2(luminance(lit) / luminance(shadows)))
-    return np.array([contrast, warmth - in_shadows, warmth])
+    third = light.shape[1] // 3
+    sides = [smooth[:, x][usable[:, x]] for x in (slice(third), slice(-third, None))]
+    bright = [x[np.argsort(luminance(x))[-round(3 * LIT * len(x)) :]].mean(axis=0) for x in sides]
+    left, right = (_stops(x[0], x[1]) for x in bright)
+    return np.array([contrast, warmth - in_shadows, warmth, left - right])
+
+
+def _stops(one: float, other: float) -> float:
+    return float(np.log2(max(one, 0.01 * other) / max(other, 0.01 * one)))
 
 
 def open_session(basis: lp.Basis, transform: lp.ViewTransform) -> Session:

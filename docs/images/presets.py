@@ -7,7 +7,7 @@ writes beside itself
     presets-SCENE.jpg     for the gallery, the stage, the table and the cornell box: in each pair of
                           rows what each preset asks for, and below it the answer
     references.jpg        six references of another place, and what they ask for and give on the
-                          gallery, the stage and the cornell box
+                          gallery, the stage, the table and the cornell box
 
 Bases come from the render cache, or are rendered. The table's sky of 128 texels takes some minutes.
 """
@@ -25,7 +25,7 @@ HERE = Path(__file__).resolve().parent
 ROOT = HERE.parent.parent
 sys.path.insert(0, str(ROOT / "benchmarks"))
 
-from courtyard import references  # noqa: E402
+from known_places import references  # noqa: E402
 
 import lightpaint as lp  # noqa: E402
 from lightpaint.basis.cache.cached_render import obtain_basis  # noqa: E402
@@ -41,8 +41,8 @@ from lightpaint.pipeline.job.settings import Settings  # noqa: E402
 SIZES = {"gallery": "213x120", "stage": "213x120", "table": "160x90", "cornell": "128x128"}
 SHEETS = (*(f"presets-{name}" for name in SIZES), "references")
 
-#: Scenes of the sheet of references.
-PLACES = ("gallery", "stage", "cornell")
+#: Scenes of the sheet of references, and the place that they show.
+PLACES, PLACE = ("gallery", "stage", "table", "cornell"), "studio"
 
 #: Height of a picture, of its title, the gap between pictures, and presets in a row.
 HEIGHT, TITLE, GAP, COLUMNS = 126, 16, 4, 5
@@ -81,7 +81,7 @@ def preset_rows(name: str, spp: int) -> list[list[Image.Image]]:
 def reference_rows(spp: int) -> list[list[Image.Image]]:
     """Return rows of pictures: the references, and what is asked for and found for each scene."""
     plain = lp.ViewTransform()
-    pictures = {k: displayed(x.picture, plain) for k, x in references().items()}
+    pictures = {k: displayed(x.picture, plain) for k, x in references(PLACE).items()}
     rows = [[framed(Image.fromarray(x), name.capitalize()) for name, x in pictures.items()]]
     for place in PLACES:
         scene = Set(place, spp)

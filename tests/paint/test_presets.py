@@ -129,7 +129,7 @@ def test_a_white_is_asked_for_whatever_colour_the_lamps_have_now(make_basis: Any
     session = session_in(basis)
     session.handle(protocol.ApplyPreset("overcast"), {})
     corner = session.views[0].image[-1, -1]
-    np.testing.assert_allclose(corner / luminance(corner), kelvin_to_rgb(7500), rtol=0.02)
+    np.testing.assert_allclose(corner / luminance(corner), kelvin_to_rgb(7000), rtol=0.02)
 
 
 def test_noir_leaves_a_pool_of_light_and_darkness(make_basis: Any) -> None:

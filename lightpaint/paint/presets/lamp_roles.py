@@ -7,7 +7,7 @@ from functools import cached_property
 import numpy as np
 import numpy.typing as npt
 
-from lightpaint.arrays import Bools, Doubles, Floats
+from lightpaint.arrays import Bools, Doubles, Floats, Indices
 from lightpaint.paint.presets.view_areas import Mask
 
 #: Kinds of emitters that always are hard light, always soft light, and light of the sky or the sun.
@@ -22,6 +22,10 @@ HARD_STOPS, HARD_SHARE = 2.2, 0.6
 #: Length of the mean normal of lit surfaces from which on they are one wall, and the largest part
 #: of it that may point up or down; a wash on a wall lights at least this share of the picture.
 WALL_NORMAL, WALL_TILT, WALL_SHARE = 0.85, 0.35, 0.08
+
+#: Difference in height of washes, in heights of the picture, from which on the lower ones are the
+#: light of a horizon.
+HORIZON = 0.06
 
 #: Least share of the light of the picture of a lamp that counts.
 LEAST_AMOUNT = 0.005
@@ -38,6 +42,13 @@ NEARLY = 0.6
 #: Cosine between the pictures of lamps that shine alike.
 ALIKE = 0.75
 
+#: Least share of the picture over which the light of a part of a sky is taken to spread, since its
+#: brightest spots are reflections; and that of a lamp in view, whose brightest spots surround it.
+IMAGE_COVERAGE, SEEN_COVERAGE = 0.35, 0.1
+
+#: Place, -1 to 1, of a part of a sky for each unit by which it lights from a side.
+FROM_SIDE = 3.0
+
 #: Pools of light in a dark picture: share of it that they light together, and their number.
 POOLS_SHARE, MAX_POOLS = 0.25, 3
 
@@ -46,10 +57,14 @@ POOLS_SHARE, MAX_POOLS = 0.25, 3
 class LampRoles:
     """The part that each of n lamps plays in one picture, all at their current levels.
 
+    A part of the image of a light, such as a sky's, is one lamp, of many lights.
+
     light: (n, h, w) luminance that arrives at surfaces, 0 where none is known. kinds: plugins of
     the emitters. subject, exhibits: masks (h, w) of the objects that a preset may be about. normal:
     (h, w, 3) of the surfaces; None if unknown. right: (3,), direction of the camera's right; None
-    if unknown. seen: (n,) light in pixels in which an emitter is seen; None if unknown.
+    if unknown. seen: (n,) light in pixels in which an emitter is seen; None if unknown. lamp_of:
+    (l,), the lamp of each light; None if each is its own. is_image: (n,) lamps that are parts of
+    images; None for none.
     """
 
     light: Floats
@@ -59,6 +74,19 @@ class LampRoles:
     normal: Floats | None = None
     right: Doubles | None = None
     seen: Doubles | None = None
+    lamp_of: Indices | None = None
+    is_image: Bools | None = None
+
+    def lights(self, lamps: Bools) -> Bools:
+        """Return the lights (l,) of some lamps (n,)."""
+        return lamps if self.lamp_of is None else np.asarray(lamps[self.lamp_of])
+
+    def lamps(self, lights: Bools) -> Bools:
+        """Return the lamps (n,) all of whose lights (l,) are among some."""
+        if self.lamp_of is None:
+            return lights
+        missing = np.bincount(self.lamp_of[~lights], minlength=len(self.light))
+        return np.asarray(missing == 0)
 
     def about(self, subject: Mask) -> "LampRoles":
         """Return the roles for another subject."""
@@ -115,6 +143,17 @@ class LampRoles:
         """(n,) lamps that light one wall widely, as those of a cyclorama."""
         return self.is_on_wall & (self.coverage >= WALL_SHARE)
 
+    @cached_property
+    def horizon(self) -> Bools:
+        """(n,) washes of the lower part of a backdrop, where there are others of its upper part."""
+        rows = np.linspace(0, 1, self.light.shape[1])
+        down = self.light.sum(axis=2, dtype=np.float64)
+        heights = down @ rows / np.maximum(down.sum(axis=1), 1e-30)
+        if not self.is_wash.any() or np.ptp(heights[self.is_wash]) < HORIZON:
+            return np.zeros(len(self.light), bool)
+        middle = 0.5 * (heights[self.is_wash].min() + heights[self.is_wash].max())
+        return np.asarray(self.is_wash & (heights > middle))
+
     @property
     def disc(self) -> Bools:
         """(n,) lamps that light one small spot of a wall, as a moon on a backdrop."""
@@ -125,6 +164,12 @@ class LampRoles:
         """(n,) lamps that stand for the sky or the sun."""
         kinds = np.array([kind in DAYLIGHT_KINDS for kind in self.kinds], bool)
         return kinds | self.is_wash | (self.is_soft & (self.coverage > 0.3))
+
+    @cached_property
+    def even_daylight(self) -> Bools:
+        """(n,) lamps of the even light of a clouded sky; all of even light where none is such."""
+        daylight = self.is_soft & self.is_daylight & self.counts
+        return daylight if (daylight & ~self.is_wash).any() else self.is_soft
 
     @property
     def hard(self) -> Bools:
@@ -138,6 +183,10 @@ class LampRoles:
         directional = hard & np.array([kind in ("directional", "sun") for kind in self.kinds])
         candidates = directional if directional.any() else hard if hard.any() else self.amounts > 0
         score = np.sqrt(self.amounts * self.coverage) * (0.05 + np.abs(self.sides))
+        if self.is_image is not None and not directional.any() and self.is_image.any():
+            # In a sky a low sun may stand anywhere, and from the side it shows best.
+            candidates = self.is_image & self.counts
+            score = np.sqrt(self.amounts * self.coverage) * self.sides**2
         return self._with_alike(int(np.argmax(np.where(candidates, score, -1))))
 
     @cached_property
@@ -157,6 +206,13 @@ class LampRoles:
         """Return the lamp of one of the smallest pools of light, (n,), from 0; none beyond them."""
         found = self._pools[number : number + 1]
         return np.isin(np.arange(len(self.light)), found)
+
+    @property
+    def edge(self) -> Bools:
+        """(n,) light from a side of a sky, where lamps make at most one pool of light."""
+        if self.is_image is None or len(self._pools) > 1:
+            return np.zeros(len(self.light), bool)
+        return self.sun & self.is_image
 
     @cached_property
     def candle(self) -> Bools:
@@ -208,10 +264,23 @@ class LampRoles:
         columns = self.light.sum(axis=1, dtype=np.float64)
         return np.asarray(columns @ x / np.maximum(columns.sum(axis=1), 1e-30))
 
+    @property
+    def places(self) -> Doubles:
+        """(n,) side of the picture to which a lamp belongs: -1 is its left, 1 its right. That on
+        which its light falls, or from which a part of a sky shines.
+        """
+        if self.is_image is None:
+            return self.middles
+        return np.where(self.is_image, FROM_SIDE * self.sides, self.middles)
+
     def level(self, lamps: Bools) -> float:
         """Return the light of lamps where they shine, relative to that of the brighter half."""
         light = self.light[lamps].sum(axis=0)
         covered = _coverage(light)
+        if covered and self.is_image is not None and self.is_image[lamps].all():
+            covered = max(covered, IMAGE_COVERAGE)
+        elif covered and self.seen is not None and (self.seen[lamps] > 0).all():
+            covered = max(covered, SEEN_COVERAGE)
         return float(light.mean()) / covered / self._bright if covered and self._bright else 0.0
 
     @cached_property

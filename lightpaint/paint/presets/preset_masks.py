@@ -69,15 +69,16 @@ def find_layers(preset: LightingPreset, canvas: Canvas, subject: str | None) -> 
     """
     roles, name = find_roles(canvas, subject)
     basis = canvas.basis
-    chosen = np.zeros(len(basis.lights), bool)
+    usable = roles.lamps(~basis.is_fixed)
+    chosen = np.zeros(len(roles.light), bool)
     lamps = []
     for change in preset.changes:
         assert change.lamps is not None
-        lamps.append(change.lamps(roles) & ~basis.is_fixed & ~chosen)
+        lamps.append(change.lamps(roles) & usable & ~chosen)
         chosen |= lamps[-1]
     rest = _group(preset.rest, basis, roles, ~chosen)
     found = [(x, k) for x, k in zip(preset.changes, lamps, strict=True) if k.any()]
-    if not is_divided(basis, chosen):
+    if not is_divided(basis, roles.lights(chosen)):
         found = list(zip(preset.changes, lamps, strict=True))[-1:]
     groups = tuple(_group(x, basis, roles, k) for x, k in found)
     return PresetLayers(rest, [x for x, _ in found], groups, name)
@@ -87,8 +88,10 @@ def _group(change: LampRequest, basis: Basis, roles: LampRoles, lamps: Bools) ->
     """Return lamps with the gain and the tint that bring them to a level and a white."""
     level = roles.level(lamps) or 1.0
     white = None if change.kelvin is None else kelvin_to_rgb(change.kelvin)
-    tint = white_tint(basis, lamps if lamps.any() else ~lamps, roles.amounts, white)
-    return LampGroup(change.name, lamps, limited_gain(change.level / level), tint)
+    lights = roles.lights(lamps)
+    amounts = roles.amounts if roles.lamp_of is None else roles.amounts[roles.lamp_of]
+    tint = white_tint(basis, lights if lights.any() else ~lights, amounts, white)
+    return LampGroup(change.name, lights, limited_gain(change.level / level), tint)
 
 
 def _area(areas: ViewAreas, name: Area) -> Mask:

@@ -83,21 +83,28 @@ _ALL = (
         "Golden hour",
         "A low golden sun from one side, everything else dim and cool",
         _rest(0.16, 7000),
-        (_sky(0.35, 3300), LampRequest("Low sun", 0.95, 2450, lambda roles: roles.sun)),
+        (
+            LampRequest("Horizon", 0.45, 2500, lambda roles: roles.horizon, "whole"),
+            LampRequest(
+                "Sky", 0.2, 9000, lambda roles: roles.is_wash & roles.horizon.any(), "whole"
+            ),
+            _sky(0.35, 3300),
+            LampRequest("Low sun", 0.95, 2450, lambda roles: roles.sun),
+        ),
     ),
     LightingPreset(
         "overcast",
         "Overcast",
         "Soft, even and cool, with hardly any shadow",
-        _rest(0.04, 7500),
-        (LampRequest("Soft light", 0.75, 7500, lambda roles: roles.is_soft, "whole"),),
+        _rest(0.04, 7000),
+        (LampRequest("Soft light", 0.75, 7000, lambda roles: roles.even_daylight, "whole"),),
     ),
     LightingPreset(
         "noir",
         "Noir",
         "A few hard pools of light in the dark",
         _rest(0.025, 6500),
-        _pools(1.0, 5500),
+        (*_pools(1.0, 5500), LampRequest("Edge", 0.5, 6000, lambda roles: roles.edge)),
     ),
     LightingPreset(
         "candle",
@@ -145,8 +152,8 @@ _ALL = (
         "night",
         "Day to night",
         "Dusk at half strength, night at full: dark and blue, with pools of warm lamplight",
-        _rest(0.12, 18000),
-        _pools(0.7, 2600, is_on_wall=False),
+        _rest(0.08, 20000),
+        _pools(0.45, 2700, is_on_wall=False)[:2],
     ),
 )
 

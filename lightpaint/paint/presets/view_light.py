@@ -4,7 +4,7 @@ from weakref import WeakKeyDictionary
 
 import numpy as np
 
-from lightpaint.arrays import Bools, Doubles, Floats
+from lightpaint.arrays import Bools, Doubles, Floats, Indices
 from lightpaint.basis.basis import Basis
 from lightpaint.basis.denoised_mixes import denoise_mix
 from lightpaint.colour.color import luminance
@@ -13,6 +13,7 @@ from lightpaint.images.pixel_blocks import block_mean
 from lightpaint.paint.layers.canvas import Canvas
 from lightpaint.paint.presets.lamp_roles import LampRoles
 from lightpaint.paint.presets.view_areas import MIN_ALBEDO, Mask, ViewAreas
+from lightpaint.scene.lights.texels.texel import coarse_name, image_of, images_of, texel_place
 
 #: Approximate pixels of the longer side of the pictures in which the roles of lamps are found.
 ROLES_SIDE = 160
@@ -22,6 +23,9 @@ BRIGHTEST = 0.998
 
 #: Most that a lamp's aim at an object counts against its distance from the middle.
 MAX_ACCENT = 12.0
+
+#: Parts of the image of a light, across and down, each of which is one lamp.
+BLOCKS = (8, 4)
 
 #: Roles that were found, by canvas, for its basis and a chosen object.
 _known: WeakKeyDictionary[Canvas, tuple[Basis, str | None, LampRoles, str | None]]
@@ -65,7 +69,8 @@ def _roles_of(basis: Basis, chosen: str | None) -> tuple[LampRoles, str | None]:
     features, objects = basis.features, basis.objects
     height, width = (side // factor for side in basis.size)
     sample = slice(0, factor * height, factor), slice(0, factor * width, factor)
-    light = np.array([_light_of(basis, k, factor) for k in range(len(basis.lights))])
+    lamp_of, firsts = _lamps_of(basis)
+    light = _light_of_lamps(basis, lamp_of, factor)
     known = ~basis.emitters_seen[sample]
     normal = None
     if features is not None:
@@ -85,18 +90,50 @@ def _roles_of(basis: Basis, chosen: str | None) -> tuple[LampRoles, str | None]:
     )
     roles = LampRoles(
         light,
-        tuple(x.plugin for x in basis.lights),
+        tuple(basis.lights[k].plugin for k in firsts),
         areas.subject,
         [areas.mask_of(name) for name in areas.exhibit_names],
         normal,
         _camera_right(basis, sample),
-        _seen_amounts(basis),
+        np.bincount(lamp_of, _seen_amounts(basis)),
+        lamp_of,
+        np.array([bool(image_of(basis.names[k])) for k in firsts], bool),
     )
     name = chosen
     if chosen is None and objects is not None:
         name = max(areas.exhibit_names, key=lambda x: _importance(x, areas, roles), default=None)
         roles = roles.about(areas.mask_of(name) if name else areas.subject)
     return roles, name
+
+
+def _lamps_of(basis: Basis) -> tuple[Indices, list[int]]:
+    """Return the lamp of each light, (l,), and the first light of each lamp.
+
+    Texels of an image are one lamp in each of `BLOCKS` parts of it.
+    """
+    sizes = images_of(basis.names)
+    keys: dict[tuple[object, ...], int] = {}
+    firsts, lamp_of = [], []
+    for k, name in enumerate(basis.names):
+        image = image_of(name)
+        key: tuple[object, ...] = (name,)
+        if image in sizes:
+            place = zip(texel_place(coarse_name(name)), BLOCKS, sizes[image], strict=True)
+            key = (image, *(at * blocks // size for at, blocks, size in place))
+        if key not in keys:
+            keys[key] = len(firsts)
+            firsts.append(k)
+        lamp_of.append(keys[key])
+    return np.array(lamp_of, np.intp), firsts
+
+
+def _light_of_lamps(basis: Basis, lamp_of: Indices, factor: int) -> Floats:
+    """Return the present light of each lamp, (n, h, w) luminance, reduced."""
+    height, width = (side // factor for side in basis.size)
+    light = np.zeros((lamp_of.max() + 1, height, width), np.float32)
+    for k, lamp in enumerate(lamp_of):
+        light[lamp] += _light_of(basis, k, factor)
+    return light
 
 
 def _light_of(basis: Basis, k: int, factor: int) -> Floats:

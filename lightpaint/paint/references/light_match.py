@@ -12,13 +12,24 @@ from lightpaint.paint.references.tones import LightTones
 #: Stops of a picture's contrast that are of its surfaces, and the least contrast of light.
 SURFACE_STOPS, LEAST_STOPS = 0.7, 0.05
 
-#: Stops that count for each stop by which shadows are cooler than lit parts, beyond the least; and
-#: the most: such shadows are of a key that is not the sky.
-COOL_SHADOWS, LEAST_COOL, MOST_COOL = 1.5, 0.1, 1.0
+#: Stops of red over blue by which surfaces of the world make a picture warmer than its light: in
+#: its lit parts, where the palest count most, and in its shadows.
+LIT_WARMTH, SHADOW_WARMTH = 0.15, 0.3
+
+#: Stops of red over blue by which shadows are cooler than lit parts, from which on they begin to be
+#: of a hard key and from which on they fully are: then the darkest tenth counts as shadows, since
+#: such a key may light most of a picture.
+HARD_COOL = (0.1, 0.25)
+
+#: Stops that count for each stop by which shadows are cooler than that, and the most.
+COOL_SHADOWS, MOST_COOL = 1.5, 1.0
 
 #: Stops by which a reference may be darker as a whole, which is its exposure; and the share of the
 #: rest that counts, since a night is meant to be dark.
-DARKER, DARKER_SHARE = 1.25, 0.6
+DARKER, DARKER_SHARE = 0.7, 1.0
+
+#: Most stops by which a picture becomes brighter as a whole, so that its highlights stay.
+MOST_BRIGHTER = 0.2
 
 #: Distance of a change of colour from a change of whites, in stops of a channel: up to the first
 #: it is one of whites, as surfaces tint it, and from the second on the colour of the light.
@@ -41,13 +52,12 @@ SEEN_STOPS, SEEN_TINT = 0.08, 0.04
 #: light; and the least contrast of such a reference, in stops.
 POOL_SHARE, POOL_STOPS = 0.3, 2.5
 
-#: Contrast of light, in stops, below which a reference has no key, and below which it is softer
-#: than lamps alone may make a picture.
-EVEN_STOPS, SOFT_STOPS = 0.25, 1.0
+#: Contrast of light, in stops, below which a reference has no key.
+EVEN_STOPS = 0.5
 
 #: Difference of the colours of light at the left and at the right, in stops of a channel, from
 #: which on a reference has a key of each; and the least contrast of their light, in stops.
-TWO_KEYS, TWO_KEYS_STOPS = 1.0, 1.0
+TWO_KEYS, TWO_KEYS_STOPS = 1.0, 2.5
 
 
 @dataclass(frozen=True)
@@ -85,7 +95,12 @@ def has_two_keys(reference: LightTones) -> bool:
 def contrast_of_light(reference: LightTones) -> float:
     """Return the stops from shadows to lit parts that are of the light of a reference."""
     least = TWO_KEYS_STOPS if has_two_keys(reference) else LEAST_STOPS
-    return max(reference.contrast - SURFACE_STOPS, least) + _cool_shadows(reference)
+    cool = _warmth(reference.lit) - _warmth(reference.shadows)
+    begin, full = HARD_COOL
+    hard = float(np.clip((cool - begin) / (full - begin), 0, 1)) * (not has_pool(reference))
+    depth = float(reference.levels[1] - reference.levels[0])
+    stops = max(reference.contrast + hard * depth - SURFACE_STOPS, least)
+    return stops + float(np.clip(COOL_SHADOWS * (cool - begin), 0, MOST_COOL))
 
 
 def is_even(reference: LightTones) -> bool:
@@ -93,40 +108,75 @@ def is_even(reference: LightTones) -> bool:
     return contrast_of_light(reference) < EVEN_STOPS
 
 
-def is_soft(reference: LightTones) -> bool:
-    """Return True if a reference is soft: its shadows and lit parts are compared, too."""
-    return contrast_of_light(reference) < SOFT_STOPS
+def lit_color(reference: LightTones) -> Doubles:
+    """Return the colour of the light, log2 (3,), in the lit parts of a reference."""
+    return reference.lit - _of_surfaces(LIT_WARMTH)
+
+
+def shadow_color(reference: LightTones) -> Doubles:
+    """Return the colour of the light, log2 (3,), in the shadows of a reference."""
+    return reference.shadows - _of_surfaces(SHADOW_WARMTH)
+
+
+@dataclass(frozen=True)
+class LampLight:
+    """Present light of some lamps. level: where they shine. color: log2 (3,) of its RGB there."""
+
+    level: float
+    color: Doubles
 
 
 def match_light(
-    reference: LightTones, picture: LightTones, light: LightTones, key: float, fill: float
+    reference: LightTones, picture: LightTones, key: LampLight, fill: LampLight
 ) -> LightMatch:
-    """Return the changes of key and fill that give a picture the light of a reference.
+    """Return the changes of key and fill that give a picture, as it is now, a reference's light.
 
-    picture: as it is now, and `light` the same without its surfaces. key, fill: present light of
-    the key where it shines, and of the rest there.
-
-    Contrast and whites are those of the reference, but a picture of the same place asks for no more
-    than what differs. Lit parts stay as bright as they are.
+    Contrast and whites are those of the reference, but a picture of much the same light asks for no
+    more than what differs. Lit parts stay as bright as they are.
     """
     other = _otherness(reference, picture)
-    now = float(np.log2((key + fill) / fill)) if fill and key else 0.0
+    lit = key.level + fill.level
+    now = float(np.log2(lit / fill.level)) if fill.level and key.level else 0.0
     meant = contrast_of_light(reference)
     stops = now + other * (meant - now) + (1 - other) * (reference.contrast - picture.contrast)
-    lit = (key + fill) * 2.0 ** -_darker(reference, picture)
     new_fill = lit * 2.0 ** -max(stops, LEAST_STOPS)
-    shadows = other * light.shadows + (1 - other) * picture.shadows
-    bright = other * light.lit + (1 - other) * picture.lit
-    theirs: tuple[Doubles, ...] = (reference.lit,)
-    fill_color = reference.shadows - shadows
+    theirs: tuple[Doubles, ...] = (lit_color(reference),)
+    fill_color = shadow_color(reference)
+    if is_even(reference):
+        fill_color = 0.5 * (fill_color + lit_color(reference))
     if has_two_keys(reference):
-        theirs, fill_color = reference.sides, np.mean(reference.sides, axis=0) - bright
+        theirs = tuple(x - _of_surfaces(LIT_WARMTH) for x in reference.sides)
+        fill_color = np.mean(theirs, axis=0)
+    bright = other * key.color + (1 - other) * lit_color(picture)
+    dark = other * fill.color + (1 - other) * shadow_color(picture)
     return LightMatch(
-        _stops(lit - new_fill, key),
-        _stops(new_fill, fill),
+        _stops(lit - new_fill, key.level),
+        _stops(new_fill, fill.level),
         tuple(_limited(x - bright) for x in theirs),
-        _limited(fill_color),
+        _limited(fill_color - dark),
     )
+
+
+def light_distance(reference: LightTones, picture: LightTones) -> float:
+    """Return how far the light of a picture, without its surfaces, is from a reference's, in stops.
+
+    The mean of the differences in contrast, in the warmth of lit parts and in that of shadows; in
+    the colours of both sides instead of these if a reference has a key of each.
+    """
+    parts = [contrast_of_light(reference) - picture.contrast]
+    if has_two_keys(reference):
+        pairs = zip(reference.sides, picture.sides, strict=True)
+        parts += [float(np.abs(theirs - ours).mean()) for theirs, ours in pairs]
+    else:
+        parts.append(_warmth(lit_color(reference)) - _warmth(picture.lit))
+        parts.append(_warmth(shadow_color(reference)) - _warmth(picture.shadows))
+    return float(np.mean(np.abs(parts)))
+
+
+def stops_darker(reference: LightTones, picture: LightTones) -> float:
+    """Return the stops by which a picture becomes darker, of a reference that is far darker."""
+    difference = float(picture.levels[-2] - reference.levels[-2])
+    return DARKER_SHARE * max(difference - DARKER, 0.0)
 
 
 def gains_of(tint: Doubles) -> Doubles:
@@ -135,16 +185,14 @@ def gains_of(tint: Doubles) -> Doubles:
     return np.asarray(gains / luminance(gains))
 
 
-def _cool_shadows(reference: LightTones) -> float:
-    """Return the stops of contrast that follow from shadows cooler than lit parts."""
-    lit, shadows = (float(x[2] - x[0]) for x in (reference.lit, reference.shadows))
-    return float(np.clip(COOL_SHADOWS * (shadows - lit - LEAST_COOL), 0, MOST_COOL))
+def _warmth(color: Doubles) -> float:
+    """Return the stops of red over blue of a colour, log2 (3,)."""
+    return float(color[0] - color[2])
 
 
-def _darker(reference: LightTones, picture: LightTones) -> float:
-    """Return the stops by which a picture becomes darker, of a reference that is far darker."""
-    difference = float(picture.levels[-1] - reference.levels[-1])
-    return DARKER_SHARE * max(difference - DARKER, 0.0)
+def _of_surfaces(warmth: float) -> Doubles:
+    """Return the colour, log2 (3,), of pale surfaces that are warm by some stops."""
+    return warmth * np.array([0.5, 0.0, -0.5])
 
 
 def _believable(tint: Doubles) -> Doubles:

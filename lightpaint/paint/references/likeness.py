@@ -12,6 +12,7 @@ from lightpaint.paint.layers.composition import adjusted
 from lightpaint.paint.layers.layer import Layer
 from lightpaint.paint.presets.view_areas import Mask, ViewAreas
 from lightpaint.paint.references.tones import Tones, Weights
+from lightpaint.paint.references.view_part import Point, ViewPart
 
 #: Most stops that an area is made brighter or darker, and that a channel of it is tinted.
 MAX_STOPS, MAX_TINT = 3.0, 1.5
@@ -35,8 +36,6 @@ PART_RADIUS = 0.15
 
 #: Least share of the picture that an area has to have.
 MIN_AREA = 0.004
-
-Point = tuple[float, float]
 
 
 @dataclass(frozen=True)
@@ -126,29 +125,55 @@ PART_AREAS = tuple(
 )
 
 
+def part_areas(part: ViewPart) -> tuple[LightArea, ...]:
+    """Return the nine parts of a reference, at the places of a view that it shows."""
+    scale = PART_RADIUS * max(part.width, part.height)
+    return tuple(_placed(name, place, part, scale) for name, place in PARTS.items())
+
+
+def _placed(name: str, there: Point, part: ViewPart, changed: float) -> LightArea:
+    across, down = there
+    here = (1 - across if part.is_mirrored else across, down)
+    in_view = part.place(across, down)
+    return LightArea(
+        name,
+        lambda tones: tones.around(*here, PART_RADIUS),
+        lambda view: view.around(*in_view, changed),
+        seen_there=lambda tones: tones.around(*there, PART_RADIUS),
+    )
+
+
+def changed_light(light: Floats, changes: Sequence[AreaChange], view: ViewAreas) -> Floats:
+    """Return a picture (h, w, 3) linear, of a view, with changes."""
+    return _changed(light, changes, [change.area.mask(view) for change in changes])
+
+
 def find_changes(
     reference: Tones,
     light: Floats,
     view: ViewAreas,
     areas: Sequence[LightArea],
     *,
+    part: ViewPart | None = None,
     matches_brightness: bool = False,
     keeps_brightness: bool = False,
 ) -> list[AreaChange]:
     """Return the changes of areas that bring a picture near a reference, without invisible ones.
 
-    light: (h, w, 3) linear, the picture now. view: its areas. matches_brightness: whether it
+    light: (h, w, 3) linear, the picture now. view: its areas. part: of the picture, that the
+    reference shows; all of it by default, and of another place. matches_brightness: whether it
     becomes as bright as the reference as a whole; otherwise only differences within it count.
     keeps_brightness: whether the whole picture, the first area, is then made as bright as it was.
     """
     masks = [area.mask(view) for area in areas]
     usable = view.whole > 0
+    seen = (slice(None), slice(None)) if part is None else part.slices(usable.shape)
     changes = [AreaChange(area, 0.0, np.zeros(3)) for area in areas]
     for _ in range(ROUNDS):
         for k, (area, mask) in enumerate(zip(areas, masks, strict=True)):
             if mask.mean() < MIN_AREA:
                 continue
-            tones = Tones(_changed(light, changes, masks), usable)
+            tones = Tones(_changed(light, changes, masks)[seen], usable[seen])
             stops, tint = _difference(reference, tones, area, matches_brightness)
             changes[k] = AreaChange(
                 area,

@@ -29,6 +29,9 @@ DETAIL_SIZE = (24, 36)
 #: Stops below the highlights down to which a part is nearly as bright.
 NEARLY_BRIGHT = 1.5
 
+#: Share of the picture's width that is its left, and its right.
+SIDE = 0.35
+
 #: Share of a side that has to be nearly as bright, to have a key of its own.
 LEAST_SIDE = 0.1
 
@@ -53,8 +56,7 @@ class LightTones:
 
     levels: log2 of luminance at QUANTILES. lit, shadows: (3,), log2 of RGB over luminance of the
     light in its brightest parts, and in its darker ones. sides: the first at its left and at its
-    right. bright_share: share of the picture that is nearly as bright as its highlights. detail:
-    its edges in a small picture, of mean 0 and variance 1, by which places are told apart.
+    right. bright_share: share of the picture that is nearly as bright as its highlights.
     """
 
     levels: Doubles
@@ -62,13 +64,6 @@ class LightTones:
     shadows: Doubles
     sides: tuple[Doubles, Doubles]
     bright_share: float
-
-    detail: Doubles
-
-    def resembles(self, other: "LightTones") -> float:
-        """Return the correlation of the edges of two pictures, one of them mirrored or not."""
-        mirrored = other.detail[:, ::-1]
-        return max(float(np.mean(self.detail * x)) for x in (other.detail, mirrored))
 
     @property
     def contrast(self) -> float:
@@ -116,16 +111,20 @@ class Tones:
         levels = self._levels[known]
         bright, dark = (float(np.quantile(levels, x)) for x in (LIT_QUANTILE, DARK_QUANTILE))
         quantiles = np.quantile(levels, QUANTILES)
-        left = np.broadcast_to(np.arange(self.size[1]) < self.size[1] / 2, self.size)
+        across = np.broadcast_to((np.arange(self.size[1]) + 0.5) / self.size[1], self.size)
         is_bright = known & (self._levels > quantiles[-1] - NEARLY_BRIGHT)
         return LightTones(
             quantiles,
             self._illuminant(known & (self._levels >= bright)),
             self._illuminant(known & (self._levels <= dark)),
-            (self._side(is_bright, left), self._side(is_bright, ~left)),
+            (self._side(is_bright, across < SIDE), self._side(is_bright, across > 1 - SIDE)),
             float(is_bright.sum() / known.sum()),
-            _detail(self._levels),
         )
+
+    @property
+    def levels(self) -> Doubles:
+        """log2 of luminance of each pixel, (h, w)."""
+        return self._levels
 
     @cached_property
     def level(self) -> float:
@@ -175,15 +174,13 @@ class Tones:
         return float(np.quantile(known, share)) if known.size else 0.0
 
 
-def _detail(levels: Doubles) -> Doubles:
-    """Return what a picture of levels, resampled to DETAIL_SIZE, has beyond its surroundings."""
+def edges(levels: Doubles, size: tuple[int, int]) -> Doubles:
+    """Return what a picture of levels, resampled to a size, has beyond its surroundings."""
     planes = np.repeat(levels[..., None], 3, axis=2).astype(np.float32)
-    small = resampled(planes, DETAIL_SIZE)[..., 0].astype(np.float64)
+    small = resampled(planes, size)[..., 0].astype(np.float64)
     rows, columns = (
         np.abs(np.subtract.outer(np.arange(n), np.arange(n))) <= 2 for n in small.shape
     )
     across = columns / columns.sum(axis=0)
     down = rows / rows.sum(axis=1, keepdims=True)
-    detail = small - down @ small @ across
-    detail -= detail.mean()
-    return np.asarray(detail / max(float(detail.std()), 1e-9))
+    return np.asarray(small - down @ small @ across)

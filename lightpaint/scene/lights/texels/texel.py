@@ -88,6 +88,14 @@ def coarse_name(name: str) -> str:
     return "" if found is None else node_name(found[0], coarsest(found[1]))
 
 
+def texel_place(name: str) -> tuple[int, int]:
+    """Return column and row of the texel of this name, of its level."""
+    found = _node_of(name)
+    if found is None:
+        raise ValueError(f"{name!r:.40} is the name of no texel")
+    return found[1][1], found[1][2]
+
+
 def _node_of(name: str) -> tuple[str, Node] | None:
     """Return image and place of the texel of this name; None for other names."""
     found = _NAME.fullmatch(name)

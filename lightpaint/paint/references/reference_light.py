@@ -1,0 +1,250 @@
+"""The light of a reference of another place, as changes of the light of key, backdrop and fill."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from lightpaint.arrays import Bools, Floats
+from lightpaint.basis.basis import Basis
+from lightpaint.basis.denoised_mixes import denoise_mix
+from lightpaint.errors import PaintError
+from lightpaint.paint.layers.canvas import Canvas
+from lightpaint.paint.layers.composition import compose_layer
+from lightpaint.paint.layers.layer import Layer
+from lightpaint.paint.presets.lamp_roles import LampRoles
+from lightpaint.paint.presets.light_layers import LampGroup, is_divided, layers_of, masks_of
+from lightpaint.paint.presets.preset_masks import reduction
+from lightpaint.paint.presets.view_areas import MIN_ALBEDO, Mask, ViewAreas
+from lightpaint.paint.presets.view_light import find_roles, light_share
+from lightpaint.paint.references.light_match import (
+    MOST_BRIGHTER,
+    LampLight,
+    LightMatch,
+    gains_of,
+    has_pool,
+    has_two_keys,
+    is_even,
+    light_distance,
+    match_light,
+    stops_darker,
+)
+from lightpaint.paint.references.tones import LightTones, Tones
+from lightpaint.paint.store.canvas_pixels import Pixels
+
+#: Approximate pixels of the longer side of the picture in which changes are found.
+FINDING_SIDE = 160
+
+#: Shares of the changes that are tried in turn, until one does not lead away from a reference.
+STRENGTHS = (1.0, 0.7, 0.4)
+
+#: Quantile of the light of a picture that stays as bright as it is.
+HIGHLIGHTS = 0.95
+
+#: Least distance from the middle, -1 to 1, at which a lamp belongs to one side of a picture.
+SIDE = 0.1
+
+#: Most by which the light of a side becomes brighter or darker, to be like that of the other side.
+MOST_BALANCE = 4.0
+
+#: Share of the stops from fill to key at which the light of a backdrop lies, which stands for a
+#: sky, and the share of its colour that is the key's.
+BACKDROP = 0.5
+
+
+@dataclass(frozen=True)
+class LightLayers:
+    """Layers for the light of a reference.
+
+    groups: lamps that they change, without the `fill`. layers: one for the fill, one for each
+    group. image: (h, w, 3) linear, the picture with them, reduced. strength: share of the changes
+    that is asked for: less than 1 where all of them would lead away from the reference.
+    """
+
+    groups: tuple[LampGroup, ...]
+    fill: LampGroup
+    layers: tuple[Layer, ...]
+    image: Floats
+    strength: float
+
+    def mask(self, canvas: Canvas, areas: ViewAreas, number: int) -> Mask:
+        """Return the mask (h, w) of one of the layers in a view."""
+        if number == 0:
+            return areas.whole
+        shares = [_share(canvas.basis, group.lamps, areas) for group in self.groups]
+        masks = masks_of(self.groups, self.fill, shares)
+        return np.asarray(masks[number - 1] * areas.whole, np.float32)
+
+
+def find_light(
+    canvas: Canvas, reference: Tones, light: Floats, areas: ViewAreas, *, matches_brightness: bool
+) -> LightLayers | None:
+    """Return layers that give a view the light of a reference of another place.
+
+    None if nobody would see them. Raises PaintError if even a part of them would lead away from
+    the reference. light: (h, w, 3) linear, the picture now, and `areas` its areas, both reduced.
+    matches_brightness: whether it becomes as bright as the reference.
+    """
+    there, known = reference.light_tones, areas.whole > 0
+    roles, _ = find_roles(canvas)
+    keys = key_lamps(canvas.basis, roles, there)
+    lit = np.any(keys, axis=0)
+    match = match_light(
+        there,
+        Tones(light, known).light_tones,
+        _lamp_light(canvas, roles, lit, known, is_key=True),
+        _lamp_light(canvas, roles, ~lit, known, is_key=False),
+    )
+    if not match.is_visible:
+        return None
+    before = distance_of(canvas, there, light, known)
+    for strength in STRENGTHS:
+        part = _share_of(match, strength)
+        level = reference.level - Tones(light, known).level if matches_brightness else None
+        found = _layers(canvas, roles, keys, part, there, light, areas, level)
+        if distance_of(canvas, there, found.image, known) < before:
+            return replace(found, strength=strength)
+    raise PaintError("these lamps bring the picture no nearer to that light")
+
+
+def distance_of(canvas: Canvas, reference: LightTones, light: Floats, known: Bools) -> float:
+    """Return how far the light of a picture, (h, w, 3) linear, is from that of a reference."""
+    return light_distance(reference, Tones(without_surfaces(canvas, light), known).light_tones)
+
+
+def key_lamps(basis: Basis, roles: LampRoles, reference: LightTones) -> list[Bools]:
+    """Return the lamps (n,) that make the key of a view: the likeliest for a reference.
+
+    Two groups, at the left and at the right, for a reference with a key of each.
+    """
+    is_on = basis.current_weights.any(axis=1) & ~basis.is_fixed
+    usable = roles.lamps(is_on)
+    if has_two_keys(reference):
+        wide = roles.is_soft & roles.is_daylight & ~roles.is_wash
+        local = usable & ~(wide if (usable & ~wide).any() else np.zeros_like(wide))
+        place = roles.places
+        pair = [local & (place < -SIDE), local & (place > SIDE)]
+        if all(x.any() for x in pair):
+            return pair
+        middle = float(np.median(place[usable])) if usable.any() else 0.0
+        return [usable & (place < middle), usable & (place >= middle)]
+    if has_pool(reference):
+        return [roles.candle & usable]
+    if is_even(reference) and (roles.hard & usable).any():
+        return [roles.hard & usable]
+    return [roles.sun & usable]
+
+
+def without_surfaces(canvas: Canvas, light: Floats) -> Floats:
+    """Return the light (h, w, 3) that arrives at surfaces; as it is where these are unknown."""
+    features = canvas.basis.features
+    if features is None:
+        return light
+    albedo = features.reduced(reduction(canvas, FINDING_SIDE)).albedo
+    return np.asarray(light / np.maximum(albedo, MIN_ALBEDO), np.float32)
+
+
+def _lamp_light(
+    canvas: Canvas, roles: LampRoles, lamps: Bools, known: Bools, *, is_key: bool
+) -> LampLight:
+    """Return the present light of lamps: its colour where they are brightest, or in the dark."""
+    weights = canvas.basis.current_weights * roles.lights(lamps)[:, None]
+    if not weights.any():
+        return LampLight(0.0, np.zeros(3))
+    image = denoise_mix(canvas.basis, weights, factor=reduction(canvas, FINDING_SIDE))
+    tones = Tones(without_surfaces(canvas, np.maximum(image, 0)), known).light_tones
+    return LampLight(roles.level(lamps), tones.lit if is_key else tones.shadows)
+
+
+def _share_of(match: LightMatch, share: float) -> LightMatch:
+    return LightMatch(
+        share * match.key_stops,
+        share * match.fill_stops,
+        tuple(share * x for x in match.key_tints),
+        share * match.fill_tint,
+    )
+
+
+def _layers(
+    canvas: Canvas,
+    roles: LampRoles,
+    keys: Sequence[Bools],
+    match: LightMatch,
+    reference: LightTones,
+    light: Floats,
+    areas: ViewAreas,
+    level: float | None,
+) -> LightLayers:
+    """Return the layers of a match. level: stops by which all becomes brighter, if that is asked
+    for.
+    """
+    names = ("Key light",) if len(keys) == 1 else ("Key light, left", "Key light, right")
+    groups = [
+        LampGroup(name, key, 2.0**match.key_stops * gain, tint)
+        for name, key, tint, gain in zip(
+            names, keys, match.key_tints, _balance(roles, keys), strict=True
+        )
+    ]
+    sky = roles.is_wash & ~np.any(keys, axis=0)
+    is_sky = len(keys) == 1 and not has_pool(reference) and not is_even(reference)
+    if is_sky and sky.any() and roles.lights(sky).any():
+        stops = match.fill_stops + BACKDROP * (match.key_stops - match.fill_stops)
+        tint = match.fill_tint + BACKDROP * (match.key_tints[0] - match.fill_tint)
+        groups.append(LampGroup("Backdrop", sky, 2.0**stops, tint))
+    rest = ~np.any([x.lamps for x in groups], axis=0)
+    fill = LampGroup("Fill light", rest, 2.0**match.fill_stops, match.fill_tint)
+    picture = Tones(light, areas.whole > 0).light_tones
+    if level is None and has_pool(reference):
+        level = 0.0
+    elif level is None:
+        level = _steady_stops(roles, (*groups, fill)) - stops_darker(reference, picture)
+    fill, *groups = (
+        LampGroup(x.name, roles.lights(x.lamps), x.gain * 2.0**level, gains_of(x.tint))
+        for x in (fill, *groups)
+    )
+    layers = layers_of(groups, fill, 1, "")[:-1]
+    factor = reduction(canvas, FINDING_SIDE)
+    shares = [_share(canvas.basis, x.lamps, areas, factor) for x in groups]
+    pixels = Pixels.unpainted(np.asarray(light, np.float32))
+    for layer, mask in zip(layers, [areas.whole, *masks_of(groups, fill, shares)], strict=True):
+        pixels = compose_layer(layer, Pixels(np.zeros_like(light), mask), pixels)
+    return LightLayers(tuple(groups), fill, layers, pixels.image, 1.0)
+
+
+def _balance(roles: LampRoles, keys: Sequence[Bools]) -> list[float]:
+    """Return the gains by which the keys of two sides light their sides alike; 1 for a key."""
+    if len(keys) == 1:
+        return [1.0]
+    middle = roles.light.shape[2] // 2
+    halves = slice(0, middle), slice(middle, None)
+    amounts = [
+        max(float(roles.light[key][:, :, half].sum(dtype=np.float64)), 1e-30)
+        for key, half in zip(keys, halves, strict=True)
+    ]
+    mean = float(np.sqrt(amounts[0] * amounts[1]))
+    return [float(np.clip(mean / x, 1 / MOST_BALANCE, MOST_BALANCE)) for x in amounts]
+
+
+def _steady_stops(roles: LampRoles, groups: Sequence[LampGroup]) -> float:
+    """Return the stops that leave the highlights of a picture as bright as they are, but do not
+    make all of it much brighter.
+    """
+    gains = np.ones(len(roles.light))
+    for group in groups:
+        gains[group.lamps] = group.gain
+    before, after = roles.light.sum(axis=0), np.tensordot(gains, roles.light, axes=1)
+    lit = before > 0
+    if not lit.any():
+        return 0.0
+    tops = [_log2(np.quantile(x[lit], HIGHLIGHTS)) for x in (before, after)]
+    means = [float(np.mean(np.log2(x[lit] + 1e-9))) for x in (before, after)]
+    return min(tops[0] - tops[1], means[0] - means[1] + MOST_BRIGHTER)
+
+
+def _log2(value: float) -> float:
+    return float(np.log2(max(value, 1e-30)))
+
+
+def _share(basis: Basis, lamps: Bools, areas: ViewAreas, factor: int = 1) -> Mask:
+    """Return the share (h, w) of the light that comes from lamps; lit parts for all or none."""
+    return light_share(basis, lamps, factor) if is_divided(basis, lamps) else areas.lit
