@@ -1,10 +1,12 @@
-"""Two places under lightings that are known: references for `benchmarks/references.py`.
+"""Four places under lightings that are known: references for `benchmarks/references.py`.
 
 A courtyard with a wall, a column, steps, a crate, a ball and a hedge, of brick, plaster, wood and
-leaves; and a studio, open to the sky, with a window to its side, of blue and green paint, slate
-and cloth: other geometry and other surfaces than the scenes that are shipped. `references` returns
-the picture of a place under each lighting, and the same in grey, where nothing but the light is
-left. Constants of *Look like this* were chosen on the courtyard, and the studio was made after.
+leaves; a studio, open to the sky, with a window to its side, of blue and green paint, slate and
+cloth; a terrace of sandstone, tiles and planks with a parapet, posts and a bench; and a market of
+tents, barrels and asphalt: other geometry and other surfaces than the scenes that are shipped.
+`references` returns the picture of a place under each lighting, and the same in grey, where nothing
+but the light is left. Constants of *Look like this* were chosen on the first three. The market was
+made after that.
 """
 
 from collections.abc import Mapping
@@ -134,8 +136,98 @@ STUDIO = Place(
     camera=("-0.4, 1.6, 5.6", "0, 1.1, -0.5"),
 )
 
+TERRACE = Place(
+    surfaces={
+        "tiles": "0.50, 0.40, 0.34",
+        "sandstone": "0.64, 0.56, 0.44",
+        "white": "0.76, 0.75, 0.72",
+        "planks": "0.34, 0.26, 0.18",
+        "leaves": "0.14, 0.24, 0.09",
+        "pot": "0.44, 0.20, 0.13",
+        "steel": "0.40, 0.42, 0.45",
+    },
+    shapes=(
+        ("rectangle", "tiles", "10 10 1", None, "0 0 0"),
+        ("cube", "sandstone", "1.5 2.2 0.15", 0, "-2.0 2.2 -2.4"),
+        ("cube", "white", "1.6 0.45 0.12", 0, "1.5 0.45 -2.3"),
+        ("cube", "steel", "0.07 1.3 0.07", 45, "1.0 1.3 -1.2"),
+        ("cube", "steel", "0.07 1.3 0.07", 45, "2.6 1.3 -1.2"),
+        ("cube", "planks", "1.1 0.05 0.6", 0, "1.8 2.6 -1.2"),
+        ("cube", "planks", "0.9 0.05 0.28", 15, "-1.4 0.5 -0.8"),
+        ("cube", "planks", "0.06 0.24 0.24", 15, "-2.1 0.24 -0.65"),
+        ("cube", "planks", "0.06 0.24 0.24", 15, "-0.7 0.24 -1.0"),
+        ("cube", "pot", "0.25 0.25 0.25", 30, "0.6 0.25 0.2"),
+        ("sphere", "leaves", "0.42 0.42 0.42", 0, "0.6 0.85 0.2"),
+        ("sphere", "white", "0.26 0.26 0.26", 0, "2.0 0.26 0.1"),
+    ),
+    suns={"low_sun": "0.9, -0.3, -0.5", "high_sun": "0.3, -1, -0.7"},
+    points={
+        "flame": "-0.8, 0.95, -0.3",
+        "tube_left": "-2.4, 1.8, 0.6",
+        "tube_right": "2.8, 1.5, 0.2",
+    },
+    lightings={
+        "golden hour": {"low_sun": _white(2300, 2.6), "sky": _white(8000, 0.12)},
+        "overcast": {"sky": _white(6600, 0.55)},
+        "neon": {
+            "tube_left": np.array([2.8, 0.5, 0.2]),
+            "tube_right": np.array([0.2, 2.0, 2.6]),
+            "sky": _white(9000, 0.01),
+        },
+        "candle": {"flame": _white(1900, 0.8), "sky": _white(5000, 0.004)},
+        "blue hour": {"sky": _white(18_000, 0.14), "flame": _white(2600, 0.1)},
+        "noon": {"high_sun": _white(5700, 2.0), "sky": _white(9500, 0.18)},
+    },
+    camera=("0.3, 1.7, 5.8", "0.1, 1.05, -0.6"),
+)
+
+MARKET = Place(
+    surfaces={
+        "asphalt": "0.16, 0.16, 0.17",
+        "canvas": "0.66, 0.64, 0.60",
+        "stripe": "0.20, 0.34, 0.52",
+        "brick": "0.42, 0.26, 0.20",
+        "wood": "0.44, 0.33, 0.22",
+        "fruit": "0.62, 0.34, 0.08",
+        "concrete": "0.46, 0.46, 0.45",
+    },
+    shapes=(
+        ("rectangle", "asphalt", "12 12 1", None, "0 0 0"),
+        ("cube", "brick", "4.2 2.4 0.15", 0, "0 2.4 -3.4"),
+        ("cube", "concrete", "0.5 1.0 0.16", 0, "-0.4 1.0 -3.2"),
+        ("cube", "canvas", "1.0 0.04 0.8", 0, "-1.9 2.0 -1.5"),
+        ("cube", "stripe", "1.0 0.2 0.02", 0, "-1.9 1.8 -0.7"),
+        ("cube", "wood", "0.9 0.4 0.35", 0, "-1.9 0.4 -1.3"),
+        ("sphere", "fruit", "0.14 0.14 0.14", 0, "-2.2 0.92 -1.1"),
+        ("sphere", "fruit", "0.14 0.14 0.14", 0, "-1.85 0.92 -1.1"),
+        ("cube", "canvas", "1.1 0.04 0.7", -8, "2.0 2.2 -1.7"),
+        ("cube", "canvas", "0.9 0.45 0.3", -8, "2.0 0.45 -1.6"),
+        ("sphere", "concrete", "0.36 0.36 0.36", 0, "0.4 0.36 -0.4"),
+        ("cube", "wood", "0.28 0.45 0.28", 25, "1.3 0.45 0.3"),
+    ),
+    suns={"low_sun": "-0.8, -0.34, -0.6", "high_sun": "-0.35, -1, -0.45"},
+    points={
+        "flame": "0.4, 1.1, -0.9",
+        "tube_left": "-2.2, 1.5, 0.3",
+        "tube_right": "2.4, 1.7, 0.0",
+    },
+    lightings={
+        "golden hour": {"low_sun": _white(2600, 3.0), "sky": _white(9500, 0.15)},
+        "overcast": {"sky": _white(7000, 0.9)},
+        "neon": {
+            "tube_left": np.array([3.2, 0.2, 1.4]),
+            "tube_right": np.array([0.2, 1.2, 3.6]),
+            "sky": _white(9000, 0.015),
+        },
+        "candle": {"flame": _white(1950, 1.6), "sky": _white(4000, 0.008)},
+        "blue hour": {"sky": _white(15_000, 0.2), "flame": _white(2700, 0.15)},
+        "noon": {"high_sun": _white(5600, 2.8), "sky": _white(9000, 0.22)},
+    },
+    camera=("-0.2, 1.7, 5.4", "0.1, 1.05, -1"),
+)
+
 #: The places by name.
-PLACES = {"courtyard": COURTYARD, "studio": STUDIO}
+PLACES = {"courtyard": COURTYARD, "studio": STUDIO, "terrace": TERRACE, "market": MARKET}
 
 
 @dataclass(frozen=True)

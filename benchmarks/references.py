@@ -2,7 +2,7 @@
 
     python benchmarks/references.py [--scenes gallery stage] [--cases 4] [--first 0]
                                     [--methods whole regions parts pairs ...]
-    python benchmarks/references.py --known [studio] [--scenes gallery stage table cornell]
+    python benchmarks/references.py --known [market] [--scenes gallery stage table cornell]
 
 A reference is a picture of the scene, in 8 bits, under a lighting that is known: one that was found
 for a painting in `targets/`, or one of those that `benchmarks/intent.py` means. It shows the view
@@ -113,7 +113,7 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("--scenes", nargs="+", default=list(SENSORS), choices=SENSORS)
     parser.add_argument(
-        "--known", nargs="?", const="studio", choices=PLACES, help="references of another place"
+        "--known", nargs="?", const="market", choices=PLACES, help="references of another place"
     )
     parser.add_argument("--methods", nargs="+", default=list(METHODS), choices=METHODS)
     parser.add_argument("--cases", type=int, default=4, metavar="N")
@@ -273,7 +273,7 @@ def random_lighting(
 def render(scene: str, sensor: str) -> lp.Basis:
     """Return the basis of a view of a scene."""
     loaded = lp.load_scene(SCENES / scene / "scene.xml", sensor=sensor)
-    return obtain_basis(loaded.reduced(SIZES[scene]), spp=SPP)
+    return obtain_basis(loaded.reduced(SIZES.get(scene, "160x90")), spp=SPP)
 
 
 def errors_of(

@@ -42,7 +42,7 @@ SIZES = {"gallery": "213x120", "stage": "213x120", "table": "160x90", "cornell":
 SHEETS = (*(f"presets-{name}" for name in SIZES), "references")
 
 #: Scenes of the sheet of references, and the place that they show.
-PLACES, PLACE = ("gallery", "stage", "table", "cornell"), "studio"
+PLACES, PLACE = ("gallery", "stage", "table", "cornell"), "market"
 
 #: Height of a picture, of its title, the gap between pictures, and presets in a row.
 HEIGHT, TITLE, GAP, COLUMNS = 126, 16, 4, 5

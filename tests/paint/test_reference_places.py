@@ -15,8 +15,6 @@ from lightpaint.paint.protocol import LookLike
 from lightpaint.paint.references.light_match import (
     contrast_of_light,
     light_distance,
-    lit_color,
-    shadow_color,
 )
 from lightpaint.paint.references.reference_light import distance_of
 from lightpaint.paint.references.tones import LightTones, Tones
@@ -177,11 +175,14 @@ def tones_of(contrast: float, lit: list[float], shadows: list[float]) -> LightTo
     return LightTones(levels, np.array(lit), np.array(shadows), (np.zeros(3), np.zeros(3)), 0.5)
 
 
-def test_the_distance_of_lights_is_the_mean_of_contrast_and_both_warmths() -> None:
+def test_the_distance_of_lights_is_the_mean_of_half_the_contrast_and_both_warmths() -> None:
     reference = tones_of(3, [0.2, 0, -0.3], [0.1, 0, -0.4])
     meant = contrast_of_light(reference)
     picture = tones_of(meant, [0, 0, 0], [0, 0, 0])
-    lit, shadows = (x[0] - x[2] for x in (lit_color(reference), shadow_color(reference)))
+    lit, shadows = (x[0] - x[2] for x in (reference.lit, reference.shadows))
     np.testing.assert_allclose(light_distance(reference, picture), (abs(lit) + abs(shadows)) / 3)
-    same = tones_of(meant, list(lit_color(reference)), list(shadow_color(reference)))
+    far = tones_of(meant + 3, [0, 0, 0], [0, 0, 0])
+    farther = light_distance(reference, far) - light_distance(reference, picture)
+    np.testing.assert_allclose(farther, 0.5)
+    same = tones_of(meant, list(reference.lit), list(reference.shadows))
     assert light_distance(reference, same) == pytest.approx(0)

@@ -202,10 +202,13 @@ class LampRoles:
             found.append(int(k))
         return found
 
-    def pool(self, number: int) -> Bools:
-        """Return the lamp of one of the smallest pools of light, (n,), from 0; none beyond them."""
-        found = self._pools[number : number + 1]
-        return np.isin(np.arange(len(self.light)), found)
+    def pool(self, number: int, *, is_on_wall: bool = True) -> Bools:
+        """Return the lamp of one of the smallest pools of light, (n,), from 0; none beyond them.
+
+        is_on_wall: whether spots on a wall are among them.
+        """
+        found = [k for k in self._pools if is_on_wall or not self.is_on_wall[k]]
+        return np.isin(np.arange(len(self.light)), found[number : number + 1])
 
     @property
     def edge(self) -> Bools:
@@ -217,11 +220,15 @@ class LampRoles:
     @cached_property
     def candle(self) -> Bools:
         """(n,) a lamp that is seen in the picture; without one, those on the subject."""
-        if self.seen is not None and self.seen.any():
-            score = np.where(self.hard, self.seen, 0)
-            if score.any():
-                return np.asarray(np.arange(len(score)) == np.argmax(score), bool)
-        return self.on_subject
+        return self.in_view if self.in_view.any() else self.on_subject
+
+    @cached_property
+    def in_view(self) -> Bools:
+        """(n,) the lamp of hard light that is seen in the picture; none if none is."""
+        if self.seen is None:
+            return np.zeros(len(self.light), bool)
+        score = np.where(self.hard, self.seen, 0)
+        return np.asarray((np.arange(len(score)) == np.argmax(score)) & (score > 0), bool)
 
     @cached_property
     def on_subject(self) -> Bools:
@@ -279,7 +286,7 @@ class LampRoles:
         covered = _coverage(light)
         if covered and self.is_image is not None and self.is_image[lamps].all():
             covered = max(covered, IMAGE_COVERAGE)
-        elif covered and self.seen is not None and (self.seen[lamps] > 0).all():
+        elif covered and not (lamps & ~self.in_view).any():
             covered = max(covered, SEEN_COVERAGE)
         return float(light.mean()) / covered / self._bright if covered and self._bright else 0.0
 

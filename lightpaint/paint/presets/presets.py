@@ -53,8 +53,7 @@ def _pools(level: float, kelvin: float, *, is_on_wall: bool = True) -> tuple[Lam
     """Return layers for pools of light. is_on_wall: whether spots on a wall are among them."""
 
     def lamps(roles: LampRoles, number: int) -> Bools:
-        pool = roles.pool(number)
-        return pool if is_on_wall else pool & ~roles.is_on_wall
+        return roles.pool(number, is_on_wall=is_on_wall)
 
     return tuple(
         LampRequest(name, level, kelvin, partial(lamps, number=k), "subject")
@@ -84,9 +83,9 @@ _ALL = (
         "A low golden sun from one side, everything else dim and cool",
         _rest(0.16, 7000),
         (
-            LampRequest("Horizon", 0.45, 2500, lambda roles: roles.horizon, "whole"),
+            LampRequest("Horizon", 0.35, 2500, lambda roles: roles.horizon, "whole"),
             LampRequest(
-                "Sky", 0.2, 9000, lambda roles: roles.is_wash & roles.horizon.any(), "whole"
+                "Sky", 0.08, 9000, lambda roles: roles.is_wash & roles.horizon.any(), "whole"
             ),
             _sky(0.35, 3300),
             LampRequest("Low sun", 0.95, 2450, lambda roles: roles.sun),

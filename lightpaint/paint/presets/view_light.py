@@ -95,7 +95,7 @@ def _roles_of(basis: Basis, chosen: str | None) -> tuple[LampRoles, str | None]:
         [areas.mask_of(name) for name in areas.exhibit_names],
         normal,
         _camera_right(basis, sample),
-        np.bincount(lamp_of, _seen_amounts(basis)),
+        np.bincount(lamp_of, _seen_amounts(basis)).astype(np.float64),
         lamp_of,
         np.array([bool(image_of(basis.names[k])) for k in firsts], bool),
     )
@@ -113,7 +113,8 @@ def _lamps_of(basis: Basis) -> tuple[Indices, list[int]]:
     """
     sizes = images_of(basis.names)
     keys: dict[tuple[object, ...], int] = {}
-    firsts, lamp_of = [], []
+    firsts: list[int] = []
+    lamp_of: list[int] = []
     for k, name in enumerate(basis.names):
         image = image_of(name)
         key: tuple[object, ...] = (name,)

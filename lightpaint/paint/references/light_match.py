@@ -12,10 +12,6 @@ from lightpaint.paint.references.tones import LightTones
 #: Stops of a picture's contrast that are of its surfaces, and the least contrast of light.
 SURFACE_STOPS, LEAST_STOPS = 0.7, 0.05
 
-#: Stops of red over blue by which surfaces of the world make a picture warmer than its light: in
-#: its lit parts, where the palest count most, and in its shadows.
-LIT_WARMTH, SHADOW_WARMTH = 0.15, 0.3
-
 #: Stops of red over blue by which shadows are cooler than lit parts, from which on they begin to be
 #: of a hard key and from which on they fully are: then the darkest tenth counts as shadows, since
 #: such a key may light most of a picture.
@@ -52,8 +48,15 @@ SEEN_STOPS, SEEN_TINT = 0.08, 0.04
 #: light; and the least contrast of such a reference, in stops.
 POOL_SHARE, POOL_STOPS = 0.3, 2.5
 
-#: Contrast of light, in stops, below which a reference has no key.
-EVEN_STOPS = 0.5
+#: Stops of red over blue from which on light is that of a flame, and so a pool.
+FLAME_WARMTH = 4.0
+
+#: Weight of contrast in the distance of lights: it is as much of a place's corners as of its light.
+CONTRAST_WEIGHT = 0.5
+
+#: Contrast of light, in stops, below which a reference has hardly any key, and is softer than lamps
+#: alone may make a picture.
+SOFT_STOPS = 1.0
 
 #: Difference of the colours of light at the left and at the right, in stops of a channel, from
 #: which on a reference has a key of each; and the least contrast of their light, in stops.
@@ -83,7 +86,8 @@ class LightMatch:
 
 def has_pool(reference: LightTones) -> bool:
     """Return True if the key of a reference is a pool of light in the dark."""
-    return reference.bright_share <= POOL_SHARE and reference.contrast >= POOL_STOPS
+    is_small = reference.bright_share <= POOL_SHARE or _warmth(reference.lit) >= FLAME_WARMTH
+    return is_small and reference.contrast >= POOL_STOPS
 
 
 def has_two_keys(reference: LightTones) -> bool:
@@ -103,19 +107,9 @@ def contrast_of_light(reference: LightTones) -> float:
     return stops + float(np.clip(COOL_SHADOWS * (cool - begin), 0, MOST_COOL))
 
 
-def is_even(reference: LightTones) -> bool:
+def is_soft(reference: LightTones) -> bool:
     """Return True if a reference shows hardly any key."""
-    return contrast_of_light(reference) < EVEN_STOPS
-
-
-def lit_color(reference: LightTones) -> Doubles:
-    """Return the colour of the light, log2 (3,), in the lit parts of a reference."""
-    return reference.lit - _of_surfaces(LIT_WARMTH)
-
-
-def shadow_color(reference: LightTones) -> Doubles:
-    """Return the colour of the light, log2 (3,), in the shadows of a reference."""
-    return reference.shadows - _of_surfaces(SHADOW_WARMTH)
+    return contrast_of_light(reference) < SOFT_STOPS
 
 
 @dataclass(frozen=True)
@@ -140,15 +134,15 @@ def match_light(
     meant = contrast_of_light(reference)
     stops = now + other * (meant - now) + (1 - other) * (reference.contrast - picture.contrast)
     new_fill = lit * 2.0 ** -max(stops, LEAST_STOPS)
-    theirs: tuple[Doubles, ...] = (lit_color(reference),)
-    fill_color = shadow_color(reference)
-    if is_even(reference):
-        fill_color = 0.5 * (fill_color + lit_color(reference))
+    theirs: tuple[Doubles, ...] = (reference.lit,)
+    fill_color = reference.shadows
+    if is_soft(reference):
+        fill_color = 0.5 * (fill_color + reference.lit)
     if has_two_keys(reference):
-        theirs = tuple(x - _of_surfaces(LIT_WARMTH) for x in reference.sides)
+        theirs = reference.sides
         fill_color = np.mean(theirs, axis=0)
-    bright = other * key.color + (1 - other) * lit_color(picture)
-    dark = other * fill.color + (1 - other) * shadow_color(picture)
+    bright = other * key.color + (1 - other) * picture.lit
+    dark = other * fill.color + (1 - other) * picture.shadows
     return LightMatch(
         _stops(lit - new_fill, key.level),
         _stops(new_fill, fill.level),
@@ -160,16 +154,16 @@ def match_light(
 def light_distance(reference: LightTones, picture: LightTones) -> float:
     """Return how far the light of a picture, without its surfaces, is from a reference's, in stops.
 
-    The mean of the differences in contrast, in the warmth of lit parts and in that of shadows; in
-    the colours of both sides instead of these if a reference has a key of each.
+    The mean of the differences in contrast, which counts half, in the warmth of lit parts and in
+    that of shadows; in the colours of both sides instead of these if a reference has a key of each.
     """
-    parts = [contrast_of_light(reference) - picture.contrast]
+    parts = [CONTRAST_WEIGHT * (contrast_of_light(reference) - picture.contrast)]
     if has_two_keys(reference):
         pairs = zip(reference.sides, picture.sides, strict=True)
         parts += [float(np.abs(theirs - ours).mean()) for theirs, ours in pairs]
     else:
-        parts.append(_warmth(lit_color(reference)) - _warmth(picture.lit))
-        parts.append(_warmth(shadow_color(reference)) - _warmth(picture.shadows))
+        parts.append(_warmth(reference.lit) - _warmth(picture.lit))
+        parts.append(_warmth(reference.shadows) - _warmth(picture.shadows))
     return float(np.mean(np.abs(parts)))
 
 
@@ -188,11 +182,6 @@ def gains_of(tint: Doubles) -> Doubles:
 def _warmth(color: Doubles) -> float:
     """Return the stops of red over blue of a colour, log2 (3,)."""
     return float(color[0] - color[2])
-
-
-def _of_surfaces(warmth: float) -> Doubles:
-    """Return the colour, log2 (3,), of pale surfaces that are warm by some stops."""
-    return warmth * np.array([0.5, 0.0, -0.5])
 
 
 def _believable(tint: Doubles) -> Doubles:

@@ -17,6 +17,7 @@ from lightpaint.paint.presets.preset_masks import (
 from lightpaint.paint.presets.presets import PRESETS
 from lightpaint.paint.presets.view_areas import Mask, ViewAreas
 from lightpaint.paint.protocol import ApplyPreset, LookLike
+from lightpaint.paint.references.light_match import is_soft
 from lightpaint.paint.references.likeness import (
     BAND_AREAS,
     CHANGED_RADIUS,
@@ -46,8 +47,9 @@ from lightpaint.paint.store.canvas_pixels import Region
 #: place: parts of the shipped scenes under other lightings have .5 to .9, other places .47 at most.
 SAME_PLACE = 0.5
 
-#: Most stops by which bands of the picture are made brighter or darker for another place.
-BAND_STOPS = 0.45
+#: Most stops by which tones and bands of the picture are made brighter or darker for a reference
+#: of another place.
+TONE_STOPS, BAND_STOPS = 1.0, 0.45
 
 
 def open_request(
@@ -95,12 +97,12 @@ def _open_likeness(
         reference,
         asked,
         areas,
-        compared_areas(request, part),
+        compared_areas(request, reference, part),
         part=part,
         matches_brightness=request.matches_brightness and (part is not None or not layers),
         keeps_brightness=request.areas == "parts" or part is not None,
     )
-    if request.areas == "regions" and part is None:
+    if request.areas in ("whole", "regions") and part is None:
         known = areas.whole > 0
         distances = [
             distance_of(canvas, reference.light_tones, x, known)
@@ -152,18 +154,24 @@ def _masks(canvas: Canvas, makers: Sequence[Callable[[Canvas, ViewAreas], Mask]]
     return [maker(canvas, found) * selected for maker in makers]
 
 
-def compared_areas(request: LookLike, part: ViewPart | None) -> Sequence[LightArea]:
+def compared_areas(
+    request: LookLike, reference: Tones, part: ViewPart | None
+) -> Sequence[LightArea]:
     """Return the areas that a request compares, beside key and fill; the lowest layers first.
 
     part: of the view that the reference shows; None for another place. Raises PaintError for pairs
     without any.
     """
-    if request.areas == "whole":
-        return () if part is None else (WHOLE_AREA, *TONE_AREAS)
-    if request.areas == "regions":
-        if part is None:
-            return of_another_place(BAND_AREAS, BAND_STOPS)
-        return (WHOLE_AREA, *TONE_AREAS, *part_areas(part))
+    if request.areas in ("whole", "regions"):
+        has_regions = request.areas == "regions"
+        if part is not None:
+            return (WHOLE_AREA, *TONE_AREAS, *(part_areas(part) if has_regions else ()))
+        tones = TONE_AREAS if is_soft(reference.light_tones) else ()
+        bands = BAND_AREAS if has_regions else ()
+        return (
+            *of_another_place(tones, TONE_STOPS),
+            *of_another_place(bands, BAND_STOPS),
+        )
     if request.areas == "parts":
         return (WHOLE_AREA, *(PART_AREAS if part is None else part_areas(part)))
     if not request.pairs:

@@ -24,7 +24,7 @@ from lightpaint.paint.references.light_match import (
     gains_of,
     has_pool,
     has_two_keys,
-    is_even,
+    is_soft,
     light_distance,
     match_light,
     stops_darker,
@@ -130,7 +130,7 @@ def key_lamps(basis: Basis, roles: LampRoles, reference: LightTones) -> list[Boo
         return [usable & (place < middle), usable & (place >= middle)]
     if has_pool(reference):
         return [roles.candle & usable]
-    if is_even(reference) and (roles.hard & usable).any():
+    if is_soft(reference) and (roles.hard & usable).any():
         return [roles.hard & usable]
     return [roles.sun & usable]
 
@@ -186,7 +186,7 @@ def _layers(
         )
     ]
     sky = roles.is_wash & ~np.any(keys, axis=0)
-    is_sky = len(keys) == 1 and not has_pool(reference) and not is_even(reference)
+    is_sky = len(keys) == 1 and not has_pool(reference) and not is_soft(reference)
     if is_sky and sky.any() and roles.lights(sky).any():
         stops = match.fill_stops + BACKDROP * (match.key_stops - match.fill_stops)
         tint = match.fill_tint + BACKDROP * (match.key_tints[0] - match.fill_tint)
