@@ -34,6 +34,15 @@ MEANT_STOPS, SHARPNESS = 0.5, 8
 #: Factor by which a colour that was given as numbers is meant more clearly than a painted one.
 EXACT_FACTOR = 4.0
 
+#: Stops within which two places ask for the same, and the shares of a wish that do so from and to
+#: which it counts as an adjustment by numbers. 8 bits are coarser than that where it is dark: light
+#: that counts as lit, relative to the mean of the look.
+UNIFORM_STOPS, ADJUSTED, LIT = 0.05, (0.55, 0.7), 0.2
+
+#: Share of the lit picture from which a wish can show that it was adjusted: in a small one, every
+#: change of light is even.
+MIN_ADJUSTED = 0.1
+
 
 @dataclass(frozen=True)
 class Wash:
@@ -137,6 +146,28 @@ def wish_shares(
     return np.array([wish.area.ravel() for wish in wishes], np.float64)
 
 
+def adjusted_share(wash: Wash, stops: Doubles) -> Doubles:
+    """Return the share of each block of pixels that was adjusted by a number, (p,).
+
+    An adjustment layer or a curve changes the light by the same ratio everywhere; a brush, and a
+    lamp, do not. So a large wish counts as numbers when most of it asks for the same. stops:
+    (3, p), see `Wash.asked`.
+    """
+    share = np.zeros(stops.shape[1])
+    is_lit = wash.look.mean(axis=0) > LIT * np.average(wash.look.mean(axis=0), weights=wash.counts)
+    weight = wash.counts * wash.importance * is_lit
+    for area in wash.wishes:
+        covered = np.flatnonzero(area * weight > 0.5 * wash.counts)
+        if covered.size <= MIN_ADJUSTED * is_lit.sum():
+            continue
+        own = stops[:, covered]
+        differs = np.abs(own - np.median(own, axis=1, keepdims=True)).max(axis=0)
+        uniform = float((differs < UNIFORM_STOPS).mean())
+        low, high = ADJUSTED
+        share += area * wash.importance * np.clip((uniform - low) / (high - low), 0, 1)
+    return np.minimum(share, 1)
+
+
 @dataclass(frozen=True)
 class ExpectedLights:
     """The emission that a painting lets one expect, and how clearly it asks for other colours.
@@ -163,7 +194,8 @@ class ExpectedLights:
         stops = wash.asked()
         share = wash.counts / (np.maximum(wash.look, 0) + dark)
         asked_share = wash.importance * share
-        spread = np.ptp(stops, axis=0) * (1 + (EXACT_FACTOR - 1) * wash.exact)
+        exact = np.maximum(wash.exact, adjusted_share(wash, stops))
+        spread = np.ptp(stops, axis=0) * (1 + (EXACT_FACTOR - 1) * exact)
         sums = np.stack([rows @ x for rows, x in zip(wash.rows, share, strict=True)], axis=-1)
         moved = np.stack(
             [rows @ x for rows, x in zip(wash.rows, asked_share * stops, strict=True)], axis=-1
