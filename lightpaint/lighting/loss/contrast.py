@@ -45,14 +45,13 @@ def contrast_rows(wash: Wash, transform: ViewTransform | None) -> Doubles:
     parts = [x for area in wash.wishes for x in _subject_and_rest(wash, area, total)]
     if not parts:
         return np.zeros((0, 3, n))
-    shares = np.stack(parts, axis=-1)  # (p, 2 k)
+    shares = np.array(parts)  # (2 k, p)
     black = BLACK * float(np.average(goal.mean(axis=0), weights=wash.counts))
-    inside, outside = (goal @ shares).reshape(3, -1, 2).transpose(2, 1, 0)  # (k, 3) each
-    lights = wash.light_sums(np.broadcast_to(shares, (3, *shares.shape)))
-    own, rest = lights.reshape(3, n, -1, 2).transpose(3, 2, 0, 1)  # (k, 3, n) each
+    inside, outside = (shares @ goal.T).reshape(-1, 2, 3).transpose(1, 0, 2)  # (k, 3) each
+    own, rest = wash.light_sums(shares).reshape(3, n, -1, 2).transpose(3, 2, 0, 1)  # (k, 3, n) each
     is_lit = (inside > black) & (outside > black)
     o, r = (np.where(is_lit, x, 1)[..., None] for x in (inside, outside))
-    amplitude = np.array([_amplitude(light, transform) for light in inside])
+    amplitude = _amplitude(inside.T, transform).T
     return np.asarray((amplitude * is_lit)[..., None] * (own / o - rest / r))
 
 
@@ -84,8 +83,11 @@ def contrast_term(rows: Doubles, strength: float) -> NormalEquations | None:
 
 
 def _amplitude(light: Doubles, transform: ViewTransform | None) -> Doubles:
-    """Return how much a value of the loss changes with a relative change of light, (3,)."""
+    """Return how much values of the loss change with a relative change of light, (3, k).
+
+    light: (3, k), linear.
+    """
     if transform is None:
         return np.maximum(light, 0)
-    low, high = (transform.encode_planes(light[:, None] * x)[:, 0] for x in (0.98, 1.02))
+    low, high = (transform.encode_planes(light * x) for x in (0.98, 1.02))
     return np.asarray(np.abs(high - low) / 0.04, np.float64)

@@ -119,9 +119,12 @@ class Wash:
         return cls(**joined, wishes=wishes)
 
     def light_sums(self, weights: Doubles) -> Doubles:
-        """Return Σ Φ over blocks with weights of each channel, (3, n, k). weights: (3, p, k)."""
+        """Return sums of the lights over blocks with each of k weights, (3, n, k).
+
+        weights: (k, p), or (3, k, p) with others for each channel.
+        """
         # In the precision of the rows: double weights would copy all of them.
-        sums = np.matmul(self.rows, weights.astype(self.rows.dtype))
+        sums = np.matmul(self.rows, np.swapaxes(weights.astype(self.rows.dtype), -1, -2))
         return np.asarray(sums, np.float64)
 
     def asked(self) -> Doubles:
@@ -169,9 +172,12 @@ def adjusted_share(wash: Wash, stops: Doubles) -> Doubles:
     look = wash.look.mean(axis=0)
     is_lit = look > LIT * np.average(look, weights=wash.counts)
     weight = wash.counts * wash.importance * is_lit
+    least = MIN_ADJUSTED * float(wash.counts @ is_lit)
     for area in wash.wishes:
+        if area @ weight <= least:
+            continue
         covered = np.flatnonzero(area * weight > 0.5 * wash.counts)
-        if covered.size <= MIN_ADJUSTED * is_lit.sum():
+        if not covered.size:
             continue
         own = stops[:, covered[:: ceil(covered.size / ADJUSTED_BLOCKS)]]
         differs = np.abs(own - np.median(own, axis=1, keepdims=True)).max(axis=0)
@@ -209,7 +215,7 @@ class ExpectedLights:
         asked_share = wash.importance * share
         exact = np.maximum(wash.exact, adjusted_share(wash, stops))
         spread = np.ptp(stops, axis=0) * (1 + (EXACT_FACTOR - 1) * exact)
-        weights = np.stack([share, asked_share * stops, asked_share * spread**2], axis=-1)
+        weights = np.stack([share, asked_share * stops, asked_share * spread**2], axis=1)
         sums, moved, squares = wash.light_sums(weights).transpose(2, 1, 0)
         reached, squares = sums.sum(axis=1), squares.sum(axis=1)
         change = moved / np.where(sums > 0, sums, 1)
