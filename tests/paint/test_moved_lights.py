@@ -24,8 +24,8 @@ from lightpaint.cli.commands.paint_command import command_for_paintings
 from lightpaint.errors import LightpaintError
 from lightpaint.paint import protocol
 from lightpaint.paint.rig import lamp_rig
+from lightpaint.paint.rig.light_placer import SearchNotes
 from lightpaint.paint.rig.rig_state import rig_state
-from lightpaint.paint.rig.search_notes import SearchNotes
 from lightpaint.paint.session.request_changes import changed_requests
 from lightpaint.paint.store.session_requests import SessionRequests
 from lightpaint.paint.store.store import Store
@@ -447,7 +447,7 @@ def paint_moved_bulb(moving: MovingStudio, position: tuple[float, float, float])
 def test_a_search_ends_with_the_best_so_far_and_leaves_a_note(
     dim_room: MovingStudio, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """What was found by then becomes a step, and the note is there when the session opens again."""
+    """The best by then becomes a step, and the note is there when the session opens again."""
     moving, position = dim_room, (-0.1, 1.2, 0.6)
     paint_moved_bulb(moving, position)
     old = moving.scene.light("bulb").members[0].site
