@@ -15,6 +15,7 @@ from typing import Any
 import numpy as np
 import pytest
 from hypothesis import settings
+from patience import PATIENCE_MS
 from renderer import write_room
 from threadpoolctl import threadpool_limits
 
@@ -91,8 +92,21 @@ def browser() -> Iterator[Any]:
         if path is None and not Path(started.chromium.executable_path).exists():
             pytest.skip("a browser (chromium)")
         chromium = started.chromium.launch(executable_path=path, args=CHROMIUM)
+        for name in ("new_context", "new_page"):
+            setattr(chromium, name, _patient(getattr(chromium, name)))
         yield chromium
         chromium.close()
+
+
+def _patient(make: Callable[..., Any]) -> Callable[..., Any]:
+    """Return a function that makes contexts or pages which wait as long as anything takes."""
+
+    def made(**options: Any) -> Any:
+        new = make(**options)
+        new.set_default_timeout(PATIENCE_MS)
+        return new
+
+    return made
 
 
 @pytest.fixture(scope="session")

@@ -9,6 +9,7 @@ from typing import Any, Literal
 import numpy as np
 import pytest
 from moving import MovingStudio, stroke
+from patience import PATIENCE_S
 from PIL import Image
 from renderer import mitsuba_render, write_room
 
@@ -179,7 +180,7 @@ def test_final_renders_go_in_the_order_of_their_requests(
 
         def late(check: Callable[[], None]) -> Any:
             answer = exact_answer(check)
-            assert is_second_answered.wait(60)
+            assert is_second_answered.wait(PATIENCE_S)
             return answer
 
         def early(check: Callable[[], None]) -> Any:

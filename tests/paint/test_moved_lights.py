@@ -15,6 +15,7 @@ from typing import Any
 import numpy as np
 import pytest
 from moving import MovingStudio, exact_answer, opened_rig, pixel_of, place_lights, stroke
+from patience import PATIENCE_S
 from renderer import LIGHTS, write_room
 
 import lightpaint as lp
@@ -149,7 +150,7 @@ def test_a_receiver_with_a_lock_may_change_the_session_while_it_is_sent_planes(
         moving.wait(lambda: not studio.rig.unrendered(studio.session.requests.placed))
         for _ in range(10):  # meanwhile a thread offers what it has rendered
             time.sleep(0.1)
-            assert studio._access.lock.acquire(timeout=5)
+            assert studio._access.lock.acquire(timeout=PATIENCE_S)
             studio._access.lock.release()
     moving.rendered()
 

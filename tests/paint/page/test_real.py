@@ -17,6 +17,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from patience import PATIENCE_S
 from renderer import REPOSITORY
 
 import lightpaint as lp
@@ -70,7 +71,7 @@ PIXELS_OF = """(element) => {
 }"""
 
 
-def wait_until(is_so: Callable[[], Any], description: str, seconds: float = 60) -> Any:
+def wait_until(is_so: Callable[[], Any], description: str, seconds: float = PATIENCE_S) -> Any:
     """What is looked for, once it is so."""
     end = time.monotonic() + seconds
     while not (value := is_so()):
@@ -279,7 +280,6 @@ def open_page(browser: Any) -> Iterator[Callable[..., PainterUser]]:
         context_options = {"viewport": VIEWPORT, **options}
         context = beside.page.context if beside else browser.new_context(**context_options)
         contexts.append(context)
-        context.set_default_timeout(60_000)
         page = context.new_page()
         page.on("response", lambda r: errors.append(r.url) if r.status >= 400 else None)
         page.on("pageerror", lambda error: errors.append(str(error)))
