@@ -4,6 +4,7 @@ from collections.abc import Callable, Sequence
 from dataclasses import replace
 from functools import partial
 
+from lightpaint.arrays import Floats
 from lightpaint.errors import PaintError
 from lightpaint.paint.layers.canvas import Canvas
 from lightpaint.paint.layers.canvases import Canvases
@@ -25,6 +26,7 @@ from lightpaint.paint.references.likeness import (
     SEEN_RADIUS,
     TONE_AREAS,
     WHOLE_AREA,
+    AreaChange,
     LightArea,
     changed_light,
     find_changes,
@@ -92,24 +94,9 @@ def _open_likeness(
             makers += [partial(_light_mask, found, k) for k in range(len(found.layers))]
             asked = found.image
             if found.strength < 1:
-                name = f"{name}, {round(100 * found.strength)} %"[:MAX_NAME_LENGTH]
-    changes = find_changes(
-        reference,
-        asked,
-        areas,
-        compared_areas(request, reference, part),
-        part=part,
-        matches_brightness=request.matches_brightness and (part is not None or not layers),
-        keeps_brightness=request.areas == "parts" or part is not None,
-    )
-    if request.areas in ("whole", "regions") and part is None:
-        known = areas.whole > 0
-        distances = [
-            distance_of(canvas, reference.light_tones, x, known)
-            for x in (asked, changed_light(asked, changes, areas))
-        ]
-        if distances[1] > distances[0]:
-            changes = []
+                share = f", {round(100 * found.strength)} %"
+                name = name[: MAX_NAME_LENGTH - len(share)] + share
+    changes = _changes(canvas, request, reference, asked, areas, part, has_layers=bool(layers))
     layers += [change.layer(1, 1) for change in changes]
     makers += [partial(_area_mask, change.area) for change in changes]
     if not layers:
@@ -120,6 +107,38 @@ def _open_likeness(
     views = [view] if request.areas == "pairs" else range(len(canvases))
     masks = {k: _masks(canvases[k], makers) for k in views}
     return open_group(canvases, [*numbered, Layer(group, "group", name)], masks), name
+
+
+def _changes(
+    canvas: Canvas,
+    request: LookLike,
+    reference: Tones,
+    light: Floats,
+    areas: ViewAreas,
+    part: ViewPart | None,
+    *,
+    has_layers: bool,
+) -> list[AreaChange]:
+    """Return the changes of areas that a request asks for, none that lead away from a reference.
+
+    light: (h, w, 3) linear, with what is asked for so far, reduced. has_layers: whether that
+    includes how bright it becomes.
+    """
+    changes = find_changes(
+        reference,
+        light,
+        areas,
+        compared_areas(request, reference, part),
+        part=part,
+        matches_brightness=request.matches_brightness and not has_layers,
+        keeps_brightness=request.areas == "parts" or part is not None,
+    )
+    if part is not None or request.areas not in ("whole", "regions"):
+        return changes
+    tones, known = reference.light_tones, areas.whole > 0
+    pictures = light, changed_light(light, changes, areas)
+    before, after = (distance_of(canvas, tones, x, known) for x in pictures)
+    return changes if after <= before else []
 
 
 def _view_shown(canvases: Canvases, first: int, reference: Tones) -> tuple[int, ViewPart | None]:
