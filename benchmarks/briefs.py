@@ -22,7 +22,7 @@ thousandths), beyond what it has now and what is painted.
 --sculptures for the three sculptures of the gallery, bright and warm in a cool dark room, beside
 the lighting that somebody set by hand for it.
 
-docs/benchmarks.md reports cases 12 to 23, and says which chose the constants.
+docs/benchmarks.md reports cases 36 to 47; those before chose the constants.
 """
 
 import argparse
