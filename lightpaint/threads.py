@@ -1,13 +1,13 @@
 """Threads: one for products of small blocks, several for independent jobs."""
 
 import os
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterable, Iterator
 from concurrent.futures import ThreadPoolExecutor
-from contextlib import AbstractContextManager
+from contextlib import contextmanager
 from contextvars import copy_context
 from functools import cache
 from itertools import count
-from threading import Event
+from threading import Event, local
 from typing import Any, TypeVar
 
 # The controller finds the libraries that are loaded, and NumPy must be among them.
@@ -25,14 +25,26 @@ def _controller() -> ThreadpoolController:
     return ThreadpoolController()
 
 
-def one_thread() -> AbstractContextManager[object]:
-    """Limit NumPy's BLAS to one thread within the block.
+_limits = local()
+
+
+@contextmanager
+def one_thread() -> Iterator[None]:
+    """Limit NumPy's BLAS to one thread within the block, or within a function that it decorates.
 
     On small arrays its threads wait for each other longer than they work, and the way they split a
-    sum decides its last bits.
+    sum decides its last bits. Setting the limit takes a tenth of a millisecond, so blocks within
+    such a block of the same thread leave it as it is.
     """
-    limits: AbstractContextManager[object] = _controller().limit(limits=1, user_api="blas")
-    return limits
+    if getattr(_limits, "is_one", False):
+        yield
+        return
+    _limits.is_one = True
+    try:
+        with _controller().limit(limits=1, user_api="blas"):
+            yield
+    finally:
+        _limits.is_one = False
 
 
 def linear_algebra() -> tuple[str, str]:

@@ -9,7 +9,7 @@ import pytest
 import lightpaint as lp
 from lightpaint.lighting.loss import contrast
 from lightpaint.lighting.loss.contrast import contrast_rows, contrast_term
-from lightpaint.lighting.loss.expected_lights import ExpectedLights, Wash
+from lightpaint.lighting.loss.expected_lights import ExpectedLights, Wash, adjusted_share
 from lightpaint.target.wish import Wish
 
 H, W = 24, 40
@@ -29,6 +29,11 @@ def room(make_basis: Any, spill: Any = 0.3) -> lp.Basis:
         images=images, names=["wash", "spot"], emission=[(0.3, 0.3, 0.3), (0.1, 0.1, 0.1)]
     )
     return basis
+
+
+def uneven() -> np.ndarray:
+    """Factors of light, (h, w, 1), of half a stop from left to right, as a brush leaves them."""
+    return np.tile(2 ** np.linspace(-0.25, 0.25, W), (H, 1))[..., None]
 
 
 def painting(basis: lp.Basis, image: np.ndarray, *, with_layers: bool = True) -> lp.Target:
@@ -117,7 +122,7 @@ def test_how_clearly_colours_are_asked_for(
     """A hue that is a little off asks for nothing; a mood decides."""
     basis = room(make_basis)
     tint = 2.0 ** np.array([-stops / 2, 0, stops / 2])
-    wash = Wash.of(basis, painting(basis, basis.current_look * tint))
+    wash = Wash.of(basis, painting(basis, basis.current_look * uneven() * tint))
     clarity = ExpectedLights.of(wash, basis.current_weights).clarity
     assert clarity.min() >= least
     assert clarity.max() <= most
@@ -127,7 +132,7 @@ def test_numbers_are_meant(make_basis: Any) -> None:
     """A tint of a quarter of a stop by eye is an error, and by a slider it is a wish."""
     basis = room(make_basis)
     tint = 2.0 ** np.array([-0.125, 0, 0.125])
-    target = painting(basis, basis.current_look * tint)
+    target = painting(basis, basis.current_look * uneven() * tint)
     exact = tuple(replace(wish, is_exact=True) for wish in target.wishes)
     by_eye, by_numbers = (
         ExpectedLights.of(Wash.of(basis, replace(target, wishes=x)), basis.current_weights)
@@ -135,6 +140,25 @@ def test_numbers_are_meant(make_basis: Any) -> None:
     )
     assert by_eye.clarity.max() < 0.01
     assert by_numbers.clarity.min() > 0.9
+
+
+@pytest.mark.parametrize("with_layers", [True, False])
+def test_an_adjustment_in_pixels_is_numbers_too(make_basis: Any, with_layers: bool) -> None:
+    """The same tint of a quarter of a stop everywhere, in 8 bits, is an adjustment layer's."""
+    basis = room(make_basis)
+    tint = 2.0 ** np.array([-0.125, 0, 0.125])
+    transform = lp.ViewTransform("srgb", 0.0)
+    image = np.where(subject()[..., None], 2.0, 1.0) * basis.current_look * tint
+    image = transform.decode(np.round(255 * transform.encode(image)) / 255)
+    wash = Wash.of(basis, painting(basis, image, with_layers=with_layers))
+    assert ExpectedLights.of(wash, basis.current_weights).clarity.min() > 0.9
+    np.testing.assert_allclose(
+        adjusted_share(wash, wash.asked())[~subject().ravel()],
+        1,
+        atol=1e-6,  # float32 areas
+    )
+    by_brush = Wash.of(basis, painting(basis, image * uneven(), with_layers=with_layers))
+    assert not adjusted_share(by_brush, by_brush.asked()).any()
 
 
 def test_lights_are_expected_as_dim_as_what_they_light(make_basis: Any) -> None:

@@ -45,6 +45,7 @@ from lightpaint.lighting.unknowns.white_mixes import (
     next_whites,
     snap_to_whites,
 )
+from lightpaint.threads import one_thread
 
 #: Maximum number of steps between whites for one answer; the next answer continues.
 WHITE_STEPS = 2
@@ -121,6 +122,7 @@ class LiveSolver:
         """The space of the answers."""
         return self._fit.space or "linear"
 
+    @one_thread()
     def answer(self, start: Doubles, *, while_moving: bool = False) -> Doubles:
         """Return the best weights (n, 3), from the last ones.
 

@@ -39,26 +39,36 @@ def contrast_rows(wash: Wash, transform: ViewTransform | None) -> Doubles:
 
     transform: the view transform of the loss; None for linear light.
     """
-    rows = []
+    n = wash.rows.shape[1]
     goal = np.where(wash.importance > 0, wash.painted, wash.look)
     total = float(wash.counts.sum())
-    black = BLACK * float(np.average(goal.mean(axis=0), weights=wash.counts)) if total else 0.0
-    for area in wash.wishes:
-        own = wash.counts * area * wash.importance
-        rest = wash.counts * (1 - area)
-        painted_rest = float((rest * wash.importance).sum())
-        if not 0 < own.sum() <= SUBJECT_SHARE * total:
-            continue
-        if painted_rest <= 0 or painted_rest < PAINTED_REST * rest.sum():
-            continue
-        means = [[(x @ part) / part.sum() for part in (own, rest)] for x in goal]
-        lights = [[(x @ part) / part.sum() for part in (own, rest)] for x in wash.rows]
-        row = np.zeros((3, wash.rows.shape[1]))
-        for c, ((inside, outside), (o, r)) in enumerate(zip(means, lights, strict=True)):
-            if inside > black and outside > black:
-                row[c] = o / inside - r / outside
-        rows.append(_amplitude(np.array([x[0] for x in means]), transform)[:, None] * row)
-    return np.array(rows).reshape(-1, 3, wash.rows.shape[1])
+    parts = [x for area in wash.wishes for x in _subject_and_rest(wash, area, total)]
+    if not parts:
+        return np.zeros((0, 3, n))
+    shares = np.array(parts)  # (2 k, p)
+    black = BLACK * float(np.average(goal.mean(axis=0), weights=wash.counts))
+    inside, outside = (shares @ goal.T).reshape(-1, 2, 3).transpose(1, 0, 2)  # (k, 3) each
+    own, rest = wash.light_sums(shares).reshape(3, n, -1, 2).transpose(3, 2, 0, 1)  # (k, 3, n) each
+    is_lit = (inside > black) & (outside > black)
+    o, r = (np.where(is_lit, x, 1)[..., None] for x in (inside, outside))
+    amplitude = _amplitude(inside.T, transform).T
+    return np.asarray((amplitude * is_lit)[..., None] * (own / o - rest / r))
+
+
+def _subject_and_rest(wash: Wash, area: Doubles, total: float) -> list[Doubles]:
+    """Return the shares of blocks, (p,), whose sums are means over a wish and over the rest; none
+    for a wish without a contrast.
+
+    total: the number of pixels.
+    """
+    own = wash.counts * area * wash.importance
+    rest = wash.counts * (1 - area)
+    painted_rest = float(rest @ wash.importance)
+    if not 0 < own.sum() <= SUBJECT_SHARE * total:
+        return []
+    if painted_rest <= 0 or painted_rest < PAINTED_REST * rest.sum():
+        return []
+    return [own / own.sum(), rest / rest.sum()]
 
 
 def contrast_term(rows: Doubles, strength: float) -> NormalEquations | None:
@@ -73,8 +83,11 @@ def contrast_term(rows: Doubles, strength: float) -> NormalEquations | None:
 
 
 def _amplitude(light: Doubles, transform: ViewTransform | None) -> Doubles:
-    """Return how much a value of the loss changes with a relative change of light, (3,)."""
+    """Return how much values of the loss change with a relative change of light, (3, k).
+
+    light: (3, k), linear.
+    """
     if transform is None:
         return np.maximum(light, 0)
-    low, high = (transform.encode_planes(light[:, None] * x)[:, 0] for x in (0.98, 1.02))
+    low, high = (transform.encode_planes(light * x) for x in (0.98, 1.02))
     return np.asarray(np.abs(high - low) / 0.04, np.float64)

@@ -24,6 +24,9 @@ from lightpaint.target.wish_finding import split_wishes
 #: Approximate number of blocks of pixels over which the light of a painting is compared.
 BLOCKS = 2**13
 
+#: Approximate number of pixels over which strokes are told apart: they are sought with each answer.
+WISH_PIXELS = 2**12
+
 #: Light below which a ratio says little, relative to the mean of the look.
 DARK = 0.01
 
@@ -33,6 +36,18 @@ MEANT_STOPS, SHARPNESS = 0.5, 8
 
 #: Factor by which a colour that was given as numbers is meant more clearly than a painted one.
 EXACT_FACTOR = 4.0
+
+#: Stops within which two places ask for the same, and the shares of a wish that do so from and to
+#: which it counts as an adjustment by numbers. 8 bits are coarser than that where it is dark: light
+#: that counts as lit, relative to the mean of the look.
+UNIFORM_STOPS, ADJUSTED, LIT = 0.05, (0.55, 0.7), 0.2
+
+#: Share of the lit picture from which a wish can show that it was adjusted: in a small one, every
+#: change of light is even.
+MIN_ADJUSTED = 0.1
+
+#: Approximate number of blocks of a wish that are compared for it.
+ADJUSTED_BLOCKS = 2**10
 
 
 @dataclass(frozen=True)
@@ -103,6 +118,15 @@ class Wash:
             first += len(view.wishes)
         return cls(**joined, wishes=wishes)
 
+    def light_sums(self, weights: Doubles) -> Doubles:
+        """Return sums of the lights over blocks with each of k weights, (3, n, k).
+
+        weights: (k, p), or (3, k, p) with others for each channel.
+        """
+        # In the precision of the rows: double weights would copy all of them.
+        sums = np.matmul(self.rows, np.swapaxes(weights.astype(self.rows.dtype), -1, -2))
+        return np.asarray(sums, np.float64)
+
     def asked(self) -> Doubles:
         """Return the change that is asked for in each block, (3, p), in stops; 0 without paint."""
         weight = self.importance * self.counts
@@ -133,8 +157,34 @@ def wish_shares(
     painted, look: (h, w, 3) linear; importance: (h, w).
     """
     whole = Wish("painting", importance.astype(np.float32), has_strokes=True)
-    wishes = split_wishes(layers or [whole], painted, importance, look)
+    wishes = split_wishes(layers or [whole], painted, importance, look, max_pixels=WISH_PIXELS)
     return np.array([wish.area.ravel() for wish in wishes], np.float64)
+
+
+def adjusted_share(wash: Wash, stops: Doubles) -> Doubles:
+    """Return the share of each block of pixels that was adjusted by a number, (p,).
+
+    An adjustment layer or a curve changes the light by the same ratio everywhere; a brush, and a
+    lamp, do not. So a large wish counts as numbers when most of it asks for the same. stops:
+    (3, p), see `Wash.asked`.
+    """
+    share = np.zeros(stops.shape[1])
+    look = wash.look.mean(axis=0)
+    is_lit = look > LIT * np.average(look, weights=wash.counts)
+    weight = wash.counts * wash.importance * is_lit
+    least = MIN_ADJUSTED * float(wash.counts @ is_lit)
+    for area in wash.wishes:
+        if area @ weight <= least:
+            continue
+        covered = np.flatnonzero(area * weight > 0.5 * wash.counts)
+        if not covered.size:
+            continue
+        own = stops[:, covered[:: ceil(covered.size / ADJUSTED_BLOCKS)]]
+        differs = np.abs(own - np.median(own, axis=1, keepdims=True)).max(axis=0)
+        uniform = float((differs < UNIFORM_STOPS).mean())
+        low, high = ADJUSTED
+        share += area * wash.importance * np.clip((uniform - low) / (high - low), 0, 1)
+    return np.minimum(share, 1)
 
 
 @dataclass(frozen=True)
@@ -163,13 +213,11 @@ class ExpectedLights:
         stops = wash.asked()
         share = wash.counts / (np.maximum(wash.look, 0) + dark)
         asked_share = wash.importance * share
-        spread = np.ptp(stops, axis=0) * (1 + (EXACT_FACTOR - 1) * wash.exact)
-        sums = np.stack([rows @ x for rows, x in zip(wash.rows, share, strict=True)], axis=-1)
-        moved = np.stack(
-            [rows @ x for rows, x in zip(wash.rows, asked_share * stops, strict=True)], axis=-1
-        )
-        squares = sum(rows @ x for rows, x in zip(wash.rows, asked_share * spread**2, strict=True))
-        reached = sums.sum(axis=1)
+        exact = np.maximum(wash.exact, adjusted_share(wash, stops))
+        spread = np.ptp(stops, axis=0) * (1 + (EXACT_FACTOR - 1) * exact)
+        weights = np.stack([share, asked_share * stops, asked_share * spread**2], axis=1)
+        sums, moved, squares = wash.light_sums(weights).transpose(2, 1, 0)
+        reached, squares = sums.sum(axis=1), squares.sum(axis=1)
         change = moved / np.where(sums > 0, sums, 1)
         amount = np.sqrt(np.maximum(squares / np.where(reached > 0, reached, 1), 0))
         excess = (amount / MEANT_STOPS) ** SHARPNESS
