@@ -275,7 +275,7 @@ def _spoken_spill(appearance: Appearance) -> str:
     names, is_one = _spoken_some(area.names)
     also = f"the {some_names([area.also.replace('_', ' ').strip()])}" if area.also else "the rest"
     spill = f"{names} {'lights' if is_one else 'light'} {also}, too"
-    return spill if area.is_alone else f"no light reaches it alone; {spill}"
+    return f"no light reaches it alone; {spill}" if appearance.lacks_light_of_its_own else spill
 
 
 def spoken_holding(reason: Reason) -> str:

@@ -188,7 +188,7 @@ def test_advice_comes_before_what_may_be_cut_off():
     text = sketch_headline(appearance)
     assert text == (
         "Vase, +1.4 stops, warmer: out of reach (brightness 69 %, colour 47 % came), since spot "
-        "lights the plinths, too. More importance, or lights that move, may bring more. Most of "
+        "lights the plinths, too. More importance, or lights that move, may help. Most of "
         "the way (69 %)."
     )
     # Parts of one painting, which nobody named: first what came.
@@ -316,5 +316,8 @@ def test_lamps_that_became_white_are_not_called_the_present_lighting(is_asked: b
     assert "current lighting" not in sentence
     plain = unpainted_text(is_asked=is_asked, is_white=False)
     assert ("current lighting" in plain) != is_asked
+    by_hand = unpainted_text(is_asked=True, is_white=False, is_set=True)
+    assert by_hand.endswith("lights that you set are as you set them, all others as they were.")
+    assert unpainted_text(is_asked=True, is_white=True, is_set=True).startswith(sentence[:30])
     moved = unpainted_text(is_asked=False, is_white=False, is_moved=True)
     assert moved.endswith("is the current lighting, from where you put the lights.")

@@ -45,7 +45,7 @@ def _seen(delta_e: float, *deliveries: Delivery, **fields: Any) -> Appearance:
         (
             _seen(5.0, LANTERN, RIM, local_lights=("sun",), reasons_wish="Lantern"),
             "Lantern: out of reach (8 % came), since sun would light too much else. "
-            "More importance, or lights that move, may bring more. Rim: 95 %. "
+            "More importance, or lights that move, may help. Rim: 95 %. "
             "On the whole: most of the way.",
         ),
         (
@@ -58,7 +58,7 @@ def _seen(delta_e: float, *deliveries: Delivery, **fields: Any) -> Appearance:
                 reasons_wish="Lantern",
             ),
             "Lantern: out of reach (8 % came), since spot lights the big plinth, too. More "
-            "importance, or lights that move, may bring more. Rim: 95 %. On the whole: most of "
+            "importance, or lights that move, may help. Rim: 95 %. On the whole: most of "
             "the way.",
         ),
         (
@@ -87,12 +87,27 @@ def _seen(delta_e: float, *deliveries: Delivery, **fields: Any) -> Appearance:
             "floor, too. Add a light for it, or paint the rest as well. Rim: 95 %. On the whole: "
             "most of the way.",
         ),
+        # Where shade is missing, nothing has to reach it.
+        (
+            _seen(
+                5.0,
+                replace(LANTERN, brightness=0.9, color=0.3),
+                RIM,
+                local_lights=("sky",),
+                place=replace(PLACE, reached=(0.9, 0.9, 0.9)),
+                area_lights=AreaLights(("sky",), is_alone=False, also="floor"),
+                reasons_wish="Lantern",
+            ),
+            "Lantern: out of reach in colour (30 % came), since sky lights the floor, too. More "
+            "importance, or lights that move, may help. Rim: 95 %. On the whole: most of the "
+            "way.",
+        ),
         # Of one painting, whose parts nobody named, the whole goes first.
         (
             _seen(5.0, VASE, WALLS, local_lights=("spot",), reasons_wish="Vase"),
             "Most of the way: brightness 98 %, colour 67 %. Vase: out of reach in colour (36 % "
             "came), since spot would colour too much else. More importance, or lights that move, "
-            "may bring more.",
+            "may help.",
         ),
         (
             _seen(2.0, VASE, WALLS, reasons=(Reason("colors"),)),

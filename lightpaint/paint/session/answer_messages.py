@@ -218,14 +218,24 @@ def wish_delivery(delivery: Delivery) -> WishDelivery:
 
 
 def unpainted_text(
-    *, is_asked: bool, is_white: bool, is_moved: bool = False, is_started: bool = False
+    *,
+    is_asked: bool,
+    is_white: bool,
+    is_moved: bool = False,
+    is_started: bool = False,
+    is_set: bool = False,
 ) -> str:
     """Describe the answer while nothing is painted, or all paint is undone.
 
     is_asked: whether there are constraints. is_white: whether all lights have to be white.
     is_moved: whether lights were moved or added. is_started: whether the solve starts from lamps
-    that were set by hand.
+    that were set by hand. is_set: whether all constraints are levels and colours of lights that
+    were set by hand, or painted on the map of an image.
     """
+    if is_set and not is_white:
+        return (
+            "Nothing is painted: lights that you set are as you set them, all others as they were."
+        )
     if is_started:
         return "Nothing is painted: the answer is your lamps, as you set them."
     stay = "the answer is the current lighting"
