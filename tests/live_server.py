@@ -10,6 +10,7 @@ from typing import Any
 
 import numpy as np
 from fake_session import FakeSession
+from patience import PATIENCE_S
 from raw_message import RawMessage
 from server_key import bearer, key_of, offered
 from websockets.client import ClientProtocol
@@ -21,8 +22,6 @@ from lightpaint.paint.message_frames import from_frame, to_frame
 from lightpaint.paint.server.guard import PROTOCOL
 from lightpaint.paint.server.server import Server
 
-#: As long as anything takes on a busy machine.
-PATIENCE_S = 60.0
 #: More than the system takes for somebody who does not read.
 LARGE = np.zeros((2048, 2048, 4), np.float32)
 
@@ -130,4 +129,4 @@ def wait_until(is_so: Callable[[], object], description: str) -> None:
 def run_in_loop(trial: Callable[[], Coroutine[Any, Any, None]]) -> None:
     """Run a trial in another thread: where other tests have a browser open, this one has a loop."""
     with ThreadPoolExecutor(1) as threads:
-        threads.submit(lambda: asyncio.run(asyncio.wait_for(trial(), 20))).result()
+        threads.submit(lambda: asyncio.run(asyncio.wait_for(trial(), PATIENCE_S))).result()

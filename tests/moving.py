@@ -6,6 +6,7 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+from patience import PATIENCE_S
 from renderer import write_room
 
 from lightpaint.paint import protocol
@@ -36,7 +37,7 @@ class MovingStudio:
         self.studio.start()
         self.wait(lambda: any(m.kind == "state" for m in self.messages))
 
-    def wait(self, condition: Callable[[], Any], seconds: float = 60) -> Any:
+    def wait(self, condition: Callable[[], Any], seconds: float = PATIENCE_S) -> Any:
         deadline = time.monotonic() + seconds
         while time.monotonic() < deadline:
             if result := condition():
@@ -112,5 +113,5 @@ def exact_answer(moving: MovingStudio) -> Any:
 
 def place_lights(moving: MovingStudio) -> Any:
     return moving.wait(
-        lambda: next((m.fields for m in moving.messages if m.kind == "placed"), None), 200
+        lambda: next((m.fields for m in moving.messages if m.kind == "placed"), None)
     )

@@ -7,6 +7,7 @@ import subprocess
 from pathlib import Path
 
 import pytest
+from patience import PATIENCE_S
 
 
 def run(folder: Path, *command: str, **environment: str) -> None:
@@ -26,7 +27,7 @@ def run(folder: Path, *command: str, **environment: str) -> None:
         start_new_session=True,
     )
     try:
-        output, _ = started.communicate(timeout=100)
+        output, _ = started.communicate(timeout=PATIENCE_S)
     except subprocess.TimeoutExpired:
         os.killpg(started.pid, signal.SIGKILL)  # the program as well as what started it
         output, _ = started.communicate()

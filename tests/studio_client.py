@@ -7,6 +7,7 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+from patience import PATIENCE_S
 
 import lightpaint as lp
 from lightpaint.cli.commands.paint_command import command_for_paintings
@@ -35,7 +36,7 @@ class StudioClient:
         self.studio.start()
         self.wait(lambda m: m.kind == "state")
 
-    def wait(self, is_match: Callable[[Message], Any], seconds: float = 60) -> Message:
+    def wait(self, is_match: Callable[[Message], Any], seconds: float = PATIENCE_S) -> Message:
         """Return the first message, from now or from before, that matches."""
         deadline = time.monotonic() + seconds
         while time.monotonic() < deadline:

@@ -9,6 +9,7 @@ from itertools import count
 from pathlib import Path
 
 import pytest
+from patience import PATIENCE_S
 from stored_sessions import IDENTITY, content, look, step
 
 import lightpaint as lp
@@ -38,7 +39,7 @@ def test_a_basis_of_so_many_seconds_takes_these(small_room: Scene, tmp_path: Pat
     basis = lp.render_basis(small_room, time_s=1.0, progress=hear)
     assert basis.origin.spp >= 1
     # Compilation and the last pass come on top.
-    assert time.monotonic() - begin_s < 60
+    assert time.monotonic() - begin_s < PATIENCE_S
     assert all(0 <= done <= total for done, total in reports)
     lp.write_basis(tmp_path / "room.basis.exr", basis)
     assert lp.read_basis(tmp_path / "room.basis.exr").origin == basis.origin

@@ -12,6 +12,7 @@ import numpy as np
 import pytest
 from command import run_refused
 from live_server import run_in_loop
+from patience import PATIENCE_S
 
 import lightpaint as lp
 from lightpaint.batch.manifest.manifest import read_manifest
@@ -84,14 +85,14 @@ def test_lists_of_lights_have_an_end(tmp_path: Path) -> None:
 
 
 def test_dots_end_no_parser(tmp_path: Path) -> None:
-    began_s = time.monotonic()
+    began_s = time.process_time()
     with pytest.raises(ValueError, match="line 2 has too many dots, 100000"):
         strict_toml("a = 1\n" + ".".join(["x"] * 100_001) + " = 1")
     path = tmp_path / "looks.toml"
     path.write_text(".".join(["x"] * 100_001) + " = 1")
     with pytest.raises(BatchError, match=r"looks.toml is not TOML: line 1 has too many dots"):
         read_manifest(path)
-    assert time.monotonic() - began_s < 5
+    assert time.process_time() - began_s < 5
 
 
 def test_a_lighting_that_is_too_long_is_not_read(tmp_path: Path) -> None:
@@ -153,7 +154,7 @@ def test_a_server_ends_while_its_session_is_at_work() -> None:
         line, has_begun = Connections(Slow(), None), threading.Event()  # type: ignore[arg-type]
         work = asyncio.ensure_future(line._thread.run(_without_end, has_begun))
         await asyncio.to_thread(has_begun.wait)
-        await asyncio.wait_for(line.close(), 10)
+        await asyncio.wait_for(line.close(), PATIENCE_S)
         with pytest.raises(PaintError, match="the painter has ended"):
             await work
 

@@ -5,6 +5,7 @@ from threading import Barrier, get_ident
 
 import numpy as np
 import pytest
+from patience import PATIENCE_S
 from threadpoolctl import threadpool_info, threadpool_limits
 
 from lightpaint.lighting.normal_equations import inner_products
@@ -38,7 +39,7 @@ def test_an_error_lifts_it():
 
 def test_jobs_within_which_limit_it_once_more():
     """The limit is one of the process: no job lifts it for the others, or for good."""
-    barrier = Barrier(2, timeout=30)
+    barrier = Barrier(2, timeout=PATIENCE_S)
 
     def work(_: int) -> list[set[int]]:
         limits = []

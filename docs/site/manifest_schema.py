@@ -38,6 +38,8 @@ from lightpaint.validation import MAX_LISTED, Check
 _TEXT: Schema = {"type": "string", "minLength": 1}
 _TEXTS: Schema = {"type": "array", "items": _TEXT, "minItems": 1, "maxItems": MAX_LISTED}
 _WHOLE: Schema = {"type": "integer"}
+_LEVEL: Schema = {"type": "number", "minimum": 0}
+_EMISSION: Schema = {"type": "array", "items": _LEVEL, "minItems": 3, "maxItems": 3}
 
 #: Bounds in the text of an expectation, and their keywords.
 _BOUNDS = {
@@ -69,8 +71,10 @@ def _look_kinds() -> dict[str, Schema]:
         {
             "light": _table_of(_closed({key: {} for key in LIGHT_KEYS})),
             "tie": {"type": "array"},
-            "prefer_current": {"type": "number", "minimum": 0},
+            "prefer_current": _LEVEL,
             "sparse": {"type": "integer", "minimum": 1},
+            "start": _table_of(_EMISSION),
+            "near": _LEVEL,
         }
     )
     if set(constraints["properties"]) != set(CONSTRAINT_KEYS):

@@ -14,6 +14,7 @@ from lightpaint.basis.lights import Lights
 from lightpaint.errors import TargetError
 from lightpaint.lighting.constraints.constraints import Constraints
 from lightpaint.lighting.constraints.constraints_file import constraints_of
+from lightpaint.lighting.constraints.start_lighting import start_weights
 from lightpaint.lighting.fit import Fit, resolve_fit, resolve_for_targets
 from lightpaint.lighting.linear_problem import SummedProblem, reduce_lights
 from lightpaint.lighting.loss.painting import ignored_paint
@@ -104,7 +105,7 @@ def summed_problem(
         reduction=reduction,
         full=reduction,
         fit=fit,
-        start=lights.current_weights,
+        start=start_weights(all_constraints.start, lights),
         scene_identity=scene_identity,
         spp=spp,
     )

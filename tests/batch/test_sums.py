@@ -53,6 +53,7 @@ def solve_sums(basis: Basis, sums: Sums, **constraint_words: Any) -> np.ndarray:
         {},
         {"constraints": Constraints.of({"light 1": {"limits": {"max": 0.4}}}, prefer_current=0.1)},
         {"constraints": Constraints.of(sparse=2)},
+        {"constraints": Constraints.of(start={"light 1": (0.2, 0.3, 0.4)})},
         {"colors": "white"},
         {"emitters": "skip"},
     ],

@@ -180,6 +180,10 @@ WRONG: dict[str, tuple[str, tuple[str, ...]]] = {
         SEQUENCE + 'through = ["one"]\nsensors = ["a", "b"]\n',
         ("sequence 'seq'", "have no scene"),
     ),
+    "lights by sums that stay near a lighting": (
+        FIRST + 'want = ["lights"]\nsettings = { literal = true }\nconstraints = { near = 0.1 }\n',
+        ("look 'one'", "near depends on the area of the paint", "want 'solve' instead"),
+    ),
     "a sequence that is solved": (
         SEQUENCE + 'through = ["one", "two"]\nframes = 4\nwant = ["solve"]\n',
         ("want is ['solve']",),
@@ -203,6 +207,10 @@ SEVERAL: dict[str, tuple[str, list[str]]] = {
             *("'masc'", "'spars': did you mean 'sparse'", "sparse is -1", "no light 'sun'"),
             *("'offf'", "temperature of -5 K", "no light 'moon'"),
         ],
+    ),
+    "nor where the solve starts": (
+        FIRST + "[look.constraints]\nnear = -1\nstart.moon = [1, 1, 1]\nstart.sun = [2, 2, 2]\n",
+        ["near is -1", "no light 'moon'", "no light 'sun'"],
     ),
     "a wrong light hides no other": (
         FIRST + "[look.constraints.light]\nsun = { off = true }\nmoon = { off = true }\n",

@@ -10,6 +10,7 @@ from pathlib import Path
 import pytest
 from command import as_from_a_terminal
 from nightly import nightly
+from patience import PATIENCE_S
 from renderer import CORNELL, LIGHTS, PATH, assert_equal_bits, write_room
 
 from lightpaint.basis.basis import Basis
@@ -85,7 +86,7 @@ def uninterrupted(
     method, folder = str(request.param), tmp_path_factory.mktemp("whole")
     room = three_lights(folder, method)
     with start(folder, room, SPP[method], "whole") as process:
-        assert process.wait(timeout=120) == 0
+        assert process.wait(timeout=PATIENCE_S) == 0
     return method, room, read_basis(folder / "whole.exr")
 
 
@@ -118,7 +119,7 @@ def test_stopped_and_gone_on_is_as_if_never_stopped(
             stopped_s = time.monotonic()
             process.send_signal(number)
             errors = process.stderr.read()
-            code = process.wait(timeout=60)
+            code = process.wait(timeout=PATIENCE_S)
         if number == signal.SIGINT:
             assert time.monotonic() - stopped_s < 3
             assert code == 130
@@ -137,7 +138,7 @@ def test_stopped_and_gone_on_is_as_if_never_stopped(
 
     # The same command goes on.
     with start(tmp_path, room, spp, "stopped") as process:
-        assert process.wait(timeout=120) == 0
+        assert process.wait(timeout=PATIENCE_S) == 0
     stopped = read_basis(tmp_path / "stopped.exr")
     assert stopped.origin.spp == spp
     assert_equal_bits(stopped, reference)
@@ -172,7 +173,7 @@ def test_interrupted_before_much_is_done(
         time.sleep(delay_s)
         process.send_signal(number)
         errors = process.stderr.read()
-        assert process.wait(timeout=60) == 128 + number
+        assert process.wait(timeout=PATIENCE_S) == 128 + number
     assert errors.startswith("lightpaint basis: interrupted")
     assert errors.count("\n") == 1
     assert len(kept_bases(tmp_path, "cache")) == ("are kept" in errors)
@@ -243,7 +244,7 @@ def test_what_a_script_starts_in_its_background_hears_ctrl_c(tmp_path: Path) -> 
         assert process.poll() is None
         process.send_signal(signal.SIGINT)
         assert "lightpaint basis: interrupted" in process.stderr.read()
-        assert process.wait(timeout=60) == 130
+        assert process.wait(timeout=PATIENCE_S) == 130
 
 
 @pytest.mark.nightly

@@ -21,6 +21,7 @@ import pytest
 from command import as_from_a_terminal, run, run_refused
 from light_groups import interleaved, pictures
 from nightly import nightly
+from patience import PATIENCE_S
 from raw_message import RawMessage
 from server_key import key_of, offered
 from websockets.exceptions import ConnectionClosedError
@@ -205,7 +206,7 @@ def test_it_serves_until_it_is_told_to_end_and_keeps_the_session(
         refusal = run_refused(work_folder, "paint", "room.basis.exr", "--no-browser", "--port", "0")
         assert re.search(r"session.db is in use: .* folder \(-o\)$", refusal)
         process.send_signal(signal.SIGTERM)
-        assert process.wait(timeout=60) == 0
+        assert process.wait(timeout=PATIENCE_S) == 0
         assert process.stderr is not None
         errors = process.stderr.read()
         assert "Traceback" not in errors
@@ -215,7 +216,7 @@ def test_it_serves_until_it_is_told_to_end_and_keeps_the_session(
         store.append(Step("stroke", "mine"))
     with start_painting(work_folder, "room.basis.exr", "--new") as (process, _):
         process.send_signal(signal.SIGINT)
-        assert process.wait(timeout=60) == 0
+        assert process.wait(timeout=PATIENCE_S) == 0
         assert process.stderr is not None
         assert "the earlier session is kept as room.paint/session-1.db" in process.stderr.read()
     with Store.open(path.with_name("session-1.db"), identity) as store:
@@ -246,7 +247,7 @@ def test_a_program_connects_by_one_line_or_by_a_file_of_its_owner(work_folder: P
                 ) as socket:
                     state = ask(socket, 0, "observe", version=VERSION)
                     if state["kind"] == "waiting":
-                        state = from_frame(bytes(socket.recv(timeout=60)))[0]
+                        state = from_frame(bytes(socket.recv(timeout=PATIENCE_S)))[0]
                     assert state["kind"] == "state"
                     names = [light["name"] for light in state["lights"]]
                     lights = {names[0]: [1.0, 1.0, 1.0]}
@@ -260,7 +261,7 @@ def test_a_program_connects_by_one_line_or_by_a_file_of_its_owner(work_folder: P
                 assert file.stat().st_mode & 0o777 == 0o600
                 killed = connection["token"]
                 process.send_signal(ends)
-                process.wait(timeout=60)
+                process.wait(timeout=PATIENCE_S)
                 assert process.stdout.read() == ""
             finally:
                 process.kill()
@@ -289,7 +290,7 @@ def test_who_asks_twice_for_the_end_gets_one(work_folder: Path, second: signal.S
         process.send_signal(signal.SIGINT)
         time.sleep(0.05)  # while the page is told
         process.send_signal(second)
-        assert process.wait(timeout=60) == 0
+        assert process.wait(timeout=PATIENCE_S) == 0
         assert process.stderr is not None
         errors = process.stderr.read()
     assert "Traceback" not in errors
@@ -310,7 +311,7 @@ def ask(socket: ClientConnection, seq: int, kind: str, **fields: Any) -> dict[st
     message = RawMessage(kind, {"seq": seq, **fields}, arrays)
     socket.send(to_frame(message.content(), message.buffers()))
     while True:
-        frame = socket.recv(timeout=60)
+        frame = socket.recv(timeout=PATIENCE_S)
         assert isinstance(frame, bytes)
         content, _ = from_frame(frame)
         if "size" in content if kind == "hello" else content.get("reply") == seq:
@@ -378,7 +379,7 @@ def test_a_host_is_told_what_it_means_and_a_closed_terminal_ends_it(
     with start_painting(work_folder, "groups.exr", "--host", host) as (process, url):
         assert key_of(url)
         process.send_signal(signal.SIGHUP)
-        assert process.wait(timeout=60) == 0
+        assert process.wait(timeout=PATIENCE_S) == 0
         assert process.stderr is not None
         errors = process.stderr.read()
     assert open_to in errors

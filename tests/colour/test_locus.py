@@ -5,6 +5,7 @@ import sys
 
 import numpy as np
 import pytest
+from patience import PATIENCE_S
 
 from lightpaint.colour.color import cct_and_duv, kelvin_to_rgb
 from lightpaint.colour.planckian_locus import nearest_mired, uv_of, uv_of_black_body, xyz_of
@@ -57,4 +58,4 @@ def test_naming_a_colour_does_not_wait_for_colour_science():
         "assert abs(cct_and_duv(kelvin_to_rgb(3200.0))[0] - 3200) < 1e-4; "
         "assert 'colour' not in sys.modules and 'scipy' not in sys.modules"
     )
-    subprocess.run([sys.executable, "-c", code], check=True, timeout=60)
+    subprocess.run([sys.executable, "-c", code], check=True, timeout=PATIENCE_S)

@@ -17,6 +17,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from hypothesis.extra import numpy as hnp
 from nightly import examples
+from patience import PATIENCE_S
 
 from lightpaint.errors import ImageError, OutputError
 from lightpaint.images.formats.exr import ExrPart, read_parts, rgb_channels, write_parts, write_rgb
@@ -168,7 +169,7 @@ Path("said").write_text(f"{pixels.shape} {standard() == before}")
         cwd=tmp_path,
         env={**os.environ, "PYTHONPATH": str(root)},
         check=False,
-        timeout=60,
+        timeout=PATIENCE_S,
     )
     assert (tmp_path / "said").read_text() == "(2, 3, 3) True"
 
@@ -262,11 +263,11 @@ def test_absurd_sizes_are_refused_at_once(
     start = content.index(b"dataWindow\0box2i\0") + len(b"dataWindow\0box2i\0") + 4
     content[start : start + 16] = struct.pack("<4i", *window)
     path.write_bytes(content)
-    start_s = time.perf_counter()
+    start_s = time.process_time()
     with pytest.raises(ImageError, match=message):
         read_parts(path)
     # It takes 0.2 ms; to decode, or only to allocate, would take many seconds.
-    assert time.perf_counter() - start_s < 1
+    assert time.process_time() - start_s < 1
 
 
 def test_of_a_crop_the_pixels_that_are_there_are_read(tmp_path: Path):

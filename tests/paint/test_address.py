@@ -8,6 +8,7 @@ from typing import Any
 
 import pytest
 from fake_session import FakeSession
+from patience import PATIENCE_S
 
 from lightpaint.errors import PaintError
 from lightpaint.paint.server import address
@@ -70,7 +71,7 @@ def test_who_can_reach_it_is_known_and_its_address_leads_there(
 ) -> None:
     listener, its_address = listen(host, 0)
     with listener:
-        listener.settimeout(60)
+        listener.settimeout(PATIENCE_S)
         listener.accept()[0].close()  # it has been tried
         assert its_address.reach is reach
         assert its_address.name == (name or its_address.name)
@@ -129,7 +130,7 @@ def test_the_page_is_there_where_the_address_says(monkeypatch: pytest.MonkeyPatc
     serving.start()
     try:
         for url in (server.url, server.one_time_url()):
-            with urllib.request.urlopen(url, timeout=60) as answer:
+            with urllib.request.urlopen(url, timeout=PATIENCE_S) as answer:
                 assert answer.status == 200
     finally:
         server.stop()

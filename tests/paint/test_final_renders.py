@@ -4,11 +4,12 @@ from collections.abc import Callable
 from copy import copy
 from pathlib import Path
 from threading import Event
-from typing import Any
+from typing import Any, Literal
 
 import numpy as np
 import pytest
 from moving import MovingStudio, stroke
+from patience import PATIENCE_S
 from PIL import Image
 from renderer import mitsuba_render, write_room
 
@@ -109,6 +110,44 @@ def test_a_page_that_opens_later_finds_the_renders_and_their_files(moving: Movin
     assert png.exists()
 
 
+def test_renders_are_listed_again_by_a_painter_that_is_started_anew(
+    moving: MovingStudio, tmp_path: Path
+) -> None:
+    """Small pictures come from the files; a render that was interrupted is stopped."""
+    stroke(moving, 1)
+    formats: list[tuple[Literal["exr", "png"], ...]] = [("exr", "png"), ("exr",), ("png",)]
+    for number, some in enumerate(formats, start=1):
+        moving.send(request(formats=some))
+        wait_for(moving, "done", number)
+    before = moving.studio.state().fields["renders"]
+    pictures = [moving.studio.resource(f"render/{number}") for number in (1, 2)]
+    moving.send(request(width=256, spp=ENDLESS_SPP))
+    wait_for(moving, "rendering", 4)
+    moving.close()
+    [png] = (Path(x) for x in before[2]["files"] if x.endswith(".png"))
+    png.unlink()
+    Path(before[1]["files"][-1]).unlink()
+    other = MovingStudio(tmp_path)
+    first, second, last = other.studio.state().fields["renders"]
+    assert first == before[0]
+    assert second == {**before[1], "files": before[1]["files"][:-1]}
+    assert (last["id"], last["state"], last["files"]) == (4, "stopped", [])
+    for number, picture in zip((1, 2), pictures, strict=True):
+        again = other.studio.resource(f"render/{number}")
+        np.testing.assert_allclose(again.astype(int), picture, atol=1)  # 16 bits, float32
+    with pytest.raises(PaintError, match="no picture"):
+        other.studio.resource("render/3")
+    other.send(protocol.DropRender(4))
+    [listed] = other.send(request(formats=("png",)))
+    assert [x["id"] for x in listed.fields["renders"]] == [1, 2, 3]
+    wait_for(other, "done", 3)
+    other.close()
+    third = MovingStudio(tmp_path)
+    states = [(x["id"], x["state"]) for x in third.studio.state().fields["renders"]]
+    assert states == [(1, "done"), (2, "done"), (3, "done")]
+    third.close()
+
+
 def test_a_final_render_can_be_stopped_and_leaves_nothing(
     moving: MovingStudio, tmp_path: Path
 ) -> None:
@@ -141,7 +180,7 @@ def test_final_renders_go_in_the_order_of_their_requests(
 
         def late(check: Callable[[], None]) -> Any:
             answer = exact_answer(check)
-            assert is_second_answered.wait(60)
+            assert is_second_answered.wait(PATIENCE_S)
             return answer
 
         def early(check: Callable[[], None]) -> Any:

@@ -18,6 +18,7 @@ from displays import FREE_DISPLAY
 from layered_sessions import SIZES, RandomEditor, bases_of, identity_of, open_session
 from nightly import FIFTHS, fifth_of
 from paint_programs import needs, run
+from patience import PATIENCE_S
 from PIL import Image
 
 import lightpaint as lp
@@ -375,7 +376,7 @@ def opened(subject: Subject) -> Iterator[tuple[Studio, list[Message]]]:
 
 def wait_for(messages: list[Message], *kinds: str) -> Message:
     """The first message of these kinds."""
-    deadline = time.monotonic() + 60
+    deadline = time.monotonic() + PATIENCE_S
     while time.monotonic() < deadline:
         for message in list(messages):
             if message.kind in kinds:

@@ -15,6 +15,7 @@ from typing import Any
 import numpy as np
 import pytest
 from moving import MovingStudio, exact_answer, opened_rig, pixel_of, place_lights, stroke
+from patience import PATIENCE_S
 from renderer import LIGHTS, write_room
 
 import lightpaint as lp
@@ -24,8 +25,8 @@ from lightpaint.cli.commands.paint_command import command_for_paintings
 from lightpaint.errors import LightpaintError
 from lightpaint.paint import protocol
 from lightpaint.paint.rig import lamp_rig
+from lightpaint.paint.rig.light_placer import SearchNotes
 from lightpaint.paint.rig.rig_state import rig_state
-from lightpaint.paint.rig.search_notes import SearchNotes
 from lightpaint.paint.session.request_changes import changed_requests
 from lightpaint.paint.store.session_requests import SessionRequests
 from lightpaint.paint.store.store import Store
@@ -149,7 +150,7 @@ def test_a_receiver_with_a_lock_may_change_the_session_while_it_is_sent_planes(
         moving.wait(lambda: not studio.rig.unrendered(studio.session.requests.placed))
         for _ in range(10):  # meanwhile a thread offers what it has rendered
             time.sleep(0.1)
-            assert studio._access.lock.acquire(timeout=5)
+            assert studio._access.lock.acquire(timeout=PATIENCE_S)
             studio._access.lock.release()
     moving.rendered()
 
@@ -447,7 +448,7 @@ def paint_moved_bulb(moving: MovingStudio, position: tuple[float, float, float])
 def test_a_search_ends_with_the_best_so_far_and_leaves_a_note(
     dim_room: MovingStudio, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """What was found by then becomes a step, and the note is there when the session opens again."""
+    """The best by then becomes a step, and the note is there when the session opens again."""
     moving, position = dim_room, (-0.1, 1.2, 0.6)
     paint_moved_bulb(moving, position)
     old = moving.scene.light("bulb").members[0].site

@@ -8,6 +8,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from patience import PATIENCE_S
 from renderer import LIGHTS, write_room
 
 from lightpaint.basis.cache.denoised_planes import read_denoised_planes
@@ -34,7 +35,7 @@ def subject(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Subject:
     return Subject(str(room), tmp_path, scene=load_scene(room), settings=settings)
 
 
-def wait_until(is_so: Callable[[], Any], seconds: float = 120) -> None:
+def wait_until(is_so: Callable[[], Any], seconds: float = PATIENCE_S) -> None:
     end = time.monotonic() + seconds
     while not is_so():
         assert time.monotonic() < end

@@ -13,6 +13,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from patience import PATIENCE_S
 from studio_client import StudioClient
 
 import lightpaint as lp
@@ -226,9 +227,9 @@ def test_an_export_can_be_stopped(
     client.paint(1, 0.8)
     client.exact()
     client.studio.handle(protocol.Export(("lighting", "report")), {})
-    assert has_begun.wait(60)
+    assert has_begun.wait(PATIENCE_S)
     client.studio.handle(protocol.Export((), run=False), {})
-    exported = client.wait(lambda m: m.kind == "exported", seconds=5)
+    exported = client.wait(lambda m: m.kind == "exported")
     files = [str(tmp_path / name) for name in ("painting.exr", "lighting.json")]
     assert exported.fields == {"files": files, "command": "", "is_stopped": True}
     client.messages.clear()
@@ -259,14 +260,14 @@ def test_denoised_planes_of_few_samples_do_until_there_are_better_ones(
     def denoise_to_halves(noisy_basis: lp.Basis, k: int) -> Any:
         if noisy_basis.images is better.images:
             is_taken.set()
-            release.wait(30)
+            release.wait(PATIENCE_S)
         cleaned.append(noisy_basis)
         return real(noisy_basis, k)
 
     monkeypatch.setattr(plane_denoiser, "denoise_to_halves", denoise_to_halves)
     monkeypatch.setattr(session_bases, "obtain_bases", lambda *_: iter([[basis], [better]]))
     client = StudioClient(tmp_path, basis)
-    assert is_taken.wait(30)
+    assert is_taken.wait(PATIENCE_S)
     assert len(cleaned) == len(basis.lights)
     fields = client.studio.state().fields
     for k, light in enumerate(fields["lights"]):
@@ -305,7 +306,7 @@ def test_what_is_said_comes_in_the_order_in_which_it_came_about(
 
     def obtain_bases(*_: Any) -> Iterator[list[lp.Basis]]:
         yield [basis]
-        assert release.wait(30)
+        assert release.wait(PATIENCE_S)
         yield [better]
 
     def slow(self: Publisher, message: Message | None) -> None:
@@ -318,7 +319,7 @@ def test_what_is_said_comes_in_the_order_in_which_it_came_about(
     monkeypatch.setattr(session_bases, "obtain_bases", obtain_bases)
     client = StudioClient(tmp_path, basis)
     release.set()
-    assert is_telling.wait(30)
+    assert is_telling.wait(PATIENCE_S)
     client.studio.publisher.publish_picture("verified", np.zeros((*SIZE, 3), np.float16))
     client.wait(lambda _: sum(m.kind == "state" for m in client.messages) == 2)
     client.wait(lambda m: m.kind == "renewed" and "verified" in m.fields["resources"])
@@ -675,12 +676,12 @@ def test_a_render_that_is_stopped_before_it_begins_does_not_begin(
 
     def slow(snapshot: SessionSnapshot) -> Any:
         has_begun.set()
-        release.wait(30)
+        release.wait(PATIENCE_S)
         return solution(snapshot)
 
     monkeypatch.setattr(SessionSnapshot, "solution", slow)
     client.studio.handle(protocol.Verify(), {})
-    assert has_begun.wait(30)
+    assert has_begun.wait(PATIENCE_S)
     client.studio.handle(protocol.Verify(run=False), {})
     release.set()
     client.wait(is_stopped)
@@ -714,13 +715,13 @@ def test_what_is_painted_while_an_answer_is_sought_is_answered_too(
     def slow(snapshot: SessionSnapshot) -> Any:
         if threading.current_thread().name == "lightpaint-export":
             has_begun.set()
-        release.wait(30)
+        release.wait(PATIENCE_S)
         return solution(snapshot)
 
     monkeypatch.setattr(SessionSnapshot, "solution", slow)
     client.paint(1, 0.8)
     client.studio.handle(protocol.Export(("target", "lighting")), {})
-    assert has_begun.wait(30)
+    assert has_begun.wait(PATIENCE_S)
     painted = client.studio.session.views[0].image.copy()
     answer = client.paint(2, 0.1, (3, 12, 16, 30))
     assert answer.fields["stroke"] == 2  # at once

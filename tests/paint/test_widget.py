@@ -21,6 +21,7 @@ from weakref import ref
 import numpy as np
 import pytest
 from nightly import nightly
+from patience import PATIENCE_S
 from renderer import LIGHTS, REPOSITORY, write_room
 
 import lightpaint as lp
@@ -134,7 +135,7 @@ def _arrays(content: Any, buffers: Any) -> dict[str, Any]:
 
 def wait_for(condition: Callable[[], Any]) -> Any:
     """What it gives, once it does."""
-    end_s = time.monotonic() + 60
+    end_s = time.monotonic() + PATIENCE_S
     while not (result := condition()):
         assert time.monotonic() < end_s
         time.sleep(0.01)
@@ -511,7 +512,7 @@ def test_messages_about_a_basis_come_while_nobody_holds_the_session(
     forward, was_free = studio.on_message, []
 
     def is_free() -> bool:
-        has_lock = studio._access.lock.acquire(timeout=20)
+        has_lock = studio._access.lock.acquire(timeout=PATIENCE_S)
         if has_lock:
             studio._access.lock.release()
         return has_lock

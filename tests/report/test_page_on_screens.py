@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 import pytest
 from nightly import nightly
+from patience import PATIENCE_S
 
 from lightpaint.images.estimate import Estimate
 from lightpaint.lighting.analysis.analysis import without_constraints
@@ -91,7 +92,10 @@ def _laid_out(folder: Path, page: str) -> dict[int, tuple[int, int]]:
     wait = "--virtual-time-budget=10000"
     url = (folder / "screens.html").as_uri()
     completed = subprocess.run(
-        [program, *options, wait, "--dump-dom", url], capture_output=True, timeout=120, check=False
+        [program, *options, wait, "--dump-dom", url],
+        capture_output=True,
+        timeout=PATIENCE_S,
+        check=False,
     )
     sizes = re.findall(r"&lt;(\d+) (\d+) (\d+)&gt;", completed.stdout.decode())
     assert len(sizes) == len(WIDTHS), completed.stderr.decode()[-2000:]

@@ -19,6 +19,7 @@ from lightpaint.display_text import some_names
 from lightpaint.errors import LOOK_ERRORS, BatchError, LightpaintError
 from lightpaint.lighting.answer.lighting_file import read_lighting
 from lightpaint.lighting.constraints.constraints import Constraints
+from lightpaint.lighting.constraints.start_lighting import start_weights
 from lightpaint.lighting.problem_sums import reason_against_sums
 from lightpaint.lighting.unknowns.constraint_reduction import reduce_to
 from lightpaint.pipeline.job.job import Job
@@ -70,6 +71,8 @@ def collect_errors(entry: LookEntry, cache: WorkerCache, mistakes: Mistakes) -> 
     if lights is not None:
         for part in _split_constraints(entry.constraints):
             attempt(partial(reduce_to, part, lights))
+        for name, emission in entry.constraints.start.items():
+            attempt(partial(start_weights, {name: emission}, lights))
 
 
 def _split_constraints(constraints: Constraints) -> Iterator[Constraints]:
@@ -78,7 +81,7 @@ def _split_constraints(constraints: Constraints) -> Iterator[Constraints]:
         yield Constraints(lights=(light,))
     for tie in constraints.ties:
         yield Constraints(ties=(tie,))
-    yield Constraints(prefer_current=constraints.prefer_current, sparse=constraints.sparse)
+    yield replace(constraints, lights=(), ties=(), start={})
 
 
 def check_by_sums(job: Job) -> None:
@@ -87,6 +90,8 @@ def check_by_sums(job: Job) -> None:
     reason = reason_against_sums(view.target, job.fit)
     if not reason and view.basis is None and view.scene is not None:
         reason = why_not_one_pass(view.scene) or ""
+    if job.all_constraints.near:
+        reason = "near depends on the area of the paint"
     if job.all_rigging:
         reason = "lights may move in it, unless move_lights is false"
     if reason:

@@ -202,7 +202,7 @@ class Constraints:
             _parse_ties(tie, f"{lead}tie"),
             parse_strength(prefer_current, f"{lead}prefer_current"),
             parse_count(sparse, f"{lead}sparse"),
-            parse_start(start or {}, f"{lead}start"),
+            parse_start({} if start is None else start, f"{lead}start"),
             parse_strength(near, f"{lead}near"),
         )
 

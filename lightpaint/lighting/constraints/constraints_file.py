@@ -44,6 +44,8 @@ def constraints_of(requests: SceneRequests) -> Constraints:
             tie=keys.get("tie", ()),
             prefer_current=strength,
             sparse=keys.get("sparse"),
+            start=keys.get("start", {}),
+            near=keys.get("near", 0.0),
             where=requests.source,
         )
     except ConstraintError as error:

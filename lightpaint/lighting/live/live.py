@@ -53,8 +53,8 @@ WHITE_STEPS = 2
 #: Width, in pieces of a range of white, of the window in which a light first finds its white.
 WHITE_WIDTH = 8
 
-#: Painted pixels that determine the colours lights may take, about.
-GAMUT_PIXELS = 2**8
+#: Painted blocks that determine the colours lights may take, about, and at least of each wish.
+GAMUT_BLOCKS, GAMUT_WISH_BLOCKS = 2**8, 2**5
 
 
 class LiveSolver:
@@ -78,6 +78,7 @@ class LiveSolver:
         self._basis = views[0].basis
         self._films: tuple[tuple[LiveView, ...], Films] | None = None
         self._start: Mapping[str, RGB] = {}
+        self._washed: Wash | None = None
         self.constrain(fit, constraints)
 
     def constrain(self, fit: Fit, constraints: Constraints) -> None:
@@ -132,6 +133,7 @@ class LiveSolver:
         for each of its places, so linear light, too, is averaged to a few thousand pixels.
         """
         views = tuple(view for view in self._views if view.is_painted)
+        self._washed = None
         if not views:
             return self._unpainted_answer()
         if not self._is_kept_to:
@@ -177,8 +179,21 @@ class LiveSolver:
             self._within = self._reduction
 
     def _wash(self, views: tuple[LiveView, ...]) -> Wash:
-        """Return the paintings and their lights, averaged over the films."""
-        return self._joint_films(views).wash([view.layers for view in views])
+        """Return the paintings and their lights, averaged over the films; once for an answer."""
+        if self._washed is None:
+            self._washed = self._joint_films(views).wash([view.layers for view in views])
+        return self._washed
+
+    def _painted_light(self, views: tuple[LiveView, ...]) -> PaintedLight:
+        """Sample the painted blocks, small wishes as well as what is around them."""
+        wash = self._wash(views)
+        blocks, weight = wash.sample(GAMUT_BLOCKS, GAMUT_WISH_BLOCKS)
+        return PaintedLight(
+            wash.rows[:, :, blocks].transpose(1, 2, 0),
+            wash.painted[:, blocks].T,
+            weight,
+            self._joint_films(views).albedo[:, blocks].T,
+        )
 
     def _with_gamuts(self, views: tuple[LiveView, ...]) -> Reduction:
         """Return the unknowns, with the gamuts that the painted views allow.
@@ -189,7 +204,7 @@ class LiveSolver:
             return self._reduction
         confined = self._within
         if confined.gamuts is None or self._gamuts_of != views:
-            painted = partial(PaintedLight.of, [x.painting for x in views], max_pixels=GAMUT_PIXELS)
+            painted = partial(self._painted_light, views)
             is_texel = texel_lights(self._basis.lights)
             is_bold = self._fit.colors == "free"
             power, own = _power(views), self._reference

@@ -113,6 +113,10 @@ class SmallFilm:
         small = np.stack([self._average(x) for x in basis.planes])
         # float32 suffices for averages, and sums of it take half the time.
         planes = small.reshape(len(small), -1, 3).transpose(2, 0, 1)
+        #: (3, p), of the visible surfaces; 1 where it is not known.
+        self.albedo: Floats = np.ones(planes.shape[::2], np.float32)
+        if basis.features is not None:
+            self.albedo = _planes(self._average(basis.features.albedo))
         self.rows = np.ascontiguousarray(planes, np.float32)
         self._current = _planes(self._average(basis.current_look))
         self._painted = self._current.copy()
@@ -233,6 +237,11 @@ class Films:
         """Join the planes of the films again, after some were replaced."""
         rows = [film.rows for film in self._films]
         self._rows = rows[0] if len(rows) == 1 else np.concatenate(rows, axis=2)
+
+    @property
+    def albedo(self) -> Floats:
+        """The albedo of all blocks, (3, p)."""
+        return np.concatenate([film.albedo for film in self._films], axis=1)
 
     def wash(self, layers: Sequence[LayerWishes]) -> Wash:
         """Return the washes of all views behind each other. layers: of each, as for `SmallFilm`."""

@@ -12,7 +12,7 @@ from math import ceil
 
 import numpy as np
 
-from lightpaint.arrays import Doubles, Floats
+from lightpaint.arrays import Doubles, Floats, Indices
 from lightpaint.basis.basis import Basis
 from lightpaint.basis.derived_planes import block_means
 from lightpaint.colour.color import luminance
@@ -117,6 +117,28 @@ class Wash:
             wishes[first : first + len(view.wishes), start : start + view.counts.size] = view.wishes
             first += len(view.wishes)
         return cls(**joined, wishes=wishes)
+
+    def sample(self, count: int, count_of_wish: int) -> tuple[Indices, Doubles]:
+        """Return about `count` painted blocks, (m,), and the number of painted pixels for which
+        each stands, (m,).
+
+        At least `count_of_wish` of them are of each wish, if it has so many.
+        """
+        amount = self.importance * self.counts
+        owners = np.zeros(amount.size, np.intp)
+        for k, area in enumerate(self.wishes):
+            owners[area > 0.5] = k + 1
+        owners[amount <= 0] = -1
+        total = max(int((amount > 0).sum()), 1)
+        blocks, weights = [], []
+        for k in range(len(self.wishes) + 1):
+            own = np.flatnonzero(owners == k)
+            least = min(max(count * own.size // total, count_of_wish), own.size)
+            chosen = own[:: max(1, own.size // max(least, 1))]
+            blocks.append(chosen)
+            sampled = amount[chosen].sum()
+            weights.append(amount[chosen] * (amount[own].sum() / sampled if sampled > 0 else 0))
+        return np.concatenate(blocks), np.concatenate(weights)
 
     def light_sums(self, weights: Doubles) -> Doubles:
         """Return sums of the lights over blocks with each of k weights, (3, n, k).

@@ -1,7 +1,7 @@
 """A background search for better places of lights, or for new lights; its result is one step."""
 
 import time
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
 from typing import Any
 
@@ -15,6 +15,7 @@ from lightpaint.paint.protocol import (
     PlaceLights,
     PlacingEstimate,
     PlacingResult,
+    SearchInfo,
     TaskStarted,
     TrialPlaces,
 )
@@ -22,11 +23,12 @@ from lightpaint.paint.publisher import Publisher
 from lightpaint.paint.rig.added_lights import free_name, values_of
 from lightpaint.paint.rig.lamp_rig import LampRig
 from lightpaint.paint.rig.moved_subjects import of_moved_scenes
-from lightpaint.paint.rig.search_notes import SearchNotes
 from lightpaint.paint.session.moved_lights import Placed
 from lightpaint.paint.session.snapshot import SessionSnapshot
 from lightpaint.paint.session_access import SessionAccess
 from lightpaint.paint.store.session_requests import HOLD_KEYS
+from lightpaint.paint.store.store import Store
+from lightpaint.paint.stored_records import StoredRecords
 from lightpaint.placement.freedom import Freedom
 from lightpaint.placement.new_lights import NewLights
 from lightpaint.placement.place import place
@@ -49,8 +51,41 @@ NOTHING_BETTER = (
     "Nothing better within these freedoms: no change reliably removes a hundredth of the error."
 )
 
+#: Number of notes on searches that a session keeps.
+MAX_NOTES = 200
+
 #: Seconds between updates of the trial places that pages show during a search.
 WATCH_S = 0.15
+
+
+class SearchNotes:
+    """Notes on the searches of a session: what was tried, and the results. store: keeps them.
+
+    They stand in the history beside its steps. A search that finds nothing changes nothing, so it
+    is no step; without a note, nobody would know later that it was tried.
+    """
+
+    def __init__(self, store: Store) -> None:
+        self._store = store
+        self._records = StoredRecords(store, "searches", SearchInfo)
+        self._notes = self._records.read()
+
+    def add(self, title: str, text: str, tried: Sequence[str], seconds: float) -> SearchInfo:
+        """Keep a note on a search that has just ended, after the step that is the last one now.
+
+        title: what was searched for. text: the result. tried: sentences on what was tried.
+        """
+        number = max((note.id for note in self._notes), default=0) + 1
+        stamp, after = time.time(), self._store.last_id
+        note = SearchInfo(number, after, title, text, tuple(tried), stamp, round(seconds, 1))
+        self._notes = [*self._notes, note][-MAX_NOTES:]
+        self._records.write(self._notes)
+        return note
+
+    def listed(self) -> tuple[SearchInfo, ...]:
+        """Return the notes whose step still exists, the oldest first."""
+        ids = {0, *self._store.step_ids}
+        return tuple(note for note in self._notes if note.after in ids)
 
 
 class _OutdatedError(Exception):

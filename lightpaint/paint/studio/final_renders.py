@@ -1,4 +1,4 @@
-"""Final renders of a session's answers: in the background, one at a time, kept over reloads."""
+"""Final renders of a session's answers: in the background, one at a time, kept with the session."""
 
 from collections.abc import Callable, Mapping
 from contextlib import suppress
@@ -18,6 +18,8 @@ from lightpaint.paint.protocol import Message, RenderInfo, RenderList
 from lightpaint.paint.publisher import Publisher
 from lightpaint.paint.session.picture_table import Picture, display_thumbnail
 from lightpaint.paint.session.snapshot import SessionSnapshot
+from lightpaint.paint.session_access import SessionAccess
+from lightpaint.paint.stored_records import StoredRecords
 from lightpaint.paint.studio.export_folders import RENDERS, folder_name, new_folder
 from lightpaint.paint.subject import Subject
 from lightpaint.progress import cancellable
@@ -32,14 +34,18 @@ _PATIENCE = 0.2
 #: States in which nothing happens any more.
 ENDED = ("done", "stopped", "failed")
 
+#: Names of the pictures that a render is written as, by format.
+PICTURES = {"exr": "render.exr", "png": "render.png"}
+
 #: The exact answer, with the scenes that it is for; its argument raises to stop.
 ExactAnswer = Callable[[Callable[[], None]], tuple[tuple[Subject, ...], SessionSnapshot, Lighting]]
 
 
 class FinalRenders:
-    """The final renders that pages have requested since the painter was started.
+    """The final renders that pages have requested, also before the painter was started anew.
 
-    subjects: the views. exact_answer: as `BackgroundJobs.exact_answer`.
+    access: the session, which keeps the list. subjects: the views. exact_answer: as
+    `BackgroundJobs.exact_answer`.
 
     Attributes:
         infos: Their descriptions, the oldest first.
@@ -47,14 +53,16 @@ class FinalRenders:
 
     def __init__(
         self,
+        access: SessionAccess,
         publisher: Publisher,
         threads: BackgroundThreads,
         subjects: tuple[Subject, ...],
         exact_answer: ExactAnswer,
     ) -> None:
-        self._publisher, self._threads = publisher, threads
+        self._access, self._publisher, self._threads = access, publisher, threads
         self._subjects, self._exact_answer = subjects, exact_answer
         self._infos: dict[int, RenderInfo] = {}
+        self._records: StoredRecords[RenderInfo] | None = None  # until there is a session
         self._previews: dict[int, Picture] = {}
         self._change, self._turn = Condition(), Lock()
         publisher.pictures.offer_family("render", self._preview)
@@ -62,7 +70,32 @@ class FinalRenders:
 
     @property
     def infos(self) -> tuple[RenderInfo, ...]:
-        return tuple(self._infos.values())
+        with self._change:
+            self._open_records()
+            return tuple(self._infos.values())
+
+    def _open_records(self) -> StoredRecords[RenderInfo] | None:
+        """Return the records in the session file, whose renders are listed; None without a session.
+
+        A render that the end of the painter has interrupted is stopped. Files that are gone are no
+        longer listed, nor are renders without a picture.
+        """
+        if self._records is None and (store := self._access.store) is not None:
+            self._records = StoredRecords(store, "renders", RenderInfo)
+            for info in self._records.read():
+                if info.state not in ENDED:
+                    self._infos[info.id] = replace(info, state="stopped")
+                    continue
+                files = tuple(file for file in info.files if Path(file).is_file())
+                has_picture = any(Path(file).name in PICTURES.values() for file in files)
+                if has_picture or info.state != "done":
+                    self._infos[info.id] = replace(info, files=files)
+        return self._records
+
+    def _store_infos(self) -> None:
+        """Write the list into the session file."""
+        if (records := self._open_records()) is not None:
+            records.write(list(self._infos.values()))
 
     def handle(
         self, message: protocol.RenderFinal | protocol.StopRender | protocol.DropRender
@@ -85,6 +118,7 @@ class FinalRenders:
                 with self._change:
                     del self._infos[number]
                     self._previews.pop(number, None)
+                    self._store_infos()
         return [RenderList(renders=self.infos)]
 
     def _start(self, request: protocol.RenderFinal) -> RenderInfo:
@@ -96,6 +130,7 @@ class FinalRenders:
         folder_name(request.name)
         check_writable(self._subjects[request.view].folder / RENDERS)
         with self._change:
+            self._open_records()
             number = max(self._infos, default=0) + 1
             info = RenderInfo(
                 id=number,
@@ -106,6 +141,7 @@ class FinalRenders:
                 formats=request.formats,
             )
             self._infos[number] = info
+            self._store_infos()
         return info
 
     def _run(self, number: int, request: protocol.RenderFinal) -> None:
@@ -161,10 +197,10 @@ class FinalRenders:
         files: list[Path] = []
         with new_folder(subject.folder / RENDERS, request.name) as folder:
             if "exr" in request.formats:
-                files.append(folder / "render.exr")
+                files.append(folder / PICTURES["exr"])
                 write_final_exr(files[-1], picture)
             if "png" in request.formats:
-                files.append(folder / "render.png")
+                files.append(folder / PICTURES["png"])
                 write_final_png(files[-1], picture, snapshot.transform)
             write_answer(folder, lighting)
             files.append(folder / LIGHTING)
@@ -182,6 +218,8 @@ class FinalRenders:
             if self._is_ended(number):
                 return False
             self._infos[number] = replace(self._infos[number], **changes)
+            if "state" in changes:  # and not with every pass
+                self._store_infos()
             self._change.notify_all()
             return True
 
@@ -191,14 +229,32 @@ class FinalRenders:
             self._publisher.publish_made(lambda: RenderList(renders=self.infos))
 
     def _find(self, number: int) -> RenderInfo:
-        if number not in self._infos:
+        if number not in {info.id for info in self.infos}:
             raise PaintError(f"there is no render {number}")
         return self._infos[number]
 
     def _preview(self, name: str) -> Picture:
-        if not name.isdecimal() or int(name) not in self._previews:
+        number = int(name) if name.isdecimal() else 0
+        info = next((x for x in self.infos if x.id == number and x.state == "done"), None)
+        if info is None:
             raise PaintError(f"there is no picture {f'render/{name}'[:40]!r}")
-        return self._previews[int(name)]
+        if number not in self._previews:
+            self._previews[number] = self._preview_of_files(info)
+        return self._previews[number]
+
+    def _preview_of_files(self, info: RenderInfo) -> Picture:
+        """Return the small picture of a render of before. Raises LightpaintError without a file."""
+        # Imported here, as what renders is.
+        from lightpaint.images.picture import read_picture
+        from lightpaint.pipeline.relit_renders import DENOISED
+
+        by_name = {Path(file).name: file for file in info.files}
+        if file := by_name.get(PICTURES["png"]):
+            picture = read_picture(file)
+        else:
+            picture = read_picture(by_name[PICTURES["exr"]], layer=DENOISED)
+        transform = picture.transform or self._access.session.transform
+        return display_thumbnail(picture.image, transform, PREVIEW_SIDE)
 
     def _file(self, name: str) -> Picture:
         """Return the bytes of a finished render's file, uint8. name: as in `2/render.png`."""

@@ -66,7 +66,7 @@ class RequestHandler:
         self._subjects = mover.rig.subjects
         self._imports = LayerImports(access, publisher, threads, exact_answers.notify)
         self._references = ReferenceImports(access, publisher, threads)
-        self._renders = FinalRenders(publisher, threads, self._subjects, jobs.exact_answer)
+        self._renders = FinalRenders(access, publisher, threads, self._subjects, jobs.exact_answer)
         self._placer = LightPlacer(access, publisher, mover.rig, threads, self._hang_lights)
 
     def state(self) -> SessionState | SessionPending:

@@ -21,7 +21,7 @@ from lightpaint.validation import MAX_LISTED, MAX_NAME
 
 SUFFIX = ".lights.toml"
 #: Keys of constraints for the solve.
-CONSTRAINTS = ("light", "tie", "prefer_current", "sparse")
+CONSTRAINTS = ("light", "tie", "prefer_current", "sparse", "start", "near")
 #: Older key for `prefer_current`, as in `prefer = { current = 0.01 }`.
 OLDER = ("prefer",)
 #: Keys of permitted moves, and those of a light in `[light.NAME]`.
@@ -104,7 +104,9 @@ class SceneRequests:
         """Names and patterns of lights with constraints."""
         lights, ties = self.keys.get("light"), self.keys.get("tie")
         named = lights if isinstance(lights, dict) else ()
-        return (*named, *_texts(ties), *_texts(self.keys.get("pair")))
+        start = self.keys.get("start")
+        started = start if isinstance(start, dict) else ()
+        return (*named, *started, *_texts(ties), *_texts(self.keys.get("pair")))
 
 
 @dataclass(frozen=True)

@@ -93,6 +93,10 @@ def test_mistakes_are_refused_in_one_line(room: Path, make_basis: Any):
         ({"light": {"blub": {"off": True}}}, r"hall\.toml: light\.blub: no light 'blub'; did you"),
         ({"tie": 3}, r"hall\.toml: tie is 3"),
         ({"prefer_current": "x"}, r"hall\.toml: prefer_current is 'x': expected a strength"),
+        ({"near": -1}, r"hall\.toml: near is -1: expected a strength"),
+        ({"start": 0}, r"hall\.toml: start is 0: expected emissions"),
+        ({"start": {"bulb": [1, 2]}}, r"hall\.toml: start\.bulb is \[1, 2\]: expected"),
+        ({"start": {"blub": [1, 1, 1]}}, r"start: no light 'blub'; did you mean 'bulb'"),
         ({"prefer": {"current": "x"}}, r"hall\.toml: prefer\.current is 'x'"),
         ({"prefer": {"past": 1}}, r"hall\.toml: prefer.*known are current"),
         ({"prefer": 1, "prefer_current": 1}, r"hall\.toml: both prefer_current and prefer"),
@@ -130,6 +134,19 @@ def test_the_pull_has_the_name_it_has_in_python_and_the_one_of_older_files(
     path.write_text(message, encoding="utf-8")
     assert read_constraints(path) == lp.Constraints.of(prefer_current=0.01)
     assert read_lights_file(path).requests.keys
+
+
+def test_a_solve_starts_from_the_lighting_in_the_file(make_basis: Any, tmp_path: Path):
+    path = tmp_path / "a.lights.toml"
+    path.write_text("near = 0.2\n[start]\nbulb = [0.1, 0.2, 0.3]\n", encoding="utf-8")
+    constraints = lp.Constraints.of(start={"bulb": (0.1, 0.2, 0.3)}, near=0.2)
+    assert read_constraints(path) == constraints
+    basis = make_basis(2, names=("panel", "bulb"))
+    target = _target(basis)
+    by_file = lp.solve(basis.with_requests(read_lights_file(path).requests), target)
+    by_argument = lp.solve(basis, target, constraints=constraints)
+    np.testing.assert_array_equal(by_file.weights, by_argument.weights)
+    assert not np.allclose(by_file.weights, lp.solve(basis, target).weights, rtol=1e-3)
 
 
 def test_all_views_heed_it(make_basis: Any):

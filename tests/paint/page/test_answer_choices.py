@@ -135,7 +135,7 @@ def test_a_share_that_nothing_was_asked_of_is_left_out(painter: Painter) -> None
 
 @pytest.mark.parametrize("viewport", [(1440, 900), (1240, 720), (1920, 1080)], ids=str)
 def test_they_move_nothing(new_painter: Any, viewport: tuple[int, int]) -> None:
-    """What is around them stays where it is when they come."""
+    """All that is around them stays where it is when they come."""
     width, height = viewport
     painter = new_painter(viewport={"width": width, "height": height})
     boxes = ".stage, .choices, .answer, .looks"

@@ -18,6 +18,7 @@ from typing import Any
 import numpy as np
 import pytest
 from foreign_server import ForeignServer
+from patience import PATIENCE_S
 from websockets.sync.client import ClientConnection, connect
 
 import lightpaint as lp
@@ -28,9 +29,6 @@ from lightpaint.paint.studio.studio import Studio
 from lightpaint.paint.subject import Subject
 
 PAINTER = "document.getElementById('lightpaint').painter"
-
-#: Seconds in which anything happens on a busy machine.
-PATIENCE_S = 60.0
 
 
 class Firefox:

@@ -49,7 +49,6 @@ def foreign_server() -> Iterator[ForeignServer]:
 def open_tab(browser: Any) -> Iterator[Any]:
     """Opens tabs of one browser."""
     context = browser.new_context(viewport={"width": 1280, "height": 720})
-    context.set_default_timeout(60_000)
     yield context.new_page
     context.close()
 

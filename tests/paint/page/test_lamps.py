@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 import pytest
 from axe import violations
+from patience import PATIENCE_S
 from renderer import write_room
 
 from lightpaint.paint.server.server import Server
@@ -23,7 +24,7 @@ from lightpaint.scene.scene_reader import load_scene
 PAINTER = "document.getElementById('lightpaint').painter"
 
 
-def wait_until(is_so: Callable[[], Any], seconds: float = 60) -> Any:
+def wait_until(is_so: Callable[[], Any], seconds: float = PATIENCE_S) -> Any:
     end = time.monotonic() + seconds
     while not (value := is_so()):
         assert time.monotonic() < end

@@ -96,7 +96,7 @@ def painted(painter: Painter) -> Any:
 
 
 def test_a_press_makes_a_layer_over_the_whole_picture(new_painter: Any) -> None:
-    """What is pressed is neutral and as bright as before; so is all else as bright. One step."""
+    """The place is neutral and as bright as before; so is all else as bright. One step."""
     painter = open_shipped(new_painter)
     before = painted(painter)
     press(painter, 36, 8)

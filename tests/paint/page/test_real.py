@@ -17,6 +17,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from patience import PATIENCE_S
 from renderer import REPOSITORY
 
 import lightpaint as lp
@@ -46,6 +47,19 @@ UNPAINTED = "Nothing is painted: the answer is the current lighting."
 PAINTER = "document.getElementById('lightpaint').painter"
 
 
+#: Counts in `window.losses` how often a page says that its connection is lost, also where that is
+#: said for less time than a busy machine needs to look.
+COUNT_LOSSES = """
+  let wasShown = false;
+  window.losses = 0;
+  new MutationObserver(() => {
+    const isShown = document.body.textContent.includes('The connection is lost');
+    window.losses += isShown && !wasShown;
+    wasShown = isShown;
+  }).observe(document.body, { childList: true, subtree: true, characterData: true });
+"""
+
+
 #: Codes of what is on a canvas, of which the page itself reads nothing; none for another element.
 PIXELS_OF = """(element) => {
   const { width = 0, height = 0 } = element;
@@ -57,7 +71,7 @@ PIXELS_OF = """(element) => {
 }"""
 
 
-def wait_until(is_so: Callable[[], Any], description: str, seconds: float = 60) -> Any:
+def wait_until(is_so: Callable[[], Any], description: str, seconds: float = PATIENCE_S) -> Any:
     """What is looked for, once it is so."""
     end = time.monotonic() + seconds
     while not (value := is_so()):
@@ -266,7 +280,6 @@ def open_page(browser: Any) -> Iterator[Callable[..., PainterUser]]:
         context_options = {"viewport": VIEWPORT, **options}
         context = beside.page.context if beside else browser.new_context(**context_options)
         contexts.append(context)
-        context.set_default_timeout(60_000)
         page = context.new_page()
         page.on("response", lambda r: errors.append(r.url) if r.status >= 400 else None)
         page.on("pageerror", lambda error: errors.append(str(error)))
@@ -463,9 +476,10 @@ def test_a_pen_paints_with_its_pressure_and_fingers_paint_and_zoom(
 def test_strokes_outlive_their_connection(served_painter: ServedPainter, open_page: Any) -> None:
     user = open_page(served_painter).ready()
     lost_notice = user.page.get_by_text("The connection is lost")
+    user.look(COUNT_LOSSES)
     user.press(*FIRM).drag(user.at(20, 20), user.at(30, 20), hold=True)
     user.look("host.socket.close()")
-    lost_notice.wait_for()
+    user.page.wait_for_function("() => window.losses === 1")
     user.page.mouse.move(*user.at(40, 20), steps=3)
     user.page.mouse.up()
     lost_notice.wait_for(state="detached")
@@ -484,7 +498,7 @@ def test_strokes_outlive_their_connection(served_painter: ServedPainter, open_pa
         "  } else receive(message); }"
     )
     user.stroke((60, 40), (80, 40))
-    lost_notice.wait_for()
+    user.page.wait_for_function("() => window.losses === 2")
     lost_notice.wait_for(state="detached")
     user.still("brush", "brush")
     user.press("Control+z", "Control+z")
@@ -547,7 +561,7 @@ def test_pictures_of_the_choices_follow_the_painting_after_a_reload(
     studio = served_painter.studio
 
     def show_the_answers() -> None:
-        """What is on the three small pictures is what the session solved last."""
+        """Wait until the three small pictures show what the session solved last."""
         for k, colors in enumerate(("own", "gentle", "free")):
 
             def is_shown(k: int = k, colors: str = colors) -> bool:

@@ -221,8 +221,8 @@ def test_a_real_painter_looks_like_a_picture_from_the_clipboard(
     page = context.new_page()
     wrong: list[str] = []
     page.on("pageerror", lambda error: wrong.append(str(error)))
-    page.goto(vars(studio)["url"].replace("#", "?view=cpu#"), timeout=60_000)
-    page.wait_for_selector(".lightpaint .tag", timeout=60_000)
+    page.goto(vars(studio)["url"].replace("#", "?view=cpu#"))
+    page.wait_for_selector(".lightpaint .tag")
     give(page, "paste", "dusk.png", png(), "body")
     page.locator(".reference-picture canvas[width='40']").wait_for()
     # Its light is picked as paint: of the brightest rows, nearly of this colour.
@@ -250,7 +250,7 @@ def test_a_real_painter_looks_like_a_picture_from_the_clipboard(
     assert toast.inner_text().startswith("evil.png is damaged")
     assert page.get_by_text("Reading the picture").count() == 0
     page.reload()
-    page.wait_for_selector(".lightpaint .tag", timeout=60_000)
+    page.wait_for_selector(".lightpaint .tag")
     page.get_by_role("button", name="References").first.click()
     assert page.locator(".reference-name").inner_text() == "dusk"
     context.close()

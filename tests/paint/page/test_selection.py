@@ -8,6 +8,7 @@ import pytest
 from axe import violations
 from nightly import nightly
 from painter_page import Painter
+from patience import PATIENCE_S
 
 
 def drag(painter: Painter, *places: tuple[float, float], keys: tuple[str, ...] = ()) -> None:
@@ -179,7 +180,7 @@ def test_ants_march_unless_motion_is_unwanted(new_painter: Any, motion: str) -> 
     )
     painter.still()
     first = second = painter.page.evaluate(ANTS)
-    end = time.monotonic() + (0.3 if motion == "reduce" else 10)
+    end = time.monotonic() + (0.3 if motion == "reduce" else PATIENCE_S)
     while first == second and time.monotonic() < end:
         painter.page.wait_for_timeout(100)
         second = painter.page.evaluate(ANTS)

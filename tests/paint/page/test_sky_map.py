@@ -187,7 +187,7 @@ def map_pixels(painter: Painter) -> Any:
 
 
 def test_the_map_keeps_its_exposure(painter: Painter) -> None:
-    """What is painted much brighter leaves the rest of the map as bright as it was."""
+    """A place that is painted much brighter leaves the rest of the map as bright as it was."""
     unfold(painter)
     before = map_pixels(painter)
     brightness = painter.page.get_by_role("slider", name="Brightness").last

@@ -15,6 +15,7 @@ import numpy as np
 import pytest
 from damaged_files import Case, damage, outcomes, wrong_outcomes
 from nightly import TENTHS, nightly, tenth_of
+from patience import PATIENCE_S
 from renderer import GLOSSY, LIGHTS, PATH, ROOM, write_room
 
 from lightpaint.errors import SceneError
@@ -263,7 +264,7 @@ def test_the_command_says_it_in_one_line(tmp_path: Path, name: str) -> None:
         [sys.executable, "-m", "lightpaint", "lights", "--no-sheet", str(path)],
         capture_output=True,
         text=True,
-        timeout=100,
+        timeout=PATIENCE_S,
     )
     assert completed.returncode == 2
     assert completed.stdout == ""

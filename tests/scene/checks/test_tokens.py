@@ -65,11 +65,11 @@ def test_what_nobody_can_read(broken: str) -> None:
 
 @pytest.mark.parametrize("start", ["<!DOCTYPE a [" + "<!b 'c'>" * 5000, "<a " + "b='c' " * 50_000])
 def test_what_is_broken_is_given_up_at_once(start: str) -> None:
-    start_s = time.perf_counter()
+    start_s = time.process_time()
     with pytest.raises(ValueError, match="cannot read"):
         list(markup(start.encode()))
     # Many times what it takes; what is tried forever takes minutes.
-    assert time.perf_counter() - start_s < 1
+    assert time.process_time() - start_s < 1
 
 
 def test_a_document_type_is_passed_over_with_its_entities() -> None:
