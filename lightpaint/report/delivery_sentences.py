@@ -7,6 +7,7 @@ from lightpaint.lighting.analysis.appearance.appearance import Appearance
 from lightpaint.lighting.analysis.appearance.delivery import (
     Delivery,
     main_deliveries,
+    mean_shares,
     newest_delivery,
     spoken_share,
 )
@@ -14,9 +15,11 @@ from lightpaint.lighting.analysis.appearance.delivery import (
 #: Maximum number of wishes in a list of sentences.
 MAX_WISHES = 4
 
-#: What may bring a wish: where no light reaches it, or none without lighting too much else.
+#: What may bring a wish: where no light reaches it, where none reaches it alone, and where a light
+#: for it lights something else, too.
 REACH_ADVICE = "A light that hangs or points elsewhere may reach it."
-SPILL_ADVICE = "More importance, or a light that reaches it alone, may bring more."
+ALONE_ADVICE = "Add a light for it, or paint the rest as well."
+SPILL_ADVICE = "More importance, or lights that move, may help."
 
 
 def spoken_deliveries(deliveries: Sequence[Delivery]) -> str:
@@ -37,6 +40,21 @@ def spoken_deliveries(deliveries: Sequence[Delivery]) -> str:
     texts = [f"{spoken_delivery(entry)}." for entry in shown]
     rest = len(entries) - len(shown)
     return " ".join([*texts, f"Of {rest} more, more came."] if rest > 0 else texts)
+
+
+def spoken_mean_shares(deliveries: Sequence[Delivery]) -> str:
+    """Return how much of all wishes came, `brightness 95 %, colour 52 %`; "" if none asks for
+    anything visible.
+    """
+    shares = mean_shares(deliveries)
+    named = (("brightness", shares.brightness), ("colour", shares.color))
+    return ", ".join(f"{part} {spoken_share(x)}" for part, x in named if x is not None)
+
+
+def is_one_painting(deliveries: Sequence[Delivery]) -> bool:
+    """Return whether wishes are parts of one painting, which nobody named, and not of layers."""
+    main = main_deliveries(deliveries)
+    return all(x.kind == "wish" for x in main) and len({x.layers for x in main}) == 1
 
 
 def named_worst_wish(appearance: Appearance) -> Delivery | None:
@@ -81,6 +99,8 @@ def spoken_newest(appearance: Appearance) -> str:
     """
     newest, worst = newest_delivery(appearance.deliveries), appearance.worst_wish
     if newest is None or newest.least is None or newest is worst:
+        return ""
+    if worst is not None and newest.layers == worst.layers:  # another part of the same
         return ""
     if worst is not None and newest.kind == "group" and worst.group == newest.name:
         return ""

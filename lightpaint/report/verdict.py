@@ -14,11 +14,14 @@ from lightpaint.lighting.solution import Solution
 from lightpaint.relit.detection_power import ERROR
 from lightpaint.relit.verification import Verification
 from lightpaint.report.delivery_sentences import (
+    ALONE_ADVICE,
     REACH_ADVICE,
     SPILL_ADVICE,
+    is_one_painting,
     named_worst_wish,
     spoken_deliveries,
     spoken_delivery,
+    spoken_mean_shares,
     spoken_newest,
     spoken_unreached,
 )
@@ -124,7 +127,12 @@ def spoken_current(appearance: Appearance) -> str:
 
 
 def _wish_headline(appearance: Appearance, wish: Delivery) -> str:
-    """Return sentences on the wish of which least came, on the newest one, and on the whole."""
+    """Return sentences on the wish of which least came, on the newest one, and on the whole.
+
+    Of one painting without named wishes the whole goes first.
+    """
+    if is_one_painting(appearance.deliveries):
+        return f"{spoken_whole(appearance)} {spoken_lack(appearance, wish)}"
     newest = spoken_newest(appearance)
     if appearance.is_nearly_equal:
         whole = "On the whole it is close."
@@ -132,6 +140,14 @@ def _wish_headline(appearance: Appearance, wish: Delivery) -> str:
         progress = spoken_progress(appearance.share_met)
         whole = f"On the whole: {progress[:1].lower()}{progress[1:]}."
     return " ".join(filter(None, [spoken_lack(appearance, wish), newest, whole]))
+
+
+def spoken_whole(appearance: Appearance) -> str:
+    """Return a sentence on how much of all that was painted came."""
+    is_nearly = appearance.is_nearly_equal
+    progress = "Close on the whole" if is_nearly else spoken_progress(appearance.share_met)
+    shares = spoken_mean_shares(appearance.deliveries)
+    return f"{progress}: {shares}." if shares else f"{progress}."
 
 
 def spoken_lack(appearance: Appearance, wish: Delivery) -> str:
@@ -143,12 +159,12 @@ def spoken_lack(appearance: Appearance, wish: Delivery) -> str:
         return f"{spoken_delivery(wish)}, since {_spoken_causes(appearance)}."
     if appearance.place is None:
         return f"{spoken_delivery(wish)}."
-    if wish.lacks_color and not wish.lacks_brightness and appearance.local_lights:
-        reason = f"{_spoken_some(appearance.local_lights)[0]} would colour too much else"
-    else:
-        reason = _spoken_reach(appearance)
+    is_of_color = wish.lacks_color and not wish.lacks_brightness
+    reason = _spoken_reach(appearance, is_of_color=is_of_color)
     is_reached = bool(appearance.local_lights) and appearance.has_strong_light
     advice = SPILL_ADVICE if is_reached and appearance.reasons_wish else REACH_ADVICE
+    if is_reached and appearance.lacks_light_of_its_own:
+        advice = ALONE_ADVICE
     return f"{spoken_unreached(wish)}, since {reason}. {advice}"
 
 
@@ -208,32 +224,58 @@ def spoken_reason(appearance: Appearance) -> str:
 
 
 def _spoken_causes(appearance: Appearance) -> str:
-    *first_phrases, last = (spoken_holding(reason) for reason in appearance.causes)
+    *first_phrases, last = (_spoken_cause(appearance, reason) for reason in appearance.causes)
     return f"{', '.join(first_phrases)}, and {last}" if first_phrases else last
 
 
-def _spoken_reach(appearance: Appearance) -> str:
-    """Return why no light brings what is missing in the place of most error."""
+def _spoken_cause(appearance: Appearance, reason: Reason) -> str:
+    """Return a reason as text: a hold matters where no light reaches the paint alone."""
+    if reason.kind == "hold" and appearance.lacks_light_of_its_own:
+        return _spoken_spill(appearance)
+    return spoken_holding(reason)
+
+
+def _spoken_reach(appearance: Appearance, *, is_of_color: bool = False) -> str:
+    """Return why no light brings what is missing in the place of most error.
+
+    is_of_color: whether it is colour and not brightness.
+    """
     if not appearance.local_lights:
         return "no light reaches it"
     names, is_one = _spoken_some(appearance.local_lights)
-    if is_darker(appearance) and is_of_texels(names):
-        return f"{names} {'shines' if is_one else 'shine'} there, too"
-    if is_darker(appearance):
-        return f"{names} {'lights' if is_one else 'light'} it too"
-    if not appearance.has_strong_light:
-        return f"{names} {'does' if is_one else 'do'} little there"
-    if _are_kept(appearance):
-        reason = "is limited by its constraints"
-        return f"{names} {reason if is_one else 'are limited by their constraints'}"
+    if not is_of_color:
+        if is_darker(appearance) and is_of_texels(names):
+            return f"{names} {'shines' if is_one else 'shine'} there, too"
+        if is_darker(appearance):
+            return f"{names} {'lights' if is_one else 'light'} it too"
+        if not appearance.has_strong_light:
+            return f"{names} {'does' if is_one else 'do'} little there"
+        if _are_kept(appearance):
+            reason = "is limited by its constraints"
+            return f"{names} {reason if is_one else 'are limited by their constraints'}"
+    if spill := _spoken_spill(appearance):
+        return spill
     free_lights = tuple(
         name for name in appearance.local_lights if name not in appearance.held_lights
     )
-    free_names = _spoken_some(free_lights)[0]
+    free_names = _spoken_some(free_lights or appearance.local_lights)[0]
+    if is_of_color:
+        return f"{free_names} would colour too much else"
     # The lights of several texels are one, in a sentence.
     if all(map(image_of, free_lights)):
         return f"more light from {free_names} would fall on too much else"
     return f"{free_names} would light too much else"
+
+
+def _spoken_spill(appearance: Appearance) -> str:
+    """Return what the lights of the paint light, too; "" if that is not known."""
+    area = appearance.area_lights
+    if area is None or (area.is_alone and not area.also):
+        return ""
+    names, is_one = _spoken_some(area.names)
+    also = f"the {some_names([area.also.replace('_', ' ').strip()])}" if area.also else "the rest"
+    spill = f"{names} {'lights' if is_one else 'light'} {also}, too"
+    return f"no light reaches it alone; {spill}" if appearance.lacks_light_of_its_own else spill
 
 
 def spoken_holding(reason: Reason) -> str:

@@ -8,6 +8,7 @@ import pytest
 
 import lightpaint as lp
 from lightpaint.lighting.analysis.appearance.appearance import Appearance
+from lightpaint.lighting.analysis.appearance.area_lights import AreaLights
 from lightpaint.lighting.analysis.appearance.delivery import Delivery
 from lightpaint.lighting.analysis.appearance.limiting_reasons import Loosening, Reason
 from lightpaint.lighting.analysis.appearance.unpainted_change import UnpaintedChange
@@ -138,6 +139,65 @@ def test_a_button_says_what_it_lets_go_and_what_that_brings():
     assert advice_given.gain is None
 
 
+SHARED = AreaLights(("sky", "skylight"), is_alone=False, name="back_wall", also="plinths")
+OWN = AreaLights(("spot",), is_alone=True, name="back_wall", also="plinths")
+
+
+def test_where_no_light_reaches_the_paint_alone_a_new_one_is_advised():
+    """And no hold is to be loosened, which would only take the rest along."""
+    weaker = Loosening(0.8, 0.35, UnpaintedChange(2.0, 12.0, "annex"), (10.0, 7.4), 4.0)
+    hold = replace(HOLD, loosening=weaker)
+    appearance = Appearance(10.0, 0.0, 20.0, PLACE, reasons=(hold,), area_lights=SHARED)
+    assert sketch_headline(appearance) == (
+        "About half way (50 %). Brighter light on the floor is missing: no light reaches it alone; "
+        "sky and skylight light the plinths, too. Add a light for it, or paint the rest as well."
+    )
+    assert advice(appearance) == Advice("light", (), None, None)
+    assert advice(replace(appearance, reasons=(), local_lights=("sky",))) == advice(appearance)
+    # With a light of its own, the hold is what keeps it.
+    own = replace(appearance, area_lights=OWN)
+    assert "held near their current look. Paint more or loosen the hold." in sketch_headline(own)
+    given = advice(own)
+    assert given is not None
+    assert given.kind == "hold"
+    # Once loosened, it is not advised again.
+    once = replace(hold, loosening=replace(weaker, present_hold=1.3))
+    again = replace(own, reasons=(once,))
+    assert advice(again) == Advice("light", (), None, None)
+    assert "loosen" not in sketch_headline(again)
+    # What is too bright is not short of light.
+    dark = replace(PLACE, painted=PLACE.reached, reached=PLACE.painted)
+    assert "sky lights it too" in sketch_headline(
+        replace(appearance, reasons=(), local_lights=("sky",), place=dark)
+    )
+
+
+def test_advice_comes_before_what_may_be_cut_off():
+    vase = Delivery("Vase, +1.4 stops, warmer", 0.69, 0.47, layers=(3,), kind="layer")
+    room = Delivery("Whole picture, −1.5 stops, cooler", 0.97, 0.83, layers=(1,), kind="layer")
+    appearance = Appearance(
+        4.4,
+        0.0,
+        14.0,
+        PLACE,
+        local_lights=("sun", "sky"),
+        area_lights=OWN,
+        deliveries=(vase, room),
+        reasons_wish=vase.name,
+    )
+    text = sketch_headline(appearance)
+    assert text == (
+        "Vase, +1.4 stops, warmer: out of reach (brightness 69 %, colour 47 % came), since spot "
+        "lights the plinths, too. More importance, or lights that move, may help. Most of "
+        "the way (69 %)."
+    )
+    # Parts of one painting, which nobody named: first what came.
+    parts = [replace(x, layers=(1,), kind="wish") for x in (vase, room)]
+    flat = sketch_headline(replace(appearance, deliveries=tuple(parts)))
+    assert flat.startswith("Most of the way: brightness 83 %, colour 65 %. Vase")
+    assert "as painted" not in flat
+
+
 def test_a_sketch_speaks_of_the_wish_that_lacks_most():
     moon = Delivery("Moonlight", 0.98, 0.43, layers=(3,), kind="group")
     rim = Delivery("Rim", 0.95, None, layers=(6,), kind="layer")
@@ -256,5 +316,8 @@ def test_lamps_that_became_white_are_not_called_the_present_lighting(is_asked: b
     assert "current lighting" not in sentence
     plain = unpainted_text(is_asked=is_asked, is_white=False)
     assert ("current lighting" in plain) != is_asked
+    by_hand = unpainted_text(is_asked=True, is_white=False, is_set=True)
+    assert by_hand.endswith("lights that you set are as you set them, all others as they were.")
+    assert unpainted_text(is_asked=True, is_white=True, is_set=True).startswith(sentence[:30])
     moved = unpainted_text(is_asked=False, is_white=False, is_moved=True)
     assert moved.endswith("is the current lighting, from where you put the lights.")

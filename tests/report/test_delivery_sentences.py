@@ -6,6 +6,7 @@ from typing import Any
 import pytest
 
 from lightpaint.lighting.analysis.appearance.appearance import Appearance
+from lightpaint.lighting.analysis.appearance.area_lights import AreaLights
 from lightpaint.lighting.analysis.appearance.delivery import Delivery
 from lightpaint.lighting.analysis.appearance.limiting_reasons import Reason
 from lightpaint.lighting.analysis.diagnosis import Place
@@ -19,6 +20,8 @@ MOON = Delivery("Moonlight", 0.98, 0.43, layers=(3, 4), kind="group", lit_pixels
 SHADOWS = Delivery("Shadows", 0.9, 0.2, layers=(4,), group="Moonlight", kind="layer")
 LANTERN = Delivery("Lantern", 0.08, None, layers=(5,), kind="layer", lit_pixels=20.0)
 RIM = Delivery("Rim", 0.95, None, layers=(6,), kind="layer", lit_pixels=20.0)
+VASE = Delivery("Vase", 0.95, 0.36, lit_pixels=20.0)
+WALLS = Delivery("Walls", 1.0, 0.98, lit_pixels=900.0)
 PAINTING = Delivery("Painting", 0.9, 0.5, layers=(0,), kind="layer")
 
 
@@ -42,8 +45,74 @@ def _seen(delta_e: float, *deliveries: Delivery, **fields: Any) -> Appearance:
         (
             _seen(5.0, LANTERN, RIM, local_lights=("sun",), reasons_wish="Lantern"),
             "Lantern: out of reach (8 % came), since sun would light too much else. "
-            "More importance, or a light that reaches it alone, may bring more. Rim: 95 %. "
+            "More importance, or lights that move, may help. Rim: 95 %. "
             "On the whole: most of the way.",
+        ),
+        (
+            _seen(
+                5.0,
+                LANTERN,
+                RIM,
+                local_lights=("sun", "sky"),
+                area_lights=AreaLights(("spot",), is_alone=True, also="big_plinth"),
+                reasons_wish="Lantern",
+            ),
+            "Lantern: out of reach (8 % came), since spot lights the big plinth, too. More "
+            "importance, or lights that move, may help. Rim: 95 %. On the whole: most of "
+            "the way.",
+        ),
+        (
+            _seen(
+                5.0,
+                LANTERN,
+                RIM,
+                local_lights=("sun",),
+                area_lights=AreaLights(("sun", "sky"), is_alone=False),
+                reasons=(Reason("hold"),),
+                reasons_wish="Lantern",
+            ),
+            "Lantern: 8 %, since no light reaches it alone; sun and sky light the rest, too. "
+            "Rim: 95 %. On the whole: most of the way.",
+        ),
+        (
+            _seen(
+                5.0,
+                LANTERN,
+                RIM,
+                local_lights=("sun",),
+                area_lights=AreaLights(("sky",), is_alone=False, also="floor"),
+                reasons_wish="Lantern",
+            ),
+            "Lantern: out of reach (8 % came), since no light reaches it alone; sky lights the "
+            "floor, too. Add a light for it, or paint the rest as well. Rim: 95 %. On the whole: "
+            "most of the way.",
+        ),
+        # Where shade is missing, nothing has to reach it.
+        (
+            _seen(
+                5.0,
+                replace(LANTERN, brightness=0.9, color=0.3),
+                RIM,
+                local_lights=("sky",),
+                place=replace(PLACE, reached=(0.9, 0.9, 0.9)),
+                area_lights=AreaLights(("sky",), is_alone=False, also="floor"),
+                reasons_wish="Lantern",
+            ),
+            "Lantern: out of reach in colour (30 % came), since sky lights the floor, too. More "
+            "importance, or lights that move, may help. Rim: 95 %. On the whole: most of the "
+            "way.",
+        ),
+        # Of one painting, whose parts nobody named, the whole goes first.
+        (
+            _seen(5.0, VASE, WALLS, local_lights=("spot",), reasons_wish="Vase"),
+            "Most of the way: brightness 98 %, colour 67 %. Vase: out of reach in colour (36 % "
+            "came), since spot would colour too much else. More importance, or lights that move, "
+            "may help.",
+        ),
+        (
+            _seen(2.0, VASE, WALLS, reasons=(Reason("colors"),)),
+            "Close on the whole: brightness 98 %, colour 67 %. Vase: brightness 95 %, colour 36 "
+            "%, since lights keep their colours.",
         ),
         (
             _seen(5.0, LANTERN, RIM, reasons=(Reason("lock", ("lamp",)),)),

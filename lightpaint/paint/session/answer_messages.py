@@ -15,6 +15,7 @@ from lightpaint.lighting.analysis.appearance.appearance import INVISIBLE, Appear
 from lightpaint.lighting.analysis.appearance.delivery import Delivery, merge_views
 from lightpaint.lighting.analysis.appearance.limiting_reasons import Reason
 from lightpaint.lighting.analysis.appearance.unpainted_change import UnpaintedChange
+from lightpaint.lighting.fit import DEFAULT_HOLD
 from lightpaint.paint.protocol import (
     Advice,
     Closeness,
@@ -24,6 +25,8 @@ from lightpaint.paint.protocol import (
     WishDelivery,
 )
 from lightpaint.report.delivery_sentences import (
+    ALONE_ADVICE,
+    is_one_painting,
     named_worst_wish,
     spoken_deliveries,
     spoken_newest,
@@ -44,7 +47,13 @@ from lightpaint.report.phrases import (
     spoken_progress,
 )
 from lightpaint.report.uncertainty_sentences import spoken_errors
-from lightpaint.report.verdict import headline, spoken_lack, spoken_missing, spoken_reason
+from lightpaint.report.verdict import (
+    headline,
+    spoken_lack,
+    spoken_missing,
+    spoken_reason,
+    spoken_whole,
+)
 
 #: Distance from Planck's locus up to which a colour is called white, and part of the current light
 #: under which one is off.
@@ -58,6 +67,7 @@ WORSE_TEXT = "Farther from the paint than the current lighting, which undo bring
 ADVICE_TEXTS: dict[str, str] = {
     "hold": "Paint more or loosen the hold.",
     "colors": "The settings allow any colour.",
+    "light": ALONE_ADVICE,
 }
 
 #: How to allow any colour: in the painter it is a setting, not an argument.
@@ -208,14 +218,24 @@ def wish_delivery(delivery: Delivery) -> WishDelivery:
 
 
 def unpainted_text(
-    *, is_asked: bool, is_white: bool, is_moved: bool = False, is_started: bool = False
+    *,
+    is_asked: bool,
+    is_white: bool,
+    is_moved: bool = False,
+    is_started: bool = False,
+    is_set: bool = False,
 ) -> str:
     """Describe the answer while nothing is painted, or all paint is undone.
 
     is_asked: whether there are constraints. is_white: whether all lights have to be white.
     is_moved: whether lights were moved or added. is_started: whether the solve starts from lamps
-    that were set by hand.
+    that were set by hand. is_set: whether all constraints are levels and colours of lights that
+    were set by hand, or painted on the map of an image.
     """
+    if is_set and not is_white:
+        return (
+            "Nothing is painted: lights that you set are as you set them, all others as they were."
+        )
     if is_started:
         return "Nothing is painted: the answer is your lamps, as you set them."
     stay = "the answer is the current lighting"
@@ -245,9 +265,9 @@ def sketch_headline(appearance: Appearance) -> str:
     # One reason at a time: the next one appears once this is resolved.
     first = replace(appearance, reasons=appearance.causes[:1])
     missing = spoken_missing(appearance)
-    text = f"{phrase}. {missing[0].upper()}{missing[1:]} is missing: {spoken_reason(first)}."
     shares = "" if appearance.worst_wish is None else spoken_deliveries(appearance.deliveries)
-    return " ".join(filter(None, [text, _advice_text(appearance), shares]))
+    text = f"{missing[0].upper()}{missing[1:]} is missing: {spoken_reason(first)}."
+    return " ".join(filter(None, [f"{phrase}.", text, _advice_text(appearance), shares]))
 
 
 def _wish_text(appearance: Appearance, wish: Delivery, phrase: str) -> str:
@@ -257,20 +277,21 @@ def _wish_text(appearance: Appearance, wish: Delivery, phrase: str) -> str:
     changes the rest by more than it gains.
     """
     first = replace(appearance, reasons=appearance.causes[:1])
-    sentences = [
-        spoken_lack(first, wish),
-        _advice_text(appearance),
-        spoken_newest(appearance),
-    ]
     is_warning = appearance.is_worse or appearance.is_at_cost
-    sentences.insert(0 if is_warning else len(sentences), f"{phrase}.")
+    lack = spoken_lack(first, wish)
+    sentences = [lack, _advice_text(appearance) if appearance.causes else ""]
+    if is_one_painting(appearance.deliveries):
+        sentences.insert(0, f"{phrase}." if is_warning else spoken_whole(appearance))
+    else:
+        sentences.append(spoken_newest(appearance))
+        sentences.insert(0 if is_warning else len(sentences), f"{phrase}.")
     return " ".join(filter(None, sentences))
 
 
 def _advice_text(appearance: Appearance) -> str:
     """Return what to do about the first reason; "" if its button says it."""
-    cause = removable_reason(appearance)
-    return "" if cause is None else ADVICE_TEXTS.get(cause.kind, "")
+    button = advice(appearance)
+    return "" if button is None else ADVICE_TEXTS.get(button.kind, "")
 
 
 def _progress_phrase(appearance: Appearance) -> str:
@@ -322,7 +343,12 @@ def advice(appearance: Appearance) -> Advice | None:
     """Return the same as data for a page's button: the obstacle to remove, and the gain."""
     if (cause := removable_reason(appearance)) is None:
         is_missed = not appearance.is_close and appearance.place is not None
-        return Advice("reach", (), None, None) if is_missed and not appearance.causes else None
+        if not is_missed or appearance.causes:
+            return None
+        is_for_new = appearance.lacks_light_of_its_own and appearance.has_strong_light
+        return Advice("light" if is_for_new else "reach", (), None, None)
+    if cause.kind == "hold" and not _helps_to_loosen(appearance, cause):
+        return Advice("light", (), None, None)
     kind, names = cause.kind, tuple(cause.names)
     # The gain of a part of the paint is not that of the preview, which is about all of it.
     is_of_all = not appearance.reasons_wish
@@ -333,6 +359,19 @@ def advice(appearance: Appearance) -> Advice | None:
     if weaker is None:
         return Advice(kind, names, None, 0.0)
     return Advice(kind, names, weaker.share if is_of_all else None, weaker.hold, weaker.delta_e)
+
+
+def _helps_to_loosen(appearance: Appearance, hold: Reason) -> bool:
+    """Return whether to loosen the hold: not where every light lights the rest, too, so that it
+    would only take the rest along, and not once more.
+    """
+    weaker = hold.loosening
+    is_looser = (
+        weaker is not None
+        and weaker.present_hold is not None
+        and weaker.present_hold < DEFAULT_HOLD
+    )
+    return not (appearance.lacks_light_of_its_own or is_looser)
 
 
 def _closeness(analysis: Analysis) -> Closeness:

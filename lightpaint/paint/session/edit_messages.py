@@ -21,6 +21,7 @@ from lightpaint.paint.session.answer_messages import unpainted_text
 from lightpaint.paint.session.history import History
 from lightpaint.paint.session.live_answer import LiveAnswer
 from lightpaint.paint.store.canvas_pixels import Region
+from lightpaint.paint.store.session_requests import HOLD_KEYS
 
 
 def edit_state(history: History, live_answer: LiveAnswer, views: Canvases) -> dict[str, Any]:
@@ -79,7 +80,13 @@ def unpainted_headline(live_answer: LiveAnswer) -> str:
     is_moved = bool(live_answer.requests.placed)
     if live_answer.requests.start and not live_answer.requests.lights:
         return unpainted_text(is_asked=False, is_white=False, is_started=True)
-    return unpainted_text(is_asked=is_asked, is_white=is_white, is_moved=is_moved)
+    requests = live_answer.requests.lights.values()
+    return unpainted_text(
+        is_asked=is_asked,
+        is_white=is_white,
+        is_moved=is_moved,
+        is_set=bool(requests) and all(set(x) <= set(HOLD_KEYS) for x in requests),
+    )
 
 
 def canvas_patches(

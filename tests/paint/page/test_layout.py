@@ -269,6 +269,14 @@ SENTENCE = (
 )
 
 
+#: The longest of those that end in advice.
+ADVICE = (
+    "Most of the way: brightness 98 %, colour 83 %. Blue with gold pools, middle: out of reach in"
+    " colour (42 % came), since spot_field and spot_figure light the trim, too. More importance,"
+    " or lights that move, may help."
+)
+
+
 HELP = {"kind": "colors", "names": [], "gain": 0.57, "hold": None}
 
 
@@ -292,6 +300,22 @@ def test_nothing_is_cut_off(new_painter: Any, size: tuple[int, int]) -> None:
     for key in "bwa":
         painter.page.keyboard.press(key)
         assert clipped_elements(painter) == []
+
+
+@pytest.mark.parametrize("size", [(1440, 900), *map(nightly, [(1360, 800), (1200, 700)])])
+def test_advice_and_its_button_are_in_view(new_painter: Any, size: tuple[int, int]) -> None:
+    painter = new_painter("lights=12", viewport={"width": size[0], "height": size[1]})
+    answer = {"headline": ADVICE, "help": HELP, "delta_e": 11.2, "delta_e_present": 20.5}
+    painter.tell(kind="answer", version=2, exact=True, lights=[], **answer)
+    assert clipped_elements(painter) == []
+    line = painter.page.locator(".answer").bounding_box()
+    for button in painter.page.locator(".answer .button").all():
+        box = button.bounding_box()
+        assert line["y"] <= box["y"]
+        assert box["y"] + box["height"] <= line["y"] + line["height"]
+        assert box["x"] + box["width"] <= line["x"] + line["width"]
+    sentence, choices = (painter.page.locator(x).bounding_box() for x in (".said", ".choices"))
+    assert sentence["x"] + sentence["width"] <= choices["x"]
 
 
 @pytest.mark.nightly
@@ -327,7 +351,7 @@ def test_of_a_low_painter_the_sentence_comes_first(new_painter: Any, size: tuple
     sentence_box = painter.page.locator(".said").bounding_box()
     assert sentence_box["y"] + sentence_box["height"] <= stage["y"]
     assert stage["height"] > 60
-    for name in (".stage", ".tools .two-colours", ".answer button", ".options input >> nth=-1"):
+    for name in (".stage", ".tools .two-colours", ".answer .button", ".options input >> nth=-1"):
         box = painter.page.locator(name).first.bounding_box()
         assert box["y"] + box["height"] <= size[1]
     assert not painter.page.locator(".here").is_visible()

@@ -634,3 +634,5 @@ def test_a_white_that_is_green_or_pink_is_said_to_be(painter: Painter) -> None:
     assert "green" not in tint_text(white)
     assert "K green" in tint_text([1.0, 1.12, 0.95])
     assert "K pink" in tint_text([1.0, 0.75, 0.95])
+    # Nobody sees the tint of a lamp that is hardly a part of the light.
+    assert "K green" not in tint_text([0.010, 0.0112, 0.0095])

@@ -421,7 +421,8 @@ def test_what_is_said_while_nothing_is_painted(
     slider.press("ArrowRight")
     user.still("light 1")
     wait_until(
-        lambda: "except for your constraints" in headline.inner_text(), "it is said as before"
+        lambda: "as you set them, all others as they were" in headline.inner_text(),
+        "it is not said that a light is set",
     )
 
 

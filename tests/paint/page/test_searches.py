@@ -17,6 +17,14 @@ SESSION = """() => {
 }"""
 
 
+#: Sends the places of lights.
+RIG = """() => host.tell({ kind: 'rig', up: 1, low: [0, 0, 0], high: [9, 5, 8], surfaces: [],
+  skies: [], objects: [], cameras: [{ origin: [5, 2, 12], x_axis: [.04, 0, 0],
+    y_axis: [0, -.07, 0], forward: [-1, 1, -1], is_parallel: false }],
+  lights: host.room.lights.map((_, k) => ({ position: [1 + k, 4, 4], direction: null,
+    target: null, cutoff: null, beam: null, rail: null, immovable_reason: '' })) })"""
+
+
 @pytest.fixture
 def painter(new_painter: Any, axe: str) -> Painter:
     opened: Painter = new_painter(axe=axe)
@@ -50,6 +58,23 @@ def test_it_says_how_long_it_takes_before_it_starts(painter: Painter) -> None:
     painter.button("Let lights move").click()
     painter.page.get_by_text("no light is free").wait_for()
     assert dialog.count() == 0
+
+
+def test_where_a_light_of_its_own_is_missing_its_fields_come_into_view(painter: Painter) -> None:
+    lights = painter.page.evaluate("() => host.exact().lights")
+    advice = {"kind": "light", "names": [], "gain": None, "hold": None}
+    answer = {"version": 901, "exact": True, "lights": lights, "delta_e": 9.0, "sentences": []}
+    painter.tell(kind="answer", headline="No light reaches it alone.", help=advice, **answer)
+    assert painter.page.get_by_role("button", name="Let lights move").count() == 0
+    painter.page.locator(".answer").get_by_role("button", name="Add a light").click()
+    painter.page.evaluate(RIG)
+    fields = painter.page.locator(".add-light")
+    fields.wait_for()
+    assert painter.ui("newLight")["surface"] == "anywhere"
+    fields.get_by_role("button", name="Find places").wait_for()
+    painter.page.wait_for_function("() => painter.store.value.isNewLightSought === false")
+    box, side = fields.bounding_box(), painter.page.locator(".side").bounding_box()
+    assert box["y"] + box["height"] <= side["y"] + side["height"] + 1
 
 
 def test_it_stops_with_the_best_so_far_or_with_nothing(painter: Painter) -> None:

@@ -11,9 +11,11 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 
 from lightpaint.arrays import Floats
+from lightpaint.colour.color import luminance
 from lightpaint.display_text import short_repr
 from lightpaint.images.estimate import Estimate
 from lightpaint.keywords import keywords
+from lightpaint.lighting.analysis.appearance.area_lights import AreaLights, lights_of_area
 from lightpaint.lighting.analysis.appearance.delivery import (
     Delivery,
     DeliveryReport,
@@ -55,6 +57,9 @@ CLOSE, FAR = 3.0, 10.0
 #: ΔE that is invisible, and the least share of the requested change to achieve.
 INVISIBLE, MIN_CHANGE = 1.0, 0.3
 
+#: Ratio of painted to reached light below which shade is missing, and no light.
+DARKER = 0.8
+
 #: Largest share of a great change that may be missing before the answer counts as far.
 FAR_SHARE = 0.5
 
@@ -75,6 +80,8 @@ class Appearance:
             lights that make it so.
         has_strong_light: Whether one of them contributes much there.
         held_lights: Those of them that constraints hold back.
+        area_lights: The lights of the paint in question, and what else they light; None if not
+            computed, or if all of the picture is painted.
         reasons: Constraints, holds and other views that keep the lights from the painting, the
             most important first, with the share of the error that vanishes without them.
         error_shares: Shares of the error of the fit that no light can change: `unreachable`,
@@ -101,6 +108,7 @@ class Appearance:
     local_lights: tuple[str, ...] = ()
     has_strong_light: bool = True
     held_lights: tuple[str, ...] = ()
+    area_lights: AreaLights | None = None
     reasons: tuple[Reason, ...] = ()
     error_shares: Mapping[str, float] = field(default_factory=dict)
     unpainted_change: UnpaintedChange | None = None
@@ -122,6 +130,18 @@ class Appearance:
             for reason in self.reasons
             if reason.share >= HEADLINE_SHARE or (lacks_color and reason.kind == "colors")
         )
+
+    @property
+    def lacks_light_of_its_own(self) -> bool:
+        """True if every light that reaches the paint in question lights the rest, too, and light is
+        missing there, or its colour.
+        """
+        if self.area_lights is None or self.area_lights.is_alone or self.place is None:
+            return False
+        painted, reached = (
+            float(luminance(np.array(x))) for x in (self.place.painted, self.place.reached)
+        )
+        return painted >= DARKER * reached
 
     @property
     def limit_groups(self) -> tuple[LimitGroup, ...]:
@@ -290,8 +310,12 @@ def _with_reasons(
         if (objects := solution.basis.objects) is not None:
             place = replace(place, object=object_with_most_error(look, objects, missed, light))
         appearance = _with_local_lights(replace(appearance, place=place), solution, place)
+    [target] = solution.problem.views.targets
     return replace(
         appearance,
+        area_lights=lights_of_area(
+            solution.basis, np.minimum(target.importance, 1) if area is None else area
+        ),
         reasons=reasons_of(solution, area),
         error_shares=error_shares(diagnosis or diagnose(solution)),
     )

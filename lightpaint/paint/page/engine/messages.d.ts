@@ -374,7 +374,8 @@ export interface EditState {
 /**
  * A constraint that keeps the lights from the paint and can be loosened.
  *
- * kind: of the constraint; `reach` if there is none, but moving lights may help. names: its
+ * kind: of the constraint; `reach` if there is none, but moving lights may help, and `light` if a
+ * new light may, since all that reach the paint light the rest, too. names: its
  * lights. gain: share of the error that disappears without it; null if more is needed. hold: the
  * weaker hold to set. delta_e: mean ΔE over the paint now and without it; null if not known.
  */

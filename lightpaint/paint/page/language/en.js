@@ -39,6 +39,8 @@ export const en = {
     letLightsMove: 'Let lights move',
     searchForPlacesAndDirectionsOf:
       'Search for places and directions of the lights that come closer. One step that undo takes back.',
+    findAPlaceForALight:
+      'A new light: choose where it hangs, and let a search find its place and direction.',
     cancel: 'Cancel',
     apply: 'Apply',
     computingThePreview: 'Computing the preview …',

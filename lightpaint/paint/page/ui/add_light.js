@@ -1,6 +1,6 @@
 /** Adds a light where the user clicks, or where a search finds that the painting needs it. */
 
-import { html } from '../vendor/preact.js';
+import { html, useEffect, useRef } from '../vendor/preact.js';
 import { Button, NumberField, Select } from './controls.js';
 import { fill, words } from '../language/language.js';
 
@@ -15,8 +15,8 @@ const KINDS = [
 ];
 
 /** Where a new light may hang, besides names of rails, surfaces and shapes. */
-const CLICK = 'click';
-const ANYWHERE = 'anywhere';
+export const CLICK = 'click';
+export const ANYWHERE = 'anywhere';
 
 /** Largest number of lights that one search on the page adds. */
 const MAX_NEW_LIGHTS = 4;
@@ -24,7 +24,13 @@ const MAX_NEW_LIGHTS = 4;
 /** @param {{ui: Ui, app: App}} props */
 export function AddLight({ ui, app }) {
   const { store, session } = app;
-  const { newLight, clickAction, rig } = ui;
+  const { newLight, clickAction, rig, isNewLightSought } = ui;
+  const ref = useRef(/** @type {HTMLElement | null} */ (null));
+  useEffect(() => {
+    if (!isNewLightSought) return;
+    ref.current?.scrollIntoView({ block: 'nearest' });
+    store.set({ isNewLightSought: false });
+  }, [isNewLightSought]);
   const isClick = newLight.surface === CLICK;
   const isClicking = clickAction?.mode === 'hang';
   const set = (/** @type {Partial<Ui["newLight"]>} */ changes) =>
@@ -44,7 +50,7 @@ export function AddLight({ ui, app }) {
           clickAction: isClicking ? null : { mode: 'hang', type: newLight.type },
         })
       : session.findLights(newLight);
-  return html`<div class="add-light" role="group" aria-label=${words.addLight.addALight}>
+  return html`<div class="add-light" ref=${ref} role="group" aria-label=${words.addLight.addALight}>
     <${Select} label=${words.addLight.newLight} value=${newLight.type} choices=${KINDS}
       change=${(/** @type {NewKind} */ type) => set({ type })} />
     <${Select} label=${words.addLight.itHangs} value=${newLight.surface} choices=${places}

@@ -1,6 +1,7 @@
 /** A button that removes what keeps the lights from the paint, and a preview of its effect. */
 
 import { html, useEffect, useRef } from '../vendor/preact.js';
+import { ANYWHERE, CLICK } from './add_light.js';
 import { Button, Dialog } from './controls.js';
 import { numberText, shortenName } from './format.js';
 import { Icon } from './icons.js';
@@ -103,6 +104,7 @@ function remainingConstraints(name, keys, ui, session) {
 export function AdviceButton({ ui, app }) {
   const { advice } = ui;
   if (advice?.kind === 'reach') return html`<${MoveButton} ui=${ui} app=${app} />`;
+  if (advice?.kind === 'light') return html`<${NewLightButton} ui=${ui} app=${app} />`;
   const change = advice && changeOf(advice, ui, app.session);
   if (!advice || !change) return null;
   const name = nameOf(advice, ui);
@@ -127,6 +129,26 @@ export function MoveButton({ ui, app }) {
   return html`<${Button} label=${words.advice.letLightsMove} class="help"
     tip=${words.advice.searchForPlacesAndDirectionsOf}
     act=${() => app.store.set({ dialog: 'move' })} />`;
+}
+
+/** The button that leads to a new light, where all that reach the paint light the rest, too.
+ * @param {{ui: Ui, app: App}} props */
+function NewLightButton({ ui, app }) {
+  if (!ui.state?.can_render || ui.placementProgress) return null;
+  const show = () => {
+    const { newLight, areLampsMarked, open } = app.store.value;
+    if (!areLampsMarked) app.session.toggleLamps();
+    const surface = newLight.surface === CLICK ? ANYWHERE : newLight.surface;
+    app.store.set({
+      side: true,
+      panel: null,
+      open: { ...open, plan: true },
+      newLight: { ...newLight, surface },
+      isNewLightSought: true,
+    });
+  };
+  return html`<${Button} label=${words.addLight.addALight} class="help" icon="plus"
+    tip=${words.advice.findAPlaceForALight} act=${show} />`;
 }
 
 /** The answer before and after a change, for the user to apply or cancel.

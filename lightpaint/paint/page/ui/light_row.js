@@ -19,6 +19,10 @@ import {
 import { Thumbnail } from './thumbnail.js';
 import { fill, words } from '../language/language.js';
 
+/** Share of the picture's light from which a lamp's tint is named: nobody sees that of a dimmer one.
+ * A share that is shown as 3 % is less. */
+const MIN_TINT_SHARE = 0.035;
+
 /** @typedef {import("./ui_state.js").Light} Light */
 /** @typedef {import("./ui_state.js").LightAnswer} LightAnswer */
 /** @typedef {import("./ui_state.js").Constraints} Constraints */
@@ -127,7 +131,8 @@ export class LightRow extends Component {
     const level = luminance(rgb);
     const match = toKelvin(rgb);
     const kelvin = isLive || !answer ? match?.kelvin : answer.kelvin;
-    const white = kelvin && whiteText(kelvin, match?.green ?? 0);
+    const isTintSeen = (answer?.share ?? 1) >= MIN_TINT_SHARE;
+    const white = kelvin && whiteText(kelvin, (isTintSeen && match?.green) || 0);
     const value = [white, numberText(level)].filter(Boolean).join(' · ');
     const error = answer?.error ?? '';
     const fullText = [value, light.unit, isLive ? '' : error].filter(Boolean).join(' ');

@@ -96,6 +96,7 @@ import { initialSelection } from './selection/selection_settings.js';
  *   places that a search tries now, by name of light
  * @property {{type: NewKind, surface: string, count: number}} newLight the light to add: where it hangs is
  *   "click", "anywhere", or the name of a rail, surface or shape
+ * @property {boolean} isNewLightSought whether the fields of a new light are to be scrolled into view
  * @property {Record<string, number[]>} ghosts places of lights before a search has moved them, by name
  * @property {ClickAction | null} clickAction what the next click on a picture does
  * @property {Record<string, any>} settings
@@ -241,6 +242,7 @@ export function initialState() {
     samplingProgress: null,
     trial: null,
     newLight: { type: 'spot', surface: 'click', count: 1 },
+    isNewLightSought: false,
     ghosts: {},
     clickAction: null,
     settings: {},

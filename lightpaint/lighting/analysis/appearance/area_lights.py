@@ -1,0 +1,176 @@
+"""The lights of a part of the picture: whether one lights it alone, and what else they light.
+
+A light's share s of the present light is compared, in the mean over the part and over the rest of
+the picture, so that dark and pale surfaces count alike. The ratio of both means does not depend on
+the strength of the light.
+"""
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+
+from lightpaint.arrays import Bools, Doubles, Floats, Indices
+from lightpaint.basis.basis import Basis
+from lightpaint.colour.color import luminance
+from lightpaint.images.object_map import Objects
+from lightpaint.lighting.analysis.appearance.object_miss import NO_NAME, object_with_most
+
+#: Ratio of a light's share in a part to its share in the rest from which it lights the part alone.
+ALONE = 3.0
+
+#: Share of a part that such lights have to cover: (mean of s)² / mean of s².
+MIN_COVERED = 0.25
+
+#: Part of what the first light has from which another light is named, too.
+MIN_NAMED = 0.4
+
+#: Share of the light in a part that another object must have to be named as lit, too, and its least
+#: share of the picture.
+MIN_ALSO, MIN_SIZE = 0.2, 0.01
+
+#: Part of the brightest light that counts as present light where it is dark.
+DARK = 0.01
+
+#: Step between pixels, along each side.
+STEP = 2
+
+
+@dataclass(frozen=True)
+class AreaLights:
+    """The lights of a part of the picture.
+
+    Attributes:
+        names: One or two lights that light the part more than the rest; without any, those with
+            most of its light.
+        is_alone: Whether they light the part more than the rest.
+        name: The object that the part is; "" if it is not a single one.
+        also: The object of the rest that they light most; "" without a name.
+
+    Examples:
+        >>> AreaLights(("sky",), is_alone=False, name="back_wall", also="plinths").is_alone
+        False
+    """
+
+    names: tuple[str, ...]
+    is_alone: bool
+    name: str = ""
+    also: str = ""
+
+
+@dataclass(frozen=True)
+class _Light:
+    """A light's shares of the present light.
+
+    inside, outside: means over the part and the rest. shares: (p,), in the pixels of the part.
+    objects: (objects,), sums over the rest on each object.
+    """
+
+    index: int
+    inside: float
+    outside: float
+    shares: Doubles
+    objects: Doubles
+
+    def ratio(self) -> float:
+        """Return how much more of the part's light it is than of the rest's."""
+        return self.inside / max(self.outside, 1e-12)
+
+    def strength(self) -> float:
+        """Return its share of the light in the part."""
+        return self.inside
+
+
+def lights_of_area(basis: Basis, area: Floats) -> AreaLights | None:
+    """Return the lights of a part of the picture; None without light there, or without a rest.
+
+    area: (h, w) from 0 to 1.
+    """
+    pixels = _Pixels.of(basis, area)
+    if not (pixels.area.any() and pixels.rest.any()):
+        return None
+    strongest: list[_Light] = []
+    alone: list[_Light] = []
+    for light in pixels.lights(basis):
+        if light.ratio() >= ALONE:
+            alone.append(light)
+        strongest = sorted([*strongest, light], key=lambda x: -x.inside)[:2]
+    covered = sum((light.shares / light.inside for light in alone), np.zeros(len(pixels.area)))
+    is_alone = bool(alone) and _covered(covered, pixels.area) >= MIN_COVERED
+    rank = _Light.ratio if is_alone else _Light.strength
+    if not (alone or strongest):
+        return None
+    first, *others = sorted(alone if is_alone else strongest, key=rank, reverse=True)
+    lights = [first, *(light for light in others[:1] if rank(light) >= MIN_NAMED * rank(first))]
+    names = tuple(basis.names[light.index] for light in lights)
+    return AreaLights(names, is_alone, *_object_names(basis, area, pixels, lights))
+
+
+@dataclass(frozen=True)
+class _Pixels:
+    """The compared pixels that show no emitter.
+
+    counts: (h', w'), which they are. area, rest: (p,), their part and the rest, from 0 to 1. now:
+    (p,), the present light. objects: (p,), indices of objects, 0 for none.
+    """
+
+    counts: Bools
+    area: Doubles
+    rest: Doubles
+    now: Doubles
+    objects: Indices
+
+    @staticmethod
+    def of(basis: Basis, area: Floats) -> "_Pixels":
+        counts = np.logical_not(_every_other(basis.emitters_seen))
+        inside = _every_other(area)[counts].astype(np.float64)
+        now = luminance(_every_other(basis.current_look))[counts].astype(np.float64)
+        dark = DARK * float(np.percentile(now, 99)) if now.size else 0.0
+        objects = np.zeros(len(now), np.intp)
+        if basis.objects is not None:
+            objects = _every_other(basis.objects.index)[counts].astype(np.intp) + 1
+        return _Pixels(counts, inside, 1 - inside, now + max(dark, 1e-12), objects)
+
+    def lights(self, basis: Basis) -> Iterator[_Light]:
+        """Return the shares of each adjustable light that shines in the part."""
+        count = 1 + (0 if basis.objects is None else len(basis.objects.names))
+        for k, plane in enumerate(basis.planes):
+            if basis.is_fixed[k]:
+                continue
+            strength = basis.current_weights[k] if basis.current_weights[k].any() else 1.0
+            share = luminance(_every_other(plane)[self.counts] * strength) / self.now
+            inside = float(np.average(share, weights=self.area))
+            if inside > 0:
+                outside = float(np.average(share, weights=self.rest))
+                sums = np.bincount(self.objects, share * self.rest, count).astype(np.float64)
+                yield _Light(k, inside, outside, share, sums)
+
+
+def _every_other(picture: npt.NDArray[Any]) -> npt.NDArray[Any]:
+    return picture[::STEP, ::STEP]
+
+
+def _covered(shares: Doubles, weights: Doubles) -> float:
+    """Return the share of a part over which light is spread, from 0 to 1."""
+    square = float(np.average(np.square(shares), weights=weights))
+    return float(np.average(shares, weights=weights)) ** 2 / square if square > 0 else 0.0
+
+
+def _object_names(
+    basis: Basis, area: Floats, pixels: _Pixels, lights: list[_Light]
+) -> tuple[str, str]:
+    """Return the object that an area is, and the object of the rest that lights light most."""
+    objects: Objects | None = basis.objects
+    if objects is None:
+        return "", ""
+    index = objects.index.ravel().astype(np.intp)
+    name = object_with_most(objects, index, area.ravel().astype(np.float64))
+    sizes = np.bincount(pixels.objects, weights=pixels.rest, minlength=len(objects.names) + 1)
+    inside = sum(light.inside for light in lights)
+    shares = np.sum([light.objects for light in lights], axis=0) / np.maximum(sizes, 1e-12)
+    is_named = [False, *(not NO_NAME.fullmatch(x) and x != name for x in objects.names)]
+    shares = np.where(is_named & (sizes >= MIN_SIZE * len(pixels.area)), shares, 0)
+    most = int(np.argmax(shares))
+    return name, objects.names[most - 1] if shares[most] >= MIN_ALSO * inside else ""
