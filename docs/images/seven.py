@@ -26,7 +26,7 @@ from tasks import AWAY, FIGURE, KNOT, VASE, Designer
 
 sys.path.insert(0, str(HERE.parent.parent / "benchmarks"))
 
-from courtyard import references
+from known_places import references
 
 import lightpaint as lp
 from lightpaint.basis.cache.cached_render import obtain_basis
@@ -98,7 +98,7 @@ def lantern(designer: Designer) -> None:
 def reference(designer: Designer) -> None:
     """The gallery like a photograph of another place at golden hour."""
     page = designer.page
-    picture = references()["golden hour"].picture
+    picture = references("courtyard")["golden hour"].picture
     with tempfile.TemporaryDirectory() as folder:
         file = Path(folder) / "golden-hour.png"
         Image.fromarray(to_8_bit(np.asarray(picture))).save(file)
