@@ -34,7 +34,8 @@ SMOOTHING, JOINING = 1 / 160, 1 / 80
 #: Light below which a ratio says little, relative to the mean of the look.
 DARK = 0.01
 
-#: Pixels, about, over which strokes are told apart unless the caller says otherwise.
+#: Pixels, about, over which strokes are told apart; larger pictures are averaged. Coarser ones grow
+#: neighbouring pools of light together.
 MAX_PIXELS = 2**14
 
 #: Importance, or coverage, that counts as painted.
@@ -54,22 +55,16 @@ def find_wishes(target: Target, current_look: Floats) -> tuple[Wish, ...]:
 
 
 def split_wishes(
-    layers: Sequence[Wish],
-    image: Floats,
-    importance: Floats,
-    current_look: Floats,
-    *,
-    max_pixels: int = MAX_PIXELS,
+    layers: Sequence[Wish], image: Floats, importance: Floats, current_look: Floats
 ) -> tuple[Wish, ...]:
     """Return layers with their separate strokes told apart, the lowest first.
 
-    image, current_look: (h, w, 3) linear, painted and now; importance: (h, w). max_pixels: about
-    how many pixels are looked at; larger pictures are averaged.
+    image, current_look: (h, w, 3) linear, painted and now; importance: (h, w).
     """
     if not any(layer.has_strokes for layer in layers):
         return tuple(layers)
     height, width = importance.shape
-    side = max(1, ceil((height * width / max_pixels) ** 0.5))
+    side = max(1, ceil((height * width / MAX_PIXELS) ** 0.5))
     small = partial(_block_means, side=side)
     small_importance = small(importance)
     ratio = asked_ratio(small(image), small_importance, small(current_look))

@@ -24,9 +24,6 @@ from lightpaint.target.wish_finding import split_wishes
 #: Approximate number of blocks of pixels over which the light of a painting is compared.
 BLOCKS = 2**13
 
-#: Approximate number of pixels over which strokes are told apart: they are sought with each answer.
-WISH_PIXELS = 2**12
-
 #: Light below which a ratio says little, relative to the mean of the look.
 DARK = 0.01
 
@@ -179,7 +176,7 @@ def wish_shares(
     painted, look: (h, w, 3) linear; importance: (h, w).
     """
     whole = Wish("painting", importance.astype(np.float32), has_strokes=True)
-    wishes = split_wishes(layers or [whole], painted, importance, look, max_pixels=WISH_PIXELS)
+    wishes = split_wishes(layers or [whole], painted, importance, look)
     return np.array([wish.area.ravel() for wish in wishes], np.float64)
 
 
