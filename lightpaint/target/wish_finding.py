@@ -14,7 +14,7 @@ import numpy as np
 import numpy.typing as npt
 
 from lightpaint.arrays import Bools, Doubles, Floats
-from lightpaint.colour.color import luminance
+from lightpaint.colour.color import LUMINANCE
 from lightpaint.images.pixel_blocks import block_sums, enlarged
 from lightpaint.target.target import Target
 from lightpaint.target.wish import Wish
@@ -81,27 +81,32 @@ def split_wishes(
     return tuple(wishes)
 
 
-def asked_ratio(image: Floats, importance: Floats, current_look: Floats) -> Doubles:
-    """Return what is asked for in stops of each channel, (h, w, 3), as a wash.
+def asked_ratio(image: Floats, importance: Floats, current_look: Floats) -> Floats:
+    """Return what is asked for in stops of each channel, (3, h, w) float32, as a wash.
 
     For the arguments see `split_wishes`. 0 where the painting is the look, or where both are black.
     """
     from scipy.ndimage import gaussian_filter
 
     dark = DARK * float(np.mean(current_look))
-    asked, now = (np.maximum(x, 0).astype(np.float64) + dark for x in (image, current_look))
-    ratio = np.log2(asked / now) if dark else np.zeros(asked.shape)
-    radius = SMOOTHING * ratio.shape[1]
-    counts = (importance > 0).astype(np.float64)
-    total = gaussian_filter(counts, radius)
-    wash = np.dstack([gaussian_filter(x * counts, radius) for x in np.moveaxis(ratio, -1, 0)])
-    return np.asarray((counts / np.maximum(total, 1e-6))[..., None] * wash)
+    if not dark > 0:
+        return np.zeros((3, *importance.shape), np.float32)
+    asked, now = (
+        np.maximum(x.transpose(2, 0, 1), 0, dtype=np.float32) + np.float32(dark)
+        for x in (image, current_look)
+    )
+    counts = (importance > 0).astype(np.float32)
+    summed = np.concatenate([np.log2(asked / now) * counts, counts[None]])
+    radius = SMOOTHING * importance.shape[1]
+    wash = gaussian_filter(summed, (0, radius, radius))
+    return np.asarray(counts / np.maximum(wash[3], 1e-6) * wash[:3], np.float32)
 
 
-def _owners(painted: Bools, ratio: Doubles) -> tuple[npt.NDArray[np.int64], int]:
+def _owners(painted: Bools, ratio: Floats) -> tuple[npt.NDArray[np.int64], int]:
     """Number the strokes of a layer, and the places in them that ask for something else.
 
-    painted: (h, w). Returns the number of each pixel, (h, w), 0 for none, and the largest.
+    painted: (h, w). ratio: see `asked_ratio`. Returns the number of each pixel, (h, w), 0 for none,
+    and the largest.
     """
     least = MIN_SHARE * painted.size
     strokes = _connected(painted, round(JOINING * painted.shape[1]), least)
@@ -126,17 +131,20 @@ def _block_means(image: Floats, *, side: int) -> Doubles:
     )
 
 
-def _distinct_places(stroke: Bools, ratio: Doubles, least: float) -> list[Bools]:
+def _distinct_places(stroke: Bools, ratio: Floats, least: float) -> list[Bools]:
     """Return connected places in a stroke that ask for something else than most of it, (h, w)
     each, those that ask for most first.
     """
-    usual = np.median(ratio[stroke], axis=0)
-    differs = np.abs(luminance(ratio - usual)) > DISTINCT_STOPS
-    differs |= np.ptp(ratio - usual, axis=-1) > DISTINCT_STOPS
+    usual = np.median(ratio[:, stroke], axis=1)
+    beyond = ratio - usual[:, None, None].astype(np.float32)
+    light = np.tensordot(LUMINANCE.astype(np.float32), beyond, 1)
+    differs = np.abs(light) > DISTINCT_STOPS
+    differs |= beyond.max(axis=0) - beyond.min(axis=0) > DISTINCT_STOPS
     places = _connected(stroke & differs, 0, least)
     most = MAX_INNER_SHARE * stroke.sum()
     places = [x for x in places if x.sum() <= most]
-    return sorted(places, key=lambda x: -float(np.abs(ratio[x] - usual).sum()))
+    amount = np.abs(beyond).sum(axis=0)
+    return sorted(places, key=lambda x: -float(amount[x].sum()))
 
 
 def _connected(mask: Bools, radius: int, least: float) -> list[Bools]:

@@ -61,7 +61,7 @@ def test_layers_stay_as_they_are():
 
 def test_the_ratio_is_in_stops():
     painted = target(LOOK * np.array([4, 1, 0.5], np.float32))
-    stops = asked_ratio(painted.image, painted.importance, LOOK)[20, 30]
+    stops = asked_ratio(painted.image, painted.importance, LOOK)[:, 20, 30]
     # Darkness of a hundredth of the mean is added to both.
     exact = np.log2((0.2 * np.array([4, 1, 0.5]) + 0.002) / 0.202)
     np.testing.assert_allclose(stops, exact, atol=1e-6)
