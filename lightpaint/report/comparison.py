@@ -200,6 +200,8 @@ def _short_verdict(appearance: Appearance) -> str:
         if appearance.is_close
         else "out of reach"
         if appearance.is_far
+        else "close on the whole"
+        if appearance.is_nearly_equal
         else spoken_progress(appearance.share_met).lower()
     )
     delta_e, noise = appearance.delta_e, appearance.noise

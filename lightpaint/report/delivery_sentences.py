@@ -22,9 +22,10 @@ ALONE_ADVICE = "Add a light for it, or paint the rest as well."
 SPILL_ADVICE = "More importance, or lights that move, may help."
 
 
-def spoken_deliveries(deliveries: Sequence[Delivery]) -> str:
+def spoken_deliveries(deliveries: Sequence[Delivery], told: str = "") -> str:
     """Return how much of each wish came, one short sentence each; "" without wishes.
 
+    told: sentences that stand before these; wishes whose shares they say are left out.
     Wishes that ask for nothing visible are left out, and of many those of which most came. Parts of
     a painting without layers are only told apart if one of them lacks something.
     """
@@ -37,9 +38,12 @@ def spoken_deliveries(deliveries: Sequence[Delivery]) -> str:
         return f"Of each of {len(entries)} wishes at least {spoken_share(least)} came."
     by_share = sorted(entries, key=lambda entry: entry.least or 0.0)
     shown = [entry for entry in entries if entry in by_share[:MAX_WISHES]]
-    texts = [f"{spoken_delivery(entry)}." for entry in shown]
+    spoken = [spoken_delivery(entry) for entry in shown]
+    texts = [f"{text}." for text in spoken if f". {text}" not in f". {told}"]
     rest = len(entries) - len(shown)
-    return " ".join([*texts, f"Of {rest} more, more came."] if rest > 0 else texts)
+    if rest > 0:
+        texts.append(f"More came of {'one other' if rest == 1 else f'{rest} others'}.")
+    return " ".join(texts)
 
 
 def spoken_mean_shares(deliveries: Sequence[Delivery]) -> str:

@@ -86,11 +86,11 @@ def verdict(
     """
     appearance = appearance or compare_appearance(solution, predicted)
     sentences = [
-        headline(appearance),
+        (start := headline(appearance)),
         f"{spoken_delta_e(appearance, known=bool(predicted.half_difference.any()))}.",
     ]
     is_told = named_worst_wish(appearance) is not None  # by the headline
-    if (deliveries := spoken_deliveries(appearance.deliveries)) and not (
+    if (deliveries := spoken_deliveries(appearance.deliveries, start)) and not (
         is_told and len(main_deliveries(appearance.deliveries)) == 1
     ):
         sentences.append(deliveries)

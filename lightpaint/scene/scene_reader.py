@@ -26,6 +26,24 @@ from lightpaint.scene.scene import Scene
 from lightpaint.scene.scene_inspection import inspect_scene
 from lightpaint.scene.scene_tree import ParsedScene
 
+#: Endings of pictures and lightings, which people give in place of a scene.
+OTHER_ENDINGS = frozenset(
+    [
+        ".exr",
+        ".hdr",
+        ".json",
+        ".png",
+        ".jpg",
+        ".jpeg",
+        ".tif",
+        ".tiff",
+        ".psd",
+        ".ora",
+        ".kra",
+        ".webp",
+    ]
+)
+
 
 @keywords()
 @MITSUBA.acquired()
@@ -196,5 +214,5 @@ def _select_lights(
 def _check_file(path: Path) -> None:
     """Raise SceneError for a missing or long file, and for a picture or a lighting."""
     file_length(path, "scene file", SceneError, limit=MAX_XML)
-    if path.suffix.lower() in (".exr", ".json", ".png"):
+    if path.suffix.lower() in OTHER_ENDINGS:
         raise SceneError(f"{path} is not a scene: this command takes a Mitsuba XML first")

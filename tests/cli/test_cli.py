@@ -363,10 +363,23 @@ def test_scalar_variant_says_so_and_serves(tmp_path: Path) -> None:
     assert (tmp_path / "room.basis.exr").is_file()
 
 
+def test_a_picture_in_place_of_the_scene_is_named(tmp_path: Path) -> None:
+    Image.new("RGB", (8, 8), "red").save(tmp_path / "dusk.jpg")
+    expected = "dusk.jpg is not a scene: this command takes a Mitsuba XML first"
+    assert expected in run_refused(tmp_path, "lights", "dusk.jpg")
+    assert "dusk.jpg stands where the scene belongs: give the scene first" in run_refused(
+        tmp_path, "solve", "dusk.jpg"
+    )
+    assert "no painting to solve for" in run_refused(tmp_path, "solve", CORNELL)
+
+
 def test_doctor_names_what_it_found(tmp_path: Path) -> None:
     output = succeed(tmp_path, "doctor", by=spawn)
     for word in ("mitsuba", "LLVM", "cores", "GPU", "backend"):
         assert word in output
+    states = {line.find(" ok ") for line in output.splitlines() if " ok " in line}
+    assert len(states) == 1, "the states are a column"
+    assert states.pop() >= len("batches on a cluster"), "no subject is wider than its column"
 
 
 def test_help_does_not_wait_for_mitsuba(tmp_path: Path) -> None:

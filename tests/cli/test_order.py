@@ -92,6 +92,8 @@ def test_behind_two_dashes_everything_is_a_path() -> None:
     [
         ("solve r.xml --sp a.png", "ambiguous option: --sp"),
         ("solve r.xml --bogus a.png", "unrecognized arguments: --bogus (see lightpaint solve -"),
+        ("solve r.xml a.png --resoluton 1/2", "--resoluton; did you mean --resolution? (see light"),
+        ("solve r.xml a.png --resoluton=1/2", "--resoluton=1/2; did you mean --resolution? (see"),
         ("solve r.xml -z a.png", "unrecognized arguments: -z (see lightpaint solve --help)"),
         ("solve r.xml a.png --spp", "argument --spp: expected one argument"),
         ("solve r.xml --spp --resize a.png", "argument --spp: expected one argument"),

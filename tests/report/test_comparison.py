@@ -17,6 +17,8 @@ from lightpaint.colour.srgb import encode_display, to_8_bit
 from lightpaint.errors import SizeError
 from lightpaint.files import write_bytes
 from lightpaint.images.formats.png import png_bytes
+from lightpaint.lighting.analysis.appearance.appearance import Appearance
+from lightpaint.lighting.analysis.appearance.delivery import Delivery
 from lightpaint.lighting.answer.combination import combine
 from lightpaint.lighting.answer.lighting import Lighting
 from lightpaint.lighting.constraints.constraints import Constraints
@@ -35,6 +37,7 @@ from lightpaint.report.answer_pictures import (
 )
 from lightpaint.report.comparison import SURROUND, Tile, comparison_image, compose
 from lightpaint.report.report_json import report_numbers
+from lightpaint.report.verdict import headline
 from lightpaint.target.target import Target
 from lightpaint.target.target_reader import read_target
 
@@ -116,6 +119,25 @@ def test_captions_of_numbers_are_whole_below_small_pictures(
     told = [words for words in captions if "dE" in words or "128 spp" in words]
     assert len(told) == 2
     assert [captions[words] for words in told] == told
+
+
+def test_the_caption_rates_an_answer_as_the_sentence_does(
+    make_basis: Any, monkeypatch: pytest.MonkeyPatch
+):
+    cut = comparison.shorten_to_width
+    captions: dict[str, str] = {}
+
+    def record(words: str, font: Any, width: int) -> str:
+        captions[words] = cut(words, font, width)
+        return captions[words]
+
+    monkeypatch.setattr(comparison, "shorten_to_width", record)
+    wishes = (Delivery("Moonlight", 0.98, 0.43), Delivery("Wall", 1.0, 1.0))
+    appearance = Appearance(2.0, 0.0, 20.0, None, deliveries=wishes)
+    comparison_image(**_look(make_basis), appearance=appearance)
+    words = "close on the whole: mean dE 2.0 (noise 0.0)"
+    assert captions[words] == words
+    assert headline(appearance).startswith("Close on the whole: ")
 
 
 def test_a_long_name_stays_below_its_own_picture(make_basis: Any):

@@ -179,7 +179,11 @@ def test_wishes_are_listed():
         for k, share in enumerate(shares)
     ]
     assert spoken_deliveries(many) == (
-        "Lamp 0: 50 %. Lamp 2: 10 %. Lamp 3: 70 %. Lamp 5: 30 %. Of 2 more, more came."
+        "Lamp 0: 50 %. Lamp 2: 10 %. Lamp 3: 70 %. Lamp 5: 30 %. More came of 2 others."
+    )
+    assert spoken_deliveries(many[:5]).endswith("Lamp 4: 80 %. More came of one other.")
+    assert spoken_deliveries([MOON, LANTERN], told="Close. Lantern: 8 %, since it is off.") == (
+        "Moonlight: brightness 98 %, colour 43 %."
     )
     parts = [replace(RIM, name=name, kind="wish", layers=()) for name in ("Vase", "Top left")]
     assert spoken_deliveries(parts) == "Of each of 2 wishes at least 95 % came."

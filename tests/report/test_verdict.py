@@ -15,6 +15,7 @@ from lightpaint.basis.file.basis_file import write_basis
 from lightpaint.images.estimate import Estimate
 from lightpaint.images.formats.exr import write_rgb
 from lightpaint.lighting.analysis.appearance.appearance import Appearance
+from lightpaint.lighting.analysis.appearance.delivery import Delivery
 from lightpaint.lighting.analysis.appearance.limiting_reasons import HEADLINE_SHARE, Reason
 from lightpaint.lighting.analysis.appearance.unpainted_change import UnpaintedChange
 from lightpaint.lighting.analysis.diagnosis import Place
@@ -196,6 +197,17 @@ def test_a_headline_names_no_reason_of_less_than_a_third(share: float, is_named:
     )
     assert ("cove is switched off" in sentence) == is_named
     assert ("out of reach" in sentence) != is_named
+
+
+def test_a_wish_of_the_headline_is_not_listed_again(make_basis: BasisFactory):
+    basis = make_basis(2, (4, 4))
+    importance = np.ones((4, 4), np.float32)
+    solution = solve(basis, Target("dusk", basis.images.sum(0), importance, everything=True))
+    wishes = (Delivery("Vase", 1.03, 0.23), Delivery("Back vase", 1.03, 0.23, layers=(1,)))
+    seen = Appearance(2.0, 0.0, 20.0, None, deliveries=wishes, reasons=(Reason("colors"),))
+    sentence = verdict(solution, combine(basis, solution.lighting), None, appearance=seen)
+    assert sentence.count("Vase: brightness 103 %, colour 23 %") == 1
+    assert " Back vase: brightness 103 %, colour 23 %." in sentence
 
 
 def test_what_changes_elsewhere_is_part_of_the_verdict():

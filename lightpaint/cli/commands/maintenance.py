@@ -56,9 +56,10 @@ def _kept_by_names(names: Sequence[str]) -> list[bases.Entry]:
 def doctor(*, variant: str | None) -> CommandOutcome:
     """Run `lightpaint doctor`."""
     findings = examine(variant)
+    width = max(len(finding.subject) for finding in findings)
     for finding in findings:
         mark = {"ok": "ok", "missing": "MISSING", "info": ""}[finding.state]
-        terminal.write(f"{finding.subject:18s} {mark:8s} {finding.result}")
+        terminal.write(f"{finding.subject:{width}s} {mark:8s} {finding.result}")
     missing = [finding for finding in findings if finding.state == "missing"]
     for finding in missing:
         if finding.remedy:

@@ -6,6 +6,7 @@ options, as usual.
 """
 
 import argparse
+import difflib
 import re
 import shlex
 from collections.abc import Iterator, Sequence
@@ -40,12 +41,23 @@ class CommandParser(Parser):
         words = in_order(self, args or ())
         options, unknown_words = argparse.ArgumentParser.parse_known_args(self, words, namespace)
         if unknown_words:
-            self.error(f"unrecognized arguments: {' '.join(unknown_words)}")
+            hint = _similar_option(self, unknown_words[0])
+            self.error(f"unrecognized arguments: {' '.join(unknown_words)}{hint}")
         return options, unknown_words
 
     def format_help(self) -> str:
         """Return the help, with many options by what they are for."""
         return themed_help(self)
+
+
+def _similar_option(parser: argparse.ArgumentParser, word: str) -> str:
+    """Return `; did you mean --resolution?` for a misspelled option; "" if none resembles it."""
+    if not word.startswith("--"):
+        return ""
+    # Without the dashes, which all of them have in common.
+    names = [name[2:] for name in parser._option_string_actions if name.startswith("--")]
+    similar_names = difflib.get_close_matches(word[2:].partition("=")[0], names, n=1)
+    return f"; did you mean --{similar_names[0]}?" if similar_names else ""
 
 
 def in_order(parser: argparse.ArgumentParser, words: Sequence[str]) -> list[str]:

@@ -62,6 +62,11 @@ def jobs_of(
         raise TargetError("TARGET and --target at once: give every painting with its sensor")
     paths = options.targets or [path for _, path in options.views]
     if not paths:
+        if basis is None and Path(options.source).suffix.lower() != ".xml":
+            raise TargetError(
+                f"{options.source} stands where the scene belongs: give the scene first, then the "
+                "painting"
+            )
         raise TargetError("no painting to solve for: give a TARGET, or --target SENSOR=TARGET")
     paintings = _paintings_of(options, paths)
     constraints, rigging = constraints_of(options), rigging_of(options)
