@@ -31,7 +31,7 @@ from known_places import references
 import lightpaint as lp
 from lightpaint.basis.cache.cached_render import obtain_basis
 from lightpaint.basis.denoised_mixes import denoise_current_look
-from lightpaint.colour.srgb import to_8_bit
+from lightpaint.colour.srgb import encode_display, to_8_bit
 
 #: Share of a picture's size at which scenes are painted, by scene.
 RESOLUTION = {"gallery": "1/2", "stage": "1/2", "table": "1/4"}
@@ -101,7 +101,7 @@ def reference(designer: Designer) -> None:
     picture = references("courtyard")["golden hour"].picture
     with tempfile.TemporaryDirectory() as folder:
         file = Path(folder) / "golden-hour.png"
-        Image.fromarray(to_8_bit(np.asarray(picture))).save(file)
+        Image.fromarray(to_8_bit(encode_display(np.asarray(picture)))).save(file)
         page.get_by_role("button", name="References").click()
         designer.done("press References")
         page.locator(".reference-pane input[type=file]").set_input_files(file)
@@ -140,7 +140,7 @@ def paint_pools() -> Image.Image:
         distance = np.hypot((x / width - center_x) / radius_x, (y / height - center_y) / radius_y)
         gold = np.exp(-(distance**3))[..., None]
         light = (1 - gold) * light + gold * look * np.array(GOLD)
-    return Image.fromarray(to_8_bit(light.astype(np.float32)))
+    return Image.fromarray(to_8_bit(encode_display(light.astype(np.float32))))
 
 
 def open_raster(picture: Image.Image) -> bytes:

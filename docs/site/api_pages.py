@@ -138,6 +138,7 @@ PARTS: dict[str, tuple[str, ...]] = {
     "lighting.answer.lighting_keys": ("LightingKey",),
     "colour.photometry": ("Photometry",),
     "lighting.analysis.ambiguity": ("Ambiguity",),
+    "lighting.analysis.appearance.area_lights": ("AreaLights",),
     "lighting.analysis.appearance.color_choices": ("ColorChoice",),
     "lighting.analysis.appearance.delivery": ("Delivery",),
     "lighting.analysis.appearance.limiting_reasons": ("Reason", "Loosening"),

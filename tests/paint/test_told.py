@@ -160,6 +160,9 @@ def test_where_no_light_reaches_the_paint_alone_a_new_one_is_advised():
     given = advice(own)
     assert given is not None
     assert given.kind == "hold"
+    # Nor where the rest would change by more than the paint gains.
+    costly = replace(weaker, unpainted_change=UnpaintedChange(3.0, 12.0, "annex"))
+    assert advice(replace(own, reasons=(replace(HOLD, loosening=costly),))) == advice(appearance)
     # Once loosened, it is not advised again.
     once = replace(hold, loosening=replace(weaker, present_hold=1.3))
     again = replace(own, reasons=(once,))

@@ -19,6 +19,7 @@ from lightpaint.arrays import Doubles
 from lightpaint.colour.display.view_transform import ViewTransform
 from lightpaint.lighting.loss.expected_lights import Wash
 from lightpaint.lighting.normal_equations import NormalEquations
+from lightpaint.threads import one_thread
 
 #: Strength of the contrast of all wishes together, relative to the importance of all paint.
 CONTRAST = 0.5
@@ -34,6 +35,7 @@ SUBJECT_SHARE = 0.5
 BLACK = 1e-3
 
 
+@one_thread()
 def contrast_rows(wash: Wash, transform: ViewTransform | None) -> Doubles:
     """Return A (ō_i / O − r̄_i / R) for each wish and channel, (k, 3, n).
 

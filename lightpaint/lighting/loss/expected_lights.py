@@ -20,9 +20,13 @@ from lightpaint.images.pixel_blocks import block_sums
 from lightpaint.target.target import Target
 from lightpaint.target.wish import Wish
 from lightpaint.target.wish_finding import split_wishes
+from lightpaint.threads import one_thread
 
 #: Approximate number of blocks of pixels over which the light of a painting is compared.
 BLOCKS = 2**13
+
+#: Number of lights whose rows are summed at a time.
+CHUNK = 64
 
 #: Light below which a ratio says little, relative to the mean of the look.
 DARK = 0.01
@@ -142,9 +146,14 @@ class Wash:
 
         weights: (k, p), or (3, k, p) with others for each channel.
         """
-        # In the precision of the rows: double weights would copy all of them.
-        sums = np.matmul(self.rows, np.swapaxes(weights.astype(self.rows.dtype), -1, -2))
-        return np.asarray(sums, np.float64)
+        columns = np.swapaxes(np.asarray(weights, np.float64), -1, -2)
+        # In double precision, so that the order of views and threads does not show.
+        with one_thread():
+            parts = [
+                np.matmul(self.rows[:, first : first + CHUNK].astype(np.float64), columns)
+                for first in range(0, self.rows.shape[1], CHUNK)
+            ]
+        return np.concatenate(parts, axis=1)
 
     def asked(self) -> Doubles:
         """Return the change that is asked for in each block, (3, p), in stops; 0 without paint."""

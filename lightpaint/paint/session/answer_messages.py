@@ -363,15 +363,15 @@ def advice(appearance: Appearance) -> Advice | None:
 
 def _helps_to_loosen(appearance: Appearance, hold: Reason) -> bool:
     """Return whether to loosen the hold: not where every light lights the rest, too, so that it
-    would only take the rest along, and not once more.
+    would only take the rest along. Below the default it is not loosened once more, and from there
+    not where that changes the rest by more than it gains.
     """
+    if appearance.lacks_light_of_its_own:
+        return False
     weaker = hold.loosening
-    is_looser = (
-        weaker is not None
-        and weaker.present_hold is not None
-        and weaker.present_hold < DEFAULT_HOLD
-    )
-    return not (appearance.lacks_light_of_its_own or is_looser)
+    if weaker is None or weaker.present_hold is None or weaker.present_hold > DEFAULT_HOLD:
+        return True
+    return weaker.present_hold == DEFAULT_HOLD and not weaker.is_at_cost
 
 
 def _closeness(analysis: Analysis) -> Closeness:

@@ -18,6 +18,7 @@ from lightpaint.lighting.analysis.appearance.constraint_kinds import (
     ConstraintKind,
 )
 from lightpaint.lighting.analysis.appearance.display_difference import PaintComparison
+from lightpaint.lighting.analysis.appearance.error_place import NOTICED
 from lightpaint.lighting.analysis.appearance.pixel_sample import LimitGroup, PixelSample
 from lightpaint.lighting.analysis.appearance.unpainted_change import (
     UnpaintedChange,
@@ -76,6 +77,17 @@ class Loosening:
     unpainted_change: UnpaintedChange | None
     delta_e: tuple[float, float] | None = None
     present_hold: float | None = None
+
+    @property
+    def is_at_cost(self) -> bool:
+        """True if unpainted pixels would visibly change, and by more than painted ones would come
+        closer.
+        """
+        rest = self.unpainted_change
+        if rest is None or self.delta_e is None or rest.worst <= NOTICED:
+            return False
+        before, after = self.delta_e
+        return rest.delta_e > max(before - after, 0)
 
 
 @dataclass(frozen=True)
