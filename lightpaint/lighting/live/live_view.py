@@ -51,11 +51,6 @@ class LiveView:
         self._display: SmallFilm | None = None
 
     @property
-    def painting(self) -> tuple[Basis, Floats, Floats]:
-        """The basis, painting and importance of the view."""
-        return self.basis, self._image, self._importance
-
-    @property
     def counts(self) -> Doubles:
         """The total importance of the paint, and the weight of the rest, (2,)."""
         return np.asarray(self._sums.sum(axis=(0, 1)))
