@@ -4,6 +4,7 @@ There the mixes of two lights lie on the straight line between them, so mixes of
 polygon stay in it. The polygon is described by its extent in a fixed set of directions.
 """
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
 
@@ -63,9 +64,10 @@ class ColorHull:
 
         The hull is clipped to Rec.709.
         """
-        corners = chromaticity(np.eye(3))
-        for direction, reach in zip(DIRECTIONS, self.reach, strict=True):
-            corners = _cut(corners, direction, float(reach))
+        # Of a dozen corners, in numbers of Python: an array for each takes ten times as long.
+        corners = [(u, v) for u, v in chromaticity(np.eye(3)).tolist()]
+        for direction, reach in zip(DIRECTIONS.tolist(), self.reach.tolist(), strict=True):
+            corners = _cut(corners, direction, reach)
         xyz = np.array([xyz_of((u, v / 1.5)) for u, v in corners])
         rgb: Doubles = np.maximum(np.linalg.solve(rgb_to_xyz(REC709), xyz.T).T, 0)
         rgb /= luminance(rgb)[:, None]
@@ -90,15 +92,20 @@ class ColorHull:
         """Return the side whose triangle, or the sector beyond it, contains a linear colour
         (3,).
         """
-        corners = chromaticity(self.primaries)
-        middle = chromaticity(self.primaries.mean(axis=0))
-        to_corners, to_color = corners - middle, chromaticity(rgb) - middle
+        middle, to_corners = self._corners_from_middle
+        to_color = chromaticity(rgb) - middle
         turn = _cross(to_corners, to_color)
         facing = _cross(to_corners, np.roll(to_corners, -1, axis=0)).sum()
         # The colour is to the left of one end of that side, and to the right of the other.
         left = turn * facing >= 0
         sides = np.flatnonzero(left & ~np.roll(left, -1))
         return int(sides[0]) if sides.size else 0
+
+    @cached_property
+    def _corners_from_middle(self) -> tuple[Doubles, Doubles]:
+        """The chromaticity of the centre, (2,), and the directions from there to the corners."""
+        middle = chromaticity(self.primaries.mean(axis=0))
+        return middle, chromaticity(self.primaries) - middle
 
     @cached_property
     def _sides(self) -> Doubles:
@@ -128,14 +135,18 @@ def _cross(first: Doubles, second: Doubles) -> Doubles:
     return np.asarray(first[..., 0] * second[..., 1] - first[..., 1] * second[..., 0])
 
 
-def _cut(corners: Doubles, direction: Doubles, reach: float) -> Doubles:
-    """Return the part of a convex polygon, (m, 2), within `reach` (Sutherland–Hodgman)."""
-    room = reach - corners @ direction
-    corners_kept = []
-    for k, (a, left) in enumerate(zip(corners, room, strict=True)):
-        b, other = corners[(k + 1) % len(corners)], room[(k + 1) % len(corners)]
+def _cut(
+    corners: Sequence[tuple[float, float]], direction: Sequence[float], reach: float
+) -> list[tuple[float, float]]:
+    """Return the part of a convex polygon within `reach` (Sutherland–Hodgman)."""
+    x, y = direction
+    room = [reach - x * u - y * v for u, v in corners]
+    kept = []
+    for k, ((u, v), left) in enumerate(zip(corners, room, strict=True)):
         if left >= 0:
-            corners_kept.append(a)
+            kept.append((u, v))
+        (next_u, next_v), other = corners[(k + 1) % len(corners)], room[(k + 1) % len(corners)]
         if left * other < 0:
-            corners_kept.append(a + (b - a) * (left / (left - other)))
-    return np.array(corners_kept).reshape(-1, 2)
+            part = left / (left - other)
+            kept.append((u + (next_u - u) * part, v + (next_v - v) * part))
+    return kept

@@ -15,7 +15,7 @@ from lightpaint.basis.planes import MemoryPlanes
 from lightpaint.images.estimate import Estimate
 from lightpaint.lighting.constraints.constraints import Constraints
 from lightpaint.lighting.fit import Fit, resolve_for_targets
-from lightpaint.lighting.live.live import LiveSolver
+from lightpaint.lighting.live.live import ANSWERS_PER_READING, LiveSolver
 from lightpaint.lighting.live.live_view import LiveView
 from lightpaint.lighting.loss.painting import unpainted_weight_of
 from lightpaint.lighting.problem import Problem
@@ -157,6 +157,33 @@ def test_the_answer_under_a_brush_is_that_of_a_solve(
     problem = Problem.of(bases, targets, constraints=constraints, fit=resolved_fit)
     # Of one convex problem, whose sums agree in single precision.
     np.testing.assert_allclose(live.answer(answer), solution_of(problem).weights, atol=2e-5)
+
+
+def test_wishes_and_gamuts_of_a_stroke_are_those_of_the_painting_soon_and_at_rest(
+    make_basis: Any,
+) -> None:
+    [brush] = _paint_views(make_basis, 6, 1, 0)
+    fit = _resolve_fit([brush.target], space="linear", colors="gentle", hold=1.0)
+
+    def new_solver() -> LiveSolver:
+        return LiveSolver([brush.view], fit=fit, constraints=Constraints(), is_sketch=True)
+
+    live, start = new_solver(), brush.basis.current_weights
+    live.answer(start, while_painting=True)
+    brush.image[5:30, 5:30], brush.importance[5:30, 5:30] = (0.9, 0.5, 0.1), 1.0
+    brush.importance[brush.basis.emitters_seen] = 0
+    brush.view.update((slice(5, 30), slice(5, 30)))
+    old = live.answer(start, while_painting=True)
+    for _ in range(ANSWERS_PER_READING - 1):
+        soon = live.answer(start, while_painting=True)
+    expected = new_solver().answer(start)
+    # Of one convex problem, in double precision; an old reading expects other lights.
+    np.testing.assert_allclose(soon, expected, atol=1e-9)
+    assert np.abs(old - expected).max() > 1e-3
+    brush.image[5:30, 5:30] *= 0.5
+    brush.view.update((slice(5, 30), slice(5, 30)), with_importance=False)
+    live.answer(start, while_painting=True)
+    np.testing.assert_allclose(live.answer(start), new_solver().answer(start), atol=1e-9)
 
 
 def test_rounds_under_a_brush_come_to_the_answer_of_a_display(make_basis: Any) -> None:

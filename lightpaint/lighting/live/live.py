@@ -53,6 +53,10 @@ WHITE_STEPS = 2
 #: Width, in pieces of a range of white, of the window in which a light first finds its white.
 WHITE_WIDTH = 8
 
+#: Answers under a moving brush for each time that wishes and gamuts are found anew: from one move
+#: to the next they hardly change.
+ANSWERS_PER_READING = 4
+
 #: Painted blocks that determine the colours lights may take, about, and at least of each wish.
 GAMUT_BLOCKS, GAMUT_WISH_BLOCKS = 2**8, 2**5
 
@@ -79,6 +83,8 @@ class LiveSolver:
         self._films: tuple[tuple[LiveView, ...], Films] | None = None
         self._start: Mapping[str, RGB] = {}
         self._washed: Wash | None = None
+        self._pull: NormalEquations | None = None
+        self._last_read, self._answers_left = tuple[LiveView, ...](), 0
         self.constrain(fit, constraints)
 
     def constrain(self, fit: Fit, constraints: Constraints) -> None:
@@ -89,6 +95,7 @@ class LiveSolver:
         self._whites: WhiteLimits | None = None
         self._untouched: Doubles | None = None
         self._within, self._gamuts_of = reduction, tuple[LiveView, ...]()
+        self._answers_left = 0
         self._is_kept_to = False  # whether the last answer kept to the constraints
         self._films = None if self._start != constraints.start else self._films
         self._start = constraints.start
@@ -102,7 +109,7 @@ class LiveSolver:
         Returns the first view's basis.
         """
         self._basis = self._views[0].basis
-        self._untouched, self._gamuts_of = None, ()
+        self._untouched, self._gamuts_of, self._answers_left = None, (), 0
         if self._start:  # whose look has these planes, too
             self._films = None
         if self._films is not None:
@@ -124,16 +131,18 @@ class LiveSolver:
         return self._fit.space or "linear"
 
     @one_thread()
-    def answer(self, start: Doubles, *, while_moving: bool = False) -> Doubles:
+    def answer(
+        self, start: Doubles, *, while_moving: bool = False, while_painting: bool = False
+    ) -> Doubles:
         """Return the best weights (n, 3), from the last ones.
 
         Before anything is painted, lights keep their current weights, within the constraints.
 
         while_moving: whether a light is being moved. Sums over tiles would have to be recomputed
         for each of its places, so linear light, too, is averaged to a few thousand pixels.
+        while_painting: whether a stroke goes on: then wishes and gamuts may be a few answers old.
         """
         views = tuple(view for view in self._views if view.is_painted)
-        self._washed = None
         if not views:
             return self._unpainted_answer()
         if not self._is_kept_to:
@@ -142,8 +151,10 @@ class LiveSolver:
             self._is_kept_to = True
         painted, rest = reduce(add, (view.counts for view in views))
         unpainted = unpainted_weight(float(painted), float(rest), self._fit)
-        self._follow_whites(views)
-        reduction = self._with_gamuts(views)
+        if not (while_painting and self._answers_left and self._last_read == views):
+            self._read_paint(views)
+        self._answers_left -= 1
+        reduction, pull = self._within, self._pull
 
         def best(equations: NormalEquations, begin: Doubles) -> Doubles:
             return self._best(equations if pull is None else equations + pull, begin)
@@ -151,7 +162,6 @@ class LiveSolver:
         def allowed(weights: Doubles) -> Doubles:
             return clip_to_gamuts(reduction, snap_to_whites(reduction, weights))
 
-        pull = self._pull(views)
         if self.mode == "linear" and not while_moving:
             return best(reduce(add, (x.tiles().equations(unpainted) for x in views)), start)
         films = self._joint_films(views)
@@ -166,6 +176,14 @@ class LiveSolver:
             self._untouched = _nearest(self._reference, self._views, self._reduction)
         return self._untouched
 
+    def _read_paint(self, views: tuple[LiveView, ...]) -> None:
+        """Find what the painting asks of the lights: whites, gamuts and the pull on them."""
+        self._washed = None
+        self._follow_whites(views)
+        self._follow_gamuts(views)
+        self._pull = self._weight_pull(views)
+        self._last_read, self._answers_left = views, ANSWERS_PER_READING
+
     def _follow_whites(self, views: tuple[LiveView, ...]) -> None:
         """Widen the ranges of lights that are to be white as far as whites are painted."""
         if self._fit.colors != "white":
@@ -179,7 +197,7 @@ class LiveSolver:
             self._within = self._reduction
 
     def _wash(self, views: tuple[LiveView, ...]) -> Wash:
-        """Return the paintings and their lights, averaged over the films; once for an answer."""
+        """Return the paintings and their lights, averaged over the films; once for a reading."""
         if self._washed is None:
             self._washed = self._joint_films(views).wash([view.layers for view in views])
         return self._washed
@@ -195,25 +213,21 @@ class LiveSolver:
             self._joint_films(views).albedo[:, blocks].T,
         )
 
-    def _with_gamuts(self, views: tuple[LiveView, ...]) -> Reduction:
-        """Return the unknowns, with the gamuts that the painted views allow.
+    def _follow_gamuts(self, views: tuple[LiveView, ...]) -> None:
+        """Limit the unknowns to the gamuts that the painted views allow.
 
         Lights that the last answer confined to their gamuts are confined from the start.
         """
         if not self._fit.keeps_to_hues(is_sketch=self._is_sketch):
-            return self._reduction
-        confined = self._within
-        if confined.gamuts is None or self._gamuts_of != views:
-            painted = partial(self._painted_light, views)
-            is_texel = texel_lights(self._basis.lights)
-            is_bold = self._fit.colors == "free"
-            power, own = _power(views), self._reference
-            gamuts = Gamuts(painted, power, own, is_texel, is_bold=is_bold)
-            confined, self._gamuts_of = self._reduction.with_gamuts(gamuts), views
-        else:
-            confined.gamuts.refresh()
-        self._within = confined
-        return confined
+            return
+        if self._within.gamuts is not None and self._gamuts_of == views:
+            self._within.gamuts.refresh()
+            return
+        painted = partial(self._painted_light, views)
+        is_texel = texel_lights(self._basis.lights)
+        is_bold = self._fit.colors == "free"
+        gamuts = Gamuts(painted, _power(views), self._reference, is_texel, is_bold=is_bold)
+        self._within, self._gamuts_of = self._reduction.with_gamuts(gamuts), views
 
     def _best(self, equations: NormalEquations, start: Doubles) -> Doubles:
         """Return the best weights (n, 3) under the constraints, from those to begin with."""
@@ -228,7 +242,7 @@ class LiveSolver:
         options: dict[str, Any] = {"steps": WHITE_STEPS, "method": method}
         return next_whites(equations, reduction, start, **options)[1].weights
 
-    def _pull(self, views: tuple[LiveView, ...]) -> NormalEquations | None:
+    def _weight_pull(self, views: tuple[LiveView, ...]) -> NormalEquations | None:
         """Return the pull on the weights, as `Problem.pull`."""
         power, lights = _power(views), self._basis.lights
         # The total importance, relative to the number of pixels.

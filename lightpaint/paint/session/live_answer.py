@@ -118,12 +118,16 @@ class LiveAnswer:
         self.set_requests(self.before_slider)
         return True
 
-    def solve(self) -> None:
-        """Solve for the weights, with the current paint."""
+    def solve(self, *, while_painting: bool = False) -> None:
+        """Solve for the weights, with the current paint. while_painting: whether a stroke goes
+        on.
+        """
         is_moving = (
             self.before_slider is not None and self.before_slider.poses != self.requests.poses
         )
-        self.weights = self._live.answer(self.weights, while_moving=is_moving)
+        self.weights = self._live.answer(
+            self.weights, while_moving=is_moving, while_painting=while_painting
+        )
 
     def _fit(self, requests: SessionRequests) -> Settings:
         settings = requests.settings(self._settings)

@@ -316,7 +316,8 @@ class SessionEdits:
         self.version += 1
         self._moved_lights.follow(self.live_answer.requests.placed, self.views, self.live_answer)
         self._follow_start()
-        self.live_answer.solve()
+        is_slider = self.live_answer.before_slider is not None
+        self.live_answer.solve(while_painting=self.views.is_open and not is_slider)
         if not self.is_open and self._answered_step != self._store.last_id:
             self.keep_answer()
 
