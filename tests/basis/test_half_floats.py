@@ -97,6 +97,16 @@ def test_rounding_is_hidden_in_the_noise_of_every_tile() -> None:
             ).all()
 
 
+def test_a_picture_seen_directly_beside_noise_keeps_its_values() -> None:
+    image, half = plane(0.1)
+    screen = np.s_[TILE - 3 : TILE + 4, 2:9]  # a part of each of four tiles
+    half[screen] = 0
+    encoding, of_noise = encodings_of(image, half)
+    assert (encoding.kind, of_noise.kind) == (FLOAT, HALF)
+    image[screen] = 0.75  # of few binary digits
+    assert encodings_of(image, half)[0].kind == HALF
+
+
 @pytest.mark.parametrize("light", [1e-30, 1e-7, 1e5, 1e30])
 def test_what_half_floats_do_not_reach_is_scaled(light: float) -> None:
     image, half = plane(0.1, light=light)

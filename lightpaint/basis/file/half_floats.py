@@ -1,7 +1,9 @@
 """Half floats for planes, used where their rounding stays invisible.
 
 Rounding to half changes a value by at most 2⁻¹¹ of it. An image is stored in half floats if that is
-far below its own noise in every tile, and in float32 if it is so clean that rounding would show.
+far below its own noise in every tile, and in float32 if it is so clean that rounding would show:
+a picture on a screen or a dome, seen directly, has no noise at all, and a verification would take
+its rounding for an error.
 Values that are too bright for half floats, or so dim that they lose digits, are first multiplied by
 a power of two.
 """
@@ -13,14 +15,18 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from lightpaint.arrays import Doubles, Floats, Indices, copy_as_singles, round_to_halves
+from lightpaint.arrays import Bools, Doubles, Floats, Indices, copy_as_singles, round_to_halves
 from lightpaint.basis.file.file_planes import RowPlanes
 
 HALF, FLOAT = np.dtype(np.float16), np.dtype(np.float32)
 
 #: Maximum ratio of rounding error to noise in a tile, root mean square, which adds 1/512 to the
-#: standard deviation; and the side of a tile in pixels.
-HIDDEN_SHARE, TILE = 1 / 16, 32
+#: standard deviation; and the side of a tile in pixels: that of the blocks that are verified.
+HIDDEN_SHARE, TILE = 1 / 16, 8
+
+#: Relative noise below which a pixel counts as clean when all neighbours within a radius do, which
+#: are those whose noise a verification pools; rounding must then be as small.
+CLEAN, CLEAN_RADIUS = 1e-5, 2
 
 #: Exponent to which the brightest value is scaled; half floats reach 15.
 BRIGHTEST = 14
@@ -133,12 +139,30 @@ def encoded_plane(channels: Sequence[npt.NDArray[Any]], scale: float) -> Encoded
 def encode_pair(image: Floats, noise: Floats) -> tuple[EncodedPlane, EncodedPlane]:
     """Return the image of a light and its half difference, (h, w, 3), in their best encodings."""
     hidden = HIDDEN_SHARE**2 * _power(noise)
-    return _encode(image, hidden), _encode(noise, hidden)
+    exact = _clean_pixels(image, noise)
+    return _encode(image, hidden, exact), _encode(noise, hidden)
 
 
-def _encode(plane: Floats, hidden: Doubles) -> EncodedPlane:
+def _clean_pixels(image: Floats, noise: Floats) -> Bools | None:
+    """Return the pixels, (h, w), that have light but no noise, nor have their neighbours; None if
+    there are none.
+    """
+    from scipy.ndimage import binary_erosion
+
+    is_clean = (np.abs(noise) <= np.float32(CLEAN) * np.abs(image)).all(axis=-1)
+    is_clean &= image.any(axis=-1)
+    if not is_clean.any():
+        return None
+    side = 2 * CLEAN_RADIUS + 1
+    inner = binary_erosion(is_clean, np.ones((side, side)), border_value=1)
+    return np.asarray(inner) if inner.any() else None
+
+
+def _encode(plane: Floats, hidden: Doubles, exact: Bools | None = None) -> EncodedPlane:
     """Return a plane in half floats if the power of the rounding error is at most `hidden` in every
     tile and channel; else in float32.
+
+    exact: (h, w), pixels that must keep their values; None for none.
     """
     height, width, _ = plane.shape
     for scale in dict.fromkeys((1.0, _scale_of(plane))):
@@ -150,6 +174,10 @@ def _encode(plane: Floats, hidden: Doubles) -> EncodedPlane:
                 rounding = encoding.decoded(stored) - rows
             if not (_row_power(rounding) <= hidden[k]).all():
                 break
+            if exact is not None:
+                inside = exact[top : top + TILE]
+                if (np.abs(rounding) > CLEAN * np.abs(rows))[:, inside].any():
+                    break
         else:
             return EncodedPlane(encoding, numbers)
     return EncodedPlane(PlaneEncoding(), np.ascontiguousarray(plane.transpose(2, 0, 1)))
