@@ -121,6 +121,11 @@ class Verification(Shown):
         power = self.power or {}
         return tuple(sorted((x for x in power if power[x] < LOW_POWER), key=power.__getitem__))
 
+    @property
+    def is_blind(self) -> bool:
+        """True if it would probably have detected an error of 5 % in no light."""
+        return bool(self.power) and len(self.unseen) == len(self.power or {})
+
 
 def limit_of_tests(count: int, *, once: float = LIMIT) -> float:
     """Return the limit, in standard errors, at which `count` tests pass correct renders as often as

@@ -199,10 +199,10 @@ def _short_verdict(appearance: Appearance) -> str:
         "close"
         if appearance.is_close
         else "out of reach"
-        if appearance.is_far
+        if appearance.is_far and not appearance.is_hidden_by_noise
         else "close on the whole"
         if appearance.is_nearly_equal
-        else spoken_progress(appearance.share_met).lower()
+        else spoken_progress(appearance.progress).lower()
     )
     delta_e, noise = appearance.delta_e, appearance.noise
     return f"{word}: mean dE {delta_e:.1f} (noise {noise:.1f})"

@@ -19,6 +19,7 @@ MAX_WISHES = 4
 #: for it lights something else, too.
 REACH_ADVICE = "A light that hangs or points elsewhere may reach it."
 ALONE_ADVICE = "Add a light for it, or paint the rest as well."
+SAMPLES_ADVICE = "Render more samples."
 SPILL_ADVICE = "More importance, or lights that move, may help."
 
 

@@ -26,7 +26,7 @@ def spoken_errors(uncertainty: Uncertainty | None, count: int) -> list[str]:
     """Return `± 4 %` for each light; empty for unknown errors.
 
     At a limit it has one side, `0 … +4 %`; a light that is off has `0 … 0.9`, in its unit; a light
-    with little but stray pixels in the samples has `cannot be told`.
+    that samples do not determine has `undetermined`.
     """
     if uncertainty is None:
         return [""] * count
@@ -42,10 +42,12 @@ def untold_lights(lighting: Lighting) -> str:
     names = [light.name for light in lighting.lights if light.untold]
     if not names:
         return ""
-    pronoun, verb = ("it", "is") if len(names) == 1 else ("them", "are")
+    is_one = len(names) == 1
+    verb, pronoun, clause = ("is", "it", "it shines") if is_one else ("are", "them", "they shine")
     return (
-        f"{spoken_lights(names, start=True)} {verb} {UNTOLD_HERE}: the samples show little "
-        f"but stray bright pixels of {pronoun}. Render more samples, or keep {pronoun}."
+        f"{spoken_lights(names, start=True)} {verb} {UNTOLD_HERE}: what was painted shows too "
+        f"little of {pronoun} beside noise. Render more samples, paint where {clause}, or keep "
+        f"{pronoun}."
     )
 
 

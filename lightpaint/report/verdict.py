@@ -10,12 +10,14 @@ from lightpaint.keywords import keywords
 from lightpaint.lighting.analysis.appearance.appearance import CLOSE, Appearance, compare_appearance
 from lightpaint.lighting.analysis.appearance.delivery import Delivery, main_deliveries
 from lightpaint.lighting.analysis.appearance.limiting_reasons import Reason
+from lightpaint.lighting.analysis.appearance.pixel_sample import LimitGroup
 from lightpaint.lighting.solution import Solution
 from lightpaint.relit.detection_power import ERROR
 from lightpaint.relit.verification import Verification
 from lightpaint.report.delivery_sentences import (
     ALONE_ADVICE,
     REACH_ADVICE,
+    SAMPLES_ADVICE,
     SPILL_ADVICE,
     is_one_painting,
     named_worst_wish,
@@ -51,6 +53,14 @@ REASON_CLAUSES: dict[str, tuple[str, str]] = {
     "prefer_current": ("lights are pulled towards their current setting",) * 2,
     "near": ("lights stay near the lighting that you started from",) * 2,
     "views": ("view {} asks for different light", "views {} ask for different light"),
+}
+
+#: What keeps the lights from a painting, with its verb.
+LIMIT_SUBJECTS: dict[LimitGroup, str] = {
+    "hold": "Unpainted parts keep",
+    "colors": "The colours that lights may have keep",
+    "constraints": "Constraints keep",
+    "views": "Other views keep",
 }
 
 #: Maximum number of names in one clause; of more it tells the number.
@@ -99,7 +109,7 @@ def verdict(
     if verification is None:
         sentences.append("Not checked by a render.")
     elif verification.agrees:
-        sentences.append("Rendered again: equal within noise.")
+        sentences.append(f"{spoken_agreement(verification)}.")
         if verification.unseen:
             sentences.append(f"{spoken_blindness(verification)}.")
     else:
@@ -137,7 +147,7 @@ def _wish_headline(appearance: Appearance, wish: Delivery) -> str:
     if appearance.is_nearly_equal:
         whole = "On the whole it is close."
     else:
-        progress = spoken_progress(appearance.share_met)
+        progress = spoken_progress(appearance.progress)
         whole = f"On the whole: {progress[:1].lower()}{progress[1:]}."
     return " ".join(filter(None, [spoken_lack(appearance, wish), newest, whole]))
 
@@ -145,7 +155,7 @@ def _wish_headline(appearance: Appearance, wish: Delivery) -> str:
 def spoken_whole(appearance: Appearance) -> str:
     """Return a sentence on how much of all that was painted came."""
     is_nearly = appearance.is_nearly_equal
-    progress = "Close on the whole" if is_nearly else spoken_progress(appearance.share_met)
+    progress = "Close on the whole" if is_nearly else spoken_progress(appearance.progress)
     shares = spoken_mean_shares(appearance.deliveries)
     return f"{progress}: {shares}." if shares else f"{progress}."
 
@@ -160,6 +170,8 @@ def spoken_lack(appearance: Appearance, wish: Delivery) -> str:
     if appearance.place is None:
         return f"{spoken_delivery(wish)}."
     is_of_color = wish.lacks_color and not wish.lacks_brightness
+    if appearance.is_hidden_by_noise:
+        return f"{spoken_delivery(wish)}: {_spoken_hidden(appearance)}. {SAMPLES_ADVICE}"
     reason = _spoken_reach(appearance, is_of_color=is_of_color)
     is_reached = bool(appearance.local_lights) and appearance.has_strong_light
     advice = SPILL_ADVICE if is_reached and appearance.reasons_wish else REACH_ADVICE
@@ -193,11 +205,13 @@ def _headline_start(appearance: Appearance) -> str:
     if appearance.is_nearly_equal:
         return "Close, but"
     if not appearance.is_far:
-        far = spoken_progress(appearance.share_met)
+        far = spoken_progress(appearance.progress)
         return f"{far}, and" if far == NO_CLOSER_TEXT else f"{far}, but"
     # "The lights cannot" would not be true if something else holds them.
-    if appearance.causes or _are_kept(appearance):
-        return "Constraints keep the lights from this"
+    if appearance.causes:
+        return f"{LIMIT_SUBJECTS[appearance.limit_groups[0]]} the lights from this"
+    if _are_kept(appearance):
+        return f"{LIMIT_SUBJECTS['constraints']} the lights from this"
     return (
         "These lights cannot match this"
         if appearance.is_out_of_reach
@@ -218,6 +232,8 @@ def spoken_reason(appearance: Appearance) -> str:
     assert appearance.place is not None
     if appearance.causes:
         return _spoken_causes(appearance)
+    if appearance.is_hidden_by_noise:
+        return _spoken_hidden(appearance)
     if not appearance.is_out_of_reach:
         return spoken_noise(appearance) or NO_MAIN_CAUSE
     return _spoken_reach(appearance)
@@ -267,6 +283,12 @@ def _spoken_reach(appearance: Appearance, *, is_of_color: bool = False) -> str:
     return f"{free_names} would light too much else"
 
 
+def _spoken_hidden(appearance: Appearance) -> str:
+    """Return which lights that reach the place the samples do not determine."""
+    hidden = tuple(x for x in appearance.local_lights if x in appearance.undetermined_lights)
+    return f"too few samples tell what {_spoken_some(hidden)[0]} can do there"
+
+
 def _spoken_spill(appearance: Appearance) -> str:
     """Return what the lights of the paint light, too; "" if that is not known."""
     area = appearance.area_lights
@@ -296,7 +318,7 @@ def spoken_holding(reason: Reason) -> str:
 
 def spoken_noise(appearance: Appearance) -> str:
     """Return a clause on noise, if it is a third of the error; else ""."""
-    share = spoken_percent(appearance.error_shares.get(appearance.main_noise, 0.0))
+    share = spoken_percent(appearance.noise_shares.get(appearance.main_noise, 0.0))
     if appearance.main_noise == "noise":
         return f"{share} of the difference from the painting is render noise"
     if appearance.main_noise == "painting_noise":
@@ -335,6 +357,15 @@ def spoken_delta_e(appearance: Appearance, *, known: bool) -> str:
     noise = f"noise explains {appearance.noise:.1f}" if known else "noise included"
     now = f"{appearance.requested_change:.1f} as the scene is now"
     return f"Mean ΔE {appearance.delta_e:.1f} over what was painted ({now}; {noise})"
+
+
+def spoken_agreement(verification: Verification) -> str:
+    """Return that a render agrees, as much as it could have told."""
+    if not verification.is_blind:
+        return "Rendered again: equal within noise"
+    spp = verification.spp
+    samples = "" if spp is None else f" with {spp} sample{'s' if spp > 1 else ''} per pixel"
+    return f"Rendered again{samples}: nothing found against it"
 
 
 def spoken_blindness(verification: Verification) -> str:

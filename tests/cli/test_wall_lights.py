@@ -53,7 +53,7 @@ def rows_of(room: Path) -> np.ndarray:
 def test_the_answer_is_the_picture_that_was_on_the_wall(room: Path) -> None:
     output = solve(room)
     assert "led, 4x3 texels" in output
-    assert "Rendered again: equal within noise" in output
+    assert "nothing found against it" in output  # each texel is a small part
     expected = np.repeat(ROWS[:, None], 4, axis=1)
     np.testing.assert_allclose(rows_of(room), expected, atol=0.15)
     stored = read_emitted_image(room / "out" / "relit.led.exr", is_linear=True)
@@ -69,7 +69,7 @@ def test_the_answer_is_the_picture_that_was_on_the_wall(room: Path) -> None:
 
 def test_a_limited_wall_is_as_near_as_its_limit_permits(room: Path) -> None:
     output = solve(room, "--limit", "led.*=:2")
-    assert "Rendered again: equal within noise" in output
+    assert "nothing found against it" in output  # each texel is a small part
     bright = luminance(rows_of(room))
     assert bright.max() <= 2 * (1 + 1e-6)
     np.testing.assert_allclose(bright[0], 2, rtol=1e-6)

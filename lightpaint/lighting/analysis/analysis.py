@@ -84,6 +84,8 @@ def analyse(solution: Solution) -> tuple[Analysis, ...]:
     diagnoses = [diagnosis for _, diagnosis in looked_at]
     uncertainty, best, alike = next(answers), next(answers), next(answers)
     solution = with_error_bars(solution, uncertainty)
+    undetermined = tuple(x.name for x in solution.lighting.lights if x.untold)
+    appearances = [replace(x, undetermined_lights=undetermined) for x in appearances]
     choices = color_choices(
         solution, [view_appearance.delta_e for view_appearance in appearances], best
     )

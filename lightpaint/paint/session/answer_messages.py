@@ -300,14 +300,14 @@ def _progress_phrase(appearance: Appearance) -> str:
     There is no praise if the rest has changed by more than the paint has come closer.
     """
     rest = appearance.unpainted_change if appearance.changes_unpainted else None
-    far = spoken_progress(appearance.share_met)
+    far = spoken_progress(appearance.progress)
     if far == NO_CLOSER_TEXT:
         phrase = WORSE_TEXT if appearance.is_worse else far
     elif rest is not None and appearance.is_at_cost:
         cost = f"{spoken_part(rest)} (ΔE {spoken_amount(rest.worst)})"
-        return f"{spoken_percent(appearance.share_met)} of the way, at the cost of {cost}"
+        return f"{spoken_percent(appearance.progress)} of the way, at the cost of {cost}"
     else:
-        phrase = f"{far} ({spoken_percent(appearance.share_met)})"
+        phrase = f"{far} ({spoken_percent(appearance.progress)})"
     return phrase if rest is None else f"{phrase}, and changes {spoken_changed(rest)}"
 
 

@@ -157,6 +157,8 @@ def render_verification(
         )
     picture = denoised(result.verified.image, basis.features)
     state = "equal within noise" if result.agrees else "NOT equal, by more than noise explains"
+    if result.agrees and result.is_blind:
+        state = "nothing found against it"
     text = f"Rendered again with {result.spp} samples per pixel: {state}"
     text += f" ({spoken_distance(result)})."
     return picture, text, result.agrees

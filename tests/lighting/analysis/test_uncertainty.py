@@ -239,6 +239,29 @@ def test_what_is_not_known_is_not_taken_for_no_noise(make_basis: Any):
         correct_noise(solution)
 
 
+def test_a_light_that_the_paint_hardly_shows_is_undetermined_alone(make_basis: Any) -> None:
+    """Two lights shine elsewhere, and a little of them, with as much noise, falls on the paint."""
+    clean, rng = _pools(), np.random.default_rng(3)
+    images, halves = _noisy_halves(clean, 0.02, rng)
+    mask = np.zeros(SIZE, np.float32)
+    mask[:, :12] = 1
+    for k in (3, 4):
+        images[k, :, :12] *= 1e-3
+        halves[k, :, :12] *= 1e-3
+        images[k, :, :12] += 2e-3 * rng.exponential(1, (24, 12, 1))
+        halves[k, :, :12] += 2e-3 * rng.normal(size=(24, 12, 1))
+    image = np.einsum("n,nhwc->hwc", [1, 0.5, 0.8], clean[:3])
+    target = Target("t", image.astype(np.float32), mask, everything=False)
+    basis = make_basis(images=images, half_differences=halves)
+    bars = error_bars(solve(basis, target))
+    names = [light.name for light in basis.lights]
+    locked = Constraints.of(light={name: {"lock": True} for name in names[3:]})
+    alone = error_bars(solve(basis, target, constraints=locked))
+    # The hidden lights, off or twice as bright, add as much again.
+    np.testing.assert_allclose(bars.scatter[:3], alone.scatter[:3], rtol=2.0)
+    assert bars.untold.tolist() == [False, False, False, True, True]
+
+
 def test_a_noiseless_refinement_stays_where_it_is(make_basis: Any):
     basis = make_basis(4, SIZE)
     solution = solve(basis, _painting(_pools()))

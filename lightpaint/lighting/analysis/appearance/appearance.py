@@ -93,6 +93,8 @@ class Appearance:
         lit_delta_e: The mean CIEDE2000 of the lit parts of the paint, as washes.
         reasons_wish: The name of the wish that place, lights and reasons are about: of `worst_wish`
             if it is a part of the paint. "" if they are about all of it.
+        undetermined_lights: Lights that the samples do not determine (`Uncertainty.untold`): what
+            they could do is not known.
 
     Examples:
         >>> appearance = lp.compare_appearance(lp.solve(basis, target))
@@ -115,6 +117,7 @@ class Appearance:
     deliveries: tuple[Delivery, ...] = ()
     lit_delta_e: float = 0.0
     reasons_wish: str = ""
+    undetermined_lights: tuple[str, ...] = ()
 
     __repr__ = short_repr
 
@@ -157,7 +160,12 @@ class Appearance:
 
     @property
     def is_out_of_reach(self) -> bool:
-        """True if a third of the error is out of reach of the lights, whatever the constraints."""
+        """True if a third of the error is out of reach of the lights, whatever the constraints.
+
+        Noise may hide what a light can do: then nothing is known to be out of its reach.
+        """
+        if self.is_hidden_by_noise:
+            return False
         if not self.error_shares:
             return True
         return (
@@ -166,11 +174,22 @@ class Appearance:
         )
 
     @property
+    def is_hidden_by_noise(self) -> bool:
+        """True if the samples do not determine a light that reaches the place."""
+        return bool(set(self.local_lights) & set(self.undetermined_lights))
+
+    @property
+    def noise_shares(self) -> dict[str, float]:
+        """The share of ΔE that render noise explains, and that of the painting's noise in the error
+        of the fit.
+        """
+        noise = self.noise / self.delta_e if self.delta_e > 0 else 0.0
+        return {"noise": noise, "painting_noise": self.error_shares.get("painting_noise", 0.0)}
+
+    @property
     def main_noise(self) -> str:
         """`noise` or `painting_noise`, if a third of the error is that; else ""."""
-        noise_shares = {
-            part: self.error_shares.get(part, 0.0) for part in ("noise", "painting_noise")
-        }
+        noise_shares = self.noise_shares
         part = max(noise_shares, key=noise_shares.__getitem__)
         return part if noise_shares[part] >= HEADLINE_SHARE else ""
 
@@ -203,6 +222,16 @@ class Appearance:
         if self.requested_change > 0:
             return max(1 - self.delta_e / self.requested_change, 0.0)
         return float(self.delta_e == 0)
+
+    @property
+    def progress(self) -> float:
+        """Achieved share of the requested change by the lighting itself, without its noise.
+
+        0 if the current scene is closer.
+        """
+        if self.requested_change > 0 and not self.is_worse:
+            return min(max(1 - self.error / self.requested_change, 0.0), 1.0)
+        return self.share_met
 
     @property
     def is_in_vain(self) -> bool:

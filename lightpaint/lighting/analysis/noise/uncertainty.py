@@ -47,8 +47,8 @@ class Uncertainty:
         excess: (3,), the expected excess of the objective over the least possible, for these
             weights rendered without noise.
         target_norm2: (3,), ‖Ψ‖², as a scale.
-        untold: (n,), the lights that these samples do not determine: their pictures are little
-            but stray bright pixels, and their interval is wider than they are bright.
+        untold: (n,), the lights that these samples do not determine: little of their light stands
+            out from noise in what is painted, and their interval is wider than they are bright.
 
     Examples:
         >>> bars = lp.error_bars(lp.solve(basis, target))
@@ -114,7 +114,8 @@ def error_bars(solution: Solution) -> Uncertainty | None:
     # the noisy M leaves a part; the unbiased answer, which determines the interval, has the scatter
     # of its own M.
     scatters = problem.solved if problem.refinement is None else unbiased
-    free, exits, excess = weight_spread(solution, noise, scatters, unbiased, weights + bias)
+    spread = weight_spread(solution, noise, scatters, unbiased, weights + bias)
+    excess, is_far = spread.excess, spread.is_far
     moved = np.zeros(weights.shape)
     doubts = noise_doubts(solution, noise.power)
     if doubts.any():
@@ -123,10 +124,12 @@ def error_bars(solution: Solution) -> Uncertainty | None:
         is_refined = problem.refinement is not None
         weak_equations = step.equations(weak) if is_refined else replace(unbiased, M=weak)
         far = solve_for(solution, weak_equations)
-        free, exits, _ = weight_spread(solution, noise, weak_equations, weak_equations, far)
+        spread = weight_spread(solution, noise, weak_equations, weak_equations, far)
+        is_far = is_far | spread.is_far
         moved = far - weights - bias
     sides, wide = (
-        [_root(x, exit_, moved) for exit_ in exits] for x in (free, free * noise.widening)
+        [_root(x, exit_, moved) for exit_ in spread.exits]
+        for x in (spread.inside, spread.inside * noise.widening)
     )
     is_determined = np.where(solution.reached, 1, np.nan)
     interval = _interval(solution, bias * is_determined, wide)
@@ -139,7 +142,7 @@ def error_bars(solution: Solution) -> Uncertainty | None:
         noise.objective_noise,
         _excess_by_channel(excess, bias, problem.equations.M),
         solution.norm2,
-        ((doubts >= 0.5) | noise.is_hidden).any(axis=1) & _is_wide(weights, interval),
+        (((doubts >= 0.5) | noise.is_hidden).any(axis=1) | is_far) & _is_wide(weights, interval),
     )
 
 

@@ -1,11 +1,12 @@
 """The spread of weights by noise of the gradient, along the freedom that bounds and caps leave."""
 
 import math
+from dataclasses import dataclass
 from statistics import NormalDist
 
 import numpy as np
 
-from lightpaint.arrays import Doubles
+from lightpaint.arrays import Bools, Doubles
 from lightpaint.lighting.analysis.noise.dominant_pixels import NORMAL_95
 from lightpaint.lighting.analysis.noise.noise import (
     NULL_EIGENVALUE,
@@ -20,10 +21,32 @@ from lightpaint.lighting.solution import Solution
 #: Share of all cases outside of a 95 % interval.
 OUTSIDE_SHARE = 0.05
 
+#: Largest standard deviation of a light, relative to its own level, that other lights answer to.
+#: One that the paint hardly shows may scatter by thousands of its levels; where its equations say
+#: that another light would have to make up for that, no answer under w >= 0 does.
+MAX_DEVIATION = 1.0
+
+#: Level of a light that is off, relative to the mean light of the whole picture.
+FAINT = 0.01
+
 NORMAL = NormalDist()
 
 #: Standard deviations beyond a bound from which a normal tail is approximated by an exponential.
 FAR_DEVIATIONS = 30.0
+
+
+@dataclass(frozen=True)
+class WeightSpread:
+    """The standard deviations of weights, (n, 3) each.
+
+    inside: within bounds. exits: below and above, when they leave a bound or cap. excess: (3 n,),
+    of the objective. is_far: (n,), lights that scatter further than their own level.
+    """
+
+    inside: Doubles
+    exits: tuple[Doubles, Doubles]
+    excess: Doubles
+    is_far: Bools
 
 
 def weight_spread(
@@ -32,11 +55,8 @@ def weight_spread(
     scatters: NormalEquations,
     unbiased: NormalEquations,
     weights: Doubles,
-) -> tuple[Doubles, list[Doubles], Doubles]:
-    """Return standard deviations of the weights within bounds, and their excess beyond, (3 n,).
-
-    The second is their spread below and above when they leave a bound or cap, also in standard
-    deviations; (n, 3) each.
+) -> WeightSpread:
+    """Return the spread of the weights.
 
     scatters: the equations by which the noise of the gradient moves the weights. unbiased,
     weights: the equations and weights, (n, 3), whose gradient tells how firmly bounds hold.
@@ -46,18 +66,54 @@ def weight_spread(
     pulled, missed = problem.with_pull(scatters), problem.equations.full_matrix
     M, C = pulled.full_matrix, noise.full_covariance.reshape(gradient.size, -1)
     free, below, above, excess = (np.zeros(gradient.size) for _ in range(4))
+    levels, is_far = _levels(solution), np.zeros(gradient.size, bool)
     for room in block_freedoms(solution, pulled):
         columns, active = room.columns, room.active
         steps, covariance = _propagate(
             columns.T @ M @ columns, columns.T @ C @ columns, room, columns.T @ gradient
         )
+        sizes = np.abs(room.emitted / levels[:, None]).max(axis=0)
+        covariance, own = limit_deviations(covariance, np.where(sizes > 0, sizes, 1))
         excess += np.einsum("pq,qp->p", missed, columns @ covariance @ columns.T)
-        free += ((room.emitted @ active.constrained(covariance)) * room.emitted).sum(axis=1)
+        limited, whole = (
+            ((room.emitted @ active.constrained(x)) * room.emitted).sum(axis=1)
+            for x in (covariance, own)
+        )
+        free += np.maximum(limited, whole)
+        is_far |= whole > 0
         own_steps = room.emitted @ (active.own_exits * steps)
         below += np.square(np.minimum(own_steps, 0)).sum(axis=1)
         above += np.square(np.maximum(own_steps, 0)).sum(axis=1)
     inside, down, up = (np.sqrt(np.maximum(x, 0)).reshape(3, -1).T for x in (free, below, above))
-    return inside, [down, up], excess
+    lights_far = np.asarray(is_far.reshape(3, -1).any(axis=0))
+    return WeightSpread(inside, (down, up), excess, lights_far)
+
+
+def limit_deviations(covariance: Doubles, sizes: Doubles) -> tuple[Doubles, Doubles]:
+    """Return the covariance (k, k) of unknowns with no light deviating further than its own level,
+    and the whole one of those that do.
+
+    sizes: (k,), the change of a light, relative to its level, with each unknown. Axes of the
+    covariance longer than MAX_DEVIATION are shortened to that: a light that is hardly seen is then
+    undetermined alone, and lights that look alike are so together.
+    """
+    scale = np.outer(sizes, sizes)
+    squares, axes = np.linalg.eigh(covariance * scale)
+    if squares.max(initial=0) <= MAX_DEVIATION**2:
+        return covariance, np.zeros_like(covariance)
+    relative = (axes * np.minimum(squares, MAX_DEVIATION**2)) @ axes.T
+    is_far = np.diag(relative) >= (MAX_DEVIATION / 2) ** 2
+    return relative / scale, np.where(np.outer(is_far, is_far), covariance, 0)
+
+
+def _levels(solution: Solution) -> Doubles:
+    """Return the levels of lights to which deviations are relative, (3 n,), channel by channel."""
+    basis = solution.basis
+    sizes = np.sqrt(basis.power.sum(axis=1))
+    levels = np.maximum(solution.weights, basis.current_weights).max(axis=1)
+    brightness = levels * sizes
+    faint = FAINT * brightness.mean() / np.where(sizes > 0, sizes, np.inf)
+    return np.tile(np.where(levels > faint, levels, np.where(faint > 0, faint, 1)), 3)
 
 
 def gradient_response(solution: Solution) -> Doubles:
