@@ -160,11 +160,13 @@ class Hand:
         print(f"{time.monotonic() - start:6.1f} s until {what}", flush=True)
 
     def is_calm(self) -> bool:
-        """Whether nothing is being solved or explained."""
+        """Whether nothing is being solved or explained, and the other answers are solved, too."""
         said = self.page.locator(".headline .said")
         reasons = self.page.get_by_role("button", name="Finding reasons …")
+        is_painted = "ΔE" in self.page.locator(".headline").inner_text()
         is_busy = self.page.locator(".headline .live").count() or reasons.count()
-        return not is_busy and "…" not in said.inner_text()
+        has_old_choices = is_painted and self.page.locator(".choices.is-old").count()
+        return not is_busy and not has_old_choices and "…" not in said.inner_text()
 
     def of_painting(self, u: float, v: float) -> Place:
         """A place of the left, or upper, picture, as shares of it."""
