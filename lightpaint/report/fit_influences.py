@@ -8,7 +8,7 @@ from lightpaint.lighting.solution import Solution
 def fit_clauses(solution: Solution) -> tuple[str, ...]:
     """Return clauses on the options of the fit; none for a literal fit."""
     certificate, fit = solution.certificate, solution.problem.fit
-    has_unpainted = any(x.painted_share < 1 for x in solution.problem.views.targets)
+    has_unpainted = any(not x.is_whole for x in solution.problem.views.targets)
     clauses = []
     if certificate.display:
         clauses.append(f"fitted as the eye sees it ({certificate.display})")

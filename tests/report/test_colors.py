@@ -121,9 +121,12 @@ def test_what_decided_stands_in_the_page_and_in_its_numbers(make_basis: Any, fit
 
 
 @pytest.mark.parametrize("fit_words", [{"hold": 4.0}, {"unpainted": 0.1}])
+@pytest.mark.parametrize("painted_share", [1.0, 0.9997])  # both are said to be 100 %
 def test_a_painting_without_unpainted_parts_is_not_said_to_hold_them(
-    make_basis: Any, fit_words: Any
+    make_basis: Any, fit_words: Any, painted_share: float
 ) -> None:
     basis = make_basis(2)
-    target = Target.of(np.full((*basis.size, 3), 0.4, np.float32), name="grey")
+    whole = Target.of(np.full((*basis.size, 3), 0.4, np.float32), name="grey")
+    target = replace(whole, full_size_share=painted_share)
+    assert target.spoken_share == "100 %"
     assert "unpainted" not in fit_sentence(solve(basis, target, **fit_words)).lower()
