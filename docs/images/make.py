@@ -7,7 +7,8 @@ writes beside itself
 
     gallery.jpg     the gallery with the lighting found for its evening
     stage.jpg       the stage with the lighting found for its sunset
-    six-looks.jpg   the gallery with the lightings found for six paintings, which are in the corners
+    six-looks.jpg   six paintings of the gallery, each beside the gallery with the lighting found
+                    for it
     placement.jpg   the gallery's evening with spots that may turn and slide on their two tracks, as
                     a report draws it; it also prints what moved, and the processor's seconds
     table.jpg       the table's painting of sunset, the answer, and the sky that was found for it
@@ -30,7 +31,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
-from PIL import Image, ImageDraw
+from PIL import Image, ImageDraw, ImageFont
 
 HERE = Path(__file__).resolve().parent
 ROOT = HERE.parent.parent
@@ -47,11 +48,17 @@ from lightpaint.report.rig.rig_drawing import rig_drawing  # noqa: E402
 from lightpaint.scene.scene_render import Stream, render  # noqa: E402
 
 SIZE = (1280, 720)
-CELL, INSET, GAP = (640, 360), (176, 99), 8
+INSET, GAP = (176, 99), 8
 PICTURES = ("gallery", "stage", "six-looks", "placement", "table", "led-wall")
+
+#: Qualities that are tried until a picture has so few bytes.
+QUALITIES, MAX_BYTES = range(88, 60, -4), 380_000
 
 #: Columns and rows of the wall of LEDs, and the size of the picture of it.
 WALL, WALL_SIZE = (16, 9), (960, 540)
+
+#: Size of a painting and of its answer, and the strip above them with their titles.
+CELL, TITLE, TITLE_SIZE = (640, 360), 36, 22
 
 #: The two tracks of the gallery, the spots that may turn and slide on each, and spots to add.
 TRACKS = {
@@ -110,8 +117,10 @@ class Set:
                 basis=self.basis,
                 mask=mask if mask.exists() else None,
                 resize=True,
+                verify=False,
+                report=False,
             )
-        print(f"{self.name}: {painting}", flush=True)
+        print(f"{self.name}: {painting}: {look.verdict}", flush=True)
         return shown(denoise(look.predicted.image, self.surfaces))
 
 
@@ -130,17 +139,18 @@ def read_painting(path: Path) -> Image.Image:
 
 
 def six_looks(room: Set) -> Image.Image:
-    """Two rows of three looks, each with its painting in a corner."""
+    """Six rows, a painting at the left of each and its answer at the right."""
     width, height = CELL
-    sheet = Image.new("RGB", (3 * width + 2 * GAP, 2 * height + GAP), "white")
+    sheet = Image.new("RGB", (2 * width + GAP, TITLE + len(LOOKS) * (height + GAP) - GAP), "white")
     draw = ImageDraw.Draw(sheet)
+    for k, title in enumerate(("Painting", "Answer: what the lights can do")):
+        place = (k * (width + GAP) + width / 2, TITLE / 2)
+        draw.text(place, title, "black", ImageFont.load_default(TITLE_SIZE), anchor="mm")
     for k, name in enumerate(LOOKS):
-        x, y = k % 3 * (width + GAP), k // 3 * (height + GAP)
-        sheet.paste(room.lit_as(name).resize(CELL, Image.Resampling.LANCZOS), (x, y))
-        small = read_painting(room.painting(name)).resize(INSET, Image.Resampling.LANCZOS)
-        left, top = x + 10, y + height - INSET[1] - 10
-        draw.rectangle((left - 2, top - 2, left + INSET[0] + 1, top + INSET[1] + 1), fill="white")
-        sheet.paste(small, (left, top))
+        top = TITLE + k * (height + GAP)
+        pair = (read_painting(room.painting(name)), room.lit_as(name))
+        for left, picture in zip((0, width + GAP), pair, strict=True):
+            sheet.paste(picture.resize(CELL, Image.Resampling.LANCZOS), (left, top))
     return sheet
 
 
@@ -269,7 +279,15 @@ def main() -> None:
     if "led-wall" in wanted:
         made["led-wall"] = led_wall(asked.spp)
     for name, picture in made.items():
-        picture.save(HERE / f"{name}.jpg", quality=88, optimize=True, progressive=True)
+        write(picture, HERE / f"{name}.jpg")
+
+
+def write(picture: Image.Image, path: Path) -> None:
+    """Write a picture as JPEG, small enough for a page to load it."""
+    for quality in QUALITIES:
+        picture.save(path, quality=quality, optimize=True, progressive=True)
+        if path.stat().st_size <= MAX_BYTES:
+            break
 
 
 if __name__ == "__main__":

@@ -75,6 +75,11 @@ COUNT_ANSWERS = """() => {
   };
 }"""
 
+#: Whether all pictures of a sheet have come.
+ARE_PICTURES_DRAWN = (
+    "() => [...document.querySelectorAll('.sheet canvas')].every(({ width }) => width > 1)"
+)
+
 #: An arrow whose tip is its first point.
 POINTER = ((0, 0), (0, 19), (5, 15), (8, 22), (12, 20), (9, 14), (15, 14))
 
@@ -160,11 +165,13 @@ class Hand:
         print(f"{time.monotonic() - start:6.1f} s until {what}", flush=True)
 
     def is_calm(self) -> bool:
-        """Whether nothing is being solved or explained."""
+        """Whether nothing is being solved or explained, and the other answers are solved, too."""
         said = self.page.locator(".headline .said")
         reasons = self.page.get_by_role("button", name="Finding reasons …")
+        is_painted = "ΔE" in self.page.locator(".headline").inner_text()
         is_busy = self.page.locator(".headline .live").count() or reasons.count()
-        return not is_busy and "…" not in said.inner_text()
+        has_old_choices = is_painted and self.page.locator(".choices.is-old").count()
+        return not is_busy and not has_old_choices and "…" not in said.inner_text()
 
     def of_painting(self, u: float, v: float) -> Place:
         """A place of the left, or upper, picture, as shares of it."""
@@ -236,6 +243,7 @@ def layered(hand: Hand) -> None:
     hand.drag(on(0.03, 0.27), on(0.13, 0.34), on(0.25, 0.41))
     hand.drag(on(0.895, 0.25), on(0.905, 0.62))
     hand.wait()
+    page.locator(".is-colour .fold-head button").first.click()  # there is room for all layers then
     page.locator(".layer-name", has_text="Knot").first.click()
     page.mouse.move(5, 5)
     hand.wait()
@@ -569,12 +577,17 @@ def main() -> None:
             like_a_reference(hand)
             page.screenshot(path=HERE / "painter-reference.jpg", type="jpeg", quality=88)
             page.get_by_role("button", name="Presets", exact=True).click()
-            page.wait_for_timeout(4000)
+            page.wait_for_function(ARE_PICTURES_DRAWN, timeout=1000 * PATIENCE_S)
+            page.wait_for_timeout(1000)
             page.screenshot(path=HERE / "painter-presets.jpg", type="jpeg", quality=88)
             page.keyboard.press("Escape")
             page.get_by_role("button", name="Colour", exact=True).last.click()
             page.get_by_role("button", name="History", exact=True).click()
             keep_looks(hand)
+            for title in ("Layers", "Lights"):  # there is room for the history then
+                page.locator(".fold-head button", has_text=title).first.click()
+            page.mouse.move(5, 5)
+            page.wait_for_timeout(1000)
             page.screenshot(path=HERE / "painter-history.jpg", type="jpeg", quality=88)
             page.get_by_role("button", name="All looks").click()
             page.wait_for_timeout(2000)

@@ -29,8 +29,6 @@ from lightpaint.target.target import Target
 
 #: Narrower images are enlarged, pixel by pixel, until their captions can be read.
 MIN_WIDTH = 240
-#: Share of painted pixels that rounds to all of them.
-WHOLE_SHARE = 0.9995
 #: Pillow's own font has little beyond Latin-1: no minus, no Greek.
 SURROUND, TEXT, FAINT = (38, 38, 38), (230, 230, 230), (165, 165, 165)
 
@@ -103,7 +101,7 @@ def comparison_image(
 
 def _target_tile(target: Target, current: Floats, *, transform: ViewTransform) -> Tile:
     """Return the picture of the target. current: the background of pixels that do not count."""
-    is_part = target.painted_share < WHOLE_SHARE
+    is_part = not target.is_whole
     rest = "the current look" if target.over_look else "grey"
     return Tile(
         f"target: {target.name}",

@@ -8,12 +8,13 @@ from lightpaint.lighting.solution import Solution
 def fit_clauses(solution: Solution) -> tuple[str, ...]:
     """Return clauses on the options of the fit; none for a literal fit."""
     certificate, fit = solution.certificate, solution.problem.fit
+    has_unpainted = any(not x.is_whole for x in solution.problem.views.targets)
     clauses = []
     if certificate.display:
         clauses.append(f"fitted as the eye sees it ({certificate.display})")
-    if fit.unpainted:
+    if has_unpainted and fit.unpainted:
         clauses.append(f"each unpainted pixel counts {fit.unpainted:g} times a painted one")
-    elif fit.hold:
+    elif has_unpainted and fit.hold:
         clauses.append(f"unpainted parts are held ({fit.hold:g} times the weight of the paint)")
     if fit.colors == "gentle":
         clauses.append("lights are pulled to their own colour (gentle)")

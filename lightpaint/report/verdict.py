@@ -223,7 +223,7 @@ def spoken_missing(appearance: Appearance) -> str:
     """Return the main error in words: `brighter light on the floor`. It must have a place."""
     assert appearance.place is not None
     change = spoken_difference(appearance.place.painted, appearance.place.reached)
-    light = "shade" if is_darker(appearance) else "light"
+    light = "shadow" if is_darker(appearance) else "light"
     return f"{change.replace('a little', 'slightly')} {light} {spoken_where(appearance.place)}"
 
 

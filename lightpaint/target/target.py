@@ -24,6 +24,9 @@ NEGATIVE = 1e-3
 #: The name of a target made from arrays, unless another is given.
 DEFAULT_NAME = "target"
 
+#: Share of painted pixels that rounds to all of them.
+WHOLE_SHARE = 0.9995
+
 
 def titled(name: str) -> str:
     """Return a target's name for messages: `target evening.exr`, or `the target` if it has no
@@ -183,6 +186,11 @@ class Target(Shown):
         so a reduced picture would have a larger share.
         """
         return share_of(self.importance) if self.full_size_share is None else self.full_size_share
+
+    @property
+    def is_whole(self) -> bool:
+        """True if all of it is painted, but for a share of pixels that its text would not show."""
+        return self.painted_share >= WHOLE_SHARE
 
     @property
     def spoken_share(self) -> str:

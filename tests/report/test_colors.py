@@ -96,7 +96,10 @@ def test_names_in_the_section_are_text():
 @pytest.mark.parametrize("fit_words", [{}, {"hold": 0.5, "colors": "white"}, {"unpainted": 0.1}])
 def test_what_decided_stands_in_the_page_and_in_its_numbers(make_basis: Any, fit_words: Any):
     basis = make_basis(2)
-    target = Target.of(np.full((*basis.size, 3), 0.4, np.float32), name="grey")
+    importance = np.ones(basis.size, np.float32)
+    importance[0] = 0
+    image = np.full((*basis.size, 3), 0.4, np.float32)
+    target = Target.of(image, importance=importance, name="grey")
     solution = solve(basis, target, **fit_words)
     arguments: Any = {
         "basis": basis,
@@ -114,3 +117,16 @@ def test_what_decided_stands_in_the_page_and_in_its_numbers(make_basis: Any, fit
     assert meaning["hold"] == fit_words.get("hold", 0)
     expected = {"white": "lights are white", "free": "any colour"}[meaning["colors"]]
     assert expected in sentence or "counts 0.1" in sentence
+    assert ("unpainted" in sentence.lower()) == ("hold" in fit_words or "unpainted" in fit_words)
+
+
+@pytest.mark.parametrize("fit_words", [{"hold": 4.0}, {"unpainted": 0.1}])
+@pytest.mark.parametrize("painted_share", [1.0, 0.9997])  # both are said to be 100 %
+def test_a_painting_without_unpainted_parts_is_not_said_to_hold_them(
+    make_basis: Any, fit_words: Any, painted_share: float
+) -> None:
+    basis = make_basis(2)
+    whole = Target.of(np.full((*basis.size, 3), 0.4, np.float32), name="grey")
+    target = replace(whole, full_size_share=painted_share)
+    assert target.spoken_share == "100 %"
+    assert "unpainted" not in fit_sentence(solve(basis, target, **fit_words)).lower()

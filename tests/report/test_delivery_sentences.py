@@ -87,7 +87,7 @@ def _seen(delta_e: float, *deliveries: Delivery, **fields: Any) -> Appearance:
             "floor, too. Add a light for it, or paint the rest as well. Rim: 95 %. On the whole: "
             "most of the way.",
         ),
-        # Where shade is missing, nothing has to reach it.
+        # Where shadow is missing, nothing has to reach it.
         (
             _seen(
                 5.0,

@@ -69,7 +69,8 @@ def _seen(missed_delta_e: float, asked_delta_e: float = 20.0, **fields: Any) -> 
         ),
         (
             _seen(5.0, local_lights=("sky",), at=((1, 0), DARK, LIT)),
-            "Most of the way, but the darker shade on the left is out of reach: sky lights it too.",
+            "Most of the way, but the darker shadow on the left is out of reach: sky lights it "
+            "too.",
         ),
         (
             _seen(14.0),
@@ -123,7 +124,8 @@ def _seen(missed_delta_e: float, asked_delta_e: float = 20.0, **fields: Any) -> 
         ),
         (
             _seen(5.0, local_lights=("sky",), held_lights=("sky",), at=((1, 0), DARK, LIT)),
-            "Most of the way, but the darker shade on the left is out of reach: sky lights it too.",
+            "Most of the way, but the darker shadow on the left is out of reach: sky lights it "
+            "too.",
         ),
         (
             _seen(5.0, reasons=(Reason("limits", ("wall.x0.y0", "wall.x1.y0", "wall.x1.y1")),)),
@@ -147,7 +149,7 @@ def _seen(missed_delta_e: float, asked_delta_e: float = 20.0, **fields: Any) -> 
         ),
         (
             _seen(5.0, local_lights=("sky.x1.y0", "sky.x2.y0"), at=((1, 0), DARK, LIT)),
-            "Most of the way, but the darker shade on the left is out of reach: 2 texels of sky "
+            "Most of the way, but the darker shadow on the left is out of reach: 2 texels of sky "
             "shine there, too.",
         ),
         (

@@ -116,13 +116,13 @@ def test_pictures_of_an_earlier_answer_are_dimmed(painter: Painter) -> None:
     assert "is-old" not in group.get_attribute("class")
 
 
-def test_a_share_that_nothing_was_asked_of_is_left_out(painter: Painter) -> None:
+def test_a_share_that_nothing_was_asked_of_is_a_dash(painter: Painter) -> None:
     painter.stroke()
     painter.still()
     difference = "Mean ΔE 1.2 from the painting."
     cases: list[tuple[float | None, float | None, list[str], str]] = [
-        (None, 0.9, ["90 %"], f"Bold. 90 % of the asked colour came. {difference}"),
-        (0.5, None, ["50 %"], f"Bold. 50 % of the asked brightness came. {difference}"),
+        (None, 0.9, ["– · 90 %"], f"Bold. 90 % of the asked colour came. {difference}"),
+        (0.5, None, ["50 · – %"], f"Bold. 50 % of the asked brightness came. {difference}"),
         (None, None, [], f"Bold. {difference}"),
     ]
     for brightness, color, on_picture, said in cases:

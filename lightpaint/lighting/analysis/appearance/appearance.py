@@ -57,7 +57,7 @@ CLOSE, FAR = 3.0, 10.0
 #: ΔE that is invisible, and the least share of the requested change to achieve.
 INVISIBLE, MIN_CHANGE = 1.0, 0.3
 
-#: Ratio of painted to reached light below which shade is missing, and no light.
+#: Ratio of painted to reached light below which shadow is missing, and no light.
 DARKER = 0.8
 
 #: Largest share of a great change that may be missing before the answer counts as far.

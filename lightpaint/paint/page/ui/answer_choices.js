@@ -74,9 +74,12 @@ function ChoiceButton({ colors, label, tip, answer, ui, app }) {
   </button>`;
 }
 
-/** Return what came of brightness and of colour in percent, `98 · 43`; `98` if the painting asks for
- * one of both, '' for neither. @param {AnswerChoice} answer */
-const sharesText = (answer) => knownShares(answer).map(percentOf).join(' · ');
+/** Return what came of brightness and of colour in percent, `98 · 43`; `98 · –` if the painting asks for
+ * no other colour, '' if it asks for neither. @param {AnswerChoice} answer */
+const sharesText = ({ brightness, color }) =>
+  brightness === null && color === null
+    ? ''
+    : [brightness, color].map((share) => (share === null ? '–' : percentOf(share))).join(' · ');
 
 /** Say how much came, of which wish least, and how far the answer is. @param {AnswerChoice} answer */
 function deliveredText(answer) {

@@ -7,7 +7,7 @@ import { Button, Checkbox, Choice, Dialog, Select } from './controls.js';
 import { LampTable } from './lamp_table.js';
 import { currentLook, loadLook } from './look_actions.js';
 import { showWall } from './look_wall.js';
-import { Thumbnail } from './thumbnail.js';
+import { sheetStyle, Thumbnail } from './thumbnail.js';
 import { fill, words } from '../language/language.js';
 
 /** @typedef {import("./ui_state.js").Ui} Ui */
@@ -47,7 +47,7 @@ function ContactSheet({ ui, app, close }) {
     const inView = nameInView(thumbnail, ui.view);
     return inView in ui.resources ? inView : thumbnail;
   };
-  return html`<ul class="sheet" ref=${sheet}>
+  return html`<ul class="sheet" style=${sheetStyle(ui)} ref=${sheet}>
       ${ui.looks.map((look) => {
         const picture = pictureOf(look);
         return html`<li key=${look.id}><button type="button" onClick=${() => load(look.id)}

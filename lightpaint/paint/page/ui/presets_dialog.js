@@ -2,7 +2,7 @@
 
 import { html, useState } from '../vendor/preact.js';
 import { Button, Dialog, Select } from './controls.js';
-import { Thumbnail } from './thumbnail.js';
+import { sheetStyle, Thumbnail } from './thumbnail.js';
 import { words } from '../language/language.js';
 
 /** @typedef {import("./ui_state.js").Ui} Ui */
@@ -40,7 +40,7 @@ export function PresetsDialog({ ui, app, close }) {
       html`<div class="row"><${Select} label=${words.presetsDialog.subject} value=${subject} choices=${choices}
         tip=${words.presetsDialog.forPresetsAboutOneObject} change=${setSubject} /></div>`
     }
-    <ul class="sheet">${(ui.state?.presets ?? []).map(
+    <ul class="sheet" style=${sheetStyle(ui)}>${(ui.state?.presets ?? []).map(
       (/** @type {import("../engine/messages.js").PresetInfo} */ preset) => html`
       <li key=${preset.name}><button type="button"
         onClick=${() => void apply(preset.name, preset.has_subject)}>

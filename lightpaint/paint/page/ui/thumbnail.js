@@ -46,6 +46,13 @@ export function Thumbnail({ name, generation, app }) {
     aria-hidden="true"></canvas>`;
 }
 
+/** Return the style of a sheet of pictures of a view: their places are as high before they come.
+ * @param {import("./ui_state.js").Ui} ui */
+export function sheetStyle({ views, view }) {
+  const [height, width] = views[view]?.size ?? [9, 16];
+  return { '--aspect': `${width} / ${height}` };
+}
+
 /** @param {HTMLCanvasElement} canvas */
 function clear(canvas) {
   canvas.getContext('2d')?.clearRect(0, 0, canvas.width, canvas.height);

@@ -16,7 +16,7 @@ export const HEADLINE =
   `${OBJECT} is missing: unpainted parts are held near their current look. Paint more or loosen the hold.`;
 
 export const LONGEST =
-  `35 % of the way, at the cost of the ${OBJECT} (ΔE 49). Darker and bluer shade on the ${OBJECT} ` +
+  `35 % of the way, at the cost of the ${OBJECT} (ΔE 49). Darker and bluer shadow on the ${OBJECT} ` +
   `is missing: ` +
   `${named(12)} and ${named(13)} are limited by their constraints.`;
 
