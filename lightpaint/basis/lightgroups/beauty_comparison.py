@@ -1,6 +1,6 @@
 """Checks whether the sum of the light groups equals the beauty, the whole picture."""
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -24,6 +24,9 @@ MAX_CANDIDATES = 40
 
 #: Step between pixels of the first, coarse comparison, which rules out most pictures.
 COARSE_STEP = 8
+
+#: Least number of pixels of a coarse comparison that finds a coefficient for each layer.
+MIN_COARSE_PIXELS = 256
 
 
 def describe_sum(
@@ -122,6 +125,13 @@ class LayerSum:
         """Return Σ |beauty − total| over the pixels where both are finite."""
         return float(_deviation(beauty.image, self.total).sum())
 
+    def exceeds(self, beauty: RenderLayer) -> float:
+        """Return Σ max(total − beauty, 0) as a share of Σ |beauty|; infinite if that is 0."""
+        with np.errstate(invalid="ignore"):
+            excess = np.nan_to_num(self.total - beauty.image, nan=0, posinf=0, neginf=0)
+        size = np.nan_to_num(np.abs(beauty.image), posinf=0, neginf=0).sum(dtype=np.float64)
+        return float(np.maximum(excess, 0).sum() / size) if size else float("inf")
+
     def is_of(self, beauty: RenderLayer, *, less_itself: bool = False) -> bool:
         """Return True if the sum equals that picture, and the picture is not black.
 
@@ -172,6 +182,26 @@ def find_beauty(layers: Sequence[RenderLayer]) -> RenderLayer | None:
     """Return the layer that is the sum of the others; None if there is none."""
     layer_sum = LayerSum.of(layers)
     return next((layer for layer in layers if layer_sum.is_of(layer, less_itself=True)), None)
+
+
+def layers_needed(
+    beauty: RenderLayer, lights: Sequence[RenderLayer], others: Mapping[str, RenderLayer]
+) -> list[str]:
+    """Return the names of the `others` with which the lights add up to the beauty; [] if no
+    choice of them does.
+    """
+    # Least squares finds a coefficient for each on few pixels; the sum of the chosen confirms it.
+    compared = (beauty, *lights, *others.values())
+    is_small = beauty.image[..., 0].size < MIN_COARSE_PIXELS * COARSE_STEP**2
+    coarse = compared if is_small else [_coarsened(layer) for layer in compared]
+    pixels = np.nan_to_num(
+        np.stack([layer.image.astype(np.float64).ravel() for layer in coarse]), posinf=0, neginf=0
+    )
+    lacking = pixels[0] - pixels[1 : 1 + len(lights)].sum(axis=0)
+    coefficients = np.linalg.lstsq(pixels[1 + len(lights) :].T, lacking, rcond=None)[0]
+    needed = [name for name, x in zip(others, coefficients, strict=True) if x > 0.5]
+    chosen = [*lights, *(others[name] for name in needed)]
+    return needed if needed and LayerSum.of(chosen).is_of(beauty) else []
 
 
 def unrelated_layer(
