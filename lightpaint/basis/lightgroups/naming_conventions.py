@@ -27,6 +27,7 @@ OTHER_VERSION = re.compile(
 
 #: Where Blender is told the group of a light, and to write the whole picture.
 CYCLES_GROUP = "Light Group in the properties of the object (under Shading) or of the world"
+CYCLES_UNGROUPED = "light that Fast GI Approximation of method Add adds (in the render properties)"
 CYCLES_BEAUTY = "Combined under Passes in the properties of the view layer"
 
 #: Characters that separate parts of a name.
@@ -47,6 +48,7 @@ class Convention:
     joint: what stands between a view layer and the rest of a name.
     group_setting: where the renderer is told the group of a light.
     beauty_setting: where it is told to write the whole picture beside the groups.
+    ungrouped: light that it writes into no group, and what leads to it.
     """
 
     renderer: str
@@ -58,6 +60,7 @@ class Convention:
     joint: str = "."
     group_setting: str = ""
     beauty_setting: str = ""
+    ungrouped: str = ""
 
 
 CONVENTIONS = (
@@ -67,6 +70,7 @@ CONVENTIONS = (
         "Combined",
         group_setting=CYCLES_GROUP,
         beauty_setting=CYCLES_BEAUTY,
+        ungrouped=CYCLES_UNGROUPED,
     ),
     Convention(
         # Nuke makes underscores of all characters but letters and digits, dots included.
@@ -76,6 +80,7 @@ CONVENTIONS = (
         joint="_",
         group_setting=CYCLES_GROUP,
         beauty_setting=CYCLES_BEAUTY,
+        ungrouped=CYCLES_UNGROUPED,
     ),
     Convention(
         "Arnold",
