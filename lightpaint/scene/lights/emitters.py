@@ -19,6 +19,7 @@ from lightpaint.scene.properties.emission import (
     EmissionKind,
     Scaling,
     emission_kind,
+    is_never_found,
     read_emission,
     why_not_adjusted,
 )
@@ -97,14 +98,16 @@ def find_emitters(parsed: ParsedScene, loaded: Any, hasher: SceneHasher) -> tupl
         if kind is None:
             check_rendered(emitter, plugin, name, parsed.integrator().plugin)
         emission = read_emission(emitter, kind, name)
+        sampling_weight = float(emitter.sampling_weight())
+        is_dark = is_never_found(plugin, sampling_weight, parsed.integrator().plugin)
         emitters.append(
             Emitter(
                 name=name,
                 plugin=plugin,
                 kind=kind,
-                emission=emission,
+                emission=(0.0, 0.0, 0.0) if is_dark else emission,
                 form=describe_form(emitter, plugin),
-                sampling_weight=float(emitter.sampling_weight()),
+                sampling_weight=sampling_weight,
                 node=node_of[name],
                 file=node.file_index,
                 offset=node.offset - 1,

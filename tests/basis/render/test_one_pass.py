@@ -24,8 +24,10 @@ from lightpaint.basis.render.render_memory import memory_needed
 from lightpaint.basis.render.render_origin import ONE_PASS, SEPARATE
 from lightpaint.basis.render.separate_renders import BLACK, WHITE
 from lightpaint.errors import SceneError
+from lightpaint.lighting.answer.lighting import Lighting
 from lightpaint.pipeline.job.remarks import remarks_of_scene
 from lightpaint.progress import silent
+from lightpaint.relit.relight import relight
 from lightpaint.scene.runtime.variant import use_variant
 from lightpaint.scene.scene import Scene
 from lightpaint.scene.scene_reader import load_scene
@@ -218,6 +220,37 @@ def test_a_light_switched_off_in_the_scene_still_has_its_image(tmp_path: Path) -
     scene = load_scene(write_room(tmp_path, lights=LIGHTS["sky"] + dark_lamp))
     basis = render_basis(scene, spp=16)
     assert basis.images[basis.names.index("bulb")].max() > 0
+
+
+UNSAMPLED = '<float name="sampling_weight" value="0"/></emitter>'
+PROJECTOR = """<emitter type="projector" id="slide"><rgb name="irradiance" value="2 3 4"/>
+    <transform name="to_world"><lookat origin="0 1 1" target="0 0 0" up="0 0 1"/></transform>
+    </emitter>"""
+
+
+@pytest.mark.parametrize("lamp", [*(LIGHTS[name] for name in ("bulb", "beam", "sun")), PROJECTOR])
+def test_a_lamp_that_is_never_sampled_is_dark_now_and_can_be_lit(tmp_path: Path, lamp: str) -> None:
+    """Nothing that a ray could hit shows it, so Mitsuba renders it black."""
+    lights = lamp.replace("</emitter>", UNSAMPLED) + LIGHTS["sky"]
+    scene = load_scene(write_room(tmp_path, lights=lights))
+    name = scene.lights[0].name
+    assert scene.light(name).emission == (0, 0, 0)
+    current = {light.name: light.emission for light in scene.lights}
+    rendered, asked = (mitsuba_render(scene, x, seed=9, spp=16) for x in (None, current))
+    assert np.abs(asked - rendered).max() <= SAME_SAMPLES * rendered.max()
+    basis = render_basis(scene, spp=16)
+    assert basis.images[0].max() > 0
+    lit = relight(scene, Lighting.current(basis).with_emission(name, (1, 1, 1)), tmp_path / "r.xml")
+    assert lit.light(name).emission == (1, 1, 1)
+    assert lit.light(name).members[0].sampling_weight == 1
+
+
+def test_a_surface_that_is_never_sampled_shines_where_rays_can_hit_it(tmp_path: Path) -> None:
+    lights = LIGHTS["panel"].replace("</emitter>", UNSAMPLED) + LIGHTS["bulb"]
+    panel = load_scene(write_room(tmp_path, lights=lights)).light("panel")
+    np.testing.assert_allclose(panel.emission, (4, 3, 2), rtol=1e-6)
+    path = write_room(tmp_path, lights=lights, integrator='<integrator type="ptracer"/>')
+    assert load_scene(path).light("panel").emission == (0, 0, 0)
 
 
 def test_second_sensor_and_crop_window(tmp_path: Path) -> None:
