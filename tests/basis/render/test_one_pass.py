@@ -400,6 +400,32 @@ def test_integrators_that_trace_the_paths_of_path_are_one_pass(
     _same_as_mitsuba_at_random_weights(scene)
 
 
+@pytest.mark.parametrize(
+    ("plugin", "brightness"), [("path", 0.5), ("direct", 1), ("volpath", 1), ("prb", 1)]
+)
+def test_a_half_masked_lamp_before_nothing_is_as_bright_as_its_integrator_shows_it(
+    tmp_path: Path, plugin: str, brightness: float
+) -> None:
+    """`path` alone discards what a path gathered that met nothing but masks."""
+    path = tmp_path / "masked.xml"
+    path.write_text(
+        f"""<scene version="3.0.0">{_integrator(plugin)}
+        <sensor type="perspective"><float name="fov" value="20"/><transform name="to_world">
+        <lookat origin="0 0 4" target="0 0 0" up="0 1 0"/></transform>
+        <film type="hdrfilm"><integer name="width" value="8"/><integer name="height" value="8"/>
+        </film></sensor><shape type="rectangle" id="lamp"><bsdf type="mask">
+        <float name="opacity" value="0.5"/><bsdf type="diffuse"/></bsdf><emitter type="area">
+        <rgb name="radiance" value="1"/></emitter></shape></scene>"""
+    )
+    scene = load_scene(path)
+    shown = mitsuba_render(scene, seed=1, spp=256).mean()
+    predicted = render_basis(scene, spp=256).images.mean()
+    # Noise: five standard errors of the mean of 64 pixels with 256 samples that are 0 or 1.
+    noise = 5 * 0.5 / np.sqrt(64 * 256)
+    assert abs(shown - brightness) <= noise
+    assert abs(predicted - brightness) <= noise
+
+
 def test_depth_of_integrators_that_nobody_told(tmp_path: Path) -> None:
     for plugin, depth in {"prb": 6, "prb_projective": 6, "path": -1, "volpath": -1}.items():
         scene = load_scene(write_room(tmp_path, integrator=_integrator(plugin)))
