@@ -44,6 +44,20 @@ def test_names_come_from_emitter_else_shape_else_plugin_and_number(tmp_path: Pat
     assert [light.name for light in load_scene(path).lights] == names
 
 
+def test_names_of_mitsubas_own_writer_are_used_where_there_is_no_id(tmp_path: Path) -> None:
+    lights = """
+        <emitter type="point" name="over the table"/>
+        <emitter type="point" id="own" name="other"/>
+        <shape type="sphere" name="paper lantern"><emitter type="area" name="emitter"/></shape>
+        <shape type="sphere"><emitter type="area" name="glow"/></shape>
+        <shape type="sphere"><emitter type="area" name="emitter"/></shape>
+        <shape type="sphere" id="globe" name="sphere"><emitter type="area" name="glow"/></shape>"""
+    scene = load_scene(write_room(tmp_path, lights=lights))
+    names = ["over the table", "own", "paper lantern", "glow", "area_2", "globe"]
+    assert [light.name for light in scene.lights] == names
+    assert [x.has_name for x in scene.emitters] == [True, True, True, True, False, True]
+
+
 def test_emission_is_read_from_the_loaded_light_not_from_its_text(tmp_path: Path) -> None:
     lights = """
         <emitter type="point" id="grey"><spectrum name="intensity" value="3"/></emitter>

@@ -118,6 +118,8 @@ def _current_radiances(
 ) -> Doubles:
     """Return what the texels of an emitter show now, (nodes, 3)."""
     assert emitter.kind is not None
+    if emitter.is_dark:
+        return np.zeros((len(layout.nodes), 3))
     shown = (emitter.node, emitter.kind, emitter.emission, domain)
     # An image that was written from these texels has their values.
     if layout.splits:

@@ -38,7 +38,6 @@ def current_image(
         return np.broadcast_to(scale * np.array(emission), (rows, columns, 3)).copy()
     path, is_linear = parsed.image_file(node, kind.parameter)
     image: Floats = scale * read_emitted_image(path, is_linear).astype(np.float64)
-    image = image * np.array(emission)  # a multiple, for images
     if not np.isfinite(image).all() or image.min() < 0:
         raise SceneError(
             f"light {name!r} has an image with values that are negative or not "
