@@ -17,6 +17,7 @@ from ..lamps.lamp_levels import (
     show_factors,
 )
 from ..lamps.memory import recall, remember
+from ..lamps.working_space import working_space
 from ..painter.painter_link import PainterLink
 from ..painter.painter_messages import PainterState
 from ..painter.program import ProgramRun, paint_arguments, running_painter
@@ -228,7 +229,7 @@ def show_preview(scene, view_layer, factors, groups=None):
     """
     if groups is None:
         groups = grouped_places(scene, view_layer)
-    changed = show_factors(groups, factors)
+    changed = show_factors(groups, factors, working_space(bpy.data))
     memory = recall(scene)
     if changed and not memory.get(PREVIEWS):
         remember(scene, {**memory, PREVIEWS: True})
