@@ -35,6 +35,20 @@ def scaled_colour(base, factor, space=None):
     return [level, *multiplied(colour, [max(f, 0.0) for f in factor], space)]
 
 
+def checked_factor(values):
+    """Return the multipliers of red, green and blue. Raises ValueError for what no light has."""
+    factor = tuple(values) if isinstance(values, list | tuple) else ()
+    is_number = all(type(value) in (int, float) for value in factor)
+    if len(factor) != 3 or not is_number or not all(map(is_amount, factor)):
+        raise ValueError(f"a light has the factor {str(values)[:60]}: expected three from 0 on")
+    return tuple(map(float, factor))
+
+
+def is_amount(value):
+    """Return whether a number is finite and not negative."""
+    return math.isfinite(value) and value >= 0
+
+
 def are_equal(first, second):
     """Return whether two lists of numbers are the same but for the rounding of float32."""
     return len(first) == len(second) and all(

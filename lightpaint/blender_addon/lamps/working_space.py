@@ -20,7 +20,10 @@ SPACES = {
 
 
 def working_space(data):
-    """Return the matrix from linear Rec.709 to the space of a file, bpy.data; None if it is that."""
+    """Return the matrix from linear Rec.709 to the space of a file; None if that is Rec.709.
+
+    data: bpy.data.
+    """
     settings = getattr(data, "colorspace", None)
     return SPACES.get(getattr(settings, "working_space_interop_id", ""))
 
