@@ -19,6 +19,17 @@ def blender_command() -> list[str]:
     pytest.skip("Blender (LIGHTPAINT_BPY: a Python with its module bpy)")
 
 
+def has_working_spaces(blender: list[str]) -> bool:
+    """Return True for Blender 5, whose files may have other primaries than Rec.709."""
+    command, code = [blender[0], "--version"], "Blender 5"
+    if len(blender) == 1:
+        code = "5"
+        command = [*blender, "-c", "import bpy; print(bpy.app.version_string)"]
+    environment = {k: v for k, v in os.environ.items() if k != "PYTHONPATH"}
+    run = subprocess.run(command, capture_output=True, text=True, env=environment, check=True)
+    return any(line.startswith(code) for line in run.stdout.splitlines())
+
+
 def in_blender(
     blender: list[str], script: Path, *arguments: object, variables: dict[str, str] | None = None
 ) -> str:

@@ -24,6 +24,16 @@ class FakeLamp(dict[str, Any]):
         self._matrix = np.array(rows, float)
 
 
+class FakeData(SimpleNamespace):
+    """Data of a lamp, with custom properties."""
+
+    def get(self, key: str) -> Any:
+        return self.__dict__.get(key)
+
+    def __setitem__(self, key: str, value: Any) -> None:
+        self.__dict__[key] = value
+
+
 class FakeMatrix(list[list[float]]):
     """A matrix as Blender has it: a sequence of its rows."""
 
@@ -48,7 +58,7 @@ class FakeObjects(dict[str, Any]):
 def fake_blender() -> tuple[ModuleType, ModuleType]:
     """Return the modules bpy and mathutils."""
     bpy, vectors = ModuleType("bpy"), ModuleType("mathutils")
-    lights = SimpleNamespace(new=lambda name, kind: SimpleNamespace(type=kind, users=1))
+    lights = SimpleNamespace(new=lambda name, kind: FakeData(type=kind, users=1))
     bpy.app = SimpleNamespace(version=(4, 2, 0), version_string="4.2.0")  # type: ignore[attr-defined]
     bpy.data = SimpleNamespace(objects=FakeObjects(), worlds={}, lights=lights)  # type: ignore[attr-defined]
     scene_link = SimpleNamespace(link=lambda item: None)

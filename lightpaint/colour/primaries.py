@@ -28,6 +28,10 @@ def colour_science() -> ModuleType:
 #: CIE xy of red, green, blue and white of Rec.709, the primaries of all images in memory.
 REC709 = (0.64, 0.33, 0.30, 0.60, 0.15, 0.06, 0.3127, 0.3290)
 
+#: The same of ACEScg (ACES primaries 1), and of ITU-R BT.2020.
+ACESCG = (0.713, 0.293, 0.165, 0.830, 0.128, 0.044, 0.32168, 0.33767)
+REC2020 = (0.708, 0.292, 0.170, 0.797, 0.131, 0.046, 0.3127, 0.3290)
+
 #: CIE XYZ itself, as a set of primaries.
 XYZ = (1.0, 0.0, 0.0, 1.0, 0.0, 0.0, 1 / 3, 1 / 3)
 
@@ -93,6 +97,11 @@ def to_rec709(primaries: tuple[float, ...]) -> Doubles:
     if not (is_same_white or are_same(primaries, XYZ)):
         source_to_xyz = adaptation(source_to_xyz.sum(axis=1), to_xyz.sum(axis=1)) @ source_to_xyz
     return np.asarray(np.linalg.solve(to_xyz, source_to_xyz), np.float64)
+
+
+def from_rec709(primaries: tuple[float, ...]) -> Doubles:
+    """Return the matrix (3, 3) from linear Rec.709 to linear RGB in these primaries."""
+    return np.asarray(np.linalg.inv(to_rec709(primaries)))
 
 
 def are_same(a: Sequence[float] | None, b: Sequence[float] | None) -> bool:

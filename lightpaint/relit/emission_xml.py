@@ -2,6 +2,7 @@
 
 import re
 from dataclasses import dataclass, field
+from pathlib import Path
 
 import numpy as np
 
@@ -10,16 +11,21 @@ from lightpaint.errors import SceneError
 from lightpaint.relit.xml_edit import Element, XmlFile
 from lightpaint.scene.checks.tokens import tag
 from lightpaint.scene.lights.emitters import Emitter
-from lightpaint.scene.properties.emission import AS_AUTHORED, Scaling
+from lightpaint.scene.properties.emission import AS_AUTHORED, Scaling, child_named
 from lightpaint.scene.scene import Scene
 
 
 @dataclass
 class Changes:
-    """Changes of an element's children: replacements, and insertions of new ones."""
+    """Changes of an element's children: replacements, and insertions of new ones.
+
+    replaced: the reference, and its file, in whose place the changed element is written; None for
+    an element that is changed where it is.
+    """
 
     xml: XmlFile
     element: Element
+    replaced: tuple[XmlFile, Element] | None = None
     _missing: list[str] = field(default_factory=list)
 
     def set(self, kind: str, name: str, value: str) -> None:
@@ -65,15 +71,19 @@ class Changes:
                 f"cannot scale {name}={text!r}: write a number in the place of the parameter"
             ) from None
 
-    def child(self, name: str) -> "Changes":
-        """Return changes of the child called `name`, which must not be a reference."""
+    def child(self, name: str, definition: tuple[Path, int]) -> "Changes":
+        """Return changes of the child called `name`, which there must be.
+
+        definition: its file, and the offset of its element there. If that is only referred to, and
+        others may share it, the changes are those of a copy in the place of the reference.
+        """
         child = self._child_named(name)
-        if child is None or child.tag == "ref":
-            raise SceneError(
-                f"the {name} of a light is given by reference, and others may share it: write "
-                f"the texture into the light itself"
-            )
-        return Changes(self.xml, child)
+        assert child is not None
+        if child.tag != "ref":
+            return Changes(self.xml, child)
+        file, offset = definition
+        xml = XmlFile(file)
+        return Changes(xml, xml.element_at(offset), (self.xml, child))
 
     def _child_named(self, name: str) -> Element | None:
         """Return the child called `name`; None if there certainly is none."""
@@ -96,6 +106,10 @@ class Changes:
         """Pass on the insertions; must be called once, last."""
         if self._missing:
             self.xml.insert_first(self.element, self._missing)
+        if self.replaced is not None:
+            xml, reference = self.replaced
+            name = reference.attributes["name"]
+            xml.replace(reference, self.xml.edited_copy(self.element, name))
 
 
 def set_emission(
@@ -111,7 +125,9 @@ def set_emission(
     if kind.scaling is Scaling.COLOUR:
         changes.set("rgb", kind.parameter, " ".join(f"{np.float32(v):.9g}" for v in rgb))
     elif kind.scaling is Scaling.FACTORS:
-        holder = changes if emitter.plugin == "sunsky" else changes.child(kind.parameter)
+        holder = changes
+        if emitter.plugin != "sunsky":
+            holder = changes.child(kind.parameter, _definition(scene, emitter, kind.parameter))
         for factor in kind.factors:
             holder.set("float", factor, f"{holder.number(factor, 1.0) * rgb[0]:.9g}")
         if holder is not changes:
@@ -170,9 +186,22 @@ def _scale_image(
     """Scale the image of `emitter` by `rgb`, and refer to the scaled copy."""
     # The index distinguishes emitters whose names give the same file name.
     name = f"{stem}.{scene.emitters.index(emitter)}.{safe_name(emitter.name)}.exr"
-    holder = changes if emitter.plugin == "envmap" else changes.child(parameter)
+    holder = changes
+    if emitter.plugin != "envmap":
+        holder = changes.child(parameter, _definition(scene, emitter, parameter))
     holder.set("string", "filename", name)
     if holder is not changes:
         holder.set("boolean", "raw", "true")
         holder.finish()
     return {name: scene.emitted_image(emitter) * np.asarray(rgb, np.float32)}
+
+
+def _definition(scene: Scene, emitter: Emitter, parameter: str) -> tuple[Path, int]:
+    """Return where the texture of an emitter is defined: its file, and the offset of its
+    element.
+    """
+    state = scene.parsed.state
+    texture = child_named(state, emitter.node, parameter)
+    assert texture is not None
+    node = state.nodes[texture]
+    return scene.files[node.file_index], int(node.offset) - 1

@@ -5,12 +5,19 @@ written in its own encoding.
 """
 
 import re
-from collections.abc import Mapping
+from collections.abc import Collection, Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
 
 from lightpaint.errors import SceneError
-from lightpaint.scene.checks.tokens import attributes, decoded, encoding_of, line_of, markup
+from lightpaint.scene.checks.tokens import (
+    ATTRIBUTE,
+    attributes,
+    decoded,
+    encoding_of,
+    line_of,
+    markup,
+)
 
 
 @dataclass
@@ -126,12 +133,35 @@ class XmlFile:
             body += f"{self._newline}{indent}"
         self._edits.append((place, place, body.encode()))
 
-    def edited(self) -> bytes:
-        """Return the whole file with all edits applied, in its own encoding."""
+    def edited_copy(self, element: Element, name: str) -> str:
+        """Return `element`, within which all edits must be, with these applied, and called `name`.
+
+        It and what is in it lose their ids, which the element in the file keeps. name: text
+        without special characters.
+        """
+        text = self._edited_text()
+        copied = text[element.start : element.end + len(text) - len(self.text)]
+        parts: list[bytes] = []
+        end, left_out = 0, {b"id", b"name"}
+        for piece in markup(copied):
+            if piece["tag"] is not None:
+                start, stop = piece.span("attributes")
+                named = f' name="{name}"'.encode() if end == 0 else b""
+                parts += [copied[end:start], named, _without(copied[start:stop], left_out)]
+                end, left_out = stop, {b"id"}
+        return decoded(b"".join([*parts, copied[end:]]))
+
+    def _edited_text(self) -> bytes:
+        """Return the whole file with all edits applied, in UTF-8."""
         text = self.text
         # From back to front; replacements before insertions at the same offset.
         for start, end, new in sorted(self._edits, key=lambda e: e[:2], reverse=True):
             text = text[:start] + new + text[end:]
+        return text
+
+    def edited(self) -> bytes:
+        """Return the whole file with all edits applied, in its own encoding."""
+        text = self._edited_text()
         if self._encoding == "utf-8":
             return text
         # Characters missing in the encoding become character references, which XML allows.
@@ -197,6 +227,11 @@ def _snake_case(name: str) -> str:
 
 def _opening(text: bytes, element: Element) -> str:
     return f"<{element.tag}> of line {line_of(text, element.start)}"
+
+
+def _without(attributes_text: bytes, names: Collection[bytes]) -> bytes:
+    """Return the attributes of a tag, as they are written, without those of these names."""
+    return ATTRIBUTE.sub(lambda m: b"" if m[1] in names else m[0], attributes_text)
 
 
 def _indent_before(text: bytes, offset: int) -> str:

@@ -1,6 +1,7 @@
 """A lighting as a patch of the scene's XML, for `patch` and for reading the changes."""
 
 import difflib
+import math
 import os
 import re
 from pathlib import Path
@@ -52,19 +53,26 @@ def scene_patch(scene: Scene, lighting: Lighting) -> str:
 def emitters_of(scene: Scene, lighting: Lighting) -> list[tuple[str, str, RGB]]:
     """Return name, Mitsuba's parameter and emission of every adjusted emitter but texels.
 
-    The parameter is "" if the emission is a multiple of that in the scene, as for a sky.
+    The parameter is "" if the emission is a multiple of that in the scene, as for a sky. A
+    projector of one colour has the intensity along its axis.
     """
     regrouped_scene = scene_of(scene, lighting)
     return [
-        (emitter.name, _quantity(emitter), rgb)
+        (emitter.name, *_quantity(emitter, rgb))
         for emitter, rgb in settings_of(regrouped_scene, lighting.emission)
         if emitter.texel is None
     ]
 
 
-def _quantity(emitter: Emitter) -> str:
+def _quantity(emitter: Emitter, rgb: RGB) -> tuple[str, RGB]:
     kind = emitter.kind
-    return kind.parameter if kind is not None and kind.scaling is Scaling.COLOUR else ""
+    if kind is None or kind.scaling is not Scaling.COLOUR:
+        return "", rgb
+    if emitter.plugin != "projector":
+        return kind.parameter, rgb
+    # Its irradiance is π times smaller than what a plane at distance 1 gets.
+    r, g, b = (math.pi * channel for channel in rgb)
+    return "intensity", (r, g, b)
 
 
 def _lines(text: str) -> list[str]:

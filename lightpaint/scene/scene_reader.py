@@ -1,7 +1,9 @@
 """Reads a Mitsuba scene and chooses the lights to adjust."""
 
+import os
 from collections.abc import Collection, Iterable, Mapping, Sequence
 from dataclasses import replace
+from fnmatch import fnmatchcase
 from pathlib import Path
 
 from lightpaint.errors import SceneError
@@ -10,7 +12,7 @@ from lightpaint.keywords import keywords
 from lightpaint.scene.checks.old_scenes import explain_old_scene
 from lightpaint.scene.checks.xml_limits import MAX_XML
 from lightpaint.scene.lights.emitters import Emitter, check_emitters
-from lightpaint.scene.lights.image_split import with_split
+from lightpaint.scene.lights.image_split import images_to_split, with_split
 from lightpaint.scene.lights.light import Light, lights_of
 from lightpaint.scene.lights.light_choice import choose_lights
 from lightpaint.scene.lights.lights_file import LightsFile, lights_file_for
@@ -81,13 +83,13 @@ def load_scene(
             they are selected by their generated names. The lights file can disable this.
         integrator: Integrator to render with instead of the scene's own, such as `path`, `direct`
             or `path:max_depth=8`. It inherits max_depth, rr_depth and hide_emitters.
-        split: Name → columns and rows, such as `(16, 8)`: a sky, an area light or a projector
-            becomes an image of that many texels, each a light `NAME.xCOLUMN.yROW`; or a text such
-            as `16x8+x4.y3`, a sky of which a texel is split again. By default those of the lights
-            file, which this replaces.
-        symmetric: Names of split lights whose images are equal to their mirror images, so that two
-            texels, left and right, are one light, called like the left one. By default those of the
-            lights file, which this replaces.
+        split: Name or pattern → columns and rows, such as `(16, 8)`: a sky, an area light or a
+            projector becomes an image of that many texels, each a light `NAME.xCOLUMN.yROW`; or a
+            text such as `16x8+x4.y3`, a sky of which a texel is split again. By default those of
+            the lights file, which this replaces.
+        symmetric: Names or patterns of split lights whose images are equal to their mirror images,
+            so that two texels, left and right, are one light, called like the left one. By default
+            those of the lights file, which this replaces.
         map_size: Columns and rows, such as `(1024, 512)`, at which `relight` writes the images of
             split lights; by default one pixel for each texel.
 
@@ -102,6 +104,7 @@ def load_scene(
         (Light('bulb', ...),
          Light('rest', ..., fixed))
     """
+    _check_path(path)
     backend = use_variant(variant)
     path = Path(path)
     _check_file(path)
@@ -113,6 +116,9 @@ def load_scene(
     selection = lights_file_for(path, lights_file, beside_scene=use_lights_file)
     selection = selection.with_more(lights, groups)
     sizes = _image_sizes(selection, split)
+    with explain_old_scene(path), mitsuba_errors(path):
+        whole = inspect_scene(parsed, index)
+    sizes = images_to_split(sizes, whole["emitters"], str(path))
     mirrored = _symmetric_images(selection, symmetric, sizes)
     for name in mirrored:
         size = sizes[name]
@@ -121,7 +127,6 @@ def load_scene(
         pairs = mirrored_pairs(name, layout)
         selection = replace(selection, groups={**pairs, **selection.groups})
     with explain_old_scene(path), mitsuba_errors(path):
-        whole = inspect_scene(parsed, index)
         facts = with_split(whole, parsed, sizes, mirrored)
     check_film(path, facts["film"], facts["spp"])
     check_emitters(path, facts["emitters"])
@@ -183,12 +188,17 @@ def _symmetric_images(
     selection: LightsFile, symmetric: Iterable[str] | None, sizes: Collection[str]
 ) -> list[str]:
     """Return the names of symmetric images: `symmetric`, or those of the file that are split."""
-    if symmetric is None:
-        return sorted(selection.requests.symmetric.intersection(sizes))
-    names = sorted(set(symmetric))
-    if whole := [name for name in names if name not in sizes]:
-        raise SceneError(f"symmetric: {whole[0]!r} is not split into texels: split it")
-    return names
+    is_of_file = symmetric is None
+    patterns = selection.requests.symmetric if symmetric is None else set(symmetric)
+    names: set[str] = set()
+    for pattern in sorted(patterns):
+        matches = [x for x in sizes if x == pattern] or [
+            x for x in sizes if fnmatchcase(x, pattern)
+        ]
+        if not matches and not is_of_file:
+            raise SceneError(f"symmetric: {pattern!r} is not split into texels: split it")
+        names.update(matches)
+    return sorted(names)
 
 
 def _adjusted_images(lights: Sequence[Light]) -> set[str]:
@@ -208,6 +218,22 @@ def _select_lights(
         groups=selection.groups,
         group_alike=group_alike and selection.group_alike,
         named=selection.requests.names,
+    )
+
+
+def _check_path(path: object) -> None:
+    """Raise SceneError for a scene that is in memory, since lights are changed in its XML."""
+    if isinstance(path, str | os.PathLike):
+        return
+    if isinstance(path, Mapping):
+        how = (
+            "write it with mi.parser.write_file(mi.parser.parse_dict(mi.parser.ParserConfig("
+            "mi.variant()), scene), 'scene.xml'), and load that"
+        )
+    else:
+        how = "give the file that it was loaded from"
+    raise SceneError(
+        f"load_scene takes the path of a Mitsuba XML, not a {type(path).__name__}: {how}"
     )
 
 

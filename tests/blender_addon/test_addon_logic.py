@@ -4,8 +4,10 @@ import socket
 import struct
 import threading
 from pathlib import Path
+from types import SimpleNamespace
 from typing import Any
 
+import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
@@ -13,6 +15,7 @@ from live_server import RunningServer
 
 from lightpaint.blender_addon.lamps.group_names import group_bytes, group_name, stem
 from lightpaint.blender_addon.lamps.lamp_units import are_equal, scaled, scaled_colour
+from lightpaint.blender_addon.lamps.working_space import working_space
 from lightpaint.blender_addon.painter import program, socket_client
 from lightpaint.blender_addon.painter.painter_messages import (
     PROTOCOL_VERSION,
@@ -22,6 +25,7 @@ from lightpaint.blender_addon.painter.painter_messages import (
 )
 from lightpaint.blender_addon.painter.program import find_program
 from lightpaint.blender_addon.shot.shot_files import ShotFolder
+from lightpaint.colour.primaries import ACESCG, REC2020, from_rec709
 from lightpaint.paint.message_frames import from_frame, to_frame
 from lightpaint.paint.protocol import VERSION
 
@@ -44,6 +48,26 @@ def test_a_light_that_goes_out_keeps_its_colour() -> None:
 
 def test_a_change_of_brightness_alone_leaves_the_colour() -> None:
     assert scaled([80.0, 1.0, 0.5, 0.25], (2.0, 2.0, 2.0)) == [160.0, 1.0, 0.5, 0.25]
+
+
+@pytest.mark.parametrize(
+    ("name", "primaries"), [("lin_ap1_scene", ACESCG), ("lin_rec2020_scene", REC2020)]
+)
+@given(factor=FACTORS)
+def test_multipliers_are_of_rec709_whatever_space_a_file_works_in(
+    name: str, primaries: tuple[float, ...], factor: tuple[float, ...]
+) -> None:
+    settings = SimpleNamespace(working_space_interop_id=name)
+    space = working_space(SimpleNamespace(colorspace=settings))
+    assert space is not None
+    np.testing.assert_allclose(space, from_rec709(primaries), atol=1e-9)  # nine digits
+    shown = np.array([1.0, 0.5, 0.25])
+    level, *colour = scaled([80.0, *(np.array(space) @ shown)], factor, space)
+    made = level * np.linalg.solve(space, colour)
+    np.testing.assert_allclose(made, 80.0 * shown * factor, rtol=1e-9, atol=1e-9 * max(factor))
+    assert working_space(SimpleNamespace()) is None  # before Blender 5
+    # A colour outside of the gamut of Rec.709 may not become negative.
+    assert min(scaled_colour([1.0, 0.0, 1.0, 0.0], factor, space)) >= 0
 
 
 def test_levels_are_compared_as_float32() -> None:

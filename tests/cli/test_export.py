@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 import pytest
 from command import run, run_refused, succeed
-from fake_blender import fake_blender, run_in
+from fake_blender import FakeData, fake_blender, run_in
 from light_groups import interleaved, pictures
 from renderer import LIGHTS, write_room
 
@@ -77,7 +77,7 @@ def _blender() -> Any:
     bpy, objects = modules[0], modules[0].data.objects
 
     def lamp(name: str, kind: str, **settings: Any) -> None:
-        item = objects.new(name, SimpleNamespace(type=kind, **settings))
+        item = objects.new(name, FakeData(type=kind, **settings))
         item.matrix_world = np.diag([2.0, 3.0, 1.0, 1.0])
 
     inputs = {name: _Socket() for name in ("Color", "Strength")}

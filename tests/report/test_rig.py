@@ -63,6 +63,17 @@ def test_the_camera_follows_from_what_pixels_show(noise: float) -> None:
     assert geometry.pixel((0.5, 1.5, 9.0)) is None  # behind the camera
 
 
+def test_a_single_wall_does_not_tell_where_the_camera_is() -> None:
+    """Every projection of its points fits, so there is no camera, and no warning either."""
+    room = a_room()
+    wall = room.normal[..., 2] == 1
+    hidden = np.where(wall[..., None], room.normal, 0).astype(np.float32)
+    geometry = ViewGeometry.of(Features(room.albedo, hidden, room.position))
+    assert geometry is not None
+    assert geometry.camera is None
+    assert rig_drawing(Features(room.albedo, hidden, room.position), [turned()]) is not None
+
+
 def test_a_light_points_at_the_first_thing_that_its_axis_meets() -> None:
     geometry = ViewGeometry.of(a_room())
     assert geometry is not None

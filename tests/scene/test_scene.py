@@ -44,6 +44,59 @@ def test_names_come_from_emitter_else_shape_else_plugin_and_number(tmp_path: Pat
     assert [light.name for light in load_scene(path).lights] == names
 
 
+def test_names_of_mitsubas_own_writer_are_used_where_there_is_no_id(tmp_path: Path) -> None:
+    lights = """
+        <emitter type="point" name="over the table"/>
+        <emitter type="point" id="own" name="other"/>
+        <shape type="sphere" name="paper lantern"><emitter type="area" name="emitter"/></shape>
+        <shape type="sphere"><emitter type="area" name="glow"/></shape>
+        <shape type="sphere"><emitter type="area" name="emitter"/></shape>
+        <shape type="sphere" id="globe" name="sphere"><emitter type="area" name="glow"/></shape>"""
+    scene = load_scene(write_room(tmp_path, lights=lights))
+    names = ["over the table", "own", "paper lantern", "glow", "area_2", "globe"]
+    assert [light.name for light in scene.lights] == names
+    assert [x.has_name for x in scene.emitters] == [True, True, True, True, False, True]
+
+
+def test_a_scene_in_memory_is_refused_with_what_to_do(tmp_path: Path) -> None:
+    variant = use_variant().variant
+    import mitsuba as mi
+
+    scene = {
+        "type": "scene",
+        "sensor": {"type": "perspective"},
+        "over the table": {"type": "point"},
+        "paper lantern": {"type": "sphere", "emitter": {"type": "area"}},
+    }
+    with pytest.raises(SceneError, match="not a dict: write it with ") as refusal:
+        load_scene(scene)  # type: ignore[arg-type]
+    written = tmp_path / "scene.xml"
+    advice = str(refusal.value).partition("write it with ")[2].partition(", and load")[0]
+    assert advice.startswith("mi.parser.write_file(mi.parser.parse_dict(")
+    config = mi.parser.ParserConfig(variant)
+    mi.parser.write_file(mi.parser.parse_dict(config, scene), str(written))
+    assert [x.name for x in load_scene(written).lights] == ["over the table", "paper lantern"]
+    with pytest.raises(SceneError, match="not a Scene: give the file"):
+        load_scene(mi.load_dict(scene))  # type: ignore[arg-type]
+
+
+def test_a_pattern_splits_all_lights_of_such_names_that_can_be(tmp_path: Path) -> None:
+    panes = "".join(
+        LIGHTS["panel"].replace('id="panel"', f'id="{name}"') for name in ("w_1", "w_2", "w_3")
+    )
+    path = write_room(tmp_path, lights=panes + LIGHTS["bulb"].replace('"bulb"', '"w_4"'))
+    scene = load_scene(path, split={"w_*": "2x2", "w_3": (3, 2)}, symmetric=["w_[12]"])
+    assert scene.split == {"w_1": (2, 2), "w_2": (2, 2), "w_3": (3, 2)}
+    assert scene.symmetric == {"w_1", "w_2"}
+    assert len(scene.lights) == 2 + 2 + 6 + 1
+    with pytest.raises(SceneError, match=r"no light 'x\*' to split into texels; it has w_1, w_2"):
+        load_scene(path, split={"x*": "2x2"})
+    with pytest.raises(SceneError, match=r"symmetric: 'x\*' is not split"):
+        load_scene(path, split={"w_*": "2x2"}, symmetric=["x*"])
+    path.with_suffix(".lights.toml").write_text("[light.'w_[23]']\nsplit = [2, 2]\n")
+    assert load_scene(path).split == {"w_2": (2, 2), "w_3": (2, 2)}
+
+
 def test_emission_is_read_from_the_loaded_light_not_from_its_text(tmp_path: Path) -> None:
     lights = """
         <emitter type="point" id="grey"><spectrum name="intensity" value="3"/></emitter>

@@ -1,6 +1,6 @@
 """Checks whether the sum of the light groups equals the beauty, the whole picture."""
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -11,6 +11,13 @@ from lightpaint.colour.color import LUMINANCE
 
 #: Share of the beauty that may be missing beyond rounding without being reported.
 NEGLIGIBLE_SHARE = 1e-5
+
+#: The same where the compression of the file changes light: what its errors are beyond their
+#: typical largest.
+LOSSY_SHARE = 2e-4
+
+#: Side of the blocks of pixels whose errors of compression depend on the brightest of them.
+BLOCK_SIDE = 8
 
 #: Share of the beauty by which the groups may exceed it without a warning.
 WARNING_EXCESS = 1e-3
@@ -24,6 +31,9 @@ MAX_CANDIDATES = 40
 
 #: Step between pixels of the first, coarse comparison, which rules out most pictures.
 COARSE_STEP = 8
+
+#: Least number of pixels of a coarse comparison that finds a coefficient for each layer.
+MIN_COARSE_PIXELS = 256
 
 
 def describe_sum(
@@ -42,13 +52,18 @@ def describe_sum(
     """
     beyond = np.sign(rest) * np.maximum(np.abs(rest) - rounding(layers), 0)
     truly_missing, truly_exceeding = missing_and_exceeding(beyond, whole)
-    if truly_missing + truly_exceeding <= NEGLIGIBLE_SHARE:
-        deviation = missing + exceeding
-        return f"the groups add up to the beauty (to {deviation:.1g} of its light)", False
+    lossy = ", ".join(dict.fromkeys(layer.compression for layer in layers if _is_lossy(layer)))
+    if truly_missing + truly_exceeding <= negligible_share(layers):
+        deviation = f"to {missing + exceeding:.1g} of its light"
+        if lossy and missing + exceeding > NEGLIGIBLE_SHARE:
+            deviation += f", as exactly as the lossy compression {lossy} stores them"
+        return f"the groups add up to the beauty ({deviation})", False
     text = (
         f"the groups lack {share_text(missing)} of the light of the beauty: "
         f"the missing part becomes the fixed light {name}"
     )
+    if lossy:
+        text += f"; some of it is the loss of the compression {lossy}: ZIP has none"
     if truly_exceeding > WARNING_EXCESS:
         warning = (
             f"WARNING: in places the groups exceed the beauty, by {share_text(exceeding)} of its "
@@ -57,7 +72,7 @@ def describe_sum(
         )
         text = (
             f"{warning} {text[0].upper()}{text[1:]}"
-            if truly_missing > NEGLIGIBLE_SHARE
+            if truly_missing > negligible_share(layers)
             else warning
         )
     return text, True
@@ -78,13 +93,37 @@ def rounding(layers: Sequence[RenderLayer]) -> Floats:
     """Return an upper bound of the rounding error of the sum of the layers, (h, w, 3)."""
     bound: Floats = np.zeros(layers[0].image.shape)
     for layer in layers:
-        bound += _rounded(layer.image, is_half=layer.is_half)
+        bound += _rounded(layer.image, layer)
     return bound
 
 
-def _rounded(image: Floats, *, is_half: bool) -> Floats:
+def negligible_share(layers: Sequence[RenderLayer]) -> float:
+    """Return the share of the beauty that may be missing beyond rounding without being
+    reported.
+    """
+    return LOSSY_SHARE if any(map(_is_lossy, layers)) else NEGLIGIBLE_SHARE
+
+
+def _is_lossy(layer: RenderLayer) -> bool:
+    """Return True if the compression of a layer changes it by more than half floats do."""
+    return layer.loss > HALF_PRECISION
+
+
+def _rounded(image: Floats, layer: RenderLayer) -> Floats:
+    """Return an upper bound of the rounding error of pixels of a layer, (h, w, 3)."""
     size = np.abs(np.nan_to_num(image.astype(np.float64), posinf=0, neginf=0))
-    return np.asarray((size * HALF_PRECISION + SUBNORMAL if is_half else 0) + size * SUM_PRECISION)
+    bound = (size * HALF_PRECISION + SUBNORMAL if layer.is_half else 0) + size * SUM_PRECISION
+    return np.asarray(bound + layer.loss * _brightest_in_block(size) if layer.loss else bound)
+
+
+def _brightest_in_block(size: Floats) -> Floats:
+    """Return the largest value of the block that each pixel is in, (h, w, 3)."""
+    height, width, _ = size.shape
+    padded = np.pad(size, ((0, -height % BLOCK_SIDE), (0, -width % BLOCK_SIDE), (0, 0)))
+    rows, columns = (side // BLOCK_SIDE for side in padded.shape[:2])
+    largest = padded.reshape(rows, BLOCK_SIDE, columns, BLOCK_SIDE, 3).max(axis=(1, 3))
+    spread = largest.repeat(BLOCK_SIDE, axis=0).repeat(BLOCK_SIDE, axis=1)
+    return np.asarray(spread[:height, :width])
 
 
 @dataclass(frozen=True)
@@ -92,11 +131,12 @@ class LayerSum:
     """A sum of layers, computed once to be compared with many pictures.
 
     total: (h, w, 3) float64, not finite where a layer is not finite. bound: upper bound of its
-    rounding error.
+    rounding error. share: what may be missing beyond it, as a share of all light.
     """
 
     total: Floats
     bound: Floats
+    share: float
 
     @staticmethod
     def of(layers: Sequence[RenderLayer]) -> "LayerSum":
@@ -105,22 +145,30 @@ class LayerSum:
         with np.errstate(invalid="ignore"):
             for layer in layers:
                 total += layer.image
-        return LayerSum(total, rounding(layers))
+        return LayerSum(total, rounding(layers), negligible_share(layers))
 
     def and_also(self, layer: RenderLayer) -> "LayerSum":
         """Return the sum with one layer added."""
         with np.errstate(invalid="ignore"):
             total = self.total + layer.image
-        return LayerSum(total, self.bound + rounding([layer]))
+        share = max(self.share, negligible_share([layer]))
+        return LayerSum(total, self.bound + rounding([layer]), share)
 
     def without(self, layer: RenderLayer) -> "LayerSum":
         """Return the sum with one of its layers removed."""
         with np.errstate(invalid="ignore"):
-            return LayerSum(self.total - layer.image, self.bound)
+            return LayerSum(self.total - layer.image, self.bound, self.share)
 
     def lacks(self, beauty: RenderLayer) -> float:
         """Return Σ |beauty − total| over the pixels where both are finite."""
         return float(_deviation(beauty.image, self.total).sum())
+
+    def exceeds(self, beauty: RenderLayer) -> float:
+        """Return Σ max(total − beauty, 0) as a share of Σ |beauty|; infinite if that is 0."""
+        with np.errstate(invalid="ignore"):
+            excess = np.nan_to_num(self.total - beauty.image, nan=0, posinf=0, neginf=0)
+        size = np.nan_to_num(np.abs(beauty.image), posinf=0, neginf=0).sum(dtype=np.float64)
+        return float(np.maximum(excess, 0).sum() / size) if size else float("inf")
 
     def is_of(self, beauty: RenderLayer, *, less_itself: bool = False) -> bool:
         """Return True if the sum equals that picture, and the picture is not black.
@@ -129,7 +177,7 @@ class LayerSum:
         it.
         """
         size = np.nan_to_num(np.abs(beauty.image), posinf=0, neginf=0).sum(dtype=np.float64)
-        largest_share = NEGLIGIBLE_SHARE * size
+        largest_share = max(self.share, negligible_share([beauty])) * size
         # The excess only grows with more pixels, so a few of them can rule a picture out.
         coarse = (slice(None, None, COARSE_STEP), slice(None, None, COARSE_STEP))
         return bool(
@@ -148,7 +196,9 @@ class LayerSum:
             deviation = _deviation(2 * image.astype(np.float64), self.total[pixels])
         else:
             deviation = _deviation(image, self.total[pixels])
-            bound = bound + _rounded(image, is_half=beauty.is_half)
+            # The loss at a pixel depends on its whole block.
+            whole = _rounded(beauty.image, beauty)[pixels] if beauty.loss else None
+            bound = bound + (_rounded(image, beauty) if whole is None else whole)
         return float(np.maximum(deviation - bound, 0).sum())
 
 
@@ -174,6 +224,26 @@ def find_beauty(layers: Sequence[RenderLayer]) -> RenderLayer | None:
     return next((layer for layer in layers if layer_sum.is_of(layer, less_itself=True)), None)
 
 
+def layers_needed(
+    beauty: RenderLayer, lights: Sequence[RenderLayer], others: Mapping[str, RenderLayer]
+) -> list[str]:
+    """Return the names of the `others` with which the lights add up to the beauty; [] if no
+    choice of them does.
+    """
+    # Least squares finds a coefficient for each on few pixels; the sum of the chosen confirms it.
+    compared = (beauty, *lights, *others.values())
+    is_small = beauty.image[..., 0].size < MIN_COARSE_PIXELS * COARSE_STEP**2
+    coarse = compared if is_small else [_coarsened(layer) for layer in compared]
+    pixels = np.nan_to_num(
+        np.stack([layer.image.astype(np.float64).ravel() for layer in coarse]), posinf=0, neginf=0
+    )
+    lacking = pixels[0] - pixels[1 : 1 + len(lights)].sum(axis=0)
+    coefficients = np.linalg.lstsq(pixels[1 + len(lights) :].T, lacking, rcond=None)[0]
+    needed = [name for name, x in zip(others, coefficients, strict=True) if x > 0.5]
+    chosen = [*lights, *(others[name] for name in needed)]
+    return needed if needed and LayerSum.of(chosen).is_of(beauty) else []
+
+
 def unrelated_layer(
     layers: Sequence[RenderLayer], beauty: RenderLayer | None
 ) -> tuple[RenderLayer, RenderLayer] | None:
@@ -187,7 +257,10 @@ def unrelated_layer(
     if beauty is not None and LayerSum.of(layers).is_of(beauty):
         return None
     # A coarse selection of pixels rules out most pairs.
-    coarse_layers, whole = list(map(_coarsened, layers)), beauty and _coarsened(beauty)
+    # What compression loses at a pixel depends on pixels that such a selection leaves out.
+    coarse_layers, whole = list(layers), beauty
+    if not any(layer.loss for layer in layers):
+        coarse_layers, whole = list(map(_coarsened, layers)), beauty and _coarsened(beauty)
     for k in _unrelated_candidates(coarse_layers, whole):
         others = [*layers[:k], *layers[k + 1 :]]
         if beauty is None and (whole_found := find_beauty(others)) is not None:

@@ -67,17 +67,24 @@ def missing_light(roles: Roles, holes: npt.NDArray[np.bool_]) -> MissingLight:
     setting = _setting(roles, "group")
     if is_missing and setting and missing > MIN_MISSING_SHARE and missing > exceeding:
         text += f"; a light in no group gets one by {setting}"
+        if ungrouped := _setting(roles, "ungrouped"):
+            text += f", but {ungrouped} is in none"
     return MissingLight(rest if is_missing else None, missing, exceeding, text)
 
 
-def _setting(roles: Roles, of: Literal["group", "beauty"]) -> str:
-    """Return where the renderer is told the group of a light, or to write the beauty; "" if it is
-    not known.
+def _setting(roles: Roles, of: Literal["group", "beauty", "ungrouped"]) -> str:
+    """Return where the renderer is told the group of a light, or to write the beauty, or which
+    light it writes into no group; "" if it is not known.
     """
     convention = convention_of(roles.renderer)
     if convention is None:
         return ""
-    return convention.group_setting if of == "group" else convention.beauty_setting
+    settings = {
+        "group": convention.group_setting,
+        "beauty": convention.beauty_setting,
+        "ungrouped": convention.ungrouped,
+    }
+    return settings[of]
 
 
 def without_holes(image: Floats, holes: npt.NDArray[np.bool_]) -> npt.NDArray[np.float32]:

@@ -15,6 +15,7 @@ from lightpaint.basis.lightgroups.naming_conventions import (
     SEPARATORS,
     Convention,
     beauty_name,
+    is_beauty,
 )
 from lightpaint.display_text import some_names
 from lightpaint.errors import BasisError
@@ -29,15 +30,19 @@ class LayerChoice:
 
     lights: light name → layer name. optional: the same for layers that may or may not be part of
     the sum. whole: the same for a group whose name says that it contains all others, which the sum
-    then confirms or not. beauty: name of its layer; None if no layer has a known name for it.
+    then confirms or not. versions: the same for groups whose name says that they show another layer
+    differently, likewise. beauty: name of its layer; None if no layer has a known name for it.
+    has_pattern: whether the lights are those of a pattern, which may match the whole picture.
     """
 
     renderer: str
     lights: Mapping[str, str]
     optional: Mapping[str, str] = field(default_factory=dict)
     whole: Mapping[str, str] = field(default_factory=dict)
+    versions: Mapping[str, str] = field(default_factory=dict)
     beauty: str | None = None
     view: str = ""
+    has_pattern: bool = False
     remarks: tuple[str, ...] = ()
 
 
@@ -55,7 +60,7 @@ def choose_layers(
     fitting = []
     for convention in CONVENTIONS:
         matches = [m for name in layers if (m := convention.layer.fullmatch(name))]
-        if any(not OTHER_VERSION.fullmatch(m[0]) for m in matches):
+        if any(not _is_version(m, layers) for m in matches):
             fitting.append((convention, matches))
     if len(fitting) == 1:
         return _by_convention(layers, *fitting[0], file_name)
@@ -79,8 +84,8 @@ def choose_files(layers: Iterable[str]) -> LayerChoice:
 
 
 def short_names(stems: Sequence[str]) -> dict[str, str]:
-    """Return names without their common start and end, cut at a separator: `shot_key_v1` →
-    `key`.
+    """Return names without their common start and end, cut at a separator or before a number:
+    `shot_key_v1` → `key`, `key0001` → `key`.
     """
     if len(stems) < 2:
         return {stem: stem for stem in stems}
@@ -89,9 +94,20 @@ def short_names(stems: Sequence[str]) -> dict[str, str]:
     trimmed_names = [stem[len(head) :] for stem in stems]
     tail = _shared_head([name[::-1] for name in trimmed_names])[::-1]
     starts = [k for joint in SEPARATORS if (k := tail.find(joint)) >= 0]
+    if not starts:
+        number = re.search(r"\d*$", tail)
+        starts = (
+            [number.start()] if number and not _is_part_of_number(trimmed_names, number) else []
+        )
     tail = tail[min(starts) :] if starts else ""
     trimmed_names = [name.removesuffix(tail) for name in trimmed_names]
     return dict(zip(stems, trimmed_names if all(trimmed_names) else stems, strict=True))
+
+
+def _is_part_of_number(names: Sequence[str], end: re.Match[str]) -> bool:
+    """Return True if a digit stands before the end that all names share in one of them."""
+    length = len(end[0])
+    return any(name[: len(name) - length][-1:].isdigit() for name in names)
 
 
 def _shared_head(names: Sequence[str]) -> str:
@@ -110,36 +126,50 @@ def _by_convention(
     file_name: str,
 ) -> LayerChoice:
     remarks = []
-    other_versions = [m[0] for m in matches if OTHER_VERSION.fullmatch(m[0])]
-    matches = [m for m in matches if m[0] not in other_versions]
-    if other_versions:
-        remarks.append(
-            f"{some_names(other_versions)}: taken for another version of a layer, and left out"
-        )
-    views = list(dict.fromkeys(m.groupdict().get("view") or "" for m in matches))
+    views = list(dict.fromkeys(_view(m) for m in matches))
     view = views[0]
     if len(views) > 1:
+        other = next(m for m in matches if _view(m) == views[1])
+        pattern = f"{other[0][: other.start('name')]}{NAME_FIELD}{other[0][other.end('name') :]}"
         remarks.append(
-            f"of the view layers {some_names(views)} the first is taken: "
-            f"pattern='{views[1]}{convention.joint}Combined_{NAME_FIELD}' takes {views[1]}"
+            f"of the view layers {some_names(views)} the first is taken: pattern={pattern!r} takes "
+            f"{views[1]}"
         )
-    matches = [m for m in matches if (m.groupdict().get("view") or "") == view]
+    matches = [m for m in matches if _view(m) == view]
     _check_not_stereo([m[0] for m in matches], file_name)
-    lights = _unique_lights(_light_names(convention, matches), file_name)
+    groups = _unique_lights(_light_names(convention, matches), file_name)
+    version_layers = {m[0] for m in matches if _is_version(m, layers)}
     # Decided by name alone, since a single group cannot be compared with others.
-    whole = {n: x for n, x in lights.items() if n == convention.whole and len(lights) > 1}
-    lights = {name: layer for name, layer in lights.items() if name not in whole}
-    rest = [name for name in layers if name not in [*lights.values(), *whole.values()]]
+    whole = {n: x for n, x in groups.items() if n == convention.whole and len(groups) > 1}
+    versions = {n: x for n, x in groups.items() if x in version_layers and n not in whole}
+    lights = {n: x for n, x in groups.items() if n not in whole and n not in versions}
+    rest = [name for name in layers if name not in groups.values()]
     optional = [name for name in rest if name.casefold() in convention.optional]
-    first = convention.beauty.replace("{view}", f"{view}{convention.joint}" if view else "")
+    first = f"{view}{convention.joint}{convention.beauty}" if view else convention.beauty
     return LayerChoice(
         convention.renderer,
         lights,
-        {name: name for name in optional if name not in lights},
-        whole,
-        beauty_name((name for name in rest if name not in optional), first=first),
-        view,
-        tuple(remarks),
+        optional={name: name for name in optional if name not in lights},
+        whole=whole,
+        versions=versions,
+        beauty=beauty_name((x for x in rest if x not in optional), first=first, view=view),
+        view=view,
+        remarks=tuple(remarks),
+    )
+
+
+def _view(match: re.Match[str]) -> str:
+    """Return the view layer in a layer's name; "" without one."""
+    return match.groupdict().get("view") or ""
+
+
+def _is_version(match: re.Match[str], layers: Iterable[str]) -> bool:
+    """Return True if the name of a group says that it shows another layer, which there is, or the
+    whole picture differently.
+    """
+    version = OTHER_VERSION.fullmatch(match[0])
+    return version is not None and (
+        version["base"] in layers or match["name"] == version["version"]
     )
 
 
@@ -174,7 +204,7 @@ def _by_pattern(layers: Mapping[str, Sequence[str]], pattern: str, file_name: st
             matches.append((match[1], layer))
     if not matches:
         raise BasisError(f"pattern={pattern!r} fits no layer of {file_name}: {_layer_list(layers)}")
-    # A pattern as broad as {name} also matches the beauty.
+    view = prefix.rpartition(".")[0]
     names = [layer for layer in layers if layer not in [matched for _, matched in matches]]
     first = {
         (
@@ -182,11 +212,18 @@ def _by_pattern(layers: Mapping[str, Sequence[str]], pattern: str, file_name: st
         ).casefold(),  # View.Combined.left of View.Combined_key.left
         (prefix + suffix).strip(SEPARATORS).casefold(),
     } - {""}
-    beauty = next((name for name in names if name.casefold() in first), beauty_name(names))
-    if beauty is None:
-        beauty = beauty_name(layer for _, layer in matches)
-    matches = [(name, layer) for name, layer in matches if layer != beauty]
-    return LayerChoice(f"pattern {pattern}", _unique_lights(matches, file_name), beauty=beauty)
+    beauty = next((x for x in names if x.casefold() in first), beauty_name(names, view=view))
+    lights = _unique_lights(matches, file_name)
+    # A pattern as broad as {name} also matches the beauty.
+    likely = beauty_name(lights.values(), view=view) if len(lights) > 1 else None
+    whole = {name: layer for name, layer in lights.items() if layer == likely}
+    return LayerChoice(
+        f"pattern {pattern}",
+        {name: layer for name, layer in lights.items() if name not in whole},
+        whole=whole,
+        beauty=beauty,
+        has_pattern=True,
+    )
 
 
 def _check_not_stereo(names: Sequence[str], file_name: str) -> None:
@@ -220,19 +257,26 @@ def _unique_lights(pairs: Sequence[tuple[str, str]], file_name: str) -> dict[str
 def _example_pattern(layers: Iterable[str]) -> str:
     """Return a pattern that matches several of the layers if there is one, else a generic
     example.
+
+    It begins with what the most layers have in common, up to a separator. A head that the whole
+    picture has too, such as the view layer, says little, so any other is better.
     """
-    names = [name for name in layers if beauty_name([name]) is None]
-    head_counts: dict[str, int] = {}
+    beauties = [name for name in layers if is_beauty(name)]
+    names = [x for x in layers if x not in beauties and not OTHER_VERSION.fullmatch(x)]
+    heads: dict[str, list[str]] = {}
     for name in names:
-        for k in (name.find(joint) for joint in SEPARATORS):
-            if 0 < k < len(name) - 1:
-                head_counts[name[: k + 1]] = head_counts.get(name[: k + 1], 0) + 1
-    best_head = max(head_counts, key=lambda head: head_counts[head], default=None)
-    return (
-        f"{best_head}{NAME_FIELD}"
-        if best_head and head_counts[best_head] > 1
-        else f"Light_{NAME_FIELD}"
-    )
+        for k, character in enumerate(name[:-1]):
+            if k and character in SEPARATORS:
+                heads.setdefault(name[: k + 1], []).append(name)
+    shared = {head: of_head for head, of_head in heads.items() if len(of_head) > 1}
+    if not shared:
+        has_plain_names = bool(beauties) and len(names) > 1
+        return NAME_FIELD if has_plain_names else f"Light_{NAME_FIELD}"
+
+    def rank(head: str) -> tuple[bool, int, int]:
+        return not any(x.startswith(head) for x in beauties), len(shared[head]), len(head)
+
+    return f"{max(shared, key=rank)}{NAME_FIELD}"
 
 
 def _layer_list(layers: Iterable[str]) -> str:

@@ -8,6 +8,7 @@ from lightpaint.basis.lightgroups.beauty_comparison import (
     LayerSum,
     find_beauty,
     find_beauty_of_lights,
+    layers_needed,
     unrelated_layer,
 )
 from lightpaint.basis.lightgroups.layer_choice import (
@@ -16,8 +17,13 @@ from lightpaint.basis.lightgroups.layer_choice import (
     choose_files,
     choose_layers,
 )
-from lightpaint.basis.lightgroups.naming_conventions import is_known
+from lightpaint.basis.lightgroups.naming_conventions import OTHER_VERSION, is_known
 from lightpaint.basis.lightgroups.render_layers import RenderLayer
+from lightpaint.display_text import some_names
+
+#: Largest light by which groups exceed a picture that they add up to, as a share of its light:
+#: what denoising takes from their noise.
+MAX_SUM_EXCESS = 0.25
 
 
 @dataclass(frozen=True)
@@ -53,13 +59,12 @@ def roles_of(path: Path, read: Sequence[RenderLayer], pattern: str | None) -> Ro
     if choice.renderer == ONE_FILE_PER_LIGHT:
         beauty, remarks_on_files = _remove_non_lights(lights, beauty)
         remarks += remarks_on_files
-    for name, layer in choice.whole.items():
-        if beauty is None or beauty is layers[layer]:
-            beauty = layers[layer]
-        elif _is_light(layers[layer], list(lights.values()), beauty):
-            lights[name] = layers[layer]
-        else:
-            remarks.append(f"{layer}: taken for the sum of all lights, and left out")
+    elif not choice.has_pattern:
+        versions = {name: layers[layer] for name, layer in choice.versions.items()}
+        remarks += _sort_out_versions(lights, versions, beauty)
+    whole = {name: layers[layer] for name, layer in choice.whole.items()}
+    beauty, left_out = _sort_out_sums(lights, whole, beauty, has_pattern=choice.has_pattern)
+    remarks += [f"{x}: taken for the sum of all lights, and left out" for x in left_out]
     in_order = {n: x for layer in read for n, x in lights.items() if x is layer}
     for name, layer in choice.optional.items():
         # Renderers include these in the sum or not, depending on version and settings.
@@ -103,9 +108,82 @@ def _remove_non_lights(
     return whole, [f"left out of the lights: {stranger.file.name} ({reason})"]
 
 
+def _sort_out_sums(
+    lights: dict[str, RenderLayer],
+    whole: Mapping[str, RenderLayer],
+    beauty: RenderLayer | None,
+    *,
+    has_pattern: bool,
+) -> tuple[RenderLayer | None, list[str]]:
+    """Decide by the sum which layers are the whole picture; return it, and the names of layers
+    that are left out.
+
+    whole: groups named like the picture. has_pattern: a pattern that matches all lights may match
+    the picture, under any name, and what it was before denoising.
+    """
+    sums = _remove_sums(lights) if has_pattern else []
+    for name, layer in whole.items():
+        others = list(lights.values())
+        if beauty is None and _may_be_whole(layer, others):
+            beauty = layer
+        elif beauty is None or _is_light(layer, others, beauty):
+            lights[name] = layer
+        else:
+            sums.append(layer)
+    sums += _remove_sums(lights) if has_pattern else []
+    beauty = beauty or next(iter(sums), None)
+    return beauty, [layer.name for layer in sums if layer is not beauty]
+
+
+def _remove_sums(lights: dict[str, RenderLayer]) -> list[RenderLayer]:
+    """Remove layers that are the sum of the others, and return them."""
+    removed = []
+    while len(lights) > 2 and (found := find_beauty(list(lights.values()))) is not None:
+        _drop(lights, found)
+        removed.append(found)
+    return removed
+
+
+def _sort_out_versions(
+    lights: dict[str, RenderLayer], versions: Mapping[str, RenderLayer], beauty: RenderLayer | None
+) -> list[str]:
+    """Decide by the sum which groups named like versions of others are lights; return a sentence
+    on those that are left out.
+
+    versions: groups that are versions of another layer by their names. Some of the lights have
+    such names, too, but there is no other layer that they could show.
+    """
+    doubtful = {n: x for n, x in lights.items() if OTHER_VERSION.fullmatch(x.name)}
+    doubtful.update(versions)
+    if not doubtful:
+        return []
+    certain = [layer for name, layer in lights.items() if name not in doubtful]
+    accepted = [name for name in doubtful if name not in versions]
+    if beauty is not None and not (lights and LayerSum.of([*lights.values()]).is_of(beauty)):
+        accepted = layers_needed(beauty, certain, doubtful) or [
+            name for name in accepted if _improves_sum(doubtful[name], certain, beauty)
+        ]
+    for name, layer in doubtful.items():
+        if name in accepted:
+            lights[name] = layer
+        else:
+            lights.pop(name, None)
+    left_out = [layer.name for name, layer in doubtful.items() if name not in accepted]
+    if not left_out:
+        return []
+    return [f"{some_names(left_out)}: taken for another version of a layer, and left out"]
+
+
 def _drop(lights: dict[str, RenderLayer], layer: RenderLayer | None) -> None:
     for name in [name for name, light_layer in lights.items() if light_layer is layer]:
         del lights[name]
+
+
+def _may_be_whole(layer: RenderLayer, lights: Sequence[RenderLayer]) -> bool:
+    """Return True unless the lights are clearly more than a layer named like the whole picture,
+    which may be denoised and have light that is in no group.
+    """
+    return not lights or LayerSum.of(lights).exceeds(layer) <= MAX_SUM_EXCESS
 
 
 def _is_light(layer: RenderLayer, lights: Sequence[RenderLayer], beauty: RenderLayer) -> bool:

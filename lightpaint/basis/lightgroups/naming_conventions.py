@@ -7,17 +7,27 @@ from dataclasses import dataclass
 #: Placeholder for the name of the light in a pattern.
 NAME_FIELD = "{name}"
 
-#: Names of the whole picture in most renderers, compared without regard to case.
-BEAUTY_NAMES = ("", "rgba", "rgb", "beauty", "combined", "main", "color", "rgb_color", "ci", "c")
+#: Names of the whole picture in most renderers, compared without regard to case; `image` is that
+#: of Blender's File Output node.
+BEAUTY_NAMES = (
+    *("", "rgba", "rgb", "beauty", "combined", "image", "main", "color", "rgb_color", "ci", "c"),
+)
+
+#: The view layer that programs such as Blender write before the names of any renderer in them.
+VIEW_PATTERN = r"(?:(?P<view>.+?)\.)??"
 
 #: An optional prefix, such as a shot name, before a marker that is distinctive enough.
 PREFIX_PATTERN = r"(?:(?P<prefix>.+?)[ ._-])??"
 
-#: Other versions of a layer, which would count a light twice. A pattern may still match them.
-OTHER_VERSION = re.compile(r".*[ _.](denoised?|denoising|variance|mse|noisy|albedo|normal)", re.I)
+#: Names of other versions of a layer, `base`, which would count a light twice. They only propose
+#: it: a light may be called `sun normal`. A pattern may match them.
+OTHER_VERSION = re.compile(
+    r"(?P<base>.*)[ _.](?P<version>denoised?|denoising|variance|mse|noisy|albedo|normal)", re.I
+)
 
 #: Where Blender is told the group of a light, and to write the whole picture.
 CYCLES_GROUP = "Light Group in the properties of the object (under Shading) or of the world"
+CYCLES_UNGROUPED = "light that Fast GI Approximation of method Add adds (in the render properties)"
 CYCLES_BEAUTY = "Combined under Passes in the properties of the view layer"
 
 #: Characters that separate parts of a name.
@@ -30,13 +40,15 @@ class Convention:
 
     layer: matches the whole name of a layer; its group `name` is the light, `view` the view layer,
     and `prefix` distinguishes lights with the same name.
-    beauty: name of the picture that the lights add up to, tried before BEAUTY_NAMES.
+    beauty: name of the picture that the lights add up to, without the view layer; tried before
+    BEAUTY_NAMES.
     whole: name of a group that contains all lights, if the renderer has one.
     optional: layers, in lower case, that belong to the sum in some versions and settings.
     light: template for the name of a light.
     joint: what stands between a view layer and the rest of a name.
     group_setting: where the renderer is told the group of a light.
     beauty_setting: where it is told to write the whole picture beside the groups.
+    ungrouped: light that it writes into no group, and what leads to it.
     """
 
     renderer: str
@@ -48,42 +60,45 @@ class Convention:
     joint: str = "."
     group_setting: str = ""
     beauty_setting: str = ""
+    ungrouped: str = ""
 
 
 CONVENTIONS = (
     Convention(
         "Blender Cycles",
-        re.compile(r"(?:(?P<view>.+)\.)?Combined_(?P<name>.+)"),
-        "{view}Combined",
+        re.compile(VIEW_PATTERN + r"Combined_(?P<name>.+)"),
+        "Combined",
         group_setting=CYCLES_GROUP,
         beauty_setting=CYCLES_BEAUTY,
+        ungrouped=CYCLES_UNGROUPED,
     ),
     Convention(
         # Nuke makes underscores of all characters but letters and digits, dots included.
         "Blender Cycles, written by Nuke",
         re.compile(r"(?!Combined_)(?P<view>\w+?)_Combined_(?P<name>\w+)", re.A),
-        "{view}Combined",
+        "Combined",
         joint="_",
         group_setting=CYCLES_GROUP,
         beauty_setting=CYCLES_BEAUTY,
+        ungrouped=CYCLES_UNGROUPED,
     ),
     Convention(
         "Arnold",
-        re.compile(r"RGBA_(?P<name>.+)"),
+        re.compile(VIEW_PATTERN + r"RGBA_(?P<name>.+)"),
         "RGBA",
         group_setting="AOV Light Group of the light",
         beauty_setting="an AOV RGBA",
     ),
     Convention(
         "Karma",
-        re.compile(r"C_(?P<name>.+)"),
+        re.compile(VIEW_PATTERN + r"C_(?P<name>.+)"),
         "C",
         group_setting="LPE Tag of the light",
         beauty_setting="Beauty in the Karma Render Settings",
     ),
     Convention(
         "RenderMan or Redshift",
-        re.compile(r"(?:[Bb]eauty|Ci)_(?P<name>.+)"),
+        re.compile(VIEW_PATTERN + r"(?:[Bb]eauty|Ci)_(?P<name>.+)"),
         "beauty",
         whole="all",  # Redshift's Beauty_all
         group_setting="Light Group of the light",
@@ -98,6 +113,21 @@ CONVENTIONS = (
         beauty_setting="an output RGBA",
     ),
     Convention(
+        "LuxCore in Blender",
+        re.compile(VIEW_PATTERN + r'LG \d+: "(?P<name>.+)"'),
+        "Combined",
+        group_setting="Light Group in the properties of the light, under LuxCore",
+        beauty_setting=CYCLES_BEAUTY,
+    ),
+    Convention(
+        "Radeon ProRender",
+        re.compile(VIEW_PATTERN + r"Light[ _.]?Group[ _.]?(?P<name>\d+)", re.I),
+        "Color",
+        light="group_{name}",
+        group_setting="Light Group of the light",
+        beauty_setting="the AOV Color or Combined",
+    ),
+    Convention(
         "V-Ray or Corona",
         re.compile(PREFIX_PATTERN + r"(?:VRay)?LightSelect_(?P<name>.+)", re.I),
         "RGBA",
@@ -107,7 +137,7 @@ CONVENTIONS = (
     ),
     Convention(
         "Octane",
-        re.compile(r"Light(?:[ _]?pass)?[ _](?P<name>\d+)", re.I),
+        re.compile(VIEW_PATTERN + r"Light(?:[ _]?pass)?[ _](?P<name>\d+)", re.I),
         "Main",
         optional=("ambient light", "ambient_light", "sunlight"),
         light="light_{name}",
@@ -127,12 +157,29 @@ def is_known(name: str) -> bool:
     return any(convention.layer.fullmatch(name) for convention in CONVENTIONS)
 
 
-def beauty_name(names: Iterable[str], *, first: str = "") -> str | None:
-    """Return the name of the whole picture: `first`, or else one of BEAUTY_NAMES; None if
-    absent.
+def is_beauty(name: str, *, view: str = "") -> bool:
+    """Return True if the last component of a layer's name is one of BEAUTY_NAMES.
+
+    view: the view layer that the name must begin with, if it has components before the last.
     """
-    by_folded: dict[str, str] = {}
-    for name in names:
-        by_folded.setdefault(name.casefold(), name)
-    candidates = (first.casefold(), *BEAUTY_NAMES)
-    return next((by_folded[name] for name in candidates if name in by_folded), None)
+    before, _, last = name.rpartition(".")
+    return last.casefold() in BEAUTY_NAMES and (not view or not before or before == view)
+
+
+def beauty_name(names: Iterable[str], *, first: str = "", view: str = "") -> str | None:
+    """Return the name of the whole picture: `first`, or else one of BEAUTY_NAMES, alone or behind
+    the view layer; None if absent.
+
+    view: the view layer; "" if it is not known, so that a beauty of any will do.
+    """
+    known = [*names]
+    candidates = [name for name in known if is_beauty(name, view=view)]
+    by_folded = {name.casefold(): name for name in reversed(known)}
+    if found := by_folded.get(first.casefold()) if first else None:
+        return found
+
+    def rank(name: str) -> tuple[bool, int]:
+        before, _, last = name.rpartition(".")
+        return before != view, BEAUTY_NAMES.index(last.casefold())
+
+    return min(candidates, key=rank, default=None)

@@ -40,6 +40,7 @@ class RenderLayer:
     image: (h, w, 3) in the display window, as stored: linear light, float16 or float32.
     alpha: (h, w), or None.
     is_vector: whether its channels are X, Y and Z, so that it is not a light.
+    compression, loss: as in ExrPart; no loss if these pixels are stored exactly.
     primaries: CIE xy of red, green, blue and white; None for Rec.709.
     """
 
@@ -52,6 +53,8 @@ class RenderLayer:
     alpha: Floats | None = None
     primaries: tuple[float, ...] | None = None
     is_vector: bool = False
+    compression: str = ""
+    loss: float = 0.0
 
     @property
     def is_half(self) -> bool:
@@ -182,9 +185,19 @@ def _content(path: Path) -> RenderFile:
                     alpha=None if alpha is None else part.channels[alpha],
                     primaries=primaries,
                     is_vector=vectors.get(prefix) == channels,
+                    compression=part.compression,
+                    loss=0.0 if _is_exact(part.compression, image) else part.loss,
                 )
             )
     return RenderFile(layers, objects, remarks)
+
+
+def _is_exact(compression: str, image: Floats) -> bool:
+    """Return True if a compression that loses light of one kind of numbers keeps those of the
+    image.
+    """
+    is_half = image.dtype == np.float16
+    return not is_half if compression.startswith("B44") else is_half and compression == "PXR24"
 
 
 def _primaries(path: Path, part: ExrPart) -> tuple[float, ...] | None:

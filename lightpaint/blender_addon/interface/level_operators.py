@@ -5,6 +5,7 @@ import bpy
 
 from ..lamps.lamp_levels import PREVIEWS, grouped_places, keep_levels, key_levels, show_factors
 from ..lamps.memory import MEMORY_KEY, recall, remember
+from ..lamps.working_space import working_space
 from ..shot.layer_setup import revert
 from ..shot.shot_home import shot_folder
 from .controller import controller, discard_preview
@@ -97,7 +98,7 @@ class LIGHTPAINT_OT_apply_look(LookOperator):
     def run(self, context):
         name, factors = self.look(context)
         groups = grouped_places(context.scene, context.view_layer)
-        show_factors(groups, factors)
+        show_factors(groups, factors, working_space(bpy.data))
         apply_levels(context.scene, context.view_layer)
         return f"the lamps are set to {name}"
 
@@ -110,7 +111,7 @@ class LIGHTPAINT_OT_key_look(LookOperator):
     def run(self, context):
         name, factors = self.look(context)
         groups = grouped_places(context.scene, context.view_layer)
-        show_factors(groups, factors)
+        show_factors(groups, factors, working_space(bpy.data))
         key_levels(groups, context.scene.frame_current)
         apply_levels(context.scene, context.view_layer)
         return f"{name} is keyed at frame {context.scene.frame_current}"

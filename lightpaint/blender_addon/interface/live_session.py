@@ -17,9 +17,11 @@ from ..lamps.lamp_levels import (
     show_factors,
 )
 from ..lamps.memory import recall, remember
+from ..lamps.working_space import working_space
 from ..painter.painter_link import PainterLink
-from ..painter.painter_messages import PainterState
+from ..painter.painter_messages import MessageError, PainterState
 from ..painter.program import ProgramRun, paint_arguments, running_painter
+from ..painter.socket_client import checked_address
 
 #: Words in errors of the painter that ask for another start: the session is of a picture of another
 #: size, or of other lights; or OpenColorIO, for Blender's own view, is not installed with it.
@@ -32,6 +34,9 @@ PATIENCE_S = 30.0
 UNCHANGED = 1e-9
 
 ENDED_TEXT = "the painter has ended: Paint opens it again, with what you painted"
+
+#: The end of a painter that is another program, or of another version.
+NOT_UNDERSTOOD = "the painter sent {}: the add-on has left it; is it of the same version?"
 
 #: What there is to do while nothing is painted.
 UNPAINTED_TEXT = "paint in the browser, and the lamps follow"
@@ -86,9 +91,14 @@ class LiveSession:
         if self._link is None:
             return self._await_start()
         has_news = is_lit = False
-        for content, buffers in self._link.messages():
-            is_lit |= self.state.receive(content, buffers)
-            has_news = True
+        try:
+            for content, buffers in self._link.messages():
+                is_lit |= self.state.receive(content, buffers)
+                has_news = True
+        except MessageError as error:
+            self.end()
+            self.message = NOT_UNDERSTOOD.format(error)
+            return True
         self.has_moved_lamps = bool(is_lit and not self._is_discarded() and self.show())
         if has_news:
             self.message = self._sentence()
@@ -164,6 +174,7 @@ class LiveSession:
         if run.first_line:
             try:
                 found = json.loads(run.first_line)
+                checked_address(found["address"], found["token"])
                 self._link = PainterLink(found["address"], found["token"], PATIENCE_S)
             except (ValueError, KeyError, TypeError):
                 self.end()
@@ -196,7 +207,10 @@ class LiveSession:
         link = self._link
         if link is None:
             return
-        if link.is_connected:
+        if link.is_connected and link.error and not self.state.closing:
+            self.end()
+            self.message = NOT_UNDERSTOOD.format(link.error)
+        elif link.is_connected:
             self._end(self.state.closing or ENDED_TEXT)
         elif self._run is None:  # an earlier painter, which was killed
             self._start_program()
@@ -228,7 +242,7 @@ def show_preview(scene, view_layer, factors, groups=None):
     """
     if groups is None:
         groups = grouped_places(scene, view_layer)
-    changed = show_factors(groups, factors)
+    changed = show_factors(groups, factors, working_space(bpy.data))
     memory = recall(scene)
     if changed and not memory.get(PREVIEWS):
         remember(scene, {**memory, PREVIEWS: True})

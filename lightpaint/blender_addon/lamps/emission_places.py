@@ -40,9 +40,9 @@ class LampEmission:
         """Set level and colour."""
         self.owner.energy, self.owner.color = values[0], values[1:]
 
-    def scaled(self, base, factor):
-        """Return level and colour for a multiplier of each channel."""
-        return scaled(base, factor)
+    def scaled(self, base, factor, space=None):
+        """Return level and colour for a multiplier of each channel. space: see working_space.py."""
+        return scaled(base, factor, space)
 
     def animated_target(self):
         """Return the data that has these properties' animation, and the paths there."""
@@ -63,8 +63,8 @@ class PlainColour(LampEmission):
     def assign(self, values):
         self.owner.color = values[1:]
 
-    def scaled(self, base, factor):
-        return scaled_colour(base, factor)
+    def scaled(self, base, factor, space=None):
+        return scaled_colour(base, factor, space)
 
 
 class NodeEmission:
@@ -94,9 +94,9 @@ class NodeEmission:
             self.strength.default_value = values[0]
         self.colour.default_value = [*values[1:], self.colour.default_value[3]]
 
-    def scaled(self, base, factor):
+    def scaled(self, base, factor, space=None):
         has_level = self.has_strength and not self.is_textured
-        return (scaled if has_level else scaled_colour)(base, factor)
+        return (scaled if has_level else scaled_colour)(base, factor, space)
 
     def animated_target(self):
         if self.is_textured:

@@ -82,10 +82,11 @@ def adopt_levels(groups):
     commit_base(unknown, present_levels(unknown))
 
 
-def show_factors(groups, factors):
+def show_factors(groups, factors, space=None):
     """Set levels to multiples of what was rendered. Return the number of places that changed.
 
-    factors: multipliers of red, green and blue by name of group; groups without one stay.
+    factors: multipliers of red, green and blue by name of group; groups without one stay. space:
+    the working space of the file, see working_space.py.
     """
     changed = 0
     for name, places in groups.items():
@@ -98,7 +99,7 @@ def show_factors(groups, factors):
             values = place.values()
             if not are_equal(values, slot["last"]):  # changed by hand since
                 slot["kept"] = values
-            wanted = place.scaled(slot["base"], factors[name])
+            wanted = place.scaled(slot["base"], factors[name], space)
             if not are_equal(values, wanted):
                 place.assign(wanted)
                 changed += 1

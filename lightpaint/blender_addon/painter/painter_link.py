@@ -23,7 +23,7 @@ class PainterLink:
     Attributes:
         is_connected: Whether the painter has answered.
         has_ended: Whether the connection has ended and every message has been given out.
-        error: Why there was no connection.
+        error: Why there was no connection, or what ended it beside its ordinary end.
     """
 
     def __init__(self, address, token, patience_s=0.0):
@@ -57,9 +57,11 @@ class PainterLink:
                 if self._queue.qsize() >= MAX_WAITING:
                     self._queue.get()
                 self._queue.put(from_bytes(frame))
-        except (OSError, ValueError, KeyError) as error:
-            self.error = str(error)
+        except (OSError, ValueError) as error:
+            self.error = " ".join(str(error).split())
         finally:
+            if self._socket is not None:
+                self._socket.close()
             self._is_over.set()
 
     def _connect(self):

@@ -6,8 +6,13 @@ import math
 import struct
 from dataclasses import dataclass, field
 
+from ..lamps.lamp_units import checked_factor, is_amount
+
 #: Version of the protocol that this add-on speaks.
 PROTOCOL_VERSION = 3
+
+#: Largest side of an array in a message, as the painter has it.
+MAX_SIDE = 2**16
 
 #: Sentences while the lights change, and until the painter has said how close they come.
 LIVE_TEXT, ANALYSING_TEXT = "the lamps follow the brush", "the lamps are set; analysing"
@@ -25,19 +30,48 @@ def to_bytes(content, buffers=()):
     return b"".join(parts)
 
 
+class MessageError(ValueError):
+    """A message that is none of a painter of this version; its text says why."""
+
+
 def from_bytes(frame):
-    """Return the JSON of a frame, and its buffers by name as flat tuples of numbers."""
+    """Return the JSON of a frame, and its buffers by name as flat tuples of numbers.
+
+    Raises MessageError for anything else.
+    """
+    try:
+        return _parsed(frame)
+    except MessageError:
+        raise
+    # A deep JSON is too much for its parser, and everything in it may be of another type.
+    except (ValueError, TypeError, KeyError, AttributeError, RecursionError, struct.error) as error:
+        raise MessageError(f"a frame that is no message ({type(error).__name__})") from None
+
+
+def _parsed(frame):
     (length,) = struct.unpack_from("<I", frame)
-    content = json.loads(frame[4 : 4 + length])
+    if length > len(frame) - 4:
+        raise MessageError("a frame that is shorter than its message")
+    content = json.loads(frame[4 : 4 + length].decode(), parse_constant=_refuse)
+    if not isinstance(content, dict) or not isinstance(content.get("kind"), str):
+        raise MessageError("a message without its kind")
     position, buffers = 4 + length + -(4 + length) % 8, {}
     for description in content.get("buffers", ()):
-        count = math.prod(description["shape"])
-        layout = f"<{count}{_NUMBERS[description['dtype']]}"
+        shape = description["shape"]
+        if not all(type(side) is int and 0 <= side <= MAX_SIDE for side in shape):
+            raise MessageError(f"an array of the shape {str(shape)[:60]}")
+        count, letter = math.prod(shape), _NUMBERS[description["dtype"]]
+        size = count * struct.calcsize(f"<{letter}")
+        if position + size > len(frame):
+            raise MessageError("a frame that is shorter than its arrays")
         if description["name"] == "weights":
-            buffers["weights"] = struct.unpack_from(layout, frame, position)
-        size = struct.calcsize(layout)
+            buffers["weights"] = struct.unpack_from(f"<{count}{letter}", frame, position)
         position += size + -size % 8
     return content, buffers
+
+
+def _refuse(constant):
+    raise MessageError(f"a message with {constant}, which is no number")
 
 
 @dataclass
@@ -72,36 +106,55 @@ class PainterState:
     _weights: tuple = ()
 
     def receive(self, content, buffers):
-        """Take in one message. Return whether the lamps may have changed."""
+        """Take in one message. Return whether the lamps may have changed.
+
+        Raises MessageError for a message that lacks something, or has it in another form.
+        """
+        try:
+            return self._receive(content, buffers)
+        except MessageError:
+            raise
+        except (KeyError, TypeError, AttributeError, IndexError, ValueError) as error:
+            reason = " ".join(str(error).split())[:80]
+            kind = str(content.get("kind"))[:40]
+            raise MessageError(f"a message {kind!r} with a fault ({reason})") from None
+
+    def _receive(self, content, buffers):
         kind = content["kind"]
         if kind == "state":
-            self.lights = [light["name"] for light in content["lights"]]
+            self.lights = [_text(light["name"]) for light in content["lights"]]
             self.is_fixed = {light["name"]: light["is_fixed"] for light in content["lights"]}
             self.is_open, self.is_new = True, content.get("is_new", False)
             self._set_looks(content["looks"])
         elif kind == "looks":
             self._set_looks(content["looks"])
         elif kind == "notice":
-            self.notice = content["text"]
+            self.notice = _text(content["text"])
         elif kind in ("closed", "failed"):
-            self.closing = self.notice = content["text"]
+            self.closing = self.notice = _text(content["text"])
         elif kind == "waiting":
-            self.notice = content["text"]
+            self.notice = _text(content["text"])
         elif kind == "progress":
             self.progress = f"{content['task']}: {content['done']} of {content['total']}"
         answer = content.get("answer", content)
         if isinstance(answer, dict) and answer.get("headline"):
-            self.headline = answer["headline"]
+            self.headline = _text(answer["headline"])
         elif kind == "answer":
             self.headline = ANALYSING_TEXT if content.get("exact") else LIVE_TEXT
         if kind not in ("state", "answer"):
             return False
-        self.is_exact = content.get("exact", True)
-        self.master = content.get("master") if content.get("master") is not None else self.master
-        self._weights = buffers.get("weights", self._weights)
+        master = content.get("master")
+        if master is not None and (type(master) not in (int, float) or not is_amount(master)):
+            raise MessageError(f"the master dimmer is {str(master)[:40]}")
+        weights = buffers.get("weights", self._weights)
+        if len(weights) != 3 * len(self.lights):
+            raise MessageError(f"{len(weights)} weights for {len(self.lights)} lights")
+        each = [checked_factor(weights[i : i + 3]) for i in range(0, len(weights), 3)]
+        self.is_exact = content.get("exact", True) is True
+        self.master = self.master if master is None else float(master)
+        self._weights = weights
         self.factors = {
-            name: self._factor(name, self._weights[3 * i : 3 * i + 3])
-            for i, name in enumerate(self.lights)
+            name: self._factor(name, weight) for name, weight in zip(self.lights, each, strict=True)
         }
         return True
 
@@ -112,11 +165,21 @@ class PainterState:
 
     def _set_looks(self, looks):
         self.looks = [
-            SessionLook(look["id"], look["name"], look_factors(look["lights"], look["weights"]))
+            SessionLook(
+                look["id"], _text(look["name"]), look_factors(look["lights"], look["weights"])
+            )
             for look in looks
         ]
 
 
 def look_factors(lights, weights):
-    """Return weights by name of light."""
-    return {name: tuple(weight) for name, weight in zip(lights, weights, strict=True)}
+    """Return weights by name of light. Raises ValueError for weights that no light has."""
+    return {
+        _text(name): checked_factor(weight) for name, weight in zip(lights, weights, strict=True)
+    }
+
+
+def _text(value):
+    if not isinstance(value, str):
+        raise MessageError(f"{str(value)[:60]} in the place of a text")
+    return value

@@ -9,6 +9,8 @@ import subprocess
 import threading
 from pathlib import Path
 
+from .socket_client import checked_address, is_loopback
+
 #: How to install it, for messages.
 INSTALL_TEXT = (
     "lightpaint is not installed, or not on the PATH: run  pip install 'lightpaint[paint,ocio]'  "
@@ -129,9 +131,15 @@ def paint_arguments(shot, session, view):
 
 
 def running_painter(session):
-    """Return address and token of a painter that serves a session; None if nothing says so."""
+    """Return address and token of a painter of this machine that serves a session; None if nothing
+    says so.
+    """
     try:
         found = json.loads((Path(session) / "painter.json").read_text(encoding="utf-8"))
-        return found["address"], found["token"]
-    except (OSError, ValueError, KeyError, TypeError):
-        return None
+        address, token = found["address"], found["token"]
+        # The file may come from elsewhere, with the shot: it must not lead away from here.
+        if is_loopback(checked_address(address, token).hostname):
+            return address, token
+    except (OSError, ValueError, KeyError, TypeError, RecursionError):
+        pass
+    return None

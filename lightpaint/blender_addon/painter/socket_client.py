@@ -3,7 +3,9 @@
 
 import base64
 import hashlib
+import ipaddress
 import os
+import re
 import socket
 import struct
 from urllib.parse import urlsplit
@@ -14,11 +16,17 @@ CONNECT_S = 10.0
 #: Maximum size of a message in bytes, as the painter has it.
 MAX_MESSAGE = 2**28
 
+#: Maximum number of frames of a message, of which most may be empty.
+MAX_FRAMES = 2**12
+
 #: Maximum size of the answer to the handshake in bytes.
 MAX_HANDSHAKE = 2**16
 
+#: What a token, and the path of an address, consist of, so that they end no line of a request.
+_TOKEN, _PATH = re.compile(r"[A-Za-z0-9._~+/=-]+"), re.compile(r"[A-Za-z0-9._~/-]*")
+
 _GUID = "258EAFA5-E914-47DA-95CA-C5AB0DC85B11"
-_CONTINUATION, _TEXT, _BINARY, _CLOSE, _PING, _PONG = 0, 1, 2, 8, 9, 10
+_CONTINUATION, _BINARY, _CLOSE, _PING, _PONG = 0, 2, 8, 9, 10
 
 
 class SocketClient:
@@ -29,8 +37,11 @@ class SocketClient:
 
     @classmethod
     def open(cls, address, token):
-        """Connect to `live` under a painter's address. Raises OSError if it does not answer."""
-        parts = urlsplit(address)
+        """Connect to `live` under a painter's address.
+
+        Raises OSError if it does not answer, and ValueError for what is no address or token.
+        """
+        parts = checked_address(address, token)
         connection = socket.create_connection((parts.hostname, parts.port or 80), CONNECT_S)
         try:
             key = base64.b64encode(os.urandom(16)).decode()
@@ -55,8 +66,11 @@ class SocketClient:
         self._connection.sendall(client_frame(_BINARY, data))
 
     def receive(self):
-        """Return the next binary message; None once the connection has ended."""
-        parts = []
+        """Return the next binary message; None once the connection has ended.
+
+        Raises ValueError for frames that no painter sends.
+        """
+        parts, size = [], 0
         while True:
             try:
                 is_last, code, data = self._read_frame()
@@ -66,10 +80,16 @@ class SocketClient:
                 return None
             if code == _CLOSE:
                 return None
-            if code in (_CONTINUATION, _TEXT, _BINARY):
-                parts.append(data)
-                if is_last:
-                    return b"".join(parts)
+            if code in (_PING, _PONG):
+                continue
+            if code != (_CONTINUATION if parts else _BINARY):
+                raise ValueError(f"a frame of the kind {code}, which no painter sends here")
+            parts.append(data)
+            size += len(data)
+            if size > MAX_MESSAGE or len(parts) > MAX_FRAMES:
+                raise ValueError("a message that is longer than a painter's")
+            if is_last:
+                return b"".join(parts)
 
     def close(self):
         """End the connection, also for the thread that reads it."""
@@ -87,9 +107,13 @@ class SocketClient:
             (length,) = struct.unpack(">H", self._read(2))
         elif length == 127:
             (length,) = struct.unpack(">Q", self._read(8))
-        if length > MAX_MESSAGE or second & 0x80:
-            raise ConnectionError("this is no frame of a painter")
-        return bool(first & 0x80), first & 0x0F, self._read(length)
+        code, is_last = first & 0x0F, bool(first & 0x80)
+        is_control = code >= _CLOSE
+        if first & 0x70 or second & 0x80 or (is_control and (length > 125 or not is_last)):
+            raise ValueError("a frame that is none of a painter's")
+        if length > MAX_MESSAGE:
+            raise ValueError("a message that is longer than a painter's")
+        return is_last, code, self._read(length)
 
     def _read(self, count):
         while len(self._unread) < count:
@@ -100,6 +124,28 @@ class SocketClient:
         data = bytes(self._unread[:count])
         del self._unread[:count]
         return data
+
+
+def checked_address(address, token):
+    """Return the parts of a painter's address. Raises ValueError for others, or an odd token."""
+    if not isinstance(address, str) or not isinstance(token, str):
+        raise ValueError("a painter has an address and a token, both texts")
+    parts = urlsplit(address)
+    if parts.scheme != "http" or not parts.hostname or not _PATH.fullmatch(parts.path):
+        raise ValueError(f"{address[:80]!r} is no address of a painter")
+    if not _TOKEN.fullmatch(token):
+        raise ValueError("the painter's token has characters that no token has")
+    return parts
+
+
+def is_loopback(hostname):
+    """Return whether a host of an address is this machine itself."""
+    if hostname == "localhost":
+        return True
+    try:
+        return ipaddress.ip_address(hostname).is_loopback
+    except ValueError:
+        return False
 
 
 def client_frame(code, data):

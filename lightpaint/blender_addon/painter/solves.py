@@ -7,6 +7,7 @@ import threading
 import time
 import traceback
 
+from ..lamps.lamp_units import checked_factor
 from .painter_messages import PROTOCOL_VERSION, PainterState, from_bytes, to_bytes
 from .program import ProgramRun
 from .socket_client import SocketClient
@@ -102,7 +103,7 @@ def read_factors(path):
     with open(path, encoding="utf-8") as file:
         answer = json.load(file)
     try:
-        return {name: tuple(light["weight"]) for name, light in answer["lights"].items()}
+        return {name: checked_factor(x["weight"]) for name, x in answer["lights"].items()}
     except (KeyError, TypeError, AttributeError):
         raise ValueError(f"{path} is no lighting of lightpaint") from None
 
@@ -126,6 +127,8 @@ def solve_like(program, shot, picture, session, areas):
         painter.send("hello", version=PROTOCOL_VERSION)
         painter.wait_for(lambda kind, content: kind == "state")
         return _look_like(painter, os.path.basename(picture), data, areas)
+    except (KeyError, TypeError, IndexError, AttributeError) as error:
+        raise SolveError(f"the painter answered otherwise than expected ({error})") from None
     finally:
         run.stop()
 
@@ -163,7 +166,7 @@ class _Painter:
             content, buffers = from_bytes(frame)
             self.state.receive(content, buffers)
             kind = content["kind"]
-            if kind in ("failed", "closed") or (kind == "notice" and content["tone"] == "warn"):
+            if kind in ("failed", "closed") or (kind == "notice" and content.get("tone") == "warn"):
                 raise SolveError(content["text"])
             if is_expected(kind, content):
                 return content

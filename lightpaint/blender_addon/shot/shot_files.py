@@ -11,6 +11,8 @@ import json
 import os
 from pathlib import Path
 
+from ..lamps.lamp_units import checked_factor
+
 
 class ShotFolder:
     """A folder with the files of one shot."""
@@ -53,7 +55,10 @@ class ShotFolder:
         """Return kept looks as (name, multipliers by group); none if there are none."""
         try:
             looks = json.loads(self.looks.read_text(encoding="utf-8"))
-            return [(str(x["name"]), {k: tuple(v) for k, v in x["factors"].items()}) for x in looks]
+            return [
+                (str(x["name"]), {k: checked_factor(v) for k, v in x["factors"].items()})
+                for x in looks
+            ]
         except (OSError, ValueError, KeyError, TypeError, AttributeError):
             return []
 

@@ -98,8 +98,8 @@ def add_split(parser: argparse.ArgumentParser) -> None:
         action="append",
         metavar="sky=16x8",
         help="split a light (envmap, constant, area or projector) into an image of 16 by 8 texels, "
-        "each a light sky.xCOLUMN.yROW; sky=16x8+x4.y3 splits a texel of a sky again; --split "
-        "none for no images (default: those of the lights file)",
+        "each a light sky.xCOLUMN.yROW; window_*=4x4 splits all of them; sky=16x8+x4.y3 splits "
+        "a texel of a sky again; --split none for no images (default: those of the lights file)",
     )
     parser.add_argument(
         "--symmetric",

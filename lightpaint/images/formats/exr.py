@@ -36,6 +36,15 @@ MAX_COMPRESSION = 64
 #: they shrink below this share.
 SAMPLE_STEP, MIN_SAMPLE_BYTES, MAX_PACKED_SHARE = 16, 2**16, 0.6
 
+#: Largest relative error of lossy compressions, as a share of the brightest value in the block of
+#: pixels that is compressed at once: measured on smooth, noisy and sparse images, of which 2e-4 of
+#: all light lies beyond. That of DWA is for its default level, to which it is proportional.
+COMPRESSION_LOSS = {
+    **{"PXR24": 2.0**-16, "B44": 0.04, "B44A": 0.04},
+    **{"DWAA": 0.02, "DWAB": 0.02, "LJ2K": 0.02},
+}
+DWA_LEVEL_KEY, DEFAULT_DWA_LEVEL = "dwaCompressionLevel", 45.0
+
 #: Arrays (height, width) by channel name.
 Channels = Mapping[str, npt.NDArray[Any]]
 
@@ -55,6 +64,7 @@ class ExrPart:
     margin.
     primaries: CIE xy of red, green, blue and white, if the header declares `chromaticities`.
     views: names of the views in the part, beginning with the one whose channels have no prefix.
+    compression: its name. loss: its largest relative error, as in COMPRESSION_LOSS; 0 if lossless.
     """
 
     name: str
@@ -64,6 +74,8 @@ class ExrPart:
     offset: tuple[int, int] = (0, 0)
     primaries: tuple[float, ...] | None = None
     views: tuple[str, ...] = ()
+    compression: str = ""
+    loss: float = 0.0
 
     @property
     def size(self) -> tuple[int, int]:
@@ -196,7 +208,18 @@ def _part(path: Path, part: Any) -> ExrPart:
         offset,
         _primaries(part.header),
         tuple(map(str, views)) if isinstance(views, list) else (),
+        *_compression(part.header),
     )
+
+
+def _compression(header: Mapping[str, Any]) -> tuple[str, float]:
+    """Return the name of the compression that a header declares, and its loss."""
+    name = getattr(header.get("compression"), "name", "").removesuffix("_COMPRESSION")
+    loss = COMPRESSION_LOSS.get(name, 0.0)
+    level = header.get(DWA_LEVEL_KEY, DEFAULT_DWA_LEVEL)
+    if name.startswith("DWA") and isinstance(level, int | float) and level > 0:
+        loss = min(loss * float(level) / DEFAULT_DWA_LEVEL, 1.0)
+    return name, loss
 
 
 def _interpolated(pixels: Floats, size: tuple[int, int], sampling: tuple[int, int]) -> Floats:

@@ -1,5 +1,6 @@
 """A light of an answer: its emission, its constraint, and its error."""
 
+import math
 from dataclasses import dataclass, replace
 
 from lightpaint.arrays import RGB
@@ -10,6 +11,9 @@ from lightpaint.validation import BRIGHTEST, MAX_NAME, is_amount
 Errors = tuple[float | None, float | None, float | None]
 Ends = tuple[float, float]
 Intervals = tuple[Ends | None, Ends | None, Ends | None]
+
+#: Plugin and unit of a projector of one colour.
+PROJECTOR = ("projector", "W/m²")
 
 ALL_REACHED = (True, True, True)
 
@@ -71,6 +75,16 @@ class LightSetting:
                 f"light {self.name!r} has the unit_flux {list(self.unit_flux)}: need three numbers "
                 f"from 0 to {BRIGHTEST:g}"
             )
+
+    @property
+    def physical_emission(self) -> RGB:
+        """Emission in the sense of `unit`: Mitsuba's projector gives a plane at distance 1 π times
+        its parameter.
+        """
+        if (self.plugin, self.unit) != PROJECTOR:
+            return self.emission
+        r, g, b = (math.pi * channel for channel in self.emission)
+        return r, g, b
 
     def with_emission(self, emission: RGB, *, weight: RGB | None = None) -> "LightSetting":
         """Return the light at another emission, which no solve has found.

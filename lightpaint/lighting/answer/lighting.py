@@ -121,7 +121,7 @@ class Lighting(Shown, Mapping[str, LightSetting]):
         The colour of a light that reaches something in some channels only is unknown.
         """
         measured = photometry(
-            light.emission,
+            light.physical_emission,
             unit=light.unit,
             unit_flux=light.unit_flux,
             cd_per_unit=self.cd_per_unit,

@@ -6,9 +6,7 @@ import io
 import math
 import re
 from collections.abc import Iterable
-from importlib import resources
 from pathlib import Path
-from string import Template
 
 import numpy as np
 
@@ -24,6 +22,7 @@ from lightpaint.lighting.answer.light_setting import LightSetting
 from lightpaint.lighting.answer.lighting import Lighting
 from lightpaint.lighting.answer.lighting_keys import key_slopes
 from lightpaint.relit.export.nuke import LAYERS, copied_part, needs_copy, nuke_script
+from lightpaint.relit.export.scene_script import filled_script
 
 #: All files that `write_exports` may write.
 EXPORTS = ("lights.csv", "set_lights.py", "relit.nk", LAYERS, "relit.exr")
@@ -145,8 +144,8 @@ def _row(*cells: str) -> str:
 def blender_script(groups: LightGroups, lighting: Lighting) -> str:
     """Return a Python script for Blender that multiplies the lights in each light group."""
     rows = [f"    {light.name!r}: {_rgb(light.weight)},\n" for light in _free(lighting)]
-    template = resources.files("lightpaint.relit.export").joinpath("set_lights.py.in")
-    return Template(template.read_text(encoding="utf-8")).substitute(
+    return filled_script(
+        "set_lights.py.in",
         target=_in_docstring(lighting.target),
         source=_in_docstring(groups.name),
         multipliers="{\n" + "".join(rows) + "}",

@@ -1,9 +1,9 @@
 """A lighting as a list of fixtures: colour, kelvin, lumen, and DMX for each channel.
 
 The list is independent of programs and displays: emissions are linear Rec.709 in the scene's own
-unit. DMX values, 0 to 255, are for fixtures with linear response: the colour with its brightest
-channel at full, and a dimmer. The fixture with the brightest channel among those with the same unit
-has its dimmer at full.
+unit, that of a projector as the irradiance of a plane at distance 1. DMX values, 0 to 255, are for
+fixtures with linear response: the colour with its brightest channel at full, and a dimmer. The
+fixture with the brightest channel among those with the same unit has its dimmer at full.
 """
 
 import csv
@@ -108,18 +108,18 @@ def _full_levels(lightings: Sequence[Lighting]) -> dict[str, float]:
     full: dict[str, float] = {}
     for light in (light for lighting in lightings for light in lighting.lights):
         if not light.is_fixed:
-            full[light.unit] = max(full.get(light.unit, 0.0), *light.emission)
+            full[light.unit] = max(full.get(light.unit, 0.0), *light.physical_emission)
     return full
 
 
 def _fixture(lighting: Lighting, light: LightSetting, full: Mapping[str, float]) -> Fixture:
     light_photometry = lighting.photometry(light)
-    dmx = None if light.is_fixed else dmx_of(light.emission, full[light.unit])
+    dmx = None if light.is_fixed else dmx_of(light.physical_emission, full[light.unit])
     return Fixture(
         light.name,
         light.members,
         light.unit,
-        *light.emission,
+        *light.physical_emission,
         light_photometry.y,
         light_photometry.hex,
         light_photometry.kelvin,

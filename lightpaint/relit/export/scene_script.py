@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 
 from lightpaint.arrays import RGB, Position
+from lightpaint.colour.primaries import ACESCG, REC2020, from_rec709
 from lightpaint.relit.export.export_places import (
     SAME_PLACE,
     axis_conversions,
@@ -30,6 +31,9 @@ KINDS = {
 
 #: Blender's type for each kind of new light.
 LAMPS = {"point": "POINT", "spot": "SPOT", "panel": "AREA"}
+
+#: Working spaces of Blender 5 other than Rec.709, by the names that it has for them in files.
+WORKING_SPACES = {"lin_ap1_scene": ACESCG, "lin_rec2020_scene": REC2020}
 
 #: Blender's up axis.
 UP = (0.0, 0.0, 1.0)
@@ -60,8 +64,8 @@ def scene_script(
             continue
         numbers = ", ".join(f"{channel:.9g}" for channel in emission)
         rows.append(f"    {name!r}: ({KINDS[parameter]!r}, ({numbers})),\n")
-    template = resources.files("lightpaint.relit.export").joinpath("set_scene.py.in")
-    return Template(template.read_text(encoding="utf-8")).substitute(
+    return filled_script(
+        "set_scene.py.in",
         target=_in_docstring(target),
         source=_in_docstring(source),
         lights="{\n" + "".join(rows) + "}",
@@ -72,6 +76,19 @@ def scene_script(
         sky_axes=repr(np.round(blender_axes(up), 12).tolist()),
         **_placed(places, up),
     )
+
+
+def filled_script(name: str, **values: str) -> str:
+    """Return a script for Blender from a template beside this module, with what all of them
+    share.
+    """
+    folder = resources.files("lightpaint.relit.export")
+    template, shared = (
+        Template(folder.joinpath(x).read_text(encoding="utf-8"))
+        for x in (name, "working_space.py.in")
+    )
+    spaces = {key: from_rec709(space).round(9).tolist() for key, space in WORKING_SPACES.items()}
+    return template.substitute(values, working_space=shared.substitute(spaces=_table(spaces)))
 
 
 def _placed(places: Sequence[EmitterPlace], up: Position) -> dict[str, str]:

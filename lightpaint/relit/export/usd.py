@@ -26,6 +26,9 @@ NORMALIZED = {"radiance": False, "irradiance": True, "intensity": True}
 #: Ratio of a prim's surface to its area visible along its axis, or from the side.
 SURFACE = {"SphereLight": 4.0, "CylinderLight": 3.141592653589793}
 
+#: What of a light in a stage multiplies its emission by direction or place.
+MULTIPLYING = ("inputs:shaping:ies:file", "inputs:shaping:focus", "inputs:texture:file")
+
 #: Path of lights if there is no stage.
 SCOPE = "/lights"
 
@@ -121,12 +124,19 @@ def _write_lights(
     writer = UsdPlaces(layer_stage, opened_stage, prims, places, up)
     light_prims = {**prims, **writer.add_new(_scope(opened_stage))}
     unset_names, unturned = [], []
+
+    def override(path: str, kind: str, parameter: str, emission: RGB) -> Any:
+        prim = layer_stage.OverridePrim(path)
+        present = None if opened_stage is None else opened_stage.GetPrimAtPath(path)
+        _override(prim, present or None, kind, parameter, emission)
+        return prim
+
     for name, file in skies.items():
         path, kind = light_prims.get(name, ("", ""))
         if opened_stage is not None and not kind.startswith("DomeLight"):
             unset_names.append(name)
             continue
-        _override(layer_stage.OverridePrim(path), kind, "radiance", (1.0, 1.0, 1.0))
+        override(path, kind, "radiance", (1.0, 1.0, 1.0))
         if not writer.place_sky(path, map_axes(up), file):
             unturned.append(name)
     for name, file in panels.items():
@@ -134,15 +144,13 @@ def _write_lights(
         if opened_stage is not None and kind != "RectLight":
             unset_names.append(name)
             continue
-        prim = layer_stage.OverridePrim(path)
-        _override(prim, kind, "radiance", (1.0, 1.0, 1.0))
-        set_image(prim, file)
+        set_image(override(path, kind, "radiance", (1.0, 1.0, 1.0)), file)
     for name, parameter, emission in emitters:
         if parameter not in NORMALIZED or name not in light_prims:
             unset_names.append(name)
             continue
         path, kind = light_prims[name]
-        _override(layer_stage.OverridePrim(path), kind, parameter, emission)
+        override(path, kind, parameter, emission)
     return tuple(unset_names), (*unturned, *writer.move())
 
 
@@ -172,8 +180,12 @@ def _scope(opened_stage: Any) -> str:
     return f"{root.GetPath()}{SCOPE}"
 
 
-def _override(prim: Any, kind: str, parameter: str, emission: RGB) -> None:
-    """Set all properties of a light that affect its brightness and colour."""
+def _override(prim: Any, present: Any, kind: str, parameter: str, emission: RGB) -> None:
+    """Set all properties of a light that affect its brightness and colour.
+
+    present: the light in the stage; None without one. A profile or a picture that it has there
+    would multiply the light, and is left out.
+    """
     from pxr import Gf, UsdLux
 
     brightest = max(emission)
@@ -185,6 +197,12 @@ def _override(prim: Any, kind: str, parameter: str, emission: RGB) -> None:
     light.CreateColorAttr(Gf.Vec3f(*color))
     light.CreateEnableColorTemperatureAttr(False)
     light.CreateNormalizeAttr(NORMALIZED[parameter])
+    light.CreateDiffuseAttr(1.0)
+    light.CreateSpecularAttr(1.0)
+    for name in MULTIPLYING:
+        if present is not None and (attribute := present.GetAttribute(name)).IsAuthored():
+            kind_of_value = attribute.GetTypeName()
+            prim.CreateAttribute(name, kind_of_value, custom=False).Block()
 
 
 def open_stage(stage: Path) -> Any:

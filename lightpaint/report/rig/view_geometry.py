@@ -25,6 +25,10 @@ PASSES, KEPT_SHARE = 3, 0.9
 #: Median error in pixels beyond which a camera has no such projection.
 MOST_ERROR = 1.5
 
+#: Depth of points that are not in a plane, as a share of their extent: more than the rounding of
+#: float32.
+MIN_DEPTH = 1e-5
+
 #: Degrees from a light's axis within which a visible point counts as its target.
 NEAR_AXIS = 2.5
 
@@ -118,7 +122,9 @@ class ViewGeometry:
 
 
 def _projection(points: Doubles, pixels: Doubles) -> Doubles | None:
-    """Return the projection that maps points to pixels, positive in front of the camera."""
+    """Return the projection that maps points to pixels, positive in front of the camera; None if
+    they do not decide it, as those of a single wall.
+    """
     step = max(1, len(points) // MAX_POINTS)
     points, pixels = points[::step], pixels[::step]
     # Numbers of equal size keep the equations well conditioned.
@@ -127,6 +133,8 @@ def _projection(points: Doubles, pixels: Doubles) -> Doubles | None:
     inliers = np.arange(len(points))
     matrix = np.zeros((3, 4))
     for _ in range(PASSES):
+        if _are_in_a_plane(scaled_points[inliers]):
+            return None
         matrix = _linear_fit(scaled_points[inliers], scaled_pixels[inliers])
         seen = np.c_[scaled_points, np.ones(len(scaled_points))] @ matrix.T
         if np.median(seen[:, 2]) < 0:
@@ -137,6 +145,11 @@ def _projection(points: Doubles, pixels: Doubles) -> Doubles | None:
     seen = np.c_[points, np.ones(len(points))] @ whole.T
     errors = np.linalg.norm(seen[:, :2] / seen[:, 2:] - pixels, axis=1)
     return whole if np.median(errors) < MOST_ERROR else None
+
+
+def _are_in_a_plane(points: Doubles) -> bool:
+    extents = np.linalg.svd(points - points.mean(axis=0), compute_uv=False)
+    return bool(extents[-1] <= MIN_DEPTH * extents[0])
 
 
 def _linear_fit(points: Doubles, pixels: Doubles) -> Doubles:

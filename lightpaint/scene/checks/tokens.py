@@ -42,7 +42,8 @@ _MARKUP = re.compile(
     rb"|<(?P<tag>%b)(?P<attributes>(?>(?:\s++%b\s*+=\s*+%b)*))\s*+(?P<empty>/?)>"
     % (_SKIPPED, _QUOTED, _SKIPPED, _DECLARATION, _NAME, _NAME, _NAME, _QUOTED)
 )
-_ATTRIBUTE = re.compile(rb"(%b)\s*+=\s*+(%b)" % (_NAME, _QUOTED))
+#: An attribute with the space before it: its name, and its value in quotes.
+ATTRIBUTE = re.compile(rb"\s*+(%b)\s*+=\s*+(%b)" % (_NAME, _QUOTED))
 _REFERENCE = re.compile(r"&(?:#x0*([0-9a-fA-F]{1,8})|#0*([0-9]{1,8})|(lt|gt|amp|quot|apos));")
 _ENTITIES = {"lt": "<", "gt": ">", "amp": "&", "quot": '"', "apos": "'"}
 
@@ -77,7 +78,7 @@ def markup(text: bytes) -> Iterator[re.Match[bytes]]:
 def attributes(tag: re.Match[bytes]) -> dict[str, str]:
     """Return attributes by name, with references resolved; of repeated attributes the first."""
     values: dict[str, str] = {}
-    for key, quoted in _ATTRIBUTE.findall(tag["attributes"]):
+    for key, quoted in ATTRIBUTE.findall(tag["attributes"]):
         value = re.sub(r"\r\n|[\r\n\t]", " ", decoded(quoted[1:-1]))
         values.setdefault(decoded(key), _REFERENCE.sub(_character, value))
     return values

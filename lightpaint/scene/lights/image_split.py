@@ -3,6 +3,7 @@
 import gc
 from collections.abc import Collection, Mapping, Sequence
 from dataclasses import replace
+from fnmatch import fnmatchcase
 from typing import Any
 
 import numpy as np
@@ -52,13 +53,42 @@ def with_split(
     return {**facts, "emitters": tuple(emitters)}
 
 
+def images_to_split(
+    sizes: Mapping[str, GridSize | TexelLayout], emitters: Sequence[Emitter], scene: str
+) -> dict[str, GridSize | TexelLayout]:
+    """Return columns and rows, or layouts, by name of an emitter, of names and patterns of lights.
+
+    A pattern stands for the lights of its name that can be split; the name of one comes before
+    patterns that match it. Raises SceneError for a pattern that matches none.
+    """
+    names = [x.name for x in emitters]
+    possible = [x.name for x in emitters if x.plugin in DOMAINS]
+    named = {name: size for name, size in sizes.items() if name in names or not _is_pattern(name)}
+    matched: dict[str, GridSize | TexelLayout] = {}
+    for pattern, size in sizes.items():
+        if pattern in named:
+            continue
+        matches = [name for name in possible if fnmatchcase(name, pattern)]
+        if not matches:
+            raise _no_light_to_split(pattern, possible, scene)
+        matched |= dict.fromkeys(matches, size)
+    return matched | named
+
+
+def _is_pattern(name: str) -> bool:
+    return any(character in name for character in "*?[")
+
+
+def _no_light_to_split(name: str, possible: Sequence[str], scene: str) -> SceneError:
+    hint = f"it has {some_names(possible)}" if possible else "none of its lights can be"
+    return SceneError(f"split: {scene} has no light {name!r} to split into texels; {hint}")
+
+
 def _index_of(name: str, emitters: Sequence[Emitter], scene: str) -> int:
     """Return the index of an emitter that can be split. Raises SceneError without one."""
     names = [x.name for x in emitters]
     if name not in names:
-        possible = [x.name for x in emitters if x.plugin in DOMAINS]
-        hint = f"it has {some_names(possible)}" if possible else "none of its lights can be"
-        raise SceneError(f"split: {scene} has no light {name!r} to split into texels; {hint}")
+        raise _no_light_to_split(name, [x.name for x in emitters if x.plugin in DOMAINS], scene)
     emitter = emitters[names.index(name)]
     if emitter.plugin not in DOMAINS:
         *others, last = DOMAINS
@@ -118,6 +148,8 @@ def _current_radiances(
 ) -> Doubles:
     """Return what the texels of an emitter show now, (nodes, 3)."""
     assert emitter.kind is not None
+    if emitter.is_dark:
+        return np.zeros((len(layout.nodes), 3))
     shown = (emitter.node, emitter.kind, emitter.emission, domain)
     # An image that was written from these texels has their values.
     if layout.splits:

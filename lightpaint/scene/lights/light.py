@@ -15,6 +15,8 @@ from lightpaint.scene.properties.emission import AS_AUTHORED, MULTIPLE, EmitterS
 #: Parameter of a light whose emission is a multiple of that in the scene.
 WHOLE_EMISSION = "emission"
 
+BLACK: RGB = (0.0, 0.0, 0.0)
+
 
 def free_names(stem: str, count: int, taken: Collection[str]) -> list[str]:
     """Return the first `count` of `stem_1`, `stem_2` … that are not taken."""
@@ -90,7 +92,10 @@ class Light:
         if self.is_fixed:
             digests = [m.digest and m.digest.as_is for m in self.members]
         elif self.unit == MULTIPLE:
-            digests = [m.digest and f"{m.digest.unit} {m.emission}" for m in self.members]
+            own = [self.emission_of(member, AS_AUTHORED) for member in self.members]
+            digests = [
+                m.digest and f"{m.digest.unit} {x}" for m, x in zip(self.members, own, strict=True)
+            ]
         else:
             digests = [m.digest and m.digest.unit for m in self.members]
         if None in digests:
@@ -101,7 +106,9 @@ class Light:
         """Return the emission of `member` in its own unit when this light has `emission`."""
         if self.unit != MULTIPLE:
             return emission
-        r, g, b = (w * factor for w, factor in zip(emission, member.emission, strict=True))
+        # One that is dark now beside others that are not keeps that proportion.
+        own = BLACK if member.is_dark and any(self.emission) else member.emission
+        r, g, b = (w * factor for w, factor in zip(emission, own, strict=True))
         return r, g, b
 
 
@@ -109,7 +116,8 @@ def tie(name: str, members: Sequence[Emitter]) -> Light:
     """Return a light called `name` whose emitters share one weight.
 
     If all have the same colour in the same unit, or all are black, the weight is that colour.
-    Otherwise it is a factor, and the emitters keep their proportions. Raises SceneError if all are
+    Otherwise it is a factor, and the emitters keep their proportions; those that are dark beside
+    others stay dark. Raises SceneError if all are
     black and of different kinds, so that their proportions are undefined.
     """
     kinds = {member.kind for member in members}
@@ -130,7 +138,7 @@ def tie(name: str, members: Sequence[Emitter]) -> Light:
         tuple(members),
         parameters.pop() if len(parameters) == 1 else WHOLE_EMISSION,
         MULTIPLE,
-        AS_AUTHORED,
+        BLACK if all(member.is_dark for member in members) else AS_AUTHORED,
         is_scalar=any(kind is not None and kind.is_scalar for kind in kinds),
     )
 
@@ -275,19 +283,18 @@ def black_emitters(
     members = {member.name for light in lights for member in light.members}
     # If nothing else may be sampled, black emitters are, since Mitsuba needs at least one.
     can_be_sampled = any(not m.hit_by_chance for light in lights for m in light.members)
-    black = (0.0, 0.0, 0.0)
     lit_nodes = {m.node for light in lights for m in light.members}
     settings = {
-        x.node: EmitterSetting(x.kind, black, 0.0 if can_be_sampled else x.sampling_weight)
+        x.node: EmitterSetting(x.kind, BLACK, 0.0 if can_be_sampled else x.sampling_weight)
         for x in emitters
         if x.node not in lit_nodes
     }
     all_emitters = tuple(
         x
         if x.name in members
-        else replace(x, emission=black, sampling_weight=settings[x.node].sampling_weight)
+        else replace(x, emission=BLACK, sampling_weight=settings[x.node].sampling_weight)
         if x.node in settings
-        else replace(x, emission=black)  # a texel beside one that is lit
+        else replace(x, emission=BLACK)  # a texel beside one that is lit
         for x in emitters
     )
     return all_emitters, settings

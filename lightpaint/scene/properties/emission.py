@@ -60,6 +60,12 @@ PLUGINS = {
     "sunsky": ("radiance", "W/(m² sr)"),
 }
 
+#: Emitters that have no surface which a ray could hit, so that only sampling finds them.
+ONLY_SAMPLED = ("directional", "point", "projector", "spot")
+
+#: Integrators that begin at the emitters, so that only sampling finds any.
+FROM_EMITTERS = ("ptracer",)
+
 #: Emitters that surround the scene.
 ENVIRONMENTS = ("constant", "envmap", "sunsky")
 
@@ -102,6 +108,11 @@ def read_emission(emitter: Any, kind: EmissionKind | None, name: str) -> RGB:
     if not np.isfinite(value).all():
         raise SceneError(f"light {name!r} has the {kind.parameter} {[r, g, b]}: not finite")
     return r, g, b
+
+
+def is_never_found(plugin: str, sampling_weight: float, integrator: str) -> bool:
+    """Return True if an emitter is dark in Mitsuba whatever it emits, for it is never sampled."""
+    return sampling_weight == 0 and (plugin in ONLY_SAMPLED or integrator in FROM_EMITTERS)
 
 
 def why_not_adjusted(plugin: str, kind: EmissionKind | None, emission: RGB) -> str:

@@ -4,8 +4,9 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+import OpenEXR
 import pytest
-from light_groups import pictures
+from light_groups import interleaved, pictures
 
 from lightpaint.basis.lightgroups.beauty_comparison import (
     LayerSum,
@@ -13,6 +14,7 @@ from lightpaint.basis.lightgroups.beauty_comparison import (
     find_beauty_of_lights,
     rounding,
 )
+from lightpaint.basis.lightgroups.light_groups import read_light_groups
 from lightpaint.basis.lightgroups.render_layers import RenderLayer
 
 
@@ -103,3 +105,53 @@ def test_every_layer_is_gone_through_a_few_times_however_many_there_are():
     # Sum, bound, size and the coarse look. With a sum for each candidate it would be 24 times
     # as many.
     assert 0 < _Counted.read < 12 * images.size
+
+
+def _lossy_layers(path: Path, compression: str, kind: Any, extra: float) -> dict[str, Any]:
+    """Layers with grain, and one light of a hundredth of the picture in a corner, in no group."""
+    rng = np.random.default_rng(3)
+    y, x = (side[..., None] for side in np.mgrid[:64, :96])
+    smooth = [np.exp(np.sin(x / a) + np.cos(y / b)) for a, b in ((9, 14), (17, 8), (30, 30))]
+    images = np.stack([s * rng.gamma(9, 1 / 9, (64, 96, 3)) for s in smooth]).astype(np.float32)
+    corner = np.zeros_like(images[0])
+    corner[:16, :16] = extra * images.sum() / (16 * 16 * 3)
+    layers = {"Combined": images.sum(axis=0) + corner}
+    layers |= {f"Combined_{name}": image for name, image in zip("abc", images, strict=True)}
+    header = {"compression": getattr(OpenEXR, f"{compression}_COMPRESSION")}
+    return {"path": interleaved(path / "a.exr", layers, kind=kind, header=header)}
+
+
+@pytest.mark.parametrize(
+    ("compression", "kind"),
+    [
+        ("DWAA", np.float16),
+        ("DWAB", np.float32),
+        ("B44", np.float16),
+        ("B44A", np.float16),
+        ("LJ2K", np.float16),
+        ("LJ2K", np.float32),
+    ],
+)
+def test_what_lossy_compression_changes_is_not_missing(tmp_path: Path, compression: str, kind: Any):
+    groups = read_light_groups(**_lossy_layers(tmp_path, compression, kind, extra=0))
+    assert groups.basis.names == ("a", "b", "c")
+    assert groups.missing is not None
+    assert groups.missing > 1e-4  # which without the loss would be a rest
+    [remark] = [x for x in groups.remarks if "add up" in x]
+    assert f"the lossy compression {compression}" in remark
+    # A light that is missing is missing.
+    groups = read_light_groups(**_lossy_layers(tmp_path, compression, kind, extra=0.01))
+    assert groups.has_rest
+    [remark] = [x for x in groups.remarks if "lack" in x]
+    assert f"some of it is the loss of the compression {compression}" in remark
+
+
+@pytest.mark.parametrize(
+    ("compression", "kind"),
+    [("B44", np.float32), ("PXR24", np.float16), ("ZSTD", np.float16), ("HTJ2K32", np.float32)],
+)
+def test_lossless_compression_is_not_called_lossy(tmp_path: Path, compression: str, kind: Any):
+    for extra, is_missing in ((0, False), (3e-4, True)):
+        groups = read_light_groups(**_lossy_layers(tmp_path, compression, kind, extra))
+        assert groups.has_rest is is_missing
+        assert not any("compression" in x for x in groups.remarks)

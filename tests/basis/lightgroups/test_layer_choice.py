@@ -84,6 +84,36 @@ CASES: list[tuple[str, list[str], dict[str, str], str | None]] = [
         {"light_1": "Light 1", "light_2": "Light pass 2"},
         "Main",
     ),
+    # Renderers that run in Blender write their names behind the view layer.
+    (
+        "RenderMan or Redshift",
+        ["ViewLayer.Combined", "ViewLayer.Ci_key", "ViewLayer.Ci_fill", "ViewLayer.Depth"],
+        {"key": "ViewLayer.Ci_key", "fill": "ViewLayer.Ci_fill"},
+        "ViewLayer.Combined",
+    ),
+    (
+        "LuxCore in Blender",
+        ["ViewLayer.Combined", 'ViewLayer.LG 1: "Default Lightgroup"', 'ViewLayer.LG 2: "a.b"'],
+        {
+            "Default Lightgroup": 'ViewLayer.LG 1: "Default Lightgroup"',
+            "a.b": 'ViewLayer.LG 2: "a.b"',
+        },
+        "ViewLayer.Combined",
+    ),
+    (
+        "Radeon ProRender",
+        ["View Layer.Combined", "View Layer.Light Group 1", "View Layer.Light Group 2"],
+        {"group_1": "View Layer.Light Group 1", "group_2": "View Layer.Light Group 2"},
+        "View Layer.Combined",
+    ),
+    (
+        "Arnold",
+        ["a.b.RGBA_key", "a.b.RGBA_c.d", "a.b.RGBA"],
+        {"key": "a.b.RGBA_key", "c.d": "a.b.RGBA_c.d"},
+        "a.b.RGBA",
+    ),
+    # The beauty of another view layer is none.
+    ("Karma", ["near.C", "far.C_key"], {"key": "far.C_key"}, None),
 ]
 
 
@@ -116,6 +146,8 @@ def test_of_several_view_layers_the_first():
     )
     [remark] = choice.remarks
     assert "pattern='near.Combined_{name}' takes near" in remark
+    [remark] = _choose("a.Ci_key", "b.Ci_key").remarks
+    assert "pattern='b.Ci_{name}' takes b" in remark
     other = _choose(*names, pattern="near.Combined_{name}")
     assert (other.lights, other.beauty) == ({"a": "near.Combined_a"}, "near.Combined")
 
@@ -184,8 +216,9 @@ def test_a_pattern_finds_what_no_convention_does():
         {"x": ("key.light",), "y": ("z",)}, pattern="{name}.light", file_name="a"
     )
     assert choice.lights == {"key": "x"}
-    # So wide a pattern must not take the picture for a light.
-    assert _choose("rgba", "key", "fill", pattern="{name}").beauty == "rgba"
+    # So wide a pattern must not take the picture for a light before the sum says so.
+    choice = _choose("rgba", "key", "fill", pattern="{name}")
+    assert (list(choice.lights), choice.whole) == (["key", "fill"], {"rgba": "rgba"})
     # A plain R, G, B is the picture before a light that is called like one.
     choice = _choose("", "L_main", "L_key", pattern="L_{name}")
     assert (list(choice.lights), choice.beauty) == (["main", "key"], "")
@@ -199,6 +232,14 @@ def test_a_pattern_finds_what_no_convention_does():
             None,
             r"like pattern='L_\{name\}'; .* are R, G, B, L_key, L_fill",
         ),
+        (
+            ["V.Combined", "V.Depth", "V.Mist", "V.lamp 1", "V.lamp 2", "V.Denoising Normal"],
+            None,
+            r"like pattern='V\.lamp \{name\}'",
+        ),
+        (["V.Combined", "V.key", "V.fill"], None, r"like pattern='V\.\{name\}'"),
+        (["a.l_key_x", "a.l_fill_x", "a.l_fill_y"], None, r"like pattern='a\.l_\{name\}'"),
+        (["Image", "key", "fill"], None, r"like pattern='\{name\}'"),
         (["depth"], None, r"like pattern='Light_\{name\}'; its RGB layers are depth"),
         (["RGBA_key", "C_key"], None, "1 as of Arnold, 1 as of Karma"),
         (["a", "b"], "L_{name}", r"'L_\{name\}' fits no layer of a\.exr: its RGB layers are a, b"),
@@ -221,6 +262,8 @@ def test_what_cannot_be_told_lists_the_layers(names: list[str], pattern: Any, me
         (["key", "keyring"], ["key", "keyring"]),
         (["a.0001", "b.0001"], ["a", "b"]),
         (["spot_1", "spot_2"], ["1", "2"]),
+        (["key0001", "ray0001"], ["key", "ray"]),
+        (["key0001", "key10001"], ["key0001", "key10001"]),
         (["a_b", "a"], ["a_b", "a"]),
         (["one"], ["one"]),
     ],

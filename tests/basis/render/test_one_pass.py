@@ -24,8 +24,10 @@ from lightpaint.basis.render.render_memory import memory_needed
 from lightpaint.basis.render.render_origin import ONE_PASS, SEPARATE
 from lightpaint.basis.render.separate_renders import BLACK, WHITE
 from lightpaint.errors import SceneError
+from lightpaint.lighting.answer.lighting import Lighting
 from lightpaint.pipeline.job.remarks import remarks_of_scene
 from lightpaint.progress import silent
+from lightpaint.relit.relight import relight
 from lightpaint.scene.runtime.variant import use_variant
 from lightpaint.scene.scene import Scene
 from lightpaint.scene.scene_reader import load_scene
@@ -220,6 +222,37 @@ def test_a_light_switched_off_in_the_scene_still_has_its_image(tmp_path: Path) -
     assert basis.images[basis.names.index("bulb")].max() > 0
 
 
+UNSAMPLED = '<float name="sampling_weight" value="0"/></emitter>'
+PROJECTOR = """<emitter type="projector" id="slide"><rgb name="irradiance" value="2 3 4"/>
+    <transform name="to_world"><lookat origin="0 1 1" target="0 0 0" up="0 0 1"/></transform>
+    </emitter>"""
+
+
+@pytest.mark.parametrize("lamp", [*(LIGHTS[name] for name in ("bulb", "beam", "sun")), PROJECTOR])
+def test_a_lamp_that_is_never_sampled_is_dark_now_and_can_be_lit(tmp_path: Path, lamp: str) -> None:
+    """Nothing that a ray could hit shows it, so Mitsuba renders it black."""
+    lights = lamp.replace("</emitter>", UNSAMPLED) + LIGHTS["sky"]
+    scene = load_scene(write_room(tmp_path, lights=lights))
+    name = scene.lights[0].name
+    assert scene.light(name).emission == (0, 0, 0)
+    current = {light.name: light.emission for light in scene.lights}
+    rendered, asked = (mitsuba_render(scene, x, seed=9, spp=16) for x in (None, current))
+    assert np.abs(asked - rendered).max() <= SAME_SAMPLES * rendered.max()
+    basis = render_basis(scene, spp=16)
+    assert basis.images[0].max() > 0
+    lit = relight(scene, Lighting.current(basis).with_emission(name, (1, 1, 1)), tmp_path / "r.xml")
+    assert lit.light(name).emission == (1, 1, 1)
+    assert lit.light(name).members[0].sampling_weight == 1
+
+
+def test_a_surface_that_is_never_sampled_shines_where_rays_can_hit_it(tmp_path: Path) -> None:
+    lights = LIGHTS["panel"].replace("</emitter>", UNSAMPLED) + LIGHTS["bulb"]
+    panel = load_scene(write_room(tmp_path, lights=lights)).light("panel")
+    np.testing.assert_allclose(panel.emission, (4, 3, 2), rtol=1e-6)
+    path = write_room(tmp_path, lights=lights, integrator='<integrator type="ptracer"/>')
+    assert load_scene(path).light("panel").emission == (0, 0, 0)
+
+
 def test_second_sensor_and_crop_window(tmp_path: Path) -> None:
     crop = """<integer name="crop_offset_x" value="5"/><integer name="crop_offset_y" value="3"/>
         <integer name="crop_width" value="12"/><integer name="crop_height" value="9"/>"""
@@ -365,6 +398,32 @@ def test_integrators_that_trace_the_paths_of_path_are_one_pass(
     assert why_not_one_pass(scene) is None
     assert not needs_a_bounce(scene)
     _same_as_mitsuba_at_random_weights(scene)
+
+
+@pytest.mark.parametrize(
+    ("plugin", "brightness"), [("path", 0.5), ("direct", 1), ("volpath", 1), ("prb", 1)]
+)
+def test_a_half_masked_lamp_before_nothing_is_as_bright_as_its_integrator_shows_it(
+    tmp_path: Path, plugin: str, brightness: float
+) -> None:
+    """`path` alone discards what a path gathered that met nothing but masks."""
+    path = tmp_path / "masked.xml"
+    path.write_text(
+        f"""<scene version="3.0.0">{_integrator(plugin)}
+        <sensor type="perspective"><float name="fov" value="20"/><transform name="to_world">
+        <lookat origin="0 0 4" target="0 0 0" up="0 1 0"/></transform>
+        <film type="hdrfilm"><integer name="width" value="8"/><integer name="height" value="8"/>
+        </film></sensor><shape type="rectangle" id="lamp"><bsdf type="mask">
+        <float name="opacity" value="0.5"/><bsdf type="diffuse"/></bsdf><emitter type="area">
+        <rgb name="radiance" value="1"/></emitter></shape></scene>"""
+    )
+    scene = load_scene(path)
+    shown = mitsuba_render(scene, seed=1, spp=256).mean()
+    predicted = render_basis(scene, spp=256).images.mean()
+    # Noise: five standard errors of the mean of 64 pixels with 256 samples that are 0 or 1.
+    noise = 5 * 0.5 / np.sqrt(64 * 256)
+    assert abs(shown - brightness) <= noise
+    assert abs(predicted - brightness) <= noise
 
 
 def test_depth_of_integrators_that_nobody_told(tmp_path: Path) -> None:

@@ -1,6 +1,7 @@
 """Runs in Blender: sets lights by set_scene.py, and prints what a white floor then looks like.
 
-Arguments: a folder with the script. Not a test by itself: test_scene_script.py runs it.
+Arguments: the file's working space, "" for that of old versions, and a folder with the script. Not
+a test by itself: test_scene_script.py runs it.
 """
 
 import json
@@ -46,6 +47,15 @@ def lamp(name, kind, **properties):
     return thing
 
 
+def with_nodes(light):
+    """Multiply a lamp by its nodes."""
+    if light.node_tree is None:
+        light.use_nodes = True
+    emission = next(node for node in light.node_tree.nodes if node.type == "EMISSION")
+    emission.inputs["Strength"].default_value = 3.0
+    emission.inputs["Color"].default_value = (0.5, 1, 1, 1)
+
+
 def floor_and_camera():
     bpy.ops.mesh.primitive_plane_add(size=1)
     bpy.context.object.data.materials.append(
@@ -69,15 +79,18 @@ def radiance():
 
 def main():
     scene = empty_scene(8, 8, 256)
+    if sys.argv[-2]:
+        bpy.ops.wm.set_working_color_space(working_space=sys.argv[-2])
     scene.cycles.max_bounces = 0
     floor_and_camera()
     lamps = [
         lamp("bulb", "POINT", shadow_soft_size=0),
         lamp("spot", "SPOT", shadow_soft_size=0, spot_size=1.0, spot_blend=0),
         lamp("sun", "SUN", angle=0),
-        lamp("desk", "AREA", shape="RECTANGLE", size=0.01, size_y=0.02),
+        lamp("desk", "AREA", shape="RECTANGLE", size=0.01, size_y=0.02, spread=1.0),
     ]
     lamps[-1].scale = (2, 1, 1)
+    with_nodes(lamps[0].data)
     bpy.ops.mesh.primitive_plane_add(
         size=0.02, location=(0, 0, HEIGHT), rotation=(3.14159265, 0, 0)
     )
@@ -93,6 +106,8 @@ def main():
             other.hide_render = other is not one
         scene.world = world if one is None else None
         radiances["sky" if one is None else one.name] = radiance()
+    kept = [dict(one.data.get("lightpaint_plain") or {}) for one in lamps]
+    print("KEPT " + json.dumps([sorted(x) for x in kept]))
     print("SEEN " + json.dumps(radiances))
 
 

@@ -3,6 +3,7 @@
 Arguments: what to do, and a folder. Not a test by itself: test_exports.py runs it.
 """
 
+import json
 import runpy
 import sys
 from pathlib import Path
@@ -202,9 +203,24 @@ def kinds():
     print("all as expected")
 
 
+def space():
+    """The lamps of `kinds` in a file that works in ACEScg; Blender converts what they were."""
+    empty()
+    sun = light("sun", "SUN", 3, (1, 0.5, 0.25), (0, 0, 5), "a")
+    lamp = light("x", "POINT", 10, (1, 1, 1), (0, 0, 1), "b")
+    glow = emitting("glow", (0.5, 0.5, 0.5), 1)
+    cube(1, (0, 0, 0), glow, "b")
+    bpy.ops.wm.set_working_color_space(working_space="ACEScg", convert_colors=True)
+    for _ in range(2):
+        runpy.run_path(SCRIPT)
+    [multiply] = [n for n in glow.node_tree.nodes if n.type == "VECT_MATH"]
+    found = emitted(sun.data), emitted(lamp.data), list(multiply.inputs[1].default_value)
+    print("FOUND " + json.dumps(found))
+
+
 if WHAT == "render":
     stage()
     bpy.ops.wm.save_as_mainfile(filepath=str(FOLDER / "scene.blend"))
     render("first")
 else:
-    {"again": again, "kinds": kinds}[WHAT]()
+    {"again": again, "kinds": kinds, "space": space}[WHAT]()

@@ -14,14 +14,14 @@ from typing import Any
 import numpy as np
 import OpenEXR
 import pytest
-from blender import in_blender
+from blender import has_working_spaces, in_blender
 from hypothesis import example, given
 from hypothesis import strategies as st
 from light_groups import channels, interleaved, multi_part, pictures, write
 
 import lightpaint as lp
 from lightpaint.basis.lightgroups.light_groups import LightGroups, read_light_groups
-from lightpaint.colour.primaries import to_rec709
+from lightpaint.colour.primaries import ACESCG, from_rec709, to_rec709
 from lightpaint.lighting.answer.lighting import Lighting
 from lightpaint.relit.export.exports import (
     EXPORTS,
@@ -134,7 +134,9 @@ def test_the_blender_script_holds_the_multipliers(tmp_path: Path):
     constants = {
         node.targets[0].id: ast.literal_eval(node.value)  # type: ignore[attr-defined]
         for node in tree.body
-        if isinstance(node, ast.Assign) and isinstance(node.targets[0], ast.Name)
+        if isinstance(node, ast.Assign)
+        and isinstance(node.targets[0], ast.Name)
+        and isinstance(node.value, ast.Dict | ast.Constant)
     }
     assert list(constants["MULTIPLIERS"]) == NASTY  # what is kept is not in it
     np.testing.assert_allclose(list(constants["MULTIPLIERS"].values()), WEIGHTS, rtol=1e-8)
@@ -342,9 +344,6 @@ def test_a_name_with_more_dots_than_nuke_parts_is_copied(tmp_path: Path):
     ]
 
 
-ACESCG = (0.713, 0.293, 0.165, 0.830, 0.128, 0.044, 0.32168, 0.33767)
-
-
 @pytest.mark.parametrize("names", [NASTY, ALIKE])
 def test_the_nuke_script_keeps_the_primaries_of_the_file(tmp_path: Path, names: list[str]):
     groups = _groups(tmp_path, lacks=0.5, names=names, header={"chromaticities": ACESCG})
@@ -483,6 +482,21 @@ def test_every_kind_of_light_is_multiplied_once(tmp_path: Path, new_blender: lis
     assert "all as expected" in output
     assert "no light is in the group gone" in output
     assert "inside the node group hidden, set it by hand" in output
+
+
+def test_multipliers_are_those_of_rec709_in_a_file_of_another_space(
+    tmp_path: Path, new_blender: list[str]
+):
+    if not has_working_spaces(new_blender):
+        pytest.skip("Blender 5 (LIGHTPAINT_BPY: a Python with its module bpy)")
+    groups = _groups(tmp_path, names=["a", "b", "gone", "linked", "world"])
+    write_exports(tmp_path, groups, _lighting(groups))
+    output = in_blender(new_blender, Path(__file__).parent / "blender_scene.py", "space", tmp_path)
+    found = next(x for x in output.splitlines() if x.startswith("FOUND "))
+    # Of a material, which may have a texture, it is what white becomes. Blender's own conversion
+    # has matrices of six digits.
+    expected = np.array([[6, 0.75, 0], [1, 10, 30], [0.1, 1, 3]]) @ from_rec709(ACESCG).T
+    np.testing.assert_allclose(json.loads(found.partition(" ")[2]), expected, rtol=2e-5)
 
 
 #: What a name may hold to be taken for a formula, or to end its cell or its line.

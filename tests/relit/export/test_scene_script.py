@@ -5,15 +5,22 @@ import math
 from pathlib import Path
 
 import numpy as np
-from blender import in_blender
+import pytest
+from blender import has_working_spaces, in_blender
 
+from lightpaint.colour.primaries import ACESCG, REC709, REC2020, from_rec709
 from lightpaint.relit.export.scene_script import scene_script
 
 #: Standard errors of 256 samples of a small lamp from afar, and its size over its distance.
 NOISE = 0.01
 
 
-def test_a_floor_in_blender_is_lit_as_in_the_scene(tmp_path: Path, new_blender: list[str]) -> None:
+@pytest.mark.parametrize("space", ["", "ACEScg", "Linear Rec.2020"])
+def test_a_floor_in_blender_is_lit_as_in_the_scene(
+    tmp_path: Path, new_blender: list[str], space: str
+) -> None:
+    if space and not has_working_spaces(new_blender):
+        pytest.skip("Blender 5 (LIGHTPAINT_BPY: a Python with its module bpy)")
     rgb = np.array([8.0, 4.0, 1.0])
     kinds = {
         **dict.fromkeys(("panel", "desk", "sky"), "radiance"),
@@ -24,12 +31,18 @@ def test_a_floor_in_blender_is_lit_as_in_the_scene(tmp_path: Path, new_blender: 
     emitters = [(name, kind, tuple(rgb)) for name, kind in kinds.items()]
     text = scene_script("evening", "hall.xml", [*emitters, ("dome", "", (2.0, 2.0, 2.0))])
     (tmp_path / "set_scene.py").write_text(text, encoding="utf-8")
-    output = in_blender(new_blender, Path(__file__).parent / "blender_lit.py", tmp_path)
+    output = in_blender(new_blender, Path(__file__).parent / "blender_lit.py", space, tmp_path)
     assert "lightpaint: 'gone' is left as it is" in output
     assert "lightpaint: 'dome' is left as it is" in output
     values = json.loads(next(x for x in output.splitlines() if x.startswith("SEEN"))[5:])
     # Irradiance of a white floor: I/d², L·A/d² of what is small, all of a sky π L; over π of it.
     falls = {"bulb": 1 / 4, "spot": 1 / 4, "sun": 1.0, "sky": math.pi}
     falls |= {"panel": 0.02**2 / 4, "desk": 0.02 * 0.02 / 4}
+    primaries = {"ACEScg": ACESCG, "Linear Rec.2020": REC2020}.get(space, REC709)
+    in_file = from_rec709(primaries) @ rgb
     for name, share in falls.items():
-        np.testing.assert_allclose(values[name], rgb * share / math.pi, rtol=NOISE)
+        np.testing.assert_allclose(values[name], in_file * share / math.pi, rtol=NOISE)
+    # What multiplied the lamps before is not lost.
+    kept = json.loads(next(x for x in output.splitlines() if x.startswith("KEPT"))[5:])
+    assert {"Emission Color", "Emission Strength"} <= {*kept[0]}
+    assert "spread" in kept[3]

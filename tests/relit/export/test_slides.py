@@ -1,6 +1,7 @@
 """Slides of projectors for other programs: the same light on a floor as in Mitsuba."""
 
 import json
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -12,10 +13,13 @@ from nightly import nightly
 from renderer import write_room
 
 import lightpaint as lp
+from lightpaint.colour.color import luminance
 from lightpaint.images.formats.exr import write_rgb
 from lightpaint.lighting.answer.lighting import Lighting
+from lightpaint.relit.export.fixtures import fixtures_of
 from lightpaint.relit.export_formats import Source
 from lightpaint.relit.light_maps import half_slide, slide_images_of
+from lightpaint.relit.xml_patch import emitters_of
 from lightpaint.scene.runtime.variant import use_variant
 from lightpaint.scene.scene import Scene
 
@@ -115,6 +119,26 @@ def test_the_size_of_a_slide_is_that_of_mitsuba(view: dict[str, Any], size: Any)
             place.p, place.t = mi.Point3f(x * width, y * height, 1.0), mi.Float(1.0)
             _, light = projector.sample_direction(place, mi.Point2f(0.5))
             assert (np.max(np.array(light)) > 0) == inside
+
+
+def test_a_projector_of_one_colour_is_as_bright_in_other_programs(tmp_path: Path) -> None:
+    """They have its intensity, which a floor at distance 1 shows, where Mitsuba has that over π."""
+    projector = """<emitter type="projector" id="slide"><transform name="to_world">
+        <lookat origin="0 1 0" target="0 0 0" up="0 0 -1"/></transform>
+        <float name="fov" value="50"/><rgb name="irradiance" value="2 1 0.5"/></emitter>"""
+    scene = lp.load_scene(write_room(tmp_path, lights=projector))
+    lighting = Lighting.current(lp.render_basis(scene, spp=2))
+    radiance = floor_in_mitsuba(scene, tmp_path, lighting)
+    middle = radiance[PIXELS // 2 - 1 : PIXELS // 2 + 1, PIXELS // 2 - 1 : PIXELS // 2 + 1]
+    # Of the four pixels around the middle, seen at an angle: cos⁻³ of its own, cos³ of the floor.
+    intensity = np.pi * middle.mean(axis=(0, 1))
+    [(name, quantity, exported)] = emitters_of(scene, lighting)
+    assert (name, quantity) == ("slide", "intensity")
+    np.testing.assert_allclose(exported, intensity, rtol=1e-5)  # float32
+    [fixture] = fixtures_of(replace(lighting, cd_per_unit=10.0))
+    np.testing.assert_allclose((fixture.red, fixture.green, fixture.blue), intensity, rtol=1e-5)
+    assert fixture.luminous == pytest.approx(10 * float(luminance(intensity)), rel=1e-5)
+    assert fixture.luminous_unit == "lx"
 
 
 def test_a_slide_in_usd_is_named_as_to_be_set_by_hand(tmp_path: Path) -> None:

@@ -94,6 +94,31 @@ def test_lights_shine_as_they_were_solved(tmp_path: Path) -> None:
     assert not shine(prim_at("lamps/tube")).any()
 
 
+def test_what_multiplies_a_light_in_the_stage_is_reset_over_it(tmp_path: Path) -> None:
+    stage = made_stage(tmp_path / "hall.usda")
+    for name in ("panel", "bulb"):
+        prim = stage.GetPrimAtPath(f"/hall/lamps/{name}")
+        UsdLux.LightAPI(prim).CreateDiffuseAttr(0.5)
+        UsdLux.LightAPI(prim).CreateSpecularAttr(0.0)
+        shaping = UsdLux.ShapingAPI.Apply(prim)
+        shaping.CreateShapingIesFileAttr("lamp.ies")
+        shaping.CreateShapingFocusAttr(8.0)
+        shaping.CreateShapingConeAngleAttr(30.0)
+    UsdLux.RectLight.Get(stage, "/hall/lamps/panel").CreateTextureFileAttr("window.exr")
+    stage.Save()
+    overrides = usd_overrides(EMITTERS, tmp_path / "hall.usda", tmp_path)
+    (tmp_path / "lights.usda").write_text(overrides.text, encoding="utf-8")
+    relit = Usd.Stage.Open(str(tmp_path / "lights.usda"))
+    for name in ("panel", "bulb"):
+        prim = relit.GetPrimAtPath(f"/hall/lamps/{name}")
+        light, shaping = UsdLux.LightAPI(prim), UsdLux.ShapingAPI(prim)
+        assert (light.GetDiffuseAttr().Get(), light.GetSpecularAttr().Get()) == (1.0, 1.0)
+        assert not shaping.GetShapingIesFileAttr().Get()
+        assert not shaping.GetShapingFocusAttr().Get()
+        assert shaping.GetShapingConeAngleAttr().Get() == 30.0  # its form is the stage's
+    assert not UsdLux.RectLight.Get(relit, "/hall/lamps/panel").GetTextureFileAttr().Get()
+
+
 def test_nothing_else_of_the_stage_changes(tmp_path: Path) -> None:
     before = made_stage(tmp_path / "hall.usda")
     overrides = usd_overrides(EMITTERS[:1], tmp_path / "hall.usda", tmp_path, about="for once")
