@@ -113,15 +113,25 @@ def write_png(
     write_bytes(path, png_bytes(to_8_bit(encode_display(image, stops=stops)), texts))
 
 
+def png_size(head: bytes) -> tuple[int, int]:
+    """Return the (height, width) that the head of a PNG declares.
+
+    Raises ImageError, without naming the file, if `head` is not that of a PNG.
+    """
+    if len(head) < PNG_HEAD or not head.startswith(b"\x89PNG\r\n\x1a\n"):
+        raise ImageError("is damaged: it does not begin like a PNG")
+    width, height = struct.unpack_from(">II", head, 16)
+    return height, width
+
+
 def longest_png(head: bytes) -> int:
     """Return the largest plausible size in bytes of a PNG that starts with `head`.
 
     It is the size of its uncompressed pixels, plus space for profiles, texts and a thumbnail.
     Raises ImageError, without naming the file, if `head` is not that of a PNG.
     """
-    if len(head) < PNG_HEAD or not head.startswith(b"\x89PNG\r\n\x1a\n"):
-        raise ImageError("is damaged: it does not begin like a PNG")
-    width, height, bits, colour = struct.unpack_from(">IIBB", head, 16)
+    height, width = png_size(head)
+    bits, colour = struct.unpack_from(">BB", head, 24)
     channels = {0: 1, 2: 3, 3: 1, 4: 2, 6: 4}.get(colour, 4)
     # Adam7 interlacing stores seven pictures, each with one extra byte per row.
     row = -(-width * channels * bits // 8) + 1
