@@ -1,4 +1,7 @@
-"""Check the names of keyword arguments; an unknown one is reported with the nearest known one."""
+"""What all public functions share: checked names of keyword arguments, and the system's refusals.
+
+An unknown name is reported with the nearest known one.
+"""
 
 import difflib
 import inspect
@@ -8,7 +11,7 @@ from functools import wraps
 from typing import Any, TypeVar
 
 from lightpaint.display_text import some_names
-from lightpaint.errors import KeywordError
+from lightpaint.errors import KeywordError, LightpaintError, refusal_of
 
 _Call = TypeVar("_Call", bound=Callable[..., Any])
 
@@ -37,7 +40,12 @@ def keywords(*passed_on: type) -> Callable[[_Call], _Call]:
                 if name not in names:
                     # Named after the function that was called, not the decorator.
                     raise _unknown(call.__qualname__, name, names) from None
-            return inner(*args, **kwargs)
+            try:
+                return inner(*args, **kwargs)
+            except OSError as error:
+                if isinstance(error, LightpaintError) or (refusal := refusal_of(error)) is None:
+                    raise
+                raise refusal from error
 
         if isinstance(call, type):
             call.__init__ = checked  # type: ignore[misc]

@@ -14,7 +14,7 @@ from lightpaint.cli.options.parser import command_parser
 from lightpaint.cli.output import lines
 from lightpaint.cli.output.output_mode import CommandOutcome, OutputMode, using_output_mode
 from lightpaint.cli.output.vocabulary import spoken
-from lightpaint.errors import BatchError, LightpaintError
+from lightpaint.errors import BatchError, LightpaintError, refusal_of
 
 #: Modules of the commands that are not in `render_commands`.
 _MODULES = {
@@ -33,6 +33,10 @@ OUT_OF_MEMORY_TEXT = (
     "this needs more memory than there is: close other programs, or render a smaller film "
     '(--resolution 1/2 takes about a quarter; in a manifest, resolution = "1/2")'
 )
+
+
+#: What Python says where no thread can be started, for want of memory or of a higher limit.
+NO_THREAD = "can't start new thread"
 
 
 def run_command(arguments: Sequence[str] | None, received: Sequence[int]) -> int:
@@ -106,7 +110,10 @@ def _report(command: str, error: Exception, words: Sequence[str]) -> int:
         for line in error.mistakes if isinstance(error, BatchError) else (str(error),):
             lines.err(f"lightpaint {command}: {spoken(line)}")
         return 2
-    if isinstance(error, MemoryError):
+    if isinstance(error, OSError) and (refusal := refusal_of(error)) is not None:
+        lines.err(f"lightpaint {command}: {refusal}")
+        return 2
+    if isinstance(error, MemoryError) or NO_THREAD in str(error):
         lines.err(f"lightpaint {command}: {OUT_OF_MEMORY_TEXT}")
         return 2
     return report_fault(f"lightpaint {command}", error, words)

@@ -27,7 +27,7 @@ from lightpaint.file_reading import read_text
 from lightpaint.files import replacing
 from lightpaint.images.denoiser import denoised
 from lightpaint.images.estimate import read_estimate
-from lightpaint.images.pixel_blocks import block_mean
+from lightpaint.images.pixel_blocks import block_mean, fitting_factor
 from lightpaint.lighting.answer.lighting_file import read_lighting
 from lightpaint.pipeline.results.result_folder import RECORD
 from lightpaint.relit.export.exports import plain_cell
@@ -221,7 +221,9 @@ def _with_picture(
     with suppress(LightpaintError, OSError):
         if not _is_whole(path):
             predicted = read_estimate(folder / "predicted.exr")[0]
-            thumbnail = block_mean(predicted.image, max(1, -(-predicted.image.shape[1] // widest)))
+            height, width = predicted.size
+            factor = fitting_factor((height, width), -(-width // widest))
+            thumbnail = block_mean(predicted.image, factor)
             if predicted.half_difference.any():
                 thumbnail = denoised(thumbnail)
             stops = choose_exposure(predicted.image)
