@@ -1,6 +1,6 @@
-"""What all public functions share: checked names of keyword arguments, and the system's refusals.
+"""Checks of the names of keyword arguments; an unknown one is reported with the nearest known one.
 
-An unknown name is reported with the nearest known one.
+The same decorator turns refusals of the system into errors of lightpaint.
 """
 
 import difflib
