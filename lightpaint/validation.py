@@ -24,6 +24,22 @@ MAX_LISTED = 10_000
 MAX_PRIMARIES = 16
 
 
+def parse_number(text: str | float) -> float:
+    """Return the number that a text is, in the digits 0 to 9. Raises ValueError for other text.
+
+    Python itself takes the digits of all scripts, and underscores between them.
+    """
+    if isinstance(text, str) and (not text.isascii() or "_" in text):
+        raise ValueError(f"{text!r} is not a number of the digits 0 to 9")
+    return float(text)
+
+
+def parse_whole_number(text: str) -> int:
+    """Return the whole number that a text is; see `parse_number`."""
+    parse_number(text)
+    return int(text)
+
+
 def is_amount(value: float) -> bool:
     """Return whether an amount of light or emission is in the range of computations."""
     return 0 <= value <= BRIGHTEST

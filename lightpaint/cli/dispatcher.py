@@ -44,6 +44,9 @@ def run_command(arguments: Sequence[str] | None, received: Sequence[int]) -> int
     words = list(sys.argv[1:] if arguments is None else arguments)
     _substitute_characters()
     parser = command_parser()
+    if not words and "_ARGCOMPLETE" not in os.environ:
+        parser.print_help()
+        return 0
     if "_ARGCOMPLETE" in os.environ:  # a shell asks for completions
         from lightpaint.cli.options.completion import complete
 
@@ -64,6 +67,8 @@ def run_command(arguments: Sequence[str] | None, received: Sequence[int]) -> int
 
         # The commands report this in their own words.
         warnings.simplefilter("ignore", SlowBackendWarning)
+        # Pillow warns of what it mends in a file; what it cannot mend is an error.
+        warnings.filterwarnings("ignore", category=UserWarning, module=r"PIL\b")
         with using_output_mode(OutputMode(options.as_json, options.is_quiet, options.is_verbose)):
             outcome = command(**values_of(options, words))
             if options.as_json and outcome.document is not None:

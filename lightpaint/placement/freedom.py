@@ -11,6 +11,7 @@ from lightpaint.errors import SceneError
 from lightpaint.keywords import keywords
 from lightpaint.placement.space.free_space import as_position
 from lightpaint.scene.properties.pose import FARTHEST
+from lightpaint.validation import parse_number
 
 #: Least width of a beam's soft edge, in degrees.
 EDGE = 0.5
@@ -120,7 +121,7 @@ class Freedom:
 
 def _number(name: str, value: Any, most: float) -> float:
     try:
-        number = float(value)
+        number = parse_number(value)
     except (TypeError, ValueError):
         number = math.nan
     if not 0 < number <= most:

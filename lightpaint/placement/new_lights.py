@@ -14,7 +14,7 @@ from lightpaint.placement.freedom import Freedom
 from lightpaint.placement.space.free_space import as_position
 from lightpaint.scene.lights.new_emitter import NewKind
 from lightpaint.scene.properties.pose import FARTHEST, Site
-from lightpaint.validation import MAX_NAME
+from lightpaint.validation import MAX_NAME, parse_number
 
 #: Maximum number of lights that one search adds.
 MAX_COUNT = 32
@@ -23,7 +23,7 @@ MAX_COUNT = 32
 NEW_CONE = (8.0, 50.0)
 
 #: Syntax of a mirror, like "x = 0".
-_MIRROR = re.compile(r"\s*([xyz])\s*=\s*([-+.\deE]+)\s*")
+_MIRROR = re.compile(r"\s*([xyz])\s*=\s*([-+.0-9eE]+)\s*")
 
 
 @keywords()
@@ -114,7 +114,7 @@ class Mirror:
         """Read a plane like "x = 0". Raises SceneError for others."""
         match = _MIRROR.fullmatch(text) if isinstance(text, str) else None
         try:
-            at = math.nan if match is None else float(match[2])
+            at = math.nan if match is None else parse_number(match[2])
         except ValueError:
             at = math.nan
         if match is None or not abs(at) <= FARTHEST:

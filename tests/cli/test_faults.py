@@ -3,6 +3,7 @@
 import errno
 import re
 import stat
+import warnings
 from pathlib import Path
 
 import pytest
@@ -12,6 +13,7 @@ from renderer import write_room
 import lightpaint as lp
 from lightpaint.cli import dispatcher
 from lightpaint.cli.crash_report import FAULT
+from lightpaint.cli.output.output_mode import CommandOutcome
 from lightpaint.errors import AccessError, BasisError
 from lightpaint.scene.runtime.mitsuba_errors import render_errors
 
@@ -145,3 +147,15 @@ def test_no_room_for_a_thread_is_no_bug(tmp_path: Path, monkeypatch: pytest.Monk
     assert "needs more memory than there is" in run_refused(tmp_path, "doctor")
     make_fail(monkeypatch, OSError(errno.ENOSPC, "No space left on device", "a"))
     assert "cannot use a: No space left" in run_refused(tmp_path, "doctor")
+
+
+def test_what_pillow_mends_in_a_file_is_not_shown(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def doctor(**_: object) -> CommandOutcome:
+        for module in ("PIL.TiffImagePlugin", "PIL"):
+            warnings.warn_explicit("Corrupt EXIF data", UserWarning, "a.py", 1, module=module)
+        return CommandOutcome()
+
+    monkeypatch.setattr(dispatcher, "_command", lambda name: doctor)
+    assert run(tmp_path, "doctor").stderr == ""

@@ -20,7 +20,7 @@ from lightpaint.keywords import keywords
 SIGN = re.compile(r"#+|@+|%0?([0-9]{0,2})d|\$F([0-9]?)|<F([0-9]?)>")
 
 #: A range of frames: `12`, `1-48`, or every second one of them, `1-48x2`.
-_RANGE = re.compile(r"(-?\d+)(?:-(-?\d+)(?:x(\d+))?)?")
+_RANGE = re.compile(r"(-?[0-9]+)(?:-(-?[0-9]+)(?:x([0-9]+))?)?")
 
 #: What errors say of patterns.
 _SIGNS = (
@@ -81,7 +81,7 @@ class FrameSequence:
         below = file.relative_to(self.path(frame)).as_posix()
         sign = SIGN.search(tail)
         assert sign is not None
-        number = re.compile(rf"(?<!\d){re.escape(self.numbers[frame])}(?!\d)")
+        number = re.compile(rf"(?<![0-9]){re.escape(self.numbers[frame])}(?![0-9])")
         return self.folder / hashes / number.sub("#" * _length(sign), below)
 
 
@@ -170,7 +170,7 @@ def _length(sign: re.Match[str]) -> int:
 def _digits(sign: re.Match[str]) -> str:
     """Return the digits that a sign stands for: padded with zeros, and longer only without."""
     length = _length(sign)
-    return r"-?\d+" if length == 1 else rf"-?(?:\d{{{length}}}|[1-9]\d{{{length},}})"
+    return r"-?[0-9]+" if length == 1 else rf"-?(?:[0-9]{{{length}}}|[1-9][0-9]{{{length},}})"
 
 
 def parse_frames(text: str, sequence: FrameSequence) -> tuple[int, ...]:
