@@ -155,7 +155,7 @@ def test_what_pillow_mends_in_a_file_is_not_shown(
     def doctor(**_: object) -> CommandOutcome:
         for module in ("PIL.TiffImagePlugin", "PIL"):
             warnings.warn_explicit("Corrupt EXIF data", UserWarning, "a.py", 1, module=module)
-        return CommandOutcome()
+        return CommandOutcome(None)
 
     monkeypatch.setattr(dispatcher, "_command", lambda name: doctor)
     assert run(tmp_path, "doctor").stderr == ""
