@@ -7,6 +7,7 @@
     ├── ImageError       an image file that cannot be read as what it should be
     │   └── ViewError    … or an unknown view transform to decode it with
     ├── KeywordError     an argument name that a function does not have; also a TypeError
+    ├── ArgumentError    an argument of another kind than a function takes; also a TypeError
     ├── ColorError       an invalid colour: hexadecimal digits, a temperature
     ├── BasisError       a basis file that is damaged, or does not fit the scene or target
     ├── TargetError      a painting or mask that cannot be solved for
@@ -62,6 +63,10 @@ class ViewError(ImageError):
 
 class KeywordError(LightpaintError, TypeError):
     """A keyword argument that a function does not have."""
+
+
+class ArgumentError(LightpaintError, TypeError):
+    """An argument of another kind than a function takes."""
 
 
 class ColorError(LightpaintError):

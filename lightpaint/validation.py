@@ -6,6 +6,7 @@ from dataclasses import fields
 from numbers import Integral, Real
 from typing import Any, get_args
 
+from lightpaint.display_text import brief
 from lightpaint.errors import LightpaintError
 
 #: A test of a value, and the text of the expectation if it fails.
@@ -58,7 +59,8 @@ def check_fields(record: Any, expected: Mapping[str, Check]) -> None:
     for field in fields(record):
         value, (is_valid, expectation) = getattr(record, field.name), expected[field.name]
         if not (is_valid(value) or (value is None and field.default is None)):
-            raise LightpaintError(f"{field.name} is {value!r}: expected {expectation}")
+            found = repr(value) if isinstance(value, int | float | str) else brief(value)
+            raise LightpaintError(f"{field.name} is {found}: expected {expectation}")
 
 
 def whole(least: int, most: float = math.inf) -> Check:

@@ -27,6 +27,9 @@ MAX_CHUNK = 2**24
 #: Number of bytes at the start of a PNG that include its size.
 PNG_HEAD = 26
 
+#: Largest side of an image pixel in a picture for notebooks.
+MAX_ZOOM = 1000
+
 #: Number of bytes at the start of a PNG that are searched for texts.
 MAX_TEXTS = 2**12
 
@@ -101,6 +104,10 @@ def display_picture(image: Floats, *, stops: float | None = None, zoom: int = 1)
         >>> lp.display_picture(target.image, zoom=8).size
         (128, 128)
     """
+    if np.ndim(image) != 3 or np.shape(image)[2:] != (3,) or not np.size(image):
+        raise ImageError(f"an image of the shape {np.shape(image)}: expected (height, width, 3)")
+    if not 1 <= zoom <= MAX_ZOOM:
+        raise ImageError(f"zoom is {zoom}: expected a whole number from 1 to {MAX_ZOOM}")
     exposure = choose_exposure(image) if stops is None else stops
     pixels = to_8_bit(encode_display(image, stops=exposure))
     return Image.fromarray(np.kron(pixels, np.ones((zoom, zoom, 1), np.uint8)))
