@@ -7,6 +7,7 @@
     ├── ImageError       an image file that cannot be read as what it should be
     │   └── ViewError    … or an unknown view transform to decode it with
     ├── KeywordError     an argument name that a function does not have; also a TypeError
+    ├── ArgumentError    an argument of another kind than a function takes; also a TypeError
     ├── ColorError       an invalid colour: hexadecimal digits, a temperature
     ├── BasisError       a basis file that is damaged, or does not fit the scene or target
     ├── TargetError      a painting or mask that cannot be solved for
@@ -17,11 +18,15 @@
     ├── BatchError       a manifest of looks; it may list several mistakes, one per line
     ├── LightingError    a lighting.json, or weights that are invalid
     │   └── UnknownLightError  … or a name that none of its lights has; also a KeyError
+    ├── AccessError      a file or folder that the system refuses to open; also an OSError
     └── OutputError      a file or folder that cannot be written
 
 Each message is one line: what came, what was expected, and what to do. The command
 line prints it and exits with 2.
 """
+
+import errno
+import os
 
 
 class LightpaintError(Exception):
@@ -58,6 +63,10 @@ class ViewError(ImageError):
 
 class KeywordError(LightpaintError, TypeError):
     """A keyword argument that a function does not have."""
+
+
+class ArgumentError(LightpaintError, TypeError):
+    """An argument of another kind than a function takes."""
 
 
 class ColorError(LightpaintError):
@@ -112,6 +121,35 @@ class UnknownLightError(LightingError, KeyError):
 
 class OutputError(LightpaintError):
     """A file or folder that cannot be written."""
+
+
+class AccessError(LightpaintError, OSError):
+    """A file or folder that the system refuses: its name is too long, or the disk is full."""
+
+    # OSError has none of a single argument.
+    __str__ = Exception.__str__
+
+
+#: Error numbers of refusals that a user can mend; others, like that of a file of ours which is
+#: missing, are faults of a program.
+REFUSALS = {
+    *(errno.ENAMETOOLONG, errno.ELOOP, errno.ENOTDIR, errno.EISDIR, errno.EINVAL),
+    *(errno.EACCES, errno.EPERM, errno.EROFS, errno.ENOSPC, errno.EDQUOT, errno.EFBIG),
+    *(errno.EIO, errno.ESTALE, errno.EMFILE, errno.ENFILE, errno.ETIMEDOUT, errno.ENODEV),
+}
+
+#: Longest name in the text of an AccessError, in characters.
+_MAX_NAME = 200
+
+
+def refusal_of(error: OSError) -> AccessError | None:
+    """Return the system's refusal in one line; None for an error that is no refusal."""
+    if error.errno not in REFUSALS:
+        return None
+    name = "" if error.filename is None else ascii(os.fsdecode(error.filename))[1:-1]
+    shortened = name if len(name) <= _MAX_NAME else f"{name[:_MAX_NAME]}…"
+    prefix = f"cannot use {shortened}" if name else "the system refuses"
+    return AccessError(f"{prefix}: {error.strerror or error}")
 
 
 #: Errors that concern one look alone: its painting, or the place of its answer.

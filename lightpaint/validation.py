@@ -6,6 +6,7 @@ from dataclasses import fields
 from numbers import Integral, Real
 from typing import Any, get_args
 
+from lightpaint.display_text import brief
 from lightpaint.errors import LightpaintError
 
 #: A test of a value, and the text of the expectation if it fails.
@@ -22,6 +23,22 @@ MAX_NAME = 1000
 MAX_LISTED = 10_000
 #: Colours that one light may mix: more than any fixture has.
 MAX_PRIMARIES = 16
+
+
+def parse_number(text: str | float) -> float:
+    """Return the number that a text is, in the digits 0 to 9. Raises ValueError for other text.
+
+    Python itself takes the digits of all scripts, and underscores between them.
+    """
+    if isinstance(text, str) and (not text.isascii() or "_" in text):
+        raise ValueError(f"{text!r} is not a number of the digits 0 to 9")
+    return float(text)
+
+
+def parse_whole_number(text: str) -> int:
+    """Return the whole number that a text is; see `parse_number`."""
+    parse_number(text)
+    return int(text)
 
 
 def is_amount(value: float) -> bool:
@@ -42,7 +59,8 @@ def check_fields(record: Any, expected: Mapping[str, Check]) -> None:
     for field in fields(record):
         value, (is_valid, expectation) = getattr(record, field.name), expected[field.name]
         if not (is_valid(value) or (value is None and field.default is None)):
-            raise LightpaintError(f"{field.name} is {value!r}: expected {expectation}")
+            found = repr(value) if isinstance(value, int | float | str) else brief(value)
+            raise LightpaintError(f"{field.name} is {found}: expected {expectation}")
 
 
 def whole(least: int, most: float = math.inf) -> Check:

@@ -19,6 +19,7 @@ from packaging.utils import canonicalize_name
 from renderer import REPOSITORY
 
 import lightpaint as lp
+from lightpaint.images.denoiser import OLDEST_OIDN
 
 PROJECT = tomllib.loads((REPOSITORY / "pyproject.toml").read_text("utf-8"))["project"]
 PINNED = {
@@ -132,6 +133,14 @@ def test_what_can_break_is_bounded_from_above():
     bounded = {x.name for x in requirements if any(y.operator == "<" for y in x.specifier)}
     assert bounded >= {"mitsuba", "drjit", "numpy", "OpenEXR", "OpenImageIO", "pillow"}
     assert "karellen-llvm-core" in bounded
+
+
+def test_the_denoiser_is_required_in_the_version_that_is_used():
+    found = [x for x in map(Requirement, PROJECT["dependencies"]) if x.name == "pyoidn"]
+    oldest = ".".join(map(str, OLDEST_OIDN))
+    assert found
+    assert all(not x.specifier.contains("2.5.0.1") for x in found)
+    assert all(x.specifier.contains(oldest) for x in found)
 
 
 def test_every_package_is_pinned_within_its_bounds():

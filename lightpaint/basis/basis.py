@@ -292,15 +292,28 @@ class Basis(Shown):
         """
         vars(self)["_power_and_totals"] = power, totals  # where cached_property stores its value
 
+    @keywords()
     def mix(self, weights: Doubles) -> npt.NDArray[np.float32]:
-        """Return the image Σ w_i Φ_i, (h, w, 3) float32. weights: (n, 3), as lights are ordered."""
+        """Return the image Σ w_i Φ_i, (h, w, 3) float32.
+
+        weights: (n, 3), as lights are ordered. Raises BasisError for another shape.
+        """
+        self._check_weights(weights)
         return self.planes.mix(weights)
 
+    def _check_weights(self, weights: Doubles) -> None:
+        """Raise BasisError unless there are three weights for each light."""
+        shape, expected = np.shape(weights), (len(self.lights), 3)
+        if shape and shape != expected:
+            raise BasisError(f"weights of the shape {shape}: expected {expected}, a row per light")
+
+    @keywords()
     def predict(self, weights: Doubles) -> Estimate:
         """Return the image Σ w_i Φ_i with its noise, read-only. weights: (n, 3).
 
         The last result is kept, since an analysis and a report ask for the same weights many times.
         """
+        self._check_weights(weights)
         key = np.asarray(weights, np.float64).tobytes()
         estimate = self._predicted.get(key)
         if estimate is None:

@@ -14,7 +14,7 @@ from lightpaint.cli.options.parser import command_parser
 from lightpaint.cli.output import lines
 from lightpaint.cli.output.output_mode import CommandOutcome, OutputMode, using_output_mode
 from lightpaint.cli.output.vocabulary import spoken
-from lightpaint.errors import BatchError, LightpaintError
+from lightpaint.errors import BatchError, LightpaintError, refusal_of
 
 #: Modules of the commands that are not in `render_commands`.
 _MODULES = {
@@ -35,11 +35,18 @@ OUT_OF_MEMORY_TEXT = (
 )
 
 
+#: What Python says where no thread can be started, for want of memory or of a higher limit.
+NO_THREAD = "can't start new thread"
+
+
 def run_command(arguments: Sequence[str] | None, received: Sequence[int]) -> int:
     """Run one command and return the exit code. received: the signals that have arrived."""
     words = list(sys.argv[1:] if arguments is None else arguments)
     _substitute_characters()
     parser = command_parser()
+    if not words and "_ARGCOMPLETE" not in os.environ:
+        parser.print_help()
+        return 0
     if "_ARGCOMPLETE" in os.environ:  # a shell asks for completions
         from lightpaint.cli.options.completion import complete
 
@@ -60,6 +67,8 @@ def run_command(arguments: Sequence[str] | None, received: Sequence[int]) -> int
 
         # The commands report this in their own words.
         warnings.simplefilter("ignore", SlowBackendWarning)
+        # Pillow warns of what it mends in a file; what it cannot mend is an error.
+        warnings.filterwarnings("ignore", category=UserWarning, module=r"PIL\b")
         with using_output_mode(OutputMode(options.as_json, options.is_quiet, options.is_verbose)):
             outcome = command(**values_of(options, words))
             if options.as_json and outcome.document is not None:
@@ -106,7 +115,10 @@ def _report(command: str, error: Exception, words: Sequence[str]) -> int:
         for line in error.mistakes if isinstance(error, BatchError) else (str(error),):
             lines.err(f"lightpaint {command}: {spoken(line)}")
         return 2
-    if isinstance(error, MemoryError):
+    if isinstance(error, OSError) and (refusal := refusal_of(error)) is not None:
+        lines.err(f"lightpaint {command}: {refusal}")
+        return 2
+    if isinstance(error, MemoryError) or NO_THREAD in str(error):
         lines.err(f"lightpaint {command}: {OUT_OF_MEMORY_TEXT}")
         return 2
     return report_fault(f"lightpaint {command}", error, words)

@@ -76,10 +76,17 @@ def _extra(purpose: str, package: str, extra: str) -> Finding:
 
 def _denoiser() -> Finding:
     """Return the finding of the denoiser, which is optional."""
+    try:
+        from lightpaint.images.denoiser import OLDEST_OIDN, oidn_is_installed
+    except ImportError:  # NumPy is missing, as another finding says
+        return Finding("denoiser", "info", "not looked for")
     version = _package("pyoidn")
-    if version.state == "ok":
+    if oidn_is_installed():
         return Finding("denoiser", "ok", f"Open Image Denoise (pyoidn {version.result})")
-    return Finding("denoiser", "info", "simpler filters; a better one: pip install pyoidn")
+    found = f"; pyoidn {version.result} is too old" if version.state == "ok" else ""
+    oldest = ".".join(map(str, OLDEST_OIDN))
+    hint = f"simpler filters{found}; a better one: pip install 'pyoidn>={oldest}'"
+    return Finding("denoiser", "info", hint)
 
 
 def _llvm() -> list[Finding]:

@@ -5,7 +5,7 @@ bars, and may remove light as noise.
 """
 
 from dataclasses import dataclass
-from importlib.metadata import version
+from importlib.metadata import PackageNotFoundError, version
 from importlib.util import find_spec
 from itertools import product
 from typing import Any, Literal
@@ -21,10 +21,14 @@ from lightpaint.images.pixel_blocks import block_mean
 #: Key of the text in a denoised PNG that names the denoiser and the file of the raw render.
 DENOISED_KEY = "lightpaint.denoised"
 
+#: Oldest version of pyoidn that has all that is used here.
+OLDEST_OIDN = (2, 5, 1)
+
 #: Remark, shown once, if only simpler filters are available.
 MISSING_REMARK = (
-    "Open Image Denoise is not installed, so simpler filters smooth the pictures: for cleaner "
-    "ones, pip install pyoidn (Linux and Windows, x86-64); the solution is the same"
+    "Open Image Denoise is not installed, or too old, so simpler filters smooth the pictures: for "
+    f"cleaner ones, pip install 'pyoidn>={'.'.join(map(str, OLDEST_OIDN))}' (Linux and Windows, "
+    "x86-64); the solution is the same"
 )
 
 #: `fast` takes a quarter of the time of `high`, but leaves 1.5 times the error.
@@ -98,10 +102,13 @@ def denoised(
 
 
 def oidn_is_installed() -> bool:
-    """Return True if Open Image Denoise is installed."""
+    """Return True if Open Image Denoise is installed, in a version that has all that is used."""
     try:
-        return find_spec("pyoidn") is not None
-    except ValueError:  # a broken module of that name
+        if find_spec("pyoidn") is None:
+            return False
+        numbers = [int(number) for number in version("pyoidn").split(".")[:3]]
+        return tuple(numbers) >= OLDEST_OIDN
+    except (ValueError, PackageNotFoundError):  # a broken module of that name, or another one
         return False
 
 

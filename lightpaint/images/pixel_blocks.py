@@ -32,6 +32,13 @@ def blocks_in(size: Size, factor: int) -> Size:
     return size[0] // factor, size[1] // factor
 
 
+def fitting_factor(size: Size, factor: int) -> int:
+    """Return `factor`, or the shorter side of an image in which blocks of so many pixels do not
+    fit.
+    """
+    return max(1, min(factor, *size))
+
+
 def left_over(size: Size, factor: int) -> Size:
     """Return the number of pixels along each side that do not fill a block of factor × factor."""
     return size[0] % factor, size[1] % factor

@@ -118,8 +118,17 @@ def _groups_of(job: Job, frame: int) -> LightGroups:
     assert job.sequence is not None
     path, example = str(job.sequence.path(frame)), job.given_bases[0]
     if isinstance(example, GroupsFile):
-        return replace(example, path=path).content
-    return read_light_groups(path)
+        groups = replace(example, path=path).content
+    else:
+        groups = read_light_groups(path)
+    expected = groups.basis.size if job.groups is None else job.groups.basis.size
+    if groups.basis.size != expected:
+        (height, width), (rows, columns) = groups.basis.size, expected
+        raise BasisError(
+            f"{path} is {width}x{height}, but the painted frames are {columns}x{rows}: the frames "
+            "of a shot must have the same size"
+        )
+    return groups
 
 
 def _mark(path: Path, lighting: Lighting) -> str:

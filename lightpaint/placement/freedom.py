@@ -7,10 +7,12 @@ from typing import Any
 import numpy as np
 
 from lightpaint.arrays import Position
+from lightpaint.display_text import brief
 from lightpaint.errors import SceneError
 from lightpaint.keywords import keywords
 from lightpaint.placement.space.free_space import as_position
 from lightpaint.scene.properties.pose import FARTHEST
+from lightpaint.validation import parse_number
 
 #: Least width of a beam's soft edge, in degrees.
 EDGE = 0.5
@@ -120,11 +122,11 @@ class Freedom:
 
 def _number(name: str, value: Any, most: float) -> float:
     try:
-        number = float(value)
+        number = parse_number(value)
     except (TypeError, ValueError):
         number = math.nan
     if not 0 < number <= most:
-        raise SceneError(f"{name} is {value!r}: expected a number above 0, at most {most:g}")
+        raise SceneError(f"{name} is {brief(value)}: expected a number above 0, at most {most:g}")
     return number
 
 
@@ -134,15 +136,17 @@ def _ends(name: str, value: Any) -> Segment:
     except (TypeError, ValueError):
         points = np.zeros(0)
     if points.shape != (2, 3) or not np.abs(points).max() <= FARTHEST:
-        raise SceneError(f"{name} is {value!r}: expected two points of three numbers each")
+        raise SceneError(f"{name} is {brief(value)}: expected two points of three numbers each")
     if name != "box" and np.array_equal(points[0], points[1]):
-        raise SceneError(f"{name} is {value!r}: expected two different points")
+        raise SceneError(f"{name} is {brief(value)}: expected two different points")
     return as_position(points[0]), as_position(points[1])
 
 
 def _rails(value: Any) -> tuple[Segment, ...]:
     if isinstance(value, str) or not hasattr(value, "__len__") or not 0 < len(value) <= MAX_PARTS:
-        raise SceneError(f"rails is {value!r}: expected a list of pairs of points, at least one")
+        raise SceneError(
+            f"rails is {brief(value)}: expected a list of pairs of points, at least one"
+        )
     return tuple(_ends("rail", ends) for ends in value)
 
 
@@ -153,7 +157,7 @@ def _ids(value: Any) -> tuple[str, ...]:
     except TypeError:
         ids = ()
     if not 0 < len(ids) <= MAX_PARTS or not all(isinstance(x, str) and x for x in ids):
-        raise SceneError(f"surfaces is {value!r}: expected ids of shapes, at least one")
+        raise SceneError(f"surfaces is {brief(value)}: expected ids of shapes, at least one")
     return ids
 
 
@@ -163,5 +167,7 @@ def _angles(name: str, value: Any, least: float) -> tuple[float, float]:
     except (TypeError, ValueError):
         low, high = math.nan, math.nan
     if not least < low <= high < 90:
-        raise SceneError(f"{name} is {value!r}: expected two angles, from {least:g} to 90 degrees")
+        raise SceneError(
+            f"{name} is {brief(value)}: expected two angles, from {least:g} to 90 degrees"
+        )
     return low, high

@@ -8,13 +8,14 @@ from typing import Any, get_args
 import numpy as np
 
 from lightpaint.arrays import Doubles, Position
+from lightpaint.display_text import brief
 from lightpaint.errors import SceneError
 from lightpaint.keywords import keywords
 from lightpaint.placement.freedom import Freedom
 from lightpaint.placement.space.free_space import as_position
 from lightpaint.scene.lights.new_emitter import NewKind
 from lightpaint.scene.properties.pose import FARTHEST, Site
-from lightpaint.validation import MAX_NAME
+from lightpaint.validation import MAX_NAME, parse_number
 
 #: Maximum number of lights that one search adds.
 MAX_COUNT = 32
@@ -23,7 +24,7 @@ MAX_COUNT = 32
 NEW_CONE = (8.0, 50.0)
 
 #: Syntax of a mirror, like "x = 0".
-_MIRROR = re.compile(r"\s*([xyz])\s*=\s*([-+.\deE]+)\s*")
+_MIRROR = re.compile(r"\s*([xyz])\s*=\s*([-+.0-9eE]+)\s*")
 
 
 @keywords()
@@ -69,16 +70,16 @@ class NewLights:
     def __post_init__(self) -> None:
         if self.kind not in get_args(NewKind):
             raise SceneError(
-                f"new lights are of the kind {self.kind!r}: expected point, spot or panel"
+                f"new lights are of the kind {brief(self.kind)}: expected point, spot or panel"
             )
         if isinstance(self.count, bool) or not isinstance(self.count, int):
-            raise SceneError(f"count is {self.count!r}: expected a whole number of lights")
+            raise SceneError(f"count is {brief(self.count)}: expected a whole number of lights")
         if not 1 <= self.count <= MAX_COUNT:
             raise SceneError(f"count is {self.count}: expected 1 to {MAX_COUNT} new lights")
         if not isinstance(self.name, str) or not 0 < len(self.name) <= MAX_NAME - 4:
-            raise SceneError(f"name is {self.name!r}: expected 1 to {MAX_NAME - 4} characters")
+            raise SceneError(f"name is {brief(self.name)}: expected 1 to {MAX_NAME - 4} characters")
         if not (isinstance(self.apart, int | float) and 0 <= self.apart <= FARTHEST):
-            raise SceneError(f"apart is {self.apart!r}: expected a distance, 0 or more")
+            raise SceneError(f"apart is {brief(self.apart)}: expected a distance, 0 or more")
         if self.freedom.within is not None:
             raise SceneError("new lights have no place yet that they could be within a distance of")
         if self.size is not None:
@@ -114,7 +115,7 @@ class Mirror:
         """Read a plane like "x = 0". Raises SceneError for others."""
         match = _MIRROR.fullmatch(text) if isinstance(text, str) else None
         try:
-            at = math.nan if match is None else float(match[2])
+            at = math.nan if match is None else parse_number(match[2])
         except ValueError:
             at = math.nan
         if match is None or not abs(at) <= FARTHEST:
@@ -186,5 +187,7 @@ def _sides(value: Any) -> tuple[float, float]:
     except (TypeError, ValueError):
         low = high = math.nan
     if not 0 < low <= high <= FARTHEST:
-        raise SceneError(f"size is {value!r}: expected the smallest and the largest side of panels")
+        raise SceneError(
+            f"size is {brief(value)}: expected the smallest and the largest side of panels"
+        )
     return low, high

@@ -15,6 +15,7 @@ from lightpaint.basis.cache.denoised_planes import (
     obtain_denoised_planes,
     read_denoised_planes,
 )
+from lightpaint.images.pixel_blocks import fitting_factor
 
 Result = TypeVar("Result")
 
@@ -59,12 +60,12 @@ def page_reduction(basis: Basis, count: int, *, max_pixels: int = MAX_PIXELS) ->
     count: planes in the page. max_pixels: of all of them.
     """
     height, width = basis.size
-    factor = max(1, -(-width // MAX_WIDTH))
+    factor = fitting_factor(basis.size, -(-width // MAX_WIDTH))
     while count * (height // factor) * (width // factor) > max_pixels and factor < min(
         height, width
     ):
         factor += 1
-    return min(factor, height, width)
+    return factor
 
 
 def cached_clean_planes(basis: Basis) -> DenoisedPlanes | None:

@@ -27,8 +27,9 @@ from lightpaint.report.clean_pictures import CleanLooks
 from lightpaint.report.phrases import spoken_progress
 from lightpaint.target.target import Target
 
-#: Narrower images are enlarged, pixel by pixel, until their captions can be read.
-MIN_WIDTH = 240
+#: Narrower images are enlarged, pixel by pixel, until their captions can be read, unless they would
+#: become higher than that; what they lack in width is grey then.
+MIN_WIDTH, MAX_ENLARGED_HEIGHT = 240, 2000
 #: Pillow's own font has little beyond Latin-1: no minus, no Greek.
 SURROUND, TEXT, FAINT = (38, 38, 38), (230, 230, 230), (165, 165, 165)
 
@@ -126,8 +127,9 @@ def compose(tiles: list[Tile]) -> npt.NDArray[np.uint8]:
     Pixels of the others are whole blocks of those of the largest tile.
     """
     height, width = max(tile.picture.shape[:2] for tile in tiles)
-    zoom = max(1, -(-MIN_WIDTH // width))
-    height, width = height * zoom, width * zoom
+    zoom = max(1, min(-(-MIN_WIDTH // width), MAX_ENLARGED_HEIGHT // height))
+    shown_size = height, width = height * zoom, width * zoom
+    width = max(width, MIN_WIDTH)
     # In proportion to the pictures, except for low panoramas, and never too small to read.
     text = gap = max(12, min(width // 24, height // 6))
     lines = 5.5 if any(tile.limit is not None for tile in tiles) else 4
@@ -135,7 +137,7 @@ def compose(tiles: list[Tile]) -> npt.NDArray[np.uint8]:
     sheet = Image.new("RGB", size, SURROUND)
     for k, tile in enumerate(tiles):
         x = gap + k * (width + gap)
-        factor = whole_factor((height, width), tile.picture.shape[:2])
+        factor = whole_factor(shown_size, tile.picture.shape[:2])
         picture = enlarged(tile.picture, factor or zoom)
         sheet.paste(Image.fromarray(picture), (x, gap))
         _caption(sheet, tile, (x, gap + height + text // 2), width, text)

@@ -21,6 +21,10 @@ from lightpaint.target.wish import Wish
 NEGATIVE = 1e-3
 
 
+#: Between these lies the brightest light of a painting that is not black: for other light, lamps
+#: would be beyond the numbers that are computed with.
+DIMMEST, BRIGHTEST_PAINT = 1e-25, 1e25
+
 #: The name of a target made from arrays, unless another is given.
 DEFAULT_NAME = "target"
 
@@ -121,6 +125,7 @@ class Target(Shown):
                 f"{titled(self.name)} has importance 0 everywhere, so nothing in it counts: "
                 "paint with some alpha, or give a mask that is not black"
             )
+        _check_range(self.name, self.image, self.importance > 0)
 
     @classmethod
     @keywords()
@@ -273,14 +278,36 @@ class Target(Shown):
 
 def _check_is_light(name: str, image: Floats, counts: npt.NDArray[np.bool_]) -> None:
     """Raise TargetError for negative luminance."""
+    if negative_text := describe_negative(image, counts):
+        raise TargetError(
+            f"{titled(name)} has {negative_text}: expected light, which is never below 0; "
+            "np.maximum(image, 0) cuts it off"
+        )
+
+
+def describe_negative(image: Floats, counts: npt.NDArray[np.bool_]) -> str:
+    """Return where light is below 0, beyond what resampling leaves; "" if nowhere.
+
+    image: (h, w, 3) linear. counts: (h, w), the pixels that are looked at.
+    """
     brightness = np.where(counts & np.isfinite(image).all(axis=-1), luminance(image), 0)
     darkest = float(brightness.min())
-    if darkest < -NEGATIVE * float(np.abs(brightness).max()):
-        negative_count = int((brightness < 0).sum())
+    if darkest >= -NEGATIVE * float(np.abs(brightness).max()):
+        return ""
+    negative_count = int((brightness < 0).sum())
+    return (
+        f"a negative luminance in {negative_count} of {brightness.size} pixels, down to "
+        f"{darkest:.3g}"
+    )
+
+
+def _check_range(name: str, image: Floats, counts: npt.NDArray[np.bool_]) -> None:
+    """Raise TargetError for light beyond all lamps, or next to nothing that is not black."""
+    peak = float(np.abs(image).max(initial=0, where=counts[..., None]))
+    if peak > BRIGHTEST_PAINT or 0 < peak < DIMMEST:
         raise TargetError(
-            f"{titled(name)} has a negative luminance in {negative_count} of {brightness.size} "
-            f"pixels, down to {darkest:.3g}: expected light, which is never below 0; "
-            "np.maximum(image, 0) cuts it off"
+            f"{titled(name)} has light up to {peak:.3g} where it counts: expected between "
+            f"{DIMMEST:g} and {BRIGHTEST_PAINT:g}, or black; was it exported in another unit?"
         )
 
 

@@ -5,6 +5,7 @@ from pathlib import Path
 from typing import Literal
 
 import numpy as np
+import numpy.typing as npt
 
 from lightpaint.arrays import Floats, largest
 from lightpaint.colour.color import luminance
@@ -17,7 +18,7 @@ from lightpaint.target.look_match import view_of_look
 from lightpaint.target.lost_template import explain_mismatch
 from lightpaint.target.painted_pixels import SHARP_RADIUS, painted_where
 from lightpaint.target.painting_file import painted_of
-from lightpaint.target.target import Target, share_of, spoken_share
+from lightpaint.target.target import Target, describe_negative, share_of, spoken_share
 from lightpaint.target.template import (
     CLEAN,
     LIGHT_FILE,
@@ -139,6 +140,7 @@ def _target_of(reading: _Reading, mask: str | Path | None = None, paint: Paint =
         image, counted, note = _lit(reading, counted)
     else:
         note = _beyond(reading, counted)
+    note = [*note, *_below_zero(image, counted > 0)]
     return Target(
         name=reading.path.stem,
         image=image,
@@ -163,6 +165,12 @@ def _target_of(reading: _Reading, mask: str | Path | None = None, paint: Paint =
         ),
         full_size_share=None if importance is None else share_of(importance),
     )
+
+
+def _below_zero(image: Floats, counts: npt.NDArray[np.bool_]) -> list[str]:
+    """Return a remark on paint below 0, which may be a colour outside Rec.709 or a mistake."""
+    text = describe_negative(image, counts)
+    return [f"{text}: no light makes that, and black comes closest"] if text else []
 
 
 def _open_picture(

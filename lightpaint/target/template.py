@@ -190,8 +190,12 @@ def files_in_the_way(folder: Path) -> list[Path]:
 
 
 def template_files(folder: Path) -> list[Path]:
-    """Return the files of the template in `folder` that `read_template` reads."""
-    return [folder / name for name in (RECORD_FILE, LIGHT_FILE, CLEAN, ALBEDO)]
+    """Return the files of the template in `folder` that `read_template` reads.
+
+    Templates of light groups have no albedo and no clean picture.
+    """
+    optional = [folder / name for name in (CLEAN, ALBEDO) if (folder / name).exists()]
+    return [folder / RECORD_FILE, folder / LIGHT_FILE, *optional]
 
 
 def write_look(

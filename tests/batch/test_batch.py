@@ -21,7 +21,7 @@ from nightly import nightly
 from lightpaint.batch.distribution import engine
 from lightpaint.batch.distribution.processes import Processes
 from lightpaint.batch.gallery.gallery import contact_sheet, gallery_page
-from lightpaint.batch.gallery.summary import LightRow, SummaryRow
+from lightpaint.batch.gallery.summary import LightRow, SummaryRow, summary_csv
 from lightpaint.batch.manifest.folder_names import FILES, is_reserved
 from lightpaint.batch.manifest.key_spelling import with_manifest_keys
 from lightpaint.batch.manifest.manifest import read_manifest
@@ -589,3 +589,39 @@ def test_planes_that_are_damaged_cost_no_gallery(batch_folder: Path, message: st
         path.write_text(message)
     run_item(batch_folder)
     assert (batch_folder / "out" / "index.html").is_file()
+
+
+def test_columns_of_lights_are_those_of_no_other_column() -> None:
+    """Of lights called as a column is, and of one called as a column of another light."""
+    names = ["state", "noise", "key", "key R", "lamp"]
+    lights = tuple(LightRow(name, k + 0.5, (2.0, 3.0, 4.0)) for k, name in enumerate(names))
+    row = SummaryRow("dusk", "done", "", "dusk", lights=lights)
+    [heading, cells] = csv.reader(summary_csv([row]).splitlines())
+    assert len(set(heading)) == len(heading) == len(cells)
+    table = dict(zip(heading, cells, strict=True))
+    assert (table["state"], table["light state"], table["light noise"]) == ("done", "0.5", "1.5")
+    assert (table["key"], table["key R"], table["light key R"], table["lamp"]) == (
+        *("2.5", "2", "3.5", "4.5"),
+    )
+
+
+def test_several_patterns_choose_looks_of_each(batch_folder: Path) -> None:
+    output = succeed(
+        batch_folder, "batch", "looks.toml", "--dry-run", "--only", "p0", "--only", "thi*"
+    )
+    assert "third" in output
+    assert "p0" in output
+    assert "p1" not in output
+    planned = plan(batch_folder / "looks.toml", batch_folder / "out")
+    with pytest.raises(BatchError, match=r"no look matches 'x\*'"):
+        planned.select("p0", "x*")
+
+
+def test_remarks_stand_in_the_log(batch_folder: Path) -> None:
+    image = small_basis().images.sum(axis=0)
+    image[0, 0] = -1
+    write_rgb(batch_folder / "p2.exr", image)
+    succeed(batch_folder, "batch", "looks.toml", "-o", "out", "--only", "third", "--log", "a.log")
+    log = (batch_folder / "a.log").read_text()
+    assert "a negative luminance in 1 of 96 pixels" in log
+    assert log.count("third: answer done in") == 1

@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 import pytest
 from command import run, succeed
+from light_groups import interleaved, pictures
 from rich.cells import cell_len
 
 from lightpaint.basis.file.basis_file import write_basis
@@ -272,3 +273,16 @@ def test_what_holds_the_lights_is_said_with_its_option(
     )
     [sentence] = _limit_sentences(look)  # type: ignore[arg-type]
     assert line in spoken(sentence)
+
+
+def test_factors_that_differ_are_a_colour(tmp_path: Path) -> None:
+    """Light groups have no colour of their own; the column was empty."""
+    images = pictures(2)
+    layers = {f"RGBA_{name}": x for name, x in zip(("key", "fill"), images, strict=True)}
+    interleaved(tmp_path / "shot.exr", {"RGBA": images.sum(axis=0), **layers})
+    write_rgb(tmp_path / "p.exr", images[0] * [1.5, 1, 0] + 0.5 * images[1])
+    output = succeed(tmp_path, "solve", "shot.exr", "p.exr", "--literal")
+    [key] = [line for line in output.splitlines() if line.startswith("key ")]
+    [fill] = [line for line in output.splitlines() if line.startswith("fill ")]
+    assert "× 1.5, 1, " in key
+    assert "×" not in fill

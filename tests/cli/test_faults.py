@@ -1,14 +1,20 @@
 """What nobody foresaw is one line and a code of its own; what Mitsuba cannot render is an error."""
 
+import errno
 import re
 import stat
+import warnings
 from pathlib import Path
 
 import pytest
 from command import run, run_refused
+from renderer import write_room
 
+import lightpaint as lp
 from lightpaint.cli import dispatcher
 from lightpaint.cli.crash_report import FAULT
+from lightpaint.cli.output.output_mode import CommandOutcome
+from lightpaint.errors import AccessError, BasisError
 from lightpaint.scene.runtime.mitsuba_errors import render_errors
 
 #: A camera that no particle hits: it loads, and Mitsuba throws in the middle of the render.
@@ -100,3 +106,56 @@ def test_a_fault_before_there_is_a_command_is_told_too(
     assert completed.returncode == FAULT
     assert "lightpaint: a bug in lightpaint: ImportError: half an inst" in completed.stderr
     assert len(completed.stderr.splitlines()) == 1
+
+
+#: Commands with a path X of a name that no system takes.
+LONG_NAMES = (
+    "template --lights X.exr",
+    "solve --lights X.exr p.exr",
+    "verify X",
+    "blender -o X.zip",
+    "template room.xml -o X",
+    "basis room.xml -o X.basis.exr",
+    "paint X.xml --no-browser -o session.paint",
+)
+
+
+@pytest.mark.parametrize("line", LONG_NAMES)
+def test_names_that_no_system_takes_are_one_line(tmp_path: Path, line: str) -> None:
+    write_room(tmp_path)
+    message = run_refused(tmp_path, *line.replace("X", "x" * 300).split())
+    assert "name too long" in message.lower()
+
+
+def test_the_library_refuses_such_names_too() -> None:
+    for read in (lp.read_light_groups, lp.find_frames, lp.read_basis, lp.read_target):
+        with pytest.raises(lp.LightpaintError):
+            read("x" * 300)
+    with pytest.raises(AccessError, match=r"cannot use x+…: File name too long") as refusal:
+        lp.read_light_groups("x" * 300)
+    assert isinstance(refusal.value, OSError)  # for those who expect that
+
+
+@pytest.mark.parametrize("pattern", ["", "/", ".", "..", "%99999999999d.exr", "shot.exr"])
+def test_what_is_no_pattern_of_frames_is_refused(pattern: str) -> None:
+    with pytest.raises(BasisError, match="the sign stands for the number"):
+        lp.find_frames(pattern)
+
+
+def test_no_room_for_a_thread_is_no_bug(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    make_fail(monkeypatch, RuntimeError("can't start new thread"))
+    assert "needs more memory than there is" in run_refused(tmp_path, "doctor")
+    make_fail(monkeypatch, OSError(errno.ENOSPC, "No space left on device", "a"))
+    assert "cannot use a: No space left" in run_refused(tmp_path, "doctor")
+
+
+def test_what_pillow_mends_in_a_file_is_not_shown(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def doctor(**_: object) -> CommandOutcome:
+        for module in ("PIL.TiffImagePlugin", "PIL"):
+            warnings.warn_explicit("Corrupt EXIF data", UserWarning, "a.py", 1, module=module)
+        return CommandOutcome(None)
+
+    monkeypatch.setattr(dispatcher, "_command", lambda name: doctor)
+    assert run(tmp_path, "doctor").stderr == ""

@@ -235,3 +235,16 @@ def test_a_job_of_frames_can_be_sent(tmp_path: Path, monkeypatch: pytest.MonkeyP
     assert lp.Job.from_json(job.to_json()) == job
     assert job.painted_frames == (1, 4)
     assert [view.folder for view in job.views] == [Path("out/0001"), Path("out/0004")]
+
+
+def test_a_frame_of_another_size_is_refused(tmp_path: Path) -> None:
+    """It was relit at its own size, without a word."""
+    shot(tmp_path)
+    paint(tmp_path, 2, SET[0], "evening")
+    images = pictures(seed=9, size=(6, 8))
+    layers = {f"RGBA_{name}": x for name, x in zip(NAMES, images, strict=True)}
+    interleaved(tmp_path / "shot.0003.exr", {"RGBA": images.sum(axis=0), **layers})
+    completed = run(tmp_path, "solve", "shot.####.exr", "evening.0002.exr", "--frames", "all")
+    assert completed.returncode == 2
+    last = completed.stderr.splitlines()[-1]
+    assert "shot.0003.exr is 8x6, but the painted frames are 16x12" in last

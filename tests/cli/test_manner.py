@@ -221,3 +221,8 @@ def test_help_shows_each_option_once_under_what_it_is_for() -> None:
     assert titles[:3] == ["Arguments", "Painting", "What the painting means"]
     assert titles[-3:] == ["Results", "Constraints", "Places"]
     assert len(set(titles)) == len(titles)
+
+
+def test_no_command_lists_the_commands(tmp_path: Path):
+    listing = succeed(tmp_path)
+    assert all(f"\n    {name} " in listing for name in ("solve", "template", "batch", "doctor"))

@@ -228,3 +228,29 @@ def test_numbers_beyond_any_light_are_one_line(tmp_path: Path, make_basis: Any):
         assert "at most 1e+30" in refusal
     for option in ("--unit", "--unpainted", "--prefer-current"):
         assert "<= 1e+30" in run_refused(tmp_path, "solve", "b.basis.exr", "p.exr", option, "1e39")
+
+
+#: Options with a number in Arabic digits, which Python takes for numbers.
+OTHER_DIGITS = (
+    ("--hold", "٣"),
+    ("--exposure", "٣"),
+    ("--exposure", "nan"),
+    ("--verify-spp", "٣٢"),
+    ("--lock", "a=٣"),
+    ("--limit", "a=٣:"),
+    ("--kelvin", "a=٣٠٠٠"),
+    ("--max-miss", "٣%"),
+    ("--hold", "1_0"),
+)
+
+
+@pytest.mark.parametrize(("option", "value"), OTHER_DIGITS)
+def test_numbers_are_written_in_plain_digits(
+    tmp_path: Path, make_basis: Any, option: str, value: str
+):
+    basis = make_basis(2, names=["a", "b"])
+    write_basis(tmp_path / "b.basis.exr", basis)
+    write(
+        tmp_path / "p.exr", ("rgb", channels("", pictures()[0][: basis.size[0], : basis.size[1]]))
+    )
+    assert option in run_refused(tmp_path, "solve", "b.basis.exr", "p.exr", option, value)

@@ -14,6 +14,8 @@ from lightpaint.basis.file.basis_file import write_basis
 from lightpaint.basis.lightgroups.light_groups import read_light_groups
 from lightpaint.colour.display.view_transform import ViewTransform
 from lightpaint.images.formats.exr import read_parts
+from lightpaint.lighting.answer.lighting_file import read_lighting
+from lightpaint.pipeline.templates import template_of_basis
 from lightpaint.target.template import read_template
 
 SIZE = (48, 64)
@@ -67,6 +69,36 @@ def test_light_groups_are_painted_on_and_answered(shot: Path, tmp_path: Path):
     assert "painted: what differs from template/template.png" in completed.stderr
     report = json.loads((tmp_path / "warm" / "report.json").read_text())
     assert report["lights"]["key"]["stops"] > 0.3
+
+
+LOOKS_OF_SHOT = """
+[defaults]
+{source}
+want = ["solve"]
+
+[[look]]
+painting = "template/warm.png"
+"""
+
+
+@pytest.mark.parametrize("source", ["light_groups = 'shot.exr'", "basis = 'b.basis.exr'"])
+def test_a_batch_takes_paintings_beside_a_template_without_optional_files(
+    shot: Path, tmp_path: Path, source: str
+):
+    basis = read_light_groups(shot).basis
+    write_basis(tmp_path / "b.basis.exr", basis)
+    written = {file.name for file in template_of_basis(basis, tmp_path / "template")}
+    assert not written & {"clean.exr", "albedo.exr"}
+    save(tmp_path / "template" / "warm.png", brighten_key(shot))
+    (tmp_path / "looks.toml").write_text(LOOKS_OF_SHOT.format(source=source))
+    succeed(tmp_path, "batch", "looks.toml", "-o", "out", "--dry-run")
+    succeed(tmp_path, "batch", "looks.toml", "-o", "out")
+    succeed(tmp_path, "solve", "shot.exr", "template/warm.png", "-o", "alone")
+    of_batch, alone = (
+        read_lighting(tmp_path / folder / "lighting.json").emission
+        for folder in ("out/warm", "alone")
+    )
+    assert of_batch == alone
 
 
 @pytest.mark.nightly

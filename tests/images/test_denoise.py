@@ -1,7 +1,9 @@
 """Pictures without grain: closer to the truth, said so, and without Open Image Denoise, too."""
 
 import sys
+from importlib.machinery import ModuleSpec
 from pathlib import Path
+from types import ModuleType
 from typing import Any
 
 import numpy as np
@@ -11,6 +13,8 @@ from PIL import Image
 from renderer import write_room
 
 from lightpaint.basis.render.basis_render import render_basis
+from lightpaint.cli import doctor
+from lightpaint.images import denoiser
 from lightpaint.images.denoiser import (
     DENOISED_KEY,
     MISSING_REMARK,
@@ -63,6 +67,26 @@ def test_it_is_closer_to_the_truth(method: str, guided: bool, scale: float):
 def test_features_of_another_size_are_not_used(method: str):
     _, noisy, features = _picture()
     np.testing.assert_array_equal(denoised(noisy, features.reduced(2)), denoised(noisy))
+
+
+@pytest.mark.parametrize(
+    ("found", "is_used"), [("2.5.0.1", False), ("2.5.1.0", True), ("?", False)]
+)
+def test_a_denoiser_that_is_too_old_is_not_used(
+    monkeypatch: pytest.MonkeyPatch, found: str, is_used: bool
+):
+    """It ended in an error of its own, at the end of every solve."""
+    old = ModuleType("pyoidn")  # without the functions of later versions
+    old.__spec__ = ModuleSpec("pyoidn", None)
+    monkeypatch.setitem(sys.modules, "pyoidn", old)
+    monkeypatch.setattr(denoiser, "version", lambda _: found)
+    monkeypatch.setattr(doctor, "_package", lambda name: doctor.Finding(name, "ok", found))
+    assert oidn_is_installed() == is_used
+    assert (doctor._denoiser().state == "ok") == is_used
+    if not is_used:
+        _, noisy, features = _picture()
+        expected = denoiser._denoise_with_filter(noisy / noisy.mean(), features) * noisy.mean()
+        np.testing.assert_allclose(denoised(noisy, features), expected, rtol=1e-4)  # float32
 
 
 @pytest.mark.parametrize("value", [0.0, 0.5])

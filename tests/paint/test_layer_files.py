@@ -23,9 +23,11 @@ from PIL import Image
 
 import lightpaint as lp
 from lightpaint.errors import ImageError, PaintError
+from lightpaint.images.formats import openraster_stack
 from lightpaint.images.formats.exr import ExrPart, read_parts, write_parts
-from lightpaint.images.formats.openraster_stack import RasterGroup, read_openraster
+from lightpaint.images.formats.openraster_stack import RasterGroup, opened_openraster
 from lightpaint.paint import protocol
+from lightpaint.paint.layers import layer_file_reading
 from lightpaint.paint.layers.composition import compose_layer
 from lightpaint.paint.layers.layer import Layer
 from lightpaint.paint.layers.layer_file_reading import read_layers
@@ -165,7 +167,8 @@ def test_an_openraster_file_shows_the_target(tmp_path: Path, seed: int) -> None:
             below = compose_layer(layer, view.pixels[layer.id].part(WHOLE), below)
     path = tmp_path / "layers.ora"
     write_layers_openraster(path, view, below.image, TRANSFORM)
-    size, items = read_openraster(path)
+    with opened_openraster(path) as (size, layers):
+        items = list(layers)
     assert size == SIZE
     assert len(items) == 5  # importance has no look
     np.testing.assert_allclose(shown(items), TRANSFORM.encode(below.image), atol=2e-5)  # 16 bits
@@ -309,6 +312,112 @@ def test_a_list_of_layers_may_not_declare_anything(tmp_path: Path) -> None:
         archive.writestr("stack.xml", '<!DOCTYPE x [<!ENTITY a "b">]><image w="1" h="1"/>')
     with pytest.raises(ImageError, match="declarations of its own"):
         read_layers(path, SIZE, TRANSFORM)
+
+
+def openraster_of(names: list[str], *, groups: int = 0) -> bytes:
+    """An OpenRaster file of the view's size, whose layers are the same two pictures of 10x5."""
+    buffer = io.BytesIO()
+    Image.new("RGBA", (10, 5), (200, 100, 50, 255)).save(buffer, "PNG")
+    layers = "".join(f'<layer name="one" src="{name}"/>' for name in names)
+    stack = f"<stack>{groups * '<stack>'}{layers}{groups * '</stack>'}</stack>"
+    return archived(
+        {
+            "mimetype": b"image/openraster",
+            "stack.xml": f'<image w="{SIZE[1]}" h="{SIZE[0]}">{stack}</image>'.encode(),
+            "a.png": buffer.getvalue(),
+            "b.png": buffer.getvalue(),
+        }
+    )
+
+
+@pytest.mark.parametrize(
+    ("limits", "names", "groups", "expected"),
+    [
+        # Several layers of one picture count as often as they name it.
+        ({"MAX_LAYER_PIXELS": 149}, ["a.png", "a.png", "b.png"], 0, "0 million pixels together"),
+        ({"MAX_LAYERS": 2}, ["a.png", "a.png", "b.png"], 0, "has 3 layers: expected at most 2"),
+        ({"MAX_DEPTH": 3}, ["a.png"], 4, "groups in groups, more than 3 deep"),
+    ],
+)
+def test_a_short_file_with_many_layers_is_refused_before_any_is_decoded(
+    tmp_path: Path,
+    monkeypatch: pytest.MonkeyPatch,
+    limits: dict[str, int],
+    names: list[str],
+    groups: int,
+    expected: str,
+) -> None:
+    path = tmp_path / "layers.ora"
+    path.write_bytes(openraster_of(names, groups=groups))
+    assert len(read_layers(path, SIZE, TRANSFORM).pixels) == len(names)
+    for name, limit in limits.items():
+        monkeypatch.setattr(openraster_stack, name, limit)
+    monkeypatch.setattr(openraster_stack, "read_bitmap", None)
+    with pytest.raises(ImageError, match=expected):
+        read_layers(path, SIZE, TRANSFORM)
+
+
+def test_the_size_of_a_file_is_compared_before_its_pixels_are_read(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    write_layers_exr(tmp_path / "layers.exr", layered((Layer(1, "paint"), 0.5, 0.5)), "eye")
+    (tmp_path / "layers.ora").write_bytes(openraster_of(["a.png"]))
+    monkeypatch.setattr(openraster_stack, "read_bitmap", None)
+    monkeypatch.setattr(layer_file_reading, "read_parts", None)
+    for name in ("layers.exr", "layers.ora"):
+        with pytest.raises(PaintError, match="70x12 pixels, and the view 8x9"):
+            read_layers(tmp_path / name, (9, 8), TRANSFORM)
+
+
+def test_layers_keep_no_more_pixels_than_fit(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Two layers of 10x5 pixels: those of a layer beside the view are not kept."""
+    view = layered(*((Layer(k, "paint"), 0.5, np.pad(np.ones((5, 10)), ((0, 7), (0, 60))))
+                     for k in (1, 2)))  # fmt: skip
+    write_layers_exr(tmp_path / "layers.exr", view, "eye")
+    (tmp_path / "layers.ora").write_bytes(openraster_of(["a.png", "b.png"]))
+    for name in ("layers.exr", "layers.ora"):
+        monkeypatch.setattr(layer_file_reading, "MAX_KEPT_PIXELS", 100)
+        assert len(read_layers(tmp_path / name, SIZE, TRANSFORM).pixels) == 2
+        monkeypatch.setattr(layer_file_reading, "MAX_KEPT_PIXELS", 99)
+        with pytest.raises(PaintError, match="cover more than 0 million pixels together"):
+            read_layers(tmp_path / name, SIZE, TRANSFORM)
+
+
+def test_layers_of_an_exr_do_not_share_channels(tmp_path: Path) -> None:
+    exr = tmp_path / "layers.exr"
+    write_layers_exr(exr, layered((Layer(1, "paint"), 0.5, 0.5)), "eye")
+    [part] = read_parts(exr)
+    about = json.loads(part.attributes[KEY])
+    [painting] = [x for x in about["layers"] if x["id"] == 1]
+    about["layers"] += [{**painting, "id": 5}]
+    write_parts(exr, [ExrPart("layers", part.channels, {KEY: json.dumps(about)})])
+    with pytest.raises(PaintError, match="two layers have the same channels"):
+        read_layers(exr, SIZE, TRANSFORM)
+
+
+@pytest.mark.parametrize("encoding", ["none-such", "utf-7", "UTF-16"])
+def test_a_list_of_layers_in_an_unknown_encoding_is_refused(tmp_path: Path, encoding: str) -> None:
+    text = f'<?xml version="1.0" encoding="{encoding}"?><image w="70" h="12"><stack/></image>'
+    members = {"mimetype": b"image/openraster", "stack.xml": text.encode()}
+    (tmp_path / "layers.ora").write_bytes(archived(members))
+    with pytest.raises(ImageError, match=r"layers\.ora is damaged"):
+        read_layers(tmp_path / "layers.ora", SIZE, TRANSFORM)
+
+
+@pytest.mark.parametrize("method", [zipfile.ZIP_DEFLATED, zipfile.ZIP_BZIP2, zipfile.ZIP_LZMA])
+def test_damaged_compression_is_refused_in_one_line(tmp_path: Path, method: int) -> None:
+    buffer = io.BytesIO()
+    with zipfile.ZipFile(buffer, "w") as archive:
+        archive.writestr("mimetype", "image/openraster")
+        archive.writestr("stack.xml", '<image w="70" h="12"><stack/></image>', method)
+        start, size = archive.start_dir, archive.infolist()[1].compress_size
+    content = bytearray(buffer.getvalue())
+    content[start - size // 2 : start] = (size - size // 2) * b"\xff"
+    (tmp_path / "layers.ora").write_bytes(content)
+    with pytest.raises(ImageError, match=r"layers\.ora is damaged"):
+        read_layers(tmp_path / "layers.ora", SIZE, TRANSFORM)
 
 
 def test_krita_opens_both_files_and_saves_layers_that_come_back(tmp_path: Path) -> None:

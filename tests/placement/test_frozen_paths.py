@@ -361,3 +361,16 @@ def test_hidden_emitters_are_not_seen(tmp_path: Path) -> None:
 def test_what_paths_cannot_be_frozen_for(room: Scene, tmp_path: Path) -> None:
     with pytest.raises(SceneError, match="first_hits is 7: expected a square number"):
         along_paths(room, lambda p: p, first_hits=7)
+
+
+def test_all_first_hits_may_be_replaced(room: Scene) -> None:
+    """Nothing that is kept remains, as on a film of one pixel."""
+    pixels = np.arange(math.prod(room.size))
+    columns = along_paths(
+        room,
+        lambda p: p.with_more_hits(pixels, 4).columns(sites(room)),
+        first_hits=1,
+        bounces=0,
+    )
+    assert np.isfinite(columns).all()
+    assert columns.any()

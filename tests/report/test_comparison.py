@@ -10,12 +10,14 @@ import numpy as np
 import pytest
 from PIL import Image, ImageDraw
 
+import lightpaint as lp
 from lightpaint.colour.color import luminance
 from lightpaint.colour.display.exposure import choose_exposure
 from lightpaint.colour.display.view_transform import ViewTransform
 from lightpaint.colour.srgb import encode_display, to_8_bit
 from lightpaint.errors import SizeError
 from lightpaint.files import write_bytes
+from lightpaint.images.formats.exr import write_rgb
 from lightpaint.images.formats.png import png_bytes
 from lightpaint.lighting.analysis.appearance.appearance import Appearance
 from lightpaint.lighting.analysis.appearance.delivery import Delivery
@@ -23,6 +25,9 @@ from lightpaint.lighting.answer.combination import combine
 from lightpaint.lighting.answer.lighting import Lighting
 from lightpaint.lighting.constraints.constraints import Constraints
 from lightpaint.lighting.solve import solve
+from lightpaint.pipeline.job.job import Job
+from lightpaint.pipeline.job.sources import Painting
+from lightpaint.pipeline.pipeline import run
 from lightpaint.report import comparison
 from lightpaint.report.answer_pictures import (
     DIVERGING,
@@ -187,7 +192,11 @@ def test_captions_do_not_meet(monkeypatch: pytest.MonkeyPatch, size: tuple[int, 
         assert 0 <= left < right <= width
         assert 0 <= top < bottom <= height
         # What is of one tile stays below it, but for the pixel that is round a letter.
-        assert any(tile[0] - 1 <= left and right <= tile[2] + 1 for tile in drawn[0:9:3])
+        assert any(
+            tile[0] - 1 <= left
+            and right <= max(tile[2], tile[0] + comparison.MIN_WIDTH) + 1  # beside a narrow one
+            for tile in drawn[0:9:3]
+        )
         for other in drawn[:k]:
             gaps = (right <= other[0], other[2] <= left, bottom <= other[1], other[3] <= top)
             assert any(gaps)
@@ -405,3 +414,32 @@ def test_how_much_is_painted_is_one_number(
     numbers = json.loads(report_numbers(**look_fields, predicted=predicted, verification=None))
     assert numbers["painting"]["share"] == pytest.approx(share, abs=1e-12)
     assert full.spoken_share == target.spoken_share == f"{100 * share:.3g} %"
+
+
+def test_a_thin_picture_does_not_become_a_tower() -> None:
+    """Enlarged until its captions can be read, one of 3x3000 pixels had 240,000 rows."""
+    tiles = [Tile("target", "", np.full((3000, 3, 3), 255, np.uint8))] * 2
+    sheet = compose(tiles)
+    assert sheet.shape[0] < 3200
+    assert sheet.shape[1] > 2 * comparison.MIN_WIDTH
+    assert (sheet == 255).all(axis=-1).sum() == 2 * 3 * 3000
+    small = compose([Tile("target", "", np.full((30, 3, 3), 255, np.uint8))])
+    assert (small == 255).all(axis=-1).sum() >= 3 * 30 * (2000 // 30) ** 2
+
+
+@pytest.mark.parametrize("size", [(1, 1), (2, 600), (600, 2)])
+def test_thin_pictures_are_solved_and_reported(
+    size: tuple[int, int], make_basis: Any, tmp_path: Path
+) -> None:
+    basis = make_basis(3, size)
+    write_rgb(tmp_path / "p.exr", np.tensordot([0.2, 0.7, 0.4], basis.images, 1))
+    job = Job((), (Painting(str(tmp_path / "p.exr")),), tmp_path / "out", basis)
+    run(job)
+    with Image.open(tmp_path / "out" / "comparison.png") as picture:
+        assert max(picture.size) < 4 * max(*size, 600)
+
+
+def test_a_film_that_sees_an_emitter_everywhere_is_solved(make_basis: Any) -> None:
+    basis = make_basis(3, (1, 1), seen=np.ones((1, 1), bool))
+    target = Target.of(basis.images.sum(axis=0))
+    assert lp.analyse(solve(basis, target, emitters="count"))

@@ -251,3 +251,13 @@ def test_a_scene_is_shown_on_one_screen(tmp_path: Path) -> None:
         assert len(text) < 1000
         assert "bulb_1" in text or "more" in text
     assert "and 2" in repr(many)
+
+
+def test_a_light_that_shines_nowhere_is_refused(tmp_path: Path):
+    """Its images were NaN, which ended in an error while the answer was written."""
+    emitter = '<vector name="direction" x="0" y="0" z="0"/>'
+    emitter = f'<emitter type="directional" id="far">{emitter}</emitter>'
+    path = write_room(tmp_path)
+    path.write_text(path.read_text().replace("</scene>", f"{emitter}</scene>"))
+    with pytest.raises(SceneError, match=r"'far' .* has a direction that is not a number"):
+        load_scene(path)

@@ -274,3 +274,12 @@ def test_a_cropped_or_padded_picture_lies_where_it_was_painted(
     write_parts(tmp_path / "mask.exr", [ExrPart("", {"Y": np.full((height, width), 0.5, "f4")})])
     target = read_target(tmp_path / "cropped.exr", mask=tmp_path / "mask.exr")
     np.testing.assert_array_equal(target.importance, 0.5 * is_inside)
+
+
+def test_paint_below_black_is_remarked_on(write: Any, image: Any):
+    image[0, :3] = -0.25
+    [note] = [x for x in read_target(write(rgb=image)).notes if "negative" in x]
+    assert note.startswith(
+        f"a negative luminance in 3 of {image[..., 0].size} pixels, down to -0.25"
+    )
+    assert not [x for x in read_target(write(rgb=abs(image))).notes if "negative" in x]

@@ -79,6 +79,8 @@ def test_a_target_of_arrays():
         (np.ones((3, 4, 3), np.uint8), None, "of uint8: expected floats"),
         (np.ones((3, 4, 3), object), None, "of object: expected floats"),
         (np.full((3, 4, 3), 1e39), None, "NaN or Inf in 12 of 12 pixels"),  # too much for float32
+        (np.full((3, 4, 3), 1e-38), None, r"light up to 1e-38 .* in another unit"),
+        (np.full((3, 4, 3), 1e30), None, r"light up to 1e\+30 .* in another unit"),
         (np.ones((3, 4, 3)), np.ones((4, 3)), "differ in size"),
         (np.ones((3, 4, 3)), np.ones((3, 4, 1)), "differ in size"),
         (np.ones((3, 4, 3)), np.full((3, 4), "x"), "expected numbers"),

@@ -8,7 +8,7 @@ Text attributes of the file hold the names of the ids.
 
 import json
 import re
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -16,6 +16,9 @@ import numpy as np
 import numpy.typing as npt
 
 from lightpaint.display_text import some_names
+from lightpaint.errors import BasisError
+from lightpaint.file_reading import read_bytes
+from lightpaint.files import one_line
 from lightpaint.images.formats.exr import ExrPart
 from lightpaint.images.formats.exr_layers import channel_named
 from lightpaint.images.object_map import BACKGROUND, Objects
@@ -26,11 +29,15 @@ ATTRIBUTE = re.compile(r"cryptomatte/(?P<key>[^/]+)/(?P<field>name|manifest|mani
 #: What mattes may be of, best first: people paint objects.
 KINDS = ("object", "node", "asset", "material")
 
-#: An entry of a manifest. Blender does not escape quotes and line breaks in names.
-ENTRY = re.compile(r'"(?P<name>.*?)"\s*:\s*"(?P<id>[0-9a-f]{8})"\s*(?=[,}])', re.S | re.I)
+#: The end of an entry of a manifest: of its name, and its id. Blender does not escape quotes and
+#: line breaks in names, so that only an id shows where a name ends.
+ENTRY_END = re.compile(r'"\s*+:\s*+"(?P<id>[0-9a-f]{8})"\s*+(?=[,}])', re.I)
 
-#: Largest manifest that is read from a file of its own.
-MAX_MANIFEST_BYTES = 2**26
+#: Longest manifest in bytes, and longest name in characters that is kept of it.
+MAX_MANIFEST_BYTES, MAX_OBJECT_NAME = 2**24, 1000
+
+#: Most mattes of a file: renderers write one of objects, one of materials and one of assets.
+MAX_MATTES = 64
 
 #: Most objects that are told apart, those that cover most pixels: painters get indices of 16 bits.
 MAX_OBJECTS = 2**15 - 1
@@ -71,7 +78,7 @@ def declared_mattes(parts: Iterable[ExrPart]) -> list[Cryptomatte]:
         for x in fields.values()
         if x.get("name")
     ]
-    return sorted(mattes, key=lambda matte: (_rank(matte.name), matte.name))
+    return sorted(mattes, key=lambda matte: (_rank(matte.name), matte.name))[:MAX_MATTES]
 
 
 def _rank(name: str) -> int:
@@ -159,29 +166,44 @@ def _names(matte: Cryptomatte, path: Path) -> tuple[dict[int, str], str]:
     text, source = matte.manifest, "its header"
     if not text and matte.manifest_file:
         source = Path(matte.manifest_file).name
-        file = path.parent / source
         try:
-            if file.stat().st_size > MAX_MANIFEST_BYTES:
-                return {}, f"{source} is too large"
-            text = file.read_text(encoding="utf-8", errors="replace")
-        except OSError as error:
-            return {}, f"{source}: {error.strerror or error}"
+            data = read_bytes(
+                path.parent / source, "manifest", BasisError, limit=MAX_MANIFEST_BYTES
+            )
+        except BasisError as error:
+            return {}, one_line(str(error))
+        text = data.decode("utf-8", errors="replace")
     if not text:
         return {}, "its header has no manifest"
+    if len(text) > MAX_MANIFEST_BYTES:
+        return {}, f"the manifest in {source} is too long"
     names = parse_manifest(text)
     return names, "" if names else f"{source} has no valid manifest"
 
 
 def parse_manifest(text: str) -> dict[int, str]:
-    """Return the names by id in the text of a manifest, JSON or what Blender writes for it."""
+    """Return the names by id in the text of a manifest, JSON or what Blender writes for it.
+
+    The time grows as the length of the text.
+    """
     pairs: Iterable[tuple[str, object]]
     try:
         parsed = json.loads(text)
         pairs = parsed.items() if isinstance(parsed, Mapping) else ()
     except (ValueError, RecursionError):
-        pairs = [(match["name"], match["id"]) for match in ENTRY.finditer(text)]
+        pairs = _unescaped_entries(text)
     names = {}
     for name, hexadecimal in pairs:
         if isinstance(hexadecimal, str) and re.fullmatch(r"[0-9a-fA-F]{1,8}", hexadecimal):
-            names[int(hexadecimal, 16)] = name
+            names[int(hexadecimal, 16)] = name[:MAX_OBJECT_NAME]
     return names
+
+
+def _unescaped_entries(text: str) -> Iterator[tuple[str, str]]:
+    """Yield names and ids of a manifest whose names are not escaped."""
+    begin = 0
+    for end in ENTRY_END.finditer(text):
+        quote = text.find('"', begin, end.start())
+        if quote >= 0:
+            yield text[quote + 1 : end.start()], end["id"]
+        begin = end.end()

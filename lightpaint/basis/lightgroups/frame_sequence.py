@@ -17,10 +17,16 @@ from lightpaint.keywords import keywords
 
 #: The signs for a frame number. Their number of characters, or the digit in them, is its least
 #: length.
-SIGN = re.compile(r"#+|@+|%0?(\d*)d|\$F(\d?)|<F(\d?)>")
+SIGN = re.compile(r"#+|@+|%0?([0-9]{0,2})d|\$F([0-9]?)|<F([0-9]?)>")
 
 #: A range of frames: `12`, `1-48`, or every second one of them, `1-48x2`.
-_RANGE = re.compile(r"(-?\d+)(?:-(-?\d+)(?:x(\d+))?)?")
+_RANGE = re.compile(r"(-?[0-9]+)(?:-(-?[0-9]+)(?:x([0-9]+))?)?")
+
+#: What errors say of patterns.
+_SIGNS = (
+    "the sign stands for the number in the names of files, as #### in shot.####.exr for "
+    "shot.0012.exr"
+)
 
 #: Largest number of frames in one folder.
 MAX_FRAMES = 100_000
@@ -75,7 +81,7 @@ class FrameSequence:
         below = file.relative_to(self.path(frame)).as_posix()
         sign = SIGN.search(tail)
         assert sign is not None
-        number = re.compile(rf"(?<!\d){re.escape(self.numbers[frame])}(?!\d)")
+        number = re.compile(rf"(?<![0-9]){re.escape(self.numbers[frame])}(?![0-9])")
         return self.folder / hashes / number.sub("#" * _length(sign), below)
 
 
@@ -99,6 +105,9 @@ def find_frames(pattern: str | Path) -> FrameSequence:
         (1, 2)
     """
     parts, literal = Path(pattern).parts, 0
+    if not any(map(SIGN.search, parts)):
+        name = visible(str(pattern))
+        raise BasisError(f"{name!r} has no sign for the number of a frame: {_SIGNS}")
     # A folder that exists may have a sign in its name.
     while literal < len(parts) - 1 and Path(*parts[: literal + 1]).is_dir():
         literal += 1
@@ -110,10 +119,7 @@ def find_frames(pattern: str | Path) -> FrameSequence:
         if match := expected.fullmatch(path.relative_to(folder).as_posix()):
             found[int(match["frame"])], numbers[int(match["frame"])] = path, match["frame"]
     if not found:
-        raise BasisError(
-            f"no frame matches {visible(str(pattern))}: the sign stands for the number in the "
-            "names of files, as #### in shot.####.exr for shot.0012.exr"
-        )
+        raise BasisError(f"no frame matches {visible(str(pattern))}: {_SIGNS}")
     frames = sorted(found)
     return FrameSequence(
         str(Path(pattern)),
@@ -164,7 +170,7 @@ def _length(sign: re.Match[str]) -> int:
 def _digits(sign: re.Match[str]) -> str:
     """Return the digits that a sign stands for: padded with zeros, and longer only without."""
     length = _length(sign)
-    return r"-?\d+" if length == 1 else rf"-?(?:\d{{{length}}}|[1-9]\d{{{length},}})"
+    return r"-?[0-9]+" if length == 1 else rf"-?(?:[0-9]{{{length}}}|[1-9][0-9]{{{length},}})"
 
 
 def parse_frames(text: str, sequence: FrameSequence) -> tuple[int, ...]:

@@ -10,7 +10,7 @@ from lightpaint.basis.planes import as_planes
 from lightpaint.basis.render.banded_film import BandedFilm, WholeFilm
 from lightpaint.basis.render.guide_training import train
 from lightpaint.basis.render.one_pass_basis import basis_of_planes, basis_of_sums
-from lightpaint.basis.render.render_budget import Budget, Keeper, steps
+from lightpaint.basis.render.render_budget import Budget, Keeper, check_samples, steps
 from lightpaint.basis.render.render_memory import check_memory, renders_in_bands
 from lightpaint.basis.render.render_origin import (
     ONE_PASS,
@@ -79,6 +79,7 @@ def render_basis(
     """
     if spp is not None and time_s is not None:
         raise SceneError("give a number of samples or a time to render for, not both")
+    check_samples(spp=spp, until_spp=until_spp, seed=seed)
     budget = Budget(scene.spp if spp is None else spp, time_s, until_spp, until_variance)
     _check_size(scene)
     check_memory(scene, in_bands=renders_in_bands(scene, start))

@@ -6,9 +6,12 @@ from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 
 from lightpaint.basis.basis import Basis
+from lightpaint.display_text import brief
 from lightpaint.errors import SceneError
 from lightpaint.progress import Progress
+from lightpaint.scene.properties.film import MAX_SPP
 from lightpaint.scene.scene_render import largest_pass, plan_passes
+from lightpaint.validation import whole
 
 #: Seconds of work that a crash may lose, both in wall time and in processor time, so that a busy
 #: machine does not save more often.
@@ -70,6 +73,17 @@ class Budget:
             ahead = self.least - done
             step = min(largest, ahead if ahead > 0 else math.ceil(STEP_SHARE * self.goal))
         return max(0, int(min(step, self.goal - done)))
+
+
+def check_samples(*, seed: int, **counts: int | None) -> None:
+    """Raise SceneError for numbers of samples per pixel, or a seed, that no render takes."""
+    is_seed, expected = whole(0)
+    if not is_seed(seed):
+        raise SceneError(f"seed is {brief(seed)}: expected {expected}")
+    is_count, expected = whole(0, MAX_SPP)
+    for name, count in counts.items():
+        if count is not None and not is_count(count):
+            raise SceneError(f"{name} is {brief(count)}: expected {expected} samples per pixel")
 
 
 class Clock:

@@ -4,7 +4,7 @@ import csv
 import io
 import json
 import math
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Mapping, Sequence
 from contextlib import suppress
 from dataclasses import asdict, dataclass, field
 from pathlib import Path
@@ -27,7 +27,7 @@ from lightpaint.file_reading import read_text
 from lightpaint.files import replacing
 from lightpaint.images.denoiser import denoised
 from lightpaint.images.estimate import read_estimate
-from lightpaint.images.pixel_blocks import block_mean
+from lightpaint.images.pixel_blocks import block_mean, fitting_factor
 from lightpaint.lighting.answer.lighting_file import read_lighting
 from lightpaint.pipeline.results.result_folder import RECORD
 from lightpaint.relit.export.exports import plain_cell
@@ -221,7 +221,9 @@ def _with_picture(
     with suppress(LightpaintError, OSError):
         if not _is_whole(path):
             predicted = read_estimate(folder / "predicted.exr")[0]
-            thumbnail = block_mean(predicted.image, max(1, -(-predicted.image.shape[1] // widest)))
+            height, width = predicted.size
+            factor = fitting_factor((height, width), -(-width // widest))
+            thumbnail = block_mean(predicted.image, factor)
             if predicted.half_difference.any():
                 thumbnail = denoised(thumbnail)
             stops = choose_exposure(predicted.image)
@@ -281,7 +283,7 @@ def summary_csv(rows: list[SummaryRow]) -> str:
     names = list(dict.fromkeys(light.name for row in rows for light in row.lights))
     text = io.StringIO()
     table = csv.writer(text, lineterminator="\n")
-    columns = [f"{name}{ending}" for name in names for ending in LIGHT_COLUMNS]
+    columns = _light_columns(names)
     table.writerow([*COLUMNS, *map(plain_cell, columns)])
     for row in rows:
         lights = {light.name: _light_cells(light) for light in row.lights}
@@ -289,6 +291,23 @@ def summary_csv(rows: list[SummaryRow]) -> str:
         empty_cells = [""] * len(LIGHT_COLUMNS)
         table.writerow([*cells, *(x for name in names for x in lights.get(name, empty_cells))])
     return text.getvalue()
+
+
+def _light_columns(names: Sequence[str]) -> list[str]:
+    """Return the headings of five columns for each light, no two of them equal.
+
+    They begin with its name; with `light` before it where that would be the heading of another
+    column, as for lights called `state`, or `key` beside `key R`.
+    """
+    taken, headings = set(COLUMNS), list[str]()
+    for name in sorted(names, key=len):
+        own = name
+        while taken & {f"{own}{ending}" for ending in LIGHT_COLUMNS}:
+            own = f"light {own}"
+        taken |= {f"{own}{ending}" for ending in LIGHT_COLUMNS}
+        headings.append(own)
+    heading_of = dict(zip(sorted(names, key=len), headings, strict=True))
+    return [f"{heading_of[name]}{ending}" for name in names for ending in LIGHT_COLUMNS]
 
 
 def _light_cells(light: LightRow) -> list[str]:

@@ -85,17 +85,21 @@ class Plan:
         """Steps of all looks, in their order."""
         return [(step.task.look, step.task.kind) for look in self.looks for step in look.steps]
 
-    def select(self, pattern: str | None) -> "Plan":
-        """Return the plan of the looks whose names match, and of the looks that they combine.
+    def select(self, *patterns: str) -> "Plan":
+        """Return the plan of the looks whose names match one of the patterns, and of the looks
+        that they combine; all looks without a pattern.
 
-        Raises BatchError if no name matches.
+        Raises BatchError for a pattern that no name matches.
         """
-        if pattern is None:
+        if not patterns:
             return self
-        chosen_names = {x.entry.name for x in self.looks if fnmatchcase(x.entry.name, pattern)}
-        if not chosen_names:
-            names = some_names(look.entry.name for look in self.looks)
-            raise BatchError(f"no look matches {pattern!r}: there are {names}")
+        chosen_names: set[str] = set()
+        for pattern in patterns:
+            found = {x.entry.name for x in self.looks if fnmatchcase(x.entry.name, pattern)}
+            if not found:
+                names = some_names(look.entry.name for look in self.looks)
+                raise BatchError(f"no look matches {pattern!r}: there are {names}")
+            chosen_names |= found
         for look in reversed(self.looks):  # a look stands behind those that it combines
             if look.entry.name in chosen_names:
                 chosen_names |= set(look.entry.combined_looks)

@@ -272,10 +272,13 @@ def _color(look: Look, light: LightSetting) -> str | None:
 
 
 def _spoken_color(look: Look, light: LightSetting) -> str:
-    """Return `2700 K` for nearly white, else `#ff2010`."""
+    """Return `2700 K` for nearly white, else `#ff2010`; `× 1.46, 1, 0` for factors that differ."""
     appearance = look.lighting.photometry(light)
-    if light.is_fixed or appearance.hex is None:
+    if light.is_fixed or light.is_partly_reached:
         return ""
+    if appearance.hex is None:
+        factors = [f"{factor:.3g}" for factor in light.weight]
+        return "" if len(set(factors)) == 1 else f"× {', '.join(factors)}"
     is_white = (
         appearance.kelvin is not None
         and appearance.duv is not None

@@ -35,7 +35,7 @@ def batch(
     is_first: bool,
     is_dry: bool,
     form: str | None,
-    name_pattern: str | None,
+    name_patterns: list[str],
     run_options: RunOptions,
     force: bool,
     log: Path | None,
@@ -51,14 +51,14 @@ def batch(
     # The same command in all reports, however often and from wherever the batch is run.
     manifest, output_folder = (str(Path(x).absolute()) for x in (paths[0], folder))
     command = shlex.join(["lightpaint", "batch", manifest, "-o", output_folder])
-    plan_ = plan(paths[0], folder, force=force, command=command).select(name_pattern)
+    plan_ = plan(paths[0], folder, force=force, command=command).select(*name_patterns)
     if is_dry:
         return _show_plan(plan_)
     if form is not None:
         return _export(plan_, Path(paths[1]), force=force)
-    _say_remarks(plan_)
     note = _log(log)
     note(f"{command}: {len(plan_.chosen_looks)} looks")
+    _say_remarks(plan_, note)
     outcome = _run(plan_, run_options, note)
     note(f"done {len(outcome.done)}, failed {len(outcome.failed)}")
     return _outcome(plan_, outcome)
@@ -74,19 +74,38 @@ def _write_first_manifest(
     return CommandOutcome(lambda: {"manifest": str(path), "looks": len(paintings)})
 
 
-def _say_remarks(plan_: Plan) -> None:
-    """Say the remarks of a plan and of its looks, each once."""
+def _say_remarks(plan_: Plan, note: Callable[[str], Any]) -> None:
+    """Say the remarks of a plan and of its looks, each once. note: adds a line to the log."""
     of_looks = (x for look in plan_.chosen_looks for x in look.remarks)
     remarks = list(dict.fromkeys((*plan_.remarks, *of_looks)))
+    for remark in remarks:
+        note(remark)
     for remark in remarks[:MAX_LISTED]:
         terminal.say(remark)
     if len(remarks) > MAX_LISTED:
         terminal.say(f"and {len(remarks) - MAX_LISTED} more remarks, each when its look is done")
 
 
+class _LoggedListener(terminal.TerminalListener):
+    """A listener whose remarks stand in the log as well. note: adds a line to it."""
+
+    def __init__(self, note: Callable[[str], Any]) -> None:
+        super().__init__()
+        self._note = note
+
+    def say(self, text: str) -> None:
+        """Show a remark, and log it."""
+        self._note(text)
+        self.show(text)
+
+    def show(self, text: str) -> None:
+        """Show a remark that the log has in other words."""
+        super().say(text)
+
+
 def _run(plan_: Plan, run_options: RunOptions, note: Callable[[str], Any]) -> BatchOutcome:
     """Run a plan, and say which look is done. note: adds a line to the log."""
-    listen = terminal.TerminalListener()
+    listen = _LoggedListener(note)
 
     def on_step(look: PlannedLook, result: ItemResult) -> None:
         name, time_text = f"{look.entry.name}: {result.kind}", time_left(result)
@@ -94,7 +113,7 @@ def _run(plan_: Plan, run_options: RunOptions, note: Callable[[str], Any]) -> Ba
             note(f"{name} failed: {result.failure}")
             return
         note(f"{name} done in {result.spent_s:.2f} s")
-        listen.say(f"{name} done in {result.spent_s:.1f} s{time_text}")
+        listen.show(f"{name} done in {result.spent_s:.1f} s{time_text}")
 
     def time_left(result: ItemResult) -> str:
         return "" if result.left_s is None else f", {spoken_time(result.left_s)} left"

@@ -15,7 +15,7 @@ from typing import Any, NoReturn
 from lightpaint.cli.options.option_themes import themed_help
 from lightpaint.cli.output import lines
 
-_NUMBER = re.compile(r"[-+]?(\d+\.?\d*|\.\d+)([eE][-+]?\d+)?")
+_NUMBER = re.compile(r"[-+]?([0-9]+\.?[0-9]*|\.[0-9]+)([eE][-+]?[0-9]+)?")
 
 
 class Parser(argparse.ArgumentParser):

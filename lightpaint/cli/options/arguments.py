@@ -1,9 +1,10 @@
 """Types for argparse: from the text of an option to its value."""
 
 import argparse
+import math
 from typing import Any
 
-from lightpaint.validation import BRIGHTEST
+from lightpaint.validation import BRIGHTEST, parse_number, parse_whole_number
 
 
 def key_value(text: str) -> tuple[str, str]:
@@ -48,6 +49,17 @@ def image_size(text: str) -> tuple[str, str]:
     return name.strip(), size.strip()
 
 
+def signed_number(text: str) -> float:
+    """Parse any finite number."""
+    try:
+        value = parse_number(text)
+    except ValueError:
+        value = math.nan
+    if not math.isfinite(value):
+        raise argparse.ArgumentTypeError(f"{text!r} is not a number")
+    return value
+
+
 def light_value(text: str) -> tuple[str, Any]:
     """Parse a value for a light, `NAME=VALUE`."""
     name, equals, value = text.rpartition("=")
@@ -60,7 +72,7 @@ def _value(text: str) -> Any:
     """Return three numbers with commas as a list; anything else as text."""
     parts = text.strip().split(",")
     try:
-        return [float(part) for part in parts] if len(parts) > 1 else text.strip()
+        return [parse_number(part) for part in parts] if len(parts) > 1 else text.strip()
     except ValueError:
         return text.strip()
 
@@ -87,10 +99,10 @@ def kelvin(text: str) -> tuple[str, list[float], float | None]:
         main, comma, option = text.partition(",")
         key, _, duv = option.partition("=")
         name, value = light_value(main)
-        ends = [float(end.strip().upper().removesuffix("K")) for end in value.split(":")]
+        ends = [parse_number(end.strip().upper().removesuffix("K")) for end in value.split(":")]
         if comma and key.strip() != "duv":
             raise ValueError(key)
-        return name, ends, float(duv) if comma else None
+        return name, ends, parse_number(duv) if comma else None
     except (ValueError, AttributeError):
         raise argparse.ArgumentTypeError(
             f"{text!r} is not NAME=2700:6500 or NAME=3200, with or without ,duv=0.003 after it"
@@ -150,7 +162,7 @@ def new_light(text: str) -> dict[str, Any]:
     if (
         not kind.strip()
         or (separator and not place.strip())
-        or (colon and not count.strip().isdecimal())
+        or (colon and not (count.isascii() and count.strip().isdecimal()))
     ):
         raise argparse.ArgumentTypeError(
             f"{text!r} is not KIND, KIND:2 or KIND:2@WHERE, like spot:2@ceiling"
@@ -158,13 +170,13 @@ def new_light(text: str) -> dict[str, Any]:
     from lightpaint.placement.rigging.rigging_values import KINDS
 
     table: dict[str, Any] = {"kind" if kind in KINDS else "like": kind.strip()}
-    table |= {"count": int(count)} if colon else {}
+    table |= {"count": parse_whole_number(count)} if colon else {}
     return table | ({"on": names_of(place)} if separator else {})
 
 
 def _number_of(text: str, value: Any, expected: str) -> float:
     try:
-        return float(value)
+        return parse_number(value)
     except (TypeError, ValueError):
         raise argparse.ArgumentTypeError(f"{text!r} is not {expected}") from None
 
@@ -183,7 +195,7 @@ class at_least:  # noqa: N801 (used as a function)
 
     def __call__(self, text: str) -> int:
         try:
-            value = int(text)
+            value = parse_whole_number(text)
         except ValueError:
             value = self.bound - 1
         if value < self.bound:
@@ -199,7 +211,7 @@ def share(text: str) -> float:
     """Parse a share, `2%` or `0.02`."""
     number = text.strip().removesuffix("%")
     try:
-        return float(number) / (1 if number == text.strip() else 100)
+        return parse_number(number) / (1 if number == text.strip() else 100)
     except ValueError:
         raise argparse.ArgumentTypeError(f"{text!r} is not a share like 2% or 0.02") from None
 
@@ -217,7 +229,7 @@ class number:  # noqa: N801 (used as a function)
 
     def __call__(self, text: str) -> float:
         try:
-            value = float(text)
+            value = parse_number(text)
         except ValueError:
             value = -1.0
         if not (0 < value <= self.maximum or (self.may_be_zero and value == 0)):

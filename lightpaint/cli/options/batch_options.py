@@ -55,7 +55,11 @@ def _add_looks(parser: argparse.ArgumentParser) -> None:
         "but do none",
     )
     parser.add_argument(
-        "--only", metavar="PATTERN", help="do only looks whose names match, like 'dusk-*'"
+        "--only",
+        action="append",
+        default=[],
+        metavar="PATTERN",
+        help="do only looks whose names match, like 'dusk-*'; repeat it for several patterns",
     )
 
 

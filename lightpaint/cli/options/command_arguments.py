@@ -140,7 +140,7 @@ def _batch_arguments(options: Namespace) -> dict[str, Any]:
         "output": Path(options.output) if options.output else None,
         "is_first": options.init,
         "is_dry": options.dry_run,
-        "name_pattern": options.only,
+        "name_patterns": options.only,
         "form": options.export,
         "run_options": _run_options(options),
         "force": options.force,

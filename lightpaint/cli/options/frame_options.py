@@ -20,7 +20,7 @@ from lightpaint.errors import BasisError, TargetError
 from lightpaint.pipeline.job.sources import GroupsFile
 
 #: Digits of a file name that may be its frame, and what separates them from the name.
-_NUMBER = re.compile(r"[._-]?(-?\d+)")
+_NUMBER = re.compile(r"[._-]?(-?[0-9]+)")
 
 
 def is_of_frames(options: Namespace) -> bool:
@@ -100,7 +100,7 @@ def _matches(pattern: str, sequence: FrameSequence) -> list[tuple[int, str]]:
 
 def _frame(text: str, path: str, sequence: FrameSequence) -> int:
     """Return the frame of `--target FRAME=TARGET`."""
-    if not re.fullmatch(r"-?\d+", text):
+    if not re.fullmatch(r"-?[0-9]+", text):
         raise TargetError(
             f"--target {text}={path}: {visible(sequence.pattern)} has frames, so expected the "
             f"number of one, like {sequence.frames[0]}={path}"

@@ -130,7 +130,7 @@ def add_view_transform(parser: argparse.ArgumentParser, name: str, stops: str) -
     )
     parser.add_argument(
         "--exposure",
-        type=float,
+        type=arguments.signed_number,
         metavar="STOPS",
         help=f"exposure of that view (default: {stops})",
     )

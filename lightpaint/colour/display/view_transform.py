@@ -110,10 +110,12 @@ class ViewTransform:
         encoding = _encoding(self.name)
         return isinstance(encoding, Curve) and encoding.matrix is None
 
+    @keywords()
     def encode(self, image: Floats) -> Floats:
         """Return a linear Rec.709 image (..., 3) as display values in [0, 1]."""
         return _encoding(self.name).encode(image * 2.0**self.stops)
 
+    @keywords()
     def decode(self, image_display: Floats) -> Floats:
         """Return display values in [0, 1], (..., 3), as linear Rec.709. Clipping cannot be
         undone.

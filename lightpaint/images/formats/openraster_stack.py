@@ -5,9 +5,12 @@ the topmost first; a PNG for each layer, with its corner in the picture; the mer
 thumbnail of it.
 """
 
+import math
 import tempfile
 import zipfile
+from collections import Counter
 from collections.abc import Iterable, Iterator
+from contextlib import ExitStack, contextmanager
 from dataclasses import dataclass, replace
 from itertools import count
 from pathlib import Path
@@ -22,8 +25,8 @@ from lightpaint.errors import ImageError
 from lightpaint.files import replacing
 from lightpaint.images.formats.bitmap import MAX_PIXELS, read_bitmap
 from lightpaint.images.formats.file_kinds import kind_of
-from lightpaint.images.formats.openraster import DAMAGES, MAX_MERGED, MERGED_PICTURE
-from lightpaint.images.formats.png import PNG_HEAD, longest_png, png_bytes, write_png_16
+from lightpaint.images.formats.openraster import MERGED_PICTURE, naming_damage, unpack_png
+from lightpaint.images.formats.png import PNG_HEAD, png_bytes, png_size, write_png_16
 
 #: Names and content that the format prescribes.
 MEDIA_TYPE, STACK, THUMBNAIL = "image/openraster", "stack.xml", "Thumbnails/thumbnail.png"
@@ -31,6 +34,10 @@ VERSION, OVER = "0.0.5", "svg:src-over"
 
 #: Largest size of the list of layers in bytes, and largest number in it.
 MAX_STACK, MAX_NUMBER = 2**22, 1e6
+
+#: Most layers, most pixels of all layers together, and most groups within each other that are read.
+#: Reading so many pixels takes about two minutes.
+MAX_LAYERS, MAX_LAYER_PIXELS, MAX_DEPTH = 1000, 2**29, 100
 
 #: Largest side of the thumbnail, in pixels.
 THUMBNAIL_SIDE = 256
@@ -89,24 +96,28 @@ def write_openraster(
             archive.writestr(STACK, text, zipfile.ZIP_DEFLATED)
 
 
-def read_openraster(path: Path) -> tuple[tuple[int, int], list[RasterLayer | RasterGroup]]:
-    """Return (height, width) and the layers of an OpenRaster file, the lowest first.
+@contextmanager
+def opened_openraster(
+    path: Path,
+) -> Iterator[tuple[tuple[int, int], Iterator[RasterLayer | RasterGroup]]]:
+    """Open an OpenRaster file: yield its (height, width) and its layers, the lowest first.
 
-    Groups within groups become one. Raises ImageError, without naming the file.
+    A layer is decoded when the iterator comes to it, so that one is in memory at a time. Groups
+    within groups become one. Raises ImageError, without naming the file; for too many layers or
+    pixels before any is decoded.
     """
-    try:
-        with zipfile.ZipFile(path) as archive, tempfile.TemporaryDirectory() as folder:
+    with ExitStack() as open_things:
+        with naming_damage():
+            archive = open_things.enter_context(zipfile.ZipFile(path))
             image = _parsed_stack(archive)
             size = int(image.attrib["h"]), int(image.attrib["w"])
             _check_size(*size)
             root = image.find("stack")
             if root is None:
                 raise ImageError("is damaged: it has no stack of layers")
-            return size, list(_read_items(root, archive, Path(folder) / "layer.png"))
-    except KeyError as error:
-        raise ImageError(f"is damaged: it lacks {ascii(str(error))[1:-1][:200]}") from None
-    except (*DAMAGES, ElementTree.ParseError) as error:
-        raise ImageError(f"is damaged: {ascii(str(error))[1:-1][:200]}") from error
+            _check_layers(root, archive)
+        folder = open_things.enter_context(tempfile.TemporaryDirectory())
+        yield size, _read_items(root, archive, Path(folder) / "layer.png")
 
 
 def _parsed_stack(archive: zipfile.ZipFile) -> ElementTree.Element:
@@ -118,40 +129,71 @@ def _parsed_stack(archive: zipfile.ZipFile) -> ElementTree.Element:
     return ElementTree.fromstring(text)
 
 
+def _check_layers(root: ElementTree.Element, archive: zipfile.ZipFile) -> None:
+    """Raise ImageError for more layers or pixels than are read.
+
+    Several layers may name one picture, and each is decoded: a short file can be long to read.
+    """
+    if _depth(root) > MAX_DEPTH:
+        raise ImageError(f"has groups in groups, more than {MAX_DEPTH} deep: merge some")
+    uses = Counter(element.attrib["src"] for element in root.iter("layer"))
+    if uses.total() > MAX_LAYERS:
+        raise ImageError(f"has {uses.total()} layers: expected at most {MAX_LAYERS}; merge some")
+    pixels = 0
+    for source, number in uses.items():
+        with archive.open(source) as packed:
+            head = packed.read(PNG_HEAD)
+        if kind_of(head) != "png":
+            raise ImageError("has a layer that is not a PNG: save it again")
+        pixels += number * math.prod(png_size(head))
+    if pixels > MAX_LAYER_PIXELS:
+        raise ImageError(
+            f"has layers of {pixels / 1e6:.0f} million pixels together: expected at most "
+            f"{MAX_LAYER_PIXELS / 1e6:.0f} million; merge some"
+        )
+
+
+def _depth(root: ElementTree.Element) -> int:
+    """Return how many groups of `root` lie in each other at most."""
+    depth, groups = 0, root.findall("stack")
+    while groups and depth <= MAX_DEPTH:
+        depth, groups = depth + 1, [inner for group in groups for inner in group.findall("stack")]
+    return depth
+
+
 def _read_items(
     stack: ElementTree.Element, archive: zipfile.ZipFile, place: Path
 ) -> Iterator[RasterLayer | RasterGroup]:
     """Yield what a stack holds, the lowest first. place: where to unpack a picture."""
     for element in reversed(stack):
-        name, is_visible = element.get("name", ""), element.get("visibility") != "hidden"
         if element.tag == "layer":
-            yield replace(_read_layer(element, archive, place), is_visible=is_visible)
+            yield _read_layer(element, archive, place)
         elif element.tag == "stack":
-            share = _number(element, "opacity", 1.0)
-            layers: list[RasterLayer] = []
-            for item in _read_items(element, archive, place):
-                if isinstance(item, RasterLayer):
-                    layers.append(item)
-                else:
-                    layers += [
-                        replace(inner, is_visible=inner.is_visible and item.is_visible)
-                        for inner in item.layers
-                    ]
-            inner_layers = [replace(x, opacity=x.opacity * share) for x in layers]
-            yield RasterGroup(name, inner_layers, is_visible)
+            layers = _read_group(element, archive, place)
+            yield RasterGroup(element.get("name", ""), layers, _is_visible(element))
 
 
+def _read_group(
+    stack: ElementTree.Element, archive: zipfile.ZipFile, place: Path
+) -> Iterator[RasterLayer]:
+    """Yield the layers of a group and of the groups in it, the lowest first, as it shows them."""
+    share = _number(stack, "opacity", 1.0)
+    for item in _read_items(stack, archive, place):
+        if isinstance(item, RasterLayer):
+            yield replace(item, opacity=item.opacity * share)
+            continue
+        for inner in item.layers:
+            is_visible = inner.is_visible and item.is_visible
+            yield replace(inner, is_visible=is_visible, opacity=inner.opacity * share)
+
+
+def _is_visible(element: ElementTree.Element) -> bool:
+    return element.get("visibility") != "hidden"
+
+
+@naming_damage()
 def _read_layer(element: ElementTree.Element, archive: zipfile.ZipFile, place: Path) -> RasterLayer:
-    member = archive.getinfo(element.attrib["src"])
-    if member.file_size > MAX_MERGED:
-        raise ImageError("declares a layer that is too large to unpack")
-    with archive.open(member) as packed:
-        head = packed.read(PNG_HEAD)
-        if kind_of(head) != "png":
-            raise ImageError("has a layer that is not a PNG: save it again")
-        if member.file_size > longest_png(head):
-            raise ImageError("is damaged: a layer is longer than it can be")
-        place.write_bytes(head + packed.read())
+    unpack_png(archive, element.attrib["src"], place, "layer")
     bitmap = read_bitmap(place, "png")
     if bitmap.profile is not None and not bitmap.profile.is_srgb:
         raise ImageError(
@@ -163,10 +205,16 @@ def _read_layer(element: ElementTree.Element, archive: zipfile.ZipFile, place: P
     display[..., :3] = bitmap.values / codes
     if bitmap.alpha is not None:
         display[..., 3] = bitmap.alpha / codes
-    corner = round(_number(element, "y", 0.0)), round(_number(element, "x", 0.0))
-    return RasterLayer(element.get("name", ""), display, corner, _number(element, "opacity", 1.0))
+    return RasterLayer(
+        element.get("name", ""),
+        display,
+        corner=(round(_number(element, "y", 0.0)), round(_number(element, "x", 0.0))),
+        opacity=_number(element, "opacity", 1.0),
+        is_visible=_is_visible(element),
+    )
 
 
+@naming_damage()
 def _number(element: ElementTree.Element, key: str, default: float) -> float:
     value = float(element.get(key, default))
     if not abs(value) < MAX_NUMBER:

@@ -27,6 +27,9 @@ MAX_CHUNK = 2**24
 #: Number of bytes at the start of a PNG that include its size.
 PNG_HEAD = 26
 
+#: Largest side of an image pixel in a picture for notebooks.
+MAX_ZOOM = 1000
+
 #: Number of bytes at the start of a PNG that are searched for texts.
 MAX_TEXTS = 2**12
 
@@ -101,6 +104,10 @@ def display_picture(image: Floats, *, stops: float | None = None, zoom: int = 1)
         >>> lp.display_picture(target.image, zoom=8).size
         (128, 128)
     """
+    if np.ndim(image) != 3 or np.shape(image)[2:] != (3,) or not np.size(image):
+        raise ImageError(f"an image of the shape {np.shape(image)}: expected (height, width, 3)")
+    if not 1 <= zoom <= MAX_ZOOM:
+        raise ImageError(f"zoom is {zoom}: expected a whole number from 1 to {MAX_ZOOM}")
     exposure = choose_exposure(image) if stops is None else stops
     pixels = to_8_bit(encode_display(image, stops=exposure))
     return Image.fromarray(np.kron(pixels, np.ones((zoom, zoom, 1), np.uint8)))
@@ -113,15 +120,25 @@ def write_png(
     write_bytes(path, png_bytes(to_8_bit(encode_display(image, stops=stops)), texts))
 
 
+def png_size(head: bytes) -> tuple[int, int]:
+    """Return the (height, width) that the head of a PNG declares.
+
+    Raises ImageError, without naming the file, if `head` is not that of a PNG.
+    """
+    if len(head) < PNG_HEAD or not head.startswith(b"\x89PNG\r\n\x1a\n"):
+        raise ImageError("is damaged: it does not begin like a PNG")
+    width, height = struct.unpack_from(">II", head, 16)
+    return height, width
+
+
 def longest_png(head: bytes) -> int:
     """Return the largest plausible size in bytes of a PNG that starts with `head`.
 
     It is the size of its uncompressed pixels, plus space for profiles, texts and a thumbnail.
     Raises ImageError, without naming the file, if `head` is not that of a PNG.
     """
-    if len(head) < PNG_HEAD or not head.startswith(b"\x89PNG\r\n\x1a\n"):
-        raise ImageError("is damaged: it does not begin like a PNG")
-    width, height, bits, colour = struct.unpack_from(">IIBB", head, 16)
+    height, width = png_size(head)
+    bits, colour = struct.unpack_from(">BB", head, 24)
     channels = {0: 1, 2: 3, 3: 1, 4: 2, 6: 4}.get(colour, 4)
     # Adam7 interlacing stores seven pictures, each with one extra byte per row.
     row = -(-width * channels * bits // 8) + 1

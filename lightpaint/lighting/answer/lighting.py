@@ -235,6 +235,10 @@ class Lighting(Shown, Mapping[str, LightSetting]):
             fields.setdefault("scene_identity", lights.origin.scene_identity)
             lights = lights.lights
         count = len(lights)
+        if np.shape(weights) != (count, 3):
+            raise LightingError(
+                f"weights of the shape {np.shape(weights)}: expected {(count, 3)}, a row per light"
+            )
         is_reached = np.ones((count, 3), dtype=bool) if reached is None else reached
         settings = tuple(
             _setting(

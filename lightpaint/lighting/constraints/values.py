@@ -11,7 +11,14 @@ from lightpaint.colour.color import hex_to_rgb, kelvin_to_rgb, luminance
 from lightpaint.colour.white_range import WhiteRange, white_range
 from lightpaint.errors import ColorError, ConstraintError
 from lightpaint.files import one_line
-from lightpaint.validation import BRIGHTEST, MAX_NAME, MAX_PRIMARIES, is_amount, is_number
+from lightpaint.validation import (
+    BRIGHTEST,
+    MAX_NAME,
+    MAX_PRIMARIES,
+    is_amount,
+    is_number,
+    parse_number,
+)
 
 
 @dataclass(frozen=True)
@@ -85,7 +92,7 @@ def parse_level(value: Any, where: str, expected: str = "") -> Level:
     if isinstance(value, str):
         text = value.strip()
         try:
-            number = float(text.removesuffix("%"))
+            number = parse_number(text.removesuffix("%"))
         except ValueError:
             number = -1.0
         if not is_amount(number):
@@ -160,7 +167,7 @@ def parse_color(value: Any, where: str, *, duv: float = 0.0) -> RGB:
         if isinstance(value, str) and value.strip().startswith("#"):
             rgb = hex_to_rgb(value)
         elif isinstance(value, str) and value.strip().upper().endswith("K"):
-            return _parse_kelvin(float(value.strip()[:-1]), duv, where)
+            return _parse_kelvin(parse_number(value.strip()[:-1]), duv, where)
         elif is_emission(value):
             rgb = np.array(value, dtype=np.float64)
         else:

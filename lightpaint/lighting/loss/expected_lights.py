@@ -198,7 +198,8 @@ def adjusted_share(wash: Wash, stops: Doubles) -> Doubles:
     """
     share = np.zeros(stops.shape[1])
     look = wash.look.mean(axis=0)
-    is_lit = look > LIT * np.average(look, weights=wash.counts)
+    # The sum of the counts is 0 where an emitter is in view everywhere.
+    is_lit = look > LIT * np.average(look, weights=wash.counts + 1e-12)
     weight = wash.counts * wash.importance * is_lit
     least = MIN_ADJUSTED * float(wash.counts @ is_lit)
     for area in wash.wishes:

@@ -10,20 +10,27 @@ import numpy.typing as npt
 from lightpaint.arrays import Bools
 from lightpaint.colour.display.view_transform import ViewTransform
 from lightpaint.errors import ImageError, PaintError
-from lightpaint.images.formats.exr import ExrPart, read_headers, read_parts
+from lightpaint.images.formats.exr import read_headers, read_parts
 from lightpaint.images.formats.file_kinds import head_of, kind_of
 from lightpaint.images.formats.openraster import layered_kind
-from lightpaint.images.formats.openraster_stack import RasterGroup, RasterLayer, read_openraster
+from lightpaint.images.formats.openraster_stack import (
+    RasterGroup,
+    RasterLayer,
+    opened_openraster,
+)
 from lightpaint.paint.layers.canvas import MAX_IMPORTANCE, MAX_LIGHT
 from lightpaint.paint.layers.layer import MAX_NAME_LENGTH, Layer
 from lightpaint.paint.layers.layer_files import FORMAT, IMPORTANCE, KEY, LOOK_NAME, MARKS
 from lightpaint.paint.layers.layer_stack import LayerStack
 from lightpaint.paint.layers.layered_paintings import LayeredPaintings
-from lightpaint.paint.store.canvas_pixels import Pixels, Region
+from lightpaint.paint.store.canvas_pixels import Pixels, Region, slices
 from lightpaint.storage.json_records import read_record, strict_json
 
 #: Number of bytes that tell the kind of a file.
 HEAD_BYTES = 128
+
+#: Most pixels that the layers of a file may cover together: 16 bytes each stay in memory.
+MAX_KEPT_PIXELS = 2**27
 
 _Channels = Mapping[str, npt.NDArray[Any]]
 
@@ -35,7 +42,10 @@ def read_layers(path: Path, size: tuple[int, int], transform: ViewTransform) -> 
     values of an OpenRaster file become light. Raises PaintError or ImageError.
     """
     is_exr = check_kind(path)
-    layered = _of_exr(path, size) if is_exr else _of_openraster(path, size, transform)
+    try:
+        layered = _of_exr(path, size) if is_exr else _of_openraster(path, size, transform)
+    except OSError as error:
+        raise PaintError(f"cannot read {path}: {error.strerror or error}") from error
     if not layered.pixels:
         raise PaintError(f"{path} has no layer with anything on it")
     return layered
@@ -61,28 +71,56 @@ def check_kind(path: Path) -> bool:
 
 
 def _of_exr(path: Path, size: tuple[int, int]) -> LayeredPaintings:
-    parts = [part.in_display_window() for part in read_parts(path)]
-    texts = [part.attributes[KEY] for part in parts if KEY in part.attributes]
-    _check_size(path, parts[0].size, size)
-    channels = {name: pixels for part in parts for name, pixels in part.channels.items()}
+    texts, file_size = read_headers(path)
+    _check_size(path, file_size, size)
     try:
-        about = strict_json(texts[0])
-        if about["format"] != FORMAT:
-            raise ValueError(f"format {about['format']!r}, expected {FORMAT!r}")
-        names: dict[int, str] = {}
-        layers = []
-        for entry in about["layers"]:
-            layers.append(read_record(Layer, {k: v for k, v in entry.items() if k != "layer"}))
-            names[layers[-1].id] = entry["layer"]
-        stack = LayerStack.of(layers)
-        found = {
-            (0, layer.id): _cropped(_exr_pixels(layer, names[layer.id], channels))
-            for layer in layers
-            if f"{names[layer.id]}.A" in channels
-        }
+        stack, names = _exr_layers(next(each[KEY] for each in texts if KEY in each))
+        parts = [part.in_display_window() for part in read_parts(path)]
+        channels = {name: pixels for part in parts for name, pixels in part.channels.items()}
+        found = _Found(path)
+        for layer in stack:
+            if f"{names.get(layer.id)}.A" in channels:
+                found.add(layer.id, *_cropped(_exr_pixels(layer, names[layer.id], channels)))
     except (LookupError, TypeError, ValueError, AttributeError) as error:
         raise PaintError(f"{path}: its layers are damaged: {ascii(error)[:200]}") from None
-    return LayeredPaintings(stack, found)
+    return LayeredPaintings(stack, found.pixels)
+
+
+def _exr_layers(text: str) -> tuple[LayerStack, dict[int, str]]:
+    """Return the layers that an EXR lists, and the names of their channels by id.
+
+    Raises LookupError, TypeError, ValueError or AttributeError; PaintError for too many.
+    """
+    about = strict_json(text)
+    if about["format"] != FORMAT:
+        raise ValueError(f"format {about['format']!r}, expected {FORMAT!r}")
+    layers = [
+        read_record(Layer, {k: v for k, v in entry.items() if k != "layer"})
+        for entry in about["layers"]
+    ]
+    names = [entry["layer"] for entry in about["layers"]]
+    if len(set(names)) < len(names):
+        raise ValueError("two layers have the same channels")
+    stack = LayerStack.of(layers)
+    return stack, dict(zip((layer.id for layer in layers), names, strict=True))
+
+
+class _Found:
+    """Pixels of the layers of a file, by view and id. Raises PaintError where they are too many."""
+
+    def __init__(self, path: Path) -> None:
+        self.pixels: dict[tuple[int, int], tuple[Region, Pixels]] = {}
+        self._path, self._count = path, 0
+
+    def add(self, number: int, region: Region, pixels: Pixels) -> None:
+        """Keep the pixels of a layer."""
+        self._count += pixels.importance.size
+        if self._count > MAX_KEPT_PIXELS:
+            raise PaintError(
+                f"{self._path} has layers that cover more than {MAX_KEPT_PIXELS / 1e6:.0f} million "
+                "pixels together: merge some"
+            )
+        self.pixels[0, number] = region, pixels
 
 
 def _exr_pixels(layer: Layer, name: str, channels: _Channels) -> Pixels:
@@ -107,32 +145,31 @@ def _exr_pixels(layer: Layer, name: str, channels: _Channels) -> Pixels:
 
 
 def _of_openraster(path: Path, size: tuple[int, int], transform: ViewTransform) -> LayeredPaintings:
-    try:
-        file_size, items = read_openraster(path)
-    except ImageError as error:
-        raise ImageError(f"{path} {error}") from error
-    _check_size(path, file_size, size)
     layers: list[Layer] = []
-    found: dict[tuple[int, int], tuple[Region, Pixels]] = {}
+    found = _Found(path)
 
     def add(item: RasterLayer, group: int | None = None) -> None:
         number = len(layers) + 1
-        pixels = _raster_pixels(item, size, transform)
+        region, pixels = _raster_pixels(item, size, transform)
         if pixels.importance.any():
             layers.append(_layer(number, item, group))
-            found[0, number] = _cropped(pixels)
+            found.add(number, region, pixels)
 
-    for k, item in enumerate(items):
-        if isinstance(item, RasterGroup):
-            number = len(layers) + 1
-            layers.append(
-                Layer(number, "group", item.name[:MAX_NAME_LENGTH], is_visible=item.is_visible)
-            )
-            for inner in item.layers:
-                add(inner, number)
-        elif k or item.name != LOOK_NAME:
-            add(item)
-    return LayeredPaintings(LayerStack.of(layers), found)
+    try:
+        with opened_openraster(path) as (file_size, items):
+            _check_size(path, file_size, size)
+            for k, item in enumerate(items):
+                if isinstance(item, RasterGroup):
+                    number = len(layers) + 1
+                    name = item.name[:MAX_NAME_LENGTH]
+                    layers.append(Layer(number, "group", name, is_visible=item.is_visible))
+                    for inner in item.layers:
+                        add(inner, number)
+                elif k or item.name != LOOK_NAME:
+                    add(item)
+    except ImageError as error:
+        raise ImageError(f"{path} {error}") from error
+    return LayeredPaintings(LayerStack.of(layers), found.pixels)
 
 
 def _layer(number: int, item: RasterLayer, group: int | None) -> Layer:
@@ -146,23 +183,36 @@ def _layer(number: int, item: RasterLayer, group: int | None) -> Layer:
     )
 
 
-def _raster_pixels(item: RasterLayer, size: tuple[int, int], transform: ViewTransform) -> Pixels:
-    """Return a layer's picture in the view, which it may be larger than, or beside."""
-    part = ExrPart(
-        "layer", {str(k): item.display[..., k] for k in range(4)}, display=size, offset=item.corner
-    ).in_display_window()
-    planes = [part.channels[str(k)] for k in range(4)]
-    light = np.asarray(transform.decode(np.stack(planes[:3], axis=-1)), np.float32)
-    return Pixels(np.minimum(light, np.float32(MAX_LIGHT)), planes[3].astype(np.float32))
+def _raster_pixels(
+    item: RasterLayer, size: tuple[int, int], transform: ViewTransform
+) -> tuple[Region, Pixels]:
+    """Return the region of the view that a layer covers, and its pixels there.
+
+    The layer's picture may be larger than the view, or beside it.
+    """
+    (y, x), (rows, columns) = item.corner, item.display.shape[:2]
+    top, left = max(y, 0), max(x, 0)
+    bottom, right = max(min(y + rows, size[0]), top), max(min(x + columns, size[1]), left)
+    display = item.display[top - y : bottom - y, left - x : right - x]
+    inner = _covered(display[..., 3])
+    display = display[slices(inner)]
+    light = np.asarray(transform.decode(display[..., :3]), np.float32)
+    pixels = Pixels(np.minimum(light, np.float32(MAX_LIGHT)), display[..., 3].copy())
+    return (top + inner[0], top + inner[1], left + inner[2], left + inner[3]), pixels
 
 
 def _cropped(pixels: Pixels) -> tuple[Region, Pixels]:
     """Return the smallest region with all covered pixels, and these."""
-    rows, columns = (np.flatnonzero(pixels.importance.any(axis=k)) for k in (1, 0))
-    if not rows.size:
-        return (0, 0, 0, 0), pixels.part((0, 0, 0, 0))
-    region = (int(rows[0]), int(rows[-1]) + 1, int(columns[0]), int(columns[-1]) + 1)
+    region = _covered(pixels.importance)
     return region, pixels.part(region).copy()
+
+
+def _covered(coverage: npt.NDArray[np.float32]) -> Region:
+    """Return the smallest region with all pixels above 0."""
+    rows, columns = (np.flatnonzero(coverage.any(axis=k)) for k in (1, 0))
+    if not rows.size:
+        return 0, 0, 0, 0
+    return int(rows[0]), int(rows[-1]) + 1, int(columns[0]), int(columns[-1]) + 1
 
 
 def _check_size(path: Path, found: tuple[int, int], expected: tuple[int, int]) -> None:

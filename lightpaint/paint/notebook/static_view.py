@@ -12,7 +12,7 @@ import numpy as np
 from lightpaint.basis.basis import Basis
 from lightpaint.colour.display.view_transform import ViewTransform
 from lightpaint.colour.srgb import to_8_bit
-from lightpaint.images.pixel_blocks import block_mean
+from lightpaint.images.pixel_blocks import block_mean, fitting_factor
 from lightpaint.lighting.answer.lighting import Lighting
 from lightpaint.report.answer_pictures import target_picture
 from lightpaint.report.page.figures import data_uri
@@ -49,7 +49,7 @@ def static_view(
     target: the painting, for the wipe of the mixer; None if nothing is painted.
     """
     light = basis.mix(lighting.weights_for(basis))
-    factor = -(-light.shape[1] // MAX_PICTURE_WIDTH)
+    factor = fitting_factor(basis.size, -(-basis.size[1] // MAX_PICTURE_WIDTH))
     pixels = to_8_bit(np.clip(transform.encode(block_mean(light, factor)), 0, 1))
     source = data_uri(pixels, largest_png=MAX_PICTURE_BYTES, quality=85)
     painting = None
@@ -57,7 +57,7 @@ def static_view(
         painting = target_picture(target, basis.current_look, transform=transform)
     mixer = mixer_html(basis, lighting, painting, transform=transform, max_pixels=MAX_PLANE_PIXELS)
     height, width = basis.size
-    page = _page(mixer, mix_width=MIX_HEIGHT * width // height)
+    page = _page(mixer, mix_width=max(1, MIX_HEIGHT * width // height))
     quoted = page.replace("&", "&amp;").replace("'", "&#39;")  # most quotes in it are double
     alt = f"{escape(basis.origin.sensor or 'The scene')}, as the painter showed it last"
     return (

@@ -10,7 +10,7 @@ from lightpaint.basis.basis import Basis
 from lightpaint.colour.color import kelvin_to_rgb
 from lightpaint.errors import PaintError
 from lightpaint.images.object_map import Objects
-from lightpaint.images.pixel_blocks import block_mean
+from lightpaint.images.pixel_blocks import block_mean, fitting_factor
 from lightpaint.paint.layers.canvas import Canvas
 from lightpaint.paint.layers.canvases import Canvases
 from lightpaint.paint.layers.composition import compose_layer
@@ -176,7 +176,7 @@ def selected_mask(canvas: Canvas) -> Mask | np.float32:
 
 def reduction(canvas: Canvas, side: int) -> int:
     """Return the side of the blocks of pixels that reduce a view to `side` pixels or so."""
-    return max(1, round(max(canvas.size) / side))
+    return fitting_factor(canvas.size, round(max(canvas.size) / side))
 
 
 def reduced_areas(

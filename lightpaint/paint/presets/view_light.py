@@ -9,7 +9,7 @@ from lightpaint.basis.basis import Basis
 from lightpaint.basis.denoised_mixes import denoise_mix
 from lightpaint.colour.color import luminance
 from lightpaint.images.object_map import Objects
-from lightpaint.images.pixel_blocks import block_mean
+from lightpaint.images.pixel_blocks import block_mean, fitting_factor
 from lightpaint.paint.layers.canvas import Canvas
 from lightpaint.paint.presets.lamp_roles import LampRoles
 from lightpaint.paint.presets.view_areas import MIN_ALBEDO, Mask, ViewAreas
@@ -65,7 +65,7 @@ def _only(basis: Basis, lamps: Bools) -> Doubles:
 
 
 def _roles_of(basis: Basis, chosen: str | None) -> tuple[LampRoles, str | None]:
-    factor = max(1, round(max(basis.size) / ROLES_SIDE))
+    factor = fitting_factor(basis.size, round(max(basis.size) / ROLES_SIDE))
     features, objects = basis.features, basis.objects
     height, width = (side // factor for side in basis.size)
     sample = slice(0, factor * height, factor), slice(0, factor * width, factor)

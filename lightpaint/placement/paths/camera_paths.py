@@ -151,7 +151,7 @@ def joined(parts: Sequence[Vertices]) -> tuple[Vertices, Indices]:
     si = dr.zeros(mi.SurfaceInteraction3f, len(order))
     throughput = dr.zeros(mi.Color3f, len(order))
     start = 0
-    for part in parts:
+    for part in filter(len, parts):  # Dr.Jit cannot scatter nothing
         part_places = mi.UInt32(aligned(place[start : start + len(part)], np.uint32))
         dr.scatter(si, part.interaction, part_places)
         dr.scatter(throughput, part.throughput, part_places)

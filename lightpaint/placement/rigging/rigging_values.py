@@ -12,7 +12,7 @@ from lightpaint.lighting.constraints.values import check_keys
 from lightpaint.placement.freedom import EDGE
 from lightpaint.scene.lights.lights_file import MOVES
 from lightpaint.scene.properties.pose import FARTHEST
-from lightpaint.validation import MAX_LISTED, MAX_NAME, is_number
+from lightpaint.validation import MAX_LISTED, MAX_NAME, is_number, parse_number
 
 #: Keys of permitted places; keys of a rail or surface.
 PLACE_KEYS = ("within", "box", "along", "on")
@@ -119,7 +119,7 @@ def mirror_of(value: Any, where: str) -> tuple[int, float]:
     """Return the axis, 0 to 2, and the coordinate of a plane like `x = 0`."""
     match = _PLANE.fullmatch(value) if isinstance(value, str) and len(value) < MAX_NAME else None
     try:
-        at = float(match[2]) if match else math.nan
+        at = parse_number(match[2]) if match else math.nan
     except ValueError:
         at = math.nan
     if match is None or not abs(at) <= FARTHEST:

@@ -99,6 +99,8 @@ def find_emitters(parsed: ParsedScene, loaded: Any, hasher: SceneHasher) -> tupl
         sampling_weight = float(emitter.sampling_weight())
         is_colour = kind is not None and kind.scaling is Scaling.COLOUR
         is_dark = is_never_found(plugin, sampling_weight, parsed.integrator().plugin)
+        site = site_of(emitter, plugin, parsed.shape_plugin(node_of[name]))
+        check_site(site, plugin, name)
         emitters.append(
             Emitter(
                 name=name,
@@ -115,7 +117,7 @@ def find_emitters(parsed: ParsedScene, loaded: Any, hasher: SceneHasher) -> tupl
                 has_name=has_name(parsed, node_of[name]),
                 belongs_to=belongs_to(parsed, node_of[name]),
                 digest=hasher.emitter(node_of[name], kind),
-                site=site_of(emitter, plugin, parsed.shape_plugin(node_of[name])),
+                site=site,
                 is_dark=is_dark,
             )
         )
@@ -128,6 +130,18 @@ def check_emitters(path: Path, emitters: Sequence[Emitter]) -> None:
         raise SceneError(f"{path} has no lights: add at least one emitter")
     if max(len(emitter.name) for emitter in emitters) > MAX_NAME:
         raise SceneError(f"{path} has an emitter whose name has more than {MAX_NAME} characters")
+
+
+def check_site(site: Site, plugin: str, name: str) -> None:
+    """Raise SceneError if an emitter is nowhere, or shines nowhere: its images would not be
+    numbers.
+    """
+    for what, values in (("position", site.position), ("direction", site.direction)):
+        if values is not None and not np.isfinite(values).all():
+            raise SceneError(
+                f"light {name!r} ({plugin}) has a {what} that is not a number: expected a "
+                "direction of a length above 0, two different points of a lookat, and no scale of 0"
+            )
 
 
 def check_rendered(emitter: Any, plugin: str, name: str, integrator: str) -> None:

@@ -106,7 +106,7 @@ def reduction_to(film: Film, pixels: int) -> int:
 
 def check_resolution(resolution: str) -> re.Match[str]:
     """Return the match of a fraction, `1/4`, or a size, `320x180`. Raises SceneError otherwise."""
-    match = re.fullmatch(r"1/(\d{1,9})|(\d{1,9})x(\d{1,9})", resolution)
+    match = re.fullmatch(r"1/([0-9]{1,9})|([0-9]{1,9})x([0-9]{1,9})", resolution)
     if match is None:
         raise SceneError(f"{resolution!r} is not a resolution: expected one like 1/4 or 320x180")
     return match

@@ -1,6 +1,7 @@
 """Objects of a render by its Cryptomatte, as programs write it."""
 
 import json
+import os
 from pathlib import Path
 from typing import Any
 
@@ -9,8 +10,10 @@ import pytest
 from light_groups import SIZE, channels, pictures, write
 
 import lightpaint as lp
-from lightpaint.basis.lightgroups.cryptomatte import MAX_OBJECTS, parse_manifest
+from lightpaint.basis.lightgroups import cryptomatte
+from lightpaint.basis.lightgroups.cryptomatte import MAX_OBJECTS, declared_mattes, parse_manifest
 from lightpaint.basis.lightgroups.light_groups import read_light_groups
+from lightpaint.images.formats.exr import ExrPart
 
 IDS = {"Cube": 0xA8FCE865, "floor": 0xE20E7901, "lamp": 0x0677345A}
 
@@ -131,6 +134,44 @@ def test_names_as_blender_writes_them():
     text = '{"Cube":"a8fce865","floor "big"\nline":"e20e7901","kugel.ü":"16773450"}'
     expected = {0xA8FCE865: "Cube", 0xE20E7901: 'floor "big"\nline', 0x16773450: "kugel.ü"}
     assert parse_manifest(text) == expected
+
+
+@pytest.mark.parametrize("text", ['"' * 2**17, '"a' * 2**17, '{"a":' * 2**15, '"a":"' * 2**15])
+def test_text_that_is_no_manifest_is_passed_over_once(text: str):
+    """A pattern that looked for the end of a name from every quote took minutes for these."""
+    assert parse_manifest(text) == {}
+    assert parse_manifest(text + '","Cube":"a8fce865"}').keys() == {IDS["Cube"]}
+
+
+def test_a_manifest_is_read_up_to_a_limit(tmp_path: Path, monkeypatch: pytest.MonkeyPatch):
+    mattes = matte_channels("ViewLayer.CryptoObject", ranks((IDS["Cube"], 1)))
+    text = header()["cryptomatte/542cafa/manifest"]
+    (tmp_path / "names.json").write_text(text)
+    beside = header(manifest="", manif_file="names.json")
+    for limit, is_read in ((len(text), True), (len(text) - 1, False)):
+        monkeypatch.setattr(cryptomatte, "MAX_MANIFEST_BYTES", limit)
+        for attributes in (header(), beside):
+            groups = read_light_groups(render(tmp_path / "a.exr", mattes, attributes))
+            assert groups.basis.objects is not None
+            assert groups.basis.objects.names == (("Cube",) if is_read else ("object a8fce865",))
+            assert any("names no object" in remark for remark in groups.remarks) != is_read
+
+
+def test_a_manifest_may_be_a_file_only(tmp_path: Path):
+    """A pipe was opened, which waits for somebody to write into it."""
+    os.mkfifo(tmp_path / "names.json")
+    mattes = matte_channels("ViewLayer.CryptoObject", ranks((IDS["Cube"], 1)))
+    attributes = header(manifest="", manif_file="names.json")
+    groups = read_light_groups(render(tmp_path / "a.exr", mattes, attributes))
+    assert any("is a device or a pipe" in remark for remark in groups.remarks)
+
+
+def test_only_the_best_of_many_mattes_are_looked_for(monkeypatch: pytest.MonkeyPatch):
+    monkeypatch.setattr(cryptomatte, "MAX_MATTES", 2)
+    names = ["other", "CryptoMaterial", "CryptoObject"]
+    attributes = {f"cryptomatte/{k}/name": name for k, name in enumerate(names)}
+    part = ExrPart("", {"R": np.zeros(SIZE, np.float32)}, attributes)
+    assert [matte.name for matte in declared_mattes([part])] == names[:0:-1]
 
 
 def test_layers_of_halves_hold_no_ids(tmp_path: Path):

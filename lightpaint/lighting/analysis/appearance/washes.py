@@ -14,7 +14,7 @@ import numpy as np
 from lightpaint.arrays import Bools, Doubles, Floats
 from lightpaint.colour.color_difference import lab
 from lightpaint.colour.display.view_transform import ViewTransform
-from lightpaint.images.pixel_blocks import block_mean
+from lightpaint.images.pixel_blocks import block_mean, fitting_factor
 from lightpaint.lighting.analysis.appearance.display_difference import display_light
 from lightpaint.threads import one_thread
 
@@ -68,7 +68,8 @@ class Washes:
 
         counts: (h, w), the pixels that count. transform: that of the display.
         """
-        factor = max(1, -(-max(counts.shape) // MAX_SIDE))
+        height, width = counts.shape
+        factor = fitting_factor((height, width), -(-max(height, width) // MAX_SIDE))
         mask = counts.astype(np.float32)
         share = block_mean(mask, factor).astype(np.float64)
         safe = np.where(share > 0, share, 1)[..., None]

@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 
 from lightpaint.arrays import Doubles
-from lightpaint.errors import BasisError
+from lightpaint.errors import BasisError, LightpaintError
 from lightpaint.keywords import keywords
 from lightpaint.lighting.analysis.noise.noise import (
     Noise,
@@ -52,6 +52,8 @@ def correct_noise(solution: Solution, *, share: float | None = None) -> Solution
         >>> 0 <= corrected.problem.noise_removed <= 1
         True
     """
+    if share is not None and not 0 <= share <= 1:
+        raise LightpaintError(f"share is {share}: expected a share of the noise, 0 to 1")
     basis = solution.basis
     if not basis.knows_noise:
         raise BasisError(

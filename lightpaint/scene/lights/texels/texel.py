@@ -25,8 +25,8 @@ MAX_MAP_SIDE = 8192
 #: Most texels of an image: each is a light with pictures of its own.
 MAX_TEXELS = 4096
 
-_SIZE = re.compile(r"(\d{1,9})\s*[x×,]\s*(\d{1,9})")
-_NAME = re.compile(r"(.+?)(?:\.sun([1-9]))?\.x(\d{1,6})\.y(\d{1,6})", re.DOTALL)
+_SIZE = re.compile(r"([0-9]{1,9})\s*[x×,]\s*([0-9]{1,9})")
+_NAME = re.compile(r"(.+?)(?:\.sun([1-9]))?\.x([0-9]{1,6})\.y([0-9]{1,6})", re.DOTALL)
 
 
 @dataclass(frozen=True)
