@@ -139,6 +139,13 @@ def most_uncertain(basis: Basis, solution: Solution, uncertainty: Uncertainty) -
     return int(np.argmax(effect)) if effect.any() else None
 
 
+def is_by_painting(uncertainty: Uncertainty, k: int) -> bool:
+    """Return whether the error of light k is for the most part by noise of the painting."""
+    parts = uncertainty.painting_scatter[k], uncertainty.scatter[k], uncertainty.bias[k]
+    painting, scatter, bias = (float(np.nansum(np.square(x))) for x in parts)
+    return painting > scatter + bias
+
+
 def halving_spp(basis: Basis, uncertainty: Uncertainty, k: int) -> int:
     """Return the samples per pixel that halve the error of light k.
 

@@ -11,6 +11,7 @@ from lightpaint.report.measures import (
     brightness,
     energy_shares,
     halving_spp,
+    is_by_painting,
     most_uncertain,
     relative_errors,
 )
@@ -18,6 +19,9 @@ from lightpaint.report.phrases import CHANNELS, spoken_lights, spoken_percent
 
 #: Texts for a light without a meaningful error: in a table, and in a sentence.
 UNDETERMINED = "undetermined"
+
+#: Upper end of an interval, relative to the light, beyond which percents say nothing.
+MAX_TIMES = 10.0
 
 UNTOLD_HERE = f"{UNDETERMINED} at this number of samples"
 
@@ -56,6 +60,8 @@ def _spoken_error(solved: float, low: float, high: float) -> str:
         return ""
     if solved == 0:
         return f"0 … {high:.2g}"
+    if high > MAX_TIMES * solved:
+        return UNDETERMINED
     below, above = (spoken_percent(float(side / solved)) for side in (solved - low, high - solved))
     if below == above:
         return f"± {below}"
@@ -98,6 +104,11 @@ def uncertainty_sentence(basis: Basis, solution: Solution, uncertainty: Uncertai
     name = solution.lighting.lights[k].name
     light = f"{spoken_lights([name])}, {spoken_percent(shares[k])} of the picture"
     change = "as much as all of it" if errors[k] > 1 else f"± {spoken_percent(float(errors[k]))}"
+    if is_by_painting(uncertainty, k):
+        return (
+            f"{is_undetermined} Noise of the painting leaves {light}, open by {change} (95 %): "
+            "more samples would not change that."
+        ).lstrip()
     sentence = (
         f"More samples would change {light}, by {change} (95 %); "
         f"{halving_spp(basis, uncertainty, k)} samples per pixel would halve that."

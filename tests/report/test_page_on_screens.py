@@ -74,7 +74,9 @@ def _errors(solution: Solution) -> Uncertainty:
     interval = (np.maximum(weights - 2 * scatter, 0), weights + 2 * scatter)
     norm2 = solution.equations.target_norm2
     is_bright = np.zeros(len(weights), dtype=bool)
-    return Uncertainty(weights, scatter, scatter, interval, each, each, each, norm2, is_bright)
+    return Uncertainty(
+        weights, scatter, scatter, 0 * scatter, interval, each, each, each, norm2, is_bright
+    )
 
 
 def _laid_out(folder: Path, page: str) -> dict[int, tuple[int, int]]:

@@ -13,6 +13,7 @@ import numpy as np
 from lightpaint.arrays import Bools, Doubles, Floats, Indices
 from lightpaint.basis.planes import BLOCK_PIXELS, FEW_LIGHTS, Planes, as_slice
 from lightpaint.lighting.analysis.noise.dominant_pixels import Peaks, t_ratios
+from lightpaint.lighting.analysis.noise.painting_grain import channel_grain
 from lightpaint.lighting.analysis.noise.residuals import Residuals
 from lightpaint.lighting.normal_equations import NormalEquations
 from lightpaint.lighting.solution import Solution
@@ -21,6 +22,9 @@ from lightpaint.threads import one_thread, parallel_map
 #: The largest share of M, in any direction of the weights, that may be removed as noise. Beyond,
 #: the estimate is itself noise, and the rest of M would soon be indefinite.
 MAX_NOISE_SHARE = 0.5
+
+#: Least noise of a painting that counts, relative to that of the prediction.
+MIN_PAINTING_NOISE = 0.02
 
 #: Parts of the pixels that are summed in parallel.
 PARTS = 4
@@ -80,11 +84,9 @@ class Noise:
 
 def noise_sums(solution: Solution) -> Noise:
     """Sum over the pixels that count in one pass, by parts in parallel."""
-    problem, weights = solution.problem, solution.weights
-    pixels = NoisyPixels.of(solution)
+    weights, pixels = solution.weights, NoisyPixels.of(solution)
     counted, weight, residuals = pixels.counted, pixels.weight, pixels.residuals
-    # A dimmer, a tie or a limit on luminance couples channels, as the one weight of a scalar light.
-    is_coupled = len(problem.full.channel_groups) < 3
+    is_coupled = _is_coupled(solution)
     # The same parts on every machine, added in order, give the same bits.
     length = BLOCK_PIXELS * max(1, -(-counted.size // (BLOCK_PIXELS * PARTS)))
     parts = [counted[k : k + length] for k in range(0, counted.size, length)]
@@ -110,6 +112,47 @@ def noise_sums(solution: Solution) -> Noise:
         hidden=np.array([Peaks.merged([x.peaks[c] for x in sums]).hidden() for c in range(3)]),
         freedom=np.square(second) / np.where(fourth > 0, fourth, np.nan),
     )
+
+
+def _is_coupled(solution: Solution) -> bool:
+    """Return whether a dimmer, a tie, a limit on luminance, or the one weight of a scalar light
+    couples channels.
+    """
+    return len(solution.problem.full.channel_groups) < 3
+
+
+def painting_covariance(solution: Solution) -> Doubles | None:
+    """Return the covariance of the gradient by noise of the painting, (3, n, 3, n); None where it
+    has next to none.
+
+    A render that serves as a painting has noise τ, which makes δg = Σ D Φ τ. Its variance is that
+    of the residual from pixel to pixel, less that of the prediction (painting_grain.py).
+    """
+    pixels, is_coupled = NoisyPixels.of(solution), _is_coupled(solution)
+    size, n = solution.basis.size, len(solution.weights)
+    counted, everything = solution.importance > 0, slice(0, pixels.unseen.size)
+    residual, mixed = pixels.residuals.residual(everything), pixels.residuals.noise(everything)
+    roots = np.zeros(residual.shape)
+    for c in range(3):
+        D = pixels.weight[:, c % pixels.weight.shape[1]].astype(np.float64)
+        of_both, of_prediction = (
+            channel_grain((np.sqrt(D) * x[:, c]).reshape(size), counted).ravel()
+            for x in (residual, mixed)
+        )
+        roots[:, c] = np.sqrt(D * np.maximum(of_both - of_prediction, 0))
+    if np.square(roots).sum() <= MIN_PAINTING_NOISE * (pixels.weight * np.square(mixed)).sum():
+        return None
+    covariance = np.zeros((3, n, 3, n))
+    for start in range(0, pixels.counted.size, BLOCK_PIXELS):
+        part = as_slice(pixels.counted[start : start + BLOCK_PIXELS])
+        rows = pixels.planes.pixels(part) * roots[part]
+        for c, d in [(k, k) for k in range(3)] + [(0, 1), (0, 2), (1, 2)] * is_coupled:
+            # Its noise, too, is that of paths, which carry all channels.
+            product = rows[..., c] @ rows[..., d].T
+            covariance[c, :, d] += product
+            if c != d:
+                covariance[d, :, c] += product.T
+    return covariance
 
 
 @dataclass(frozen=True)

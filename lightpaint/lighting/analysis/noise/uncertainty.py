@@ -19,6 +19,7 @@ from lightpaint.lighting.analysis.noise.noise import (
     denoised_matrix,
     gradient_bias,
     noise_sums,
+    painting_covariance,
 )
 from lightpaint.lighting.analysis.noise.outliers import noise_doubts, weakest_matrix
 from lightpaint.lighting.analysis.noise.weight_directions import solve_for
@@ -40,6 +41,8 @@ class Uncertainty:
         scatter: (n, 3), standard deviation of the weights between seeds. For a light that is off
             or at a limit, the part on the side where it may go.
         bias: (n, 3), the rise of the weights without the noise power in M.
+        painting_scatter: (n, 3), standard deviation by noise of the painting, where that is a
+            render or a photograph; more samples of the basis do not lower it.
         interval: The 95 % interval of each weight, lower and upper ends, (n, 3) each. At 0 or at a
             limit it has one side, which is never empty.
         objective_error: (3,), standard deviation of the objective.
@@ -60,6 +63,7 @@ class Uncertainty:
     weights: Doubles
     scatter: Doubles
     bias: Doubles
+    painting_scatter: Doubles
     interval: tuple[Doubles, Doubles]
     objective_error: Doubles
     objective_noise: Doubles
@@ -80,8 +84,10 @@ class Uncertainty:
 
     @property
     def standard_error(self) -> Doubles:
-        """Root mean square of scatter and bias, (n, 3): the error of the answer."""
-        return np.hypot(self.scatter, self.bias)
+        """Root of the sum of squares of scatter, bias and painting_scatter, (n, 3): the error of
+        the answer.
+        """
+        return _root(self.scatter, self.bias, self.painting_scatter)
 
 
 @keywords()
@@ -116,7 +122,12 @@ def error_bars(solution: Solution) -> Uncertainty | None:
     scatters = problem.solved if problem.refinement is None else unbiased
     spread = weight_spread(solution, noise, scatters, unbiased, weights + bias)
     excess, is_far = spread.excess, spread.is_far
-    moved = np.zeros(weights.shape)
+    by_painting, moved = np.zeros((2, *weights.shape))
+    if (covariance := painting_covariance(solution)) is not None:
+        of_painting = replace(noise, gradient=covariance, hidden=np.zeros_like(noise.hidden))
+        by_painting = weight_spread(
+            solution, of_painting, scatters, unbiased, weights + bias
+        ).inside
     doubts = noise_doubts(solution, noise.power)
     if doubts.any():
         weak = weakest_matrix(solution, noise.power, doubts, unbiased.M)
@@ -128,8 +139,8 @@ def error_bars(solution: Solution) -> Uncertainty | None:
         is_far = is_far | spread.is_far
         moved = far - weights - bias
     sides, wide = (
-        [_root(x, exit_, moved) for exit_ in spread.exits]
-        for x in (spread.inside, spread.inside * noise.widening)
+        [_root(*parts, exit_, moved) for exit_ in spread.exits]
+        for parts in ((spread.inside,), (spread.inside * noise.widening, by_painting))
     )
     is_determined = np.where(solution.reached, 1, np.nan)
     interval = _interval(solution, bias * is_determined, wide)
@@ -137,6 +148,7 @@ def error_bars(solution: Solution) -> Uncertainty | None:
         weights,
         np.maximum(*sides) * is_determined,
         bias * is_determined,
+        by_painting * is_determined,
         interval,
         noise.objective_error,
         noise.objective_noise,
