@@ -146,7 +146,7 @@ class XmlFile:
         for piece in markup(copied):
             if piece["tag"] is not None:
                 start, stop = piece.span("attributes")
-                named = f' name="{name}"'.encode() if end == 0 else b""
+                named = b' name="%b"' % name.encode() if end == 0 else b""
                 parts += [copied[end:start], named, _without(copied[start:stop], left_out)]
                 end, left_out = stop, {b"id"}
         return decoded(b"".join([*parts, copied[end:]]))
