@@ -172,6 +172,7 @@ def main() -> None:
                     server = painter(scene, options.spp, options.port, *words, folder=folder)
                     designer = Designer(stack.enter_context(using(stack.enter_context(server))))
                     job(designer)
+                    load(designer.page)  # samples that are still rendered
                     designer.page.mouse.move(*AWAY)
                     designer.hand.wait(0)
                     actions += designer.actions
