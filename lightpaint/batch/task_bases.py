@@ -36,8 +36,9 @@ def has_basis(task: Task, worker_cache: WorkerCache) -> bool:
     requested_spp = replace(settings, time_s=None).basis_spp
     sensor = film.sensor_names[film.sensor]
     cached_spp = cache.cached_spp(film.identity, sensor, settings.seed, film.size)
-    exact = settings.exact_spp or not settings.use_cache
-    return not exact and cached_spp >= (film.spp if requested_spp is None else requested_spp)
+    goal_spp = film.spp if requested_spp is None else requested_spp
+    has_enough = cached_spp == goal_spp if settings.exact_spp else cached_spp >= goal_spp
+    return settings.use_cache and has_enough
 
 
 def obtain_bases(

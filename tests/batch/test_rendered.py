@@ -233,3 +233,39 @@ def test_a_batch_says_that_it_finds_no_sun(tmp_path: Path, count: int) -> None:
     (tmp_path / "looks.toml").write_text(f"{looks}settings.sun = 72\n", encoding="utf-8")
     line = run_refused(tmp_path, "batch", "looks.toml", "-o", "out")
     assert "leave it out here, and solve that look alone for its sun" in line
+
+
+CACHED = """
+[[look]]
+name = "bright"
+scene = "room.xml"
+painting = "bright.exr"
+want = ["predict"]
+settings = {{ spp = 8{more} }}
+"""
+
+
+def test_the_cache_decides_no_answer(batch_folder: Path, tmp_path: Path) -> None:
+    """A batch of 8 samples took 352 that a killed run had left."""
+    cache = str(tmp_path / "cache")
+    manifest = batch_folder / "cached.toml"
+    manifest.write_text(CACHED.format(more=""))
+    succeed(batch_folder, "batch", manifest, "-o", tmp_path / "first", LIGHTPAINT_CACHE=cache)
+    succeed(batch_folder, "basis", "room.xml", "--spp", "32", LIGHTPAINT_CACHE=cache)
+    rows = {}
+    for name, more in (("second", ""), ("third", ", exact_spp = false")):
+        manifest.write_text(CACHED.format(more=more))
+        succeed(batch_folder, "batch", manifest, "-o", tmp_path / name, LIGHTPAINT_CACHE=cache)
+        [rows[name]] = json.loads((tmp_path / name / "summary.json").read_text())["looks"]
+    assert (rows["second"]["spp"], rows["third"]["spp"]) == (8, 32)
+    first, second, third = (
+        read_lighting(tmp_path / name / "bright" / "lighting.json").emission
+        for name in ("first", "second", "third")
+    )
+    assert first == second != third
+    # The same fingerprint means the same answer, whatever the cache holds.
+    [row] = json.loads((tmp_path / "first" / "summary.json").read_text())["looks"]
+    assert row["fingerprint"] == rows["second"]["fingerprint"] != rows["third"]["fingerprint"]
+    [heading, cells] = (tmp_path / "first" / "summary.csv").read_text().splitlines()
+    table = dict(zip(heading.split(","), cells.split(","), strict=True))
+    assert (table["spp"], table["fingerprint"]) == ("8", row["fingerprint"])

@@ -6,7 +6,7 @@ import json
 import math
 from collections.abc import Iterable, Mapping, Sequence
 from contextlib import suppress
-from dataclasses import asdict, dataclass, field
+from dataclasses import asdict, dataclass, field, replace
 from pathlib import Path
 from typing import Any, Literal
 
@@ -52,6 +52,8 @@ COLUMNS = (
     "variation",
     "folder",
     "why",
+    "spp",
+    "fingerprint",
 )
 
 #: Suffixes of a light's columns: luminance, emission, kelvin.
@@ -84,6 +86,8 @@ class SummaryRow:
 
     folder: of its results, relative to the batch's. delta_e, noise, share_met: as in report.json;
     None if nothing was painted. agrees: whether a render confirms it; None if there was none.
+    spp: samples per pixel of its basis; None if nothing was rendered. fingerprint: hash of its
+    request and of the files that it reads, as in the journal.
     files: to open. picture: small, relative to the batch's folder; "" where there is none.
     """
 
@@ -104,6 +108,8 @@ class SummaryRow:
     files: tuple[str, ...] = ()
     picture: str = ""
     size: tuple[int, int] = field(default=(4, 3))
+    spp: float | None = None
+    fingerprint: str = ""
 
 
 def rows_of(plan: Plan, lines: Mapping[tuple[str, Kind], JournalLine]) -> list[SummaryRow]:
@@ -115,6 +121,8 @@ def rows_of(plan: Plan, lines: Mapping[tuple[str, Kind], JournalLine]) -> list[S
         state, reason = state_of(look, lines)
         for folder in view_folders(look):
             row = _row(plan, look, folder, state, reason)
+            if state == "done":
+                row = replace(row, fingerprint=lines[look.entry.name, "answer"].made_of)
             # A look that combines others is shown through their view transform.
             view = row.view or next(
                 (views[x] for x in look.entry.combined_looks if views.get(x)), None
@@ -181,6 +189,7 @@ def _row(plan: Plan, look: PlannedLook, folder: Path, state: State, reason: str)
         tuple(x.relative_to(plan.folder).as_posix() for x in result_files)
         if state == "done"
         else (),
+        spp=basis.get("spp"),
     )
 
 

@@ -131,10 +131,11 @@ class Lighting(Shown, Mapping[str, LightSetting]):
     def to_dataframe(self) -> Any:
         """Return a pandas.DataFrame with a row for each light, by its name.
 
-        red, green, blue: its emission, linear Rec.709 in `unit`; where they are known also
-        `"error_red"` and the ends `"lower_red"`, `"upper_red"` of the 95 % interval, and those of
-        the other channels. y: luminance of the emission.
-        kelvin, duv, hex: its colour, where it has one. Raises LightpaintError without pandas.
+        red, green, blue: its emission, linear Rec.709 in `unit`. error_red: its standard error;
+        lower_red, upper_red: the ends of the 95 % interval; likewise for the other channels, and
+        NaN where they are unknown, as before an analysis (`analyse`, `error_bars`). y: luminance of
+        the emission. kelvin, duv, hex: its colour, where it has one.
+        Raises LightpaintError without pandas.
         """
         rows = [self._row(light) for light in self.lights]
         return pandas().DataFrame(rows, index=pandas().Index([*self], name="light"))
