@@ -309,7 +309,7 @@ def like_a_reference(hand: Hand) -> None:
 
 
 def _wait_for_layer(hand: Hand, name: str) -> None:
-    hand.page.locator(".layer-name", has_text=name).first.wait_for()
+    hand.page.locator(".layer-name", has_text=name).first.wait_for(timeout=1000 * PATIENCE_S)
     hand.page.mouse.move(5, 5)
     hand.wait()
 
