@@ -28,6 +28,7 @@ library. No Mitsuba variant is set before the first scene is loaded.
 from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
+from lightpaint.scene.runtime.drjit_import import choose_llvm_at_import
 from lightpaint.version import __version__
 
 if TYPE_CHECKING:
@@ -107,6 +108,8 @@ if TYPE_CHECKING:
     from lightpaint.target.target_reader import read_target as read_target
 
 #: Public name → its module, below this package: what type checkers read above, for Python.
+choose_llvm_at_import()
+
 _HOMES = {
     "AddedLight": "placement.placement",
     "Analysis": "lighting.analysis.analysis",

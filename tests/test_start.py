@@ -76,3 +76,16 @@ def test_no_name_is_that_of_a_room():
 def test_what_there_is_none_of():
     with pytest.raises(AttributeError, match="module 'lightpaint' has no attribute 'relit_scene'"):
         _ = lp.relit_scene
+
+
+def test_imports_in_order_of_the_alphabet_render_as_fast_as_others() -> None:
+    """Dr.Jit takes the LLVM of the system when it is imported, which may be too old."""
+    code = "import lightpaint as lp, mitsuba; print(lp.use_variant().variant)"
+    alone = "import lightpaint as lp; print(lp.use_variant().variant)"
+    variants = [
+        subprocess.run(
+            [sys.executable, "-c", x], capture_output=True, text=True, check=True
+        ).stdout.split()[-1]
+        for x in (alone, code)
+    ]
+    assert variants[0] == variants[1]

@@ -149,8 +149,8 @@ def _check_llvm_in_use(dr: Any, variant: str) -> None:
     if variant.startswith("llvm") and (version := dr.detail.llvm_version())[0] < OLDEST_LLVM:
         raise BackendError(
             f"Mitsuba was imported before lightpaint and loaded LLVM {version[0]}, which "
-            f"is too old for it: load a scene or call lightpaint.use_variant() before "
-            f"`import mitsuba`, or set DRJIT_LIBLLVM_PATH to LLVM {OLDEST_LLVM} or newer"
+            f"is too old for it: `import lightpaint` before `import mitsuba`, or set "
+            f"DRJIT_LIBLLVM_PATH to LLVM {OLDEST_LLVM} or newer"
         )
 
 
