@@ -32,5 +32,5 @@ def main(arguments: Sequence[str] | None = None) -> int:
         from lightpaint.cli.crash_report import report_fault
 
         words = list(sys.argv[1:] if arguments is None else arguments)
-        code = report_fault("lightpaint", error, words)
+        code = report_fault("", error, words)
     return 128 + received[0] if received and code == 130 else code

@@ -25,13 +25,13 @@ MAX_ERROR_LENGTH = 300
 def report_fault(command: str, error: BaseException, arguments: Sequence[str]) -> int:
     """Print that an unexpected error occurred and where the details are; return the exit code.
 
-    command: its name, with the sub-command. arguments: the arguments after `lightpaint`.
+    command: the sub-command; "" before any. arguments: the arguments after `lightpaint`.
     """
     message = one_line(str(error), limit=MAX_ERROR_LENGTH)
     error_text = f"{type(error).__name__}: {message}" if message else type(error).__name__
     path = _write_details(_details(error, arguments))
     details_note = f"the details are in {path}" if path else "the details could not be written"
-    lines.err(f"{command}: a bug in lightpaint: {error_text}; {details_note}")
+    lines.complain(command, f"a bug in lightpaint: {error_text}; {details_note}")
     return FAULT
 
 

@@ -1,5 +1,6 @@
 """Runs one command, from its arguments to its exit code."""
 
+import argparse
 import gc
 import io
 import os
@@ -52,6 +53,13 @@ def run_command(arguments: Sequence[str] | None, received: Sequence[int]) -> int
 
         complete(parser)
     options = parser.parse_args(words)
+    mode = OutputMode(options.as_json, options.is_quiet, options.is_verbose, options.json_progress)
+    with using_output_mode(mode):
+        return _run_parsed(options, words, received)
+
+
+def _run_parsed(options: argparse.Namespace, words: Sequence[str], received: Sequence[int]) -> int:
+    """Run the command of parsed arguments and return the exit code."""
     hint = ""
     try:
         # A command's imports happen when it runs, so that --help answers at once. An interrupt in
@@ -69,11 +77,10 @@ def run_command(arguments: Sequence[str] | None, received: Sequence[int]) -> int
         warnings.simplefilter("ignore", SlowBackendWarning)
         # Pillow warns of what it mends in a file; what it cannot mend is an error.
         warnings.filterwarnings("ignore", category=UserWarning, module=r"PIL\b")
-        with using_output_mode(OutputMode(options.as_json, options.is_quiet, options.is_verbose)):
-            outcome = command(**values_of(options, words))
-            if options.as_json and outcome.document is not None:
-                terminal.write_json(outcome.document())
-            terminal.note("done")
+        outcome = command(**values_of(options, words))
+        if options.as_json and outcome.document is not None:
+            terminal.write_json(outcome.document())
+        terminal.note("done")
         return outcome.code
     except KeyboardInterrupt as interrupt:
         hint = f": {interrupt}" if str(interrupt) else ""
@@ -81,7 +88,7 @@ def run_command(arguments: Sequence[str] | None, received: Sequence[int]) -> int
         # An interrupt inside a library often surfaces as an error of its own.
         if not received:
             return _report(options.command, error, words)
-    lines.err(f"lightpaint {options.command}: interrupted{hint}")
+    lines.complain(options.command, f"interrupted{hint}")
     return 130
 
 
@@ -113,12 +120,12 @@ def _report(command: str, error: Exception, words: Sequence[str]) -> int:
     """Print the error, and return the exit code."""
     if isinstance(error, LightpaintError):
         for line in error.mistakes if isinstance(error, BatchError) else (str(error),):
-            lines.err(f"lightpaint {command}: {spoken(line)}")
+            lines.complain(command, spoken(line))
         return 2
     if isinstance(error, OSError) and (refusal := refusal_of(error)) is not None:
-        lines.err(f"lightpaint {command}: {refusal}")
+        lines.complain(command, str(refusal))
         return 2
     if isinstance(error, MemoryError) or NO_THREAD in str(error):
-        lines.err(f"lightpaint {command}: {OUT_OF_MEMORY_TEXT}")
+        lines.complain(command, OUT_OF_MEMORY_TEXT)
         return 2
-    return report_fault(f"lightpaint {command}", error, words)
+    return report_fault(command, error, words)

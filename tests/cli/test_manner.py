@@ -199,11 +199,31 @@ def test_quiet_and_verbose(work_folder: Path) -> None:
     assert "lightpaint: " in plain.stderr
 
 
+def test_progress_as_json_lines(tmp_path: Path) -> None:
+    """Each line of stderr is an object: progress from its begin to its end, remarks, an error."""
+    room = write_room(tmp_path, lights=LIGHTS["bulb"])
+    write_rgb(tmp_path / "warm.exr", np.full((20, 24, 3), 0.3, np.float32))
+    command = ("solve", room, "warm.exr", "--spp", 8, "--json-progress")
+    completed = run(tmp_path, *command, "-o", "out")
+    assert completed.returncode == 0, completed.stderr
+    objects = [json.loads(line) for line in completed.stderr.splitlines()]
+    works = [x for x in objects if "work" in x]
+    assert {x["work"] for x in works} == {"basis", "verification"}
+    for label in ("basis", "verification"):
+        counts = [x["done"] for x in works if x["work"] == label]
+        assert counts[0] == 0
+        assert counts == sorted(counts)
+    assert any(x.get("remark", "").startswith("verification of at most 8") for x in objects)
+    refused = run(tmp_path, *command, "-o", "out", "--exposure", 99999)
+    assert refused.returncode == 2
+    assert "error" in json.loads(refused.stderr.splitlines()[-1])
+
+
 def test_each_command_takes_them_and_says_its_exit_codes(tmp_path: Path) -> None:
     [commands] = (x for x in command_parser()._actions if isinstance(x.choices, dict))
     for parser in commands.choices.values():
         option_actions = parser._option_string_actions
-        assert {"--json", "-q", "--quiet", "-v", "--verbose"} <= set(option_actions)
+        assert {"--json", "-q", "--quiet", "-v", "--json-progress"} <= set(option_actions)
         assert "Exit codes" in parser.format_help()
     assert json.loads(succeed(tmp_path, "cache", "--json", "list"))
 

@@ -308,3 +308,8 @@ def add_output_mode(parser: argparse.ArgumentParser) -> None:
         action="store_true",
         help="also print settings, and the time of each stage",
     )
+    group.add_argument(
+        "--json-progress",
+        action="store_true",
+        help="print progress, remarks and errors on stderr as one JSON object a line",
+    )

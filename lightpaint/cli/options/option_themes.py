@@ -19,7 +19,7 @@ THEMES = {
     "Machines": "--workers --cluster --shared-fs --apart --task-limit --export --log",
     "Page": "--host --port --no-browser --new",
     "Results": "--to --output --force --table --map-size --no-sheet --json --quiet --verbose "
-    "--help",
+    "--json-progress --help",
 }
 _THEME_OF = {option: title for title, options in THEMES.items() for option in options.split()}
 

@@ -4,9 +4,13 @@ Names, paths and texts of libraries may contain anything. Characters that would 
 or look like a new line, are made visible (`screen.visible`).
 """
 
+import json
 import os
 import sys
+from collections.abc import Mapping
+from typing import Any
 
+from lightpaint.cli.output.output_mode import output_mode
 from lightpaint.display_text import visible
 from lightpaint.errors import OutputError
 from lightpaint.images.formats.library_output import unsilenced
@@ -41,6 +45,21 @@ def err(line: str) -> None:
     """Print a line of progress, a remark or an error to stderr."""
     with unsilenced():
         print(shortened_line(line), file=sys.stderr, flush=True)
+
+
+def complain(command: str, text: str) -> None:
+    """Print an error to stderr, as a line for people or for programs. command: "" before any."""
+    if output_mode().json_progress:
+        err_json({"error": text})
+    else:
+        err(f"{f'lightpaint {command}'.rstrip()}: {text}")
+
+
+def err_json(document: Mapping[str, Any]) -> None:
+    """Print progress, a remark or an error to stderr as a line for programs."""
+    with unsilenced():
+        # json escapes all but ASCII, which has one more invisible character.
+        print(json.dumps(document).replace("\x7f", "\\u007f"), file=sys.stderr, flush=True)
 
 
 def shortened_line(line: str) -> str:

@@ -26,12 +26,14 @@ class OutputMode:
     """The output mode of a command.
 
     as_json: one document on stdout, and nothing else. is_quiet: neither progress nor remarks.
-    is_verbose: also settings and times. clock: runs since the command began.
+    is_verbose: also settings and times. json_progress: what goes to stderr is JSON, an object a
+    line. clock: runs since the command began.
     """
 
     as_json: bool = False
     is_quiet: bool = False
     is_verbose: bool = False
+    json_progress: bool = False
     clock: Stopwatch = field(default_factory=Stopwatch)
 
 

@@ -5,6 +5,7 @@ import json
 import os
 import sys
 import textwrap
+import time
 from collections.abc import Mapping, Sequence
 from typing import Any
 
@@ -107,13 +108,15 @@ def write_lines(text: str) -> None:
 
 def say(text: str) -> None:
     """Print a remark to stderr."""
-    if not output_mode().is_quiet:
+    if output_mode().json_progress:
+        lines.err_json({"remark": spoken(text)})
+    elif not output_mode().is_quiet:
         lines.err(f"lightpaint: {spoken(text)}")
 
 
 def complain(command: str, text: str) -> None:
-    """Print a shortcoming to stderr, even in quiet mode."""
-    lines.err(f"lightpaint {command}: {spoken(text)}")
+    """Print a shortcoming or an error to stderr, even in quiet mode."""
+    lines.complain(command, spoken(text))
 
 
 def note(text: str) -> None:
@@ -126,6 +129,9 @@ def _timed(text: str) -> str:
     lap, total = output_mode().clock.read()
     return f"{text} [{lap:.2f} s, {total:.2f} s in all]"
 
+
+#: Least seconds between two JSON lines on the same work.
+JSON_INTERVAL_S = 0.5
 
 #: Maximum number of workers with a line each; of more, only their number is shown.
 MAX_WORKER_LINES = 8
@@ -151,9 +157,11 @@ class TerminalListener:
         self._tasks: dict[str, TaskID] = {}
         self._workers: dict[str, TaskID] = {}
         self._workers_without_line: set[str] = set()  # workers without a line
+        self._told: dict[str, float] = {}  # seconds of the clock at the last JSON line
 
     def __enter__(self) -> "TerminalListener":
-        if sys.stderr.isatty() and not output_mode().is_quiet:
+        mode = output_mode()
+        if sys.stderr.isatty() and not (mode.is_quiet or mode.json_progress):
             columns = (
                 TextColumn("{task.description}", markup=False),
                 BarColumn(),
@@ -171,6 +179,9 @@ class TerminalListener:
 
     def __call__(self, label: str, done: int, total: int, unit: str = "passes") -> None:
         """Show that `done` of `total` pieces of the work `label` are finished."""
+        if output_mode().json_progress:
+            self._tell(label, done, total, unit)
+            return
         if self._bars is None:
             if done == 0 and not output_mode().is_quiet:
                 lines.err(f"{label}: {_counted(total, unit)}")
@@ -180,8 +191,19 @@ class TerminalListener:
             self._tasks[label] = self._bars.add_task(visible(title), total=total)
         self._bars.update(self._tasks[label], completed=done, total=total)
 
+    def _tell(self, label: str, done: int, total: int, unit: str) -> None:
+        """Print a JSON line of progress: the first, the last, and some between."""
+        now_s = time.perf_counter()
+        is_between = label in self._told and 0 < done < total
+        if is_between and now_s < self._told[label] + JSON_INTERVAL_S:
+            return
+        self._told[label] = now_s
+        lines.err_json({"work": label, "done": done, "total": total, "unit": unit})
+
     def at_work(self, worker: str, task: str | None) -> None:
         """Show the current task of a worker; None if it is idle."""
+        if output_mode().json_progress:
+            lines.err_json({"worker": worker, "task": task})
         if self._bars is None:
             return
         if task is None:
