@@ -49,8 +49,8 @@ class Certainty:
 
     @classmethod
     def of(cls, solution: Solution) -> "Certainty":
-        """Return the certainty of a solution whose basis knows its noise."""
-        uncertainty = error_bars(solution)
+        """Return the certainty of a solution whose basis knows its noise, which samples lower."""
+        uncertainty = error_bars(solution, with_painting=False)
         assert uncertainty is not None
         errors = picture_errors(solution.basis, uncertainty)
         return cls(solution, solution.basis.names[int(np.argmax(errors))], errors)

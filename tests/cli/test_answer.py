@@ -139,7 +139,7 @@ def test_of_many_lights_the_ten_that_matter_and_what_the_others_do(tmp_path: Pat
     [
         ((), "The painting is fitted literally: linear light, nothing held, any colour."),
         (
-            ("--space", "display", "--hold", "0.5", "--colors", "gentle"),
+            ("--space", "display", "--hold", "0.5", "--colors", "gentle", "--mask", "m.png"),
             # Most of the painting is brighter than middle grey, a quarter brighter than white.
             "Fitted as the eye sees it (srgb at -1.2 stops); unpainted parts are held (0.5 times "
             "the weight of the paint); "
@@ -147,12 +147,15 @@ def test_of_many_lights_the_ten_that_matter_and_what_the_others_do(tmp_path: Pat
         ),
         (("--colors", "white"), "Lights are white; --literal turns this off."),
         (
-            ("--unpainted", "0.1"),
+            ("--unpainted", "0.1", "--mask", "m.png"),
             "Each unpainted pixel counts 0.1 times a painted one; --literal turns this off.",
         ),
     ],
 )
 def test_one_line_says_what_else_was_asked(folder: Path, options: tuple[str, ...], sentence: str):
+    mask = np.full((16, 20, 3), 255, np.uint8)
+    mask[:2] = 0
+    (folder / "m.png").write_bytes(png_bytes(mask))
     assert sentence in succeed(folder, *SOLVE, *options).splitlines()
 
 

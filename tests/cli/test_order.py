@@ -105,7 +105,6 @@ def test_behind_two_dashes_everything_is_a_path() -> None:
         ("lights r.xml b.xml", "unrecognized arguments: b.xml (see lightpaint lights --help)"),
         ("relight r.xml", "(see lightpaint relight --help)"),
         ("--spp 4 solve r.xml a.png", "the command comes first: lightpaint COMMAND --spp"),
-        ("", "required: COMMAND (see lightpaint --help)"),
         ("slove r.xml", "invalid choice: 'slove'"),
     ],
 )

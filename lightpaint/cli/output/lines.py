@@ -4,7 +4,6 @@ Names, paths and texts of libraries may contain anything. Characters that would 
 or look like a new line, are made visible (`screen.visible`).
 """
 
-import json
 import os
 import sys
 from collections.abc import Mapping
@@ -57,6 +56,8 @@ def complain(command: str, text: str) -> None:
 
 def err_json(document: Mapping[str, Any]) -> None:
     """Print progress, a remark or an error to stderr as a line for programs."""
+    import json
+
     with unsilenced():
         # json escapes all but ASCII, which has one more invisible character.
         print(json.dumps(document).replace("\x7f", "\\u007f"), file=sys.stderr, flush=True)

@@ -91,7 +91,7 @@ class Uncertainty:
 
 
 @keywords()
-def error_bars(solution: Solution) -> Uncertainty | None:
+def error_bars(solution: Solution, *, with_painting: bool = True) -> Uncertainty | None:
     """Estimate standard error and bias of every weight of a solve or `refine`.
 
     None if the noise of the basis is unknown, which is not the same as none. After reweighting they
@@ -102,6 +102,7 @@ def error_bars(solution: Solution) -> Uncertainty | None:
 
     Args:
         solution: From `solve`, `refine` or `correct_noise`.
+        with_painting: Whether noise of the painting counts, which no samples of the basis lower.
 
     Examples:
         >>> bars = lp.error_bars(lp.solve(basis, target))
@@ -123,7 +124,8 @@ def error_bars(solution: Solution) -> Uncertainty | None:
     spread = weight_spread(solution, noise, scatters, unbiased, weights + bias)
     excess, is_far = spread.excess, spread.is_far
     by_painting, moved = np.zeros((2, *weights.shape))
-    if (covariance := painting_covariance(solution)) is not None:
+    covariance = painting_covariance(solution) if with_painting else None
+    if covariance is not None:
         of_painting = replace(noise, gradient=covariance, hidden=np.zeros_like(noise.hidden))
         by_painting = weight_spread(
             solution, of_painting, scatters, unbiased, weights + bias
