@@ -1,4 +1,4 @@
-"""What may stand in a painter's place: other frames, other messages, other numbers, other hosts."""
+"""The add-on beside a foreign painter: malformed frames, messages and numbers, and other hosts."""
 
 import json
 import socket
@@ -132,7 +132,7 @@ def test_no_light_has_such_a_factor(tmp_path: Path, value: Any) -> None:
 
 
 def receiving(*frames: bytes) -> Any:
-    """What a client receives of these frames."""
+    """Return the messages that a client receives from these frames."""
     here, there = socket.socketpair()
     try:
         there.sendall(b"".join(frames))
