@@ -683,8 +683,7 @@ def test_a_basis_for_a_time(tmp_path: Path) -> None:
     # each of a smaller film.
     solved = ("solve", room, "warm.exr", *arguments[2:], "--quality", "final")
     output = succeed(tmp_path, *solved)
-    assert "NOT equal" not in output
-    assert "Rendered again" in output
+    assert re.search(r"Rendered again.*: (equal within noise|nothing found against it)\.", output)
     [part] = read_parts(tmp_path / "warm" / "predicted.exr")
     spp = spp_of(succeed(tmp_path, "basis", room, *arguments[4:], "--spp", 2))
     view = json.loads(part.attributes["lightpaint.view"])

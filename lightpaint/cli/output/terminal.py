@@ -157,7 +157,7 @@ class TerminalListener:
         self._tasks: dict[str, TaskID] = {}
         self._workers: dict[str, TaskID] = {}
         self._workers_without_line: set[str] = set()  # workers without a line
-        self._told: dict[str, float] = {}  # seconds of the clock at the last JSON line
+        self._last_line_s: dict[str, float] = {}  # time of the last JSON line on each work
 
     def __enter__(self) -> "TerminalListener":
         mode = output_mode()
@@ -180,7 +180,7 @@ class TerminalListener:
     def __call__(self, label: str, done: int, total: int, unit: str = "passes") -> None:
         """Show that `done` of `total` pieces of the work `label` are finished."""
         if output_mode().json_progress:
-            self._tell(label, done, total, unit)
+            self._print_json(label, done, total, unit)
             return
         if self._bars is None:
             if done == 0 and not output_mode().is_quiet:
@@ -191,13 +191,13 @@ class TerminalListener:
             self._tasks[label] = self._bars.add_task(visible(title), total=total)
         self._bars.update(self._tasks[label], completed=done, total=total)
 
-    def _tell(self, label: str, done: int, total: int, unit: str) -> None:
+    def _print_json(self, label: str, done: int, total: int, unit: str) -> None:
         """Print a JSON line of progress: the first, the last, and some between."""
         now_s = time.perf_counter()
-        is_between = label in self._told and 0 < done < total
-        if is_between and now_s < self._told[label] + JSON_INTERVAL_S:
+        is_between = label in self._last_line_s and 0 < done < total
+        if is_between and now_s < self._last_line_s[label] + JSON_INTERVAL_S:
             return
-        self._told[label] = now_s
+        self._last_line_s[label] = now_s
         lines.err_json({"work": label, "done": done, "total": total, "unit": unit})
 
     def at_work(self, worker: str, task: str | None) -> None:
