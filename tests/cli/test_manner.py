@@ -204,7 +204,8 @@ def test_progress_as_json_lines(tmp_path: Path) -> None:
     room = write_room(tmp_path, lights=LIGHTS["bulb"])
     write_rgb(tmp_path / "warm.exr", np.full((20, 24, 3), 0.3, np.float32))
     command = ("solve", room, "warm.exr", "--spp", 8, "--json-progress")
-    completed = run(tmp_path, *command, "-o", "out")
+    own_cache = str(tmp_path / "cache")  # where no other test has left this room's basis
+    completed = run(tmp_path, *command, "-o", "out", LIGHTPAINT_CACHE=own_cache)
     assert completed.returncode == 0, completed.stderr
     objects = [json.loads(line) for line in completed.stderr.splitlines()]
     works = [x for x in objects if "work" in x]
