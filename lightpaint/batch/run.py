@@ -148,8 +148,9 @@ class _Run:
                 limit_s=options.task_limit_s,
             )
             return stack.enter_context(cluster)
-        if options.workers > 1:
-            return stack.enter_context(Processes(options.workers, self._listen))
+        if options.workers > 1 or options.task_limit_s is not None:
+            processes = Processes(options.workers, self._listen, limit_s=options.task_limit_s)
+            return stack.enter_context(processes)
         return self._engine
 
     def _solve_by_sums(self, steps: Sequence[PlanStep]) -> None:

@@ -14,7 +14,8 @@ class RunOptions:
     other processes do other looks of the plan at the same time in the same folder; the last one
     writes the gallery.
     cluster: address of a Dask scheduler whose workers do the work. shared_fs: whether they see the
-    same files under the same paths. task_limit_s: seconds after which a worker counts as hung.
+    same files under the same paths. task_limit_s: seconds after which a step is ended: it fails, or
+    a cluster counts its worker as hung and lets another try it.
     """
 
     workers: int = 1

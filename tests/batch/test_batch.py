@@ -439,8 +439,7 @@ def test_workers_make_the_same_and_one_that_dies_costs_nothing(
 
     def record_remark(*_: Any) -> None:
         if not pids:  # the first answer is here, and another is on its way
-            [pool] = [x for x in started if x._pool is not None]
-            victim = next(iter(pool._pool._processes))
+            victim = _first_process(started[-1])
             pids.append(victim)
             os.kill(victim, signal.SIGKILL)
 
@@ -457,6 +456,45 @@ def test_workers_make_the_same_and_one_that_dies_costs_nothing(
     assert {f"{name}: answer" for name in outcome.done} <= listener.done
     assert not outcome.failed
     assert contents(batch_folder / "out") == reference_batch[1]
+
+
+def _first_process(processes: Processes) -> int:
+    """Return the number of a worker process."""
+    return next(pid for pool in processes._pools.values() for pid in pool._processes)
+
+
+def test_a_step_that_takes_too_long_fails_in_words_and_costs_nothing_else(
+    batch_folder: Path, reference_batch: tuple[Path, dict[str, bytes]]
+) -> None:
+    hasty = run_item(batch_folder, task_limit_s=0.2)  # no process even starts so quickly
+    assert not hasty.done
+    assert all("longer than 0.2 s" in x or "which failed" in x for x in hasty.failed.values())
+    assert not run_item(batch_folder).failed
+    assert contents(batch_folder / "out") == reference_batch[1]
+
+
+@pytest.mark.nightly
+def test_the_others_go_on_while_a_worker_hangs(
+    batch_folder: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    started: list[Processes] = []
+    begin = Processes.__enter__
+    monkeypatch.setattr(Processes, "__enter__", lambda x: started.append(x) or begin(x))
+    stopped: list[int] = []
+
+    def stop_one(*_: Any) -> None:
+        if not stopped:  # the first answer is here, and another is on its way
+            stopped.append(_first_process(started[-1]))
+            os.kill(stopped[0], signal.SIGSTOP)
+
+    planned = plan(batch_folder / "looks.toml", batch_folder / "out")
+    options = RunOptions(workers=2, task_limit_s=60)
+    outcome = run_batch(planned, options, on_step=stop_one)
+    [failed] = [name for name, reason in outcome.failed.items() if "longer than 60 s" in reason]
+    others = {name: reason for name, reason in outcome.failed.items() if name != failed}
+    assert set(others.values()) <= {f"it is made of {failed}, which failed"}
+    assert set(outcome.done) == {look.entry.name for look in planned.looks} - set(outcome.failed)
+    assert outcome.done
 
 
 @pytest.mark.parametrize("moments", [5, nightly(20)])

@@ -348,7 +348,6 @@ def test_what_is_wrong_with_a_cluster_is_one_line(folder: Path, workers: Workers
         (("--cluster", "nowhere"), "no scheduler answers at nowhere"),
         (("--cluster", workers.address, "--workers", "2"), "give one of them"),
         (("--shared-fs",), "give --cluster ADDRESS, too"),
-        (("--task-limit", "3"), "give --cluster ADDRESS, too"),
     ):
         completed = run(folder, "batch", "looks.toml", "-o", "wrong", "-q", *options)
         assert completed.returncode == 2

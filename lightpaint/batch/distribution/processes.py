@@ -4,9 +4,12 @@ import multiprocessing
 import os
 import signal
 import threading
-from collections.abc import Iterator, Sequence
+import time
+from collections import Counter, deque
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from concurrent.futures import FIRST_COMPLETED, Future, ProcessPoolExecutor, wait
 from concurrent.futures.process import BrokenProcessPool
+from dataclasses import dataclass
 
 from threadpoolctl import threadpool_limits
 
@@ -17,101 +20,122 @@ from lightpaint.batch.work.worker_cache import WorkerCache
 from lightpaint.progress import Listener, silent
 from lightpaint.scene.runtime.kernel_threads import limit_threads
 
+#: Failure of an item that took longer than allowed.
+TOO_LONG_TEXT = "it took longer than {limit_s:g} s: allow more time, or take fewer samples"
+
+
+@dataclass(frozen=True)
+class _Run:
+    """A run of an item. slot: number of the process that does it. begin_s: when it was sent."""
+
+    item: WorkItem
+    slot: int
+    begin_s: float
+
 
 class Processes:
-    """An engine of several processes. One that dies costs only one try of its own item."""
+    """An engine of several processes. One that dies costs only one try of its own item.
+
+    limit_s: seconds that an item may take; a process that takes longer is killed, and its item
+    fails.
+    """
 
     is_apart = True
     is_gone = False
 
-    def __init__(self, workers: int, listen: Listener = silent) -> None:
-        self.workers, self._listen = workers, listen
-        self._pool: ProcessPoolExecutor | None = None
+    def __init__(
+        self, workers: int, listen: Listener = silent, *, limit_s: float | None = None
+    ) -> None:
+        self.workers, self._listen, self._limit_s = workers, listen, limit_s
+        # A pool with several processes would not tell which of them runs an item.
+        self._pools: dict[int, ProcessPoolExecutor] = {}
 
     def __enter__(self) -> "Processes":
         return self
 
     def __exit__(self, *_: object) -> None:
-        self._stop_pool()
+        self._kill(self._pools)
 
     def run(self, items: Sequence[WorkItem]) -> Iterator[ItemResult]:
         """Run the items; see `Engine`."""
-        queue, try_counts = list(items), dict.fromkeys((item.name for item in items), 0)
-        # When a process dies, any of the running items may be the cause: each is then run alone.
-        suspects: list[WorkItem] = []
+        queue, free_slots = deque(items), list(reversed(range(self.workers)))
+        try_counts: Counter[str] = Counter()
+        runs: dict[Future[ItemResult], _Run] = {}
         try:
-            while queue or suspects:
-                if queue:
-                    yield from self._run_parallel(queue, suspects)
-                while suspects:
-                    item = suspects.pop(0)
-                    try_counts[item.name] += 1
-                    lost_items: list[WorkItem] = []
-                    yield from self._run_parallel([item], lost_items)
-                    if lost_items and try_counts[item.name] < MAX_TRIES:
-                        suspects.append(item)
-                    elif lost_items:
-                        yield ItemResult(item.name, item.kind, LOST_TEXT, is_lost=True)
+            while queue or runs:
+                while queue and free_slots:
+                    run = _Run(queue.popleft(), free_slots.pop(), time.monotonic())
+                    runs[self._begin(run)] = run
+                finished, _ = wait(runs, self._wait_s(runs.values()), FIRST_COMPLETED)
+                for future in finished or self._overdue(runs):
+                    run = runs.pop(future)
+                    result = self._end(run, future)
+                    free_slots.append(run.slot)
+                    if result is not None:
+                        yield result
+                        continue
+                    try_counts[run.item.name] += 1
+                    if try_counts[run.item.name] < MAX_TRIES:
+                        queue.append(run.item)
+                    else:
+                        yield ItemResult(run.item.name, run.item.kind, LOST_TEXT, is_lost=True)
         except BaseException:
-            self._stop_pool()
+            self._kill(self._pools)
             raise
 
-    def _run_parallel(
-        self, queue: list[WorkItem], lost_items: list[WorkItem]
-    ) -> Iterator[ItemResult]:
-        """Run the items in `queue`, one for each worker at a time, until a worker dies.
-
-        Removes the started items from `queue`, and adds those that were running to `lost_items`.
-        """
-        running_items: dict[Future[ItemResult], WorkItem] = {}
-        # The pool does not tell which process runs an item, so the display numbers the slots.
-        slots: dict[Future[ItemResult], str] = {}
-        free_slots = [f"worker {k + 1}" for k in reversed(range(self.workers))]
-        pool = self._start_pool()
-        while queue or running_items:
-            try:
-                while queue and len(running_items) < self.workers:
-                    future = pool.submit(_run_item, queue[0])
-                    running_items[future], slots[future] = queue[0], free_slots.pop()
-                    self._listen.at_work(slots[future], item_label(queue[0]))
-                    del queue[0]
-                futures, _ = wait(running_items, return_when=FIRST_COMPLETED)
-                for future in futures:
-                    result = future.result()
-                    del running_items[future]
-                    free_slots.append(slots.pop(future))
-                    self._listen.at_work(free_slots[-1], None)
-                    yield result
-            except BrokenProcessPool:
-                lost_items += running_items.values()
-                for place in slots.values():
-                    self._listen.at_work(place, None)
-                self._stop_pool()
-                return
-
-    def _start_pool(self) -> ProcessPoolExecutor:
-        if self._pool is None:
+    def _begin(self, run: _Run) -> "Future[ItemResult]":
+        """Send an item to the process of its slot."""
+        if run.slot not in self._pools:
             threads = max(1, (os.cpu_count() or 1) // self.workers)
-            self._pool = ProcessPoolExecutor(
-                self.workers,
+            self._pools[run.slot] = ProcessPoolExecutor(
+                1,
                 # A forked process would lack the renderer's threads.
                 mp_context=multiprocessing.get_context("spawn"),
                 initializer=_init_worker,
                 initargs=(threads,),
             )
-        return self._pool
+        self._listen.at_work(_label(run), item_label(run.item))
+        return self._pools[run.slot].submit(_run_item, run.item)
 
-    def _stop_pool(self) -> None:
-        """Stop all workers now."""
-        pool, self._pool = self._pool, None
-        if pool is None:
-            return
-        workers = list((pool._processes or {}).values())
-        pool.shutdown(wait=False, cancel_futures=True)
+    def _end(self, run: _Run, future: "Future[ItemResult]") -> ItemResult | None:
+        """Return the result of an item that is finished or overdue; None if its process died."""
+        try:
+            if future.done():
+                return future.result()
+            self._kill([run.slot])
+            reason = TOO_LONG_TEXT.format(limit_s=self._limit_s)
+            spent_s = time.monotonic() - run.begin_s
+            return ItemResult(run.item.name, run.item.kind, reason, spent_s=spent_s)
+        except BrokenProcessPool:
+            self._kill([run.slot])
+            return None
+        finally:
+            self._listen.at_work(_label(run), None)
+
+    def _wait_s(self, runs: Iterable[_Run]) -> float | None:
+        """Return the seconds until the first item is overdue; None without a limit."""
+        if self._limit_s is None:
+            return None
+        return max(0.0, min(run.begin_s for run in runs) + self._limit_s - time.monotonic())
+
+    def _overdue(self, runs: Mapping["Future[ItemResult]", _Run]) -> list["Future[ItemResult]"]:
+        now_s, limit_s = time.monotonic(), self._limit_s or 0.0
+        return [future for future, run in runs.items() if now_s - run.begin_s >= limit_s]
+
+    def _kill(self, slots: Iterable[int]) -> None:
+        """Kill the processes of these slots; the next items there begin new ones."""
+        pools = [self._pools.pop(slot) for slot in list(slots)]
+        workers = [worker for pool in pools for worker in (pool._processes or {}).values()]
+        for pool in pools:
+            pool.shutdown(wait=False, cancel_futures=True)
         for worker in workers:
-            worker.terminate()
+            worker.kill()
         for worker in workers:
             worker.join()
+
+
+def _label(run: _Run) -> str:
+    return f"worker {run.slot + 1}"
 
 
 _CACHE = WorkerCache()

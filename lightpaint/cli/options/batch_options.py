@@ -114,6 +114,6 @@ def _add_workers(parser: argparse.ArgumentParser) -> None:
         dest="task_limit_s",
         type=arguments.number(" of seconds"),
         metavar="SECONDS",
-        help="with --cluster: give a step to another worker after this time, because the first "
-        "one is probably hung (default: 20 times what it is expected to take, at least 300)",
+        help="end a step after this time: its look fails, and the others go on. With --cluster, "
+        "another worker tries it (default: 20 times what it is expected to take, at least 300)",
     )

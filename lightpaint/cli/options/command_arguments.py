@@ -152,9 +152,8 @@ def _run_options(options: Namespace) -> "RunOptions":
     """Return the options of a run. Raises BatchError if they exclude each other."""
     from lightpaint.batch.run_options import RunOptions
 
-    if options.cluster is None and (options.shared_fs or options.task_limit_s is not None):
-        option = "--shared-fs" if options.shared_fs else "--task-limit"
-        raise BatchError(f"{option} concerns workers of a cluster: give --cluster ADDRESS, too")
+    if options.cluster is None and options.shared_fs:
+        raise BatchError("--shared-fs concerns workers of a cluster: give --cluster ADDRESS, too")
     if options.cluster is not None and options.workers > 1:
         raise BatchError(
             f"--cluster {options.cluster} and --workers {options.workers}: give one of them"
