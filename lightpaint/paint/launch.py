@@ -17,7 +17,6 @@ from lightpaint.paint.server.address import BoundSocket, listen
 from lightpaint.paint.server.server import Server, check_installed
 from lightpaint.paint.session_file import SessionFile
 from lightpaint.paint.store.database import set_aside
-from lightpaint.paint.store.store import Store
 from lightpaint.paint.studio.studio import Studio
 from lightpaint.paint.subject import Subject
 from lightpaint.signals import interruptible_between_pieces
@@ -75,13 +74,8 @@ def _serve_session(
         server = Server(studio, session_file.store, listening=listening, say=say)
         session_file.server = server
         connection_file = ConnectionFile(path.parent, server.connection)
-        # Called once this painter has locked the session.
-        write_connection = partial(_write_if_possible, connection_file, say)
         try:
-            if session_file.store is None:
-                session_file.on_store_opened = write_connection
-            else:
-                write_connection()
+            _write_if_possible(connection_file, say)
             studio.on_failure = partial(_stop_after_failure, server)
             on_ready(server)
             with interruptible_between_pieces():  # a thread that is starting cannot be joined
@@ -94,7 +88,7 @@ def _serve_session(
         if studio.failure is not None and studio.store is None:
             raise studio.failure
     finally:
-        _close(studio, session_file.store)
+        _close(studio, session_file)
 
 
 def _write_if_possible(file: "ConnectionFile", say: Callable[[str], None]) -> None:
@@ -162,11 +156,10 @@ def _stop_after_failure(server: Server, error: Exception) -> None:
     server.stop(str(error))
 
 
-def _close(studio: Studio, store: Store | None) -> None:
-    """Close the studio, and the store even if the studio fails; then wait for renders."""
+def _close(studio: Studio, session_file: SessionFile) -> None:
+    """Close the studio, and the session even if the studio fails; then wait for renders."""
     try:
         studio.close()
     finally:
-        if store is not None:
-            store.close()
+        session_file.close()
     studio.wait()

@@ -52,25 +52,24 @@ def check_view_names(sensors: Sequence[str]) -> None:
 
 
 class SessionFile:
-    """The session file at `path`, opened at once unless scenes have to be loaded first.
+    """The session file at `path`, opened at once, before its scenes are loaded: two painters that
+    start together would both believe it to be theirs.
 
     say: receives remarks on the scenes, each one once.
 
     Attributes:
-        store: The session; None until its identity is known.
-        server: Receives the store once there is one.
-        on_store_opened: Called when a store is opened later than at the start.
+        store: The session.
+        server: Receives the store once its identity is known.
     """
 
     def __init__(self, subjects: Sequence[Subject], path: Path, say: Callable[[str], None]) -> None:
-        self.store: Store | None = None
         self.server: Server | None = None
-        self.on_store_opened: Callable[[], None] = lambda: None
         self._subjects, self._path, self._report = subjects, path, say
         self._loaded: dict[int, Scene] = {}
         self._reported: set[str] = set()
-        if (identity := session_identity(subjects)) is not None or path.exists():
-            self.store = Store.open(path, identity)
+        identity = session_identity(subjects)
+        self._is_unused = identity is None and not path.exists()
+        self.store = Store.open(path, identity)
         for k, subject in enumerate(subjects):
             if subject.record is not None and isinstance(subject.scene, LazyScene):
                 self._report_new(subject.scene.remarks)
@@ -79,8 +78,13 @@ class SessionFile:
 
     def open_store(self, _: Identity) -> Store:
         """Return the store; called when there are bases."""
-        assert self.store is not None
         return self.store
+
+    def close(self) -> None:
+        """Close the session; a new one whose scenes could not be loaded leaves no file."""
+        self.store.close()
+        if self._is_unused:
+            self._path.unlink(missing_ok=True)
 
     def _on_scene_loaded(self, k: int, lazy_scene: LazyScene, scene: Scene) -> None:
         """Complete the identity with the scene of view k, which was not cached."""
@@ -103,13 +107,10 @@ class SessionFile:
     def _open_with(self, identity: Identity) -> None:
         """Open the store, or check its identity, once all scenes are loaded."""
         check_view_names([view.sensor for view in identity.views])
-        if self.store is None:
-            self.store = Store.open(self._path, identity)
-            self.on_store_opened()
-        else:
-            self.store.set_identity(identity)
+        self.store.set_identity(identity)
+        self._is_unused = False
         if self.server is not None:
-            self.server.set_store(self.store)
+            self.server.follow_identity()
 
     def _report_new(self, remarks: Iterable[str]) -> None:
         for remark in remarks:

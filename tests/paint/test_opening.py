@@ -20,7 +20,7 @@ from lightpaint.images.denoiser import Features
 from lightpaint.images.object_map import Objects
 from lightpaint.paint import subject_factory
 from lightpaint.paint.lazy_scene import LazyScene
-from lightpaint.paint.session_file import session_identity
+from lightpaint.paint.session_file import SessionFile, session_identity
 from lightpaint.paint.store.history_steps import Identity
 from lightpaint.paint.store.store import Store
 from lightpaint.paint.subject import Subject
@@ -103,6 +103,16 @@ def test_nothing_is_known_of_a_scene_where_the_clock_was_set_meanwhile(
     )
     monkeypatch.setattr(time, "time", real_time)
     assert session_identity([open_subject(path)]) is None
+
+
+def test_a_second_painter_is_refused_before_the_first_has_loaded_its_scene(path: Path) -> None:
+    remarks: list[str] = []
+    session = path.parent / "s" / "session.db"
+    first = SessionFile([open_subject(path)], session, remarks.append)
+    with pytest.raises(PaintError, match="is in use"):
+        SessionFile([open_subject(path)], session, remarks.append)
+    first.close()
+    assert not session.exists()  # nothing was ever painted, so nothing is left
 
 
 def test_a_known_scene_is_painted_without_being_loaded(

@@ -164,9 +164,8 @@ class Server:
         self.expects_page = True
         return f"{self.address.local_url}#token={self._guard.one_time_token()}"
 
-    def set_store(self, store: Store) -> None:
-        """Set the store of a session that was opened later."""
-        self._connections.store = store
+    def follow_identity(self) -> None:
+        """Let messages be as large as the views of the store, which has just learnt them."""
         if self._uvicorn is not None:
             self._uvicorn.config.ws_max_size = self._max_message_bytes
 
