@@ -75,8 +75,6 @@ def _run_parsed(options: argparse.Namespace, words: Sequence[str], received: Seq
 
         # The commands report this in their own words.
         warnings.simplefilter("ignore", SlowBackendWarning)
-        # Pillow warns of what it mends in a file; what it cannot mend is an error.
-        warnings.filterwarnings("ignore", category=UserWarning, module=r"PIL\b")
         outcome = command(**values_of(options, words))
         if options.as_json and outcome.document is not None:
             terminal.write_json(outcome.document())

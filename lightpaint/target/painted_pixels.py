@@ -19,6 +19,7 @@ from lightpaint.arrays import Floats, largest
 from lightpaint.colour.srgb import to_8_bit
 from lightpaint.errors import SizeError
 from lightpaint.images.estimate import box_mean
+from lightpaint.images.formats.library_output import without_pillow_warnings
 from lightpaint.images.picture import Picture
 from lightpaint.target.template import Template
 
@@ -116,7 +117,7 @@ def compressed_like(path: Path, display: Floats) -> Floats:
     from PIL import Image, JpegImagePlugin
 
     eight = Image.fromarray(to_8_bit(display))
-    with Image.open(path) as file:
+    with without_pillow_warnings(), Image.open(path) as file:
         tables = getattr(file, "quantization", None)
         if file.format != "JPEG" or not tables:
             return display

@@ -30,6 +30,7 @@ from lightpaint.paint.session.session import Session
 from lightpaint.paint.store.history_steps import Identity
 from lightpaint.paint.store.store import MemoryStore, Store
 from lightpaint.pipeline.job.settings import Settings
+from lightpaint.target.painted_pixels import compressed_like
 
 H, W = 36, 64
 
@@ -81,6 +82,18 @@ def stops(session: Session) -> np.ndarray:
 @pytest.fixture
 def session(make_basis: Any) -> Session:
     return session_in(room(make_basis))
+
+
+@pytest.mark.parametrize("name", ["cut.webp", "cut.jpg"])
+def test_an_exif_block_that_is_cut_off_is_no_warning(tmp_path: Path, name: str) -> None:
+    orientation = b"\x12\x01\x03\x00\xff\x00\x00\x00\x01\x00\x00\x00"  # of 255 values that lack
+    exif = b"Exif\0\0II*\0\x08\0\0\0\x05\0" + orientation
+    grey = np.full((16, 16, 3), 128, np.uint8)
+    Image.fromarray(grey).save(tmp_path / name, exif=exif)
+    assert read_reference(tmp_path / name, TRANSFORM).shape == grey.shape
+    if name.endswith("jpg"):
+        again = compressed_like(tmp_path / name, grey.astype(np.float32) / 255)
+        np.testing.assert_allclose(again, grey / 255, atol=1.5 / 255)
 
 
 @pytest.mark.parametrize("areas", AREAS)

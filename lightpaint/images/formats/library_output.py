@@ -1,4 +1,4 @@
-"""Silences libraries that print to the terminal."""
+"""Silences libraries that print to the terminal, or warn of files."""
 
 import errno
 import fcntl
@@ -6,6 +6,7 @@ import io
 import os
 import sys
 import threading
+import warnings
 from collections.abc import Iterator
 from contextlib import contextmanager, redirect_stdout
 
@@ -46,6 +47,17 @@ def silenced() -> Iterator[None]:
                     os.dup2(copy, fd)
                     os.close(copy)
             os.close(null_device)
+
+
+@contextmanager
+def without_pillow_warnings() -> Iterator[None]:
+    """Ignore Pillow's warnings of what it mends in a file, such as an Exif block that is cut off.
+
+    What it cannot mend is an error.
+    """
+    with warnings.catch_warnings():
+        warnings.filterwarnings("ignore", category=UserWarning, module=r"PIL\b")
+        yield
 
 
 def _flush_standard_streams() -> None:

@@ -15,7 +15,7 @@ from lightpaint.files import first_line, one_line
 from lightpaint.images.formats.bitmap import MAX_PIXELS, Bitmap
 from lightpaint.images.formats.bitmap_decoder import light_of_integers
 from lightpaint.images.formats.file_kinds import head_of
-from lightpaint.images.formats.library_output import silenced
+from lightpaint.images.formats.library_output import silenced, without_pillow_warnings
 from lightpaint.images.picture import read_picture
 from lightpaint.images.resampling import resampled
 
@@ -79,7 +79,7 @@ def _webp(path: Path) -> Bitmap:
     from PIL import Image, ImageOps
 
     try:
-        with Image.open(path, formats=["WEBP"]) as file:
+        with without_pillow_warnings(), Image.open(path, formats=["WEBP"]) as file:
             _check_size(file.size)
             profile = file.info.get("icc_profile")
             upright = ImageOps.exif_transpose(file).convert("RGBA")
