@@ -36,8 +36,9 @@ OUT_OF_MEMORY_TEXT = (
 )
 
 
-#: What Python says where no thread can be started, for want of memory or of a higher limit.
-NO_THREAD = "can't start new thread"
+#: Errors of too little memory, or too low a limit, that are no MemoryError: of Python where no
+#: thread can be started, and of the loader where there is no room for a library.
+NO_ROOM_TEXTS = "can't start new thread", "failed to map segment from shared object"
 
 
 def run_command(arguments: Sequence[str] | None, received: Sequence[int]) -> int:
@@ -123,7 +124,7 @@ def _report(command: str, error: Exception, words: Sequence[str]) -> int:
     if isinstance(error, OSError) and (refusal := refusal_of(error)) is not None:
         lines.complain(command, str(refusal))
         return 2
-    if isinstance(error, MemoryError) or NO_THREAD in str(error):
+    if isinstance(error, MemoryError) or any(x in str(error) for x in NO_ROOM_TEXTS):
         lines.complain(command, OUT_OF_MEMORY_TEXT)
         return 2
     return report_fault(command, error, words)
