@@ -74,6 +74,14 @@ def test_arguments_of_other_kinds_are_one_line(
                     refuse(call, *right[:k], wrong, *right[k + 1 :])
 
 
+def test_methods_take_arguments_of_other_kinds_alike(values: dict[str, Any]) -> None:
+    target, lighting = values["target"], values["solution"].lighting
+    for method in (target.cropped, target.reduced, target.fitted_to, lighting.with_emission):
+        for wrong in (None, "no such thing", {}, object()):
+            with pytest.raises(lp.LightpaintError):
+                method(*[wrong] * len(required(method)))
+
+
 def test_what_is_wrong_is_named(values: dict[str, Any], tmp_path: Path) -> None:
     basis, lighting, scene = (values[x] for x in ("basis", "lighting", "scene"))
     cases: list[tuple[Callable[[], Any], str]] = [
@@ -106,6 +114,10 @@ def test_the_library_has_the_bounds_of_the_command_line(
     [name] = options
     with pytest.raises(lp.LightpaintError, match=f"{name} is .*: expected a whole number"):
         lp.render_basis(values["scene"], **options)
+    if name in ("spp", "seed"):
+        prediction = lp.combine(values["basis"], values["solution"].lighting)
+        with pytest.raises(lp.LightpaintError, match=f"{name} is .*: expected a whole number"):
+            lp.verify(prediction, values["scene"], **options)
 
 
 @pytest.mark.parametrize("share", [-0.1, 1.1, 2, float("nan")])

@@ -2,6 +2,7 @@
 
 from dataclasses import replace
 
+from lightpaint.basis.render.render_budget import check_samples
 from lightpaint.errors import SizeError
 from lightpaint.images.estimate import Estimate
 from lightpaint.images.pixel_blocks import whole_factor
@@ -39,6 +40,7 @@ def verify(
         >>> lp.verify(lp.combine(basis, lighting), relit, spp=4).agrees
         True
     """
+    check_samples(seed=seed, spp=spp)
     if whole_factor(relit.size, predicted.size) is None:
         raise SizeError(
             f"the prediction is {predicted.size[1]}x{predicted.size[0]} but {relit.path} renders "

@@ -202,6 +202,7 @@ class Target(Shown):
         """`painted_share` as text, such as `63.7 %`, the same everywhere."""
         return spoken_share(self.painted_share)
 
+    @keywords()
     def resized(self, size: tuple[int, int]) -> "Target":
         """Return the target resampled to `size` (height, width), in linear light, weighted by
         importance.
@@ -212,13 +213,22 @@ class Target(Shown):
             self._pixels.resampled(size), [wish.resized(size) for wish in self.wishes]
         )
 
+    @keywords()
     def cropped(self, height: int, width: int) -> "Target":
-        """Return the top left part of the target, of this size."""
+        """Return the top left part of the target, of this size.
+
+        Raises SizeError for a size that it does not have.
+        """
+        if not (0 < height <= self.size[0] and 0 < width <= self.size[1]):
+            raise SizeError(
+                f"the target is {self.size[1]}x{self.size[0]}, and has no part of {width}x{height}"
+            )
         return self._with_pixels(
             self._pixels.cropped(height, width),
             [wish.cropped(height, width) for wish in self.wishes],
         )
 
+    @keywords()
     def reduced(self, factor: int) -> "Target":
         """Return the target averaged over blocks of factor × factor pixels, weighted by importance.
 
@@ -240,6 +250,7 @@ class Target(Shown):
         share = self.painted_share
         return replace(self, **pixels._asdict(), full_size_share=share, wishes=tuple(wishes))
 
+    @keywords()
     def without(self, holes: npt.NDArray[np.bool_]) -> "Target":
         """Return the target with importance 0 in the pixels `holes`, (h, w), which the basis
         lacks.
@@ -253,6 +264,7 @@ class Target(Shown):
             not_finite=self.not_finite + int(lost_mask.sum()),
         )
 
+    @keywords()
     def fitted_to(self, size: tuple[int, int], *, resize: bool) -> "Target":
         """Return the target at `size` (height, width) of the basis.
 

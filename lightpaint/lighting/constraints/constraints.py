@@ -206,6 +206,7 @@ class Constraints:
             parse_strength(near, f"{lead}near"),
         )
 
+    @keywords()
     def and_then(self, others: "Constraints") -> "Constraints":
         """Return these constraints with `others`, which replace contradictory ones.
 

@@ -12,7 +12,7 @@ import numpy as np
 from lightpaint.basis.basis import Basis
 from lightpaint.basis.lightgroups.light_groups import LightGroups
 from lightpaint.colour.display.view_transform import TransformChoice, ViewTransform
-from lightpaint.errors import LightpaintError, PaintError
+from lightpaint.errors import KeywordError, LightpaintError, PaintError
 from lightpaint.lighting.answer.lighting import Lighting
 from lightpaint.lighting.constraints.constraints import Constraints
 from lightpaint.lighting.loss.painting import resolve_importance
@@ -199,12 +199,12 @@ def _pixels_of(target: Target) -> Pixels:
 def read_settings(value: Mapping[str, Any], names: Iterable[str]) -> Settings:
     """Return the `Settings` among a painter's keyword arguments; `names` are its other arguments.
 
-    Raises TypeError for an unknown name, LightpaintError for an invalid value.
+    Raises KeywordError for an unknown name, another LightpaintError for an invalid value.
     """
     setting_names = [field.name for field in fields(Settings)]
     for name in value:
         if name not in setting_names:
-            raise TypeError(
+            raise KeywordError(
                 f"lp.Painter has no argument {name!r}{did_you_mean(name, [*names, *setting_names])}"
             )
     return Settings(**value)
@@ -242,8 +242,12 @@ def widget_subjects(
     Raises LightpaintError if one cannot be painted.
     """
     _check_types(constraints=constraints, transform=transform)
-    if not isinstance(layers, str | Path | None):
-        raise PaintError(f"layers is {layers!r}: expected the path of a file, like 'layers.ora'")
+    for name, value_of, example in (
+        ("layers", layers, "file, like 'layers.ora'"),
+        ("folder", folder, "folder"),
+    ):
+        if not isinstance(value_of, str | Path | None):
+            raise PaintError(f"{name} is {value_of!r}: expected the path of a {example}")
     sources = list(value) if isinstance(value, list | tuple) else [value]
     if not sources:
         raise PaintError("lp.Painter paints at least one view: give a basis, or a scene")
