@@ -381,7 +381,6 @@ def test_what_cannot_be_given_is_said_at_once(
     for options, message in (
         ({"transform": "agx"}, r"transform is 'agx': expected a ViewTransform, like lp.ViewTran"),
         ({"constraints": {"key": {"off": True}}}, r"are a dict: give lp.Constraints.of\(\.\.\.\)"),
-        ({"folder": 5}, "folder is 5: expected the path of a folder"),
         ({"layers": 5}, "layers is 5: expected the path of a file"),
         ({"spp": 4}, r"spp=\.\.\. cannot change a saved basis: leave it out, or give the scene"),
     ):
@@ -393,6 +392,8 @@ def test_what_cannot_be_given_is_said_at_once(
         open_painter(heigth=300)
     with pytest.raises(TypeError, match=r"lp.Painter has no argument 'sp': did you mean 'spp'"):
         open_painter(sp=300)
+    with pytest.raises(lp.LightpaintError, match="folder is 5: expected the path of a folder"):
+        lp.Painter(basis, folder=5)
     for height in (-5, 10):
         with pytest.raises(traitlets.TraitError, match="should not be less than 240"):
             open_painter(height=height)
