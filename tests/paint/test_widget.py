@@ -386,9 +386,7 @@ def test_what_cannot_be_given_is_said_at_once(
     ):
         with pytest.raises(lp.LightpaintError, match=message):
             open_painter(**options)
-    with pytest.raises(
-        lp.KeywordError, match=r"lp.Painter has no argument 'heigth': did you mean 'heig"
-    ):
+    with pytest.raises(lp.LightpaintError, match="has no argument 'heigth': did you mean 'heig"):
         open_painter(heigth=300)
     with pytest.raises(TypeError, match=r"lp.Painter has no argument 'sp': did you mean 'spp'"):
         open_painter(sp=300)
