@@ -3,11 +3,13 @@
 import ast
 import subprocess
 import sys
+import warnings
 from pathlib import Path
 
 import pytest
 
 import lightpaint as lp
+from lightpaint.scene.runtime import variant
 
 #: What takes long to load, or needs a part that may be missing.
 LIBRARIES = {
@@ -89,3 +91,18 @@ def test_imports_in_order_of_the_alphabet_render_as_fast_as_others() -> None:
         for x in (alone, code)
     ]
     assert variants[0] == variants[1]
+
+
+def test_a_slow_backend_is_warned_of_at_every_line_that_renders(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    slow = variant.Backend("scalar_rgb", note="no usable LLVM: many times slower")
+    monkeypatch.setattr(variant, "_current", slow)
+    monkeypatch.setattr(variant, "_check_unchanged", lambda backend: None)
+    with warnings.catch_warnings(record=True) as caught:
+        warnings.simplefilter("default")
+        for _ in range(3):
+            lp.use_variant()
+        lp.use_variant()
+    assert [Path(x.filename).name for x in caught] == ["test_start.py"] * 2
+    assert len({x.lineno for x in caught}) == 2

@@ -3,8 +3,10 @@
 This is the only module that calls `mi.set_variant`.
 """
 
+import sys
 import warnings
 from dataclasses import dataclass
+from types import FrameType
 from typing import Any
 
 from lightpaint.errors import BackendError
@@ -63,12 +65,27 @@ def use_variant(requested: str | None = None) -> Backend:
                 f"this process already renders with {_current.variant}: "
                 f"start a new one for {requested}"
             )
-        return _current
-
-    # An interrupt while C++ modules initialise would crash the process.
-    with interruptible_between_pieces():
-        _current = _start(requested)
+    else:
+        # An interrupt while C++ modules initialise would crash the process.
+        with interruptible_between_pieces():
+            _current = _start(requested)
+    if _current.note:
+        _warn_of(_current)
     return _current
+
+
+def _warn_of(backend: Backend) -> None:
+    """Warn of a slow backend at the line that called lightpaint: Python shows it once for each."""
+    frame, level = sys._getframe(), 1
+    while frame.f_back is not None and _is_ours(frame):
+        frame, level = frame.f_back, level + 1
+    warnings.warn(backend.note, SlowBackendWarning, stacklevel=level)
+
+
+def _is_ours(frame: FrameType) -> bool:
+    """Return whether a frame is lightpaint's, or of a decorator around it."""
+    module = str(frame.f_globals.get("__name__", ""))
+    return module.startswith("lightpaint.") or module == "contextlib"
 
 
 def _start(requested: str | None) -> Backend:
@@ -117,7 +134,6 @@ def _choose(mi: Any, llvm: Llvm | None) -> Backend:
         problem = f"no usable LLVM {OLDEST_LLVM} or newer"
     backend = _set(mi, PLAIN_VARIANT, None)
     note = f"{problem}: rendering with {PLAIN_VARIANT}, many times slower; {INSTALL_LLVM}"
-    warnings.warn(note, SlowBackendWarning, stacklevel=5)
     return Backend(backend.variant, note=note)
 
 
