@@ -1,16 +1,32 @@
-"""Checks of values, each with the text of the expectation for errors."""
+"""Checks of values, each with the text of the expectation for errors, and its JSON schema.
+
+A field of a record says what it takes in its annotation: `bool` and `Literal` by themselves,
+anything else by `Annotated[int | None, whole(2, 64)]`.
+"""
 
 import math
 from collections.abc import Callable, Mapping
-from dataclasses import fields
+from dataclasses import dataclass, field, fields
+from functools import cache
 from numbers import Integral, Real
-from typing import Any, get_args
+from types import NoneType, UnionType
+from typing import Annotated, Any, Literal, Union, get_args, get_origin, get_type_hints
 
 from lightpaint.display_text import brief
 from lightpaint.errors import LightpaintError
 
-#: A test of a value, and the text of the expectation if it fails.
-Check = tuple[Callable[[Any], bool], str]
+
+@dataclass(frozen=True)
+class Check:
+    """A test of a value.
+
+    expectation: text of what was expected, for errors. schema: JSON schema of valid values; empty
+    for values that JSON does not have.
+    """
+
+    is_valid: Callable[[Any], bool]
+    expectation: str
+    schema: Mapping[str, Any] = field(default_factory=dict)
 
 
 #: More than any light emits, yet small enough for sums and products in float32.
@@ -51,16 +67,37 @@ def is_number(value: Any) -> bool:
     return isinstance(value, int | float) and not isinstance(value, bool)
 
 
-def check_fields(record: Any, expected: Mapping[str, Check]) -> None:
-    """Raise LightpaintError for the first field of a dataclass that is not as expected.
+@cache
+def checks_of(kind: Any) -> Mapping[str, Check]:
+    """Return the check of each field of a dataclass, as its annotation says it."""
+    hints = get_type_hints(kind, include_extras=True)
+    return {x.name: _check_of(hints[x.name]) for x in fields(kind)}
+
+
+def _check_of(hint: Any) -> Check:
+    if get_origin(hint) is Annotated:
+        [check] = (x for x in get_args(hint)[1:] if isinstance(x, Check))
+        return check
+    if get_origin(hint) in (UnionType, Union):  # of one kind and None
+        [hint] = (x for x in get_args(hint) if x is not NoneType)
+    if hint is bool:
+        return SWITCH
+    if get_origin(hint) is Literal:
+        return one_of(hint)
+    raise TypeError(f"{hint!r} does not say which values it takes")
+
+
+def check_fields(record: Any) -> None:
+    """Raise LightpaintError for the first field of a dataclass with a value that it does not take.
 
     A field that is None by default may be None.
     """
-    for field in fields(record):
-        value, (is_valid, expectation) = getattr(record, field.name), expected[field.name]
-        if not (is_valid(value) or (value is None and field.default is None)):
+    checks = checks_of(record.__class__)
+    for field_ in fields(record):
+        value, check = getattr(record, field_.name), checks[field_.name]
+        if not (check.is_valid(value) or (value is None and field_.default is None)):
             found = repr(value) if isinstance(value, int | float | str) else brief(value)
-            raise LightpaintError(f"{field.name} is {found}: expected {expectation}")
+            raise LightpaintError(f"{field_.name} is {found}: expected {check.expectation}")
 
 
 def whole(least: int, most: float = math.inf) -> Check:
@@ -70,7 +107,10 @@ def whole(least: int, most: float = math.inf) -> Check:
     def is_valid(value: Any) -> bool:
         return isinstance(value, Integral) and not _is_bool(value) and least <= int(value) <= most
 
-    return is_valid, f"a whole number >= {least}" + (f", at most {most}" if most < math.inf else "")
+    expectation, schema = f"a whole number >= {least}", {"type": "integer", "minimum": least}
+    if most == math.inf:
+        return Check(is_valid, expectation, schema)
+    return Check(is_valid, f"{expectation}, at most {most}", {**schema, "maximum": most})
 
 
 def number(about: str, *, may_be_zero: bool = False) -> Check:
@@ -81,7 +121,9 @@ def number(about: str, *, may_be_zero: bool = False) -> Check:
             return False
         return 0 < float(value) <= BRIGHTEST or (may_be_zero and value == 0)
 
-    return is_valid, f"{about} {'>= 0' if may_be_zero else '> 0'}, at most {BRIGHTEST:g}"
+    expectation = f"{about} {'>= 0' if may_be_zero else '> 0'}, at most {BRIGHTEST:g}"
+    least = {"minimum" if may_be_zero else "exclusiveMinimum": 0}
+    return Check(is_valid, expectation, {"type": "number", **least, "maximum": BRIGHTEST})
 
 
 def between(least: float, most: float, about: str) -> Check:
@@ -90,23 +132,33 @@ def between(least: float, most: float, about: str) -> Check:
     def is_valid(value: Any) -> bool:
         return isinstance(value, Real) and not _is_bool(value) and least <= float(value) < most
 
-    return is_valid, f"{about} of at least {least:g} and less than {most:g}"
+    expectation = f"{about} of at least {least:g} and less than {most:g}"
+    schema = {"type": "number", "minimum": least, "exclusiveMaximum": most}
+    return Check(is_valid, expectation, schema)
 
 
 def one_of(expectation: Any) -> Check:
     """Expect one of the words of a Literal."""
     words_known = get_args(expectation)
-    expected = " or ".join(map(repr, words_known))
-    return lambda value: isinstance(value, str) and value in words_known, expected
+    return Check(
+        lambda value: isinstance(value, str) and value in words_known,
+        " or ".join(map(repr, words_known)),
+        {"enum": [*words_known]},
+    )
 
 
 def a(kind: type, about: str) -> Check:
     """Expect anything of a type."""
-    return lambda value: isinstance(value, kind), about
+    schema = {"type": _JSON_TYPES[kind]} if kind in _JSON_TYPES else {}
+    return Check(lambda value: isinstance(value, kind), about, schema)
+
+
+#: Names of types in JSON.
+_JSON_TYPES = {str: "string", list: "array", dict: "object"}
 
 
 def _is_bool(value: Any) -> bool:
     return isinstance(value, bool)
 
 
-SWITCH: Check = (_is_bool, "True or False")
+SWITCH = Check(_is_bool, "True or False", {"type": "boolean"})

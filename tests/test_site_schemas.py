@@ -21,7 +21,6 @@ from lightpaint.batch.manifest.keys import (
     SEQUENCE_KEYS,
     SETTINGS,
 )
-from lightpaint.pipeline.job.settings import Settings
 from lightpaint.relit.export.fixtures import COLUMNS, fixtures_csv, fixtures_json
 from lightpaint.validation import Check
 
@@ -82,7 +81,7 @@ def tables() -> Iterator[tuple[Mapping[str, Check], list[str]]]:
     yield LOOK_KEYS, look
     yield SEQUENCE_KEYS, ["sequence", "items"]
     for top in (["defaults"], look):
-        yield {name: Settings.expected[name] for name in SETTINGS}, [*top, "settings"]
+        yield SETTINGS, [*top, "settings"]
         yield FINAL_KEYS, [*top, "render"]
         yield HANDOVER_KEYS, [*top, "export"]
 
@@ -95,7 +94,7 @@ def test_the_schema_of_a_manifest_expects_what_the_code_does(
     for name in path:
         schema = schema["items"] if name == "items" else schema["properties"][name]
     assert set(schema["properties"]) == set(keys)
-    for key, (is_valid, expectation) in keys.items():
+    for key, check in keys.items():
         validator = jsonschema.Draft202012Validator(schema["properties"][key])
         # Tables within have keys of their own, which other rows of this test try.
         is_table = isinstance(schema["properties"][key].get("additionalProperties"), bool)
@@ -106,7 +105,7 @@ def test_the_schema_of_a_manifest_expects_what_the_code_does(
             # JSON has one kind of numbers, of which 1.0 is a whole one.
             if isinstance(value, float) and value.is_integer():
                 continue
-            assert validator.is_valid(value) == bool(is_valid(value)), (key, value, expectation)
+            assert validator.is_valid(value) == bool(check.is_valid(value)), (key, value, check)
 
 
 @pytest.mark.parametrize("path", sorted((REPOSITORY / "scenes").glob("*/*looks*.toml")), ids=str)

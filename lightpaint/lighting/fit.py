@@ -1,8 +1,8 @@
 """Options of a fit: the measure of closeness, and the method that finds the closest lighting."""
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
-from typing import ClassVar, Literal, TypeVar
+from typing import Annotated, Literal, TypeVar
 
 from lightpaint.colour.display.exposure import choose_exposure
 from lightpaint.colour.display.view_transform import ViewTransform
@@ -10,7 +10,7 @@ from lightpaint.errors import LightpaintError, TargetError
 from lightpaint.keywords import keywords
 from lightpaint.lighting.algebra.optimum import Method
 from lightpaint.target.target import Target
-from lightpaint.validation import SWITCH, Check, a, check_fields, number, one_of
+from lightpaint.validation import a, check_fields, number
 
 #: The space of the comparison with the painting: light, or display values.
 Space = Literal["linear", "display"]
@@ -28,6 +28,8 @@ F = TypeVar("F", bound="Fit")
 #: Whether pixels with a visible emitter count: if alpha, mask or template mark them as painted,
 #: wherever they are painted, or never.
 Emitters = Literal["auto", "count", "skip"]
+
+_TRANSFORM = a(ViewTransform, "a ViewTransform, like ViewTransform('agx', 1.0)")
 
 
 @keywords()
@@ -68,24 +70,13 @@ class Fit:
     """
 
     space: Space | None = None
-    hold: float | None = None
+    hold: Annotated[float | None, number("a weight", may_be_zero=True)] = None
     colors: Colors | None = None
-    unpainted: float = 0.0
+    unpainted: Annotated[float, number("a weight", may_be_zero=True)] = 0.0
     literal: bool = False
     method: Method = "polished"
-    transform: ViewTransform | None = None
+    transform: Annotated[ViewTransform | None, _TRANSFORM] = None
     emitters: Emitters = "auto"
-
-    expected: ClassVar[Mapping[str, Check]] = {
-        "space": one_of(Space),
-        "hold": number("a weight", may_be_zero=True),
-        "colors": one_of(Colors),
-        "unpainted": number("a weight", may_be_zero=True),
-        "literal": SWITCH,
-        "method": one_of(Method),
-        "transform": a(ViewTransform, "a ViewTransform, like ViewTransform('agx', 1.0)"),
-        "emitters": one_of(Emitters),
-    }
 
     def reads_wishes(self, *, is_sketch: bool) -> bool:
         """Return whether wishes have contrasts, and the paint says which colours it means.
@@ -110,7 +101,7 @@ class Fit:
         return 1.0 if self.transform is None else float(4.0**self.transform.stops)
 
     def __post_init__(self) -> None:
-        check_fields(self, self.expected)
+        check_fields(self)
         if self.unpainted and self.hold:
             raise LightpaintError(
                 f"unpainted is {self.unpainted:g} and hold {self.hold:g}: expected one of them, "

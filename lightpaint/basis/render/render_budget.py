@@ -77,13 +77,13 @@ class Budget:
 
 def check_samples(*, seed: int, **counts: int | None) -> None:
     """Raise SceneError for numbers of samples per pixel, or a seed, that no render takes."""
-    is_seed, expected = whole(0)
-    if not is_seed(seed):
-        raise SceneError(f"seed is {brief(seed)}: expected {expected}")
-    is_count, expected = whole(0, MAX_SPP)
+    if not (check := whole(0)).is_valid(seed):
+        raise SceneError(f"seed is {brief(seed)}: expected {check.expectation}")
+    check = whole(0, MAX_SPP)
     for name, count in counts.items():
-        if count is not None and not is_count(count):
-            raise SceneError(f"{name} is {brief(count)}: expected {expected} samples per pixel")
+        if count is not None and not check.is_valid(count):
+            expected = f"{check.expectation} samples per pixel"
+            raise SceneError(f"{name} is {brief(count)}: expected {expected}")
 
 
 class Clock:

@@ -13,7 +13,7 @@ from lightpaint.pipeline.job.settings import Settings
 from lightpaint.relit.export_formats import FORMS
 from lightpaint.scene.properties.film import MAX_SPP, check_resolution
 from lightpaint.target.target_reader import Paint
-from lightpaint.validation import BRIGHTEST, MAX_LISTED, SWITCH, Check, a, one_of, whole
+from lightpaint.validation import BRIGHTEST, MAX_LISTED, SWITCH, Check, a, checks_of, one_of, whole
 
 #: Steps of a look; `lights` is the lighting and nothing else.
 Step = Literal["solve", "predict", "verify", "report", "render", "export", "lights"]
@@ -60,12 +60,29 @@ def _some_of(words: Iterable[str], *, or_none: bool = False) -> Check:
             return True
         return _texts(value) and set(value) <= set(allowed_words) and len(set(value)) == len(value)
 
-    return is_valid, f"a list of some of {', '.join(map(repr, allowed_words))}, each once"
+    expectation = f"a list of some of {', '.join(map(repr, allowed_words))}, each once"
+    items = {"enum": [*allowed_words]}
+    least = 0 if or_none else 1
+    schema = {"type": "array", "items": items, "minItems": least, "uniqueItems": True}
+    return Check(is_valid, expectation, schema)
 
 
-TEXT: Check = (lambda value: isinstance(value, str) and value != "", "a text")
-TEXTS: Check = (_texts, f'a list of texts, ["a", "b"], {MAX_LISTED} at most')
-TABLE: Check = a(dict, "a table")
+def _texts_by_name(about: str) -> Check:
+    """Return the check of a table of texts. about: the table."""
+    schema = {"type": "object", "additionalProperties": _TEXT_SCHEMA, "minProperties": 1}
+    return Check(_table_of(_is_text), about, schema)
+
+
+def _is_text(value: Any) -> bool:
+    return isinstance(value, str) and value != ""
+
+
+_TEXT_SCHEMA = {"type": "string", "minLength": 1}
+_TEXTS_SCHEMA = {"type": "array", "items": _TEXT_SCHEMA, "minItems": 1, "maxItems": MAX_LISTED}
+
+TEXT = Check(_is_text, "a text", _TEXT_SCHEMA)
+TEXTS = Check(_texts, f'a list of texts, ["a", "b"], {MAX_LISTED} at most', _TEXTS_SCHEMA)
+TABLE = a(dict, "a table")
 
 #: Keys for loading a scene or its replacement.
 SOURCE_KEYS: dict[str, Check] = {
@@ -73,23 +90,33 @@ SOURCE_KEYS: dict[str, Check] = {
     "basis": TEXT,
     "light_groups": TEXT,
     "pattern": TEXT,
-    "sensor": (
+    "sensor": Check(
         lambda v: isinstance(v, str | int) and not isinstance(v, bool) and v != "",
         "the id of a sensor, or its index",
+        {"anyOf": [_TEXT_SCHEMA, {"type": "integer"}]},
     ),
     "sensors": TEXTS,
-    "parameters": (_table_of(_is_plain), "a table of texts and numbers"),
+    "parameters": Check(
+        _table_of(_is_plain),
+        "a table of texts and numbers",
+        {
+            "type": "object",
+            "additionalProperties": {"type": ["string", "number", "boolean"]},
+            "minProperties": 1,
+        },
+    ),
     "variant": TEXT,
     "lights": TEXTS,
-    "groups": (_table_of(_texts), "a table of lists of names"),
+    "groups": Check(
+        _table_of(_texts),
+        "a table of lists of names",
+        {"type": "object", "additionalProperties": _TEXTS_SCHEMA, "minProperties": 1},
+    ),
     "lights_file": TEXT,
     "use_lights_file": SWITCH,
     "group_alike": SWITCH,
     "integrator": TEXT,
-    "split": (
-        _table_of(lambda v: isinstance(v, str) and v != ""),
-        'a table of sizes, { sky = "16x8" }',
-    ),
+    "split": _texts_by_name('a table of sizes, { sky = "16x8" }'),
     "symmetric": TEXTS,
     "map_size": TEXT,
 }
@@ -101,29 +128,28 @@ PAINTING_KEYS: dict[str, Check] = {
     "template": TEXT,
     "find_template": SWITCH,
     "view": TEXT,
-    "exposure": (_is_number, "a number of stops"),
+    "exposure": Check(_is_number, "a number of stops", {"type": "number"}),
     "paint": one_of(Paint),
 }
 
 #: Keys for constraints, settings and steps.
 REQUEST_KEYS: dict[str, Check] = {
-    "constraints": (
-        lambda v: isinstance(v, dict) or (isinstance(v, str) and v != ""),
-        "a table, or the path of a lights file",
+    "constraints": Check(
+        lambda v: isinstance(v, dict) or _is_text(v), "a table, or the path of a lights file"
     ),
     "settings": TABLE,
     "want": _some_of(get_args(Step)),
     "render": TABLE,
     "export": TABLE,
     "variations": _some_of(VARIATIONS, or_none=True),
-    "share": (lambda v: v in get_args(Share), '"places"'),
+    "share": Check(lambda v: v in get_args(Share), '"places"', {"enum": [*get_args(Share)]}),
 }
 
 #: Keys of which a look has exactly one.
 SUBJECT_KEYS: dict[str, Check] = {
     "painting": TEXT,
     "paintings": TEXTS,
-    "views": (_table_of(lambda v: isinstance(v, str) and v != ""), "a table, SENSOR = PAINTING"),
+    "views": _texts_by_name("a table, SENSOR = PAINTING"),
     "lighting": TEXT,
     "lightings": TEXTS,
 }
@@ -132,7 +158,7 @@ DEFAULT_KEYS: dict[str, Check] = {**SOURCE_KEYS, **PAINTING_KEYS, **REQUEST_KEYS
 LOOK_KEYS: dict[str, Check] = {"name": TEXT, **SUBJECT_KEYS, **DEFAULT_KEYS}
 SEQUENCE_KEYS: dict[str, Check] = {
     "name": TEXT,
-    "through": (_texts, "a list of names of looks"),
+    "through": Check(_texts, "a list of names of looks", _TEXTS_SCHEMA),
     "sensors": TEXTS,
     "frames": whole(2, MAX_FRAMES),
     "space": one_of(Space),
@@ -141,12 +167,13 @@ SEQUENCE_KEYS: dict[str, Check] = {
     "export": TABLE,
 }
 
-#: Fields of `Settings` that have no other place in a manifest or on the command line.
-SETTINGS = tuple(
-    name
-    for name in Settings.expected
+#: Fields of `Settings` that have no other place in a manifest or on the command line, with their
+#: checks.
+SETTINGS = {
+    name: check
+    for name, check in checks_of(Settings).items()
     if name not in ("transform", "command", "force", "verify", "report", "use_cache")
-)
+}
 
 
 @dataclass(frozen=True)
@@ -202,11 +229,11 @@ class Mistakes:
                 )
                 self.add(label, f"unknown key {key!r}{hint}")
                 continue
-            is_valid, expected = keys[key]
-            if is_valid(value):
+            if keys[key].is_valid(value):
                 valid.add(key)
             else:
-                self.add(label, f"{key} is {one_line(repr(value), limit=120)}: expected {expected}")
+                expected, found = keys[key].expectation, one_line(repr(value), limit=120)
+                self.add(label, f"{key} is {found}: expected {expected}")
         return valid
 
     def unclear_keys(
@@ -218,8 +245,7 @@ class Mistakes:
 
     def settings(self, table: Mapping[str, Any], label: str) -> dict[str, Any]:
         """Return the valid settings of a table, by name."""
-        keys = {name: Settings.expected[name] for name in SETTINGS}
-        valid = self.check_keys(table, keys, f"{label}, settings")
+        valid = self.check_keys(table, SETTINGS, f"{label}, settings")
         values = {name: value for name, value in table.items() if name in valid}
         try:
             Settings(**values)

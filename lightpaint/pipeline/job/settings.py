@@ -1,8 +1,7 @@
 """Settings of a solve, beyond scene and painting."""
 
-from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import ClassVar, TypedDict
+from typing import Annotated, TypedDict
 
 from lightpaint.errors import LightpaintError
 from lightpaint.keywords import keywords
@@ -11,7 +10,7 @@ from lightpaint.lighting.fit import Colors, Emitters, Fit, Space
 from lightpaint.scene.lights.texels.texel import MAX_TEXELS
 from lightpaint.scene.properties.film import MAX_SPP, check_resolution
 from lightpaint.scene.quality_presets import Quality, samples
-from lightpaint.validation import SWITCH, Check, a, between, number, one_of, whole
+from lightpaint.validation import a, between, number, whole
 
 #: Maximum number of rounds of rendering and solving again: a larger number is a typing error.
 MAX_REFINE = 100
@@ -85,52 +84,27 @@ class Settings(Fit):
     """
 
     resize: bool = False
-    spp: int | None = None
-    time_s: float | None = None
-    error: float | None = None
-    seed: int = 0
-    resolution: str | None = None
+    # The noise is estimated from two halves of the samples.
+    spp: Annotated[int | None, whole(2, MAX_SPP)] = None
+    time_s: Annotated[float | None, number("seconds")] = None
+    error: Annotated[float | None, between(MIN_ERROR, 1, "a share")] = None
+    seed: Annotated[int, whole(0)] = 0
+    resolution: Annotated[str | None, a(str, "a part of the film like '1/4' or '320x180'")] = None
     quality: Quality | None = None
     use_cache: bool = True
     exact_spp: bool = False
     noise_correction: bool | None = None
-    refine: int = 0
-    suggest: int = 0
-    sun: int | None = None
+    refine: Annotated[int, whole(0, MAX_REFINE)] = 0
+    suggest: Annotated[int, whole(0, MAX_SUGGEST)] = 0
+    sun: Annotated[int | None, whole(0, MAX_TEXELS)] = None
     move_lights: bool = True
     animate: bool = False
-    cd_per_unit: float | None = None
+    cd_per_unit: Annotated[float | None, number("cd/m²")] = None
     verify: bool = True
-    verify_spp: int | None = None
+    verify_spp: Annotated[int | None, whole(2, MAX_SPP)] = None
     report: bool = True
     force: bool = False
-    command: str = ""
-
-    expected: ClassVar[Mapping[str, Check]] = {
-        **Fit.expected,
-        "resize": SWITCH,
-        # The noise is estimated from two halves of the samples.
-        "spp": whole(2, MAX_SPP),
-        "time_s": number("seconds"),
-        "error": between(MIN_ERROR, 1, "a share"),
-        "seed": whole(0),
-        "resolution": a(str, "a part of the film like '1/4' or '320x180'"),
-        "quality": one_of(Quality),
-        "use_cache": SWITCH,
-        "exact_spp": SWITCH,
-        "noise_correction": SWITCH,
-        "refine": whole(0, MAX_REFINE),
-        "suggest": whole(0, MAX_SUGGEST),
-        "sun": whole(0, MAX_TEXELS),
-        "move_lights": SWITCH,
-        "animate": SWITCH,
-        "cd_per_unit": number("cd/m²"),
-        "verify": SWITCH,
-        "verify_spp": whole(2, MAX_SPP),
-        "report": SWITCH,
-        "force": SWITCH,
-        "command": a(str, "the text of a shell command"),
-    }
+    command: Annotated[str, a(str, "the text of a shell command")] = ""
 
     def __post_init__(self) -> None:
         super().__post_init__()
