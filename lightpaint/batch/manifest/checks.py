@@ -19,7 +19,7 @@ from lightpaint.lighting.constraints.constraints_file import read_constraints
 from lightpaint.pipeline.job.settings import Settings
 from lightpaint.pipeline.job.sources import GroupsFile
 from lightpaint.relit.export.usd import check_usd
-from lightpaint.relit.export_formats import FORMS
+from lightpaint.relit.formats.formats import FORMS
 
 #: Default steps of a look that is solved, and of a given lighting or a frame.
 SOLVE_STEPS, GIVEN_LIGHTING_STEPS = ("solve", "predict", "verify", "report"), ("predict",)
@@ -132,10 +132,10 @@ def check_handover(mistakes: Mistakes, label: str, handover: Handover, entry: An
     """Add exports that a look cannot have to the mistakes. entry: one of its looks."""
     has_groups = isinstance(entry.basis, GroupsFile)
     for form in handover.to:
-        if FORMS[form][has_groups] is None:
+        if has_groups and FORMS[form].file_of_groups is None:
             requirement = "a scene, and no light groups"
             mistakes.add(f"{label}, export", f"{form!r} is of {requirement}: leave it out")
-        elif not has_groups and not entry.scenes and form not in ("csv", "json"):
+        elif not has_groups and not entry.scenes and FORMS[form].needs_source:
             mistakes.add(f"{label}, export", f"{form!r} needs the scene: give scene = ...")
     if handover.stage and "usd" in handover.to and not Path(handover.stage).is_file():
         mistakes.add(f"{label}, export", f"stage: no such file: {handover.stage}")

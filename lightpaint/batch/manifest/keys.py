@@ -10,7 +10,7 @@ from lightpaint.batch.manifest.variations import VARIATIONS
 from lightpaint.errors import LightpaintError
 from lightpaint.files import one_line
 from lightpaint.pipeline.job.settings import Settings
-from lightpaint.relit.export_formats import FORMS
+from lightpaint.relit.formats.formats import FORMS
 from lightpaint.scene.properties.film import MAX_SPP, check_resolution
 from lightpaint.target.target_reader import Paint
 from lightpaint.validation import BRIGHTEST, MAX_LISTED, SWITCH, Check, a, checks_of, one_of, whole

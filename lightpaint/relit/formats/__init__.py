@@ -1,0 +1,1 @@
+"""The formats in which an answer can be exported, a class each."""
