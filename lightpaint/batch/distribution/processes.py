@@ -25,7 +25,7 @@ TOO_LONG_TEXT = "it took longer than {limit_s:g} s: allow more time, or take few
 
 
 @dataclass(frozen=True)
-class _Run:
+class _ItemRun:
     """A run of an item. slot: number of the process that does it. begin_s: when it was sent."""
 
     item: WorkItem
@@ -60,11 +60,11 @@ class Processes:
         """Run the items; see `Engine`."""
         queue, free_slots = deque(items), list(reversed(range(self.workers)))
         try_counts: Counter[str] = Counter()
-        runs: dict[Future[ItemResult], _Run] = {}
+        runs: dict[Future[ItemResult], _ItemRun] = {}
         try:
             while queue or runs:
                 while queue and free_slots:
-                    run = _Run(queue.popleft(), free_slots.pop(), time.monotonic())
+                    run = _ItemRun(queue.popleft(), free_slots.pop(), time.monotonic())
                     runs[self._begin(run)] = run
                 finished, _ = wait(runs, self._wait_s(runs.values()), FIRST_COMPLETED)
                 for future in finished or self._overdue(runs):
@@ -83,7 +83,7 @@ class Processes:
             self._kill(self._pools)
             raise
 
-    def _begin(self, run: _Run) -> "Future[ItemResult]":
+    def _begin(self, run: _ItemRun) -> "Future[ItemResult]":
         """Send an item to the process of its slot."""
         if run.slot not in self._pools:
             threads = max(1, (os.cpu_count() or 1) // self.workers)
@@ -97,7 +97,7 @@ class Processes:
         self._listen.at_work(_label(run), item_label(run.item))
         return self._pools[run.slot].submit(_run_item, run.item)
 
-    def _end(self, run: _Run, future: "Future[ItemResult]") -> ItemResult | None:
+    def _end(self, run: _ItemRun, future: "Future[ItemResult]") -> ItemResult | None:
         """Return the result of an item that is finished or overdue; None if its process died."""
         try:
             if future.done():
@@ -112,13 +112,13 @@ class Processes:
         finally:
             self._listen.at_work(_label(run), None)
 
-    def _wait_s(self, runs: Iterable[_Run]) -> float | None:
+    def _wait_s(self, runs: Iterable[_ItemRun]) -> float | None:
         """Return the seconds until the first item is overdue; None without a limit."""
         if self._limit_s is None:
             return None
         return max(0.0, min(run.begin_s for run in runs) + self._limit_s - time.monotonic())
 
-    def _overdue(self, runs: Mapping["Future[ItemResult]", _Run]) -> list["Future[ItemResult]"]:
+    def _overdue(self, runs: Mapping["Future[ItemResult]", _ItemRun]) -> list["Future[ItemResult]"]:
         now_s, limit_s = time.monotonic(), self._limit_s or 0.0
         return [future for future, run in runs.items() if now_s - run.begin_s >= limit_s]
 
@@ -134,7 +134,7 @@ class Processes:
             worker.join()
 
 
-def _label(run: _Run) -> str:
+def _label(run: _ItemRun) -> str:
     return f"worker {run.slot + 1}"
 
 

@@ -165,7 +165,7 @@ class Server:
         return f"{self.address.local_url}#token={self._guard.one_time_token()}"
 
     def follow_identity(self) -> None:
-        """Let messages be as large as the views of the store, which has just learnt them."""
+        """Accept messages as large as the views of the store, which has just learnt them."""
         if self._uvicorn is not None:
             self._uvicorn.config.ws_max_size = self._max_message_bytes
 

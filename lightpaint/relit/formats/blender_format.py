@@ -3,7 +3,7 @@
 from lightpaint.relit.export.exports import blender_script
 from lightpaint.relit.export.scene_script import scene_script
 from lightpaint.relit.export.sky_maps import SkyMap
-from lightpaint.relit.formats.export_format import Export, ExportFormat, Writer
+from lightpaint.relit.formats.export_format import ExportContext, ExportFormat, Writer
 from lightpaint.relit.light_maps import SlideImage, WallImage
 from lightpaint.relit.xml_patch import emitters_of
 
@@ -14,7 +14,7 @@ class BlenderFormat(ExportFormat):
     name, file, file_of_groups = "blender", "set_scene.py", "set_lights.py"
     refers_to_maps = True
 
-    def of_scene(self, export: Export) -> Writer:
+    def of_scene(self, export: ExportContext) -> Writer:
         """Return the writer of the script for lights."""
         lighting, scene, maps = export.lighting, export.source.scene, export.maps
         assert scene is not None
@@ -28,7 +28,7 @@ class BlenderFormat(ExportFormat):
             slides={one.name: (one.file, one.position, one.axes, one.half_size) for one in slides},
         )
 
-    def of_groups(self, export: Export) -> Writer:
+    def of_groups(self, export: ExportContext) -> Writer:
         """Return the writer of the script for light groups."""
         groups = export.source.light_groups
         assert groups is not None

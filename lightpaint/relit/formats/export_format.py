@@ -41,8 +41,8 @@ class Source:
 
 
 @dataclass(frozen=True)
-class Export:
-    """An answer on its way into files.
+class ExportContext:
+    """The answer that is exported, its source, and where its files go.
 
     folder: folder of the files. listen: receives remarks on what a format leaves out. maps: of
     image lights, which are files beside these.
@@ -71,15 +71,15 @@ class ExportFormat(ABC):
     name: str
     file: str
     file_of_groups: str | None = None
-    needs_source = True
-    refers_to_maps = False
-    keeps_lighting = False
+    needs_source: bool = True
+    refers_to_maps: bool = False
+    keeps_lighting: bool = False
 
     @abstractmethod
-    def of_scene(self, export: Export) -> Writer:
+    def of_scene(self, export: ExportContext) -> Writer:
         """Return the writer for the lights of a scene."""
 
-    def of_groups(self, export: Export) -> Writer:
+    def of_groups(self, export: ExportContext) -> Writer:
         """Return the writer for the multipliers of light groups."""
         raise NotImplementedError(self.name)
 

@@ -17,7 +17,7 @@ from lightpaint.lighting.answer.lighting import Lighting
 from lightpaint.progress import Listener
 from lightpaint.relit.export.colors import with_own_colors
 from lightpaint.relit.formats.blender_format import BlenderFormat
-from lightpaint.relit.formats.export_format import AnyMap, Export, ExportFormat, Source
+from lightpaint.relit.formats.export_format import AnyMap, ExportContext, ExportFormat, Source
 from lightpaint.relit.formats.nuke_format import NukeFormat
 from lightpaint.relit.formats.plain_formats import CsvFormat, JsonFormat, MitsubaFormat
 from lightpaint.relit.formats.usd_format import UsdFormat
@@ -62,7 +62,7 @@ def writers_of(
     if not all(FORMS[form].keeps_lighting for form in names):
         elsewhere, remark = _exported(lighting, source)
     maps = _maps(names, elsewhere, source)
-    export = Export(elsewhere, source, folder, listen, maps)
+    export = ExportContext(elsewhere, source, folder, listen, maps)
     writers: dict[str, Callable[[], str | Floats]] = {}
     for form, name in names.items():
         format_ = FORMS[form]
@@ -113,7 +113,7 @@ def _exported(lighting: Lighting, source: Source) -> tuple[Lighting, str]:
     )
 
 
-def _check_groups(export: Export) -> None:
+def _check_groups(export: ExportContext) -> None:
     """Raise LightpaintError for light groups that the lighting is not of, or not of all frames."""
     lighting, groups = export.lighting, export.source.light_groups
     assert groups is not None

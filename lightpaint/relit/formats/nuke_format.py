@@ -4,7 +4,7 @@ from lightpaint.display_text import some_names
 from lightpaint.errors import OutputError
 from lightpaint.relit.export.nuke import needs_copy, nuke_script, spoken_unreadable
 from lightpaint.relit.export.nuke_lights import nuke_lights
-from lightpaint.relit.formats.export_format import Export, ExportFormat, Writer
+from lightpaint.relit.formats.export_format import ExportContext, ExportFormat, Writer
 from lightpaint.relit.rig_lights import rig_lights
 
 
@@ -17,7 +17,7 @@ class NukeFormat(ExportFormat):
         "or light_groups=... for multipliers of their layers"
     )
 
-    def of_scene(self, export: Export) -> Writer:
+    def of_scene(self, export: ExportContext) -> Writer:
         """Return the writer of the lights, which says which of them Nuke lacks."""
         lighting, scene = export.lighting, export.source.scene
         assert scene is not None
@@ -32,7 +32,7 @@ class NukeFormat(ExportFormat):
 
         return write
 
-    def of_groups(self, export: Export) -> Writer:
+    def of_groups(self, export: ExportContext) -> Writer:
         """Return the writer of the multipliers."""
         groups = export.source.light_groups
         assert groups is not None

@@ -1,7 +1,7 @@
 """Tables of fixtures for any lighting, and the patch of a scene of Mitsuba."""
 
 from lightpaint.relit.export.fixtures import fixtures_csv, fixtures_json
-from lightpaint.relit.formats.export_format import Export, ExportFormat, Writer
+from lightpaint.relit.formats.export_format import ExportContext, ExportFormat, Writer
 from lightpaint.relit.xml_patch import scene_patch
 
 
@@ -11,7 +11,7 @@ class CsvFormat(ExportFormat):
     name, file, file_of_groups = "csv", "fixtures.csv", "fixtures.csv"
     needs_source = False
 
-    def of_scene(self, export: Export) -> Writer:
+    def of_scene(self, export: ExportContext) -> Writer:
         """Return the writer of the table."""
         return lambda: fixtures_csv(export.lighting)
 
@@ -24,7 +24,7 @@ class JsonFormat(ExportFormat):
     name, file, file_of_groups = "json", "fixtures.json", "fixtures.json"
     needs_source = False
 
-    def of_scene(self, export: Export) -> Writer:
+    def of_scene(self, export: ExportContext) -> Writer:
         """Return the writer of the table."""
         return lambda: fixtures_json(export.lighting)
 
@@ -37,7 +37,7 @@ class MitsubaFormat(ExportFormat):
     name, file = "mitsuba", "relit.patch"
     keeps_lighting = True
 
-    def of_scene(self, export: Export) -> Writer:
+    def of_scene(self, export: ExportContext) -> Writer:
         """Return the writer of the patch."""
         scene = export.source.scene
         assert scene is not None

@@ -9,7 +9,7 @@ from lightpaint.lighting.answer.lighting import Lighting
 from lightpaint.relit.export.sky_maps import SkyMap
 from lightpaint.relit.export.usd import check_usd, usd_overrides
 from lightpaint.relit.export.usd_groups import usd_multipliers
-from lightpaint.relit.formats.export_format import Export, ExportFormat, Source, Writer
+from lightpaint.relit.formats.export_format import ExportContext, ExportFormat, Source, Writer
 from lightpaint.relit.light_maps import SlideImage, WallImage
 from lightpaint.relit.xml_patch import emitters_of
 
@@ -33,7 +33,7 @@ class UsdFormat(ExportFormat):
             )
         return name
 
-    def of_scene(self, export: Export) -> Writer:
+    def of_scene(self, export: ExportContext) -> Writer:
         """Return the writer of the layer, and say which images USD has no light for."""
         scene, maps = export.source.scene, export.maps
         assert scene is not None
@@ -50,13 +50,13 @@ class UsdFormat(ExportFormat):
         panels = {wall.name: wall.file for wall in walls if wall.is_rectangle}
         return lambda: _layer(export, emitters, skies, panels)
 
-    def of_groups(self, export: Export) -> Writer:
+    def of_groups(self, export: ExportContext) -> Writer:
         """Return the writer of a layer with multipliers."""
         return lambda: _layer_of_groups(export)
 
 
 def _layer(
-    export: Export,
+    export: ExportContext,
     emitters: Sequence[tuple[str, str, RGB]],
     skies: Mapping[str, str],
     panels: Mapping[str, str],
@@ -88,7 +88,7 @@ def _layer(
     return overridden.text
 
 
-def _layer_of_groups(export: Export) -> str:
+def _layer_of_groups(export: ExportContext) -> str:
     """Return a layer with these multipliers, and say which lights its stage lacks."""
     source, lighting = export.source, export.lighting
     assert source.stage is not None
