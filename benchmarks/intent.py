@@ -1,6 +1,6 @@
 """How well an answer guesses what somebody meant, who painted it the way people paint.
 
-    python benchmarks/intent.py [--scenes gallery stage cornell] [--styles spot blob all full]
+    python benchmarks/intent.py [--scenes gallery stage cornell] [--styles spot blob all full core]
                                 [--cases 12] [--first 0] [--settings literal default ...] [--clean]
                                 [--few 2 4]
     python benchmarks/intent.py --loosen [--scenes ...] [--styles ...] [--cases ...] [--first ...]
@@ -10,8 +10,13 @@ down, most of them warmer or cooler, in a quarter of the cases everything else d
 stops. Painted is only part of what that would do, and not exactly: the look times 2^(log ratio),
 blurred, its strength wrong by a factor of 0.75 to 1.35, its hue off by 0.15 stops, with soft edges,
 in 8 bits. Styles: `spot`, only the strongest part of the strongest region; `blob`, that region;
-`all`, whatever changes clearly; `full`, the whole picture. Judged is the whole picture, painted or
-not: mean CIEDE2000 between the answer and what was meant, at the exposure of the painting.
+`all`, whatever changes clearly; `full`, the whole picture; `core`, the pixels of the strongest
+change in `all` that have a third of it together: the bright middle of a pool of light. Judged is
+the whole picture, painted or not: mean CIEDE2000 between the answer and what was meant, at the
+exposure of the painting.
+
+`off` counts lamps that an answer turns off, or down by two stops, though they were meant to stay as
+they are or become brighter: lamps below 5 % and below a quarter of their present luminance.
 
 Harm is how much worse than a lighting with nothing painted a case is at most. `now` is the current
 lighting; `unpainted` is what the same settings give with nothing painted. Only whites differ in it:
@@ -61,7 +66,15 @@ SPP = 256
 #: Of what no hold would bring, what a weaker one is to bring.
 SHARES = (0.3, 0.5, 0.7, 0.9)
 
-STYLES = ("spot", "blob", "all", "full")
+#: In this order: the number of a style chooses its cases.
+STYLES = ("spot", "blob", "all", "full", "core")
+
+#: Share of the visible change that a core has.
+CORE_SHARE = 1 / 3
+
+#: Shares of its present luminance below which a lamp is off, and down, and from which on it was
+#: meant to stay.
+OFF, DOWN, STAYING = 0.05, 0.25, 0.99
 
 #: What is tried; the first is the paper's own reading, the last what nobody has to ask for.
 SETTINGS: dict[str, dict[str, Any]] = {
@@ -82,11 +95,16 @@ Errors = dict[str, list[float]]
 
 @dataclass(frozen=True)
 class Case:
-    """What was meant and how it was painted. meant, current: (h, w, 3) linear."""
+    """What was meant and how it was painted.
+
+    meant, current: (h, w, 3) linear. kept: (n,), the luminance of each lamp that was meant,
+    relative to its present one.
+    """
 
     meant: np.ndarray
     current: np.ndarray
     target: lp.Target
+    kept: np.ndarray
 
     def judged(self, image: np.ndarray) -> float:
         """Mean ΔE of a picture against what was meant, as the display shows both."""
@@ -153,12 +171,16 @@ def main() -> None:
             if own != idle_errors:
                 row(f"nothing, {setting}", own, idle_errors, own)
             start_s = time.perf_counter()
-            errors = {
-                style: [x.judged(answer(basis, x, SETTINGS[setting])) for x in cases_of_style]
+            answers = {
+                style: [weights(basis, x, SETTINGS[setting]) for x in cases_of_style]
                 for style, cases_of_style in cases.items()
             }
-            taken_s = time.perf_counter() - start_s
-            row(setting, errors, idle_errors, own, taken_s / (options.cases * len(cases)))
+            taken_s = (time.perf_counter() - start_s) / (options.cases * len(cases))
+            errors = {
+                style: [x.judged(basis.mix(w)) for x, w in zip(cases[style], found, strict=True)]
+                for style, found in answers.items()
+            }
+            row(setting, errors, idle_errors, own, taken_s, darkened(basis, cases, answers))
         for spp in options.few:
             few = obtain_basis(scene, spp=spp, seed=1, use_cache=False)
             errors = {
@@ -219,12 +241,19 @@ def loosened(name: str, options: argparse.Namespace) -> None:
 def head(styles: Collection[str]) -> None:
     """Print the heads of the columns of `row`."""
     columns = "".join(f"{style:>14s}" for style in styles)
-    print(f"{'':22s}{columns}{'mean':>8s}   harm: now unpainted{'s':>6s}")
+    print(f"{'':22s}{columns}{'mean':>8s}   harm: now unpainted{'s':>6s}   off, down")
 
 
-def row(name: str, errors: Errors, present: Errors, own: Errors, taken_s: float = 0) -> None:
+def row(
+    name: str,
+    errors: Errors,
+    present: Errors,
+    own: Errors,
+    taken_s: float = 0,
+    lamps: tuple[int, int] | None = None,
+) -> None:
     """Print a line: errors by style, their mean, and how much worse than either lighting with
-    nothing painted a case is at most.
+    nothing painted a case is at most. lamps: see `darkened`.
     """
     columns = "".join(f"{np.mean(x):8.2f} {max(x):5.1f}" for x in errors.values())
     mean = np.mean([np.mean(x) for x in errors.values()])
@@ -233,7 +262,24 @@ def row(name: str, errors: Errors, present: Errors, own: Errors, taken_s: float 
         for baseline in (present, own)
     )
     harm_text = "".join(f"{x:10.2f}" for x in harm)
-    print(f"{name:22s}{columns}{mean:8.2f}  {harm_text}{taken_s:6.2f}", flush=True)
+    lamps_text = "" if lamps is None else f"{lamps[0]:6d}{lamps[1]:6d}"
+    print(f"{name:22s}{columns}{mean:8.2f}  {harm_text}{taken_s:6.2f}{lamps_text}", flush=True)
+
+
+def darkened(
+    basis: lp.Basis, cases: Mapping[str, Sequence[Case]], answers: Mapping[str, Sequence[Any]]
+) -> tuple[int, int]:
+    """Return how many lamps that were meant to stay or be brighter are off, and down.
+
+    answers: weights (n, 3) for each case.
+    """
+    counts = [0, 0]
+    for style, found in answers.items():
+        for case, w in zip(cases[style], found, strict=True):
+            stays = case.kept >= STAYING
+            for k, level in enumerate((OFF, DOWN)):
+                counts[k] += int((stays & (levels(basis, w) < level)).sum())
+    return counts[0], counts[1]
 
 
 def judged_alike(cases: Mapping[str, Sequence[Case]], image: np.ndarray) -> Errors:
@@ -290,9 +336,9 @@ def painted(
     is_clean: whether it is painted over the denoised look.
     """
     current = basis.mix(basis.current_weights)
-    intended, ratio = next(
-        (image, ratio)
-        for _, image, ratio in intentions(basis, current, rng)
+    weights, intended, ratio = next(
+        (weights, image, ratio)
+        for weights, image, ratio in intentions(basis, current, rng)
         if (np.abs(ratio).max(axis=-1) > 0.5).mean() > 0.005
     )
     soft = basis.size[1] / 80
@@ -317,7 +363,12 @@ def painted(
         through_view=True,
         over_look=True,
     )
-    return Case(intended, current, target)
+    return Case(intended, current, target, levels(basis, weights))
+
+
+def levels(basis: lp.Basis, weights: np.ndarray) -> np.ndarray:
+    """Return the luminance (n,) of lamps of weights (n, 3), relative to the present one."""
+    return np.asarray(luminance(weights) / np.maximum(luminance(basis.current_weights), 1e-12))
 
 
 def over_lamp(basis: lp.Basis, rng: np.random.Generator) -> Case | None:
@@ -356,7 +407,7 @@ def over_lamp(basis: lp.Basis, rng: np.random.Generator) -> Case | None:
         through_view=True,
         over_look=True,
     )
-    return Case(intended, current, target)
+    return Case(intended, current, target, levels(basis, weights))
 
 
 def intentions(
@@ -383,11 +434,22 @@ def intentions(
 
 def region(strong: np.ndarray, style: str) -> np.ndarray:
     """(h, w) bool, where somebody paints who sees a change of so many stops, (h, w)."""
+    visible = strong > max(0.35, 0.25 * strong.max())
     if style == "all":
-        return strong > max(0.35, 0.25 * strong.max())
+        return visible
+    if style == "core":
+        return core(strong, visible)
     parts, count = label(strong > (0.5 if style == "blob" else 0.75) * strong.max())
     sums = [strong[parts == k].sum() for k in range(1, count + 1)]
     return parts == 1 + int(np.argmax(sums))
+
+
+def core(strong: np.ndarray, visible: np.ndarray) -> np.ndarray:
+    """(h, w) bool, the pixels of the strongest change that have a third of all that is visible."""
+    descending = np.sort(strong[visible])[::-1]
+    amounts = np.cumsum(descending)
+    least = descending[np.searchsorted(amounts, CORE_SHARE * amounts[-1])]
+    return visible & (strong >= least)
 
 
 if __name__ == "__main__":

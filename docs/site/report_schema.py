@@ -50,7 +50,7 @@ def report_schema() -> Schema:
             **_all(_AMOUNT, "delta_e", "noise", "asked", "share_met"),
             region=region,
             object=_TEXT,
-            **_all(_TEXTS, "held", "held_by_views"),
+            **_all(_TEXTS, "held", "held_by_views", "compensating"),
             reasons=_list(_reason(elsewhere)),
             elsewhere=elsewhere,
             lit_delta_e=_AMOUNT,

@@ -45,6 +45,7 @@ class LinearProblem:
     fit: Fit
     expected: ExpectedLights | None
     contrast: NormalEquations | None
+    restraint: NormalEquations | None
     tether: NormalEquations | None
 
     if TYPE_CHECKING:  # properties of one kind of problem, fields of the other
@@ -117,8 +118,8 @@ class LinearProblem:
 
     @cached_property
     def pull(self) -> NormalEquations | None:
-        """The penalty for leaving the current lighting, its colours, the contrasts or the
-        lights at other frames; None if there is none.
+        """The penalty for leaving the current lighting, its colours, the contrasts, unpainted parts
+        or the lights at other frames; None if there is none.
         """
         prior = image_prior(self.lights, self.power, self.fit, self.painted_share, self.expected)
         pull = weight_pull(
@@ -137,7 +138,8 @@ class LinearProblem:
             near=self.constraints.near,
             painted_share=self.painted_share,
         )
-        pulls = [x for x in (pull, near, prior, self.contrast, self.tether) if x is not None]
+        terms = (pull, near, prior, self.contrast, self.restraint, self.tether)
+        pulls = [x for x in terms if x is not None]
         return reduce(add, pulls) if pulls else None
 
     def with_pull(self, equations: NormalEquations) -> NormalEquations:
@@ -181,6 +183,7 @@ class SummedProblem(LinearProblem):
     noise_removed: float = 0.0
     expected: ExpectedLights | None = None
     contrast: NormalEquations | None = None
+    restraint: NormalEquations | None = None
     tether: NormalEquations | None = None
 
     __repr__ = short_repr

@@ -36,6 +36,7 @@ from lightpaint.lighting.loss.painting import (
     target_light,
     unpainted_weight_of,
 )
+from lightpaint.lighting.loss.weight_penalty import restrain_lights
 from lightpaint.lighting.normal_equations import NormalEquations
 from lightpaint.lighting.round_off import remove_traces
 from lightpaint.lighting.unknowns.gamuts import Gamuts, PaintedLight
@@ -86,6 +87,8 @@ class Problem(LinearProblem):
         expected: The lights that the paintings let one expect, where lights keep to them; None
             where they may take any colour.
         contrast: The term that keeps the contrasts between wishes; None without one.
+        restraint: The price of what each light by itself does to unpainted parts; None without a
+            hold.
         block_side: Pixels along the side of the blocks behind `corrected`; 1 for single pixels.
         tether: A further pull on the weights, to those at other frames of a shot; None without.
 
@@ -110,6 +113,7 @@ class Problem(LinearProblem):
     refinement: Refinement | None = None
     expected: ExpectedLights | None = None
     contrast: NormalEquations | None = None
+    restraint: NormalEquations | None = None
     block_side: int = 1
     tether: NormalEquations | None = None
 
@@ -308,7 +312,7 @@ def whites_for(expected: ExpectedLights | None, fit: Fit) -> WhiteLimits | None:
 
 
 def _wash_fields(views: Views, fit: Fit, own: Doubles) -> dict[str, Any]:
-    """Return what a sketch lets one expect, and its contrasts, as fields of a problem."""
+    """Return what a sketch lets one expect, and its terms of the loss, as fields of a problem."""
     reads_wishes = fit.reads_wishes(is_sketch=_are_sketches(views))
     if not (reads_wishes or fit.colors == "white"):
         return {}
@@ -316,8 +320,12 @@ def _wash_fields(views: Views, fit: Fit, own: Doubles) -> dict[str, Any]:
     if not reads_wishes:
         return {"expected": expected_for(views, fit, own, wash)}
     strength = sum(float(x.importance.sum(dtype=np.float64)) for x in views.targets)
-    contrast = contrast_term(contrast_rows(wash, fit.transform), strength)
-    return {"expected": expected_for(views, fit, own, wash), "contrast": contrast}
+    unpainted = unpainted_weight_of(views, fit)
+    return {
+        "expected": expected_for(views, fit, own, wash),
+        "contrast": contrast_term(contrast_rows(wash, fit.transform), strength),
+        "restraint": restrain_lights(wash, own, fit.transform, unpainted=unpainted),
+    }
 
 
 def _are_sketches(views: Views) -> bool:

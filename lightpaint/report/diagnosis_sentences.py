@@ -35,7 +35,7 @@ def error_sentences(
     *,
     holds: Sequence[str] | None = None,
 ) -> list[str]:
-    """Return at most four sentences on why it does not look like the painting, the main one first.
+    """Return at most five sentences on why it does not look like the painting, the main one first.
 
     appearance: the result of `compare_appearance`, whose reasons go before single bounds. holds:
     instead of the sentences of `bound_sentences`.
@@ -80,26 +80,48 @@ def hold_clause(appearance: Appearance | None) -> str:
 def bound_sentences(
     diagnosis: Diagnosis, appearance: Appearance | None = None, *, any_color: str = ANY_COLOR
 ) -> list[str]:
-    """Return at most two sentences on limits of the lights, the most important first.
+    """Return at most two sentences on limits of the lights, the most important first, and one on
+    lights that are down for unpainted parts alone.
 
     appearance: the result of `compare_appearance`; its reasons come with their shares, and single
     bounds only without reasons. any_color: how to allow any colour.
     """
+    compensating = () if appearance is None else appearance.compensating_lights
+    down = compensation_sentences(compensating)
     if appearance is not None and appearance.reasons:
         about = spoken_about(appearance)
         sentences = [
             spoken_cause(reason, any_color=any_color, about=about) for reason in appearance.reasons
         ]
-        return [sentence for sentence in sentences if sentence][:2]
+        return [sentence for sentence in sentences if sentence][:2] + down
     d = diagnosis
-    most = [bound for bound in d.bounds[:1] if d.gain_share(bound) >= MIN_SHARE]
+    most = [
+        bound
+        for bound in d.bounds[:1]
+        if d.gain_share(bound) >= MIN_SHARE and not set(bound.lights) <= set(compensating)
+    ]
     to_switch_on = [
         bound
         for bound in d.bounds
         if bound.is_switched_off and d.gain_share(bound) >= MIN_SWITCHED_OFF_SHARE
     ]
     bounds = dict.fromkeys([*most, *to_switch_on[:1]])
-    return [spoken_bound(bound, d.gain_share(bound)) for bound in bounds]
+    return [spoken_bound(bound, d.gain_share(bound)) for bound in bounds] + down
+
+
+def compensation_sentences(names: Sequence[str]) -> list[str]:
+    """Return a sentence on lights that are down for unpainted parts alone, and on what helps.
+
+    names: see `Appearance.compensating_lights`; none for no sentence.
+    """
+    if not names:
+        return []
+    is_one = len(names) == 1
+    return [
+        f"{spoken_lights(names, start=True)} {'is' if is_one else 'are'} off or nearly off only "
+        "because unpainted parts are held, and other lights would brighten them: paint what "
+        f"{'it lights, or lock it' if is_one else 'they light, or lock them'}."
+    ]
 
 
 #: Clauses on constraints and their release: for one light, and for several.

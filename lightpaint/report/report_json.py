@@ -148,6 +148,7 @@ def _appearance(appearance: Appearance) -> dict[str, Any]:
         "held_by_views": appearance.limiting_views or None,
         "reasons": [_reason(reason) for reason in appearance.reasons] or None,
         "elsewhere": _unpainted(appearance.unpainted_change),
+        "compensating": appearance.compensating_lights or None,
         "lit_delta_e": appearance.lit_delta_e,
         "wishes": [_wish(delivery) for delivery in appearance.deliveries] or None,
     }

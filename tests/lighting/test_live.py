@@ -135,18 +135,19 @@ def test_undoing_a_stroke_gives_back_the_bits(make_basis: Any) -> None:
     assert stroke.M.tobytes() != before.M.tobytes()
 
 
-@pytest.mark.parametrize("views", [1, 2])
+@pytest.mark.parametrize("count", [1, 2])
 @pytest.mark.parametrize("fit", [{"hold": 1.0}, {"unpainted": 0.1, "colors": "free"}])
 @pytest.mark.parametrize(
     "words", [{}, {"light 1": {"lock": True}}, {"light 0": {"limits": {"max": "40%"}}}]
 )
 def test_the_answer_under_a_brush_is_that_of_a_solve(
-    make_basis: Any, words: dict[str, Any], fit: dict[str, Any], views: int
+    make_basis: Any, words: dict[str, Any], fit: dict[str, Any], count: int
 ) -> None:
     constraints = Constraints.of(light=words)
-    brushes = _paint_views(make_basis, 5, views, 0)
+    brushes = _paint_views(make_basis, 5, count, 0)
     resolved_fit = _resolve_fit([brush.target for brush in brushes], space="linear", **fit)
-    live = LiveSolver([brush.view for brush in brushes], fit=resolved_fit, constraints=constraints)
+    views = [brush.view for brush in brushes]
+    live = LiveSolver(views, fit=resolved_fit, constraints=constraints, is_sketch=True)
     rng, answer = np.random.default_rng(3), brushes[0].basis.current_weights
     for _ in range(4):
         for brush in brushes:
@@ -155,6 +156,7 @@ def test_the_answer_under_a_brush_is_that_of_a_solve(
     targets = [brush.target for brush in brushes]
     bases = [brush.basis for brush in brushes]
     problem = Problem.of(bases, targets, constraints=constraints, fit=resolved_fit)
+    assert problem.restraint is not None
     # Of one convex problem, whose sums agree in single precision.
     np.testing.assert_allclose(live.answer(answer), solution_of(problem).weights, atol=2e-5)
 

@@ -23,6 +23,7 @@ from lightpaint.pipeline.results.results import Look
 from lightpaint.report.answer_pictures import spoken_view
 from lightpaint.report.diagnosis_sentences import (
     bound_sentences,
+    compensation_sentences,
     error_sentences,
     spoken_about,
     spoken_cause,
@@ -89,15 +90,16 @@ def _sentences(look: Look, table: Table) -> list[str]:
     """
     choice = closer_choice(look.analysis.color_choices)
     closer = [f"Other colours come closer: --colors {choice}."] if choice else []
-    limits = _limit_sentences(look)
+    limits, appearance = _limit_sentences(look), look.analysis.appearance
+    down = compensation_sentences(appearance.compensating_lights)
     if table == "short":
-        limits = [] if look.analysis.appearance.is_close else limits[:1]
+        limits = [] if appearance.is_close else limits[:1]
         # One line offers other colours, the one that says which light turns.
         if closer and any("--colors free" in sentence for sentence in map(spoken, limits)):
             limits = []
-        return [*limits, *closer]
+        return [*limits, *down, *closer]
     sentences = [
-        *error_sentences(look.diagnosis, look.analysis.appearance, holds=limits),
+        *error_sentences(look.diagnosis, appearance, holds=[*limits, *down]),
         *closer,
     ]
     if look.uncertainty is not None:

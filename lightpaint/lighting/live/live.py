@@ -33,7 +33,12 @@ from lightpaint.lighting.loss.expected_lights import ExpectedLights, Wash
 from lightpaint.lighting.loss.image_prior import image_prior
 from lightpaint.lighting.loss.painting import unpainted_weight
 from lightpaint.lighting.loss.pixel_bins import block_side
-from lightpaint.lighting.loss.weight_penalty import pull_near_start, pull_to_current, weight_pull
+from lightpaint.lighting.loss.weight_penalty import (
+    pull_near_start,
+    pull_to_current,
+    restrain_lights,
+    weight_pull,
+)
 from lightpaint.lighting.normal_equations import NormalEquations
 from lightpaint.lighting.unknowns.gamut_bounds import solve_near_sides
 from lightpaint.lighting.unknowns.gamuts import Gamuts, PaintedLight
@@ -152,7 +157,7 @@ class LiveSolver:
         painted, rest = reduce(add, (view.counts for view in views))
         unpainted = unpainted_weight(float(painted), float(rest), self._fit)
         if not (while_painting and self._answers_left and self._last_read == views):
-            self._read_paint(views)
+            self._read_paint(views, unpainted)
         self._answers_left -= 1
         reduction, pull = self._within, self._pull
 
@@ -176,12 +181,15 @@ class LiveSolver:
             self._untouched = _nearest(self._reference, self._views, self._reduction)
         return self._untouched
 
-    def _read_paint(self, views: tuple[LiveView, ...]) -> None:
-        """Find what the painting asks of the lights: whites, gamuts and the pull on them."""
+    def _read_paint(self, views: tuple[LiveView, ...], unpainted: float) -> None:
+        """Find what the painting asks of the lights: whites, gamuts and the pull on them.
+
+        unpainted: the weight of each unpainted pixel.
+        """
         self._washed = None
         self._follow_whites(views)
         self._follow_gamuts(views)
-        self._pull = self._weight_pull(views)
+        self._pull = self._weight_pull(views, unpainted)
         self._last_read, self._answers_left = views, ANSWERS_PER_READING
 
     def _follow_whites(self, views: tuple[LiveView, ...]) -> None:
@@ -242,18 +250,20 @@ class LiveSolver:
         options: dict[str, Any] = {"steps": WHITE_STEPS, "method": method}
         return next_whites(equations, reduction, start, **options)[1].weights
 
-    def _weight_pull(self, views: tuple[LiveView, ...]) -> NormalEquations | None:
+    def _weight_pull(self, views: tuple[LiveView, ...], unpainted: float) -> NormalEquations | None:
         """Return the pull on the weights, as `Problem.pull`."""
         power, lights = _power(views), self._basis.lights
         # The total importance, relative to the number of pixels.
         total = sum(float(view.counts[0]) for view in views)
         share = total / sum(view.pixels for view in views)
-        expected, contrast = None, None
+        expected, contrast, restraint = None, None, None
         if self._fit.reads_wishes(is_sketch=self._is_sketch):
             wash = self._wash(views)
-            contrast = contrast_term(contrast_rows(wash, self._fit.transform), total)
+            transform, own = self._fit.transform, self._reference
+            contrast = contrast_term(contrast_rows(wash, transform), total)
+            restraint = restrain_lights(wash, own, transform, unpainted=unpainted)
             if self._fit.colors == "gentle":
-                expected = ExpectedLights.of(wash, self._reference)
+                expected = ExpectedLights.of(wash, own)
         pull = weight_pull(
             power,
             self._reference,
@@ -271,7 +281,7 @@ class LiveSolver:
             painted_share=share,
         )
         prior = image_prior(lights, power, self._fit, share, expected)
-        pulls = [x for x in (pull, near, prior, contrast) if x is not None]
+        pulls = [x for x in (pull, near, prior, contrast, restraint) if x is not None]
         return reduce(add, pulls) if pulls else None
 
     def _joint_films(self, views: tuple[LiveView, ...]) -> Films:

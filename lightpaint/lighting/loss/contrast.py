@@ -53,7 +53,7 @@ def contrast_rows(wash: Wash, transform: ViewTransform | None) -> Doubles:
     own, rest = wash.light_sums(shares).reshape(3, n, -1, 2).transpose(3, 2, 0, 1)  # (k, 3, n) each
     is_lit = (inside > black) & (outside > black)
     o, r = (np.where(is_lit, x, 1)[..., None] for x in (inside, outside))
-    amplitude = _amplitude(inside.T, transform).T
+    amplitude = display_amplitude(inside.T, transform).T
     return np.asarray((amplitude * is_lit)[..., None] * (own / o - rest / r))
 
 
@@ -84,10 +84,10 @@ def contrast_term(rows: Doubles, strength: float) -> NormalEquations | None:
     return NormalEquations(M, np.zeros(M.shape[:2]), np.zeros(3))
 
 
-def _amplitude(light: Doubles, transform: ViewTransform | None) -> Doubles:
+def display_amplitude(light: Doubles, transform: ViewTransform | None) -> Doubles:
     """Return how much values of the loss change with a relative change of light, (3, k).
 
-    light: (3, k), linear.
+    light: (3, k), linear. transform: the view transform of the loss; None for linear light.
     """
     if transform is None:
         return np.maximum(light, 0)

@@ -1,6 +1,6 @@
-"""Penalties on the weights: for changes of emission, or of colour alone.
+"""Penalties on the weights: for changes of emission, of colour alone, or of unpainted parts.
 
-Both are quadratics in w, scaled by the pictures of the lights over the whole picture, so that they
+All are quadratics in w, scaled by the pictures of the lights over the whole picture, so that they
 are alike for all lights. Pixels in which an emitter is visible do not count.
 """
 
@@ -8,14 +8,21 @@ import numpy as np
 
 from lightpaint.arrays import Bools, Doubles
 from lightpaint.colour.color import LUMINANCE, luminance
+from lightpaint.colour.display.view_transform import ViewTransform
 from lightpaint.lighting.fit import Fit
-from lightpaint.lighting.loss.expected_lights import ExpectedLights
+from lightpaint.lighting.loss.contrast import display_amplitude
+from lightpaint.lighting.loss.expected_lights import DARK, ExpectedLights, Wash
 from lightpaint.lighting.normal_equations import NormalEquations
+from lightpaint.threads import one_thread
 
 #: Strength of the pull to the current colours, of lights of which the painting asks for no other
 #: colour, and of lights of which it clearly does: the share of a hue's effect on the picture that
 #: counts as an error, scaled by the share of painted pixels.
 COLOR_PULL, CLEAR_PULL = 1.5, 0.02
+
+#: Price of what each light by itself does to unpainted pixels, relative to that of what all lights
+#: together do: the hold.
+RESTRAINT = 0.25
 
 #: Largest factor of dimming that strengthens the pull to a light's colour.
 MAX_DIMMING = 100.0
@@ -84,6 +91,33 @@ def pull_near_start(
     """
     strength = near * fit.brightness * painted_share
     return pull_to_current(strength * power, start) if strength > 0 else None
+
+
+@one_thread()
+def restrain_lights(
+    wash: Wash, reference: Doubles, transform: ViewTransform | None, *, unpainted: float
+) -> NormalEquations | None:
+    """Return the price of what each light by itself does to unpainted pixels; None without a hold.
+
+    A hold counts what all lights together do there: one light may be turned off to make up for what
+    another spills, although nobody painted that. So each light also pays for its own change,
+
+        s ū Σᵢ Σ (1 − D) |A Φᵢ (wᵢ − pᵢ) / L|²
+
+    with A, the change of a value of the loss with a relative change of the look L.
+
+    reference: (n, 3), the weights p that the look has. transform: the view transform of the loss;
+    None for linear light. unpainted: ū, the weight of each unpainted pixel.
+    """
+    if unpainted <= 0:
+        return None
+    look = np.maximum(wash.look, 0).astype(np.float64)
+    slope = display_amplitude(look, transform) / (look + (DARK * float(look.mean()) or 1.0))
+    rest = wash.counts * (1 - np.minimum(wash.importance, 1))
+    energy = np.stack(
+        [np.square(rows) @ (s**2 * rest) for rows, s in zip(wash.rows, slope, strict=True)], axis=1
+    )
+    return pull_to_current(RESTRAINT * unpainted * energy, reference)
 
 
 def pull_to_colors(power: Doubles, current: Doubles, lights: Bools) -> NormalEquations:

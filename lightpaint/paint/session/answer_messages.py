@@ -34,6 +34,7 @@ from lightpaint.report.delivery_sentences import (
 from lightpaint.report.diagnosis_sentences import (
     NO_ERROR,
     bound_sentences,
+    compensation_sentences,
     hold_clause,
     spoken_shares,
 )
@@ -312,7 +313,7 @@ def _progress_phrase(appearance: Appearance) -> str:
 
 
 def why_not_closer(analysis: Analysis) -> list[str]:
-    """Return at most four sentences on the reasons that keep the lights from the paint.
+    """Return at most five sentences on the reasons that keep the lights from the paint.
 
     `sketch_headline`, below the pictures, has the place of the largest error.
     """
@@ -377,14 +378,16 @@ def _helps_to_loosen(appearance: Appearance, hold: Reason) -> bool:
 def _closeness(analysis: Analysis) -> Closeness:
     """Return how close one view is, and why not closer."""
     appearance = analysis.appearance
+    if appearance.is_close:
+        sentences = compensation_sentences(appearance.compensating_lights)
+    else:
+        sentences = bound_sentences(analysis.diagnosis, appearance, any_color=ANY_COLOR_TEXT)
     return Closeness(
         headline=sketch_headline(appearance),
         help=advice(appearance),
         delta_e=appearance.delta_e,
         delta_e_present=appearance.requested_change,
-        sentences=()
-        if appearance.is_close
-        else tuple(bound_sentences(analysis.diagnosis, appearance, any_color=ANY_COLOR_TEXT)),
+        sentences=tuple(sentences),
     )
 
 

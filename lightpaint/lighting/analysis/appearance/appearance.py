@@ -16,6 +16,7 @@ from lightpaint.display_text import short_repr
 from lightpaint.images.estimate import Estimate
 from lightpaint.keywords import keywords
 from lightpaint.lighting.analysis.appearance.area_lights import AreaLights, lights_of_area
+from lightpaint.lighting.analysis.appearance.compensation import compensating_lights
 from lightpaint.lighting.analysis.appearance.delivery import (
     Delivery,
     DeliveryReport,
@@ -93,6 +94,8 @@ class Appearance:
         lit_delta_e: The mean CIEDE2000 of the lit parts of the paint, as washes.
         reasons_wish: The name of the wish that place, lights and reasons are about: of `worst_wish`
             if it is a part of the paint. "" if they are about all of it.
+        compensating_lights: Lights that are down by two stops or more only to make up for what
+            others spill on unpainted parts.
         undetermined_lights: Lights that the samples do not determine (`Uncertainty.untold`): what
             they could do is not known.
 
@@ -118,6 +121,7 @@ class Appearance:
     lit_delta_e: float = 0.0
     reasons_wish: str = ""
     undetermined_lights: tuple[str, ...] = ()
+    compensating_lights: tuple[str, ...] = ()
 
     __repr__ = short_repr
 
@@ -300,7 +304,9 @@ def compare_appearance(
     if len(problem.views) > 1:
         return appearance
     rest = change_from_scene(solution, look, solution.weights, predicted.image)
-    appearance = replace(appearance, unpainted_change=rest)
+    appearance = replace(
+        appearance, unpainted_change=rest, compensating_lights=compensating_lights(solution)
+    )
     if not missed.any():
         return appearance
     place, share = place_with_most_error(look, missed, light, grain)

@@ -1,8 +1,8 @@
 """The noise of the normal equations and of a prediction, from the half differences of a basis.
 
 The two halves of the samples give two gradients of the objective at the solved weights. Half
-their difference, pixel by pixel, has the covariance of the gradient's noise (docs/method.md,
-"How sure").
+their difference, pixel by pixel, has the covariance of the gradient's noise, once no noise is
+multiplied by itself (docs/method.md, "How sure").
 """
 
 from contextlib import nullcontext
@@ -14,6 +14,7 @@ from lightpaint.arrays import Bools, Doubles, Floats, Indices
 from lightpaint.basis.planes import BLOCK_PIXELS, FEW_LIGHTS, Planes, as_slice
 from lightpaint.lighting.analysis.noise.dominant_pixels import Peaks, t_ratios
 from lightpaint.lighting.analysis.noise.painting_grain import channel_grain
+from lightpaint.lighting.analysis.noise.pixel_pairs import UNCORRECTED, factor, own_share
 from lightpaint.lighting.analysis.noise.residuals import Residuals
 from lightpaint.lighting.normal_equations import NormalEquations
 from lightpaint.lighting.solution import Solution
@@ -82,9 +83,13 @@ class Noise:
         return covariance
 
 
-def noise_sums(solution: Solution) -> Noise:
-    """Sum over the pixels that count in one pass, by parts in parallel."""
-    weights, pixels = solution.weights, NoisyPixels.of(solution)
+def noise_sums(solution: Solution, *, removed: float | None = None) -> Noise:
+    """Sum over the pixels that count in one pass, by parts in parallel.
+
+    removed: the share of the noise's power that the equations whose gradient it is do not have; by
+    default that of the solution.
+    """
+    weights, pixels = solution.weights, NoisyPixels.of(solution, removed=removed)
     counted, weight, residuals = pixels.counted, pixels.weight, pixels.residuals
     is_coupled = _is_coupled(solution)
     # The same parts on every machine, added in order, give the same bits.
@@ -182,7 +187,7 @@ class NoisyPixels:
 
     planes, noise: of the basis. weights: (n, 3). weight, share: (p, 1) or (p, 3). unseen: (p,),
     where no emitter is. counted: the pixels that count. pulled: (n, 3), by how much noise moves the
-    pull on the weights.
+    pull on the weights. own_share: see `pixel_pairs`.
     """
 
     planes: Planes
@@ -194,10 +199,11 @@ class NoisyPixels:
     unseen: Bools
     counted: Indices
     pulled: Doubles
+    own_share: float
 
     @classmethod
-    def of(cls, solution: Solution) -> "NoisyPixels":
-        """Return the noisy pixels of a solution."""
+    def of(cls, solution: Solution, *, removed: float | None = None) -> "NoisyPixels":
+        """Return the noisy pixels of a solution. removed: see `noise_sums`."""
         basis, problem, weights = solution.basis, solution.problem, solution.weights
         # (pixels, 1), or (pixels, 3) where channels differ.
         squares = problem.squares
@@ -208,11 +214,13 @@ class NoisyPixels:
         unseen = ~basis.emitters_seen.ravel()
         counted = np.flatnonzero((solution.importance.ravel() > 0) | (unseen & pulled.any()))
         residuals = Residuals.of(solution)
-        planes = basis.planes, basis.noise
-        return cls(*planes, weights, weight, share, residuals, unseen, counted, pulled)
+        planes, own = (basis.planes, basis.noise), own_share(problem, removed)
+        return cls(*planes, weights, weight, share, residuals, unseen, counted, pulled, own)
 
     def gradient_noise(self, pixels: slice | Indices) -> Doubles:
-        """Return the half differences of the gradient that some pixels make, (3, n, pixels)."""
+        """Return the half differences of the gradient that some pixels make by their own samples
+        alone, (3, n, pixels).
+        """
         arrays = self.noise.pixels(pixels), self.planes.pixels(pixels)
         missed = self.residuals.residual(pixels), self.residuals.noise(pixels)
         return np.stack([self._rows(None, pixels, arrays, missed, c) for c in range(3)])
@@ -253,12 +261,16 @@ class NoisyPixels:
         D = self.weight[pixels, c % self.weight.shape[1]].astype(np.float64)
         h, lit = (x[..., c].astype(np.float64) for x in arrays)
         residual, mixed = (x[:, c] for x in missed)
-        rows = D * (h * residual - lit * mixed)
+        # One by one, pixels show their own noise; in sums none is multiplied by itself.
+        own = 1.0 if sums is None else self.own_share
+        rows = D * (h * factor(residual, mixed, own) - factor(lit, h, own) * mixed)
         if sums is not None:
             size = np.abs(residual) + self.weights[:, c, None] * lit
             sums.peaks[c].add(D * lit * size, rows)
         if self.pulled.any():
-            rows += self.pulled[:, c, None] * np.where(self.unseen[pixels], lit, 0) * h
+            # The noise correction leaves the pull as it is.
+            power = factor(lit, h, max(own, UNCORRECTED)) * h
+            rows += self.pulled[:, c, None] * np.where(self.unseen[pixels], power, 0)
         if sums is None:
             return np.asarray(rows)
         sums.power[c] += (D * h) @ h.T

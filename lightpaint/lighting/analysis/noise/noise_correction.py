@@ -62,13 +62,13 @@ def correct_noise(solution: Solution, *, share: float | None = None) -> Solution
         )
     if solution.problem.block_side > 1:
         return solution
-    noise, e = noise_sums(solution), solution.equations
+    noise, e = noise_sums(solution, removed=1), solution.equations
     if share is None and _has_noise_of_target(solution, noise):
         return _solved(solution, e, 0.0)
     base = e
     if can_smooth(solution.problem.views.bases):
         smooth = on_smooth_light(solution)
-        base, noise = smooth.equations, noise_sums(smooth)
+        base, noise = smooth.equations, noise_sums(smooth, removed=1)
     least = denoised_matrix(base, noise.power)
     if share is None:
         share = _best_share(solution, base, noise, least)

@@ -1,7 +1,7 @@
 """Error bars: the effect of the basis's noise on the answer, from half differences.
 
 The two halves of the samples give two gradients of the objective at the solved weights. Half
-their difference, pixel by pixel, has the covariance of the gradient's noise, and the inverse
+their difference, pixel by pixel, gives the covariance of the gradient's noise, and the inverse
 of M turns that into the covariance of the weights (docs/method.md, "How sure").
 """
 
@@ -122,7 +122,6 @@ def error_bars(solution: Solution, *, with_painting: bool = True) -> Uncertainty
     # of its own M.
     scatters = problem.solved if problem.refinement is None else unbiased
     spread = weight_spread(solution, noise, scatters, unbiased, weights + bias)
-    excess, is_far = spread.excess, spread.is_far
     by_painting, moved = np.zeros((2, *weights.shape))
     covariance = painting_covariance(solution) if with_painting else None
     if covariance is not None:
@@ -137,8 +136,8 @@ def error_bars(solution: Solution, *, with_painting: bool = True) -> Uncertainty
         is_refined = problem.refinement is not None
         weak_equations = step.equations(weak) if is_refined else replace(unbiased, M=weak)
         far = solve_for(solution, weak_equations)
-        spread = weight_spread(solution, noise, weak_equations, weak_equations, far)
-        is_far = is_far | spread.is_far
+        weak_spread = weight_spread(solution, noise, weak_equations, weak_equations, far)
+        spread = spread.mixed_with(weak_spread, doubts)
         moved = far - weights - bias
     sides, wide = (
         [_root(*parts, exit_, moved) for exit_ in spread.exits]
@@ -154,9 +153,10 @@ def error_bars(solution: Solution, *, with_painting: bool = True) -> Uncertainty
         interval,
         noise.objective_error,
         noise.objective_noise,
-        _excess_by_channel(excess, bias, problem.equations.M),
+        _excess_by_channel(spread.excess, bias, problem.equations.M),
         solution.norm2,
-        (((doubts >= 0.5) | noise.is_hidden).any(axis=1) | is_far) & _is_wide(weights, interval),
+        (((doubts >= 0.5) | noise.is_hidden).any(axis=1) | spread.is_far)
+        & _is_wide(weights, interval),
     )
 
 

@@ -48,6 +48,18 @@ class WeightSpread:
     excess: Doubles
     is_far: Bools
 
+    def mixed_with(self, weak: "WeightSpread", doubts: Doubles) -> "WeightSpread":
+        """Return the spread of lights that may be noise alone, and of others.
+
+        weak: the spread where such lights have as little power as they may. doubts: (n, 3), 0 to 1.
+        The expected excess is that of these equations.
+        """
+        inside, below, above = (
+            np.sqrt((1 - doubts) * np.square(x) + doubts * np.square(y))
+            for x, y in zip((self.inside, *self.exits), (weak.inside, *weak.exits), strict=True)
+        )
+        return WeightSpread(inside, (below, above), self.excess, self.is_far | weak.is_far)
+
 
 def weight_spread(
     solution: Solution,
