@@ -12,12 +12,12 @@ from fake_messages import fake_answer, fake_state
 from lightpaint.errors import PaintError
 from lightpaint.paint.protocol import (
     Acknowledgement,
-    AnyRequest,
     ConstrainLight,
     ConstrainLights,
     Message,
     Notice,
     Paint,
+    Request,
     SessionState,
 )
 
@@ -31,14 +31,14 @@ class FakeSession:
     def __init__(self) -> None:
         self.on_message: Callable[[Message], None] | None = None
         self.before_paint: Callable[[], object] = lambda: None
-        self.requests: list[AnyRequest] = []
+        self.requests: list[Request] = []
         self.threads: set[int] = set()
         self.pictures: dict[str, npt.NDArray[Any]] = {
             "present": np.arange(2 * 3 * 3, dtype=np.float16).reshape(2, 3, 3),
             "objects": np.array([[-1, 0, 1]], np.int16),
         }
 
-    def handle(self, request: AnyRequest, arrays: dict[str, npt.NDArray[Any]]) -> list[Message]:
+    def handle(self, request: Request, arrays: dict[str, npt.NDArray[Any]]) -> list[Message]:
         self.threads.add(threading.get_ident())
         self.requests.append(request)
         match request:

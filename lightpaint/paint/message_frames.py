@@ -19,7 +19,7 @@ import numpy.typing as npt
 
 from lightpaint.errors import PaintError
 from lightpaint.files import one_line
-from lightpaint.paint.protocol import REQUESTS, VERSION, AnyRequest
+from lightpaint.paint.protocol import VERSION, Request
 from lightpaint.paint.protocol.base import DTYPES
 from lightpaint.storage.json_records import read_record, strict_json
 
@@ -70,20 +70,20 @@ def is_other_version(content: Mapping[str, Any]) -> bool:
 
 def parse_request(
     content: Mapping[str, Any], buffers: Sequence[bytes | memoryview]
-) -> tuple[int, AnyRequest, dict[str, npt.NDArray[Any]]]:
+) -> tuple[int, Request, dict[str, npt.NDArray[Any]]]:
     """Return the number, the message and the arrays of a request.
 
     The arrays are finite and read-only. Raises PaintError for anything else.
     """
     kind, seq = content.get("kind"), content.get("seq")
-    if not (isinstance(kind, str) and kind in REQUESTS):
+    if not (isinstance(kind, str) and kind in Request.kinds):
         raise PaintError(f"no message is called {str(kind)[:40]!r}")
     if not (type(seq) is int and 0 <= seq < 2**53):
         raise PaintError("a message without its number")
     plain = {k: v for k, v in content.items() if k not in ("kind", "seq", "buffers")}
     _check_lengths(kind, plain)
     try:
-        request = read_record(REQUESTS[kind], plain)
+        request = read_record(Request.kinds[kind], plain)
     except ValueError as error:
         raise PaintError(one_line(f"{kind}: {error}")) from None
     buffer_types = _buffer_types(content)

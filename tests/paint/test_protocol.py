@@ -18,13 +18,13 @@ from raw_message import RawMessage
 from lightpaint.errors import PaintError
 from lightpaint.paint.message_frames import DTYPES, MAX_TEXT, from_frame, parse_request, to_frame
 from lightpaint.paint.protocol import (
-    EVENTS,
-    REQUESTS,
     VERSION,
     ChangeSettings,
+    Event,
     Findings,
     LightAnswer,
     Paint,
+    Request,
     TakeOver,
     TieLights,
     document,
@@ -103,7 +103,7 @@ def test_what_is_said_is_read_as_it_is_meant() -> None:
         ),
     ):
         assert parse_request({"kind": kind, "seq": 0, **fields}, [])[1] == meaning
-    names = {name.replace("_", ""): kind.__name__.lower() for name, kind in REQUESTS.items()}
+    names = {name.replace("_", ""): kind.__name__.lower() for name, kind in Request.kinds.items()}
     assert all(kind.startswith(name) for name, kind in names.items())
 
 
@@ -125,7 +125,7 @@ def test_any_json_is_refused_or_read(content: Any) -> None:
 
 @given(
     st.fixed_dictionaries(
-        {"kind": st.sampled_from([*REQUESTS, "x"]), "seq": st.just(1) | PLAIN},
+        {"kind": st.sampled_from([*Request.kinds, "x"]), "seq": st.just(1) | PLAIN},
         optional={
             "buffers": st.lists(
                 st.fixed_dictionaries(
@@ -203,7 +203,7 @@ def test_the_types_of_the_page_are_those_of_the_messages() -> None:
 
 
 def test_every_message_says_what_it_is() -> None:
-    for message in (*REQUESTS.values(), *EVENTS.values()):
+    for message in (*Request.kinds.values(), *Event.kinds.values()):
         assert message.__doc__
         assert not message.__doc__.startswith(f"{message.__name__}(")
         assert message.__dataclass_params__.frozen
@@ -231,7 +231,7 @@ def test_the_document_has_every_message_as_it_is() -> None:
     """Run `python -m lightpaint.paint.protocol.document docs/protocol.md` after a change."""
     text = (Path(__file__).parents[2] / "docs" / "protocol.md").read_text(encoding="utf-8")
     assert document.replace_sections(text) == text
-    for kind in (*REQUESTS, *EVENTS):
+    for kind in (*Request.kinds, *Event.kinds):
         assert f"### `{kind}`" in text
     assert f'"protocol": {VERSION}' in text
     for limit in (MAX_OBSERVERS, MAX_PROPOSALS):

@@ -61,6 +61,45 @@ class Message:
         ]
 
 
+class Request(Message):
+    """Base of what clients ask of the session. A subclass with a kind is known by it.
+
+    Attributes:
+        kinds: All requests by kind.
+    """
+
+    kinds: ClassVar[dict[str, type[Any]]] = {}
+
+    def __init_subclass__(cls, *, kind: str = "", **options: Any) -> None:
+        super().__init_subclass__(kind=kind, **options)
+        _register(cls, Request.kinds)
+
+
+class Event(Message):
+    """Base of what the session tells its clients. A subclass with a kind is known by it.
+
+    Attributes:
+        kinds: All events by kind.
+        is_observed: Whether observers receive it.
+    """
+
+    kinds: ClassVar[dict[str, type[Any]]] = {}
+    is_observed: ClassVar[bool] = False
+
+    def __init_subclass__(
+        cls, *, kind: str = "", is_observed: bool = False, **options: Any
+    ) -> None:
+        super().__init_subclass__(kind=kind, **options)
+        cls.is_observed = is_observed
+        _register(cls, Event.kinds)
+
+
+def _register(message: type[Message], kinds: dict[str, type[Any]]) -> None:
+    """Add a message to those known by kind. Raises ValueError for a kind that is taken."""
+    if kinds.setdefault(message.kind, message) is not message:
+        raise ValueError(f"{message.__name__} and {kinds[message.kind].__name__} are one kind")
+
+
 def plain(value: Any) -> Any:
     """Return values of JSON for dataclasses, tuples and NumPy's numbers; NaN and Inf are null."""
     if is_dataclass(value) and not isinstance(value, type):

@@ -8,6 +8,7 @@ puts them into the document between its marks.
 import inspect
 import re
 import sys
+from collections.abc import Mapping
 from dataclasses import fields
 from pathlib import Path
 from typing import Any, get_origin, get_type_hints
@@ -15,7 +16,17 @@ from typing import Any, get_origin, get_type_hints
 import numpy as np
 
 from lightpaint.paint.layers.layer import Layer
-from lightpaint.paint.protocol import answer_parts, events, message_parts, requests
+from lightpaint.paint.protocol import (
+    Event,
+    Request,
+    answer_parts,
+    events,
+    light_requests,
+    message_parts,
+    painting_requests,
+    requests,
+    task_events,
+)
 from lightpaint.paint.protocol.typescript import field_types
 
 
@@ -24,10 +35,17 @@ def sections() -> dict[str, str]:
     modules = (message_parts, answer_parts)
     records = [x for module in modules for x in vars(module).values() if _is_part(x)]
     return {
-        "requests": "\n".join(_entry(record.kind, record) for record in requests.REQUESTS.values()),
-        "events": "\n".join(_entry(record.kind, record) for record in events.EVENTS.values()),
+        "requests": "\n".join(_entry(record.kind, record) for record in _in_order(Request.kinds)),
+        "events": "\n".join(_entry(record.kind, record) for record in _in_order(Event.kinds)),
         "parts": "\n".join(_entry(record.__name__, record) for record in records),
     }
+
+
+def _in_order(kinds: Mapping[str, type[Any]]) -> list[type[Any]]:
+    """Return messages module by module, those of every client first."""
+    modules = (requests, painting_requests, light_requests, events, task_events)
+    names = [module.__name__ for module in modules]
+    return sorted(kinds.values(), key=lambda message: names.index(message.__module__))
 
 
 def replace_sections(text: str) -> str:
@@ -64,7 +82,7 @@ def _entry(name: str, record: type[Any]) -> str:
 
 def _nested_kind(kind: str) -> str:
     """Return a type in which a message within another one is called by its kind."""
-    for event in events.EVENTS.values():
+    for event in Event.kinds.values():
         kind = kind.replace(f"Omit<{event.__name__}, 'kind' | 'arrays'>", event.kind)
     return kind
 

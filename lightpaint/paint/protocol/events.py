@@ -5,14 +5,14 @@ Here are those about the state of the session and of the connection, and the lis
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
-from typing import Any, Literal
+from typing import Literal
 
 import numpy as np
 import numpy.typing as npt
 
 from lightpaint.arrays import Doubles, Floats
 from lightpaint.paint.protocol.answer_parts import AnswerChoice, Findings
-from lightpaint.paint.protocol.base import OPTIONAL, Message
+from lightpaint.paint.protocol.base import OPTIONAL, Event
 from lightpaint.paint.protocol.message_parts import (
     Camera,
     EditState,
@@ -34,24 +34,12 @@ from lightpaint.paint.protocol.message_parts import (
     TransformInfo,
     ViewInfo,
 )
-from lightpaint.paint.protocol.task_events import (
-    Explanation,
-    ExportResult,
-    PlacingEstimate,
-    PlacingResult,
-    PreviewResult,
-    ProgressReport,
-    RenderList,
-    TaskStarted,
-    TaskStopped,
-    TrialPlaces,
-    VerificationResult,
-)
+from lightpaint.paint.protocol.task_events import ProgressReport, VerificationResult
 from lightpaint.paint.store.canvas_pixels import Region
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
-class SessionPending(Message, kind="waiting"):
+class SessionPending(Event, kind="waiting"):
     """The state while there is no picture yet; `state` follows. text: an error, if one occurred."""
 
     version: int
@@ -65,7 +53,7 @@ class SessionPending(Message, kind="waiting"):
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
-class SessionState(EditState, Message, kind="state"):
+class SessionState(EditState, Event, kind="state", is_observed=True):
     """The whole state: the answer to `hello`, `take_over` and `observe`, and unasked when the basis
     improves. All lists of lights are in the order of `lights`.
 
@@ -111,7 +99,7 @@ class SessionState(EditState, Message, kind="state"):
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
-class AnswerUpdate(EditState, Findings, Message, kind="answer"):
+class AnswerUpdate(EditState, Findings, Event, kind="answer", is_observed=True):
     """The current lights: the answer to paint and requests, unasked once the exact answer is found,
     and again with its analysis.
 
@@ -134,7 +122,7 @@ class AnswerUpdate(EditState, Findings, Message, kind="answer"):
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
-class CanvasPatch(EditState, Message, kind="patch"):
+class CanvasPatch(EditState, Event, kind="patch"):
     """New pixels of a canvas, after undo and the like: one message for each changed view; `views`
     lists all of these.
 
@@ -168,19 +156,19 @@ class CanvasPatch(EditState, Message, kind="patch"):
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
-class SelectionUpdate(EditState, Message, kind="selected"):
+class SelectionUpdate(EditState, Event, kind="selected"):
     """The new selection: the answer to `select`, which changes no light."""
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
-class PictureUpdate(Message, kind="renewed"):
+class PictureUpdate(Event, kind="renewed", is_observed=True):
     """New or replaced pictures, and their numbers. Unasked."""
 
     resources: Mapping[str, int]
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
-class DraggedPlane(Message, kind="dragged"):
+class DraggedPlane(Event, kind="dragged"):
     """The picture of a light that is dragged, so that it need not be fetched. Unasked, before the
     answer.
 
@@ -197,7 +185,7 @@ class DraggedPlane(Message, kind="dragged"):
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
-class PictureData(Message, kind="fetched"):
+class PictureData(Event, kind="fetched"):
     """A picture, as the array `data`: the answer to `fetch`."""
 
     name: str
@@ -205,7 +193,7 @@ class PictureData(Message, kind="fetched"):
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
-class StepList(Message, kind="steps"):
+class StepList(Event, kind="steps"):
     """The last steps of the history, in order, including undone ones: the answer to `list_steps`.
 
     earlier: number of steps before them. done: id of the last step that is not undone; 0 at the
@@ -219,7 +207,7 @@ class StepList(Message, kind="steps"):
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
-class PreviousAnswer(Message, kind="previous"):
+class PreviousAnswer(Event, kind="previous"):
     """The answer before the last step, under the master dimmer: the answer to `show_previous`.
 
     weights: (lights, 3) float64, in the order of the state.
@@ -229,7 +217,7 @@ class PreviousAnswer(Message, kind="previous"):
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
-class LookList(Message, kind="looks"):
+class LookList(Event, kind="looks", is_observed=True):
     """The kept looks, and all pictures: the answer to requests about looks, and unasked when an
     observer has proposed one.
     """
@@ -239,7 +227,7 @@ class LookList(Message, kind="looks"):
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
-class ReferenceList(Message, kind="references"):
+class ReferenceList(Event, kind="references"):
     """The references, the oldest first: the answer to requests about them, and unasked once a file
     has become one.
     """
@@ -248,7 +236,7 @@ class ReferenceList(Message, kind="references"):
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
-class AnswerChoices(Message, kind="choices"):
+class AnswerChoices(Event, kind="choices"):
     """The answers with other light colours, to choose from. Unasked, once the exact answer rests.
 
     version: of the session. choices: from the least freedom to the most; empty without paint, and
@@ -261,7 +249,7 @@ class AnswerChoices(Message, kind="choices"):
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
-class Rig(Message, kind="rig"):
+class Rig(Event, kind="rig"):
     """The places of all lights. Sent after every move, once requested.
 
     lights: in the order of the state. cameras: of each view; null for one that is no pinhole. up:
@@ -281,7 +269,7 @@ class Rig(Message, kind="rig"):
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
-class Notice(Message, kind="notice"):
+class Notice(Event, kind="notice", is_observed=True):
     """A sentence for users. Unasked. task: the one that it ends."""
 
     text: str
@@ -290,7 +278,7 @@ class Notice(Message, kind="notice"):
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
-class Failure(Message, kind="failed"):
+class Failure(Event, kind="failed"):
     """The reason why a request was refused; nothing has changed."""
 
     text: str
@@ -298,7 +286,7 @@ class Failure(Message, kind="failed"):
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
-class Closing(Message, kind="closed"):
+class Closing(Event, kind="closed"):
     """Notice that the client does not have the session, or has lost it: another client has `taken`
     it, the painter has `ended`, or the client speaks another `version` of this protocol.
     """
@@ -308,42 +296,5 @@ class Closing(Message, kind="closed"):
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
-class Acknowledgement(Message, kind="done"):
+class Acknowledgement(Event, kind="done"):
     """Confirmation of a request that has no other answer."""
-
-
-#: The events by kind.
-EVENTS: Mapping[str, type[Any]] = {
-    event.kind: event
-    for event in (
-        SessionState,
-        SessionPending,
-        AnswerUpdate,
-        CanvasPatch,
-        SelectionUpdate,
-        PictureUpdate,
-        DraggedPlane,
-        PictureData,
-        StepList,
-        PreviousAnswer,
-        LookList,
-        ReferenceList,
-        AnswerChoices,
-        ProgressReport,
-        TaskStarted,
-        TaskStopped,
-        ExportResult,
-        RenderList,
-        VerificationResult,
-        Explanation,
-        PreviewResult,
-        Rig,
-        TrialPlaces,
-        PlacingEstimate,
-        PlacingResult,
-        Notice,
-        Failure,
-        Closing,
-        Acknowledgement,
-    )
-}

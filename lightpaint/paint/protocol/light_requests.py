@@ -4,12 +4,12 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import Any, Literal
 
-from lightpaint.paint.protocol.base import Message
+from lightpaint.paint.protocol.base import Request
 from lightpaint.paint.protocol.message_parts import Place
 
 
 @dataclass(frozen=True)
-class ConstrainLight(Message, kind="constrain_light"):
+class ConstrainLight(Request, kind="constrain_light"):
     """New constraints on one light; an empty object frees it. Answered by `answer`.
 
     constraints: keys and values as in a lights file: lock, off, limits, color, kelvin, duv,
@@ -23,7 +23,7 @@ class ConstrainLight(Message, kind="constrain_light"):
 
 
 @dataclass(frozen=True)
-class ConstrainLights(Message, kind="constrain_lights"):
+class ConstrainLights(Request, kind="constrain_lights"):
     """New constraints on several lights, by name, as in `constrain_light`: one step and one solve.
     Answered by `answer`.
 
@@ -39,7 +39,7 @@ class ConstrainLights(Message, kind="constrain_lights"):
 
 
 @dataclass(frozen=True)
-class SetMaster(Message, kind="set_master"):
+class SetMaster(Request, kind="set_master"):
     """The master dimmer: one step. Answered by `answer`.
 
     level: factor of all lights but fixed ones, 0 to 2, applied to the answer. It changes neither
@@ -50,7 +50,7 @@ class SetMaster(Message, kind="set_master"):
 
 
 @dataclass(frozen=True)
-class StartFromLamps(Message, kind="start_from_lamps"):
+class StartFromLamps(Request, kind="start_from_lamps"):
     """The lights as they are now become the lighting that the solve starts from and stays near, and
     locked ones are released; or this ends. One step. Answered by `answer`. The setting `near` says
     how near.
@@ -69,7 +69,7 @@ def _check_step(step: int) -> None:
 
 
 @dataclass(frozen=True)
-class MoveLights(Message, kind="move"):
+class MoveLights(Request, kind="move"):
     """New places, targets and cones of lights, by name. Answered by `answer`; `rig` follows.
 
     A light that is moved keeps its level from then on, as if it were locked, until it is released
@@ -93,7 +93,7 @@ class MoveLights(Message, kind="move"):
 
 
 @dataclass(frozen=True)
-class PointLight(Message, kind="point"):
+class PointLight(Request, kind="point"):
     """A move of a light by a place in the picture. Answered by `answer`; `rig` follows.
 
     mode: `aim` points it there; `highlight` hangs it so that its reflection appears there; `shadow`
@@ -114,7 +114,7 @@ class PointLight(Message, kind="point"):
 
 
 @dataclass(frozen=True)
-class AddLight(Message, kind="add_light"):
+class AddLight(Request, kind="add_light"):
     """A new light, with a generated name: one step. Answered by `state`; `rig` follows.
 
     type: of the light. pixel: column and row in a picture; the light hangs a little before the
@@ -129,7 +129,7 @@ class AddLight(Message, kind="add_light"):
 
 
 @dataclass(frozen=True)
-class RemoveLight(Message, kind="remove_light"):
+class RemoveLight(Request, kind="remove_light"):
     """A request to remove an added light, by name: one step. Answered by `state`; `rig`
     follows.
     """
@@ -138,14 +138,14 @@ class RemoveLight(Message, kind="remove_light"):
 
 
 @dataclass(frozen=True)
-class ShowRig(Message, kind="show_rig"):
+class ShowRig(Request, kind="show_rig"):
     """A request for the places of all lights, and for `rig` after every later move. Answered by
     `started`, later by `rig`.
     """
 
 
 @dataclass(frozen=True)
-class PlaceLights(Message, kind="place"):
+class PlaceLights(Request, kind="place"):
     """A request to find places, directions and cones of lights that come closest to the paintings,
     or to stop that. Answered by `started`, then by `trial` and later by `placed`; the result is one
     step.
@@ -164,7 +164,7 @@ class PlaceLights(Message, kind="place"):
 
 
 @dataclass(frozen=True)
-class EstimatePlaces(Message, kind="estimate_place"):
+class EstimatePlaces(Request, kind="estimate_place"):
     """A request to say what a search for places would do, and about how long it would take.
     Answered by `place_estimate`.
 
@@ -177,7 +177,7 @@ class EstimatePlaces(Message, kind="estimate_place"):
 
 
 @dataclass(frozen=True)
-class TieLights(Message, kind="tie"):
+class TieLights(Request, kind="tie"):
     """The lights that share a dimmer: all such groups, of names. Answered by `answer`."""
 
     ties: tuple[tuple[str, ...], ...]

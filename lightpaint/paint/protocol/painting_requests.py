@@ -6,7 +6,7 @@ from typing import ClassVar, Literal
 
 from lightpaint.arrays import RGB
 from lightpaint.paint.layers.layer import PAINTING_ID, Layer
-from lightpaint.paint.protocol.base import Message
+from lightpaint.paint.protocol.base import Request
 from lightpaint.paint.protocol.message_parts import PlacePair
 from lightpaint.paint.store.canvas_pixels import Region
 
@@ -18,7 +18,7 @@ MAX_PAIRS = 20
 
 
 @dataclass(frozen=True)
-class Paint(Message, kind="paint"):
+class Paint(Request, kind="paint"):
     """Pixels under the brush; with arrays `image` (rows, columns, 3) float32 and `importance`
     (rows, columns) float32. Answered by `answer`.
 
@@ -48,7 +48,7 @@ class Paint(Message, kind="paint"):
 
 
 @dataclass(frozen=True)
-class ChangeLayers(Message, kind="change_layers"):
+class ChangeLayers(Request, kind="change_layers"):
     """A change of layers, their properties or their order: one step. Answered by `answer`.
 
     layers: new or changed ones; new ones lie on top. order: ids of all that stay, the lowest first;
@@ -65,7 +65,7 @@ class ChangeLayers(Message, kind="change_layers"):
 
 
 @dataclass(frozen=True)
-class Select(Message, kind="select"):
+class Select(Request, kind="select"):
     """The selection of a view: a mask that clients multiply what they paint by; one step. With an
     array `mask` (rows, columns) uint8, 255 for a fully selected pixel. Answered by `selected`.
 
@@ -81,7 +81,7 @@ class Select(Message, kind="select"):
 
 
 @dataclass(frozen=True)
-class ImportLayers(Message, kind="import_layers"):
+class ImportLayers(Request, kind="import_layers"):
     """A part of a file of layers, `.ora` or the painter's EXR; with array `part`, its bytes.
     Answered by `started`. After the last part follow `patch` messages, as a step was made, and a
     `notice`; or a `notice` that says why not.
@@ -101,7 +101,7 @@ class ImportLayers(Message, kind="import_layers"):
 
 
 @dataclass(frozen=True)
-class DropStroke(Message, kind="drop_stroke"):
+class DropStroke(Request, kind="drop_stroke"):
     """Cancel the unfinished stroke, and what a drag or a slider has changed. Answered by `patch`.
 
     stroke: number of the stroke; 0 for none.
@@ -111,17 +111,17 @@ class DropStroke(Message, kind="drop_stroke"):
 
 
 @dataclass(frozen=True)
-class Undo(Message, kind="undo"):
+class Undo(Request, kind="undo"):
     """Undo the last step, whether paint, constraints or settings. Answered by `patch`."""
 
 
 @dataclass(frozen=True)
-class Redo(Message, kind="redo"):
+class Redo(Request, kind="redo"):
     """Redo a step that was undone. Answered by `patch`."""
 
 
 @dataclass(frozen=True)
-class ListSteps(Message, kind="list_steps"):
+class ListSteps(Request, kind="list_steps"):
     """A request for the last `count` steps of the history. Answered by `steps`."""
 
     count: int = 100
@@ -132,7 +132,7 @@ class ListSteps(Message, kind="list_steps"):
 
 
 @dataclass(frozen=True)
-class GoToStep(Message, kind="go_to_step"):
+class GoToStep(Request, kind="go_to_step"):
     """Undo or redo up to the state after a step, by its id; 0 is the beginning. Answered by
     `patch`.
     """
@@ -141,12 +141,12 @@ class GoToStep(Message, kind="go_to_step"):
 
 
 @dataclass(frozen=True)
-class ShowPrevious(Message, kind="show_previous"):
+class ShowPrevious(Request, kind="show_previous"):
     """A request for the answer before the last step, to compare with. Answered by `previous`."""
 
 
 @dataclass(frozen=True)
-class ApplyPreset(Message, kind="apply_preset"):
+class ApplyPreset(Request, kind="apply_preset"):
     """Put the layers of a preset on top, in all views and within what is selected: one step.
     Answered by `patch`.
 
@@ -159,7 +159,7 @@ class ApplyPreset(Message, kind="apply_preset"):
 
 
 @dataclass(frozen=True)
-class AddReference(Message, kind="add_reference"):
+class AddReference(Request, kind="add_reference"):
     """A part of a picture file that becomes a reference; with array `part`, its bytes. Answered by
     `started`. After the last part follows `references`, or a `notice` that says why not.
 
@@ -175,14 +175,14 @@ class AddReference(Message, kind="add_reference"):
 
 
 @dataclass(frozen=True)
-class DropReference(Message, kind="drop_reference"):
+class DropReference(Request, kind="drop_reference"):
     """Delete a reference. Answered by `references`."""
 
     reference: int
 
 
 @dataclass(frozen=True)
-class LookLike(Message, kind="look_like"):
+class LookLike(Request, kind="look_like"):
     """Put layers on top that ask for the light of a reference, within what is selected: one step.
     Answered by `patch`.
 
@@ -207,33 +207,33 @@ class LookLike(Message, kind="look_like"):
 
 
 @dataclass(frozen=True)
-class ClearPainting(Message, kind="clear_painting"):
+class ClearPainting(Request, kind="clear_painting"):
     """Delete all layers and all paint, in all views: one step. Answered by `patch`."""
 
 
 @dataclass(frozen=True)
-class StartOver(Message, kind="start_over"):
+class StartOver(Request, kind="start_over"):
     """Go back to the scene as it was before anything was painted or requested, except for looks:
     one step. Answered by `patch`, or by `state` if lights had been added.
     """
 
 
 @dataclass(frozen=True)
-class SaveLook(Message, kind="save_look"):
+class SaveLook(Request, kind="save_look"):
     """Keep painting and answer under a name. Answered by `looks`."""
 
     name: str
 
 
 @dataclass(frozen=True)
-class LoadLook(Message, kind="load_look"):
+class LoadLook(Request, kind="load_look"):
     """Continue from a look; a step that can be undone. Answered by `patch`."""
 
     look: int
 
 
 @dataclass(frozen=True)
-class RenameLook(Message, kind="rename_look"):
+class RenameLook(Request, kind="rename_look"):
     """Give a look another name. Answered by `looks`."""
 
     look: int
@@ -241,14 +241,14 @@ class RenameLook(Message, kind="rename_look"):
 
 
 @dataclass(frozen=True)
-class CopyLook(Message, kind="copy_look"):
+class CopyLook(Request, kind="copy_look"):
     """Keep a copy of a look. Answered by `looks`."""
 
     look: int
 
 
 @dataclass(frozen=True)
-class MixLooks(Message, kind="mix_looks"):
+class MixLooks(Request, kind="mix_looks"):
     """Keep a mix of two looks: its lights are locked at the share `part` of the way from the first
     to the second. Answered by `looks`.
     """
@@ -260,7 +260,7 @@ class MixLooks(Message, kind="mix_looks"):
 
 
 @dataclass(frozen=True)
-class CompareLooks(Message, kind="compare_looks"):
+class CompareLooks(Request, kind="compare_looks"):
     """A request for pictures of looks whose lights hang elsewhere than now; for none, to stop.
     Answered by `started`; `renewed` then lists `look_plane/ID` and `look_clean/ID` of each: first
     with estimated planes of lights that hang nowhere else, later with rendered ones.
@@ -270,14 +270,14 @@ class CompareLooks(Message, kind="compare_looks"):
 
 
 @dataclass(frozen=True)
-class DropLook(Message, kind="drop_look"):
+class DropLook(Request, kind="drop_look"):
     """Delete a look. Answered by `looks`."""
 
     look: int
 
 
 @dataclass(frozen=True)
-class Propose(Message, kind="propose"):
+class Propose(Request, kind="propose"):
     """Propose a lighting to the painter: it becomes a look with each light locked at the proposed
     level, and replaces an earlier proposal of that name. Answered by `looks`.
 

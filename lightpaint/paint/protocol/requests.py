@@ -8,49 +8,9 @@ Here are those about the connection, the settings and tasks, and the list of all
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
-from typing import Any, Literal, get_args
+from typing import Any, Literal
 
-from lightpaint.paint.protocol.base import Message
-from lightpaint.paint.protocol.light_requests import (
-    AddLight,
-    ConstrainLight,
-    ConstrainLights,
-    EstimatePlaces,
-    MoveLights,
-    PlaceLights,
-    PointLight,
-    RemoveLight,
-    SetMaster,
-    ShowRig,
-    StartFromLamps,
-    TieLights,
-)
-from lightpaint.paint.protocol.painting_requests import (
-    AddReference,
-    ApplyPreset,
-    ChangeLayers,
-    ClearPainting,
-    CompareLooks,
-    CopyLook,
-    DropLook,
-    DropReference,
-    DropStroke,
-    GoToStep,
-    ImportLayers,
-    ListSteps,
-    LoadLook,
-    LookLike,
-    MixLooks,
-    Paint,
-    Propose,
-    Redo,
-    RenameLook,
-    SaveLook,
-    Select,
-    ShowPrevious,
-    StartOver,
-    Undo,
-)
+from lightpaint.paint.protocol.base import Request
 
 #: Version of this protocol; a page of another version is told to reload.
 VERSION = 3
@@ -60,7 +20,7 @@ MIN_RENDER_WIDTH, MAX_RENDER_WIDTH, MAX_RENDER_SPP = 16, 2**14, 2**16
 
 
 @dataclass(frozen=True)
-class Hello(Message, kind="hello"):
+class Hello(Request, kind="hello"):
     """The first message of a page, and again after a dropped connection. Answered by `state`, or
     by `waiting` while there is no picture yet; `state` then comes as soon as there is one.
     """
@@ -69,7 +29,7 @@ class Hello(Message, kind="hello"):
 
 
 @dataclass(frozen=True)
-class ChangeSettings(Message, kind="change_settings"):
+class ChangeSettings(Request, kind="change_settings"):
     """Settings of the answer, as in `Fit`. Answered by `answer`.
 
     settings: of hold, space, colors, literal, prefer_current, near, sparse; null for the default
@@ -80,7 +40,7 @@ class ChangeSettings(Message, kind="change_settings"):
 
 
 @dataclass(frozen=True)
-class Preview(Message, kind="preview"):
+class Preview(Request, kind="preview"):
     """A request to show the effect of a change, before it is made. Answered by `started`, later by
     `previewed`, with small pictures of the answer now and after the change, `before` and `after`
     (h, w, 3) uint8.
@@ -98,7 +58,7 @@ class Preview(Message, kind="preview"):
 
 
 @dataclass(frozen=True)
-class Export(Message, kind="export"):
+class Export(Request, kind="export"):
     """Write results to a folder of the session, or stop that. Answered by `started`, later by
     `exported`, which names the files written, even if stopped.
 
@@ -114,7 +74,7 @@ class Export(Message, kind="export"):
 
 
 @dataclass(frozen=True)
-class RenderFinal(Message, kind="render_final"):
+class RenderFinal(Request, kind="render_final"):
     """Render the answer of now with the renderer, in the background, into a new folder in
     `renders/`. Answered by `renders`, which follows again whenever a render changes its state.
 
@@ -140,21 +100,21 @@ class RenderFinal(Message, kind="render_final"):
 
 
 @dataclass(frozen=True)
-class StopRender(Message, kind="stop_render"):
+class StopRender(Request, kind="stop_render"):
     """Stop a final render, which writes nothing then. Answered by `renders`."""
 
     render: int
 
 
 @dataclass(frozen=True)
-class DropRender(Message, kind="drop_render"):
+class DropRender(Request, kind="drop_render"):
     """Take a final render that has ended off the list; its files stay. Answered by `renders`."""
 
     render: int
 
 
 @dataclass(frozen=True)
-class Verify(Message, kind="verify"):
+class Verify(Request, kind="verify"):
     """Render the answer in a view, or stop that. Answered by `started`, later by `verified`, or by
     `stopped` once the render has ended.
     """
@@ -164,7 +124,7 @@ class Verify(Message, kind="verify"):
 
 
 @dataclass(frozen=True)
-class Explain(Message, kind="explain"):
+class Explain(Request, kind="explain"):
     """A request for the reasons why a view is not closer to its painting. Answered by `started`,
     later by `explained` and the picture `beyond`.
     """
@@ -173,12 +133,12 @@ class Explain(Message, kind="explain"):
 
 
 @dataclass(frozen=True)
-class TakeOver(Message, kind="take_over"):
+class TakeOver(Request, kind="take_over"):
     """Take the session over from the page that has it. Answered by `state`."""
 
 
 @dataclass(frozen=True)
-class Fetch(Message, kind="fetch"):
+class Fetch(Request, kind="fetch"):
     """A request for a picture, for clients without HTTP. Answered by `fetched`, with the picture as
     its array.
     """
@@ -187,66 +147,10 @@ class Fetch(Message, kind="fetch"):
 
 
 @dataclass(frozen=True)
-class Observe(Message, kind="observe"):
+class Observe(Request, kind="observe"):
     """The first message of an observer: a client that receives lighting, looks and progress, and
     never has the session. It may then send `fetch`, `export` and `propose`, and nothing else.
     Answered by `state` or `waiting`.
     """
 
     version: int
-
-
-#: All requests of clients.
-AnyRequest = (
-    Hello
-    | Paint
-    | ChangeLayers
-    | Select
-    | DropStroke
-    | ImportLayers
-    | Undo
-    | Redo
-    | ListSteps
-    | GoToStep
-    | ApplyPreset
-    | AddReference
-    | DropReference
-    | LookLike
-    | ShowPrevious
-    | ClearPainting
-    | StartOver
-    | ConstrainLight
-    | ConstrainLights
-    | SetMaster
-    | StartFromLamps
-    | MoveLights
-    | PointLight
-    | AddLight
-    | RemoveLight
-    | PlaceLights
-    | EstimatePlaces
-    | ShowRig
-    | TieLights
-    | ChangeSettings
-    | Preview
-    | SaveLook
-    | LoadLook
-    | RenameLook
-    | CopyLook
-    | MixLooks
-    | CompareLooks
-    | DropLook
-    | Export
-    | RenderFinal
-    | StopRender
-    | DropRender
-    | Verify
-    | Explain
-    | TakeOver
-    | Fetch
-    | Observe
-    | Propose
-)
-
-#: The requests by kind.
-REQUESTS: Mapping[str, type[Any]] = {request.kind: request for request in get_args(AnyRequest)}

@@ -7,12 +7,12 @@ from typing import Literal
 import numpy as np
 import numpy.typing as npt
 
-from lightpaint.paint.protocol.base import OPTIONAL, Message
+from lightpaint.paint.protocol.base import OPTIONAL, Event
 from lightpaint.paint.protocol.message_parts import Place, RenderInfo
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
-class ProgressReport(Message, kind="progress"):
+class ProgressReport(Event, kind="progress", is_observed=True):
     """The progress of a long task. Unasked.
 
     task: `export`, `final` for a final render, `basis`, `sampling` for samples added where the
@@ -26,7 +26,7 @@ class ProgressReport(Message, kind="progress"):
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
-class VerificationResult(Message, kind="verified"):
+class VerificationResult(Event, kind="verified", is_observed=True):
     """The result of a verification; its render is the picture `verified`. Unasked.
 
     is_old: whether the session has changed since.
@@ -39,7 +39,7 @@ class VerificationResult(Message, kind="verified"):
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
-class TaskStarted(Message, kind="started"):
+class TaskStarted(Event, kind="started"):
     """Notice that a long task has started. task: the request, or `stop`."""
 
     task: Literal[
@@ -57,14 +57,14 @@ class TaskStarted(Message, kind="started"):
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
-class TaskStopped(Message, kind="stopped"):
+class TaskStopped(Event, kind="stopped"):
     """Notice that a stopped task has ended. Unasked."""
 
     task: Literal["verify"]
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
-class ExportResult(Message, kind="exported"):
+class ExportResult(Event, kind="exported", is_observed=True):
     """Files that were written. Unasked.
 
     command: solves for the exported paintings; "" for none. is_stopped: whether the export was
@@ -78,7 +78,7 @@ class ExportResult(Message, kind="exported"):
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
-class RenderList(Message, kind="renders"):
+class RenderList(Event, kind="renders"):
     """The final renders since the painter was started, the oldest first: the answer to requests
     about them, and unasked when one changes its state.
     """
@@ -87,7 +87,7 @@ class RenderList(Message, kind="renders"):
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
-class Explanation(Message, kind="explained"):
+class Explanation(Event, kind="explained"):
     """The reasons why a view is not closer to its painting; the picture `beyond` shows where.
     Unasked.
     """
@@ -98,7 +98,7 @@ class Explanation(Message, kind="explained"):
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
-class PreviewResult(Message, kind="previewed"):
+class PreviewResult(Event, kind="previewed"):
     """The effect of a change, before it is made. Unasked. number: of the preview. is_at_cost:
     whether it changes the unpainted part by more than it gains. before, after: (h, w, 3) uint8.
     """
@@ -113,7 +113,7 @@ class PreviewResult(Message, kind="previewed"):
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
-class TrialPlaces(Message, kind="trial"):
+class TrialPlaces(Event, kind="trial"):
     """The places that a search is trying. Unasked.
 
     positions, directions: by name of light, including new ones.
@@ -124,7 +124,7 @@ class TrialPlaces(Message, kind="trial"):
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
-class PlacingEstimate(Message, kind="place_estimate"):
+class PlacingEstimate(Event, kind="place_estimate"):
     """The extent of a search for places, and its time: the answer to `estimate_place`.
 
     text: the lights, and what each may do. seconds: about how long it takes, at least and at most.
@@ -137,7 +137,7 @@ class PlacingEstimate(Message, kind="place_estimate"):
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
-class PlacingResult(Message, kind="placed"):
+class PlacingResult(Event, kind="placed"):
     """The result of a search for places of lights. Unasked.
 
     text: the moves or additions and their gain, or why there are none. names: of these lights.

@@ -16,7 +16,7 @@ import numpy as np
 
 from lightpaint.arrays import RGB
 from lightpaint.paint.layers.layer import Layer
-from lightpaint.paint.protocol import answer_parts, events, message_parts, requests
+from lightpaint.paint.protocol import Event, Request, answer_parts, message_parts
 from lightpaint.paint.store.canvas_pixels import Region
 
 #: The file of types, beside the scripts that use them.
@@ -49,11 +49,11 @@ def declarations() -> str:
         if _is_record_of(record, module)
     ]
     blocks = [HEADER, *(_interface(record, is_request=False) for record in records)]
-    blocks += [_interface(record, is_request=False) for record in events.EVENTS.values()]
-    blocks += [_interface(record, is_request=True) for record in requests.REQUESTS.values()]
+    blocks += [_interface(record, is_request=False) for record in Event.kinds.values()]
+    blocks += [_interface(record, is_request=True) for record in Request.kinds.values()]
     for name, comment, kinds in (
-        ("Events", "Events from the session, by kind.", events.EVENTS),
-        ("Requests", "Fields of clients' requests, by kind.", requests.REQUESTS),
+        ("Events", "Events from the session, by kind.", Event.kinds),
+        ("Requests", "Fields of clients' requests, by kind.", Request.kinds),
     ):
         rows = "".join(f"  {kind}: {record.__name__};\n" for kind, record in kinds.items())
         blocks.append(f"/** {comment} */\nexport interface {name} {{\n{rows}}}\n")
@@ -72,7 +72,7 @@ def _interface(record: type[Any], *, is_request: bool) -> str:
     array_names = [one.name for one in fields(record) if get_origin(hints[one.name]) is np.ndarray]
     arrays = [f"{name}: Picture" for name in array_names]
     lines = [f"  {name}: {kind};\n" for name, kind in field_types(record, is_request=is_request)]
-    if record.__name__ in {one.__name__ for one in events.EVENTS.values()}:
+    if record.__name__ in {one.__name__ for one in Event.kinds.values()}:
         lines.insert(0, f"  kind: '{record.kind}';\n  reply?: number;\n")
         lines.append(f"  arrays: {{ {'; '.join(arrays)} }};\n")
     comment_lines = (inspect.getdoc(record) or "").replace("*/", "* /").split("\n")
@@ -89,7 +89,7 @@ def field_types(record: type[Any], *, is_request: bool = True) -> list[tuple[str
     for entry in fields(record):
         if get_origin(hints[entry.name]) is np.ndarray:
             continue
-        is_event = record in events.EVENTS.values() or not is_request
+        is_event = record in Event.kinds.values() or not is_request
         is_optional = _is_optional(entry) or (not is_event and _has_default(entry))
         # Omitted if None; a request may give null nevertheless.
         hint = _without_none(hints[entry.name]) if _is_optional(entry) else hints[entry.name]
@@ -115,7 +115,7 @@ def typescript_type(hint: Any) -> str:
         return f"[{', '.join(map(typescript_type, inner))}]"
     if outer is Mapping:
         return f"Record<{typescript_type(inner[0])}, {typescript_type(inner[1])}>"
-    if hint in events.EVENTS.values():  # nested messages have no kind
+    if hint in Event.kinds.values():  # nested messages have no kind
         return f"Omit<{hint.__name__}, 'kind' | 'arrays'>"
     return "any" if hint is Any else str(hint.__name__)
 

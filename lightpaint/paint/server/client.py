@@ -11,7 +11,6 @@ from lightpaint.errors import PaintError
 from lightpaint.paint.message_frames import from_frame, is_other_version, parse_request, to_frame
 from lightpaint.paint.protocol import (
     AnswerUpdate,
-    AnyRequest,
     Closing,
     DraggedPlane,
     EditState,
@@ -22,6 +21,7 @@ from lightpaint.paint.protocol import (
     Paint,
     PictureUpdate,
     ProgressReport,
+    Request,
     SessionState,
     TakeOver,
 )
@@ -53,7 +53,7 @@ class IncomingMessage:
     """
 
     replies: list[int] = field(default_factory=list)
-    request: AnyRequest | None = None
+    request: Request | None = None
     arrays: dict[str, npt.NDArray[Any]] = field(default_factory=dict)
     refusal: Message | None = None
     size: int = 0

@@ -4,37 +4,18 @@ from collections.abc import Collection
 
 from lightpaint.errors import PaintError
 from lightpaint.paint.protocol import (
-    AnswerUpdate,
-    AnyRequest,
     CanvasPatch,
+    Event,
     Export,
-    ExportResult,
     Fetch,
-    LookList,
     Message,
-    Notice,
-    PictureUpdate,
-    ProgressReport,
     Propose,
-    SessionState,
-    VerificationResult,
+    Request,
 )
 from lightpaint.paint.server.client import Client
 
 #: Maximum number of observers.
 MAX_OBSERVERS = 8
-
-#: Events that observers receive.
-OBSERVED_EVENTS = (
-    SessionState,
-    AnswerUpdate,
-    LookList,
-    PictureUpdate,
-    ProgressReport,
-    ExportResult,
-    VerificationResult,
-    Notice,
-)
 
 
 class Observers:
@@ -56,13 +37,13 @@ class Observers:
     def send(self, message: Message, but: Client | None = None) -> None:
         """Send observers the events that concern them; newer events replace those that wait."""
         event = message.answer if isinstance(message, CanvasPatch) else message
-        if isinstance(event, OBSERVED_EVENTS):
+        if isinstance(event, Event) and event.is_observed:
             for client in self._clients:
                 if client.is_observer and client is not but:
                     client.send(event)
 
 
-def check_observer_request(request: AnyRequest | None) -> None:
+def check_observer_request(request: Request | None) -> None:
     """Raise PaintError for requests that observers may not make."""
     is_export = isinstance(request, Export) and request.run
     if not (is_export or isinstance(request, Fetch | Propose)):

@@ -6,8 +6,8 @@ from typing import Any, Protocol
 import numpy.typing as npt
 
 from lightpaint.paint.protocol import (
-    AnyRequest,
     Message,
+    Request,
 )
 
 
@@ -16,7 +16,7 @@ class ServedSession(Protocol):
 
     on_message: Callable[[Message], None] | None
 
-    def handle(self, request: AnyRequest, arrays: dict[str, npt.NDArray[Any]]) -> list[Message]:
+    def handle(self, request: Request, arrays: dict[str, npt.NDArray[Any]]) -> list[Message]:
         """Return the answers; the first one replies to the request. Raises LightpaintError."""
 
     def greet(self, *, is_back: bool) -> Message:

@@ -20,7 +20,6 @@ from lightpaint.errors import LightpaintError, PaintError
 from lightpaint.paint.background_threads import error_text, error_tone
 from lightpaint.paint.protocol import (
     Acknowledgement,
-    AnyRequest,
     Closing,
     ConstrainLight,
     ConstrainLights,
@@ -33,6 +32,7 @@ from lightpaint.paint.protocol import (
     PictureData,
     PointLight,
     Propose,
+    Request,
     SessionState,
 )
 from lightpaint.paint.server.client import Client, IncomingMessage
@@ -180,7 +180,7 @@ class Connections:
             self.report("".join(traceback.format_exception(error)))
             return [Failure(text=error_text(error, at_length=False))]
 
-    async def _handle_observer(self, client: Client, request: AnyRequest | None) -> list[Message]:
+    async def _handle_observer(self, client: Client, request: Request | None) -> list[Message]:
         """Return the answers to an observer, once no brush is down.
 
         Raises LightpaintError for requests that observers may not make.

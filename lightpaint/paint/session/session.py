@@ -166,7 +166,7 @@ class Session:
     # Requests and answers
 
     def handle(
-        self, message: protocol.AnyRequest, arrays: Mapping[str, npt.NDArray[Any]]
+        self, message: protocol.Request, arrays: Mapping[str, npt.NDArray[Any]]
     ) -> list[Message]:
         """Handle a request. Raises LightpaintError if refused; nothing has changed then.
 
@@ -185,7 +185,7 @@ class Session:
             raise
 
     def _dispatch(
-        self, message: protocol.AnyRequest, arrays: Mapping[str, npt.NDArray[Any]]
+        self, message: protocol.Request, arrays: Mapping[str, npt.NDArray[Any]]
     ) -> list[Message]:
         match message:
             case protocol.Paint():

@@ -105,7 +105,7 @@ class RequestHandler:
             return replace(state, is_back=is_back)
 
     def handle(
-        self, message: protocol.AnyRequest, arrays: Mapping[str, npt.NDArray[Any]]
+        self, message: protocol.Request, arrays: Mapping[str, npt.NDArray[Any]]
     ) -> list[Message]:
         """Return the immediate answers to a request. Raises LightpaintError if it is refused."""
         if isinstance(message, protocol.Hello | protocol.TakeOver):

@@ -185,7 +185,7 @@ class Studio:
         return self._requests.greet(is_back=is_back)
 
     def handle(
-        self, message: protocol.AnyRequest, arrays: Mapping[str, npt.NDArray[Any]]
+        self, message: protocol.Request, arrays: Mapping[str, npt.NDArray[Any]]
     ) -> list[Message]:
         """Return the immediate answers to a request. Raises LightpaintError if it is refused."""
         return self._requests.handle(message, arrays)

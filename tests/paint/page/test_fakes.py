@@ -6,7 +6,7 @@ from typing import Any, get_origin, get_type_hints
 import numpy as np
 import pytest
 
-from lightpaint.paint.protocol import EVENTS, REQUESTS
+from lightpaint.paint.protocol import Event, Request
 from lightpaint.storage.json_records import read_record
 
 #: One request of each kind that the page sends.
@@ -52,7 +52,7 @@ RIG |= {"estimate_place", "compare_looks", "import_layers", "add_reference"}
 
 def check(message: dict[str, Any]) -> None:
     """Fail unless the dataclass of its kind could have said it."""
-    event = EVENTS[message["kind"]]
+    event = Event.kinds[message["kind"]]
     hints, known_fields = get_type_hints(event), {spec.name: spec for spec in fields(event)}
     arrays = {name for name in known_fields if get_origin(hints[name]) is np.ndarray}
     plain = {k: v for k, v in message.items() if k not in ("kind", "reply", "arrays")}
@@ -66,7 +66,7 @@ def check(message: dict[str, Any]) -> None:
 
 @pytest.mark.nightly
 def test_a_made_up_session_says_what_a_real_one_could(painter: Any) -> None:
-    assert set(ASKED) == set(REQUESTS) - {"hello", "fetch", "observe", "propose", *RIG}
+    assert set(ASKED) == set(Request.kinds) - {"hello", "fetch", "observe", "propose", *RIG}
     messages = painter.page.evaluate(
         """async (asked) => {
             const told = [];

@@ -470,6 +470,170 @@ export interface Findings {
 }
 
 /**
+ * The progress of a long task. Unasked.
+ *
+ * task: `export`, `final` for a final render, `basis`, `sampling` for samples added where the
+ * paint needs them, or the renderer's name for the task.
+ */
+export interface ProgressReport {
+  kind: 'progress';
+  reply?: number;
+  task: string;
+  done: number;
+  total: number;
+  unit: string;
+  arrays: {  };
+}
+
+/**
+ * The result of a verification; its render is the picture `verified`. Unasked.
+ *
+ * is_old: whether the session has changed since.
+ */
+export interface VerificationResult {
+  kind: 'verified';
+  reply?: number;
+  agrees: boolean;
+  text: string;
+  view: number;
+  is_old: boolean;
+  arrays: {  };
+}
+
+/**
+ * Notice that a long task has started. task: the request, or `stop`.
+ */
+export interface TaskStarted {
+  kind: 'started';
+  reply?: number;
+  task: 'export' | 'verify' | 'explain' | 'preview' | 'rig' | 'place' | 'compare' | 'import' | 'reference' | 'stop';
+  arrays: {  };
+}
+
+/**
+ * Notice that a stopped task has ended. Unasked.
+ */
+export interface TaskStopped {
+  kind: 'stopped';
+  reply?: number;
+  task: 'verify';
+  arrays: {  };
+}
+
+/**
+ * Files that were written. Unasked.
+ *
+ * command: solves for the exported paintings; "" for none. is_stopped: whether the export was
+ * stopped before its end. is_unpainted: whether files that need a painting were left out.
+ */
+export interface ExportResult {
+  kind: 'exported';
+  reply?: number;
+  files: string[];
+  command: string;
+  is_stopped?: boolean;
+  is_unpainted?: boolean;
+  arrays: {  };
+}
+
+/**
+ * The final renders since the painter was started, the oldest first: the answer to requests
+ * about them, and unasked when one changes its state.
+ */
+export interface RenderList {
+  kind: 'renders';
+  reply?: number;
+  renders: RenderInfo[];
+  arrays: {  };
+}
+
+/**
+ * The reasons why a view is not closer to its painting; the picture `beyond` shows where.
+ * Unasked.
+ */
+export interface Explanation {
+  kind: 'explained';
+  reply?: number;
+  sentences: string[];
+  view: number;
+  is_old: boolean;
+  arrays: {  };
+}
+
+/**
+ * The effect of a change, before it is made. Unasked. number: of the preview. is_at_cost:
+ * whether it changes the unpainted part by more than it gains. before, after: (h, w, 3) uint8.
+ */
+export interface PreviewResult {
+  kind: 'previewed';
+  reply?: number;
+  number: number;
+  view: number;
+  text: string;
+  is_at_cost: boolean;
+  is_old: boolean;
+  arrays: { before: Picture; after: Picture };
+}
+
+/**
+ * The places that a search is trying. Unasked.
+ *
+ * positions, directions: by name of light, including new ones.
+ */
+export interface TrialPlaces {
+  kind: 'trial';
+  reply?: number;
+  positions: Record<string, number[]>;
+  directions: Record<string, number[]>;
+  arrays: {  };
+}
+
+/**
+ * The extent of a search for places, and its time: the answer to `estimate_place`.
+ *
+ * text: the lights, and what each may do. seconds: about how long it takes, at least and at most.
+ * is_measured: whether an earlier search of this session tells the pace of this machine.
+ */
+export interface PlacingEstimate {
+  kind: 'place_estimate';
+  reply?: number;
+  text: string;
+  seconds: [number, number];
+  is_measured: boolean;
+  arrays: {  };
+}
+
+/**
+ * The result of a search for places of lights. Unasked.
+ *
+ * text: the moves or additions and their gain, or why there are none. names: of these lights.
+ */
+export interface PlacingResult {
+  kind: 'placed';
+  reply?: number;
+  text: string;
+  names: string[];
+  arrays: {  };
+}
+
+/**
+ * The state while there is no picture yet; `state` follows. text: an error, if one occurred.
+ */
+export interface SessionPending {
+  kind: 'waiting';
+  reply?: number;
+  version: number;
+  scene: string;
+  folder: string;
+  can_render: boolean;
+  can_report: boolean;
+  text: string;
+  progress: Omit<ProgressReport, 'kind' | 'arrays'> | null;
+  is_back: boolean;
+  arrays: {  };
+}
+
+/**
  * The whole state: the answer to `hello`, `take_over` and `observe`, and unasked when the basis
  * improves. All lists of lights are in the order of `lights`.
  *
@@ -528,23 +692,6 @@ export interface SessionState {
   choices: AnswerChoice[];
   renders: RenderInfo[];
   arrays: { weights: Picture };
-}
-
-/**
- * The state while there is no picture yet; `state` follows. text: an error, if one occurred.
- */
-export interface SessionPending {
-  kind: 'waiting';
-  reply?: number;
-  version: number;
-  scene: string;
-  folder: string;
-  can_render: boolean;
-  can_report: boolean;
-  text: string;
-  progress: Omit<ProgressReport, 'kind' | 'arrays'> | null;
-  is_back: boolean;
-  arrays: {  };
 }
 
 /**
@@ -750,112 +897,6 @@ export interface AnswerChoices {
 }
 
 /**
- * The progress of a long task. Unasked.
- *
- * task: `export`, `final` for a final render, `basis`, `sampling` for samples added where the
- * paint needs them, or the renderer's name for the task.
- */
-export interface ProgressReport {
-  kind: 'progress';
-  reply?: number;
-  task: string;
-  done: number;
-  total: number;
-  unit: string;
-  arrays: {  };
-}
-
-/**
- * Notice that a long task has started. task: the request, or `stop`.
- */
-export interface TaskStarted {
-  kind: 'started';
-  reply?: number;
-  task: 'export' | 'verify' | 'explain' | 'preview' | 'rig' | 'place' | 'compare' | 'import' | 'reference' | 'stop';
-  arrays: {  };
-}
-
-/**
- * Notice that a stopped task has ended. Unasked.
- */
-export interface TaskStopped {
-  kind: 'stopped';
-  reply?: number;
-  task: 'verify';
-  arrays: {  };
-}
-
-/**
- * Files that were written. Unasked.
- *
- * command: solves for the exported paintings; "" for none. is_stopped: whether the export was
- * stopped before its end. is_unpainted: whether files that need a painting were left out.
- */
-export interface ExportResult {
-  kind: 'exported';
-  reply?: number;
-  files: string[];
-  command: string;
-  is_stopped?: boolean;
-  is_unpainted?: boolean;
-  arrays: {  };
-}
-
-/**
- * The final renders since the painter was started, the oldest first: the answer to requests
- * about them, and unasked when one changes its state.
- */
-export interface RenderList {
-  kind: 'renders';
-  reply?: number;
-  renders: RenderInfo[];
-  arrays: {  };
-}
-
-/**
- * The result of a verification; its render is the picture `verified`. Unasked.
- *
- * is_old: whether the session has changed since.
- */
-export interface VerificationResult {
-  kind: 'verified';
-  reply?: number;
-  agrees: boolean;
-  text: string;
-  view: number;
-  is_old: boolean;
-  arrays: {  };
-}
-
-/**
- * The reasons why a view is not closer to its painting; the picture `beyond` shows where.
- * Unasked.
- */
-export interface Explanation {
-  kind: 'explained';
-  reply?: number;
-  sentences: string[];
-  view: number;
-  is_old: boolean;
-  arrays: {  };
-}
-
-/**
- * The effect of a change, before it is made. Unasked. number: of the preview. is_at_cost:
- * whether it changes the unpainted part by more than it gains. before, after: (h, w, 3) uint8.
- */
-export interface PreviewResult {
-  kind: 'previewed';
-  reply?: number;
-  number: number;
-  view: number;
-  text: string;
-  is_at_cost: boolean;
-  is_old: boolean;
-  arrays: { before: Picture; after: Picture };
-}
-
-/**
  * The places of all lights. Sent after every move, once requested.
  *
  * lights: in the order of the state. cameras: of each view; null for one that is no pinhole. up:
@@ -874,47 +915,6 @@ export interface Rig {
   surfaces: string[];
   objects: PlanObject[];
   skies: SkyAxes[];
-  arrays: {  };
-}
-
-/**
- * The places that a search is trying. Unasked.
- *
- * positions, directions: by name of light, including new ones.
- */
-export interface TrialPlaces {
-  kind: 'trial';
-  reply?: number;
-  positions: Record<string, number[]>;
-  directions: Record<string, number[]>;
-  arrays: {  };
-}
-
-/**
- * The extent of a search for places, and its time: the answer to `estimate_place`.
- *
- * text: the lights, and what each may do. seconds: about how long it takes, at least and at most.
- * is_measured: whether an earlier search of this session tells the pace of this machine.
- */
-export interface PlacingEstimate {
-  kind: 'place_estimate';
-  reply?: number;
-  text: string;
-  seconds: [number, number];
-  is_measured: boolean;
-  arrays: {  };
-}
-
-/**
- * The result of a search for places of lights. Unasked.
- *
- * text: the moves or additions and their gain, or why there are none. names: of these lights.
- */
-export interface PlacingResult {
-  kind: 'placed';
-  reply?: number;
-  text: string;
-  names: string[];
   arrays: {  };
 }
 
@@ -960,184 +960,6 @@ export interface Acknowledgement {
   kind: 'done';
   reply?: number;
   arrays: {  };
-}
-
-/**
- * The first message of a page, and again after a dropped connection. Answered by `state`, or
- * by `waiting` while there is no picture yet; `state` then comes as soon as there is one.
- */
-export interface Hello {
-  version: number;
-}
-
-/**
- * Pixels under the brush; with arrays `image` (rows, columns, 3) float32 and `importance`
- * (rows, columns) float32. Answered by `answer`.
- *
- * stroke: number of the stroke, which the page counts. is_final: whether this ends the stroke;
- * only then it is kept. label: its name for undo. view: index of the painted view. layer: id of
- * the layer of these pixels. For all kinds but `pixels`, `importance` is the coverage, 0 to 1, and
- * masks need no `image`. properties: of the layer, from now on; with an unused id they add a layer
- * on top.
- */
-export interface Paint {
-  stroke: number;
-  region: Region;
-  is_final?: boolean;
-  label?: string;
-  view?: number;
-  layer?: number;
-  properties?: Layer | null;
-}
-
-/**
- * A change of layers, their properties or their order: one step. Answered by `answer`.
- *
- * layers: new or changed ones; new ones lie on top. order: ids of all that stay, the lowest first;
- * null for the current order. copies: ids of the originals by the id of each copy, which is among
- * `layers`. is_final: whether it becomes a step; false while a slider moves. label: its name for
- * undo.
- */
-export interface ChangeLayers {
-  layers?: Layer[];
-  order?: number[] | null;
-  copies?: Record<string, number>;
-  is_final?: boolean;
-  label?: string;
-}
-
-/**
- * The selection of a view: a mask that clients multiply what they paint by; one step. With an
- * array `mask` (rows, columns) uint8, 255 for a fully selected pixel. Answered by `selected`.
- *
- * region: of the mask; nothing is selected outside it. With an empty one, or a mask of zeros,
- * everything can be painted. label: its name for undo. view: index of the view.
- */
-export interface Select {
-  region: Region;
-  label?: string;
-  view?: number;
-}
-
-/**
- * Cancel the unfinished stroke, and what a drag or a slider has changed. Answered by `patch`.
- *
- * stroke: number of the stroke; 0 for none.
- */
-export interface DropStroke {
-  stroke?: number;
-}
-
-/**
- * A part of a file of layers, `.ora` or the painter's EXR; with array `part`, its bytes.
- * Answered by `started`. After the last part follow `patch` messages, as a step was made, and a
- * `notice`; or a `notice` that says why not.
- *
- * name: of the file. size: of the whole file in bytes. start: position of the part, which arrive
- * in order. view: index of the view that the layers are of. replaces: whether they replace all
- * layers, which needs a session of one view; otherwise they lie on top.
- */
-export interface ImportLayers {
-  name: string;
-  size: number;
-  start: number;
-  view?: number;
-  replaces?: boolean;
-}
-
-/**
- * Undo the last step, whether paint, constraints or settings. Answered by `patch`.
- */
-export interface Undo {
-}
-
-/**
- * Redo a step that was undone. Answered by `patch`.
- */
-export interface Redo {
-}
-
-/**
- * A request for the last `count` steps of the history. Answered by `steps`.
- */
-export interface ListSteps {
-  count?: number;
-}
-
-/**
- * Undo or redo up to the state after a step, by its id; 0 is the beginning. Answered by
- * `patch`.
- */
-export interface GoToStep {
-  step: number;
-}
-
-/**
- * Put the layers of a preset on top, in all views and within what is selected: one step.
- * Answered by `patch`.
- *
- * preset: its name, as in `state`. subject: name of the object that it is about; null to take the
- * most central one.
- */
-export interface ApplyPreset {
-  preset: string;
-  subject?: string | null;
-}
-
-/**
- * A part of a picture file that becomes a reference; with array `part`, its bytes. Answered by
- * `started`. After the last part follows `references`, or a `notice` that says why not.
- *
- * name: of the file. size: of the whole file in bytes. start: position of the part, which arrive
- * in order.
- */
-export interface AddReference {
-  name: string;
-  size: number;
-  start: number;
-}
-
-/**
- * Delete a reference. Answered by `references`.
- */
-export interface DropReference {
-  reference: number;
-}
-
-/**
- * Put layers on top that ask for the light of a reference, within what is selected: one step.
- * Answered by `patch`.
- *
- * areas: that are compared beside the colour of the `whole` picture: its shadows and lit parts;
- * these and its `regions`, top, middle and bottom; nine `parts`, for a reference of the same view;
- * or `pairs` of places, each in the reference and in the view. matches_brightness: whether the
- * picture becomes as bright as the reference; otherwise only differences within it count.
- */
-export interface LookLike {
-  reference: number;
-  areas?: 'whole' | 'regions' | 'parts' | 'pairs';
-  pairs?: PlacePair[];
-  view?: number;
-  matches_brightness?: boolean;
-}
-
-/**
- * A request for the answer before the last step, to compare with. Answered by `previous`.
- */
-export interface ShowPrevious {
-}
-
-/**
- * Delete all layers and all paint, in all views: one step. Answered by `patch`.
- */
-export interface ClearPainting {
-}
-
-/**
- * Go back to the scene as it was before anything was painted or requested, except for looks:
- * one step. Answered by `patch`, or by `state` if lights had been added.
- */
-export interface StartOver {
 }
 
 /**
@@ -1247,6 +1069,13 @@ export interface RemoveLight {
 }
 
 /**
+ * A request for the places of all lights, and for `rig` after every later move. Answered by
+ * `started`, later by `rig`.
+ */
+export interface ShowRig {
+}
+
+/**
  * A request to find places, directions and cones of lights that come closest to the paintings,
  * or to stop that. Answered by `started`, then by `trial` and later by `placed`; the result is one
  * step.
@@ -1277,13 +1106,6 @@ export interface EstimatePlaces {
 }
 
 /**
- * A request for the places of all lights, and for `rig` after every later move. Answered by
- * `started`, later by `rig`.
- */
-export interface ShowRig {
-}
-
-/**
  * The lights that share a dimmer: all such groups, of names. Answered by `answer`.
  */
 export interface TieLights {
@@ -1291,30 +1113,173 @@ export interface TieLights {
 }
 
 /**
- * Settings of the answer, as in `Fit`. Answered by `answer`.
+ * Pixels under the brush; with arrays `image` (rows, columns, 3) float32 and `importance`
+ * (rows, columns) float32. Answered by `answer`.
  *
- * settings: of hold, space, colors, literal, prefer_current, near, sparse; null for the default
- * that follows from the painting.
+ * stroke: number of the stroke, which the page counts. is_final: whether this ends the stroke;
+ * only then it is kept. label: its name for undo. view: index of the painted view. layer: id of
+ * the layer of these pixels. For all kinds but `pixels`, `importance` is the coverage, 0 to 1, and
+ * masks need no `image`. properties: of the layer, from now on; with an unused id they add a layer
+ * on top.
  */
-export interface ChangeSettings {
-  settings: Record<string, any>;
+export interface Paint {
+  stroke: number;
+  region: Region;
+  is_final?: boolean;
+  label?: string;
+  view?: number;
+  layer?: number;
+  properties?: Layer | null;
 }
 
 /**
- * A request to show the effect of a change, before it is made. Answered by `started`, later by
- * `previewed`, with small pictures of the answer now and after the change, `before` and `after`
- * (h, w, 3) uint8.
+ * A change of layers, their properties or their order: one step. Answered by `answer`.
  *
- * number: of the preview, which the page counts; `previewed` returns it. settings, constraints,
- * ties: as in `change_settings`, `constrain_lights` and `tie`; null for unchanged ties. view:
- * index of the view.
+ * layers: new or changed ones; new ones lie on top. order: ids of all that stay, the lowest first;
+ * null for the current order. copies: ids of the originals by the id of each copy, which is among
+ * `layers`. is_final: whether it becomes a step; false while a slider moves. label: its name for
+ * undo.
  */
-export interface Preview {
-  number: number;
-  settings?: Record<string, any>;
-  constraints?: Record<string, Record<string, any>>;
-  ties?: string[][] | null;
+export interface ChangeLayers {
+  layers?: Layer[];
+  order?: number[] | null;
+  copies?: Record<string, number>;
+  is_final?: boolean;
+  label?: string;
+}
+
+/**
+ * The selection of a view: a mask that clients multiply what they paint by; one step. With an
+ * array `mask` (rows, columns) uint8, 255 for a fully selected pixel. Answered by `selected`.
+ *
+ * region: of the mask; nothing is selected outside it. With an empty one, or a mask of zeros,
+ * everything can be painted. label: its name for undo. view: index of the view.
+ */
+export interface Select {
+  region: Region;
+  label?: string;
   view?: number;
+}
+
+/**
+ * A part of a file of layers, `.ora` or the painter's EXR; with array `part`, its bytes.
+ * Answered by `started`. After the last part follow `patch` messages, as a step was made, and a
+ * `notice`; or a `notice` that says why not.
+ *
+ * name: of the file. size: of the whole file in bytes. start: position of the part, which arrive
+ * in order. view: index of the view that the layers are of. replaces: whether they replace all
+ * layers, which needs a session of one view; otherwise they lie on top.
+ */
+export interface ImportLayers {
+  name: string;
+  size: number;
+  start: number;
+  view?: number;
+  replaces?: boolean;
+}
+
+/**
+ * Cancel the unfinished stroke, and what a drag or a slider has changed. Answered by `patch`.
+ *
+ * stroke: number of the stroke; 0 for none.
+ */
+export interface DropStroke {
+  stroke?: number;
+}
+
+/**
+ * Undo the last step, whether paint, constraints or settings. Answered by `patch`.
+ */
+export interface Undo {
+}
+
+/**
+ * Redo a step that was undone. Answered by `patch`.
+ */
+export interface Redo {
+}
+
+/**
+ * A request for the last `count` steps of the history. Answered by `steps`.
+ */
+export interface ListSteps {
+  count?: number;
+}
+
+/**
+ * Undo or redo up to the state after a step, by its id; 0 is the beginning. Answered by
+ * `patch`.
+ */
+export interface GoToStep {
+  step: number;
+}
+
+/**
+ * A request for the answer before the last step, to compare with. Answered by `previous`.
+ */
+export interface ShowPrevious {
+}
+
+/**
+ * Put the layers of a preset on top, in all views and within what is selected: one step.
+ * Answered by `patch`.
+ *
+ * preset: its name, as in `state`. subject: name of the object that it is about; null to take the
+ * most central one.
+ */
+export interface ApplyPreset {
+  preset: string;
+  subject?: string | null;
+}
+
+/**
+ * A part of a picture file that becomes a reference; with array `part`, its bytes. Answered by
+ * `started`. After the last part follows `references`, or a `notice` that says why not.
+ *
+ * name: of the file. size: of the whole file in bytes. start: position of the part, which arrive
+ * in order.
+ */
+export interface AddReference {
+  name: string;
+  size: number;
+  start: number;
+}
+
+/**
+ * Delete a reference. Answered by `references`.
+ */
+export interface DropReference {
+  reference: number;
+}
+
+/**
+ * Put layers on top that ask for the light of a reference, within what is selected: one step.
+ * Answered by `patch`.
+ *
+ * areas: that are compared beside the colour of the `whole` picture: its shadows and lit parts;
+ * these and its `regions`, top, middle and bottom; nine `parts`, for a reference of the same view;
+ * or `pairs` of places, each in the reference and in the view. matches_brightness: whether the
+ * picture becomes as bright as the reference; otherwise only differences within it count.
+ */
+export interface LookLike {
+  reference: number;
+  areas?: 'whole' | 'regions' | 'parts' | 'pairs';
+  pairs?: PlacePair[];
+  view?: number;
+  matches_brightness?: boolean;
+}
+
+/**
+ * Delete all layers and all paint, in all views: one step. Answered by `patch`.
+ */
+export interface ClearPainting {
+}
+
+/**
+ * Go back to the scene as it was before anything was painted or requested, except for looks:
+ * one step. Answered by `patch`, or by `state` if lights had been added.
+ */
+export interface StartOver {
 }
 
 /**
@@ -1371,6 +1336,52 @@ export interface CompareLooks {
  */
 export interface DropLook {
   look: number;
+}
+
+/**
+ * Propose a lighting to the painter: it becomes a look with each light locked at the proposed
+ * level, and replaces an earlier proposal of that name. Answered by `looks`.
+ *
+ * lights: emission by name of light; other lights keep that of the current answer.
+ */
+export interface Propose {
+  name: string;
+  lights: Record<string, RGB>;
+}
+
+/**
+ * The first message of a page, and again after a dropped connection. Answered by `state`, or
+ * by `waiting` while there is no picture yet; `state` then comes as soon as there is one.
+ */
+export interface Hello {
+  version: number;
+}
+
+/**
+ * Settings of the answer, as in `Fit`. Answered by `answer`.
+ *
+ * settings: of hold, space, colors, literal, prefer_current, near, sparse; null for the default
+ * that follows from the painting.
+ */
+export interface ChangeSettings {
+  settings: Record<string, any>;
+}
+
+/**
+ * A request to show the effect of a change, before it is made. Answered by `started`, later by
+ * `previewed`, with small pictures of the answer now and after the change, `before` and `after`
+ * (h, w, 3) uint8.
+ *
+ * number: of the preview, which the page counts; `previewed` returns it. settings, constraints,
+ * ties: as in `change_settings`, `constrain_lights` and `tie`; null for unchanged ties. view:
+ * index of the view.
+ */
+export interface Preview {
+  number: number;
+  settings?: Record<string, any>;
+  constraints?: Record<string, Record<string, any>>;
+  ties?: string[][] | null;
+  view?: number;
 }
 
 /**
@@ -1459,21 +1470,21 @@ export interface Observe {
   version: number;
 }
 
-/**
- * Propose a lighting to the painter: it becomes a look with each light locked at the proposed
- * level, and replaces an earlier proposal of that name. Answered by `looks`.
- *
- * lights: emission by name of light; other lights keep that of the current answer.
- */
-export interface Propose {
-  name: string;
-  lights: Record<string, RGB>;
-}
-
 /** Events from the session, by kind. */
 export interface Events {
-  state: SessionState;
+  progress: ProgressReport;
+  verified: VerificationResult;
+  started: TaskStarted;
+  stopped: TaskStopped;
+  exported: ExportResult;
+  renders: RenderList;
+  explained: Explanation;
+  previewed: PreviewResult;
+  trial: TrialPlaces;
+  place_estimate: PlacingEstimate;
+  placed: PlacingResult;
   waiting: SessionPending;
+  state: SessionState;
   answer: AnswerUpdate;
   patch: CanvasPatch;
   selected: SelectionUpdate;
@@ -1485,18 +1496,7 @@ export interface Events {
   looks: LookList;
   references: ReferenceList;
   choices: AnswerChoices;
-  progress: ProgressReport;
-  started: TaskStarted;
-  stopped: TaskStopped;
-  exported: ExportResult;
-  renders: RenderList;
-  verified: VerificationResult;
-  explained: Explanation;
-  previewed: PreviewResult;
   rig: Rig;
-  trial: TrialPlaces;
-  place_estimate: PlacingEstimate;
-  placed: PlacingResult;
   notice: Notice;
   failed: Failure;
   closed: Closing;
@@ -1505,23 +1505,6 @@ export interface Events {
 
 /** Fields of clients' requests, by kind. */
 export interface Requests {
-  hello: Hello;
-  paint: Paint;
-  change_layers: ChangeLayers;
-  select: Select;
-  drop_stroke: DropStroke;
-  import_layers: ImportLayers;
-  undo: Undo;
-  redo: Redo;
-  list_steps: ListSteps;
-  go_to_step: GoToStep;
-  apply_preset: ApplyPreset;
-  add_reference: AddReference;
-  drop_reference: DropReference;
-  look_like: LookLike;
-  show_previous: ShowPrevious;
-  clear_painting: ClearPainting;
-  start_over: StartOver;
   constrain_light: ConstrainLight;
   constrain_lights: ConstrainLights;
   set_master: SetMaster;
@@ -1530,12 +1513,26 @@ export interface Requests {
   point: PointLight;
   add_light: AddLight;
   remove_light: RemoveLight;
+  show_rig: ShowRig;
   place: PlaceLights;
   estimate_place: EstimatePlaces;
-  show_rig: ShowRig;
   tie: TieLights;
-  change_settings: ChangeSettings;
-  preview: Preview;
+  paint: Paint;
+  change_layers: ChangeLayers;
+  select: Select;
+  import_layers: ImportLayers;
+  drop_stroke: DropStroke;
+  undo: Undo;
+  redo: Redo;
+  list_steps: ListSteps;
+  go_to_step: GoToStep;
+  show_previous: ShowPrevious;
+  apply_preset: ApplyPreset;
+  add_reference: AddReference;
+  drop_reference: DropReference;
+  look_like: LookLike;
+  clear_painting: ClearPainting;
+  start_over: StartOver;
   save_look: SaveLook;
   load_look: LoadLook;
   rename_look: RenameLook;
@@ -1543,6 +1540,10 @@ export interface Requests {
   mix_looks: MixLooks;
   compare_looks: CompareLooks;
   drop_look: DropLook;
+  propose: Propose;
+  hello: Hello;
+  change_settings: ChangeSettings;
+  preview: Preview;
   export: Export;
   render_final: RenderFinal;
   stop_render: StopRender;
@@ -1552,7 +1553,6 @@ export interface Requests {
   take_over: TakeOver;
   fetch: Fetch;
   observe: Observe;
-  propose: Propose;
 }
 
 export type AnyEvent = Events[keyof Events];
