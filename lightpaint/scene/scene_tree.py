@@ -89,6 +89,7 @@ class ParsedScene:
         # Reading a property marks it as used, and Mitsuba reports unused ones: so check copies.
         check_nodes(path, parser.ParserState(state))
         parser.transform_all(self.config, state)
+        _lift_merged(state)
         check_required(path, parser.ParserState(state))
         has_exr = check_assets(path, parser.ParserState(state), self.resolver)
         # An exception about a damaged offset table in Mitsuba's OpenEXR reader sometimes ends the
@@ -305,3 +306,24 @@ def relocated_path(path: Path, old: Path, new: Path) -> Path:
         return Path(os.path.realpath(new)) / real.relative_to(old_real)
     # The path may lead through the old folder.
     return real if old_real.name in path.parts else path
+
+
+def _lift_merged(state: Any) -> None:
+    """Move what stands in a shape `merge` of the scene up into the scene itself.
+
+    Mitsuba's own writer puts the whole scene, sensors and all, into one if the state that it writes
+    was prepared for rendering. Merged shapes would have no names.
+    """
+    import mitsuba as mi
+
+    nodes = state.nodes
+    root, reference = nodes[0].props, mi.Properties.Type.ResolvedReference
+    for key in [key for key in root if root.type(key) == reference]:
+        merged = nodes[root[key].index()].props
+        if merged.plugin_name() != "merge":
+            continue
+        del root[key]
+        for inner in [inner for inner in merged if merged.type(inner) == reference]:
+            is_free = inner not in root
+            root[inner if is_free else f"_arg_{len(nodes) + merged[inner].index()}"] = merged[inner]
+            del merged[inner]

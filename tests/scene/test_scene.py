@@ -120,6 +120,24 @@ def test_parameters_and_includes(tmp_path: Path) -> None:
     assert scene.light("bulb").members[0].file == 1
 
 
+def test_a_scene_that_was_prepared_before_it_was_written_is_whole(tmp_path: Path) -> None:
+    """Mitsuba's writer puts all of it into a shape that merges meshes."""
+    import mitsuba as mi
+
+    original = load_scene(write_room(tmp_path))
+    config = mi.parser.ParserConfig(use_variant().variant)
+    state = mi.parser.parse_file(config, str(tmp_path / "room.xml"))
+    mi.parser.transform_all(config, state)
+    mi.parser.write_file(state, str(tmp_path / "written.xml"))
+    assert 'type="merge"' in (tmp_path / "written.xml").read_text("utf-8")
+    written = load_scene(tmp_path / "written.xml")
+    assert written.size == original.size
+    emissions = [np.array([x.emission for x in scene.lights]) for scene in (original, written)]
+    np.testing.assert_allclose(*emissions, rtol=1e-6)
+    images = [mitsuba_render(scene, seed=1, spp=16) for scene in (original, written)]
+    np.testing.assert_allclose(*images, rtol=1e-3, atol=1e-4)
+
+
 def test_identity_follows_files_that_only_the_parser_reads(tmp_path: Path) -> None:
     (tmp_path / "lamp.spd").write_text("400 1\n700 2\n", encoding="ascii")
     light = """<emitter type="point"><spectrum name="intensity" filename="lamp.spd"/></emitter>"""
