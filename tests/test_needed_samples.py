@@ -92,7 +92,8 @@ def test_the_scene_stays_loaded_over_the_rounds(
 def test_samples_go_where_they_are_needed_until_the_error_is_met(small_room: Scene, tmp_path: Path):
     target = painting(small_room)
     look, recorder = answer(small_room, target, tmp_path / "a", error=0.3)
-    error = picture_errors(look.basis, error_bars(look.solution)).max()
+    # More samples of the basis do not lower what noise of the painting adds.
+    error = picture_errors(look.basis, error_bars(look.solution, with_painting=False)).max()
     assert error <= 0.3
     assert look.basis.origin.spp == PILOT_SPP
     assert look.basis.extra.any()

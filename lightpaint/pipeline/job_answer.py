@@ -3,7 +3,7 @@
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
-from lightpaint.arrays import as_rgb
+from lightpaint.arrays import RGB, as_rgb
 from lightpaint.basis.basis import Basis
 from lightpaint.lighting.analysis.analysis import Analysis, analyse, with_findings
 from lightpaint.lighting.animated_solve import solve_frames
@@ -34,8 +34,17 @@ class JobAnswer:
     lighting: Lighting
 
 
-def answer_job(job: Job, bases: list[Basis], listen: Listener) -> JobAnswer:
-    """Solve a job and analyse its answer. bases: of its views; the list is emptied."""
+def answer_job(
+    job: Job,
+    bases: list[Basis],
+    listen: Listener,
+    *,
+    level_errors: Sequence[tuple[str, RGB]] = (),
+) -> JobAnswer:
+    """Solve a job and analyse its answer.
+
+    bases: of its views; the list is emptied. level_errors: of lights whose poses were searched for.
+    """
     if job.settings.animate:
         return _animated_answer(job, bases, listen)
     problem = problem_of(job, bases)
@@ -45,7 +54,7 @@ def answer_job(job: Job, bases: list[Basis], listen: Listener) -> JobAnswer:
             make_ahead(basis, prepare_page)
     solution = _reduce_noise(job, solution_of(problem), listen)
     del problem  # some of its arrays are as large as the pictures
-    analyses = analyse(solution)
+    analyses = analyse(solution, level_errors=level_errors)
     solution.problem.squares.release()
     return JobAnswer(solution, analyses, with_findings(solution, analyses).lighting)
 

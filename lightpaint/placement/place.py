@@ -28,7 +28,13 @@ from lightpaint.placement.paths.panel_site import PanelSite
 from lightpaint.placement.paths.view_paths import SearchPaths
 from lightpaint.placement.placement import AddedLight, Move, Placement, hung
 from lightpaint.placement.placement_fit import fit_of
-from lightpaint.placement.search.judgement import Found, Growth, PlacementJudge, PoseError
+from lightpaint.placement.search.judgement import (
+    ArrangementError,
+    Found,
+    Growth,
+    PlacementJudge,
+    PoseError,
+)
 from lightpaint.placement.search.new_light_search import STARTS, NewLightSearch
 from lightpaint.placement.search.pose_rules import PoseRules
 from lightpaint.placement.search.pose_search import TURNS, PoseSearch
@@ -146,19 +152,19 @@ def place(
         return result
 
     result = large[0].while_loaded(search, views=large[1:])
-    return _placement([x for x, _ in views], result, lights, len(names))
+    return _placement([x for x, _ in views], result, lights, names)
 
 
 @dataclass(frozen=True)
 class _Result:
     """The result of a search on small films, the first one of `size`.
 
-    errors, seen: of each movable, and its place in the first picture. growth: the best lighting
-    with none, one … of the new lights, largest gain first.
+    errors: of poses and levels. seen: of each movable, its place in the first picture. growth: the
+    best lighting with none, one … of the new lights, largest gain first.
     """
 
     found: Found
-    errors: list[PoseError]
+    errors: ArrangementError
     seen: Sequence[tuple[float, float] | None]
     growth: list[Growth]
     spread: float
@@ -185,7 +191,7 @@ class _Result:
         errors = (
             judge.errors(found.arrangement)
             if is_changed and with_errors
-            else [PoseError(None, None)] * len(sites)
+            else ArrangementError([PoseError(None, None)] * len(sites), np.zeros((0, 3)))
         )
         return cls(
             found,
@@ -198,7 +204,7 @@ class _Result:
 
     def is_hardly_visible(self, k: int) -> bool:
         """Return whether the picture says little about the place of movable `k`."""
-        error = self.errors[k]
+        error = self.errors.poses[k]
         is_long = error.place is not None and error.place > LONG_ERROR * self.spread
         return is_long or (error.turn is not None and error.turn > WIDE_ERROR)
 
@@ -286,37 +292,46 @@ def _searched(
 
 
 def _placement(
-    scenes: Sequence[Scene], result: _Result, lights: Sequence[NewLight], first: int
+    scenes: Sequence[Scene], result: _Result, lights: Sequence[NewLight], names: Sequence[str]
 ) -> Placement:
-    """Return the placement of a search result. first: the index of the first new light's column."""
+    """Return the placement of a search result. names: of the lights of the basis."""
     found, moves, additions = result.found, list[Move](), list[AddedLight]()
     arrangement, order = found.arrangement, _additions(found)
     for k, (movable, site) in enumerate(zip(arrangement.movables, arrangement.sites, strict=True)):
         about: dict[str, Any] = {
             "gain_share": found.gains[k],
-            "place_error": result.errors[k].place,
-            "turn_error": result.errors[k].turn,
+            "place_error": result.errors.poses[k].place,
+            "turn_error": result.errors.poses[k].turn,
             "is_hardly_visible": result.is_hardly_visible(k),
         }
         if movable.group is not None:
             weight = arrangement.fitted.weights[movable.columns[0]]
-            emitter = _emitter(lights[movable.columns[0] - first], site, weight)
+            emitter = _emitter(lights[movable.columns[0] - len(names)], site, weight)
             about |= result.grown(order.index(k))
             additions.append(AddedLight(emitter, **about, seen_at=result.seen[k]))
         elif site != movable.light.site:
             about["is_slid_to_end"] = movable.light.is_slid_to_end(site)
             about["is_turned_to_end"] = movable.light.is_turned_to_end(site)
-            names = [movable.light.name]
+            pair = [movable.light.name]
             if movable.mirror is not None:
-                names.append(scenes[0].lights[movable.columns[1]].name)
-            for name, new_site in zip(names, movable.sites(site), strict=True):
+                pair.append(scenes[0].lights[movable.columns[1]].name)
+            for name, new_site in zip(pair, movable.sites(site), strict=True):
                 old = scenes[0].light(name).members[0].site
-                about["mirrors"] = "" if name == names[0] else names[0]
+                about["mirrors"] = "" if name == pair[0] else pair[0]
                 moves.append(Move(name, old, new_site.without_shape, **about))
     moves.sort(key=lambda move: -move.gain_share)
     additions.sort(key=lambda light: -light.gain_share)
     placed = hung(scenes, moves, additions)
-    return Placement(tuple(placed), tuple(moves), tuple(additions), found.before, found.after)
+    all_names = (*names, *(light.name for light in lights))
+    levels = zip(all_names, result.errors.levels.tolist(), strict=False)
+    return Placement(
+        tuple(placed),
+        tuple(moves),
+        tuple(additions),
+        found.before,
+        found.after,
+        level_errors=tuple((name, as_rgb(errors)) for name, errors in levels if any(errors)),
+    )
 
 
 def _emitter(light: NewLight, site: Site, weight: Any) -> NewEmitter:

@@ -214,6 +214,8 @@ class Placement:
             was fitted to.
         missed_after: The same with the moves and additions.
         looks: Names of the looks that share it; empty for a single look.
+        level_errors: Lights, also unmoved ones, and the standard deviations of their weights by the
+            errors of poses, of each channel and relative to the weight.
 
     Examples:
         >>> solution, scene = lp.solve(basis, target), lp.load_scene("room.xml")
@@ -228,6 +230,7 @@ class Placement:
     missed_before: float
     missed_after: float
     looks: tuple[str, ...] = ()
+    level_errors: tuple[tuple[str, RGB], ...] = ()
 
     @property
     def scene(self) -> Scene:

@@ -6,6 +6,7 @@ from dataclasses import asdict, dataclass, replace
 from pathlib import Path
 from typing import Literal
 
+from lightpaint.arrays import RGB
 from lightpaint.errors import SceneError
 from lightpaint.file_reading import read_text
 from lightpaint.placement.placement import AddedLight, Move, Placement, hung
@@ -30,6 +31,7 @@ class PlacementRecord:
     missed_before: float
     missed_after: float
     looks: tuple[str, ...] = ()
+    level_errors: tuple[tuple[str, RGB], ...] = ()
     made_of: str = ""
     format: Literal["lightpaint-places 1"] = FORMAT
 
@@ -45,6 +47,7 @@ class PlacementRecord:
             self.missed_before,
             self.missed_after,
             self.looks,
+            self.level_errors,
         )
 
     def to_json(self) -> str:
@@ -62,6 +65,7 @@ def record_of(
         placement.missed_before,
         placement.missed_after,
         tuple(looks),
+        placement.level_errors,
         made_of,
     )
 

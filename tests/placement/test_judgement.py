@@ -14,7 +14,7 @@ from lightpaint.placement.free_light import FreeLight
 from lightpaint.placement.look_goals import LookGoal
 from lightpaint.placement.movable import Arrangement, Movable
 from lightpaint.placement.placement_fit import PlacementFit
-from lightpaint.placement.search.judgement import NOTHING, WORTH, PlacementJudge
+from lightpaint.placement.search.judgement import FEW_FITS, NOTHING, WORTH, PlacementJudge
 from lightpaint.placement.search.pose_steps import PoseSteps
 from lightpaint.scene.properties.pose import Site
 
@@ -74,3 +74,51 @@ def test_a_negligible_light_is_not_worth_it() -> None:
     """However surely it is seen."""
     its = found((1.0, 0.005, 0.0), noise=1e-4)
     assert [x.light.name for x in its.arrangement.movables] == ["new_0"]
+
+
+#: Pixels along a line, and the deviation of the noise of the light that stays.
+LINE, NOISE = np.linspace(-3, 3, 100), 0.02
+
+
+class LinePaths:
+    """A pool of light around the x coordinate of a light, without noise."""
+
+    def columns(self, sites: Sequence[Site]) -> Floats:
+        pools = [np.exp(-((LINE - (x.position or (0, 0, 0))[0]) ** 2)) for x in sites]
+        images = np.array(pools)[..., None] * np.ones(3)
+        return np.concatenate([images, 0 * images], axis=1).astype(np.float32)
+
+
+def test_errors_of_poses_and_levels_know_the_noise_of_lights_that_stay() -> None:
+    """The scatter of a pose over bases, and what it adds to that of the level."""
+    lamp = np.exp(-2 * np.square(LINE - 1))[:, None] * np.ones(3)
+    goal = lamp + LinePaths().columns([Site((0.0, 0.0, 0.0))])[0, : LINE.size]
+    knobs = tuple(Knob.of_any_colour(k) for k in range(2))
+    reduction = Reduction(np.zeros((2, 3)), ("lamp", "pool"), knobs)
+    look = LookGoal(goal, np.ones_like(goal), reduction, None, np.zeros_like(goal))
+    start = Site((0.0, 0.0, 0.0))
+    freedom = lp.Freedom(box=((-1.0, 0.0, 0.0), (1.0, 0.0, 0.0)))
+    movables = (Movable(FreeLight("pool", start, freedom), (1,), None, None),)
+    line: Any = LinePaths()
+    paths: Any = SimpleNamespace(refine=line, judge=line, spread=line)
+    seeds, rows = 30, []
+    for seed in range(seeds):
+        a, b = lamp + NOISE * np.random.default_rng(seed).normal(size=(2, LINE.size, 1))
+        columns = np.zeros((2, 2 * LINE.size, 3), np.float32)
+        columns[0] = np.concatenate([(a + b) / 2, (a - b) / 2])
+        fit = PlacementFit(columns, [look])
+        steps = PoseSteps(fit, 1.0, lambda *_: True)
+        before = steps.fitted(movables, (start,), line)
+        best = steps.descend(Arrangement(movables, (start,), before), line, 3)
+        errors = PlacementJudge(fit, steps, paths).errors(best)
+        level, there = best.fitted.weights[1, 0], before.weights[1, 0]
+        place = (best.sites[0].position or (0, 0, 0))[0]
+        rows.append((place, errors.poses[0].place, level, there, errors.levels[1, 0] * level))
+    places, place_errors, levels, there, level_errors = np.array(rows).T
+    # At the true pose the same bases give other levels: the difference is what the pose does.
+    by_poses = np.var(levels - there, ddof=1)
+    # Both variances are of `seeds` numbers, each with a relative standard error of √(2 / n).
+    tolerance = 4 * np.sqrt(2 * 2 / seeds)
+    for stated, true in ((place_errors, np.var(places, ddof=1)), (level_errors, by_poses)):
+        ratio = np.mean(np.square(stated / FEW_FITS)) / true
+        assert abs(np.log(ratio)) < tolerance

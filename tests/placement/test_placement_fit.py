@@ -102,3 +102,19 @@ def test_the_gradient_along_other_paths_has_no_bias_by_noise(rng: np.random.Gene
     slope += 0.5 * (start - column(rng, TRUE, 0.0))  # of the noise that the column has
     matrix, gradient = fit.newton(fit.fitted(start), Slopes(slope, [0], [0]), there)
     assert abs(gradient[0] / matrix[0, 0]) < 0.02  # noise
+
+
+def test_the_fit_of_a_half_is_to_the_samples_of_that_half(rng: np.random.Generator) -> None:
+    first, second = (TRUE + 0.1 * rng.normal(size=TRUE.shape) for _ in range(2))
+    goal_halves = 2 * first, 2 * second
+    fit = fit_to((goal_halves[0] + goal_halves[1]) / 2, (goal_halves[0] - goal_halves[1]) / 2)
+    fit.columns = np.concatenate([(first + second) / 2, (first - second) / 2])[None]
+    for sign, half in ((1, first), (-1, second)):
+        alone = fit.of_half(sign)
+        np.testing.assert_allclose(alone.columns[0, :PIXELS], half, atol=1e-12)
+        # Half the samples have twice the variance.
+        np.testing.assert_allclose(alone.columns[0, PIXELS:], 0.5**0.5 * (first - second))
+        # Goal and column are the same but for the factor, and so is their noise.
+        fitted = alone.fitted(alone.columns)
+        assert fitted.weights == pytest.approx(np.full((1, 3), 2.0), rel=1e-9)
+        assert abs(fitted.missed) < 1e-9 * fit.norm2

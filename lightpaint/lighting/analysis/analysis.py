@@ -1,10 +1,11 @@
 """The whole analysis of an answer, computed once: its errors, its reasons, and their costs."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from functools import partial
 from typing import Any
 
+from lightpaint.arrays import RGB
 from lightpaint.display_text import short_repr
 from lightpaint.images.bands import in_turns
 from lightpaint.keywords import keywords
@@ -58,11 +59,14 @@ class Analysis:
 
 
 @keywords()
-def analyse(solution: Solution) -> tuple[Analysis, ...]:
+def analyse(
+    solution: Solution, *, level_errors: Sequence[tuple[str, RGB]] = ()
+) -> tuple[Analysis, ...]:
     """Analyse the answer to each view.
 
     Args:
         solution: Of one view or of several.
+        level_errors: As of `error_bars`.
 
     Examples:
         >>> solution = lp.solve(basis, target)
@@ -72,7 +76,8 @@ def analyse(solution: Solution) -> tuple[Analysis, ...]:
     """
     views = solution.views
     jobs: list[Callable[[], Any]] = [partial(_appearance_and_diagnosis, view) for view in views]
-    jobs += [partial(error_bars, solution), partial(best_by_colors, solution)]
+    jobs += [partial(error_bars, solution, level_errors=level_errors)]
+    jobs += [partial(best_by_colors, solution)]
     jobs += [partial(_ambiguities, solution)]
     jobs += [partial(without_constraints, view) for view in views]
     # All of them ask for it.

@@ -1,8 +1,8 @@
 """The judgement of which moves and new lights are worth it, with error bars of their places.
 
 Weights are fitted along some paths and judged along others, which no pose was fitted to. Places are
-fitted again along each set of other paths, and their spread is the error bar; an error bar from the
-derivatives alone would be too optimistic.
+fitted again along each set of other paths, to one half of the basis's samples, and their spread is
+the error bar; an error bar from the derivatives alone would be too optimistic.
 """
 
 import math
@@ -72,6 +72,18 @@ class PoseError:
 
     place: float | None
     turn: float | None
+
+
+@dataclass(frozen=True)
+class ArrangementError:
+    """Errors of an arrangement.
+
+    poses: of each movable. levels: (n, 3), standard deviations of the weights by errors of poses,
+    relative to the weights; the root mean square of all looks.
+    """
+
+    poses: Sequence[PoseError]
+    levels: Doubles
 
 
 class _ErrorsOfChanges:
@@ -218,15 +230,24 @@ class PlacementJudge:
         fitted, judged = self._along_both(arrangement)
         return float(self._fit.missed_map(judged.columns, fitted.weights).sum())
 
-    def errors(self, best: Arrangement) -> list[PoseError]:
-        """Return the spread of each pose between fits along independent paths."""
+    def errors(self, best: Arrangement) -> ArrangementError:
+        """Return the spread of poses between fits along independent paths.
+
+        All fits share the basis, whose noise moves poses, too. So the two others are to one half of
+        its samples each: of 0, d and -d, where d is the effect of the half difference, the variance
+        is d².
+        """
         fits: list[Sequence[Site]] = [best.sites]
-        for other in (self._paths.judge, self._paths.spread):
-            fits.append(self._steps.refit(best, self._paths.refine, other))
-        return [
+        for sign, other in ((1, self._paths.judge), (-1, self._paths.spread)):
+            steps = self._steps.with_fit(self._fit.of_half(sign))
+            fits.append(steps.refit(best, self._paths.refine, other))
+        poses = [
             _error([sites[k] for sites in fits], best.movables[k].light.freedom.slides)
             for k in range(len(best.movables))
         ]
+        # The same paths and samples at all poses: what levels do by the poses alone.
+        levels = [self._steps.fitted(best.movables, x, self._paths.refine).weights for x in fits]
+        return ArrangementError(poses, _level_errors(np.array(levels)))
 
     def growth(self, best: Arrangement, order: Sequence[int]) -> list[Growth]:
         """Return the best lighting with none of the new lights, with the first, and so on.
@@ -262,6 +283,14 @@ class PlacementJudge:
                 sites.append(start.sites[k])
         fitted = self._steps.fitted(movables, sites, self._paths.refine)
         return Arrangement(tuple(movables), tuple(sites), fitted)
+
+
+def _level_errors(weights: Doubles) -> Doubles:
+    """Return relative deviations of levels, (n, 3). weights: (fits, n, channels of all looks)."""
+    mean, spread = weights.mean(axis=0), FEW_FITS * weights.std(axis=0, ddof=1)
+    relative = np.divide(spread, mean, out=np.zeros_like(mean), where=mean > 0)
+    looks = relative.reshape(len(mean), -1, 3)
+    return np.asarray(np.sqrt(np.square(looks).mean(axis=1)))
 
 
 def _error(sites: Sequence[Site], slides: bool) -> PoseError:

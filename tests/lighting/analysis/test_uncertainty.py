@@ -136,6 +136,25 @@ def test_one_light_by_hand(make_basis: Any):
     np.testing.assert_allclose(error_bars(corrected).bias, 0, atol=1e-5)
 
 
+def test_errors_of_poses_add_to_the_scatter(make_basis: Any):
+    """Independent of the basis's noise: the squares add up, in intervals, too."""
+    clean = _pools()
+    images, halves = _noisy_halves(clean, 0.1, np.random.default_rng(1))
+    basis = make_basis(images=images, half_differences=halves, names="abcde")
+    solution = solve(basis, _painting(clean))
+    alone, both = (error_bars(solution, level_errors=x) for x in ((), [("a", (0.1, 0.2, 0.3))]))
+    by_poses = np.zeros((5, 3))
+    by_poses[0] = solution.weights[0] * [0.1, 0.2, 0.3]
+    assert (solution.weights[0] > 0).all()
+    np.testing.assert_allclose(both.scatter, np.hypot(alone.scatter, by_poses), rtol=1e-12)
+    (low, _), (both_low, _) = alone.interval, both.interval
+    np.testing.assert_array_equal(both_low[1:], low[1:])
+    inside = both_low[0] > 0
+    rise = np.hypot((solution.weights - low)[0], NORMAL_95 * by_poses[0])
+    np.testing.assert_allclose((solution.weights - both_low)[0][inside], rise[inside], rtol=1e-9)
+    assert inside.any()
+
+
 @pytest.mark.nightly
 def test_intervals_are_those_of_student_where_few_pixels_have_noise(make_basis: Any):
     """Three half differences are three degrees of freedom: 1.96 standard errors hold in 85 %."""

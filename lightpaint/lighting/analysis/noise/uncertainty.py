@@ -5,11 +5,12 @@ their difference, pixel by pixel, gives the covariance of the gradient's noise, 
 of M turns that into the covariance of the weights (docs/method.md, "How sure").
 """
 
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
 
-from lightpaint.arrays import Bools, Doubles, as_rgb
+from lightpaint.arrays import RGB, Bools, Doubles, as_rgb
 from lightpaint.colour.color import LUMINANCE
 from lightpaint.display_text import short_repr
 from lightpaint.keywords import keywords
@@ -38,8 +39,8 @@ class Uncertainty:
 
     Attributes:
         weights: (n, 3), as solved.
-        scatter: (n, 3), standard deviation of the weights between seeds. For a light that is off
-            or at a limit, the part on the side where it may go.
+        scatter: (n, 3), standard deviation of the weights between seeds, that by errors of poses
+            included. For a light that is off or at a limit, the part on the side where it may go.
         bias: (n, 3), the rise of the weights without the noise power in M.
         painting_scatter: (n, 3), standard deviation by noise of the painting, where that is a
             render or a photograph; more samples of the basis do not lower it.
@@ -91,7 +92,12 @@ class Uncertainty:
 
 
 @keywords()
-def error_bars(solution: Solution, *, with_painting: bool = True) -> Uncertainty | None:
+def error_bars(
+    solution: Solution,
+    *,
+    with_painting: bool = True,
+    level_errors: Sequence[tuple[str, RGB]] = (),
+) -> Uncertainty | None:
     """Estimate standard error and bias of every weight of a solve or `refine`.
 
     None if the noise of the basis is unknown, which is not the same as none. After reweighting they
@@ -103,6 +109,8 @@ def error_bars(solution: Solution, *, with_painting: bool = True) -> Uncertainty
     Args:
         solution: From `solve`, `refine` or `correct_noise`.
         with_painting: Whether noise of the painting counts, which no samples of the basis lower.
+        level_errors: Names of lights and relative standard deviations of their weights by errors of
+            poses, as in `Placement`. Without them error bars hold for the poses as they are.
 
     Examples:
         >>> bars = lp.error_bars(lp.solve(basis, target))
@@ -139,8 +147,9 @@ def error_bars(solution: Solution, *, with_painting: bool = True) -> Uncertainty
         weak_spread = weight_spread(solution, noise, weak_equations, weak_equations, far)
         spread = spread.mixed_with(weak_spread, doubts)
         moved = far - weights - bias
+    by_poses = _scatter_by_poses(solution, level_errors)
     sides, wide = (
-        [_root(*parts, exit_, moved) for exit_ in spread.exits]
+        [_root(*parts, exit_, moved, by_poses) for exit_ in spread.exits]
         for parts in ((spread.inside,), (spread.inside * noise.widening, by_painting))
     )
     is_determined = np.where(solution.reached, 1, np.nan)
@@ -158,6 +167,13 @@ def error_bars(solution: Solution, *, with_painting: bool = True) -> Uncertainty
         (((doubts >= 0.5) | noise.is_hidden).any(axis=1) | spread.is_far)
         & _is_wide(weights, interval),
     )
+
+
+def _scatter_by_poses(solution: Solution, level_errors: Sequence[tuple[str, RGB]]) -> Doubles:
+    """Return the standard deviations of the weights by errors of poses, (n, 3)."""
+    relative = dict(level_errors)
+    none = (0.0, 0.0, 0.0)
+    return solution.weights * [relative.get(x.name, none) for x in solution.basis.lights]
 
 
 @dataclass(frozen=True)
