@@ -4,6 +4,8 @@ All are quadratics in w, scaled by the pictures of the lights over the whole pic
 are alike for all lights. Pixels in which an emitter is visible do not count.
 """
 
+from math import ceil
+
 import numpy as np
 
 from lightpaint.arrays import Bools, Doubles
@@ -23,6 +25,9 @@ COLOR_PULL, CLEAR_PULL = 1.5, 0.02
 #: Price of what each light by itself does to unpainted pixels, relative to that of what all lights
 #: together do: the hold.
 RESTRAINT = 0.25
+
+#: Approximate number of blocks of pixels over which that price is summed.
+RESTRAINT_BLOCKS = 2**11
 
 #: Largest factor of dimming that strengthens the pull to a light's colour.
 MAX_DIMMING = 100.0
@@ -111,13 +116,17 @@ def restrain_lights(
     """
     if unpainted <= 0:
         return None
-    look = np.maximum(wash.look, 0).astype(np.float64)
-    slope = display_amplitude(look, transform) / (look + (DARK * float(look.mean()) or 1.0))
-    rest = wash.counts * (1 - np.minimum(wash.importance, 1))
-    energy = np.stack(
-        [np.square(rows) @ (s**2 * rest) for rows, s in zip(wash.rows, slope, strict=True)], axis=1
-    )
-    return pull_to_current(RESTRAINT * unpainted * energy, reference)
+    sampled = slice(None, None, ceil(wash.counts.size / RESTRAINT_BLOCKS))
+    dark = DARK * float(np.maximum(wash.look, 0).mean()) or 1.0
+    look = np.maximum(wash.look[:, sampled], 0).astype(np.float64)
+    slope = display_amplitude(look, transform) / (look + dark)
+    counts = wash.counts * (1 - np.minimum(wash.importance, 1))
+    total, rest = float(counts.sum()), counts[sampled]
+    rest = rest * (total / max(float(rest.sum()), 1e-300))
+    rows = np.square(wash.rows[:, :, sampled])
+    per_block = (slope**2 * rest).astype(np.float32)
+    energy = np.stack([x @ y for x, y in zip(rows, per_block, strict=True)], axis=1)
+    return pull_to_current(RESTRAINT * unpainted * energy.astype(np.float64), reference)
 
 
 def pull_to_colors(power: Doubles, current: Doubles, lights: Bools) -> NormalEquations:

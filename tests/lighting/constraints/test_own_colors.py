@@ -84,7 +84,7 @@ def test_under_the_brush_the_answer_is_the_same(make_basis: Any):
     painting = _painting(basis, over_look=True)
     fit = resolve_for_targets(lp.Fit(colors="own"), [painting])
     view = LiveView(basis, painting.image, painting.importance)
-    live = LiveSolver([view], fit=fit, constraints=lp.Constraints())
+    live = LiveSolver([view], fit=fit, constraints=lp.Constraints(), is_sketch=True)
     answer = live.answer(basis.current_weights)
     exact = lp.solve(basis, painting, colors="own").weights
     np.testing.assert_allclose(answer, exact, rtol=1e-6, atol=1e-9)

@@ -100,7 +100,7 @@ def test_under_the_brush_the_answer_is_the_same(make_basis: Any, colors: Any, ne
     constraints = lp.Constraints.of(start=START, near=near)
     fit = resolve_for_targets(lp.Fit(colors=colors), [painting])
     view = LiveView(basis, painting.image, painting.importance)
-    live = LiveSolver([view], fit=fit, constraints=lp.Constraints())
+    live = LiveSolver([view], fit=fit, constraints=lp.Constraints(), is_sketch=True)
     live.answer(basis.current_weights)
     live.constrain(fit, constraints)
     answer = live.answer(live.answer(basis.current_weights))
@@ -116,7 +116,7 @@ def test_without_paint_lamps_are_as_they_were_set(make_basis: Any):
     basis = _basis(make_basis)
     fit = resolve_for_targets(lp.Fit(), [_painting(basis, over_look=True)])
     view = LiveView(basis, basis.current_look.copy(), np.zeros(basis.size, np.float32))
-    live = LiveSolver([view], fit=fit, constraints=lp.Constraints.of(start=START))
+    live = LiveSolver([view], fit=fit, constraints=lp.Constraints.of(start=START), is_sketch=True)
     weights = live.answer(basis.current_weights)
     np.testing.assert_allclose(weights, _start_weights(basis), rtol=1e-9)
 
