@@ -138,7 +138,7 @@ function layersUpdate(layerState, { selectedLayers, hoveredLayer }) {
   };
 }
 
-/** Width in pixels below which panels overlay the pictures; style.css has the same number. */
+/** Width in pixels below which panels overlay the pictures; styles/windows.css has the same number. */
 const NARROW_MAX_PIXELS = 760;
 
 /** Hide panels while there is no room beside the pictures, and show them again when there is.
