@@ -1,7 +1,31 @@
-"""Texts of the page that stand in its code and not in its language file."""
+"""Sentences of the page that its code marks for translation, and texts that it does not mark.
 
+`python tests/page_texts.py` prints all sentences as a translation in which each stands for itself,
+which is a start for a file like `lightpaint/paint/page/language/de.js`.
+"""
+
+import json
 import re
+from collections.abc import Iterator
 from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+PAGE = Path(__file__).parents[1] / "lightpaint" / "paint" / "page"
+
+_LITERAL = r"""('[^'\\\n]*'|"[^"\\\n]*")"""
+
+#: A call that gives a sentence in the language of the page.
+CALL = re.compile(r"(?<![\w.$])(?:t|plural)\(")
+
+#: The same with a literal, as translators need it; and with the two forms of a number in English.
+SENTENCE = re.compile(rf"(?<![\w.$])t\(\s*{_LITERAL}(?:,\s*\{{ context: '(\w+)' \}})?")
+FORMS = re.compile(
+    rf"(?<![\w.$])plural\([^{{;]*\{{\s*one:\s*{_LITERAL},\s*other:\s*{_LITERAL},?\s*\}}"
+)
+
+#: Names of forms, as `Intl.PluralRules` has them.
+CATEGORIES = {"zero", "one", "two", "few", "many", "other"}
 
 #: Properties and attributes whose literal text somebody reads.
 READ = "aria-label|aria-valuetext|data-tip|description|label|placeholder|text|tip|title|unit"
@@ -90,13 +114,77 @@ def literals(source: str) -> tuple[list[tuple[str, str]], list[Template]]:
     return quoted, templates
 
 
+def modules() -> Iterator[Path]:
+    """Yield the modules of the page that are written here and have sentences."""
+    for path in sorted(PAGE.rglob("*.js")):
+        if path.relative_to(PAGE).parts[0] not in ("vendor", "language"):
+            yield path
+
+
+def sentences_in(source: str) -> dict[str, str | dict[str, str]]:
+    """Return the marked sentences of a module by their keys in a translation."""
+    found: dict[str, str | dict[str, str]] = {}
+    for literal, context in SENTENCE.findall(source):
+        text = literal[1:-1]
+        found[f"{text} ({context})" if context else text] = text
+    for one, other in FORMS.findall(source):
+        found[one[1:-1]] = {"one": one[1:-1], "other": other[1:-1]}
+    return found
+
+
+def all_sentences() -> dict[str, str | dict[str, str]]:
+    """Return the marked sentences of the page by their keys in a translation."""
+    found: dict[str, str | dict[str, str]] = {}
+    for path in modules():
+        for key, text in sentences_in(path.read_text("utf-8")).items():
+            assert found.setdefault(key, text) == text, (
+                f"{path.name}: {key!r} with a number, and without"
+            )
+    return found
+
+
+def calls_without_literal(source: str) -> list[str]:
+    """Return the beginnings of calls whose sentence no translator would be given."""
+    marked = {match.start() for pattern in (SENTENCE, FORMS) for match in pattern.finditer(source)}
+    starts = [match.start() for match in CALL.finditer(source)]
+    return [source[start : start + 60] for start in starts if start not in marked]
+
+
+def _names(text: str) -> set[str]:
+    return set(re.findall(r"\{(\w+)\}", text))
+
+
+def faults(
+    translation: dict[str, Any], sentences: dict[str, str | dict[str, str]]
+) -> list[tuple[str, str]]:
+    """Return keys of a translation with what is wrong there. What it lacks is no fault."""
+    found = []
+    for key, text in translation.items():
+        english = sentences.get(key)
+        if english is None:
+            found.append((key, "no sentence of the page"))
+            continue
+        forms = {"other": text} if isinstance(text, str) else text
+        names = _names(english if isinstance(english, str) else english["other"])
+        if forms is text and isinstance(english, str):
+            found.append((key, "forms of a sentence that has no number"))
+        elif not {"other"} <= set(forms) <= CATEGORIES:
+            found.append((key, "unknown forms, or none that is called other"))
+        elif any(_names(form) | {"count"} != names | {"count"} for form in forms.values()) or (
+            _names(forms["other"]) != names
+        ):
+            found.append((key, "other names in braces"))
+    return found
+
+
 def _is_read(text: str) -> bool:
     return bool(_SENTENCE.search(text)) and not NOT_READ.fullmatch(text)
 
 
 def texts_in(source: str) -> list[str]:
-    """Return the texts in the code of a module that somebody reads."""
+    """Return the texts of a module that somebody reads and no translation reaches."""
     source = re.sub(r"^import [\s\S]*?;$", "", source, flags=re.MULTILINE)
+    source = FORMS.sub("plural(0", SENTENCE.sub("t(''", source))
     quoted, templates = literals(source)
     found = []
     for text, before in quoted:
@@ -119,3 +207,10 @@ def texts_in(source: str) -> list[str]:
             if re.search(rf"{_WORD}[,:.]? ", bare) and not is_unread:
                 found.append(template.text.replace("\0", "…"))
     return [text for text in found if text]
+
+
+if __name__ == "__main__":
+    print("/** @type {import('./languages.js').Translation} */")
+    print(
+        f"export const translation = {json.dumps(all_sentences(), indent=2, ensure_ascii=False)};"
+    )

@@ -184,13 +184,12 @@ def test_numbers_in_other_words_of_the_help_are_those_of_the_code():
 
 def test_numbers_of_settings_are_the_same_in_documents_and_on_the_page():
     page = ROOT / "lightpaint" / "paint" / "page"
-    texts = (page / "language" / "en.js").read_text()
     solving, method = ((ROOT / "docs" / name).read_text() for name in ("solving.md", "method.md"))
     panel = (page / "ui" / "settings_panel.js").read_text()
     assert f"const DEFAULT_HOLD = {DEFAULT_HOLD:g};" in panel
     assert f"`--hold {DEFAULT_HOLD:g}`" in solving
     assert f"It is {DEFAULT_HOLD:g} by default where something was painted over" in method
-    for text in (texts, solving):
+    for text in (panel, solving):
         assert f"{LAMP_KELVINS[0]} to {LAMP_KELVINS[1]} K" in text
     assert f"`--kelvin '*={LAMP_KELVINS[0]}:{LAMP_KELVINS[1]}'`" in method
 

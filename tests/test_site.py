@@ -11,6 +11,7 @@ from pathlib import Path
 from typing import Any, get_args, get_type_hints
 
 import pytest
+from page_texts import all_sentences
 from renderer import REPOSITORY
 
 import lightpaint as lp
@@ -185,7 +186,8 @@ def _literals() -> Iterator[str]:
                 )
             elif isinstance(node, ast.Constant) and isinstance(node.value, str):
                 yield node.value
-    yield (REPOSITORY / "lightpaint/paint/page/language/en.js").read_text("utf-8")
+    for text in all_sentences().values():
+        yield from [text] if isinstance(text, str) else text.values()
 
 
 def test_the_version_is_the_same_everywhere() -> None:

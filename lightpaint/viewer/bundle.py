@@ -27,6 +27,7 @@ _EXPORT_LIST = re.compile(
     r"(?<![\w$.])export\s*\{(?P<names>[^}]*)\}"
     r"(?:\s*from\s*(?P<q>['\"])(?P<path>[^'\"]+)(?P=q))?;?"
 )
+_SHEET_IMPORT = re.compile(r'^@import "(?P<path>[^"]+)";$', re.MULTILINE)
 _DYNAMIC = re.compile(r"(?<![\w$.])import\(")
 _PATHS = re.compile(r"""\(\s*["'](\.[./\w-]*\.js)["']""")
 _COMMENT = re.compile(
@@ -57,8 +58,17 @@ def _code(path: str) -> str:
 
 @cache
 def styles(*paths: str) -> str:
-    """Return style sheets joined, without comments and space that has no meaning."""
-    return "\n".join(rcssmin.cssmin(source(path)) for path in paths)
+    """Return style sheets joined, with all that they import, without comments and space that has no
+    meaning."""
+    return "\n".join(rcssmin.cssmin(_whole_sheet(path)) for path in paths)
+
+
+def _whole_sheet(path: str) -> str:
+    """Return a style sheet with the sheets that it imports in place."""
+    folder = posixpath.dirname(path)
+    return _SHEET_IMPORT.sub(
+        lambda match: _whole_sheet(posixpath.join(folder, match["path"])), source(path)
+    )
 
 
 def compact_script(text: str) -> str:

@@ -501,18 +501,14 @@ def test_what_is_held_is_let_go_of_by_zero(basis: lp.Basis):
 def test_a_setting_is_undone_by_the_name_that_the_page_has_for_it():
     page = REPOSITORY / "lightpaint" / "paint" / "page"
     panel = (page / "ui" / "settings_panel.js").read_text("utf-8")
-    words = (page / "language" / "en.js").read_text("utf-8")
-    section = words[words.index("\n  settingsPanel: {") :]
-    titles = [
-        section.split(f"\n    {row}: '")[1].split("'")[0]
-        for row in re.findall(r"<\$\{Row\} title=\$\{words\.settingsPanel\.(\w+)\}", panel)
-    ]
+    titles = re.findall(r"<\$\{Row\} title=\$\{t\('([^']+)'\)\}", panel)
     # This one is beside the lights that it is about.
-    near = words[words.index("\n  startLamps: {") :].split("nearMyLamps: '")[1].split("'")[0]
-    in_panel = [title for title in TITLES.values() if title != near]
+    lamps = (page / "ui" / "lamps" / "start_lamps.js").read_text("utf-8")
+    in_panel = [title for title in TITLES.values() if f"t('{title}')" not in lamps]
     assert len(in_panel) == len(TITLES) - 1
     assert in_panel == titles[: len(in_panel)]
-    assert titles[len(in_panel) :] == ["Theme", "Tour", "Language"]  # of the page, not of the solve
+    # These are of the page, not of the solve.
+    assert titles[len(in_panel) :] == ["Theme", "Panels", "Tour", "Language"]
     assert set(TITLES) == {*FIT_KEYS, *ALL_LIGHTS_KEYS}
 
 

@@ -3,8 +3,9 @@
 import re
 
 import pytest
+from renderer import REPOSITORY
 
-from lightpaint.viewer.bundle import bundled, compact_script, styles
+from lightpaint.viewer.bundle import bundled, compact_script, source, styles
 
 
 @pytest.mark.parametrize(
@@ -38,6 +39,14 @@ def test_style_sheets_lose_comments_alone() -> None:
     style = styles("viewer/mixer/wipe.css")
     assert "/*" not in style
     assert style.startswith(".wipe-stage{position:relative;")
+
+
+def test_a_style_sheet_has_those_that_it_imports_in_their_place() -> None:
+    parts = re.findall(r'"(styles/\w+\.css)"', source("paint/page/style.css"))
+    assert len(parts) > 10
+    assert styles("paint/page/style.css") == "".join(styles(f"paint/page/{x}") for x in parts)
+    folder = REPOSITORY / "lightpaint" / "paint" / "page"
+    assert {f"styles/{sheet.name}" for sheet in folder.glob("styles/*")} == {*parts}
 
 
 def test_names_and_texts_of_the_mixer_stay() -> None:

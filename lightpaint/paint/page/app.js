@@ -43,7 +43,7 @@ import { AnalysisPanel } from './ui/analysis_panel.js';
 import { AnswerLine, PointerStatus } from './ui/answer_line.js';
 import { ViewTabs, showView } from './ui/view_tabs.js';
 import { watched } from './ui/watched_panel.js';
-import { fillCount, language, words } from './language/language.js';
+import { language, plural, t } from './language/language.js';
 
 /** @typedef {import("./ui/engine_interface.js").Host} Host */
 /** @typedef {import("./ui/engine_interface.js").Engine} Engine */
@@ -138,7 +138,7 @@ function layersUpdate(layerState, { selectedLayers, hoveredLayer }) {
   };
 }
 
-/** Width in pixels below which panels overlay the pictures; style.css has the same number. */
+/** Width in pixels below which panels overlay the pictures; styles/windows.css has the same number. */
 const NARROW_MAX_PIXELS = 760;
 
 /** Hide panels while there is no room beside the pictures, and show them again when there is.
@@ -160,7 +160,11 @@ function foldWhenNarrow(root, store) {
 
 /** @param {number} count */
 function droppedText(count) {
-  return fillCount(words.app.droppedStrokes, count);
+  return plural(count, {
+    one: 'A stroke in this tab had not been sent when another tab took over. It is dropped, so as not to cover what was painted there.',
+    other:
+      '{count} strokes in this tab had not been sent when another tab took over. They are dropped, so as not to cover what was painted there.',
+  });
 }
 
 /** The panels, each of which renders again only for the state that it shows. */
@@ -208,7 +212,7 @@ function Painter({ app, root }) {
     <${SkipLinks} app=${app} />
     <${Watched.TopBar} ui=${ui} app=${app} />
     <${Watched.ToolBar} ui=${ui} app=${app} />
-    <main class=${`middle ${ui.side || ui.panel ? '' : 'is-wide'}`} aria-label=${words.app.painter}>
+    <main class=${`middle ${ui.side || ui.panel ? '' : 'is-wide'}`} aria-label=${t('Painter')}>
       <${Watched.ToolOptions} ui=${ui} app=${app} />
       <${Watched.ViewTabs} ui=${ui} app=${app} />
       <div class="view"><${Watched.Stage} ui=${ui} app=${app} />
@@ -247,30 +251,30 @@ function Side({ ui, app }) {
     html`<${Fold} key=${name} name=${name} title=${title} class=${`is-${name}`} open=${isOpen} extra=${extra}
       toggle=${() => store.set({ open: { ...ui.open, [name]: !isOpen } })}>${content}</${Fold}>`;
   const panels = html`
-    ${renderFold('colour', words.app.colour, html`<${Watched.ColourPanel} ui=${ui} app=${app} />`)}
-    ${renderFold('ask', words.app.adjustByNumbers, html`<${Watched.AdjustPanel} ui=${ui} app=${app} />`)}
+    ${renderFold('colour', t('Colour'), html`<${Watched.ColourPanel} ui=${ui} app=${app} />`)}
+    ${renderFold('ask', t('Adjust by numbers'), html`<${Watched.AdjustPanel} ui=${ui} app=${app} />`)}
     ${
       (ui.tool === 'select' || ui.selection.current) &&
-      renderFold('select', words.app.selection, html`<${Watched.SelectionFields} ui=${ui} app=${app} />`)
+      renderFold('select', t('Selection'), html`<${Watched.SelectionFields} ui=${ui} app=${app} />`)
     }
     ${renderFold(
       'layers',
-      words.app.layers,
+      t('Layers'),
       html`<${Watched.LayerPanel} ui=${ui} app=${app} />`,
       html`<${Watched.LayerCount} ui=${ui} /><${PresetsButton} app=${app} />`,
       ui.open.layers ?? hasLayers(ui),
     )}
     ${renderFold(
       'lights',
-      words.app.lights,
+      t('Lights'),
       html`<${Watched.LightList} ui=${ui} app=${app} />`,
       html`<${Watched.LightListActions} ui=${ui} app=${app} />`,
     )}
-    ${ui.areLampsMarked && renderFold('plan', words.app.plan, html`<${Watched.RoomPlan} ui=${ui} app=${app} />`)}
-    ${renderFold('history', words.app.history, html`<${Watched.HistoryPanel} ui=${ui} app=${app} />`)}
-    ${renderFold('scopes', words.app.scopes, html`<${Watched.ScopesPanel} ui=${ui} app=${app} />`)}
-    ${renderFold('truth', words.app.analysis, html`<${Watched.AnalysisPanel} ui=${ui} app=${app} />`)}`;
-  return html`<aside class="side" aria-label=${words.app.panels}
+    ${ui.areLampsMarked && renderFold('plan', t('Plan'), html`<${Watched.RoomPlan} ui=${ui} app=${app} />`)}
+    ${renderFold('history', t('History'), html`<${Watched.HistoryPanel} ui=${ui} app=${app} />`)}
+    ${renderFold('scopes', t('Scopes'), html`<${Watched.ScopesPanel} ui=${ui} app=${app} />`)}
+    ${renderFold('truth', t('Analysis'), html`<${Watched.AnalysisPanel} ui=${ui} app=${app} />`)}`;
+  return html`<aside class="side" aria-label=${t('Panels')}
     onPointerDown=${(/** @type {PointerEvent} */ event) => dragPanel(event, store)}
     onKeyDown=${(/** @type {KeyboardEvent} */ event) => stepPanel(event, store)}>
     ${orderedPanels(panels, ui.panelOrder)}

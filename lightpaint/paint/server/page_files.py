@@ -3,7 +3,7 @@
 from dataclasses import dataclass
 from pathlib import Path
 
-from lightpaint.viewer.bundle import bundled
+from lightpaint.viewer.bundle import bundled, styles
 
 #: Content types by suffix; other files are not part of the page.
 CONTENT_TYPES = {
@@ -26,6 +26,9 @@ VIEWER_FOLDER = Path(__file__).parents[2] / "viewer"
 
 #: The page's main module; a browser loads it with all its imports.
 ENTRY_MODULE = "/main.js"
+
+#: Its style sheet, which imports one for each part of the page.
+STYLE_SHEET = "/style.css"
 
 ICON = "/icon.svg"
 
@@ -55,6 +58,9 @@ def page_files(folder: Path = PAGE_FOLDER) -> dict[str, PageFile]:
         # A browser takes ten milliseconds per file, independent of the server.
         table[ENTRY_MODULE] = PageFile(
             CONTENT_TYPES[".js"], bundled(f"paint/page{ENTRY_MODULE}").encode()
+        )
+        table[STYLE_SHEET] = PageFile(
+            CONTENT_TYPES[".css"], styles(f"paint/page{STYLE_SHEET}").encode()
         )
     return table
 

@@ -77,6 +77,9 @@ def site() -> Iterator[Site]:
 
 
 #: What serves the painter over the made-up session as one script, instead of `fake/index.html`.
+#: All style sheets of the page as one, as a server gives them.
+STYLE_SHEET = "/style.css"
+
 BUNDLE, BUNDLE_PAGE = "/fake/bundle.js", "/fake/bundled.html"
 
 
@@ -110,6 +113,8 @@ def served_file(site: Site, path: str) -> tuple[dict[str, str], bytes]:
         return {"content-type": "image/x-icon"}, b""
     if path == BUNDLE:
         return {"content-type": KINDS[".js"]}, fake_bundle()
+    if path == STYLE_SHEET:
+        return {"content-type": KINDS[".css"]}, bundle.styles("paint/page/style.css").encode()
     if path == BUNDLE_PAGE:
         text = (HERE / "fake" / "index.html").read_text(encoding="utf-8")
         return {"content-type": KINDS[".html"]}, text.replace("main.js", "bundle.js").encode()

@@ -1,4 +1,4 @@
-"""Every text of the page comes from its language file, so that another file translates all."""
+"""Every text of the page is a sentence that a translation reaches."""
 
 import json
 import re
@@ -6,21 +6,24 @@ from collections.abc import Callable
 from typing import Any
 
 import pytest
-from page_texts import texts_in
+from page_texts import PAGE, all_sentences, calls_without_literal, faults, modules, texts_in
 from painter_page import Painter
-from renderer import REPOSITORY
-
-PAGE = REPOSITORY / "lightpaint" / "paint" / "page"
 
 #: Texts in the code that nobody reads, by module: the name of an array.
 EXCEPTIONS = {"engine/layers/layer_picture.js": ["… of halves"]}
 
 #: A second language, in which each text stands in brackets.
 BRACKETS = """
-import { en } from './en.js';
-const inBrackets = (texts) => typeof texts === 'string' ? `\u27e6${texts}\u27e7`
-  : Object.fromEntries(Object.entries(texts).map(([name, text]) => [name, inBrackets(text)]));
-export const LANGUAGES = { en, qq: inBrackets(en) };
+const inBrackets = { get: (_, key) => `\u27e6${key}\u27e7` };
+export const LANGUAGES = { en: {}, qq: new Proxy({}, inBrackets) };
+"""
+
+#: A language with more forms than English, and without most sentences.
+POLISH = """
+export const LANGUAGES = { en: {}, pl: {
+  '{count} light': { one: '{count} lampa', few: '{count} lampy', other: '{count} lamp' },
+  'Light': 'Lampa', 'Light (theme)': 'Jasny', 'Delete': 'Usuń', 'Show {name}': 'Pokaż: {name}',
+} };
 """
 
 #: What a person reads, hears or sees under the pointer, without the texts of session and person.
@@ -77,13 +80,47 @@ def strings(value: Any) -> list[str]:
     )
 
 
-def test_no_text_stands_in_the_code() -> None:
+def test_all_texts_are_marked_for_translation() -> None:
     found = {}
-    for file in sorted(PAGE.rglob("*.js")):
-        name = file.relative_to(PAGE).as_posix()
-        if not name.startswith(("vendor/", "language/")):
-            found[name] = texts_in(file.read_text())
-    assert {name: texts for name, texts in found.items() if texts} == EXCEPTIONS
+    for file in modules():
+        if texts := texts_in(file.read_text("utf-8")):
+            found[file.relative_to(PAGE).as_posix()] = texts
+    assert found == EXCEPTIONS
+
+
+def test_translators_are_given_all_sentences() -> None:
+    """The code has them as literals; the types of `t` check the values of their names."""
+    calls = {file.name: calls_without_literal(file.read_text("utf-8")) for file in modules()}
+    assert {name: found for name, found in calls.items() if found} == {}
+    assert len(all_sentences()) > 1000
+
+
+@pytest.mark.parametrize(
+    "code", ["t(text)", "t(`on ${name}`)", "t(isOn ? 'On' : 'Off')", "plural(2, forms)"]
+)
+def test_a_sentence_that_is_no_literal_is_found(code: str) -> None:
+    assert calls_without_literal(f"const a = {code};") == [f"{code};"]
+
+
+@pytest.mark.parametrize(
+    ("key", "text", "fault"),
+    [
+        ("Lock", "Sperren", ""),
+        ("Light (theme)", "Hell", ""),
+        ("Show {name}", "{name} zeigen", ""),
+        ("{count} light", "{count} lamp", ""),
+        ("{count} light", {"one": "eine Lampe", "other": "{count} Lampen"}, ""),
+        ("Lokc", "Sperren", "no sentence of the page"),
+        ("Show {name}", "zeigen", "other names in braces"),
+        ("Show {name}", "{Name} zeigen", "other names in braces"),
+        ("{count} light", {"one": "{count} Lampe", "other": "Lampen"}, "other names in braces"),
+        ("{count} light", {"one": "{n} Lampe", "other": "{count} Lampen"}, "other names in braces"),
+        ("{count} light", {"one": "{count} Lampe"}, "unknown forms, or none that is called other"),
+        ("Lock", {"other": "Sperren"}, "forms of a sentence that has no number"),
+    ],
+)
+def test_a_wrong_translation(key: str, text: Any, fault: str) -> None:
+    assert faults({key: text}, all_sentences()) == ([(key, fault)] if fault else [])
 
 
 @pytest.mark.parametrize(
@@ -137,22 +174,28 @@ STATES: dict[str, Callable[[Painter], None]] = {
 }
 
 
-@pytest.fixture
-def painter(new_painter: Any) -> Painter:
-    """A page in the second language, chosen by its code as a person's choice is kept."""
+def in_language(new_painter: Any, code: str, languages: str, query: str = "") -> Painter:
+    """Open a page in a language, chosen by its code as a person's choice is kept."""
 
     def route(context: Any) -> None:
         context.route(
             "**/language/languages.js",
-            lambda route: route.fulfill(body=BRACKETS, content_type="text/javascript"),
+            lambda route: route.fulfill(body=languages, content_type="text/javascript"),
         )
 
     opened: Painter = new_painter(
-        "lights=5",
-        init="localStorage.setItem('lightpaint.language', 'qq')",
+        query,
+        init=f"localStorage.setItem('lightpaint.language', '{code}')",
         prepare=route,
         with_modules=True,
     )
+    return opened
+
+
+@pytest.fixture
+def painter(new_painter: Any) -> Painter:
+    """A page in the second language."""
+    opened = in_language(new_painter, "qq", BRACKETS, "lights=5")
     opened.page.evaluate("() => engine.makeLayers(3)")
     for _ in range(2):
         opened.page.keyboard.press("Control+s")
@@ -181,17 +224,31 @@ def test_a_language_is_chosen_in_the_settings(painter: Painter) -> None:
     assert painter.page.evaluate(kept) == "en"
 
 
-def test_languages_have_the_same_placeholders(painter: Painter) -> None:
-    """A translation that misses one shows less, one that adds one shows braces."""
-    wrong = painter.page.evaluate(
+def test_a_translation_has_its_own_forms_and_may_lack_sentences(new_painter: Any) -> None:
+    painter = in_language(new_painter, "pl", POLISH)
+    texts = painter.page.evaluate(
         """async () => {
-          const { LANGUAGES } = await import('/language/languages.js');
-          const { en } = LANGUAGES;
-          const holders = (text) => [...new Set(JSON.stringify(text).match(/\\{\\w+\\}/g))].sort();
-          return Object.entries(LANGUAGES).flatMap(([code, words]) =>
-            Object.keys(en).flatMap((part) => Object.keys(en[part]).filter((name) =>
-              String(holders(words[part][name])) !== String(holders(en[part][name]))
-            ).map((name) => [code, part, name])));
+          const { plural, t } = await import('/language/language.js');
+          const lights = (count) =>
+            plural(count, { one: '{count} light', other: '{count} lights' });
+          return {
+            counts: [lights(1), lights(3), lights(5)],
+            meanings: [
+              t('Light'), t('Light', { context: 'theme' }), t('Delete', { context: 'key' }),
+            ],
+            names: [t('Show {name}', { name: 'a' }), t('Hide {name}', { name: 'b' })],
+          };
         }"""
     )
-    assert wrong == []
+    assert texts == {
+        "counts": ["1 lampa", "3 lampy", "5 lamp"],
+        "meanings": ["Lampa", "Jasny", "Usuń"],
+        "names": ["Pokaż: a", "Hide b"],
+    }
+
+
+def test_the_translations_that_ship(page: Any, site: Any) -> None:
+    """They have no sentences that the page has not, and no other names in braces."""
+    languages = page.evaluate("async () => (await import('/language/languages.js')).LANGUAGES")
+    sentences = all_sentences()
+    assert {code: found for code, x in languages.items() if (found := faults(x, sentences))} == {}

@@ -7,10 +7,10 @@ from typing import Any
 import pytest
 from axe import violations
 from nightly import nightly
+from page_texts import PAGE
 from painter_page import Painter
-from renderer import REPOSITORY
 
-STYLES = (REPOSITORY / "lightpaint" / "paint" / "page" / "style.css").read_text()
+STYLES = "".join(sheet.read_text("utf-8") for sheet in sorted(PAGE.glob("styles/*.css")))
 
 #: A colour that no custom property names.
 LITERAL = re.compile(r"#[0-9a-fA-F]{3,8}\b|\brgba?\(|\bhsla?\(|:\s*(?:white|black)\b")

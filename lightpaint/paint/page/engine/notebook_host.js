@@ -1,7 +1,7 @@
 /** The session behind an anywidget model in a notebook. */
 import { UNQUEUED, Emitter } from './socket_host.js';
 import { VERSION, bufferInfo, pictureOf } from './message_frames.js';
-import { words } from '../language/language.js';
+import { t } from '../language/language.js';
 
 /** @typedef {import("./socket_host.js").Host} Host */
 /** @typedef {import("./message_frames.js").Arrays} Arrays */
@@ -21,7 +21,7 @@ const MESSAGES_PER_PAGE = 2 ** 32;
 /** Milliseconds without an answer before the page reports it. */
 const SILENCE_MS = 10_000;
 
-const ENDED_TEXT = words.notebookHost.theKernelHasEndedRunThe;
+const ENDED_TEXT = t('The kernel has ended. Run the cell again to continue.');
 
 /** @implements {Host} */
 export class ModelHost extends Emitter {
@@ -141,6 +141,6 @@ export class ModelHost extends Emitter {
   close() {
     this.model.off('msg:custom', this.onContent);
     this.model.off('comm_live_update', this.onEnd);
-    this.rejectAll(words.notebookHost.thePainterIsClosed);
+    this.rejectAll(t('the painter is closed'));
   }
 }

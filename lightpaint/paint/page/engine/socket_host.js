@@ -6,7 +6,7 @@
  */
 import { AccessKey, PROTOCOL, REFUSALS, authorization } from './access_key.js';
 import { VERSION, encodeFrame, pictureOf, decodeFrame } from './message_frames.js';
-import { words } from '../language/language.js';
+import { t } from '../language/language.js';
 
 /** @typedef {import("./message_frames.js").Arrays} Arrays */
 /** @typedef {import("./message_frames.js").Message} Message */
@@ -129,7 +129,7 @@ export class SocketHost extends Emitter {
   handleDrop(socket) {
     if (socket !== this.socket) return;
     this.socket = null;
-    const error = new Error(words.socketHost.theConnectionToThePainterIs);
+    const error = new Error(t('the connection to the painter is lost'));
     for (const { reject } of this.requests.values()) reject(error);
     this.requests.clear();
     this.retry();
@@ -187,7 +187,7 @@ export class SocketHost extends Emitter {
     if (isOpen && !UNQUEUED.includes(kind)) await this.gate();
     return new Promise((resolve, reject) => {
       if (this.socket?.readyState !== WebSocket.OPEN)
-        return reject(new Error(words.socketHost.thereIsNoConnectionToThe));
+        return reject(new Error(t('there is no connection to the painter')));
       const seq = ++this.seq;
       this.requests.set(seq, { resolve, reject });
       this.socket.send(encodeFrame({ kind, seq, ...fields }, arrays));

@@ -3,7 +3,7 @@ import { Path, fill, flood, stamp } from './brush.js';
 import { LayerCanvas } from './layers/layer_canvas.js';
 import { warmer } from '../../../viewer/drawing/colour.js';
 import { wholeAdjustment } from './whole_adjustment.js';
-import { words } from '../language/language.js';
+import { t } from '../language/language.js';
 
 /** @typedef {import("./brush.js").Point} Point */
 /** @typedef {import("./stroke_effects.js").Effect} Effect */
@@ -37,7 +37,18 @@ export const DEFAULT_TOOL = {
 };
 
 /** Name of a stroke in the undo history. @type {Record<Tool, string>} */
-export const LABELS = words.stroke;
+export const LABELS = {
+  neutral: t('neutral'),
+  brush: t('brush'),
+  eraser: t('eraser'),
+  weight: t('importance'),
+  pick: t('pick'),
+  fill: t('fill'),
+  line: t('line'),
+  adjust: t('adjust'),
+  select: t('select'),
+  gradient: t('gradient'),
+};
 
 /** Pixels of the picture below which a gradient is a click. */
 const MIN_GRADIENT_LENGTH = 2;

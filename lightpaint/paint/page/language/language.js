@@ -1,10 +1,13 @@
-/** The texts of the page in the language that was chosen, and what puts numbers and names into them. */
+/** The language that was chosen for the page, and its sentences. The code has them in English, and they
+ * are the keys of translations: what a translation lacks is shown in English. */
 
 import { LANGUAGES } from './languages.js';
 
-/** @typedef {import("./languages.js").Words} Words */
-/** Forms of a text by number, as `Intl.PluralRules` names them.
- * @typedef {{other: string, zero?: string, one?: string, two?: string, few?: string, many?: string}} Forms */
+/** @typedef {import("./languages.js").Forms} Forms */
+/** @typedef {string | number | undefined} Value */
+/** The names in the braces of a sentence.
+ * @template {string} S
+ * @typedef {S extends `${string}{${infer Name}}${infer Rest}` ? Name | Names<Rest> : never} Names */
 
 /** Where the browser keeps the chosen language. */
 const LANGUAGE_KEY = 'lightpaint.language';
@@ -12,10 +15,9 @@ const LANGUAGE_KEY = 'lightpaint.language';
 /** The code of the language that the page has: the chosen one, else that of the browser, else English. */
 export const language = chooseLanguage();
 
-/** @type {Words} */
-export const words = LANGUAGES[language];
+const translation = LANGUAGES[language];
 
-const pluralRules = new Intl.PluralRules(language);
+const rules = new Intl.PluralRules(language);
 
 /** @returns {string} */
 function chooseLanguage() {
@@ -47,12 +49,26 @@ export const languageChoices = Object.keys(LANGUAGES).map((code) => ({
   label: new Intl.DisplayNames([code], { type: 'language' }).of(code) ?? code,
 }));
 
-/** Return a text with its placeholders, such as `{name}`, replaced.
- * @param {string} text @param {Record<string, string | number | undefined>} values */
-export const fill = (text, values) =>
-  text.replace(/\{(\w+)\}/g, (placeholder, name) => String(values[name] ?? placeholder));
+/** Return a sentence in the language of the page, with values in place of its names in braces.
+ * A `context` tells one meaning of an English word from another: its key is `Light (theme)`.
+ * @template {string} S @param {S} sentence a literal, since translators are given those
+ * @param {[Names<S>] extends [never] ? [{context: string}?] : [Record<Names<S>, Value>]} values */
+export function t(sentence, ...[values]) {
+  const { context, ...names } = /** @type {Record<string, Value>} */ (values ?? {});
+  const text = (context && translation[`${sentence} (${context})`]) ?? translation[sentence];
+  return fill(String(text ?? sentence), names);
+}
 
-/** Return the form of a text for a number, which replaces `{count}`.
- * @param {Forms} forms @param {number} count @param {Record<string, string | number>} [values] */
-export const fillCount = (forms, count, values = {}) =>
-  fill(forms[pluralRules.select(count)] ?? forms.other, { count, ...values });
+/** Return the form of a sentence for a number, which replaces `{count}`. Its form `one` is its key.
+ * @param {number} count @param {{one: string, other: string}} english literals
+ * @param {Record<string, Value>} [values] */
+export function plural(count, english, values) {
+  /** @type {string | Forms} */
+  const forms = translation[english.one] ?? english;
+  const text = typeof forms === 'string' ? forms : (forms[rules.select(count)] ?? forms.other);
+  return fill(text, { count, ...values });
+}
+
+/** @param {string} text @param {Record<string, Value>} values */
+const fill = (text, values) =>
+  text.replace(/\{(\w+)\}/g, (braces, name) => String(values[name] ?? braces));

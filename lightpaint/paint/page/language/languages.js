@@ -1,8 +1,10 @@
-/** All languages of the page, by their codes. To add one, write a file like `en.js` and list it here. */
+/** All languages of the page, by their codes. English has no translation: its sentences stand in the
+ * code. To add a language, write its translation in a file like `de.js`, and list it here. */
 
-import { en } from './en.js';
+/** Forms of a sentence by number, as `Intl.PluralRules` names them.
+ * @typedef {{other: string, zero?: string, one?: string, two?: string, few?: string, many?: string}} Forms */
+/** Translated sentences by the English ones; a sentence about a number by its form `one`.
+ * @typedef {Record<string, string | Forms>} Translation */
 
-/** @typedef {typeof en} Words */
-
-/** @type {Record<string, Words>} */
-export const LANGUAGES = { en };
+/** @type {Record<string, Translation>} */
+export const LANGUAGES = { en: {} };

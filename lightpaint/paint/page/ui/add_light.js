@@ -2,16 +2,16 @@
 
 import { html, useEffect, useRef } from '../vendor/preact.js';
 import { Button, NumberField, Select } from './controls.js';
-import { fill, words } from '../language/language.js';
+import { t } from '../language/language.js';
 
 /** @typedef {import("./ui_state.js").Ui} Ui */
 /** @typedef {import("./shortcuts.js").App} App */
 /** @typedef {import("./ui_state.js").NewKind} NewKind */
 
 const KINDS = [
-  { value: 'spot', label: words.addLight.spot },
-  { value: 'point', label: words.addLight.point },
-  { value: 'panel', label: words.addLight.panel },
+  { value: 'spot', label: t('Spot') },
+  { value: 'point', label: t('Point') },
+  { value: 'panel', label: t('Panel') },
 ];
 
 /** Where a new light may hang, besides names of rails, surfaces and shapes. */
@@ -36,11 +36,11 @@ export function AddLight({ ui, app }) {
   const set = (/** @type {Partial<Ui["newLight"]>} */ changes) =>
     store.set({ newLight: { ...newLight, ...changes }, clickAction: null });
   const places = [
-    { value: CLICK, label: words.addLight.whereIClick },
-    { value: ANYWHERE, label: words.addLight.anywhereFree },
+    { value: CLICK, label: t('where I click') },
+    { value: ANYWHERE, label: t('anywhere free') },
     ...(rig?.surfaces ?? []).map((name) => ({
       value: name,
-      label: fill(words.addLight.on, { name }),
+      label: t('on {name}', { name }),
     })),
   ];
   const addOrSearch = () =>
@@ -50,23 +50,25 @@ export function AddLight({ ui, app }) {
           clickAction: isClicking ? null : { mode: 'hang', type: newLight.type },
         })
       : session.findLights(newLight);
-  return html`<div class="add-light" ref=${ref} role="group" aria-label=${words.addLight.addALight}>
-    <${Select} label=${words.addLight.newLight} value=${newLight.type} choices=${KINDS}
+  return html`<div class="add-light" ref=${ref} role="group" aria-label=${t('Add a light')}>
+    <${Select} label=${t('New light')} value=${newLight.type} choices=${KINDS}
       change=${(/** @type {NewKind} */ type) => set({ type })} />
-    <${Select} label=${words.addLight.itHangs} value=${newLight.surface} choices=${places}
-      tip=${words.addLight.clickItsPlaceOrLetA}
+    <${Select} label=${t('It hangs')} value=${newLight.surface} choices=${places}
+      tip=${t('Click its place, or let a search find the places that come closest to the painting')}
       change=${(/** @type {string} */ surface) => set({ surface })} />
     ${
       !isClick &&
-      html`<${NumberField} label=${words.addLight.atMost} value=${newLight.count} min=${1} max=${MAX_NEW_LIGHTS}
+      html`<${NumberField} label=${t('At most')} value=${newLight.count} min=${1} max=${MAX_NEW_LIGHTS}
         step=${1} digits=${0} change=${(/** @type {number} */ count) => set({ count })} />`
     }
-    <${Button} label=${isClick ? words.addLight.addALight : words.addLight.findPlaces} icon="plus" pressed=${isClick && isClicking}
+    <${Button} label=${isClick ? t('Add a light') : t('Find places')} icon="plus" pressed=${isClick && isClicking}
       disabled=${ui.placementProgress !== null}
       tip=${
         isClick
-          ? words.addLight.thenClickTheSurfaceThatIt
-          : words.addLight.addsOnlyLightsThatSurelyCome
+          ? t('Then click the surface that it hangs on, or its place in the plan')
+          : t(
+              'Adds only lights that surely come closer to the painting. One step that undo takes back.',
+            )
       } act=${addOrSearch} />
   </div>`;
 }

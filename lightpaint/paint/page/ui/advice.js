@@ -3,11 +3,11 @@
 import { html, useEffect, useRef } from '../vendor/preact.js';
 import { ANYWHERE, CLICK } from './add_light.js';
 import { Button, Dialog } from './controls.js';
-import { numberText, shortenName } from './format.js';
+import { lightCountText, numberText, shortenName } from './format.js';
 import { Icon } from './icons.js';
 import { texelsText } from './lamps/light_selection.js';
 import { drawPicture } from './thumbnail.js';
-import { fill, words } from '../language/language.js';
+import { t } from '../language/language.js';
 
 /** @typedef {import("./ui_state.js").Ui} Ui */
 /** @typedef {import("./ui_state.js").Advice} Cause */
@@ -24,20 +24,20 @@ const CONSTRAINT_KEYS = {
 
 /** Button text for one light and for several. @type {Record<string, [string, string]>} */
 const BUTTON_WORDS = {
-  off: [words.advice.turnOn, words.advice.turnOn],
-  lock: [words.advice.unlock, words.advice.unlock],
-  limits: [words.advice.removeTheLimitOf, words.advice.removeTheLimitsOf],
-  colour: [words.advice.anyColourFor, words.advice.anyColourFor],
-  tie: [words.advice.untie, words.advice.untie],
+  off: [t('Turn on'), t('Turn on')],
+  lock: [t('Unlock'), t('Unlock')],
+  limits: [t('Remove the limit of'), t('Remove the limits of')],
+  colour: [t('Any colour for'), t('Any colour for')],
+  tie: [t('Untie'), t('Untie')],
 };
 
 /** Button text for advice on all lights. @type {Record<string, string>} */
 const ALL_LIGHTS_WORDS = {
-  hold: words.advice.loosen,
-  colors: words.advice.anyColour,
-  sparse: words.advice.moreLights,
-  prefer_current: words.advice.letLightsChange,
-  near: words.advice.letLightsChange,
+  hold: t('Loosen'),
+  colors: t('Any colour'),
+  sparse: t('More lights'),
+  prefer_current: t('Let lights change'),
+  near: t('Let lights change'),
 };
 
 /** Characters of a light's name on a button, which shares its line with a sentence. */
@@ -51,7 +51,7 @@ function nameOf({ kind, names }, ui, maxLength = Infinity) {
   const lights =
     names.length === 1
       ? shortenName(names[0], maxLength)
-      : (texelsText(ui, indices) ?? fill(words.advice.lights, { count: names.length }));
+      : (texelsText(ui, indices) ?? lightCountText(names.length));
   return `${BUTTON_WORDS[kind][names.length === 1 ? 0 : 1]} ${lights}`;
 }
 
@@ -60,8 +60,8 @@ function titleOf({ kind, hold }, name, ui) {
   if (kind !== 'hold') return name;
   const now = numberText(ui.effectiveSettings.hold, 2);
   return hold
-    ? fill(words.advice.loosenTheHoldTo, { now, number: numberText(hold, 2) })
-    : words.advice.ignoreUnpaintedParts;
+    ? t('Loosen the hold from {now} to {number}', { now, number: numberText(hold, 2) })
+    : t('Ignore unpainted parts');
 }
 
 /** Return the request that removes the obstacle; null if this page did not set it, or it is gone
@@ -110,14 +110,14 @@ export function AdviceButton({ ui, app }) {
   const name = nameOf(advice, ui);
   // The numbers beside the sentence: ΔE as it is, and as it will be.
   const [before, after] = (advice.delta_e ?? []).map((x) => numberText(x, 2));
-  /** @param {string} text */
-  const withGain = (text) =>
-    after === undefined || after === before ? '' : fill(text, { before, after });
-  const gain = withGain(words.advice.deltaeInsteadOf);
+  const isGain = after !== undefined && after !== before;
+  const gain = isGain ? t(': ΔE {after} instead of {before}', { before, after }) : '';
   return html`<${Button} label=${`${nameOf(advice, ui, BUTTON_NAME_MAX_LENGTH)}${gain}`} class="help"
-    tip=${fill(words.advice.showsAPreviewFirst, {
+    tip=${t('{name}{gain}. Shows a preview first.', {
       name,
-      gain: withGain(words.advice.bringsTheMeanDeltae),
+      gain: isGain
+        ? t(' brings the mean ΔE over the paint from {before} to {after}', { before, after })
+        : '',
     })}
     act=${() => app.session.preview(titleOf(advice, name, ui), change)} />`;
 }
@@ -126,8 +126,8 @@ export function AdviceButton({ ui, app }) {
  * @param {{ui: Ui, app: App}} props */
 export function MoveButton({ ui, app }) {
   if (!ui.state?.can_render || ui.placementProgress) return null;
-  return html`<${Button} label=${words.advice.letLightsMove} class="help"
-    tip=${words.advice.searchForPlacesAndDirectionsOf}
+  return html`<${Button} label=${t('Let lights move')} class="help"
+    tip=${t('Search for places and directions of the lights that come closer. One step that undo takes back.')}
     act=${() => app.store.set({ dialog: 'move' })} />`;
 }
 
@@ -147,8 +147,8 @@ function NewLightButton({ ui, app }) {
       isNewLightSought: true,
     });
   };
-  return html`<${Button} label=${words.addLight.addALight} class="help" icon="plus"
-    tip=${words.advice.findAPlaceForALight} act=${show} />`;
+  return html`<${Button} label=${t('Add a light')} class="help" icon="plus"
+    tip=${t('A new light: choose where it hangs, and let a search find its place and direction.')} act=${show} />`;
 }
 
 /** The answer before and after a change, for the user to apply or cancel.
@@ -160,24 +160,24 @@ export function PreviewDialog({ ui, app }) {
   const { label, text, isAtCost, before, after } = preview;
   return html`<${Dialog} title=${label} close=${close} class="preview">
     <div class="pair">
-      <${PreviewPicture} picture=${before} caption="Before" /><${PreviewPicture} picture=${after} caption="After" />
+      <${PreviewPicture} picture=${before} caption=${t('Before')} label=${t('The answer before the change')} />
+      <${PreviewPicture} picture=${after} caption=${t('After')} label=${t('The answer after it')} />
     </div>
     <p class=${isAtCost ? 'is-bad' : ''} role="status">
       ${isAtCost && html`<${Icon} name="warn" />`}
-      <span>${text || words.advice.computingThePreview}</span></p>
-    <div class="row"><${Button} label=${words.advice.cancel} act=${close} />
-      <${Button} label=${words.advice.apply} primary disabled=${!text} act=${() => app.session.makeChange()} />
+      <span>${text || t('Computing the preview …')}</span></p>
+    <div class="row"><${Button} label=${t('Cancel')} act=${close} />
+      <${Button} label=${t('Apply')} primary disabled=${!text} act=${() => app.session.makeChange()} />
     </div>
   </${Dialog}>`;
 }
 
-/** @param {{picture: import("./engine_interface.js").Picture | null, caption: string}} props */
-function PreviewPicture({ picture, caption }) {
+/** @param {{picture: import("./engine_interface.js").Picture | null, caption: string, label: string}} props */
+function PreviewPicture({ picture, caption, label }) {
   const ref = useRef(/** @type {HTMLCanvasElement | null} */ (null));
   useEffect(() => {
     if (picture && ref.current) drawPicture(ref.current, picture);
   }, [picture]);
-  return html`<figure><canvas ref=${ref} width="16" height="9" role="img"
-    aria-label=${caption === 'Before' ? words.advice.theAnswerBeforeTheChange : words.advice.theAnswerAfterIt}></canvas>
+  return html`<figure><canvas ref=${ref} width="16" height="9" role="img" aria-label=${label}></canvas>
     <figcaption>${caption}</figcaption></figure>`;
 }

@@ -7,7 +7,7 @@ import { numberText, progressText, joinUnits } from './format.js';
 import { Icon } from './icons.js';
 import { overlayOf } from './display_state.js';
 import { updateDisplay } from './tools.js';
-import { fill, words } from '../language/language.js';
+import { t } from '../language/language.js';
 import { shortcutsOf } from './key_bindings.js';
 
 /** @typedef {import("./ui_state.js").Ui} Ui */
@@ -15,37 +15,37 @@ import { shortcutsOf } from './key_bindings.js';
 /** @typedef {import("./engine_interface.js").Pane} Pane */
 
 const OVERLAYS = [
-  { value: null, label: words.analysisPanel.none },
+  { value: null, label: t('None') },
   {
     value: 'missed',
-    label: words.analysisPanel.difference,
-    tip: words.analysisPanel.whereTheAnswerDiffersFromThe,
+    label: t('Difference'),
+    tip: t('Where the answer differs from the painting'),
   },
   {
     value: 'beyond',
-    label: words.analysisPanel.outOfReach,
-    tip: words.analysisPanel.whatNoSettingOfTheseLights,
+    label: t('Out of reach'),
+    tip: t('What no setting of these lights can do'),
   },
   {
     value: 'falsecolor',
-    label: words.analysisPanel.falseColour,
-    tip: words.analysisPanel.brightnessInStops,
+    label: t('False colour'),
+    tip: t('Brightness in stops'),
   },
   {
     value: 'importance',
-    label: words.analysisPanel.importance,
-    tip: words.analysisPanel.whatIsPaintedAndHowMuch,
+    label: t('Importance'),
+    tip: t('What is painted, and how much it counts'),
   },
 ];
 
-const PAINTED_LABEL = words.analysisPanel.painted;
+const PAINTED_LABEL = t('painted');
 
 /** Legends of the overlays: colours and hatches. @type {Record<string, string[]>} */
 const LEGEND_TEXTS = {
-  missed: [words.analysisPanel.tooDark, words.analysisPanel.matches, words.analysisPanel.tooBright],
-  beyond: [words.analysisPanel.inReach, words.analysisPanel.legendOutOfReach],
-  falsecolor: [words.analysisPanel.n6Stops, words.analysisPanel.grey, '+6'],
-  importance: [words.analysisPanel.unpainted, PAINTED_LABEL],
+  missed: [t('too dark'), t('matches'), t('too bright')],
+  beyond: [t('in reach'), t('out of reach')],
+  falsecolor: [t('−6 stops'), t('grey'), '+6'],
+  importance: [t('unpainted'), PAINTED_LABEL],
 };
 
 /** @param {{ui: Ui, app: App}} props */
@@ -63,15 +63,15 @@ export function AnalysisPanel({ ui, app }) {
     (text) => text !== ui.headline,
   );
   return html`<div class="truth" ref=${frame}>
-    <${Choice} label=${words.analysisPanel.overlay} value=${ui.display.overlay} 
+    <${Choice} label=${t('Overlay')} value=${ui.display.overlay} 
       choices=${OVERLAYS.map((choice) => ({ ...choice, keys: shortcutsOf(ui, 'overlay') }))}
       change=${choose} />
     ${sentences.map((text) => html`<p key=${text}>${joinUnits(text)}</p>`)}
     <div class="row">
-      <${Button} label=${ui.isExplaining ? words.analysisPanel.findingReasons : words.analysisPanel.whyNotCloser}
+      <${Button} label=${ui.isExplaining ? t('Finding reasons …') : t('Why not closer?')}
         disabled=${ui.isExplaining} act=${() => session.explain()}
-        tip=${words.analysisPanel.whatKeepsTheAnswerFromMatching} />
-      ${ui.isExplaining && html`<${ProgressBar} progress=${{ done: 0, total: 0 }} label=${words.analysisPanel.reasonsProgress} />`}
+        tip=${t('What keeps the answer from matching the painting')} />
+      ${ui.isExplaining && html`<${ProgressBar} progress=${{ done: 0, total: 0 }} label=${t('Finding reasons')} />`}
       ${ui.state?.can_render && html`<${VerifyButton} ui=${ui} app=${app} />`}
     </div>
     ${ui.verification && html`<${VerificationResult} ui=${ui} app=${app} />`}
@@ -132,12 +132,12 @@ export function Legend({ ui, app, panes }) {
   const { left, top, isLow } = placeLegend(pane, ui.state.size);
   const texts = LEGEND_TEXTS[overlay].map((text) =>
     text === PAINTED_LABEL && maxWeight > 1
-      ? fill(words.analysisPanel.weight, { number: numberText(maxWeight, 2) })
+      ? t('weight {number} ×', { number: numberText(maxWeight, 2) })
       : text,
   );
   return html`<div class=${`legend ${isLow ? 'is-low' : ''}`}
     style=${{ top: `${top}px`, left: `${left}px` }}>
-    <b>${label}${isOld && ui.deltaE !== null ? words.analysisPanel.computing : ''}</b>
+    <b>${label}${isOld && ui.deltaE !== null ? t(': computing …') : ''}</b>
     <i class=${`is-${overlay}`}></i>
     ${texts.map((text, k) => html`<span key=${k}>${text}</span>`)}
   </div>`;
@@ -149,11 +149,11 @@ function VerifyButton({ ui, app }) {
   if (!ui.verificationProgress) {
     // Ignore the second click of a double click on "Analysis", under which the button appears.
     const begin = (/** @type {MouseEvent} */ { detail }) => detail < 2 && session.verify();
-    return html`<${Button} label=${words.analysisPanel.verify} icon="camera" act=${begin}
-      tip=${words.analysisPanel.renderTheSceneWithThisLighting} />`;
+    return html`<${Button} label=${t('Verify')} icon="camera" act=${begin}
+      tip=${t('Render the scene with this lighting, and compare')} />`;
   }
-  return html`<${Button} label=${words.analysisPanel.stop} icon="close" act=${() => session.verify(false)} />
-    <${ProgressBar} progress=${ui.verificationProgress} label=${words.analysisPanel.verifying} />
+  return html`<${Button} label=${t('Stop')} icon="close" act=${() => session.verify(false)} />
+    <${ProgressBar} progress=${ui.verificationProgress} label=${t('Verifying')} />
     <span class="faint">${progressText(ui.verificationProgress)}</span>`;
 }
 
@@ -176,8 +176,8 @@ function VerificationResult({ ui, app }) {
   };
   return html`<div ref=${frame} class=${`verified ${verification.agrees ? 'is-good' : 'is-bad'}`}>
     <p><${Icon} name=${verification.agrees ? 'check' : 'warn'} /><span>${verification.text}${
-      verification.isOld ? words.analysisPanel.ofAnEarlierAnswer : ''
+      verification.isOld ? t(' (of an earlier answer)') : ''
     }</span></p>
-    <${Button} label=${words.analysisPanel.answerRender} icon="wipe" pressed=${isShown} act=${compare} />
+    <${Button} label=${t('Answer | Render')} icon="wipe" pressed=${isShown} act=${compare} />
   </div>`;
 }

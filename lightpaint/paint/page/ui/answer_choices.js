@@ -3,9 +3,9 @@
 import { nameInView } from '../engine/message_frames.js';
 import { html } from '../vendor/preact.js';
 import { numberText } from './format.js';
-import { deliveryText, knownShares, percentOf } from './layers/layer_delivery.js';
+import { knownShares, percentOf } from './layers/layer_delivery.js';
 import { Thumbnail } from './thumbnail.js';
-import { fill, words } from '../language/language.js';
+import { t } from '../language/language.js';
 
 /** @typedef {import("./ui_state.js").Ui} Ui */
 /** @typedef {import("./shortcuts.js").App} App */
@@ -22,9 +22,21 @@ export const INITIAL_CHOICES = { choices: [], choicesVersion: -1 };
 
 /** From the least freedom of the lamps to the most. */
 const CHOICES = /** @type {const} */ ([
-  { colors: 'own', label: words.answerChoices.own, tip: words.answerChoices.ownTip },
-  { colors: 'gentle', label: words.answerChoices.asPainted, tip: words.answerChoices.asPaintedTip },
-  { colors: 'free', label: words.answerChoices.bold, tip: words.answerChoices.boldTip },
+  {
+    colors: 'own',
+    label: t('Own colours'),
+    tip: t('Lamps keep the colours they have, and only get brighter or dimmer.'),
+  },
+  {
+    colors: 'gentle',
+    label: t('As painted'),
+    tip: t('Lamps take the whites and colours that the painting asks for.'),
+  },
+  {
+    colors: 'free',
+    label: t('Bold'),
+    tip: t('Lamps may take any hue that is white, painted or their own.'),
+  },
 ]);
 
 /** Take the choices of the session. @param {import("../engine/messages.js").Events["choices"]} message
@@ -43,7 +55,7 @@ export function AnswerChoices({ ui, app }) {
   const isUnpainted = ui.deltaE === null && !ui.isLive && ui.isJudgementCurrent;
   const isOld = ui.isLive || ui.version > ui.choicesVersion;
   return html`<div class=${`choices ${isOld ? 'is-old' : ''}`} role="group"
-    aria-label=${words.answerChoices.lightColours}>
+    aria-label=${t('Light colours of the answer')}>
     ${CHOICES.map((choice) => {
       const answer = isUnpainted
         ? undefined
@@ -81,17 +93,28 @@ const sharesText = ({ brightness, color }) =>
     ? ''
     : [brightness, color].map((share) => (share === null ? '–' : percentOf(share))).join(' · ');
 
+/** Say how much came of the wishes. @param {AnswerChoice} answer */
+function askedText({ brightness, color }) {
+  const [value, colour] = [percentOf(brightness ?? 0), percentOf(color ?? 0)];
+  if (brightness === null) return t('{value} % of the asked colour came.', { value: colour });
+  if (color === null) return t('{value} % of the asked brightness came.', { value });
+  return t('{brightness} % of the asked brightness and {colour} % of the asked colour came.', {
+    brightness: value,
+    colour,
+  });
+}
+
 /** Say how much came, of which wish least, and how far the answer is. @param {AnswerChoice} answer */
 function deliveredText(answer) {
   const { delta_e: deltaE, worst } = answer;
   const least = percentOf(Math.min(...knownShares(answer)));
   const worstShare = worst ? percentOf(Math.min(...knownShares(worst))) : least;
   return [
-    knownShares(answer).length && deliveryText(answer, words.answerChoices),
+    knownShares(answer).length && askedText(answer),
     worst &&
       worstShare < least &&
-      fill(words.answerChoices.least, { name: worst.name, value: worstShare }),
-    fill(words.answerChoices.meanDifference, { number: numberText(deltaE, 2) }),
+      t('Least came of {name}: {value} %.', { name: worst.name, value: worstShare }),
+    t('Mean ΔE {number} from the painting.', { number: numberText(deltaE, 2) }),
   ]
     .filter(Boolean)
     .join(' ');

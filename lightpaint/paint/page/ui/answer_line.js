@@ -10,34 +10,38 @@ import { pointingHint } from './lamp_fields.js';
 import { isAnswerHidden, saveLook } from './look_actions.js';
 import { toolHint } from './tools.js';
 import { exposureOf } from './display_state.js';
-import { fill, words } from '../language/language.js';
+import { t } from '../language/language.js';
 import { shortcutsOf } from './key_bindings.js';
 
 /** @typedef {import("./ui_state.js").Ui} Ui */
 /** @typedef {import("./shortcuts.js").App} App */
 
-const DELTA_E_TIP = words.answerLine.meanColourDifferenceFromThe;
+const DELTA_E_TIP = t(
+  'Mean colour difference from the painting (ΔE 2000), and what it was with the current lighting. 1 is just visible, 5 is obvious.',
+);
 
-const MASTER_TIP = words.answerLine.theMasterDimmerChangesThe;
+const MASTER_TIP = t(
+  'The master dimmer changes the pictures and what is exported. The sentence describes the answer without it.',
+);
 
 /** States of the sentence. */
 const STATES = {
-  live: words.answerLine.live,
-  analysing: words.answerLine.analysing,
-  hidden: words.answerLine.answerNotShown,
+  live: t('live'),
+  analysing: t('analysing'),
+  hidden: t('answer not shown'),
 };
 
 const STATE_TIPS = {
-  live: words.answerLine.aQuickAnswerWhileYouPaint,
-  analysing: words.answerLine.theLightsAreSolvedTheSentence,
-  hidden: words.answerLine.theSentenceDescribesTheAnswer,
+  live: t('A quick answer while you paint. The exact one follows.'),
+  analysing: t('The lights are solved. The sentence still describes the previous answer.'),
+  hidden: t('The sentence describes the answer, which is neither of the looks compared.'),
 };
 
 /** One sentence below the pictures: how close the answer is.
  * @param {{ui: Ui, app: App}} props */
 export function AnswerLine({ ui, app }) {
   const { store } = app;
-  const text = ui.headline || (ui.ready ? words.answerLine.solving : '');
+  const text = ui.headline || (ui.ready ? t('Solving …') : '');
   const isOpen = ui.side && !ui.panel && ui.open.truth;
   const isOld = ui.headline !== '' && !ui.isJudgementCurrent;
   const progressState = ui.isLive ? 'live' : isOld ? 'analysing' : null;
@@ -59,28 +63,27 @@ export function AnswerLine({ ui, app }) {
       ${
         !state &&
         ui.deltaE !== null &&
-        html`<span class="faint" data-tip=${DELTA_E_TIP}>${words.answerLine.deltae} ${numberText(ui.deltaE, 2)}${
+        html`<span class="faint" data-tip=${DELTA_E_TIP}>${t('ΔE')} ${numberText(ui.deltaE, 2)}${
           ui.deltaPresent !== null &&
-          html`<span class="was">${fill(words.answerLine.was, { number: numberText(ui.deltaPresent, 2) })}</span>`
+          html`<span class="was">${t(', was {number}', { number: numberText(ui.deltaPresent, 2) })}</span>`
         }</span>`
       }
       ${
         ui.master !== 1 &&
-        html`<span class="faint" data-tip=${MASTER_TIP}>${words.answerLine.beforeTheMaster}</span>`
+        html`<span class="faint" data-tip=${MASTER_TIP}>${t('before the master')}</span>`
       }
     </p>
     <${AdviceButton} ui=${ui} app=${app} />
     <${AnswerChoices} ui=${ui} app=${app} />
     ${
       ui.ready &&
-      html`<${Button} label=${words.answerLine.saveLook} icon="plus" keys=${shortcutsOf(ui, 'saveLook')}
-      tip=${words.answerLine.savePaintingAndAnswerAsA}
+      html`<${Button} label=${t('Save look')} icon="plus" keys=${shortcutsOf(ui, 'saveLook')}
+      tip=${t('Save painting and answer as a look')}
       act=${() => saveLook(app)} />`
     }
     ${
       // The button keeps its place when pressed, so that nothing else slides under the pointer.
-      ui.ready &&
-      html`<${Button} label=${words.answerLine.analysis} pressed=${isOpen} act=${toggleAnalysis} />`
+      ui.ready && html`<${Button} label=${t('Analysis')} pressed=${isOpen} act=${toggleAnalysis} />`
     }
   </div>`;
 }
@@ -94,8 +97,8 @@ export function PointerStatus({ ui }) {
   }
   if (ui.isLassoing) {
     const text = ui.rig
-      ? words.answerLine.drawAroundTheMarksOfThe
-      : words.answerLine.lookingWhereTheLightsHang;
+      ? t('Draw around the marks of the lights to select them. Escape ends it.')
+      : t('Looking where the lights hang …');
     return html`<p class="here" id="lp-status" role="status"><strong>${text}</strong></p>`;
   }
   if (!ui.probe) {

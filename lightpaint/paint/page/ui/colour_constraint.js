@@ -3,16 +3,16 @@
 import { html } from '../vendor/preact.js';
 import { Button, NumberField, Select, useDraft } from './controls.js';
 import { atFullBrightness, toHex, toKelvin } from './paint_colour.js';
-import { words } from '../language/language.js';
+import { t } from '../language/language.js';
 
 /** @typedef {import("./ui_state.js").Constraints} Constraints */
 /** @typedef {import("./engine_interface.js").RGB} RGB */
 
 const COLOURS = [
-  { value: 'any', label: words.colourConstraint.anyColour },
-  { value: 'color', label: words.colourConstraint.oneColour },
-  { value: 'kelvin', label: words.colourConstraint.whiteRange },
-  { value: 'primaries', label: words.colourConstraint.ledMix },
+  { value: 'any', label: t('Any colour') },
+  { value: 'color', label: t('One colour') },
+  { value: 'kelvin', label: t('White range') },
+  { value: 'primaries', label: t('LED mix') },
 ];
 
 /** Return the kind of colour constraint of a light. @param {Constraints} constraints */
@@ -34,12 +34,12 @@ export function ColourConstraint(props) {
     set({ ...otherConstraints, ...constraint });
   };
   return html`<div class="ask-row">
-      <${Select} label=${words.colourConstraint.colour} value=${kind} choices=${COLOURS} change=${change} /></div>
+      <${Select} label=${t('Colour')} value=${kind} choices=${COLOURS} change=${change} /></div>
     ${kind === 'color' && html`<${SingleColour} ...${props} otherConstraints=${otherConstraints} />`}
     ${kind === 'kelvin' && html`<${WhiteRange} ...${props} otherConstraints=${otherConstraints} />`}
     ${
       kind === 'primaries' &&
-      html`<${TextField} label=${words.colourConstraint.leds} value=${[...primaries].join(', ')}
+      html`<${TextField} label=${t('LEDs')} value=${[...primaries].join(', ')}
       take=${(/** @type {string} */ text) =>
         set({
           ...otherConstraints,
@@ -55,12 +55,12 @@ function SingleColour({ constraints, otherConstraints, rgb, set }) {
     : String(constraints.color);
   const white = toKelvin(rgb);
   return html`<div class="ask-row">
-    <${TextField} label=${words.colourConstraint.hexOrKelvin} value=${text}
+    <${TextField} label=${t('Hex or kelvin')} value=${text}
       take=${(/** @type {string} */ color) => set({ ...otherConstraints, color })} />
     ${
       white &&
       html`<${Button} label=${`${Math.round(white.kelvin / 50) * 50}K`}
-      tip=${words.colourConstraint.theWhiteNearestToItsColour} act=${() =>
+      tip=${t('The white nearest to its colour in the answer')} act=${() =>
         set({
           ...otherConstraints,
           color: `${Math.round(white.kelvin / 50) * 50}K`,
@@ -81,12 +81,12 @@ function WhiteRange({ constraints, otherConstraints, set }) {
     });
   const duv = constraints.duv ?? 0;
   return html`<div class="ask-fields">
-    <${NumberField} label=${words.colourConstraint.from} value=${low} min=${1000} max=${25000} step=${100} digits=${0}
-      unit=${words.colourConstraint.k} change=${(/** @type {number} */ kelvin) => setRange(kelvin, high, duv)} />
-    <${NumberField} label=${words.colourConstraint.to} value=${high} min=${1000} max=${25000} step=${100} digits=${0}
-      unit=${words.colourConstraint.k} change=${(/** @type {number} */ kelvin) => setRange(low, kelvin, duv)} />
-    <${NumberField} label=${words.colourConstraint.tint} value=${1000 * duv} min=${-20} max=${20} digits=${1}
-      tip=${words.colourConstraint.duv1000Above0GreenBelow}
+    <${NumberField} label=${t('From')} value=${low} min=${1000} max=${25000} step=${100} digits=${0}
+      unit=${t('K')} change=${(/** @type {number} */ kelvin) => setRange(kelvin, high, duv)} />
+    <${NumberField} label=${t('To')} value=${high} min=${1000} max=${25000} step=${100} digits=${0}
+      unit=${t('K')} change=${(/** @type {number} */ kelvin) => setRange(low, kelvin, duv)} />
+    <${NumberField} label=${t('Tint')} value=${1000 * duv} min=${-20} max=${20} digits=${1}
+      tip=${t('Duv × 1000: above 0 green, below 0 magenta')}
       change=${(/** @type {number} */ tint) => setRange(low, high, tint / 1000)} />
   </div>`;
 }

@@ -14,16 +14,16 @@ import {
 import { ColourWheel } from './colour_wheel.js';
 import { Slider, useDraft } from './controls.js';
 import { KelvinSlider, gradient, clampKelvin } from './kelvin_slider.js';
-import { words } from '../language/language.js';
+import { t } from '../language/language.js';
 
 /** @typedef {import("./ui_state.js").RGB} RGB */
 /** isFinal: false while a slider moves. @typedef {(colour: RGB, isFinal: boolean) => void} SetColour */
 
 /** Choices of these controls. */
 export const MIXERS = [
-  { value: 'white', label: words.colourMixers.white },
-  { value: 'hsv', label: words.colourMixers.hsv },
-  { value: 'rgb', label: words.colourMixers.rgb },
+  { value: 'white', label: t('White') },
+  { value: 'hsv', label: t('HSV') },
+  { value: 'rgb', label: t('RGB') },
 ];
 
 /** @param {{colour: RGB, set: SetColour}} props */
@@ -38,7 +38,7 @@ export function Hex({ colour, set }) {
     if (key === 'Enter') take(currentTarget.value);
     if (key === 'Escape') setDraft(null);
   };
-  return html`<label class="field hex"><span class="only-read">${words.colourMixers.hex}</span>
+  return html`<label class="field hex"><span class="only-read">${t('Hex')}</span>
     <input type="text" value=${draft ?? toHex(colour)} data-typed=${draft === null ? 'no' : 'yes'} spellcheck=${false} autocomplete="off"
       maxlength="7"
       onInput=${(/** @type {any} */ event) => setDraft(event.currentTarget.value)}
@@ -71,9 +71,9 @@ export function White({ colour, set, isPure = false }) {
     <${KelvinSlider} value=${kelvin}
       change=${(/** @type {number} */ kelvin, /** @type {boolean} */ isFinal) =>
         setWhite({ kelvin, ...(isPure && !isLast ? { green: 0 } : {}) }, isFinal)} />
-    <${Slider} label=${words.colourMixers.tint} value=${green} min=${-20} max=${20} step=${1} digits=${0} resetValue=${0}
+    <${Slider} label=${t('Tint')} value=${green} min=${-20} max=${20} step=${1} digits=${0} resetValue=${0}
       track=${gradient([-20, 0, 20].map((tint) => fromKelvin(kelvin, tint)))}
-      tip=${words.colourMixers.duv1000GreenToTheRight}
+      tip=${t('Duv × 1000: green to the right, magenta to the left')}
       change=${(/** @type {number} */ value, /** @type {boolean} */ isFinal) =>
         setWhite({ green: value }, isFinal)} /></div>`;
 }
@@ -110,14 +110,14 @@ export function Hsv({ colour, set, hasValue = true }) {
     set(fromHsv(newHsv), isFinal);
   };
   return html`<${ColourWheel} hue=${hsv[0]} saturation=${hsv[1]} set=${setHue} />
-    <${Slider} label=${words.colourMixers.hue} value=${hsv[0]} min=${0} max=${360} unit="°"
+    <${Slider} label=${t('Hue')} value=${hsv[0]} min=${0} max=${360} unit="°"
       track=${gradient(hues)} change=${setChannel(0)} />
-    <${Slider} label=${words.colourMixers.saturation} value=${100 * hsv[1]} min=${0} max=${100} unit="%"
+    <${Slider} label=${t('Saturation')} value=${100 * hsv[1]} min=${0} max=${100} unit="%"
       track=${gradient([fromHsv([hsv[0], 0, hsv[2]]), fromHsv([hsv[0], 1, hsv[2]])])}
       change=${setChannel(1, 100)} />
     ${
       hasValue &&
-      html`<${Slider} label=${words.colourMixers.value} value=${100 * hsv[2]} min=${0} max=${100} unit="%"
+      html`<${Slider} label=${t('Value')} value=${100 * hsv[2]} min=${0} max=${100} unit="%"
       track=${gradient([[0, 0, 0], fromHsv([hsv[0], hsv[1], 1])])} change=${setChannel(2, 100)} />`
     }`;
 }
@@ -126,7 +126,7 @@ export function Hsv({ colour, set, hasValue = true }) {
 export function Rgb({ colour, set }) {
   const replaceChannel = (/** @type {number} */ channel, /** @type {number} */ value) =>
     /** @type {RGB} */ (colour.map((x, c) => (c === channel ? decode(value / 255) : x)));
-  return html`${[words.colourMixers.red, words.colourMixers.green, words.colourMixers.blue].map(
+  return html`${[t('Red'), t('Green'), t('Blue')].map(
     (label, c) => html`<${Slider} key=${label}
     label=${label} value=${255 * encode(colour[c])} min=${0} max=${255}
     track=${gradient([replaceChannel(c, 0), replaceChannel(c, 255)])}

@@ -6,7 +6,7 @@ import { Hex, Hsv, MIXERS, Rgb, White } from './colour_mixers.js';
 import { Choice, Slider } from './controls.js';
 import { signedText } from './format.js';
 import { paintOf } from './display_state.js';
-import { fill, words } from '../language/language.js';
+import { t } from '../language/language.js';
 
 /** @typedef {import("./ui_state.js").Ui} Ui */
 /** @typedef {import("./ui_state.js").RGB} RGB */
@@ -15,13 +15,13 @@ import { fill, words } from '../language/language.js';
 /** Warm is right, as on the sliders and in an adjusting drag. */
 const WHITES = [9000, 6500, 5600, 4300, 3200, 2700, 1900];
 const GELS = [
-  [words.colourPanel.red, '#ff2a1a'],
-  [words.colourPanel.amber, '#ff9a1f'],
-  [words.colourPanel.green, '#35d04a'],
-  [words.colourPanel.cyan, '#2fd6e0'],
-  [words.colourPanel.blue, '#2a55ff'],
-  [words.colourPanel.magenta, '#e02fd0'],
-  [words.colourPanel.black, '#000000'],
+  [t('Red'), '#ff2a1a'],
+  [t('Amber'), '#ff9a1f'],
+  [t('Green'), '#35d04a'],
+  [t('Cyan'), '#2fd6e0'],
+  [t('Blue'), '#2a55ff'],
+  [t('Magenta'), '#e02fd0'],
+  [t('Black'), '#000000'],
 ];
 
 /** @param {{ui: Ui, app: App}} props */
@@ -31,15 +31,15 @@ export function ColourPanel({ ui, app }) {
   const Mixer = { white: White, hsv: Hsv, rgb: Rgb }[ui.mixer];
   return html`<div class="colour">
     <div class="colour-row">
-      <span class="patch" data-tip=${words.colourPanel.leftTheColourRightHowThe}
+      <span class="patch" data-tip=${t('Left: the colour. Right: how the display shows it at this brightness.')}
         style=${{ '--colour': toHex(ui.colour), '--shown': displayColour(ui, app) }}></span>
       <${Hex} colour=${ui.colour} set=${set} />
-      <${Choice} label=${words.colourPanel.colourModel} value=${ui.mixer} choices=${MIXERS}
+      <${Choice} label=${t('Colour model')} value=${ui.mixer} choices=${MIXERS}
         change=${(/** @type {any} */ mixer) => store.set({ mixer })} />
     </div>
     <${Mixer} colour=${ui.colour} set=${set} />
-    <${Slider} label=${words.colourPanel.brightness} value=${ui.stops} min=${-8} max=${8} step=${0.1} digits=${1}
-      unit=${words.colourPanel.st} resetValue=${0} tip=${words.colourPanel.stopsAboveDisplayWhitePaintCan}
+    <${Slider} label=${t('Brightness')} value=${ui.stops} min=${-8} max=${8} step=${0.1} digits=${1}
+      unit=${t('st')} resetValue=${0} tip=${t('Stops above display white. Paint can be brighter than white.')}
       change=${(/** @type {number} */ stops) => store.set({ stops })} />
     <${Swatches} ui=${ui} app=${app} />
   </div>`;
@@ -57,17 +57,17 @@ function Swatches({ ui, app }) {
     html`<${Swatch} key=${tip} rgb=${rgb} tip=${tip}
       act=${() => store.set({ colour: rgb, stops })} />`;
   const gels = GELS.map(([name, hex]) => ({ name, rgb: /** @type {RGB} */ (fromHex(hex)) }));
-  return html`<div class="swatches" role="group" aria-label=${words.colourPanel.swatches}>
-    ${WHITES.map((kelvin) => swatch(fromKelvin(kelvin), fill(words.colourPanel.k, { kelvin }), ui.stops))}
+  return html`<div class="swatches" role="group" aria-label=${t('Swatches')}>
+    ${WHITES.map((kelvin) => swatch(fromKelvin(kelvin), t('{kelvin} K', { kelvin }), ui.stops))}
     ${gels.map(({ name, rgb }) => swatch(rgb, name, ui.stops))}
   </div>
-  <div class="swatches is-recent" role="group" aria-label=${words.colourPanel.recentColours}>
-    ${!ui.recent.length && html`<span class="faint">${words.colourPanel.recentColours}</span>`}
+  <div class="swatches is-recent" role="group" aria-label=${t('Recent colours')}>
+    ${!ui.recent.length && html`<span class="faint">${t('Recent colours')}</span>`}
     ${ui.recent.map(({ colour, stops }, k) => {
       const stopsLabel = signedText(stops, Math.abs(stops - Math.round(stops)) < 0.05 ? 0 : 1);
-      const brightness = stopsLabel === '0' ? '' : fill(words.colourPanel.stops, { stopsLabel });
+      const brightness = stopsLabel === '0' ? '' : t(', {stopsLabel} stops', { stopsLabel });
       return html`<${Swatch} key=${k} rgb=${colour} stops=${brightness && stopsLabel}
-        tip=${fill(words.colourPanel.recent, { k: k + 1, colour: toHex(colour), brightness })}
+        tip=${t('Recent {k}: {colour}{brightness}', { k: k + 1, colour: toHex(colour), brightness })}
         act=${() => store.set({ colour, stops })} />`;
     })}
   </div>`;

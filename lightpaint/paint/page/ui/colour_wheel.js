@@ -1,7 +1,7 @@
 /** A wheel of hue, around, and saturation, outwards. The sliders below it do the same by keyboard. */
 
 import { html, useRef } from '../vendor/preact.js';
-import { words } from '../language/language.js';
+import { t } from '../language/language.js';
 
 /** @typedef {(hue: number, saturation: number, isFinal: boolean) => void} SetHue */
 
@@ -34,7 +34,7 @@ export function ColourWheel({ hue, saturation, set }) {
     left: `${50 * (1 + saturation * Math.sin(angle))}%`,
     top: `${50 * (1 - saturation * Math.cos(angle))}%`,
   };
-  return html`<div class="wheel" aria-hidden="true" data-tip=${words.colourMixers.wheel} onPointerDown=${down}
+  return html`<div class="wheel" aria-hidden="true" data-tip=${t('Hue around the wheel, saturation outwards')} onPointerDown=${down}
     onPointerMove=${follow(false)} onPointerUp=${follow(true)} onPointerCancel=${follow(true)}>
     <i style=${place}></i></div>`;
 }

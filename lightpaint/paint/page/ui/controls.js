@@ -4,7 +4,7 @@ import { slideByTouch } from '../../../viewer/touch_sliders.js';
 import { html, useLayoutEffect, useRef, useState } from '../vendor/preact.js';
 import { cleanNumberText, typedNumber } from './format.js';
 import { Icon } from './icons.js';
-import { fill, words } from '../language/language.js';
+import { t } from '../language/language.js';
 
 /** The text being typed in a field, null if none, as state and as a ref. Event handlers read the
  * ref before the next render, so that text cancelled by Escape is not taken when the field loses
@@ -126,12 +126,14 @@ export function NumberField(props) {
     const [typed, number] = [text.trim(), typedNumber(text)];
     if (!typed) return void (placeholder !== undefined && change(null));
     if (!Number.isFinite(number)) {
-      refuse(fill(words.controls.isNoNumber, { label, typed }));
+      refuse(t('{label} is {typed}: expected a number', { label, typed }));
       return;
     }
     const taken = clamp(figures ? number : round(number));
     if (number < min || number > max)
-      refuse(fill(words.controls.isOutOfRange, { label, typed, taken: round(taken) }));
+      refuse(
+        t('{label} cannot be {typed}: it is {taken} now', { label, typed, taken: round(taken) }),
+      );
     change(taken);
   };
   const press = (/** @type {any} */ event) => {
@@ -234,7 +236,7 @@ export function Fold({ title, name, open, toggle, children, extra, class: classe
         aria-keyshortcuts="Alt+ArrowUp Alt+ArrowDown">
         <${Icon} name="fold" /><span>${title}</span></button></h2>
       ${extra}
-      <span class="fold-grip" aria-hidden="true" data-tip=${words.panels.grip}><${Icon} name="grip" /></span>
+      <span class="fold-grip" aria-hidden="true" data-tip=${t('Drag this panel to another place')}><${Icon} name="grip" /></span>
     </div>
     <div class="fold-body" id=${id} hidden=${!open}>${open && children}</div>
   </section>`;
@@ -300,7 +302,7 @@ export function Dialog({ title, close, children, class: name }) {
     onClose=${close} onClick=${(/** @type {any} */ event) => event.target === ref.current && close()}>
     <div class="dialog-head">
       <h2 id=${id}>${title}</h2>
-      <${Button} icon="close" tip=${words.controls.close} act=${close} />
+      <${Button} icon="close" tip=${t('Close')} act=${close} />
     </div>
     <div class="dialog-body">${children}</div>
   </dialog>`;

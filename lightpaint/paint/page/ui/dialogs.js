@@ -11,7 +11,7 @@ import { LooksDialog } from './looks_dialog.js';
 import { PresetsDialog } from './presets_dialog.js';
 import { MoveDialog } from './searches/move_dialog.js';
 import { ShortcutsDialog } from './shortcuts_dialog.js';
-import { fill, words } from '../language/language.js';
+import { t } from '../language/language.js';
 
 /** @typedef {import("./ui_state.js").Ui} Ui */
 /** @typedef {import("./shortcuts.js").App} App */
@@ -34,36 +34,36 @@ export function Dialogs({ ui, app }) {
 const EXPORTS = [
   {
     key: 'target',
-    label: words.dialogs.painting,
-    description: words.dialogs.paintingExrForLightpaintSolve,
+    label: t('Painting'),
+    description: t('painting.exr, for lightpaint solve'),
   },
   {
     key: 'layers',
-    label: words.dialogs.layers,
-    description: words.dialogs.layersExrAndLayersOraFor,
+    label: t('Layers'),
+    description: t('layers.exr and layers.ora, for Krita and others'),
   },
   {
     key: 'picture',
-    label: words.dialogs.picture,
-    description: words.dialogs.answerPngTheAnswerAsA,
+    label: t('Picture'),
+    description: t('answer.png: the answer as a picture'),
   },
   {
     key: 'lighting',
-    label: words.dialogs.lighting,
-    description: words.dialogs.lightingJsonLevelAndColourOf,
+    label: t('Lighting'),
+    description: t('lighting.json: level and colour of every light'),
   },
-  { key: 'relit', label: words.dialogs.scene, description: words.dialogs.relitXmlTheSceneWithThis },
+  { key: 'relit', label: t('Scene'), description: t('relit.xml: the scene with this lighting') },
   {
     key: 'report',
-    label: words.dialogs.report,
-    description: words.dialogs.reportHtmlPaintingAnswerAnd,
+    label: t('Report'),
+    description: t('answer/report.html: painting, answer and analysis'),
   },
 ];
 
 /** Exports that are not ticked at first: few people need them. @type {string[]} */
 const UNTICKED = ['layers'];
 
-const UNPAINTED_TEXT = words.dialogs.nothingIsPaintedYetSoNo;
+const UNPAINTED_TEXT = t('Nothing is painted yet, so no painting, layers or report were exported.');
 
 /** @param {{ui: Ui, app: App, close: () => void}} props */
 function ExportDialog({ ui, app, close }) {
@@ -79,7 +79,7 @@ function ExportDialog({ ui, app, close }) {
   const isBusy = ui.isExporting;
   const { exportResult } = ui;
   const folder = ui.state?.folder ?? '';
-  return html`<${Dialog} title=${words.dialogs.export} close=${close} class="export">
+  return html`<${Dialog} title=${t('Export')} close=${close} class="export">
     <${ExportKind} value="export" app=${app} />
     <${ExportName} name=${name} change=${setName} />
     ${available.map(
@@ -91,29 +91,32 @@ function ExportDialog({ ui, app, close }) {
     )}
     ${
       ui.master !== 1 &&
-      html`<p>${fill(words.dialogs.theMasterIsAtPictureLighting, { percent: percentText(ui.master) })}</p>`
+      html`<p>${t(
+        'The master is at {percent}: picture, lighting and relit scene are dimmed; painting, report and the command are not.',
+        { percent: percentText(ui.master) },
+      )}</p>`
     }
-    <div class="row"><span class="faint folder">${fill(words.dialogs.to, { folder: `${folder}/exports` })}</span>
-      <${CopyButton} text=${`${folder}/exports`} tip=${words.dialogs.copyTheFoldersPath} app=${app} />
-      <${Button} label=${isBusy ? words.dialogs.exporting : words.dialogs.export} primary disabled=${isBusy || !outputs.length || !name.trim()}
+    <div class="row"><span class="faint folder">${t('to {folder}', { folder: `${folder}/exports` })}</span>
+      <${CopyButton} text=${`${folder}/exports`} tip=${t("Copy the folder's path")} app=${app} />
+      <${Button} label=${isBusy ? t('Exporting …') : t('Export')} primary disabled=${isBusy || !outputs.length || !name.trim()}
         act=${() => app.session.exportFiles(outputs, name.trim())} /></div>
     ${
       isBusy &&
-      html`<div class="row"><span class="faint folder">${words.dialogs.youCanCloseThisWindow}</span>
-        <${ProgressBar} progress=${ui.exportProgress ?? { done: 0, total: 0 }} label=${words.dialogs.exportProgress} />
+      html`<div class="row"><span class="faint folder">${t('You can close this window.')}</span>
+        <${ProgressBar} progress=${ui.exportProgress ?? { done: 0, total: 0 }} label=${t('Exporting')} />
         <span class="faint">${ui.exportProgress && progressText(ui.exportProgress)}</span>
-        <${Button} label=${words.dialogs.stop} icon="close" act=${() => app.session.exportFiles([])}
-          tip=${words.dialogs.filesThatAreWrittenAlreadyStay} /></div>`
+        <${Button} label=${t('Stop')} icon="close" act=${() => app.session.exportFiles([])}
+          tip=${t('Files that are written already stay')} /></div>`
     }
     ${
       exportResult &&
       html`<div class="exported" role="status">
-      <h3>${exportResult.is_stopped ? words.dialogs.stoppedWrittenAlready : words.dialogs.exported}</h3>
+      <h3>${exportResult.is_stopped ? t('Stopped. Written already:') : t('Exported')}</h3>
       <ul>${exportResult.files.map((file) => html`<li key=${file}><code>${relativePath(file, folder)}</code></li>`)}</ul>
       ${exportResult.is_unpainted && html`<p>${UNPAINTED_TEXT}</p>`}
       ${
         exportResult.command &&
-        html`<h3>${words.dialogs.theSameFromTheCommandLine}</h3>
+        html`<h3>${t('The same from the command line')}</h3>
         <${CommandLine} text=${exportResult.command} app=${app} />`
       }
     </div>`
@@ -124,7 +127,7 @@ function ExportDialog({ ui, app, close }) {
 /** @param {{text: string, app: App}} props */
 function CommandLine({ text, app }) {
   return html`<div class="command"><code tabindex="0">${text}</code>
-    <${CopyButton} text=${text} label=${words.dialogs.copy} app=${app} />
+    <${CopyButton} text=${text} label=${t('Copy')} app=${app} />
   </div>`;
 }
 
@@ -138,9 +141,9 @@ function CopyButton({ text, app, label, tip }) {
       setCopied(true);
     } catch {
       // Browsers allow copying only to pages from this machine or over https.
-      app.session.toast(words.dialogs.thisBrowserDoesNotLetThe);
+      app.session.toast(t('This browser does not let the page copy. Select the text instead.'));
     }
   };
-  return html`<${Button} label=${label && (isCopied ? words.dialogs.copied : label)} tip=${isCopied && tip ? words.dialogs.copied : tip}
+  return html`<${Button} label=${label && (isCopied ? t('Copied') : label)} tip=${isCopied && tip ? t('Copied') : tip}
     icon=${isCopied ? 'check' : 'copy'} act=${copy} />`;
 }

@@ -1,6 +1,6 @@
 /** Files that go to the session in parts: no side of an array in a message may be long. */
 
-import { fill, words } from '../language/language.js';
+import { t } from '../language/language.js';
 
 /** @typedef {import("./shortcuts.js").App} App */
 
@@ -24,7 +24,7 @@ export async function sendFile({ session }, file, kind, fields) {
       if (reply.kind !== 'started') return false;
       start += count;
     }
-    if (!bytes.length) session.toast(fill(words.references.isEmpty, { name: file.name }), 'warn');
+    if (!bytes.length) session.toast(t('{name} is empty.', { name: file.name }), 'warn');
     return bytes.length > 0;
   } catch (error) {
     session.toast(error instanceof Error ? error.message : String(error), 'warn');

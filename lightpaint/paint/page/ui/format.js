@@ -1,7 +1,7 @@
 /** Numbers as text: a true minus sign, few digits, units behind. */
 
 import { luminance, toKelvin } from './paint_colour.js';
-import { fill, fillCount, words } from '../language/language.js';
+import { plural, t } from '../language/language.js';
 
 const MINUS = '\u2212';
 
@@ -36,9 +36,7 @@ export function signedText(value, digits = 1) {
 /** @param {number | null | undefined} stops @returns {string} */
 export function stopsText(stops) {
   if (stops === null || stops === undefined || !Number.isFinite(stops)) return '';
-  return Math.abs(stops) < 0.05
-    ? words.format.asNow
-    : fill(words.format.st, { signed: signedText(stops) });
+  return Math.abs(stops) < 0.05 ? t('as now') : t('{signed} st', { signed: signedText(stops) });
 }
 
 /** Return progress and remaining time as text, in one form for all tasks.
@@ -48,17 +46,17 @@ export function progressText({ done, total, remainingSeconds: remaining }) {
   const share = `${Math.floor((100 * Math.min(done, total)) / total)} %`;
   return remaining === undefined
     ? share
-    : fill(words.format.left, { share, time: durationText(remaining) });
+    : t('{share}, {time} left', { share, time: durationText(remaining) });
 }
 
 /** Return a time, rounded to the precision of an estimate. @param {number} seconds */
 export function durationText(seconds) {
   if (seconds < 60)
-    return fill(words.format.s, {
+    return t('{value} s', {
       value: Math.max(1, seconds < 10 ? Math.round(seconds) : 5 * Math.round(seconds / 5)),
     });
-  if (seconds < 3600) return fill(words.format.min, { value: Math.round(seconds / 60) });
-  return fill(words.format.h, { value: (seconds / 3600).toFixed(1) });
+  if (seconds < 3600) return t('{value} min', { value: Math.round(seconds / 60) });
+  return t('{value} h', { value: (seconds / 3600).toFixed(1) });
 }
 
 /** @param {number} share 0 to 1 @returns {string} */
@@ -71,7 +69,7 @@ export function percentText(share) {
 /** Rounded to what an eye can distinguish. @param {number} kelvin @returns {string} */
 const kelvinText = (kelvin) => {
   const step = kelvin < 4000 ? 10 : kelvin < 8000 ? 50 : 500;
-  return fill(words.format.k, { step: Math.round(kelvin / step) * step });
+  return t('{step} K', { step: Math.round(kelvin / step) * step });
 };
 
 /** Distance from Planck's locus, in thousandths, beyond which a white looks green or pink. Lamps
@@ -83,7 +81,9 @@ const MIN_TINT_DUV = 6;
 export const whiteText = (kelvin, green) =>
   Math.abs(green) < MIN_TINT_DUV
     ? kelvinText(kelvin)
-    : fill(green > 0 ? words.format.kGreen : words.format.kPink, { kelvin: kelvinText(kelvin) });
+    : green > 0
+      ? t('{kelvin} green', { kelvin: kelvinText(kelvin) })
+      : t('{kelvin} pink', { kelvin: kelvinText(kelvin) });
 
 /** Distance from Planck's locus, in thousandths of (u, v), up to which light has a colour
  * temperature. */
@@ -102,7 +102,7 @@ function describeLight(rgb, level) {
   if (!(level > 0)) return '';
   const white = toKelvin(rgb);
   const isWhite = white && Math.abs(white.green) <= MAX_WHITE_DUV;
-  const stops = fill(words.format.st, { signed: signedText(Math.log2(level)) });
+  const stops = t('{signed} st', { signed: signedText(Math.log2(level)) });
   return isWhite ? `${stops} · ${whiteText(white.kelvin, white.green)}` : stops;
 }
 
@@ -115,7 +115,8 @@ export function shortenName(name, maxLength) {
 }
 
 /** @param {number} count of lights @returns {string} */
-export const lightCountText = (count) => fillCount(words.format.lights, count);
+export const lightCountText = (count) =>
+  plural(count, { one: '{count} light', other: '{count} lights' });
 
 /** Return the name of a file without its folder. @param {string} file @param {string} folder */
 export function relativePath(file, folder) {

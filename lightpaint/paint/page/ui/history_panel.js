@@ -5,7 +5,7 @@ import { Button, Checkbox } from './controls.js';
 import { clockText, dateText } from './format.js';
 import { SearchRow } from './searches/search_row.js';
 import { Thumbnail } from './thumbnail.js';
-import { fill, words } from '../language/language.js';
+import { t } from '../language/language.js';
 
 /** @typedef {import("./ui_state.js").Ui} Ui */
 /** @typedef {import("./shortcuts.js").App} App */
@@ -19,7 +19,7 @@ const LISTED_COUNT = 100;
 const MIN_FILTERED_COUNT = 12;
 
 /** The state before all steps. @type {Step} */
-const BEGINNING = { id: 0, label: words.historyPanel.beginning, stamp: null, is_milestone: true };
+const BEGINNING = { id: 0, label: t('Beginning'), stamp: null, is_milestone: true };
 
 /** @param {string} label */
 const capitalized = (label) => label.charAt(0).toUpperCase() + label.slice(1);
@@ -58,30 +58,29 @@ export function HistoryPanel({ ui, app }) {
     element.current?.querySelector('[aria-current]')?.scrollIntoView({ block: 'nearest' });
   }, [done, list === null]);
   if (!ui.history.count && !ui.history.redo.length && !searches.length)
-    return html`<p class="faint panel-note">${words.historyPanel.everyStepIsListedHereWith}</p>`;
-  return html`<ul class="steps" ref=${element} aria-label=${words.historyPanel.stepsTheLastOnTop}>
-      ${rows.map(
-        ({ step, isUndone, isCurrent }) => [
-          ...searches
-            .filter(({ after }) => after === step.id)
-            .map((search) => html`<${SearchRow} key=${`search ${search.id}`} search=${search} />`)
-            .reverse(),
-          html`<${StepRow} key=${step.id} step=${step} ui=${ui}
+    return html`<p class="faint panel-note">${t('Every step is listed here, with its picture. Click one to go back to it.')}</p>`;
+  return html`<ul class="steps" ref=${element} aria-label=${t('Steps, the last on top')}>
+      ${rows.map(({ step, isUndone, isCurrent }) => [
+        ...searches
+          .filter(({ after }) => after === step.id)
+          .map((search) => html`<${SearchRow} key=${`search ${search.id}`} search=${search} />`)
+          .reverse(),
+        html`<${StepRow} key=${step.id} step=${step} ui=${ui}
           app=${app} isUndone=${isUndone} isCurrent=${isCurrent} />`,
         ],
       )}
       ${
         earlier > 0 &&
-        html`<li><${Button} label=${fill(words.historyPanel.earlierSteps, { earlier })} class="is-flat"
+        html`<li><${Button} label=${t('Earlier steps ({earlier})', { earlier })} class="is-flat"
           act=${() => setCount(count + LISTED_COUNT)} /></li>`
       }
     </ul>
     <div class="history-actions">
       ${
         (hasMilestonesOnly || all.length > MIN_FILTERED_COUNT) &&
-        html`<${Checkbox} label=${words.historyPanel.milestonesOnly} checked=${hasMilestonesOnly}
+        html`<${Checkbox} label=${t('Milestones only')} checked=${hasMilestonesOnly}
           change=${setMilestonesOnly}
-          tip=${words.historyPanel.theStepsBeforeAPauseOr} />`
+          tip=${t('The steps before a pause or a new start, and every twentieth')} />`
       }
       <${NewStart} ui=${ui} app=${app} />
     </div>`;
@@ -95,10 +94,10 @@ function NewStart({ ui, app }) {
     engine.cancel();
     void session.send(kind);
   };
-  return html`<${Button} label=${words.historyPanel.clearPainting} disabled=${!hasPaint} act=${() => send('clear_painting')}
-      tip=${words.historyPanel.deleteAllPaintAndLayersLights} />
-    <${Button} label=${words.historyPanel.startOver} disabled=${!ui.history.count} act=${() => send('start_over')}
-      tip=${words.historyPanel.backToTheSceneAsIt} />`;
+  return html`<${Button} label=${t('Clear painting')} disabled=${!hasPaint} act=${() => send('clear_painting')}
+      tip=${t('Delete all paint and layers. Lights keep what you asked of them.')} />
+    <${Button} label=${t('Start over')} disabled=${!ui.history.count} act=${() => send('start_over')}
+      tip=${t('Back to the scene as it was. Looks stay, and undo goes back.')} />`;
 }
 
 /** @param {{step: Step, ui: Ui, app: App, isUndone: boolean, isCurrent: boolean}} props */
@@ -118,7 +117,7 @@ function StepRow({ step, ui, app, isUndone, isCurrent }) {
       data-tip=${stamp === null ? undefined : `${text}, ${dateText(stamp)}`}>
     <${Thumbnail} name=${`step/${id}`} generation=${generation} app=${app} />
     <span class=${`step-label ${isMilestone ? 'is-milestone' : ''}`}>${text}</span>
-    ${isUndone && html`<span class="only-read">${words.historyPanel.undone}</span>`}
+    ${isUndone && html`<span class="only-read">${t(', undone')}</span>`}
     <span class="faint">${stamp === null ? '' : clockText(stamp)}</span>
   </button></li>`;
 }

@@ -2,7 +2,7 @@
 
 import { html, useRef } from '../vendor/preact.js';
 import { updateDisplay } from './tools.js';
-import { fill, words } from '../language/language.js';
+import { t } from '../language/language.js';
 
 /** @typedef {import("./engine_interface.js").Display} Display */
 /** @typedef {import("./engine_interface.js").Pane} Pane */
@@ -95,8 +95,8 @@ export function InsetFrame({ inset, name, corner, store }) {
     if (next) event.preventDefault();
   };
   const { x, y, width, height } = inset;
-  return html`<button type="button" class="inset-frame" aria-label=${fill(words.insetPicture.makeLarge, { name })}
-    data-tip=${words.insetPicture.pressToMakeItLarge}
+  return html`<button type="button" class="inset-frame" aria-label=${t('Make it large: {name}', { name })}
+    data-tip=${t('Press to make it large. Drag it, or press arrow keys, for another corner.')}
     style=${{ left: `${x}px`, top: `${y}px`, width: `${width}px`, height: `${height}px` }}
     onPointerDown=${begin} onPointerMove=${move} onPointerUp=${end} onPointerCancel=${end}
     onKeyDown=${key} onClick=${(/** @type {MouseEvent} */ { detail }) => {

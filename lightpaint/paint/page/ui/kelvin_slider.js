@@ -3,7 +3,7 @@
 import { html } from '../vendor/preact.js';
 import { fromKelvin, toHex } from './paint_colour.js';
 import { Slider } from './controls.js';
-import { words } from '../language/language.js';
+import { t } from '../language/language.js';
 
 /** @typedef {import("./engine_interface.js").RGB} RGB */
 
@@ -12,7 +12,7 @@ const [MIN_KELVIN, MAX_KELVIN] = [1500, 15000];
 
 const MIRED_CURVE = {
   toPosition: (/** @type {number} */ k) => 1e6 / k,
-  toValue: (/** @type {number} */ t) => Math.round(1e6 / t / 50) * 50,
+  toValue: (/** @type {number} */ x) => Math.round(1e6 / x / 50) * 50,
 };
 
 /** Return the CSS gradient of the track. @param {RGB[]} colours */
@@ -30,8 +30,8 @@ export const clampKelvin = (kelvin) => Math.min(MAX_KELVIN, Math.max(MIN_KELVIN,
 
 /** @param {{value: number, change: (kelvin: number, isFinal: boolean) => void, label?: string,
  *   disabled?: boolean}} props */
-export function KelvinSlider({ value, change, label = words.kelvinSlider.cct, disabled }) {
+export function KelvinSlider({ value, change, label = t('CCT'), disabled }) {
   return html`<${Slider} label=${label} value=${clampKelvin(value)} min=${MIN_KELVIN}
-    max=${MAX_KELVIN} step=${100} unit=${words.kelvinSlider.k} curve=${MIRED_CURVE} track=${TRACK} disabled=${disabled}
-    tip=${words.kelvinSlider.correlatedColourTemperature} change=${change} />`;
+    max=${MAX_KELVIN} step=${100} unit=${t('K')} curve=${MIRED_CURVE} track=${TRACK} disabled=${disabled}
+    tip=${t('Correlated colour temperature: warmer to the right')} change=${change} />`;
 }

@@ -1,12 +1,23 @@
 /** Names of keys, as the shortcuts dialog and tips show them. */
 
-import { words } from '../language/language.js';
+import { t } from '../language/language.js';
 
 /** Name of the Ctrl key on this system. */
-export const MOD = /mac/i.test(navigator.platform) ? '⌘' : words.keys.Ctrl;
+export const MOD = /mac/i.test(navigator.platform) ? '⌘' : t('Ctrl');
 
 /** @type {Record<string, string>} */
-const NAMES = { ...words.keys, Ctrl: MOD, Control: MOD, Escape: words.keys.Esc };
+const NAMES = {
+  Ctrl: MOD,
+  Control: MOD,
+  Shift: t('Shift'),
+  Alt: t('Alt'),
+  Esc: t('Esc'),
+  Escape: t('Esc'),
+  Enter: t('Enter'),
+  Space: t('Space'),
+  Tab: t('Tab'),
+  Delete: t('Delete', { context: 'key' }),
+};
 
 /** Return the name of a key. @param {string} key */
 export const keyName = (key) => NAMES[key] ?? key;

@@ -18,7 +18,7 @@ import { useMarkDrag } from './lamps/mark_drag.js';
 import { showsElsewhere } from './look_comparison.js';
 import { toHex } from './paint_colour.js';
 import { atFullBrightness, luminance } from './paint_colour.js';
-import { fill, words } from '../language/language.js';
+import { t } from '../language/language.js';
 
 /** @typedef {import("./engine_interface.js").Pane} Pane */
 /** @typedef {import("./ui_state.js").Ui} Ui */
@@ -162,8 +162,13 @@ function Mark({ ui, app, light, place, pane, camera, positionOf, isTwin }) {
     app.session.moveLamp(light, { position: place.rail ? onRail(place.rail, position) : position });
   };
   const tip = place.immovable_reason
-    ? fill(words.lampMarks.itStaysWhereItIs, { label, immovable_reason: place.immovable_reason })
-    : fill(canDrag ? words.lampMarks.dragToMoveItWithShift : words.lampMarks.isFarAway, { label });
+    ? t('{label} {immovable_reason}: it stays where it is', {
+        label,
+        immovable_reason: place.immovable_reason,
+      })
+    : canDrag
+      ? t('{label}: drag to move it, with Shift up and down', { label })
+      : t('{label} is far away: turn it by its fields, a highlight or a shadow edge', { label });
   const drag = useMarkDrag(app, pane, (x, y, isShift, start) => {
     if (!canDrag || !place.position || !ui.rig) return null;
     const startPosition = /** @type {number[]} */ (start.place.position);
@@ -190,7 +195,7 @@ function Mark({ ui, app, light, place, pane, camera, positionOf, isTwin }) {
     top: `${position.y}px`,
     '--lit': isOn ? toHex(atFullBrightness(rgb)) : 'transparent',
     '--outwards': `${position.angle}rad`,
-  }} aria-label=${isSelected ? fill(words.lampMarks.selected, { label }) : label} aria-pressed=${String(ui.lamp === light)} tabindex=${isTwin ? -1 : 0}
+  }} aria-label=${isSelected ? t('{label}, selected', { label }) : label} aria-pressed=${String(ui.lamp === light)} tabindex=${isTwin ? -1 : 0}
     aria-hidden=${isTwin ? 'true' : undefined} data-tip=${tip} data-lamp=${label}
     onClick=${(/** @type {MouseEvent} */ event) => {
       if (hasControl(event)) return pressLight(app.store, light, event);
@@ -250,8 +255,8 @@ function AimHandle({ ui, app, light, pane, camera, innerBox, toPage, isTwin }) {
   const { label } = ui.lights[light];
   return html`<button type="button" class=${`lamp-aim ${position.isInside ? '' : 'is-outside'}`}
     style=${{ left: `${position.x}px`, top: `${position.y}px` }} tabindex=${isTwin ? -1 : 0}
-    aria-hidden=${isTwin ? 'true' : undefined} aria-label=${fill(words.lampMarks.aimOf, { label })}
-    data-tip=${fill(words.lampMarks.dragWhatPointsAt, { label })}
+    aria-hidden=${isTwin ? 'true' : undefined} aria-label=${t('Aim of {label}', { label })}
+    data-tip=${t('Drag what {label} points at', { label })}
     onPointerDown=${(/** @type {PointerEvent} */ event) =>
       ui.clickAction ? undefined : drag.down(event, light, place)}
     onPointerMove=${drag.move} onPointerUp=${drag.up} onPointerCancel=${drag.up}></button>`;

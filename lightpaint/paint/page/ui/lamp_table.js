@@ -4,7 +4,7 @@ import { html } from '../vendor/preact.js';
 import { signedText, whiteText } from './format.js';
 import { meanOf, wholeLight } from './images/light_images.js';
 import { atFullBrightness, luminance, toHex, toKelvin } from './paint_colour.js';
-import { fill, words } from '../language/language.js';
+import { t } from '../language/language.js';
 
 /** @typedef {import("./engine_interface.js").RGB} RGB */
 /** @typedef {import("./ui_state.js").Ui} Ui */
@@ -20,16 +20,16 @@ export function LampTable({ ui, first, second }) {
   const rows = rowsOf(ui, first, second);
   const presents = new Map(ui.lights.map(({ name, present }) => [name, present]));
   for (const image of ui.images) presents.set(image.name, wholeLight(image, ui.lights).present);
-  return html`<div class="lamp-table" tabindex="0" role="group" aria-label=${words.lampTable.lampsOfTwoLooks}><table>
-    <thead><tr><th scope="col">${words.lampTable.lamp}</th><th scope="col">${first.name}</th>
-      <th scope="col">${second.name}</th><th scope="col">${words.lampTable.difference}</th></tr></thead>
+  return html`<div class="lamp-table" tabindex="0" role="group" aria-label=${t('Lamps of two looks')}><table>
+    <thead><tr><th scope="col">${t('Lamp')}</th><th scope="col">${first.name}</th>
+      <th scope="col">${second.name}</th><th scope="col">${t('Difference')}</th></tr></thead>
     <tbody>${rows.map(
       ({ name, label, emissions, text }) => html`<tr key=${name} class=${text ? '' : 'is-equal'}>
         <th scope="row">${label}</th>
         ${emissions.map(
           (emission) => html`<td>${lampText(emission, presents.get(name) ?? null)}</td>`,
         )}
-        <td>${text || words.lampTable.equal}</td></tr>`,
+        <td>${text || t('equal')}</td></tr>`,
     )}</tbody>
   </table></div>`;
 }
@@ -68,25 +68,25 @@ export function differenceOf([first, second]) {
   if (!first || !second)
     return {
       difference: Infinity,
-      text: first ? words.lampTable.isNotThere : words.lampTable.isNew,
+      text: first ? t('is not there') : t('is new'),
     };
   const [before, after] = [luminance(first), luminance(second)];
   if (!(before > 0) && !(after > 0)) return { difference: 0, text: '' };
   if (!(before > 0) || !(after > 0))
     return {
       difference: Number.MAX_VALUE,
-      text: after > 0 ? words.lampTable.on : words.lampTable.off,
+      text: after > 0 ? t('on') : t('off'),
     };
   const stops = Math.log2(after / before);
   const parts =
-    Math.abs(stops) < MIN_STOPS ? [] : [fill(words.lampTable.st, { signed: signedText(stops) })];
+    Math.abs(stops) < MIN_STOPS ? [] : [t('{signed} st', { signed: signedText(stops) })];
   const whites = [toKelvin(first), toKelvin(second)];
   const chroma = Math.max(...[0, 1, 2].map((c) => Math.abs(first[c] / before - second[c] / after)));
   if (whites[0] && whites[1]) {
     const mired = 1e6 / whites[1].kelvin - 1e6 / whites[0].kelvin;
     if (Math.abs(mired) >= MIN_MIRED)
-      parts.push(fill(words.lampTable.mired, { signed: signedText(mired, 0) }));
-  } else if (chroma > 0.02) parts.push(words.lampTable.otherColour);
+      parts.push(t('{signed} mired', { signed: signedText(mired, 0) }));
+  } else if (chroma > 0.02) parts.push(t('other colour'));
   return { difference: parts.length ? Math.abs(stops) + chroma : 0, text: parts.join(', ') };
 }
 
@@ -94,12 +94,12 @@ export function differenceOf([first, second]) {
 function lampText(emission, present) {
   if (!emission) return '–';
   const level = luminance(emission);
-  if (!(level > 0)) return words.lampTable.off;
+  if (!(level > 0)) return t('off');
   const scene = present ? luminance(present) : 0;
   const white = toKelvin(emission);
   const hex = toHex(atFullBrightness(emission));
   const colour = white ? whiteText(white.kelvin, white.green) : hex;
   const stops =
-    scene > 0 ? fill(words.lampTable.stopsThen, { signed: signedText(Math.log2(level / scene)) }) : '';
+    scene > 0 ? t('{signed} st, ', { signed: signedText(Math.log2(level / scene)) }) : '';
   return html`<i style=${{ background: hex }}></i> ${stops}${colour}`;
 }

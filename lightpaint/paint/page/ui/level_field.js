@@ -4,7 +4,7 @@ import { html } from '../vendor/preact.js';
 import { luminance } from './paint_colour.js';
 import { useDraft } from './controls.js';
 import { cleanNumberText, stopsText } from './format.js';
-import { fill, words } from '../language/language.js';
+import { t } from '../language/language.js';
 
 /** @typedef {import("./engine_interface.js").RGB} RGB */
 /** @typedef {import("./ui_state.js").Light} Light */
@@ -66,10 +66,16 @@ const [MAX_TYPED_STOPS, MAX_UNITLESS_STOPS] = [20, 8];
 function refusalText(text, light) {
   const cleanText = text.trim();
   if (!isOnAtPresent(light))
-    return fill(words.levelField.isNotALevelIsOff, { cleanText, label: light.label });
+    return t('{cleanText} is not a level. {label} is off now: type stops (+1.5 st) or off.', {
+      cleanText,
+      label: light.label,
+    });
   if (Number.isFinite(Number(cleanNumberText(cleanText))))
-    return fill(words.levelField.couldBeStopsOrPercentAdd, { cleanText });
-  return fill(words.levelField.isNotALevelTypeStops, { cleanText });
+    return t('{cleanText} could be stops or percent: add the unit (12 st, 80 %).', { cleanText });
+  return t(
+    '{cleanText} is not a level. Type stops from now (+1.5), percent (80 %), as now, or off.',
+    { cleanText },
+  );
 }
 
 /**
@@ -96,7 +102,7 @@ export function LevelField({ light, rgb, disabled, change, say }) {
     if (stops === null && step < 0) return; // nothing is below off
     const newStops = (stops ?? DIMMER_MIN_STOPS) + step * (event.shiftKey ? 10 : 1);
     take(
-      fill(words.levelField.st, {
+      t('{MAX_TYPED_STOPS} st', {
         MAX_TYPED_STOPS: Math.min(
           MAX_TYPED_STOPS,
           Math.max(-MAX_TYPED_STOPS, Number(newStops.toFixed(1))),
@@ -105,7 +111,7 @@ export function LevelField({ light, rgb, disabled, change, say }) {
     );
   };
   return html`<input class="level" type="text" data-typed=${draft === null ? 'no' : 'yes'} autocomplete="off" spellcheck=${false}
-    aria-label=${fill(words.levelField.level, { label: light.label })} data-tip=${words.levelField.stopsFromNowType15}
+    aria-label=${t('{label}, level', { label: light.label })} data-tip=${t('Stops from now. Type +1.5, 80 % or off.')}
     value=${draft ?? (stops === null ? 'off' : stopsText(stops))} disabled=${disabled}
     onFocus=${(/** @type {any} */ event) => event.currentTarget.select()}
     onInput=${(/** @type {any} */ event) => setDraft(event.currentTarget.value)}

@@ -13,27 +13,27 @@ import {
   presentLevel,
   stopsOf,
 } from './level_field.js';
-import { fill, words } from '../language/language.js';
+import { t } from '../language/language.js';
 
 /** @typedef {import("./ui_state.js").Constraints} Constraints */
 /** @typedef {import("./engine_interface.js").RGB} RGB */
 
 const LEVEL_MODES = [
-  { value: 'free', label: words.lightConstraints.free, tip: words.lightConstraints.theSolveSetsIt },
+  { value: 'free', label: t('Free'), tip: t('The solve sets it') },
   {
     value: 'held',
-    label: words.lightConstraints.locked,
-    tip: words.lightConstraints.lockedAtALevelThatYou,
+    label: t('Locked'),
+    tip: t('Locked at a level that you set'),
   },
   {
     value: 'present',
-    label: words.lightConstraints.asNow,
-    tip: words.lightConstraints.itStaysAsItIsIn,
+    label: t('As now'),
+    tip: t('It stays as it is in the scene'),
   },
   {
     value: 'off',
-    label: words.lightConstraints.off,
-    tip: words.lightConstraints.switchedOffInEveryAnswer,
+    label: t('Off'),
+    tip: t('Switched off in every answer'),
   },
 ];
 
@@ -42,7 +42,7 @@ export function LightConstraints(props) {
   const { k, light, app, constraints = {}, rgb, tie, ui } = props;
   const { session } = app;
   if (light.is_fixed)
-    return html`<p class="asking-light faint">${words.lightConstraints.thisLightIsNotAdjusted}</p>`;
+    return html`<p class="asking-light faint">${t('This light is not adjusted.')}</p>`;
   const mode = constraints.off
     ? 'off'
     : constraints.lock === true
@@ -56,9 +56,9 @@ export function LightConstraints(props) {
     if (newMode === 'present') session.constrainLight(k, { lock: true });
     if (newMode === 'off') session.switchLight(k, true);
   };
-  return html`<div class="asking-light" role="group" aria-label=${fill(words.lightConstraints.constraintsOn, { label: light.label })}>
-    <h3>${words.lightConstraints.constraints}</h3>
-    <${Choice} label=${words.lightConstraints.level} value=${mode} choices=${LEVEL_MODES} change=${change} />
+  return html`<div class="asking-light" role="group" aria-label=${t('Constraints on {label}', { label: light.label })}>
+    <h3>${t('Constraints')}</h3>
+    <${Choice} label=${t('Level')} value=${mode} choices=${LEVEL_MODES} change=${change} />
     ${
       mode === 'held' &&
       html`<${LockedLevel} ...${props} />
@@ -100,15 +100,15 @@ function LockedLevel({ k, light, app, rgb }) {
     },
     value: { value: level, min: 0, step: 0.1, toLevel: (/** @type {number} */ x) => x },
   }[/** @type {'stops' | 'share' | 'value'} */ (unit)];
-  const units = [{ value: 'stops', label: words.lightConstraints.stFromNow }, ...unitsOf(light)];
+  const units = [{ value: 'stops', label: t('st from now') }, ...unitsOf(light)];
   return html`<div class="ask-fields is-pair">
-    <${NumberField} label=${words.lightConstraints.lockedAt} value=${value} min=${min} max=${unit === 'stops' ? 20 : undefined}
+    <${NumberField} label=${t('Locked at')} value=${value} min=${min} max=${unit === 'stops' ? 20 : undefined}
       figures=${unit === 'stops' ? undefined : SIGNIFICANT_DIGITS} step=${step} start=${DIMMER_MIN_STOPS}
       placeholder=${unit === 'stops' ? 'off' : undefined}
       change=${(/** @type {number | null} */ newLevel) => lockAt(newLevel === null ? 0 : toLevel(newLevel))} />
     ${
       isOnAtPresent(light) &&
-      html`<${Select} label=${words.lightConstraints.unit} value=${unit} choices=${units} change=${setUnit} />`
+      html`<${Select} label=${t('Unit')} value=${unit} choices=${units} change=${setUnit} />`
     }
   </div>`;
 }
@@ -119,7 +119,7 @@ const SIGNIFICANT_DIGITS = 6;
 /** Return the units that a light's level can be given in.
  * @param {import("./ui_state.js").Light} light */
 const unitsOf = (light) => [
-  { value: 'share', label: words.lightConstraints.ofNow },
+  { value: 'share', label: t('% of now') },
   { value: 'value', label: light.unit || 'value' },
 ];
 
@@ -132,7 +132,7 @@ export function LevelAndColour(props) {
   return html`<${LevelLimits} ...${props} />
     ${
       isTied && colourKind(constraints) === 'any'
-        ? html`<p class="faint">${words.lightConstraints.tiedLightsKeepTheirCurrent}</p>`
+        ? html`<p class="faint">${t('Tied lights keep their current colours.')}</p>`
         : !light.is_scalar && html`<${ColourConstraint} ...${props} />`
     }`;
 }
@@ -158,7 +158,12 @@ function LevelLimits({ light, app, constraints, isImage = false, set: constrain 
       const limitText = (/** @type {number} */ x) =>
         unit === 'share' ? `${x} %` : numberText(x, SIGNIFICANT_DIGITS);
       const [low, high] = [min, max].map(limitText);
-      app.session.toast(fill(words.lightConstraints.theMinimumIsAboveTheMaximum, { low, high }));
+      app.session.toast(
+        t('The minimum ({low}) is above the maximum ({high}). The limits have not changed.', {
+          low,
+          high,
+        }),
+      );
       return;
     }
     const { limits: _, ...otherConstraints } = constraints;
@@ -181,13 +186,13 @@ function LevelLimits({ light, app, constraints, isImage = false, set: constrain 
   const isUnitSet = isImage && levels.length > 0;
   const units = unitsOf(light).filter(({ value }) => !isUnitSet || value === unit);
   return html`<div class="ask-fields is-levels">
-    <${NumberField} label=${words.lightConstraints.min} value=${limitValue(limits.min)} min=${0} placeholder="–" step=${5}
+    <${NumberField} label=${t('Min')} value=${limitValue(limits.min)} min=${0} placeholder="–" step=${5}
       change=${(/** @type {number | null} */ value) => set('min', value)} figures=${SIGNIFICANT_DIGITS} />
-    <${NumberField} label=${words.lightConstraints.max} value=${limitValue(limits.max)} min=${0} placeholder="–" step=${5}
+    <${NumberField} label=${t('Max')} value=${limitValue(limits.max)} min=${0} placeholder="–" step=${5}
       change=${(/** @type {number | null} */ value) => set('max', value)} figures=${SIGNIFICANT_DIGITS} />
     ${
       canShare &&
-      html`<${Select} label=${words.lightConstraints.unit} value=${unit} choices=${units} change=${convert} />`
+      html`<${Select} label=${t('Unit')} value=${unit} choices=${units} change=${convert} />`
     }
   </div>`;
 }
@@ -212,20 +217,20 @@ function TieFields({ light, app, tie, allLights = [] }) {
   const label = (/** @type {string} */ name) =>
     allLights.find((other) => other.name === name)?.label ?? name;
   const choices = [
-    { value: '', label: words.lightConstraints.noLight },
+    { value: '', label: t('no light') },
     ...candidates.map((other) => ({ value: other.name, label: other.label })),
   ];
   return html`<div class="ask-row">
     ${
       tie &&
-      html`<span>${fill(words.lightConstraints.tiedTo, {
+      html`<span>${t('Tied to {value}', {
         value: tie
           .filter((name) => name !== light.name)
           .map(label)
           .join(', '),
-      })}</span><${Button} label=${words.lightConstraints.untie} act=${() => app.session.untie(light.name)} />`
+      })}</span><${Button} label=${t('Untie')} act=${() => app.session.untie(light.name)} />`
     }
-    <${Select} label=${tie ? words.lightConstraints.alsoTieTo : words.lightConstraints.tieTo} value="" choices=${choices}
+    <${Select} label=${tie ? t('Also tie to') : t('Tie to')} value="" choices=${choices}
       change=${(/** @type {string} */ name) => name && app.session.tie(light.name, name)} />
   </div>`;
 }

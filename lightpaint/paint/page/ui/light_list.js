@@ -22,17 +22,17 @@ import { Icon } from './icons.js';
 import { comparedAnswer, isAnswerHidden } from './look_actions.js';
 import { ImageRow } from './images/image_row.js';
 import { LightRow } from './light_row.js';
-import { fill, words } from '../language/language.js';
+import { t } from '../language/language.js';
 
 /** @typedef {import("./ui_state.js").Ui} Ui */
 /** @typedef {import("./ui_state.js").UiStore} UiStore */
 /** @typedef {import("./shortcuts.js").App} App */
 
 const SORTS = [
-  { value: 'scene', label: words.lightList.scene },
-  { value: 'name', label: words.lightList.name },
-  { value: 'share', label: words.lightList.share },
-  { value: 'change', label: words.lightList.change },
+  { value: 'scene', label: t('Scene') },
+  { value: 'name', label: t('Name') },
+  { value: 'share', label: t('Share') },
+  { value: 'change', label: t('Change') },
 ];
 
 /** @param {{ui: Ui, app: App}} props */
@@ -50,12 +50,12 @@ export function LightList({ ui, app }) {
     ${
       ui.lights.length > 1 &&
       html`<div class="lights-tools">
-      <label class="field search"><span class="only-read">${words.lightList.searchLights}</span>
-        <${Icon} name="search" /><input type="search" value=${ui.search} placeholder=${words.lightList.search}
-          data-tip=${words.lightList.wordsOrPatternsSuchAsSpot} onKeyDown=${selectFound}
+      <label class="field search"><span class="only-read">${t('Search lights')}</span>
+        <${Icon} name="search" /><input type="search" value=${ui.search} placeholder=${t('Search')}
+          data-tip=${t('Words, or patterns such as spot_*; Enter selects what is found')} onKeyDown=${selectFound}
           onInput=${(/** @type {any} */ event) =>
             store.set({ search: event.currentTarget.value })} /></label>
-      <${Select} label=${words.lightList.sortBy} hidden value=${ui.sort} choices=${SORTS} tip=${words.lightList.sortBy}
+      <${Select} label=${t('Sort by')} hidden value=${ui.sort} choices=${SORTS} tip=${t('Sort by')}
         change=${(/** @type {any} */ sort) => store.set({ sort })} />
       <${Button} icon="select" pressed=${areSelected} tip=${selectionTip(ui, indices, areSelected)}
         act=${() => toggleLights(store, indices)} />
@@ -63,7 +63,7 @@ export function LightList({ ui, app }) {
     </div>`
     }
     <${SelectionPanel} ui=${ui} app=${app} />
-    ${ui.ready && !indices.length && html`<p class="faint">${words.lightList.noLightHasThisName}</p>`}
+    ${ui.ready && !indices.length && html`<p class="faint">${t('No light has this name.')}</p>`}
     ${groups.map(({ name, members, image }) =>
       image
         ? html`<${ImageRow} key=${`image ${image.name}`} image=${image} ui=${ui} app=${app} />`
@@ -77,9 +77,11 @@ export function LightList({ ui, app }) {
 
 /** @param {Ui} ui @param {number[]} indices that the list shows @param {boolean} areSelected */
 function selectionTip({ search }, indices, areSelected) {
-  if (!search.trim()) return areSelected ? words.lightList.deselectAll : words.lightList.selectAll;
-  const text = areSelected ? words.lightList.deselectFound : words.lightList.selectFound;
-  return fill(text, { count: indices.length });
+  if (!search.trim()) return areSelected ? t('Deselect all') : t('Select all');
+  const count = indices.length;
+  return areSelected
+    ? t('Deselect the {count} found', { count })
+    : t('Select the {count} found', { count });
 }
 
 /** @param {{ui: Ui, app: App}} props */
@@ -90,7 +92,7 @@ function LassoButton({ ui, app }) {
     app.store.set({ isLassoing: !isLassoing, clickAction: null });
   };
   return html`<${Button} icon="lasso" pressed=${isLassoing} act=${toggle}
-    tip=${words.lightList.lassoSelectLightsByDrawingAround} />`;
+    tip=${t('Lasso: select lights by drawing around their marks; with Shift also those')} />`;
 }
 
 /** A note beside the title, where it moves no row: that lights are hidden, which of two looks they
@@ -98,17 +100,17 @@ function LassoButton({ ui, app }) {
 export function LightListActions({ ui, app }) {
   const hasHidden = ui.solo.length > 0 || ui.mute.length > 0;
   if (ui.mix && !hasHidden) {
-    const look = comparedAnswer(ui)?.name ?? words.lightList.theAnswerNotShown;
-    return html`<${TruncatedText} class="whose" text=${fill(words.lightList.of, { look })} maxLength=${20} />`;
+    const look = comparedAnswer(ui)?.name ?? t('the answer (not shown)');
+    return html`<${TruncatedText} class="whose" text=${t('of {look}', { look })} maxLength=${20} />`;
   }
   const lockedCount = lockedLights(ui).length;
   if (!hasHidden && lockedCount < 2) return null;
   if (!hasHidden) {
-    return html`<${Button} label=${words.lightList.unlockAll} class="of-all" act=${() => app.session.unlockAll()}
-      tip=${fill(words.lightList.lightsAreLockedOrOffLet, { lockedCount })} />`;
+    return html`<${Button} label=${t('Unlock all')} class="of-all" act=${() => app.session.unlockAll()}
+      tip=${t('{lockedCount} lights are locked or off. Let the solve set them again.', { lockedCount })} />`;
   }
-  return html`<${Button} label=${words.lightList.showAll} class="of-all"
-    tip=${words.lightList.soloOrMuteHidesSomeLights}
+  return html`<${Button} label=${t('Show all')} class="of-all"
+    tip=${t('Solo or mute hides some lights. The answer has them all.')}
     act=${() => app.store.set({ solo: [], mute: [] })} />`;
 }
 
@@ -138,13 +140,13 @@ function Group({ name, ui, app, members, isMany }) {
         onClick=${() => store.set({ open: { ...ui.open, [groupKey(name)]: !open } })}>
         <${Icon} name="fold" /><strong>${name}</strong>
         <span class="faint">${lightCountText(members.length)} · ${percentText(share)}</span></button>
-      <${Button} icon="select" class="letter" pressed=${areSelected} tip=${fill(words.lightList.selectGroup, { name })}
+      <${Button} icon="select" class="letter" pressed=${areSelected} tip=${t('Select {name}', { name })}
         act=${() => toggleLights(store, members)} />
-      <${Button} label=${words.lightList.s} class="letter" pressed=${isSolo} tip=${fill(words.lightList.showAlone, { name })}
+      <${Button} label=${t('S')} class="letter" pressed=${isSolo} tip=${t('Show {name} alone', { name })}
         act=${() => store.set({ solo: isSolo ? solo : [...solo, ...members] })} />
     </div>
     <div class="group-dimmer">
-      <${GroupDimmer} app=${app} lights=${members} label=${fill(words.lightList.dim, { name })} isPlain />
+      <${GroupDimmer} app=${app} lights=${members} label=${t('{name}, dim', { name })} isPlain />
       <span class="stops">${levelsText(ui, members)}</span>
     </div>
     ${open && members.map((k) => renderRow(ui, app, k, isMany))}

@@ -17,7 +17,7 @@ import {
   stopsOf,
 } from './level_field.js';
 import { Thumbnail } from './thumbnail.js';
-import { fill, words } from '../language/language.js';
+import { t } from '../language/language.js';
 
 /** Share of the picture's light from which a lamp's tint is named: nobody sees that of a dimmer one.
  * A share that is shown as 3 % is less. */
@@ -74,8 +74,8 @@ export class LightRow extends Component {
         <${Share} share=${this.props.answer?.share ?? 0} pointerShare=${pointerShare} />
         <${Badge} ...${this.props} />
         <button type="button" class="pick" role="checkbox" aria-checked=${String(isSelected)}
-          aria-label=${fill(words.lightRow.select, { label: light.label })} onClick=${select}
-          data-tip=${words.lightRow.selectForOneActionOnSeveral}>${
+          aria-label=${t('Select {label}', { label: light.label })} onClick=${select}
+          data-tip=${t('Select, for one action on several lights; with Shift all from the last one')}>${
             isSelected && html`<${Icon} name="check" />`
           }</button>
       </div>
@@ -107,20 +107,20 @@ export class LightRow extends Component {
     const isLocked = constraints.lock !== undefined || Boolean(constraints.off);
     const lock = () =>
       isLocked ? session.unlockLight(k) : session.lockLight(k, this.props.rgb, true);
-    return html`<span class="marks" role="group" aria-label=${words.lightRow.display}>
-      <${Button} label=${words.lightRow.s} class="letter" pressed=${isSolo} act=${() => toggleDisplay('solo', isSolo)}
-        tip=${fill(words.lightRow.soloShowAloneTheAnswerDoes, { label: light.label })} />
-      <${Button} label=${words.lightRow.m} class="letter" pressed=${isMute} act=${() => toggleDisplay('mute', isMute)}
-        tip=${fill(words.lightRow.muteShowThePictureWithoutThe, { label: light.label })} />
+    return html`<span class="marks" role="group" aria-label=${t('Display', { context: 'verb' })}>
+      <${Button} label=${t('S')} class="letter" pressed=${isSolo} act=${() => toggleDisplay('solo', isSolo)}
+        tip=${t('Solo: show {label} alone. The answer does not change.', { label: light.label })} />
+      <${Button} label=${t('M')} class="letter" pressed=${isMute} act=${() => toggleDisplay('mute', isMute)}
+        tip=${t('Mute: show the picture without {label}. The answer does not change.', { label: light.label })} />
     </span>
     ${
       !light.is_fixed &&
       html`<span class="marks is-solve" role="group"
-      aria-label=${words.lightRow.solve}>
+      aria-label=${t('Solve')}>
       <${Button} icon="lock" pressed=${isLocked} act=${lock} tip=${
         isLocked
-          ? fill(words.lightRow.unlockTheSolveSetsItAgain, { label: light.label })
-          : fill(words.lightRow.lockAsItIsInThe, { label: light.label })
+          ? t('Unlock {label}: the solve sets it again', { label: light.label })
+          : t('Lock {label} as it is in the answer', { label: light.label })
       } />
     </span>`
     }`;
@@ -141,7 +141,7 @@ export class LightRow extends Component {
       <span class=${`dot ${level > 0 ? '' : 'is-off'}`} aria-hidden="true"
         style=${{ background: level > 0 ? toHex(atFullBrightness(rgb)) : 'none' }}></span>
       <span class="values" data-tip=${level > 0 ? fullText : undefined}
-        >${level > 0 ? value : words.lightRow.off}</span>
+        >${level > 0 ? value : t('off')}</span>
       ${
         this.props.isKept
           ? html`<${KeptButton} ...${this.props} />`
@@ -160,9 +160,9 @@ export class LightRow extends Component {
       app.session.lockLight(k, scaleToStops(this.dragStartColour, light, newStops), isFinal);
       if (isFinal) this.dragStartColour = null;
     };
-    const text = luminance(rgb) > 0 ? stopsText(stops) : words.lightRow.off;
+    const text = luminance(rgb) > 0 ? stopsText(stops) : t('off');
     return html`<div class=${`dimmer ${constraints?.lock !== undefined ? 'is-held' : ''}`}>
-      <${Slider} plain label=${fill(words.lightRow.stopsFromNow, { label: light.label })} value=${clampStops(stops)}
+      <${Slider} plain label=${t('{label}, stops from now', { label: light.label })} value=${clampStops(stops)}
         min=${DIMMER_MIN_STOPS} max=${DIMMER_MAX_STOPS} step=${0.05} resetValue=${0} text=${text}
         disabled=${Boolean(constraints?.off)} change=${move} />
       <${LevelField} light=${light} rgb=${rgb} disabled=${Boolean(constraints?.off)}
@@ -195,7 +195,7 @@ export function Share({ share, pointerShare }) {
   const isAtPointer = pointerShare !== undefined;
   const value = isAtPointer ? pointerShare : share;
   return html`<span class=${`share ${isAtPointer ? 'is-here' : ''}`}
-    data-tip=${isAtPointer ? words.lightRow.shareOfTheLightHere : words.lightRow.shareOfThePicturesLight}>
+    data-tip=${isAtPointer ? t('Share of the light here') : t("Share of the picture's light")}>
     <i style=${{ '--share': String(value) }}></i><span>${percentText(value)}</span></span>`;
 }
 
@@ -214,18 +214,19 @@ function Badge(props) {
     constraints.lock === undefined &&
     !constraints.off;
   const sentences = remarks.map(([, text]) => `${text}.`);
-  if (isHeldBack) sentences.push(words.lightRow.thisKeepsItFromWhatThe);
+  if (isHeldBack) sentences.push(t('This keeps it from what the painting asks for.'));
   const moreText = remarks.length > 1 ? ` +${remarks.length - 1}` : '';
   return html`<span class=${`badge ${isHeldBack ? 'is-back' : ''}`} data-tip=${sentences.join(' ')}
-    >${isHeldBack ? words.lightRow.heldBack : `${remarks[0][0]}${moreText}`}</span>`;
+    >${isHeldBack ? t('held back') : `${remarks[0][0]}${moreText}`}</span>`;
 }
 
 /** The reason why a light that was moved stays as it is; a press lets the solve set it again.
  * @param {Props} props */
 function KeptButton({ k, light, app }) {
-  return html`<button type="button" class="kept" aria-label=${fill(words.lightRow.release, { label: light.label })}
-    data-tip=${words.lightRow.keptSinceItWasMoved} onClick=${() => app.session.unlockLight(k)}
-    >${words.lightRow.kept}</button>`;
+  return html`<button type="button" class="kept" aria-label=${t('Release {label}: the solve sets it again', { label: light.label })}
+    data-tip=${t('You moved it, so it keeps its level, and the others are solved around it. A press releases it: the solve sets it again')}
+    onClick=${() => app.session.unlockLight(k)}
+    >${t('kept')}</button>`;
 }
 
 /** @param {import("./ui_state.js").UiStore} store @param {number} k */
@@ -247,23 +248,19 @@ const colourConstraint = ({ color, kelvin, primaries }) => color ?? kelvin ?? pr
 function listRemarks({ light, answer, constraints = {}, tie, isKept }) {
   /** @type {[unknown, string, string][]} */
   const remarks = [
-    [light.is_fixed, words.lightRow.fixed, words.lightRow.itStaysAsItIsIn],
-    [constraints.off, words.lightRow.off, words.lightRow.youSwitchedItOff],
-    [
-      constraints.lock !== undefined && !isKept,
-      words.lightRow.locked,
-      words.lightRow.youLockedItAtThisLevel,
-    ],
-    [constraints.limits, words.lightRow.limits, words.lightRow.youLimitedItsLevel],
-    [colourConstraint(constraints), words.lightRow.colour, words.lightRow.youLimitedItsColour],
+    [light.is_fixed, t('fixed'), t('It stays as it is in the scene')],
+    [constraints.off, t('off'), t('You switched it off')],
+    [constraints.lock !== undefined && !isKept, t('locked'), t('You locked it at this level')],
+    [constraints.limits, t('limits'), t('You limited its level')],
+    [colourConstraint(constraints), t('colour'), t('You limited its colour')],
     [
       tie,
-      words.lightRow.tied,
-      fill(words.lightRow.itIsTiedTo, {
+      t('tied'),
+      t('It is tied to {value}', {
         value: tie?.filter((name) => name !== light.name).join(', '),
       }),
     ],
-    [answer?.is_unreached, words.lightRow.unseen, words.lightRow.noneOfItsLightReachesThe],
+    [answer?.is_unreached, t('unseen'), t('None of its light reaches the picture')],
   ];
   return remarks.filter(([applies]) => applies).map(([, ...texts]) => texts);
 }

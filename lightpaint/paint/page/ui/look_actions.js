@@ -2,7 +2,7 @@
 
 import { outputWeights } from './lamps/lamp_state.js';
 import { isElsewhere, weightsIn } from './look_comparison.js';
-import { fill, words } from '../language/language.js';
+import { t } from '../language/language.js';
 
 /** @typedef {import("./engine_interface.js").RGB} RGB */
 /** @typedef {import("./ui_state.js").Ui} Ui */
@@ -95,8 +95,8 @@ const idOf = ({ id }) => id;
 /** @param {Look[]} looks */
 function unusedName(looks) {
   let count = looks.length + 1;
-  while (looks.some(({ name }) => name === fill(words.lookActions.look, { count }))) count += 1;
-  return fill(words.lookActions.look, { count });
+  while (looks.some(({ name }) => name === t('Look {count}', { count }))) count += 1;
+  return t('Look {count}', { count });
 }
 
 /** @param {RGB[]} weights @param {RGB[]} otherWeights */

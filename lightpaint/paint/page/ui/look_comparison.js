@@ -5,7 +5,7 @@
 
 import { nameInView } from '../engine/message_frames.js';
 import { COMPARED_COUNT } from '../engine/picture_slots.js';
-import { fill, words } from '../language/language.js';
+import { t } from '../language/language.js';
 
 /** @typedef {import("./engine_interface.js").Display} Display */
 /** @typedef {import("./engine_interface.js").RGB} RGB */
@@ -120,7 +120,10 @@ export function whyNotSaved(ui, mix) {
   const looks = comparedLooks(ui, mix);
   if (!looks || looks[0].places === looks[1].places) return null;
   const [first, second] = looks.map(({ name }) => name);
-  return fill(words.lookComparison.andHangLightsInDifferentPlaces, { first, second });
+  return t('{first} and {second} hang lights in different places: no lighting lies between them', {
+    first,
+    second,
+  });
 }
 
 /** Return the lights that a look has and now are not there, or that it lacks, in words.
@@ -130,9 +133,9 @@ export function placesText(ui, look) {
   const extra = look.lights.filter((name) => !names.includes(name));
   const missing = names.filter((name) => !look.lights.includes(name));
   const parts = [
-    ...(isElsewhere(ui, look) ? [words.lookComparison.itsLightsInTheirOwnPlaces] : []),
-    ...(extra.length ? [fill(words.lookComparison.with, { value: extra.join(', ') })] : []),
-    ...(missing.length ? [fill(words.lookComparison.without, { value: missing.join(', ') })] : []),
+    ...(isElsewhere(ui, look) ? [t('its lights in their own places')] : []),
+    ...(extra.length ? [t('with {value}', { value: extra.join(', ') })] : []),
+    ...(missing.length ? [t('without {value}', { value: missing.join(', ') })] : []),
   ];
   return parts.length ? `${look.name}: ${parts.join(', ')}` : look.name;
 }

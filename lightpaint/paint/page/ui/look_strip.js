@@ -20,7 +20,7 @@ import {
 import { showWall } from './look_wall.js';
 import { Thumbnail } from './thumbnail.js';
 import { updateDisplay } from './tools.js';
-import { fill, words } from '../language/language.js';
+import { t } from '../language/language.js';
 
 /** @typedef {import("./ui_state.js").Ui} Ui */
 /** @typedef {import("./ui_state.js").Look} Look */
@@ -42,7 +42,7 @@ export function LookStrip({ ui, app }) {
     setMarks(marked.includes(id) ? marked.filter((other) => other !== id) : [...marked, id]);
   const current = currentLook(ui);
   const kind = !looks.length ? 'is-empty' : ui.mix ? 'is-comparing' : '';
-  return html`<section class=${`looks ${kind}`} aria-label=${words.lookStrip.looks}><div class="looks-row">
+  return html`<section class=${`looks ${kind}`} aria-label=${t('Looks')}><div class="looks-row">
     ${
       looks.length > 0 &&
       html`<ul ref=${list}>${looks.map(
@@ -54,17 +54,17 @@ export function LookStrip({ ui, app }) {
     ${
       !looks.length &&
       ui.ready &&
-      html`<p class="faint">${words.lookStrip.noLooksYet} <kbd>${keyText(ui, 'saveLook')}</kbd> ${words.lookStrip.savesPaintingAndAnswerAsA}</p>`
+      html`<p class="faint">${t('No looks yet:')} <kbd>${keyText(ui, 'saveLook')}</kbd> ${t('saves painting and answer as a look.')}</p>`
     }
     ${
       marked.length > 1 &&
       !ui.mix &&
-      html`<${Button} icon="side" label=${words.looksDialog.sideBySide} primary
-        tip=${words.looksDialog.sideBySideTip} act=${() => showWall(app, marked)} />`
+      html`<${Button} icon="side" label=${t('Side by side')} primary
+        tip=${t('The marked looks at full size, two to four')} act=${() => showWall(app, marked)} />`
     }
     ${
       looks.length > 1 &&
-      html`<${Button} icon="sheet" class="all-looks" tip=${words.lookStrip.allLooksPicturesAndLamps}
+      html`<${Button} icon="sheet" class="all-looks" tip=${t('All looks: pictures and lamps')}
         act=${() => app.store.set({ dialog: 'looks' })} />`
     }
     ${looks.length > 1 && html`<${LookCrossfade} ui=${ui} app=${app} />`}
@@ -82,11 +82,11 @@ function LookItem({ look, isCurrent, isMarked, canMark, mark, ui, app }) {
   const viewPicture = nameInView(look.thumbnail, ui.view);
   const picture = viewPicture in ui.resources ? viewPicture : look.thumbnail;
   const tip = isCurrent
-    ? words.lookStrip.paintingAndAnswerEqualThisLook
-    : words.lookStrip.loadThisLookUndoGoesBack;
+    ? t('Painting and answer equal this look')
+    : t('Load this look. Undo goes back.');
   return html`<li class=${`look ${isCurrent ? 'is-current' : ''}`}
     onPointerLeave=${() => setConfirming(false)}>
-    <button type="button" class="look-picture" aria-label=${fill(words.lookStrip.load, { name: look.name })}
+    <button type="button" class="look-picture" aria-label=${t('Load {name}', { name: look.name })}
       aria-current=${isCurrent ? 'true' : undefined} data-tip=${tip}
       onClick=${() => loadLook(app, look.id)}>
       <${Thumbnail} name=${picture} generation=${ui.resources[picture] ?? 0} app=${app} />
@@ -94,18 +94,18 @@ function LookItem({ look, isCurrent, isMarked, canMark, mark, ui, app }) {
     ${
       isNaming
         ? html`<${LookNameField} look=${look} app=${app} done=${() => setNaming(false)} />`
-        : html`<button type="button" class="look-name" data-tip=${fill(words.lookStrip.rename, { name: look.name })}
+        : html`<button type="button" class="look-name" data-tip=${t('Rename {name}', { name: look.name })}
           onClick=${() => setNaming(true)}>${look.name}</button>`
     }
     <span class="look-tools">
       ${
         (canMark || isMarked) &&
-        html`<${Button} icon="side" tip=${fill(words.looksDialog.mark, { name: look.name })} pressed=${isMarked} act=${mark} />`
+        html`<${Button} icon="side" tip=${t('Compare {name}', { name: look.name })} pressed=${isMarked} act=${mark} />`
       }
-      <${Button} icon="copy" tip=${fill(words.lookStrip.duplicate, { name: look.name })}
+      <${Button} icon="copy" tip=${t('Duplicate {name}', { name: look.name })}
         act=${() => session.send('copy_look', { look: look.id })} />
       <${Button} icon=${isConfirming ? 'check' : 'trash'} class=${isConfirming ? 'is-sure' : ''}
-        tip=${isConfirming ? fill(words.lookStrip.deletePressAgainToConfirm, { name: look.name }) : fill(words.lookStrip.delete, { name: look.name })} act=${drop} />
+        tip=${isConfirming ? t('Delete {name}: press again to confirm', { name: look.name }) : t('Delete {name}', { name: look.name })} act=${drop} />
     </span>
   </li>`;
 }
@@ -123,7 +123,7 @@ function LookNameField({ look, app, done }) {
     if (event.key === 'Enter') commit();
     if (event.key === 'Escape') done();
   };
-  return html`<input class="naming" ref=${ref} type="text" aria-label=${fill(words.lookStrip.nameOf, { name: look.name })}
+  return html`<input class="naming" ref=${ref} type="text" aria-label=${t('Name of {name}', { name: look.name })}
     defaultValue=${look.name} value=${look.name} maxlength="60" onBlur=${commit} onKeyDown=${press} />`;
 }
 
@@ -173,28 +173,28 @@ function LookCrossfade({ ui, app }) {
       part: comparison.share,
       name: mixName(ui.looks, comparison),
     });
-  return html`<div class="mix" role="group" aria-label=${words.lookStrip.compareTwoLooks}>
+  return html`<div class="mix" role="group" aria-label=${t('Compare two looks')}>
     ${
       ui.mix &&
       !ui.mix.more &&
-      html`<${Select} label=${words.lookStrip.firstLook} hidden value=${String(comparison.a)} choices=${choices}
-        tip=${fill(words.lookStrip.from, { a: describe(comparison.a) })}
+      html`<${Select} label=${t('First look')} hidden value=${String(comparison.a)} choices=${choices}
+        tip=${t('From {a}', { a: describe(comparison.a) })}
         change=${(/** @type {string} */ id) => set({ a: Number(id) })} />
-      <${Slider} label=${words.lookStrip.crossfade} value=${100 * comparison.share} min=${0} max=${100} unit="%"
-        tip=${fill(words.lookStrip.crossfadeFromTo, { a: nameOf(comparison.a), b: nameOf(comparison.b) })}
+      <${Slider} label=${t('Crossfade')} value=${100 * comparison.share} min=${0} max=${100} unit="%"
+        tip=${t('Crossfade from {a} to {b}', { a: nameOf(comparison.a), b: nameOf(comparison.b) })}
         change=${(/** @type {number} */ share) => set({ share: share / 100 })} />
-      <${Select} label=${words.lookStrip.secondLook} hidden value=${String(comparison.b)} choices=${choices}
-        tip=${fill(words.lookStrip.to, { b: describe(comparison.b) })}
+      <${Select} label=${t('Second look')} hidden value=${String(comparison.b)} choices=${choices}
+        tip=${t('To {b}', { b: describe(comparison.b) })}
         change=${(/** @type {string} */ id) => set({ b: Number(id) })} />
       ${
         refusal
-          ? html`<span class="faint keep" tabindex="0" data-tip=${refusal}>${words.lookStrip.placesDiffer}</span>`
-          : html`<${Button} icon="plus" label=${words.lookStrip.saveAsLook} class="keep" act=${keep}
-        tip=${fill(words.lookStrip.save, { looks: mixName(ui.looks, comparison) })} />`
+          ? html`<span class="faint keep" tabindex="0" data-tip=${refusal}>${t('Places differ')}</span>`
+          : html`<${Button} icon="plus" label=${t('Save as look')} class="keep" act=${keep}
+        tip=${t('Save {looks}', { looks: mixName(ui.looks, comparison) })} />`
       }`
     }
-    <${Button} icon="side" label=${ui.mix ? words.lookStrip.backToThePainting : words.lookStrip.compareLooks} class="compare"
-      tip=${ui.mix ? words.lookStrip.showPaintingAndAnswerAgain : words.lookStrip.twoLooksSideBySideAnd}
+    <${Button} icon="side" label=${ui.mix ? t('Back to the painting') : t('Compare looks')} class="compare"
+      tip=${ui.mix ? t('Show painting and answer again') : t('Two looks side by side, and a crossfade between them')}
       pressed=${Boolean(ui.mix)} act=${() => (ui.mix ? store.set(resetMix) : set({}))} />
   </div>`;
 }

@@ -1,6 +1,6 @@
 /** Two to four looks at full size, side by side, with one zoom and one exposure; a click takes one. */
 
-import { fill, words } from '../language/language.js';
+import { t } from '../language/language.js';
 import { html, useLayoutEffect, useRef, useState } from '../vendor/preact.js';
 import { currentLook, loadLook } from './look_actions.js';
 import { comparedLooks, isPending, resetMix } from './look_comparison.js';
@@ -93,14 +93,15 @@ function Wall({ ui, app, looks }) {
     event.stopPropagation();
   };
   const current = currentLook(ui);
-  return html`<div class="look-wall" ref=${frame} role="group" aria-label=${words.lookWall.label}
+  return html`<div class="look-wall" ref=${frame} role="group"
+    aria-label=${t('Looks side by side. Arrow keys go from one to another, Enter takes it, Escape goes back.')}
     style=${{ '--columns': String(columns) }} onKeyDown=${press}>
     ${looks.map(
       (look) => html`<button type="button" key=${look.id} class="look-pane"
-      aria-label=${fill(words.lookWall.take, { name: look.name })}
+      aria-label=${t('Take {name}', { name: look.name })}
       aria-current=${look.id === current ? 'true' : undefined} onClick=${() => take(look.id)}>
       <canvas aria-hidden="true"></canvas><span class="tag" aria-hidden="true">${
-        isPending(ui, look) ? fill(words.lookWall.moving, { name: look.name }) : look.name
+        isPending(ui, look) ? t('{name}: moving its lights …', { name: look.name }) : look.name
       }</span></button>`,
     )}</div>`;
 }

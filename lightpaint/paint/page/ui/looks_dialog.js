@@ -8,22 +8,22 @@ import { LampTable } from './lamp_table.js';
 import { currentLook, loadLook } from './look_actions.js';
 import { showWall } from './look_wall.js';
 import { sheetStyle, Thumbnail } from './thumbnail.js';
-import { fill, words } from '../language/language.js';
+import { t } from '../language/language.js';
 
 /** @typedef {import("./ui_state.js").Ui} Ui */
 /** @typedef {import("./ui_state.js").Look} Look */
 /** @typedef {import("./shortcuts.js").App} App */
 
 const PARTS = [
-  { value: 'pictures', label: words.looksDialog.pictures },
-  { value: 'lamps', label: words.looksDialog.lamps },
+  { value: 'pictures', label: t('Pictures') },
+  { value: 'lamps', label: t('Lamps') },
 ];
 
 /** @param {{ui: Ui, app: App, close: () => void}} props */
 export function LooksDialog({ ui, app, close }) {
   const [part, setPart] = useState('pictures');
-  return html`<${Dialog} title=${words.looksDialog.looks} close=${close} class="looks-dialog">
-    <${Choice} label=${words.looksDialog.whatToShowOfTheLooks} value=${part} choices=${PARTS} change=${setPart} />
+  return html`<${Dialog} title=${t('Looks')} close=${close} class="looks-dialog">
+    <${Choice} label=${t('What to show of the looks')} value=${part} choices=${PARTS} change=${setPart} />
     ${
       part === 'pictures'
         ? html`<${ContactSheet} ui=${ui} app=${app} close=${close} />`
@@ -51,18 +51,18 @@ function ContactSheet({ ui, app, close }) {
       ${ui.looks.map((look) => {
         const picture = pictureOf(look);
         return html`<li key=${look.id}><button type="button" onClick=${() => load(look.id)}
-          aria-current=${look.id === current ? 'true' : undefined} aria-label=${fill(words.looksDialog.load, { name: look.name })}>
+          aria-current=${look.id === current ? 'true' : undefined} aria-label=${t('Load {name}', { name: look.name })}>
           <${Thumbnail} name=${picture} generation=${ui.resources[picture] ?? 0} app=${app} />
           <span>${look.name}</span></button>
-          <${Checkbox} label=${fill(words.looksDialog.mark, { name: look.name })} hidden
+          <${Checkbox} label=${t('Compare {name}', { name: look.name })} hidden
             checked=${marked.includes(look.id)} change=${(/** @type {boolean} */ on) => mark(look.id, on)}
             disabled=${marked.length >= COMPARED_COUNT && !marked.includes(look.id)} /></li>`;
       })}
     </ul>
-    <div class="row"><${Button} icon="side" label=${words.looksDialog.sideBySide} primary
-        tip=${words.looksDialog.sideBySideTip} disabled=${marked.length < 2} act=${() => showWall(app, marked)} />
+    <div class="row"><${Button} icon="side" label=${t('Side by side')} primary
+        tip=${t('The marked looks at full size, two to four')} disabled=${marked.length < 2} act=${() => showWall(app, marked)} />
       <span class="spring"></span>
-      <${Button} icon="export" label=${words.looksDialog.saveAsAPicture}
+      <${Button} icon="export" label=${t('Save as a picture')}
         act=${() => sheet.current && saveSheet(sheet.current, ui.looks)} /></div>`;
 }
 
@@ -109,10 +109,10 @@ function LampComparison({ ui }) {
   const choose = (/** @type {number} */ which) => (/** @type {string} */ id) =>
     setIds(ids.map((other, k) => (k === which ? Number(id) : other)));
   if (!first || !second)
-    return html`<p class="faint">${words.looksDialog.saveTwoLooksToCompareTheir}</p>`;
+    return html`<p class="faint">${t('Save two looks to compare their lamps.')}</p>`;
   return html`<div class="row compared">
-      <${Select} label=${words.looksDialog.lampsOf} value=${String(first.id)} choices=${choices} change=${choose(0)} />
-      <${Select} label=${words.looksDialog.against} value=${String(second.id)} choices=${choices} change=${choose(1)} />
+      <${Select} label=${t('Lamps of')} value=${String(first.id)} choices=${choices} change=${choose(0)} />
+      <${Select} label=${t('against')} value=${String(second.id)} choices=${choices} change=${choose(1)} />
     </div>
     <${LampTable} ui=${ui} first=${first} second=${second} />`;
 }

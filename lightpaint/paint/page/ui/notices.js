@@ -7,30 +7,40 @@ import { progressText } from './format.js';
 import { Icon } from './icons.js';
 import { keysText } from './key_names.js';
 import { ProgressBar } from './progress_bar.js';
-import { fill, fillCount, words } from '../language/language.js';
+import { plural, t } from '../language/language.js';
 
 /** @typedef {import("./ui_state.js").Ui} Ui */
 /** @typedef {import("./shortcuts.js").App} App */
 
 /** @param {{ui: Ui, app: App}} props */
 export function Toasts({ ui, app }) {
-  return html`<div class="toasts" role="log" aria-live="polite" aria-label=${words.notices.messages}>
+  return html`<div class="toasts" role="log" aria-live="polite" aria-label=${t('Messages')}>
     ${ui.toasts.map(
       ({ id, text, tone }) => html`<div class=${`toast is-${tone}`} key=${id}>
       ${tone === 'warn' && html`<${Icon} name="warn" />`}<span>${text}</span>
-      <${Button} icon="close" tip=${words.notices.dismiss} act=${() => app.session.dismiss(id)} /></div>`,
+      <${Button} icon="close" tip=${t('Dismiss')} act=${() => app.session.dismiss(id)} /></div>`,
     )}
   </div>`;
 }
 
-const SILENT_TEXT = words.notices.theKernelHasNotAnsweredFor;
+const SILENT_TEXT = t(
+  'The kernel has not answered for 10 s. If it is busy, your strokes arrive when it is free. If it was restarted, run the cell again.',
+);
 
-const LOST_TEXT = words.notices.theConnectionIsLostReconnecting;
+const LOST_TEXT = t(
+  'The connection is lost; reconnecting … Finished strokes are kept. What you paint now is sent if the same painter comes back.',
+);
 
 /** @param {number} lostStrokes */
 function staleText(lostStrokes) {
-  const loss = lostStrokes ? ` ${fillCount(words.notices.lostStrokes, lostStrokes)}` : '';
-  return words.notices.thisPageBelongsToAPainter + loss;
+  const text = t(
+    'This page belongs to a painter that has ended. Open the address that the terminal shows now.',
+  );
+  const loss = plural(lostStrokes, {
+    one: '{count} stroke painted here could not be sent, and is lost.',
+    other: '{count} strokes painted here could not be sent, and are lost.',
+  });
+  return lostStrokes ? `${text} ${loss}` : text;
 }
 
 /** A banner over the pictures; centred if there are none. @param {{ui: Ui, app: App}} props */
@@ -52,11 +62,11 @@ export function Banner({ ui, app }) {
 function ReconnectButton({ ui, app }) {
   const reason = ui.closure?.reason;
   if (reason === 'taken') {
-    return html`<${Button} label=${words.notices.takeOver} primary tip=${words.notices.continueHereInsteadOfInThe}
+    return html`<${Button} label=${t('Take over')} primary tip=${t('Continue here instead of in the other tab')}
       act=${() => app.session.send('take_over')} />`;
   }
   if (reason !== 'version') return null;
-  return html`<${Button} label=${words.notices.reloadThePage} primary act=${() => location.reload()} />`;
+  return html`<${Button} label=${t('Reload the page')} primary act=${() => location.reload()} />`;
 }
 
 /**
@@ -71,11 +81,15 @@ export function RunningTasks({ ui, app }) {
     const label = [name, progressLabel].filter(Boolean).join(': ');
     return html`<div class="working" key=${name}><${ProgressBar} progress=${progress} label=${name} />
       <span>${ui.probe ? progressLabel || name : text ? `${label}. ${text}` : label}</span>
-      ${end && html`<${Button} label=${words.searches.keepBest} tip=${words.searches.keepBestTip} act=${end} />`}
+      ${
+        end &&
+        html`<${Button} label=${t('Stop with the best so far')} act=${end}
+          tip=${t('End the search: the best that was found by now is checked and becomes a step')} />`
+      }
       ${
         stop &&
         html`<${Button} icon=${stopText ? undefined : 'close'} label=${stopText}
-        tip=${stopTip ?? fill(words.notices.stop, { value: name.toLowerCase() })} act=${stop} />`
+        tip=${stopTip ?? t('Stop: {value}', { value: name.toLowerCase() })} act=${stop} />`
       }</div>`;
   })}`;
 }
@@ -94,45 +108,45 @@ function runningTasks(ui, { session }) {
   const tasks = [];
   if ((ui.isExporting || exportProgress) && ui.dialog !== 'export')
     tasks.push({
-      name: words.notices.exportingFiles,
+      name: t('Exporting files'),
       progress: exportProgress ?? unknownProgress,
       stop: () => void session.exportFiles([]),
     });
   const render = runningRender(ui);
   if (render && ui.dialog !== 'render')
     tasks.push({
-      name: words.finalRender.rendering,
+      name: t('Final render'),
       progress: ui.renderProgress ?? unknownProgress,
       stop: () => void session.send('stop_render', { render: render.id }),
     });
   if (verificationProgress && !isOpen)
     tasks.push({
-      name: words.notices.verifying,
+      name: t('Verifying'),
       progress: verificationProgress,
       stop: () => void session.verify(false),
     });
   if (ui.placementProgress)
     tasks.push({
-      name: words.notices.searchingForPlaces,
+      name: t('Searching for places'),
       progress: ui.placementProgress,
-      text: ui.isPlacementEnding ? words.searches.judging : undefined,
+      text: ui.isPlacementEnding ? t('Checking the best so far') : undefined,
       end: ui.isPlacementEnding ? undefined : () => void session.endPlacing(),
-      stopText: words.notices.stopMoveNothing,
-      stopTip: words.notices.stopTheSearchEveryLightStays,
+      stopText: t('Stop, move nothing'),
+      stopTip: t('Stop the search: every light stays where it is'),
       stop: () => void session.placeLights(false),
     });
   if (ui.isExplaining && !isOpen)
-    tasks.push({ name: words.notices.findingReasons, progress: unknownProgress });
+    tasks.push({ name: t('Finding reasons'), progress: unknownProgress });
   if (basis)
     tasks.push({
-      name: words.notices.renderingTheLights,
+      name: t('Rendering the lights'),
       progress: basis,
-      text: words.notices.youCanPaintAlready,
+      text: t('You can paint already.'),
     });
   else if (loadProgress && loadProgress.done < loadProgress.total)
-    tasks.push({ name: words.notices.loadingTheImagesOfTheLights, progress: loadProgress });
+    tasks.push({ name: t('Loading the images of the lights'), progress: loadProgress });
   else if (ui.samplingProgress)
-    tasks.push({ name: words.notices.addingSamplesWhereYouPainted, progress: ui.samplingProgress });
+    tasks.push({ name: t('Adding samples where you painted'), progress: ui.samplingProgress });
   return tasks;
 }
 

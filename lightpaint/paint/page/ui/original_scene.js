@@ -3,7 +3,7 @@
 
 import { html } from '../vendor/preact.js';
 import { HeldButton } from './held_button.js';
-import { words } from '../language/language.js';
+import { t } from '../language/language.js';
 
 /** @typedef {import("./ui_state.js").Ui} Ui */
 /** @typedef {import("./engine_interface.js").Display} Display */
@@ -32,6 +32,6 @@ export function withOriginal(display) {
 /** @param {{ui: Ui, app: App}} props */
 export function OriginalButton({ ui, app }) {
   return html`<${HeldButton} ui=${ui} app=${app} command="original" icon="original"
-    tip=${words.originalScene.hold} isHeld=${ui.isOriginalHeld} disabled=${!ui.ready || Boolean(ui.mix?.more)}
+    tip=${t('Hold: the original scene, in place of the answer')} isHeld=${ui.isOriginalHeld} disabled=${!ui.ready || Boolean(ui.mix?.more)}
     show=${showOriginal} hide=${hideOriginal} />`;
 }

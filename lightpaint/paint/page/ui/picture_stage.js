@@ -6,7 +6,7 @@ import { nameInView } from '../engine/message_frames.js';
 import { html, useEffect, useLayoutEffect, useMemo, useRef, useState } from '../vendor/preact.js';
 import { toHex } from './paint_colour.js';
 import { reportProbe, refreshProbe, drawRings } from './brush_cursor.js';
-import { percentText } from './format.js';
+import { lightCountText, percentText } from './format.js';
 import { useStageInput } from './stage_input.js';
 import { comparedLooks, isPending, mixName } from './look_comparison.js';
 import { gainOf, paintOf, effectiveDisplay } from './display_state.js';
@@ -26,7 +26,7 @@ import { LampLasso } from './lamps/lamp_lasso.js';
 import { Legend } from './analysis_panel.js';
 import { ProgressBar } from './progress_bar.js';
 import { Button } from './controls.js';
-import { fill, fillCount, words } from '../language/language.js';
+import { plural, t } from '../language/language.js';
 
 /** @typedef {import("./engine_interface.js").Engine} Engine */
 /** @typedef {import("./engine_interface.js").Pane} Pane */
@@ -36,11 +36,11 @@ import { fill, fillCount, words } from '../language/language.js';
 
 /** @type {Record<string, string>} */
 const NAMES = {
-  painting: words.pictureStage.painting,
-  solution: words.pictureStage.answer,
-  other: words.pictureStage.otherLook,
-  verified: words.pictureStage.render,
-  present: words.pictureStage.now,
+  painting: t('Painting'),
+  solution: t('Answer'),
+  other: t('Other look'),
+  verified: t('Render'),
+  present: t('Now'),
 };
 
 /** @param {Ui} ui @param {string} kind @returns {string} */
@@ -49,8 +49,15 @@ function nameOf(ui, kind) {
     const stops = Math.round(Math.log2(gainOf(ui, ui.hoveredLight)));
     const name = ui.lights[ui.hoveredLight].label;
     return stops > 0
-      ? fillCount(words.pictureStage.aloneAndBrighter, stops, { name })
-      : fill(words.pictureStage.alone, { name });
+      ? plural(
+          stops,
+          {
+            one: '{name} alone, {count} stop brighter',
+            other: '{name} alone, {count} stops brighter',
+          },
+          { name },
+        )
+      : t('{name} alone', { name });
   }
   if (kind === 'other' && ui.mix) {
     const look = comparedLooks(ui, ui.mix)?.[1];
@@ -60,29 +67,28 @@ function nameOf(ui, kind) {
     const look = comparedLooks(ui, ui.mix)?.[0];
     return look ? lookText(ui, look) : NAMES.solution;
   }
-  if (kind === 'solution' && ui.previousWeights) return words.pictureStage.answerBeforeTheLastStep;
-  if (kind === 'present' && ui.isOriginalHeld) return words.originalScene.name;
+  if (kind === 'solution' && ui.previousWeights) return t('Answer before the last step');
+  if (kind === 'present' && ui.isOriginalHeld) return t('Original scene');
   const gap = kind === 'solution' || kind === 'painting' ? missingText(ui, kind) : null;
   if (gap) return `${NAMES[kind]}: ${gap}`;
   if (isPartial(ui, kind)) return `${NAMES.solution}: ${visibleNames(ui)}`;
   if (kind === 'solution' && !ui.mix && ui.master !== 1)
-    return fill(words.pictureStage.answerMaster, { percent: percentText(ui.master) });
-  if (kind === 'verified' && ui.verification?.isOld)
-    return words.pictureStage.renderOfAnEarlierAnswer;
+    return t('Answer, master {percent}', { percent: percentText(ui.master) });
+  if (kind === 'verified' && ui.verification?.isOld) return t('Render of an earlier answer');
   return NAMES[kind] ?? kind;
 }
 
 /** Return the name of a look, and whether its lights are still shown where they hang now.
  * @param {Ui} ui @param {import("./ui_state.js").Look} look */
 const lookText = (ui, look) =>
-  isPending(ui, look) ? fill(words.pictureStage.movingItsLights, { name: look.name }) : look.name;
+  isPending(ui, look) ? t('{name}: moving its lights …', { name: look.name }) : look.name;
 
 /** Return what a picture does not show yet; null if it is complete. @param {Ui} ui
  * @param {'solution' | 'painting'} kind */
 function missingText({ loadingLook, loadProgress }, kind) {
-  if (loadingLook !== null) return fill(words.pictureStage.loading, { loadingLook });
+  if (loadingLook !== null) return t('loading {loadingLook} …', { loadingLook });
   const isIncomplete = loadProgress?.isFirst && loadProgress.done < loadProgress.total;
-  return kind === 'solution' && isIncomplete ? words.pictureStage.someLightsAreStillLoading : null;
+  return kind === 'solution' && isIncomplete ? t('some lights are still loading …') : null;
 }
 
 /** Return whether a picture shows only some of the lights. @param {Ui} ui @param {string} kind */
@@ -94,11 +100,9 @@ function isPartial(ui, kind) {
 function visibleNames({ solo, mute, lights }) {
   const indices = solo.length ? solo : mute;
   const labels =
-    indices.length > 2
-      ? fill(words.pictureStage.lights, { count: indices.length })
-      : indices.map((k) => lights[k]?.label);
-  const names = [labels].flat().join(words.pictureStage.and);
-  return fill(solo.length ? words.pictureStage.only : words.pictureStage.without, { names });
+    indices.length > 2 ? lightCountText(indices.length) : indices.map((k) => lights[k]?.label);
+  const names = [labels].flat().join(t(' and '));
+  return solo.length ? t('only {names}', { names }) : t('without {names}', { names });
 }
 
 /** @param {{ui: Ui, app: App}} props */
@@ -195,7 +199,7 @@ export function Stage({ ui, app }) {
   const fit = panes.length ? panes[0].scale / ui.display.zoom : null;
   useLayoutEffect(() => store.set({ fit }), [fit?.toPrecision(6)]);
   return html`<div class=${`stage is-${ui.tool} ${ui.dragAdjustment ? 'is-asking' : ''} ${ui.clickAction ? 'is-pointing' : ''} ${ui.drag ? 'is-dragging' : ''} ${inset ? 'has-inset' : ''}`} ref=${frame} style=${aroundInset(inset)} tabindex="0" role="application" inert=${Boolean(ui.mix?.more)}
-    aria-label=${words.pictureStage.picturesArrowKeysMoveTheBrush} aria-describedby="lp-status">
+    aria-label=${t('Pictures. Arrow keys move the brush, Enter paints, Shift Enter a line.')} aria-describedby="lp-status">
     ${ui.ready && html`<${ObjectOutline} ui=${ui} engine=${engine} panes=${panes} />`}
     ${ui.ready && html`<${SelectionOutline} ui=${ui} engine=${engine} panes=${panes} />`}
     ${ui.ready && html`<${LayerMask} ui=${ui} engine=${engine} panes=${panes} />`}
@@ -225,8 +229,7 @@ function WaitingScreen({ ui }) {
   // Nothing will come; the banner says why.
   if (closure || connection === 'stale') return null;
   const text =
-    ui.waitReason ||
-    (basis ? words.pictureStage.renderingTheFirstPicture : words.pictureStage.openingTheScene);
+    ui.waitReason || (basis ? t('Rendering the first picture …') : t('Opening the scene …'));
   return html`<div class="waiting" role="status"><span>${text}</span>
     ${!ui.waitReason && html`<${ProgressBar} progress=${basis ?? { done: 0, total: 0 }} label=${text} />`}
   </div>`;
@@ -253,7 +256,7 @@ function Tag({ ui, app, pane, panes }) {
     ${
       hasHidden &&
       html`<span onPointerDown=${(/** @type {Event} */ event) => event.stopPropagation()}>
-        <${Button} icon="close" tip=${words.pictureStage.showAllLights} act=${showAll} /></span>`
+        <${Button} icon="close" tip=${t('Show all lights')} act=${showAll} /></span>`
     }</span>`;
 }
 
@@ -294,7 +297,7 @@ function Wipe({ ui, app }) {
     event.stopPropagation();
     setWipe(ui.display.wipe + sign * 0.02);
   };
-  return html`<div class="wipe" ref=${ref} role="slider" tabindex="0" aria-label=${words.pictureStage.wipe}
+  return html`<div class="wipe" ref=${ref} role="slider" tabindex="0" aria-label=${t('Wipe')}
     aria-valuemin="0" aria-valuemax="100" aria-valuenow=${Math.round(100 * ui.display.wipe)}
     style=${{ left: `${100 * ui.display.wipe}%` }} onPointerDown=${grab} onPointerMove=${drag}
     onKeyDown=${press}><i></i></div>`;

@@ -2,7 +2,7 @@
 
 import { html } from '../vendor/preact.js';
 import { useId } from './controls.js';
-import { fill, words } from '../language/language.js';
+import { t } from '../language/language.js';
 
 /** @typedef {import("../engine/messages.js").Rig} Rig */
 /** @typedef {(point: number[]) => [number, number]} ToPlan */
@@ -42,7 +42,7 @@ export function PlanObjects({ rig, toPlan, room }) {
   }));
   const labels = labelsOf(outlines);
   return html`<clipPath id=${id}><polygon points=${room} /></clipPath>
-  <g class="plan-objects" clip-path=${`url(#${id})`} role="img" aria-label=${fill(words.roomPlan.objects, { names })}>
+  <g class="plan-objects" clip-path=${`url(#${id})`} role="img" aria-label=${t('Objects: {names}', { names })}>
     ${outlines.map(
       ({ name, outline }, k) =>
         html`<polygon key=${k} points=${outline.join(' ')} data-tip=${name} />`,

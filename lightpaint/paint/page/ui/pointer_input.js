@@ -6,7 +6,7 @@
 
 import { SelectDrag } from './selection/select_drag.js';
 import { updateDisplay, rememberPaint, pickPaint } from './tools.js';
-import { words } from '../language/language.js';
+import { t } from '../language/language.js';
 
 /** @typedef {import("./engine_interface.js").Engine} Engine */
 /** @typedef {import("./engine_interface.js").Point} Point */
@@ -159,7 +159,11 @@ export class Pointer {
     const { left, right } = display;
     const isShown = left === 'painting' || right === 'painting';
     if (!isShown)
-      this.say(mix ? words.pointerInput.hiddenByLooks : words.pointerInput.hiddenByOthers);
+      this.say(
+        mix
+          ? t('The painting is not shown: press Back to the painting to paint.')
+          : t('The painting is not shown: compare Painting | Answer to paint.'),
+      );
     return isShown;
   }
 
@@ -173,7 +177,10 @@ export class Pointer {
     if (tool === 'pick')
       return pickPaint(this.store, this.engine.paintAt(pane.kind, point.x, point.y));
     if (tool === 'select') return this.selecting.press({ ...point, kind: pane.kind }, isLine);
-    if (tool === 'adjust') return this.say(words.pointerInput.adjustNeedsADragToType);
+    if (tool === 'adjust')
+      return this.say(
+        t('Adjust needs a drag. To type values instead, press By numbers above the pictures.'),
+      );
     if (!this.canPaint()) return;
     if (tool === 'neutral') return this.neutralize(point);
     rememberPaint(this.store);
@@ -190,7 +197,8 @@ export class Pointer {
   /** Make a place neutral, or say why not. @param {Point} point */
   neutralize(point) {
     this.store.set({ hint: false });
-    if (!this.engine.neutralize(point)) this.say(words.pointerInput.nothingNeutral);
+    if (!this.engine.neutralize(point))
+      this.say(t('Nothing is neutral here: it is black, or has light of one colour alone.'));
   }
 
   /** Draw a gradient by key: Enter sets its start, then its end. @param {Point} point */
@@ -198,7 +206,7 @@ export class Pointer {
     const { gradientStart } = this;
     this.gradientStart = gradientStart ? null : point;
     if (gradientStart) this.engine.line(gradientStart, point);
-    else this.say(words.pointerInput.itBeginsHereMoveToWhere);
+    else this.say(t('It begins here. Move to where it ends, and press Enter again.'));
   }
 
   /** Handle a second finger: cancel what the first began, or end it if it is a stroke already.

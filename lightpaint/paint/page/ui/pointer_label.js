@@ -5,7 +5,7 @@ import { toHex } from './paint_colour.js';
 import { paintText } from './format.js';
 import { exposureOf } from './display_state.js';
 import { paneAt } from './pointer_input.js';
-import { fill, words } from '../language/language.js';
+import { t } from '../language/language.js';
 
 /** @typedef {import("./engine_interface.js").Engine} Engine */
 /** @typedef {import("./ui_state.js").Ui} Ui */
@@ -22,7 +22,7 @@ export function PointerLabel({ ui, engine, rings }) {
   if (tool !== 'pick' || !probe) return null;
   const exposedPaint = probe.paint.map((x) => Math.max(0, x) * 2 ** exposureOf(ui.state));
   return html`<div class="near picking" ref=${ref} aria-hidden="true">
-    <i style=${{ background: toHex(exposedPaint) }}></i>${paintText(exposedPaint) || words.pointerLabel.noLight}</div>`;
+    <i style=${{ background: toHex(exposedPaint) }}></i>${paintText(exposedPaint) || t('no light')}</div>`;
 }
 
 /** Above the brush, where no hand covers it, or beside it without room above; always within the
@@ -52,13 +52,13 @@ const clamp = (x, min, max) => Math.max(min, Math.min(max, x));
 function adjustmentText({ stops, mired }) {
   const brightness =
     Math.abs(stops) >= 0.05 &&
-    fill(stops > 0 ? words.pointerLabel.brighter : words.pointerLabel.darker, {
-      stops: Math.abs(stops).toFixed(1),
-    });
+    (stops > 0
+      ? t('{stops} stops brighter', { stops: stops.toFixed(1) })
+      : t('{stops} stops darker', { stops: (-stops).toFixed(1) }));
   const warmth =
     Math.abs(mired) >= 3 &&
-    fill(mired > 0 ? words.pointerLabel.warmer : words.pointerLabel.cooler, {
-      mired: Math.abs(Math.round(mired)),
-    });
-  return [brightness, warmth].filter(Boolean).join(', ') || words.pointerLabel.noChange;
+    (mired > 0
+      ? t('{mired} mired warmer', { mired: Math.round(mired) })
+      : t('{mired} mired cooler', { mired: Math.abs(Math.round(mired)) }));
+  return [brightness, warmth].filter(Boolean).join(', ') || t('no change');
 }

@@ -3,7 +3,7 @@
 import { html, useState } from '../vendor/preact.js';
 import { Button, Dialog, Select } from './controls.js';
 import { sheetStyle, Thumbnail } from './thumbnail.js';
-import { words } from '../language/language.js';
+import { t } from '../language/language.js';
 
 /** @typedef {import("./ui_state.js").Ui} Ui */
 /** @typedef {import("./shortcuts.js").App} App */
@@ -16,7 +16,7 @@ export function PresetsDialog({ ui, app, close }) {
   const [subject, setSubject] = useState(CENTRAL);
   const objects = [...new Set(/** @type {string[]} */ (ui.state?.objects ?? []))];
   const choices = [
-    { value: CENTRAL, label: words.presetsDialog.theMostCentralObject },
+    { value: CENTRAL, label: t('The most central object') },
     ...objects.map((name) => ({ value: name, label: name })),
   ];
   const apply = async (/** @type {string} */ preset, /** @type {boolean} */ hasSubject) => {
@@ -33,12 +33,12 @@ export function PresetsDialog({ ui, app, close }) {
     const group = store.value.layers.find(({ id, kind }) => kind === 'group' && !before.has(id));
     if (group) store.set({ openLayer: group.id });
   };
-  return html`<${Dialog} title=${words.presetsDialog.presets} close=${close} class="looks-dialog">
-    <p>${words.presetsDialog.aPresetAsksForLightAnd}</p>
+  return html`<${Dialog} title=${t('Presets')} close=${close} class="looks-dialog">
+    <p>${t('A preset asks for light, and the lamps come as close as they can. It becomes a group of layers, whose strength you can change later.')}</p>
     ${
       objects.length > 0 &&
-      html`<div class="row"><${Select} label=${words.presetsDialog.subject} value=${subject} choices=${choices}
-        tip=${words.presetsDialog.forPresetsAboutOneObject} change=${setSubject} /></div>`
+      html`<div class="row"><${Select} label=${t('Subject')} value=${subject} choices=${choices}
+        tip=${t('For presets about one object')} change=${setSubject} /></div>`
     }
     <ul class="sheet" style=${sheetStyle(ui)}>${(ui.state?.presets ?? []).map(
       (/** @type {import("../engine/messages.js").PresetInfo} */ preset) => html`
@@ -53,6 +53,6 @@ export function PresetsDialog({ ui, app, close }) {
 
 /** @param {{app: App}} props */
 export function PresetsButton({ app }) {
-  return html`<${Button} label=${words.presetsDialog.presets} class="in-head" tip=${words.presetsDialog.moonlightNoirGalleryAndOthers}
+  return html`<${Button} label=${t('Presets')} class="in-head" tip=${t('Moonlight, noir, gallery and others')}
     act=${() => app.store.set({ dialog: 'presets' })} />`;
 }

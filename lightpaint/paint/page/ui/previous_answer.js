@@ -2,7 +2,7 @@
 
 import { html } from '../vendor/preact.js';
 import { HeldButton } from './held_button.js';
-import { words } from '../language/language.js';
+import { t } from '../language/language.js';
 
 /** @typedef {import("./ui_state.js").Ui} Ui */
 /** @typedef {import("./engine_interface.js").RGB} RGB */
@@ -30,6 +30,6 @@ export function hidePrevious({ store }) {
 /** @param {{ui: Ui, app: App}} props */
 export function PreviousButton({ ui, app }) {
   return html`<${HeldButton} ui=${ui} app=${app} command="previous" icon="previous"
-    tip=${words.previousAnswer.holdTheAnswerBeforeTheLast} isHeld=${ui.isPreviousHeld}
+    tip=${t('Hold: the answer before the last step')} isHeld=${ui.isPreviousHeld}
     disabled=${!ui.history.undo.length} show=${showPrevious} hide=${hidePrevious} />`;
 }

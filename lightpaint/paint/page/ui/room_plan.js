@@ -9,7 +9,7 @@ import { placeOf, shiftedTo } from './lamp_marks.js';
 import { PlanObjects } from './plan_objects.js';
 import { DRAG_MIN_PIXELS } from './lamps/mark_drag.js';
 import { atFullBrightness, luminance, toHex } from './paint_colour.js';
-import { words } from '../language/language.js';
+import { t } from '../language/language.js';
 
 /** @typedef {import("./ui_state.js").Ui} Ui */
 /** @typedef {import("./shortcuts.js").App} App */
@@ -97,8 +97,8 @@ function CameraMark({ ui, toPlan }) {
     [x - 6, y - 9],
     [x + 6, y - 9],
   ];
-  return html`<polygon class="camera" points=${corners.join(' ')} data-tip=${words.roomPlan.camera}>
-    <title>${words.roomPlan.camera}</title></polygon>`;
+  return html`<polygon class="camera" points=${corners.join(' ')} data-tip=${t('Camera')}>
+    <title>${t('Camera')}</title></polygon>`;
 }
 
 /** @param {{ui: Ui, app: App}} props */
@@ -106,7 +106,7 @@ export function RoomPlan({ ui, app }) {
   const frame = useRef(/** @type {SVGElement | null} */ (null));
   const drag = useRef(/** @type {PlanDrag | null} */ (null));
   const plan = planOf(ui);
-  if (!plan || !ui.rig) return html`<p class="faint">${words.roomPlan.loadingTheScene}</p>`;
+  if (!plan || !ui.rig) return html`<p class="faint">${t('Loading the scene …')}</p>`;
   const { rig } = ui;
   const [a, b] = [0, 1, 2].filter((axis) => axis !== rig.up);
   const corner = (/** @type {number} */ x, /** @type {number} */ z) => {
@@ -166,12 +166,12 @@ export function RoomPlan({ ui, app }) {
       height,
     );
     if ([a, b].some((axis) => place[axis] < low[axis] || place[axis] > high[axis]))
-      return app.session.toast(words.roomPlan.clickInsideTheRoom, 'warn');
+      return app.session.toast(t('That is outside the room: click inside its outline'), 'warn');
     void app.session.addLight({ type: ui.clickAction.type, position: place, view: ui.view });
   };
   return html`<div class="room-plan">
     <svg ref=${frame} viewBox=${`0 0 ${WIDTH} ${HEIGHT}`} role="group"
-      aria-label=${words.roomPlan.planOfTheRoomFromAbove} class=${isHanging ? 'is-pointing' : ''}
+      aria-label=${t('Plan of the room from above')} class=${isHanging ? 'is-pointing' : ''}
       onPointerDown=${hang} onPointerMove=${dragLight}
       onPointerUp=${endDrag} onPointerCancel=${endDrag}>
       <polygon class="room" points=${outline} />

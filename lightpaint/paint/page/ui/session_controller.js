@@ -7,7 +7,7 @@ import { ManyLights } from './lamps/many_lights.js';
 import { SessionLink } from './session_link.js';
 import { movablePlaces } from './state_updates.js';
 import { lockedLights, lockingLight } from './tied_lights.js';
-import { fill, words } from '../language/language.js';
+import { t } from '../language/language.js';
 
 /** @typedef {import("./engine_interface.js").Requests} Requests */
 /** @typedef {import("./engine_interface.js").RGB} RGB */
@@ -106,10 +106,7 @@ export class SessionController extends SessionLink {
   /** Unlock all lights in one step, and restore their earlier constraints. */
   unlockAll() {
     const lights = lockedLights(this.store.value);
-    return this.unlockLights(
-      lights,
-      fill(words.sessionController.unlockLights, { count: lights.length }),
-    );
+    return this.unlockLights(lights, t('unlock {count} lights', { count: lights.length }));
   }
 
   /** @param {number[]} lockedIndices of lights that are locked or off @param {string} label */

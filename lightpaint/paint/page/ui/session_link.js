@@ -17,7 +17,7 @@ import { relativePath } from './format.js';
 import { choicesUpdate } from './answer_choices.js';
 import { referencesUpdate } from './references/reference_state.js';
 import { updateDisplay } from './tools.js';
-import { fill, words } from '../language/language.js';
+import { t } from '../language/language.js';
 
 /** @typedef {import("./engine_interface.js").Host} Host */
 /** @typedef {import("./engine_interface.js").Message} Message */
@@ -281,7 +281,7 @@ export class SessionLink {
 /** Return a sentence on the exported files. @param {string[]} names @param {boolean} isStopped */
 function exportText(names, isStopped) {
   const sentence = names.length
-    ? fill(words.sessionLink.exported, { value: names.join(', ') })
-    : words.sessionLink.nothingWasExported;
-  return isStopped ? fill(words.sessionLink.stopped, { sentence }) : sentence;
+    ? t('Exported {value}.', { value: names.join(', ') })
+    : t('Nothing was exported.');
+  return isStopped ? t('Stopped. {sentence}', { sentence }) : sentence;
 }

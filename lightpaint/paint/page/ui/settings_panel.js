@@ -6,96 +6,100 @@
 import { html, useLayoutEffect, useRef, useState } from '../vendor/preact.js';
 import { Button, Choice, NumberField, Select, useId } from './controls.js';
 import { numberText } from './format.js';
-import { fill, words, language, languageChoices, storeLanguage } from '../language/language.js';
+import { language, languageChoices, storeLanguage, t } from '../language/language.js';
 import { startTour } from './tour.js';
 
 /** @typedef {import("./ui_state.js").Ui} Ui */
 /** @typedef {import("./shortcuts.js").App} App */
 
-const AUTOMATIC_TIP = words.settingsPanel.theBestChoiceForAPainting;
+const AUTOMATIC_TIP = t('The best choice for a painting made here');
 
 const SPACES = [
-  { value: null, label: words.settingsPanel.automatic, tip: AUTOMATIC_TIP },
+  { value: null, label: t('Automatic'), tip: AUTOMATIC_TIP },
   {
     value: 'display',
-    label: words.settingsPanel.display,
-    tip: words.settingsPanel.differencesAsTheEyeSeesThem,
+    label: t('Display'),
+    tip: t('Differences as the eye sees them on a display'),
   },
   {
     value: 'linear',
-    label: words.settingsPanel.linear,
-    tip: words.settingsPanel.differencesInLinearLightBright,
+    label: t('Linear'),
+    tip: t('Differences in linear light: bright areas count most'),
   },
 ];
 const COLOURS = [
-  { value: null, label: words.settingsPanel.automatic, tip: AUTOMATIC_TIP },
-  { value: 'free', label: words.settingsPanel.free, tip: words.settingsPanel.anyColour },
+  { value: null, label: t('Automatic'), tip: AUTOMATIC_TIP },
+  { value: 'free', label: t('Free'), tip: t('Any colour') },
   {
     value: 'gentle',
-    label: words.settingsPanel.gentle,
-    tip: words.settingsPanel.theirOwnUnlessThePaintAsks,
+    label: t('Gentle'),
+    tip: t('Their own, unless the paint asks for another'),
   },
   {
     value: 'white',
-    label: words.settingsPanel.white,
-    tip: words.settingsPanel.whitesFrom2200To9000K,
+    label: t('White'),
+    tip: t('Whites from 2200 to 9000 K'),
   },
-  { value: 'own', label: words.settingsPanel.own, tip: words.settingsPanel.onlyTheirOwn },
+  {
+    value: 'own',
+    label: t('Own'),
+    tip: t('Only the colours they have: lamps only get brighter or dimmer'),
+  },
 ];
 const HOLDS = [
-  { value: 'auto', label: words.settingsPanel.automatic, tip: AUTOMATIC_TIP },
+  { value: 'auto', label: t('Automatic'), tip: AUTOMATIC_TIP },
   {
     value: 'hold',
-    label: words.settingsPanel.hold,
-    tip: words.settingsPanel.theyStayNearTheirCurrentLook,
+    label: t('Hold'),
+    tip: t('They stay near their current look'),
   },
   {
     value: 'go',
-    label: words.settingsPanel.ignore,
-    tip: words.settingsPanel.theyMayChangeFreelyOnlyThe,
+    label: t('Ignore'),
+    tip: t('They may change freely: only the paint counts'),
   },
 ];
 const PAINT_READINGS = [
   {
     value: false,
-    label: words.settingsPanel.sketch,
-    tip: words.settingsPanel.strokesShowWhatShouldChange,
+    label: t('Sketch'),
+    tip: t('Strokes show what should change'),
   },
   {
     value: true,
-    label: words.settingsPanel.literal,
-    tip: words.settingsPanel.eachStrokeIsTheExactLight,
+    label: t('Literal'),
+    tip: t('Each stroke is the exact light you want'),
   },
 ];
 const THEMES = [
   {
     value: 'system',
-    label: words.settingsPanel.system,
-    tip: words.settingsPanel.asTheSystemOrTheNotebook,
+    label: t('System'),
+    tip: t('As the system, or the notebook around it'),
   },
-  { value: 'dark', label: words.settingsPanel.dark },
-  { value: 'light', label: words.settingsPanel.light },
+  { value: 'dark', label: t('Dark') },
+  { value: 'light', label: t('Light', { context: 'theme' }) },
 ];
 const MINOR_LIGHTS = [
   {
     value: false,
-    label: words.settingsPanel.mayChange,
-    tip: words.settingsPanel.everyChangeThatBringsTheAnswer,
+    label: t('May change'),
+    tip: t('Every change that brings the answer closer'),
   },
-  { value: true, label: words.settingsPanel.stay, tip: words.settingsPanel.asTheyAreNowUnlessA },
+  { value: true, label: t('Stay'), tip: t('As they are now, unless a change helps much') },
 ];
 
 /** Short explanations of the choices. @type {Record<string, Record<string, string>>} */
 const DESCRIPTIONS = {
   space: {
-    display: words.settingsPanel.describedDisplay,
-    linear: words.settingsPanel.differencesInLinearLightWhere,
+    display: t('differences as the eye sees them on a display'),
+    linear: t('differences in linear light, where bright areas count most'),
   },
   colors: {
-    free: words.settingsPanel.describedFree,
-    gentle: words.settingsPanel.describedGentle,
-    white: words.settingsPanel.describedWhite,
-    own: words.settingsPanel.describedOwn,
+    free: t('any colour'),
+    gentle: t('their own, unless the paint asks for another'),
+    white: t('whites from 2200 to 9000 K'),
+    own: t('only the colours they have'),
   },
 };
 
@@ -115,54 +119,56 @@ export function SettingsPanel({ ui, app }) {
   const pull = settings.prefer_current || null;
   return html`<${Panel} labelledby=${id} close=${close}>
     <div class="panel-head">
-      <h2 id=${id}>${words.settingsPanel.solveSettings}</h2>
-      <${Button} icon="close" tip=${words.settingsPanel.close} keys="Escape" act=${close} />
+      <h2 id=${id}>${t('Solve settings')}</h2>
+      <${Button} icon="close" tip=${t('Close')} keys="Escape" act=${close} />
     </div>
-    <${Row} title=${words.settingsPanel.unpaintedParts} description=${describeSource(hold === null, describeHold(effectiveSettings.hold))}>
-      <${Choice} label=${words.settingsPanel.unpaintedParts} value=${mode} choices=${HOLDS}
+    <${Row} title=${t('Unpainted parts')} description=${describeSource(hold === null, describeHold(effectiveSettings.hold))}>
+      <${Choice} label=${t('Unpainted parts')} value=${mode} choices=${HOLDS}
         change=${(/** @type {string} */ newMode) => set('hold')({ auto: null, hold: hold || DEFAULT_HOLD, go: 0 }[newMode])} />
       ${
         mode === 'hold' &&
-        html`<${NumberField} label=${words.settingsPanel.strength} value=${hold} min=${0.01} max=${100} step=${0.1}
-        unit="×" tip=${words.settingsPanel.n1TheyCountAsMuchAs}
+        html`<${NumberField} label=${t('Strength')} value=${hold} min=${0.01} max=${100} step=${0.1}
+        unit="×" tip=${t('1: they count as much as all paint together. 3 is the usual value.')}
         change=${set('hold')} />`
       }
     </${Row}>
-    <${Row} title=${words.settingsPanel.colourSpaceOfTheMatch} description=${describeSource(!settings.space, DESCRIPTIONS.space[effectiveSettings.space])}>
-      <${Choice} label=${words.settingsPanel.colourSpaceOfTheMatch} value=${settings.space ?? null} choices=${SPACES}
+    <${Row} title=${t('Colour space of the match')} description=${describeSource(!settings.space, DESCRIPTIONS.space[effectiveSettings.space])}>
+      <${Choice} label=${t('Colour space of the match')} value=${settings.space ?? null} choices=${SPACES}
         change=${set('space')} /></${Row}>
-    <${Row} title=${words.settingsPanel.lightColours}
+    <${Row} title=${t('Light colours')}
       description=${describeSource(!settings.colors, DESCRIPTIONS.colors[effectiveSettings.colors])}>
-      <${Choice} label=${words.settingsPanel.lightColours} value=${settings.colors ?? null}
+      <${Choice} label=${t('Light colours')} value=${settings.colors ?? null}
         choices=${COLOURS} change=${set('colors')} /></${Row}>
-    <${Row} title=${words.settingsPanel.readThePaintAs} description=${
+    <${Row} title=${t('Read the paint as')} description=${
       settings.literal
-        ? words.settingsPanel.everyStrokeIsExactLinearLight
-        : words.settingsPanel.strokesShowWhatShouldChangeThe
+        ? t(
+            'Every stroke is exact: linear light, nothing held, any colour, unless set otherwise above',
+          )
+        : t('Strokes show what should change; the rest of the picture counts, too')
     }>
-      <${Choice} label=${words.settingsPanel.readThePaintAs} value=${Boolean(settings.literal)} choices=${PAINT_READINGS}
+      <${Choice} label=${t('Read the paint as')} value=${Boolean(settings.literal)} choices=${PAINT_READINGS}
         change=${set('literal')} /></${Row}>
-    <${Row} title=${words.settingsPanel.lightsThatMakeLittleDifference} description=${
-      pull ? words.settingsPanel.theyStayAsTheyAreNow : words.settingsPanel.theyMayChangeToo
+    <${Row} title=${t('Lights that make little difference')} description=${
+      pull ? t('They stay as they are now') : t('They may change, too')
     }>
-      <${Choice} label=${words.settingsPanel.lightsThatMakeLittleDifference} value=${pull !== null} choices=${MINOR_LIGHTS}
+      <${Choice} label=${t('Lights that make little difference')} value=${pull !== null} choices=${MINOR_LIGHTS}
         change=${(/** @type {boolean} */ isPulled) =>
           set('prefer_current')(isPulled ? (pull ?? DEFAULT_PREFER_CURRENT) : null)} />
       ${
         pull !== null &&
-        html`<${NumberField} label=${words.settingsPanel.pull} value=${pull} min=${0.001} max=${10} step=${0.01}
-        digits=${3} tip=${words.settingsPanel.n001OnlyWhereThePaint}
+        html`<${NumberField} label=${t('Pull')} value=${pull} min=${0.001} max=${10} step=${0.01}
+        digits=${3} tip=${t('0.01: only where the paint leaves it open. 1: unless a change helps very much.')}
         change=${set('prefer_current')} />`
       }
     </${Row}>
-    <${Row} title=${words.settingsPanel.numberOfLights} description=${
+    <${Row} title=${t('Number of lights')} description=${
       settings.sparse
-        ? words.settingsPanel.theMostUsefulOnesBesidesLocked
-        : words.settingsPanel.noLimit
+        ? t('The most useful ones, besides locked lights; the others are off')
+        : t('No limit')
     }>
-      <${NumberField} label=${words.settingsPanel.atMost} value=${settings.sparse ?? null} min=${1} digits=${0}
-        max=${ui.lights.length || 1} placeholder=${words.settingsPanel.all} unit=${words.settingsPanel.lights}
-        tip=${words.settingsPanel.emptyNoLimit} change=${set('sparse')} /></${Row}>
+      <${NumberField} label=${t('At most')} value=${settings.sparse ?? null} min=${1} digits=${0}
+        max=${ui.lights.length || 1} placeholder=${t('all')} unit=${t('lights')}
+        tip=${t('Empty: no limit')} change=${set('sparse')} /></${Row}>
     <${PageSettings} ui=${ui} app=${app} />
   </${Panel}>`;
 }
@@ -174,20 +180,20 @@ function PageSettings({ ui, app }) {
     storeLanguage(code);
     setNextLanguage(code);
   };
-  return html`<div class="panel-head is-page"><h2>${words.settingsPanel.thisPage}</h2></div>
-    <${Row} title=${words.settingsPanel.theme} description=${words.settingsPanel.theGreyAroundThePicturesIs}>
-      <${Choice} label=${words.settingsPanel.theme} value=${ui.theme} choices=${THEMES}
+  return html`<div class="panel-head is-page"><h2>${t('This page')}</h2></div>
+    <${Row} title=${t('Theme')} description=${t('The grey around the pictures is the same in both')}>
+      <${Choice} label=${t('Theme')} value=${ui.theme} choices=${THEMES}
         change=${(/** @type {import("./theme.js").Theme} */ theme) => app.store.set({ theme })} />
     </${Row}>
-    <${Row} title=${words.panels.reset} description=${words.panels.resetDescription}>
-      <${Button} label=${words.panels.asAtFirst} disabled=${!ui.panelOrder.length}
+    <${Row} title=${t('Panels')} description=${t('Drag their titles, or press Alt and an arrow key there, for another order.')}>
+      <${Button} label=${t('Order as at first')} disabled=${!ui.panelOrder.length}
         act=${() => app.store.set({ panelOrder: [] })} /></${Row}>
-    <${Row} title=${words.settingsPanel.tour} description=${words.settingsPanel.tourDescription}>
-      <${Button} label=${words.settingsPanel.showTheTour} act=${() => startTour(app.store)} /></${Row}>
+    <${Row} title=${t('Tour')} description=${t('Five steps through what the painter does')}>
+      <${Button} label=${t('Show the tour')} act=${() => startTour(app.store)} /></${Row}>
     ${
       languageChoices.length > 1 &&
-      html`<${Row} title=${words.settingsPanel.language} description=${words.settingsPanel.whenThePageOpensNext}>
-        <${Select} label=${words.settingsPanel.language} hidden value=${nextLanguage}
+      html`<${Row} title=${t('Language')} description=${t('When the page opens next')}>
+        <${Select} label=${t('Language')} hidden value=${nextLanguage}
           choices=${languageChoices} change=${chooseLanguage} /></${Row}>`
     }`;
 }
@@ -227,18 +233,16 @@ function Row({ title, description, children }) {
 /** The current value, and whether it follows from the painting. @param {boolean} isAuto
  * @param {string | undefined} text */
 function describeSource(isAuto, text = '') {
-  return isAuto && text
-    ? fill(words.settingsPanel.now, { text })
-    : text.charAt(0).toUpperCase() + text.slice(1);
+  return isAuto && text ? t('Now: {text}', { text }) : text.charAt(0).toUpperCase() + text.slice(1);
 }
 
 /** The setting for unpainted parts. @param {number | null | undefined} hold */
 function describeHold(hold) {
   if (hold === undefined || hold === null) return '';
-  if (!hold) return words.settingsPanel.freeToChange;
+  if (!hold) return t('free to change');
   const weight =
     hold === 1
-      ? words.settingsPanel.theSameWeightAs
-      : fill(words.settingsPanel.timesTheWeightOf, { number: numberText(hold) });
-  return fill(words.settingsPanel.heldNearTheirCurrentLookWith, { weight });
+      ? t('the same weight as')
+      : t('{number} times the weight of', { number: numberText(hold) });
+  return t('held near their current look, with {weight} the paint', { weight });
 }

@@ -5,7 +5,7 @@ import { showOriginal } from './original_scene.js';
 import { showPrevious } from './previous_answer.js';
 import { swapInset } from './inset_picture.js';
 import { chooseSelect, updateSelection } from './selection/selection_settings.js';
-import { words } from '../language/language.js';
+import { t } from '../language/language.js';
 import { endTour } from './tour.js';
 import { showNextView } from './view_tabs.js';
 import {
@@ -74,7 +74,7 @@ export function escape({ engine, store }) {
 /** All shortcuts, by their effect. @type {{title: string, keys: (CommandKey | FixedKey)[]}[]} */
 export const SHORTCUTS = [
   {
-    title: words.shortcuts.tools,
+    title: t('Tools'),
     keys: TOOLS.map(({ tool, label }) => ({
       command: tool,
       description: label,
@@ -82,84 +82,84 @@ export const SHORTCUTS = [
     })),
   },
   {
-    title: words.shortcuts.general,
+    title: t('General'),
     keys: [
       {
         command: 'saveLook',
-        description: words.shortcuts.saveLook,
+        description: t('save look'),
         act: (app) => void saveLook(app),
         isOnce: true,
       },
-      { symbols: ['Ctrl', 'V'], description: words.shortcuts.pasteAReference },
+      { symbols: ['Ctrl', 'V'], description: t('add a copied picture to the references') },
       {
         command: 'panels',
-        description: words.shortcuts.showOrHidePanels,
+        description: t('show or hide panels'),
         act: ({ store }) => togglePanels(store),
       },
       {
         command: 'lights',
-        description: words.shortcuts.markTheLightsAndMove,
+        description: t('mark the lights, and move them'),
         act: ({ store, session }) => {
           if (store.value.state?.can_render) session.toggleLamps();
         },
       },
       {
         command: 'shortcuts',
-        description: words.shortcuts.showTheseShortcuts,
+        description: t('show these shortcuts'),
         act: ({ store }) => store.set({ dialog: 'keys' }),
       },
-      { symbols: ['Tab'], description: words.shortcuts.nextControl },
+      { symbols: ['Tab'], description: t('next control') },
       {
         symbols: ['← ↑ ↓ →'],
-        description: words.shortcuts.moveTheBrushOnThe,
+        description: t('move the brush on the pictures; Enter paints'),
       },
-      { symbols: ['Shift', 'Enter'], description: words.shortcuts.thereALineFromThe },
+      { symbols: ['Shift', 'Enter'], description: t('there, a line from the last stroke') },
     ],
   },
   {
-    title: words.shortcuts.brush,
+    title: t('Brush'),
     keys: [
       {
         command: 'smaller',
-        description: words.shortcuts.smaller,
+        description: t('smaller'),
         act: ({ store }) => resizeBrush(store, -1),
       },
       {
         command: 'larger',
-        description: words.shortcuts.larger,
+        description: t('larger'),
         act: ({ store }) => resizeBrush(store, 1),
       },
       {
         command: 'softer',
-        description: words.shortcuts.softer,
+        description: t('softer'),
         act: ({ store }) => hardenBrush(store, -1),
       },
       {
         command: 'harder',
-        description: words.shortcuts.harder,
+        description: t('harder'),
         act: ({ store }) => hardenBrush(store, 1),
       },
-      { symbols: ['1', '…', '9', '0'], description: words.shortcuts.flow10To100 },
+      { symbols: ['1', '…', '9', '0'], description: t('flow 10 % to 100 %') },
       {
         command: 'swap',
-        description: words.shortcuts.swapColours,
+        description: t('swap colours'),
         act: ({ store }) => swapColours(store),
       },
       {
-        symbols: ['Alt', words.shortcuts.click],
-        description: words.shortcuts.pickLightFromThePicture,
+        symbols: ['Alt', t('click')],
+        description: t('pick light from the picture'),
       },
       {
-        symbols: ['Shift', words.shortcuts.click],
-        description: words.shortcuts.lineFromTheLastStroke,
+        symbols: ['Shift', t('click')],
+        description: t('line from the last stroke'),
       },
       {
         symbols: ['Esc'],
-        description: words.shortcuts.cancelTheStroke,
+        description: t('cancel the stroke, or the drag of a light'),
       },
       {
         command: 'undo',
-        description: words.shortcuts.undo,
+        description: t('undo'),
         // Undo first cancels the current stroke, which is the last action.
         act: ({ engine, session, store }) => {
           if (engine.cancel()) store.set({ dragAdjustment: null });
@@ -168,74 +168,74 @@ export const SHORTCUTS = [
       },
       {
         command: 'redo',
-        description: words.shortcuts.redo,
+        description: t('redo'),
         act: ({ session }) => void session.send('redo'),
       },
     ],
   },
   {
-    title: words.shortcuts.selection,
+    title: t('Selection'),
     keys: [
       {
         command: 'selectAll',
-        description: words.shortcuts.selectAll,
+        description: t('select all'),
         act: ({ engine }) => void engine.selections.select({ kind: 'all' }),
       },
       {
         command: 'selectNone',
-        description: words.shortcuts.selectNothing,
+        description: t('select nothing'),
         act: ({ engine }) => engine.selections.change({ kind: 'none' }),
       },
       {
         command: 'invert',
-        description: words.shortcuts.invertTheSelection,
+        description: t('invert the selection'),
         act: ({ engine }) => engine.selections.change({ kind: 'invert' }),
       },
       {
-        symbols: ['Shift', words.shortcuts.drag],
-        description: words.shortcuts.addToTheSelection,
+        symbols: ['Shift', t('drag')],
+        description: t('add to the selection'),
       },
       {
-        symbols: ['Alt', words.shortcuts.drag],
-        description: words.shortcuts.subtractFromIt,
+        symbols: ['Alt', t('drag')],
+        description: t('subtract from it'),
       },
       {
-        symbols: ['Shift', 'Alt', words.shortcuts.drag],
-        description: words.shortcuts.intersectWithIt,
+        symbols: ['Shift', 'Alt', t('drag')],
+        description: t('intersect with it'),
       },
     ],
   },
   {
-    title: words.shortcuts.pictures,
+    title: t('Pictures'),
     keys: [
-      { symbols: ['Space', words.shortcuts.drag], description: words.shortcuts.pan },
-      { symbols: ['Ctrl', words.shortcuts.wheel], description: words.shortcuts.zoom },
-      { command: 'zoomIn', description: words.shortcuts.zoomIn, act: zoomBy(1.25) },
-      { command: 'zoomOut', description: words.shortcuts.zoomOut, act: zoomBy(0.8) },
+      { symbols: ['Space', t('drag')], description: t('pan') },
+      { symbols: ['Ctrl', t('wheel')], description: t('zoom') },
+      { command: 'zoomIn', description: t('zoom in'), act: zoomBy(1.25) },
+      { command: 'zoomOut', description: t('zoom out'), act: zoomBy(0.8) },
       {
         command: 'fit',
-        description: words.shortcuts.fitToWindow,
+        description: t('fit to window'),
         act: ({ store }) => updateDisplay(store, { zoom: 1, pan: [0, 0] }),
       },
       {
         command: 'pixels',
-        description: words.shortcuts.fullSize,
+        description: t('100 %'),
         act: showPixels,
       },
       {
         command: 'layout',
-        description: words.shortcuts.sideBySideWipeBlink,
+        description: t('side by side, wipe, blink, inset'),
         act: ({ store }) =>
           updateDisplay(store, { layout: nextValue(LAYOUTS, store.value.display.layout) }),
       },
       {
         command: 'nextView',
-        description: words.shortcuts.nextViewIfThereAre,
+        description: t('next view, if there are several'),
         act: showNextView,
       },
       {
         command: 'blink',
-        description: words.shortcuts.switchThePictureInBlink,
+        description: t('switch the picture in blink, the large one with an inset'),
         act: ({ store }) => {
           const { layout, blink } = store.value.display;
           if (layout === 'inset') return swapInset(store);
@@ -244,34 +244,34 @@ export const SHORTCUTS = [
       },
       {
         command: 'previous',
-        description: words.shortcuts.holdTheAnswerBeforeThe,
+        description: t('hold: the answer before the last step'),
         act: (app) => void showPrevious(app),
         isOnce: true,
       },
       {
         command: 'original',
-        description: words.shortcuts.holdTheOriginalScene,
+        description: t('hold: the original scene'),
         act: showOriginal,
         isOnce: true,
       },
       {
         command: 'lowerExposure',
-        description: words.shortcuts.lowerDisplayExposure,
+        description: t('lower display exposure'),
         act: changeExposure(-0.5),
       },
       {
         command: 'raiseExposure',
-        description: words.shortcuts.raiseDisplayExposure,
+        description: t('raise display exposure'),
         act: changeExposure(0.5),
       },
       {
         command: 'denoise',
-        description: words.shortcuts.denoiseOnOrOff,
+        description: t('denoise on or off'),
         act: ({ store }) => updateDisplay(store, { clean: !store.value.display.clean }),
       },
       {
         command: 'overlay',
-        description: words.shortcuts.nextOverlay,
+        description: t('next overlay'),
         act: ({ store }) =>
           updateDisplay(store, { overlay: nextValue(OVERLAYS, store.value.display.overlay) }),
       },

@@ -1,6 +1,6 @@
 /** The dialog of all keyboard shortcuts, in which the keys of commands can be changed. */
 
-import { fill, words } from '../language/language.js';
+import { t } from '../language/language.js';
 import { html, useLayoutEffect, useRef, useState } from '../vendor/preact.js';
 import { Button, Dialog } from './controls.js';
 import {
@@ -23,8 +23,6 @@ import { startTour } from './tour.js';
 /** What is being changed: the command that waits for a key, and the one that was pressed if another
  * command has it. @typedef {{command: Command, keys?: string, other?: Command}} Recording */
 
-const texts = words.shortcutsDialog;
-
 /** @type {Map<Command, string>} */
 const DESCRIPTIONS = new Map(
   SHORTCUTS.flatMap(({ keys }) => keys).flatMap((key) =>
@@ -39,14 +37,15 @@ export function ShortcutsDialog({ ui, app, close }) {
   const set = (/** @type {Command} */ command, /** @type {string} */ keys) => {
     app.store.set((state) => withKeys(state, command, keys));
     setRecording(null);
-    setNote(fill(keys ? texts.isNow : texts.hasNoKey, namesOf(command, keys)));
+    const names = namesOf(command, keys);
+    setNote(keys ? t('{name}: {keys}', names) : t('{name} has no key.', names));
   };
   const isChanged = Object.keys(ui.keyBindings).length > 0;
   const resetAll = () => {
     app.store.set({ keyBindings: {} });
-    setNote(texts.allReset);
+    setNote(t('All keys are those that the painter came with.'));
   };
-  return html`<${Dialog} title=${texts.title} close=${close} class="keys">
+  return html`<${Dialog} title=${t('Keyboard shortcuts')} close=${close} class="keys">
     ${SHORTCUTS.map(
       ({ title, keys }) => html`<section key=${title}><h3>${title}</h3><dl>
       ${keys.map((key) =>
@@ -59,11 +58,11 @@ export function ShortcutsDialog({ ui, app, close }) {
       )}
     </dl></section>`,
     )}
-    <div class="key-foot"><p class="faint">${texts.howToChange}</p>
+    <div class="key-foot"><p class="faint">${t('Press a key in this list, then the new one; Delete leaves the command without a key.')}</p>
       <p role="status">${note}</p>
-      <${Button} label=${texts.showTheTour} act=${() => startTour(app.store)} />
-      <${Button} icon="undo" label=${texts.resetAll} disabled=${!isChanged} act=${resetAll} /></div>
-    <p class="faint">${texts.touch}</p>
+      <${Button} label=${t('Show the tour')} act=${() => startTour(app.store)} />
+      <${Button} icon="undo" label=${t('Reset all keys')} disabled=${!isChanged} act=${resetAll} /></div>
+    <p class="faint">${t('On a tablet, one finger paints; two fingers pan and zoom. Pen pressure controls the flow.')}</p>
   </${Dialog}>`;
 }
 
@@ -99,22 +98,25 @@ function CommandRow({ ui, entry, recording, setRecording, setNote, set }) {
     if (['Shift', 'Control', 'Alt', 'Meta', 'AltGraph'].includes(event.key)) return;
     const [pressed] = pressedKeys(event);
     if (isAllowed(pressed)) setUnlessTaken(pressed);
-    else setNote(fill(texts.isReserved, namesOf(command, pressed)));
+    else
+      setNote(
+        t('{keys} cannot be set: the browser or the page needs it.', namesOf(command, pressed)),
+      );
   };
   const symbols = keySymbols(keys);
-  const shown = symbols.length ? symbols : [texts.none];
+  const shown = symbols.length ? symbols : [t('none')];
   return html`<div class=${own ? 'is-recorded' : ''}>
     <dt><button type="button" class="key-button" onKeyDown=${press}
-      aria-label=${fill(texts.changeKey, { name: description, keys: shown.join(' ') })}
+      aria-label=${t('{name}: {keys}. Change the key', { name: description, keys: shown.join(' ') })}
       aria-pressed=${String(isWaiting)} onBlur=${() => isWaiting && setRecording(null)}
       onClick=${() => setRecording(own ? null : { command })}>${
         isWaiting
-          ? html`<span>${texts.pressAKey}</span>`
+          ? html`<span>${t('press a key')}</span>`
           : shown.map((symbol, k) => [k > 0 && ' ', html`<kbd>${symbol}</kbd>`])
       }</button></dt>
     <dd>${description}${
       command in ui.keyBindings &&
-      html`<${Button} icon="undo" tip=${fill(texts.reset, namesOf(command, DEFAULT_KEYS[command]))}
+      html`<${Button} icon="undo" tip=${t('Reset to {keys}', namesOf(command, DEFAULT_KEYS[command]))}
         act=${() => setUnlessTaken(DEFAULT_KEYS[command])} />`
     }</dd>
     ${
@@ -130,8 +132,8 @@ function CommandRow({ ui, entry, recording, setRecording, setNote, set }) {
 function Conflict({ keys, other, take, cancel }) {
   const ref = useRef(/** @type {HTMLElement | null} */ (null));
   useLayoutEffect(() => ref.current?.querySelector('button')?.focus(), []);
-  return html`<div class="key-conflict" role="group" ref=${ref} aria-label=${fill(texts.conflict, namesOf(other, keys))}>
-    <p>${fill(texts.conflict, namesOf(other, keys))}</p>
-    <${Button} label=${texts.take} primary act=${take} />
-    <${Button} label=${texts.leave} act=${cancel} /></div>`;
+  return html`<div class="key-conflict" role="group" ref=${ref} aria-label=${t('{keys} is: {name}', namesOf(other, keys))}>
+    <p>${t('{keys} is: {name}', namesOf(other, keys))}</p>
+    <${Button} label=${t('Take it')} primary act=${take} />
+    <${Button} label=${t('Leave it')} act=${cancel} /></div>`;
 }

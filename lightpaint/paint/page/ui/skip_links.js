@@ -2,7 +2,7 @@
 
 import { html } from '../vendor/preact.js';
 import { Button, reveal } from './controls.js';
-import { words } from '../language/language.js';
+import { t } from '../language/language.js';
 
 /** @typedef {import("./shortcuts.js").App} App */
 
@@ -15,9 +15,9 @@ export function SkipLinks({ app: { store } }) {
     store.set(({ open }) => ({ side: true, panel: null, open: { ...open, lights: true } }));
     reveal(button, '.lights :is(.group-name, .light-name)', true);
   };
-  return html`<nav class="skips" aria-label=${words.skipLinks.skipLinks}>
-    <${Button} label=${words.skipLinks.skipToThePictures} act=${(/** @type {MouseEvent} */ event) =>
+  return html`<nav class="skips" aria-label=${t('Skip links')}>
+    <${Button} label=${t('Skip to the pictures')} act=${(/** @type {MouseEvent} */ event) =>
       reveal(buttonOf(event), '.stage', true)} />
-    <${Button} label=${words.skipLinks.skipToTheLights} act=${skipToLights} />
+    <${Button} label=${t('Skip to the lights')} act=${skipToLights} />
   </nav>`;
 }

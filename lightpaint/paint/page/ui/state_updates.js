@@ -9,7 +9,7 @@ import { stateOfView } from '../engine/message_frames.js';
 import { rendersUpdate } from './exports/render_state.js';
 import { comparedLooks, resetMix } from './look_comparison.js';
 import { withLights } from './images/light_images.js';
-import { words } from '../language/language.js';
+import { t } from '../language/language.js';
 
 /** State of requested tasks while none is running.
  * @type {Record<string, Partial<Ui>>} */
@@ -189,7 +189,7 @@ function closenessUpdate(answer, { view, views }) {
   };
 }
 
-const UNPAINTED = words.stateUpdates.nothingIsPaintedInThisView;
+const UNPAINTED = t('Nothing is painted in this view. It follows the others.');
 
 const UNKNOWN = { error: null, is_constrained: false, is_unreached: false };
 

@@ -18,7 +18,7 @@ import {
   swapColours,
   TOOLS,
 } from './tools.js';
-import { fill, words } from '../language/language.js';
+import { t } from '../language/language.js';
 import { shortcutsOf } from './key_bindings.js';
 
 /** @typedef {import("./ui_state.js").Ui} Ui */
@@ -27,27 +27,27 @@ import { shortcutsOf } from './key_bindings.js';
 /** Sizes are perceived as ratios. */
 const RATIO_CURVE = {
   toPosition: (/** @type {number} */ x) => Math.log2(x),
-  toValue: (/** @type {number} */ t) => Math.round(2 ** t),
+  toValue: (/** @type {number} */ x) => Math.round(2 ** x),
 };
 
 /** Symmetric around 1, and snapped to 1 near it. */
 const FACTOR_CURVE = {
   toPosition: (/** @type {number} */ x) => Math.log10(x),
-  toValue: (/** @type {number} */ t) => Number((10 ** (Math.abs(t) < 0.02 ? 0 : t)).toPrecision(2)),
+  toValue: (/** @type {number} */ x) => Number((10 ** (Math.abs(x) < 0.02 ? 0 : x)).toPrecision(2)),
 };
 
 const AREAS = [
-  { value: 'spot', label: words.toolbar.spot, tip: words.toolbar.aSoftSpotWhereTheDrag },
+  { value: 'spot', label: t('Spot'), tip: t('A soft spot where the drag begins') },
   {
     value: 'object',
-    label: words.toolbar.object,
-    tip: words.toolbar.theWholeObjectUnderThePointer,
+    label: t('Object'),
+    tip: t('The whole object under the pointer'),
   },
 ];
 const SELECTED = {
   value: 'selection',
-  label: words.toolbar.selection,
-  tip: words.toolbar.allThatIsSelected,
+  label: t('Selection'),
+  tip: t('All that is selected'),
 };
 
 /** Return the areas that a drag may adjust. @param {Ui} ui */
@@ -58,10 +58,10 @@ const areasOf = ({ state, selection }) => [
 const PAINT_MODES = [
   {
     value: 'light',
-    label: words.toolbar.light,
-    tip: words.toolbar.paintTheLightOnASurface,
+    label: t('Light'),
+    tip: t('Paint the light on a surface: its own colour stays visible'),
   },
-  { value: 'colour', label: words.toolbar.colour, tip: words.toolbar.paintTheFinalColourAsIt },
+  { value: 'colour', label: t('Colour'), tip: t('Paint the final colour, as it should appear') },
 ];
 
 /** @param {{ui: Ui, app: App}} props */
@@ -74,7 +74,7 @@ export function ToolBar({ ui, app }) {
     '--second': toHex(second.colour),
     '--second-shown': displayColour(second, app),
   };
-  return html`<nav class="tools" aria-label=${words.toolbar.tools}>
+  return html`<nav class="tools" aria-label=${t('Tools')}>
     ${TOOLS.map(
       ({ tool, icon, tip }) => html`<${Button} key=${tool} icon=${icon} tip=${tip}
       keys=${shortcutsOf(ui, tool)} pressed=${ui.tool === tool}
@@ -82,16 +82,20 @@ export function ToolBar({ ui, app }) {
       disabled=${tool === 'fill' && !ui.state?.objects?.length && !ui.selection.current} />`,
     )}
     <div class="spring"></div>
-    <${Button} icon="photo" tip=${words.references.button}
+    <${Button} icon="photo" tip=${t('References: pictures whose light you want here')}
       pressed=${ui.isReferenceOpen}
       act=${() => store.set({ isReferenceOpen: !ui.isReferenceOpen, clickAction: null })} />
     ${
       ui.state?.can_render &&
-      html`<${Button} icon="lamp" tip=${words.toolbar.lightsInThePictureMarkAnd} keys=${shortcutsOf(ui, 'lights')}
+      html`<${Button} icon="lamp" tip=${t('Lights in the picture: mark and move them')} keys=${shortcutsOf(ui, 'lights')}
       pressed=${ui.areLampsMarked} act=${() => app.session.toggleLamps()} />`
     }
-    <button type="button" class="two-colours" style=${style} data-tip=${words.toolbar.swapColours} data-keys=${shortcutsOf(ui, 'swap')}
-      aria-keyshortcuts=${shortcutsOf(ui, 'swap')} aria-label=${fill(words.toolbar.swapColoursTheCurrentOneIs, { colour: toHex(ui.colour), signed: signedText(ui.stops) })}
+    <button type="button" class="two-colours" style=${style} data-tip=${t('Swap colours')} data-keys=${shortcutsOf(ui, 'swap')}
+      aria-keyshortcuts=${shortcutsOf(ui, 'swap')}
+      aria-label=${t('Swap colours: the current one is {colour}, {signed} stops', {
+        colour: toHex(ui.colour),
+        signed: signedText(ui.stops),
+      })}
       onClick=${() => swapColours(store)}><i></i><i></i></button>
   </nav>`;
 }
@@ -107,19 +111,19 @@ export function ToolOptions({ ui, app }) {
   const isPanelOpen = ui.side && !ui.panel && Boolean(ui.open.ask);
   const togglePanel = () =>
     store.set({ side: true, panel: null, open: { ...ui.open, ask: !isPanelOpen } });
-  return html`<div class="options" role="group" aria-label=${fill(words.toolbar.settings, { label })}>
+  return html`<div class="options" role="group" aria-label=${t('{label} settings', { label })}>
     <strong>${label}</strong>
     ${
       isPaintTool &&
       ui.resources[nameInView('albedo', ui.view)] !== undefined &&
-      html`<${Choice} label=${words.toolbar.paintAs}
+      html`<${Choice} label=${t('Paint as')}
       value=${ui.paintMode} choices=${PAINT_MODES} change=${(/** @type {any} */ paintMode) => store.set({ paintMode })} />`
     }
     ${
       ui.tool === 'weight' &&
-      html`<${Slider} label=${words.toolbar.weight} value=${ui.importance} min=${0.1}
+      html`<${Slider} label=${t('Weight')} value=${ui.importance} min=${0.1}
       max=${10} curve=${FACTOR_CURVE} step=${0.1} digits=${2} resetValue=${1} unit="×"
-      tip=${words.toolbar.howManyTimesAsMuchThe}
+      tip=${t('How many times as much the area counts: above 1 the answer matches better there')}
       change=${(/** @type {number} */ importance) => store.set({ importance })} />`
     }
     ${ui.tool === 'gradient' && html`<${GradientOptions} ui=${ui} app=${app} />`}
@@ -127,43 +131,43 @@ export function ToolOptions({ ui, app }) {
     ${
       ui.tool === 'adjust' &&
       (ui.state?.objects?.length > 0 || ui.selection.current) &&
-      html`<${Choice} label=${words.toolbar.area} value=${ui.adjustedArea} choices=${areasOf(ui)} change=${(
+      html`<${Choice} label=${t('Area')} value=${ui.adjustedArea} choices=${areasOf(ui)} change=${(
         /** @type {any} */ adjustedArea,
       ) => store.set({ adjustedArea })} />`
     }
     ${
       (isStrokeTool || (ui.tool === 'adjust' && ui.adjustedArea === 'spot')) &&
-      html`<${Slider} label=${words.toolbar.size}
-      value=${ui.size} min=${MIN_BRUSH_SIZE} curve=${RATIO_CURVE} max=${MAX_BRUSH_SIZE} unit=${words.toolbar.px} keys=${shortcutsOf(ui, 'smaller', 'larger')}
-      tip=${words.toolbar.size} change=${(/** @type {number} */ size) => store.set({ size })} />`
+      html`<${Slider} label=${t('Size')}
+      value=${ui.size} min=${MIN_BRUSH_SIZE} curve=${RATIO_CURVE} max=${MAX_BRUSH_SIZE} unit=${t('px')} keys=${shortcutsOf(ui, 'smaller', 'larger')}
+      tip=${t('Size')} change=${(/** @type {number} */ size) => store.set({ size })} />`
     }
     ${
       isStrokeTool &&
-      html`<${Slider} label=${words.toolbar.hardness} value=${100 * ui.hardness} min=${0} max=${100} unit="%"
-        keys=${shortcutsOf(ui, 'softer', 'harder')} tip=${words.toolbar.hardnessOfTheEdge}
+      html`<${Slider} label=${t('Hardness')} value=${100 * ui.hardness} min=${0} max=${100} unit="%"
+        keys=${shortcutsOf(ui, 'softer', 'harder')} tip=${t('Hardness of the edge')}
         change=${(/** @type {number} */ percent) => store.set({ hardness: percent / 100 })} />`
     }
     ${
       ui.tool === 'fill' &&
       ui.selection.current &&
-      html`<${Choice} label=${words.toolbar.area} value=${ui.adjustedArea === 'selection' ? 'selection' : 'object'}
+      html`<${Choice} label=${t('Area')} value=${ui.adjustedArea === 'selection' ? 'selection' : 'object'}
         choices=${areasOf(ui).filter(({ value }) => value !== 'spot')}
         change=${(/** @type {any} */ adjustedArea) => store.set({ adjustedArea })} />`
     }
     ${
       (isStrokeTool || ui.tool === 'fill') &&
-      html`<${Slider} label=${words.toolbar.flow} value=${100 * flowOf(ui)}
+      html`<${Slider} label=${t('Flow')} value=${100 * flowOf(ui)}
       min=${1} max=${100} unit="%" keys="1 … 0" tip=${
         isStrokeTool
-          ? words.toolbar.flowHowMuchPaintEachDab
-          : words.toolbar.flow100CoversTheObjectCompletely
+          ? t('Flow: how much paint each dab adds')
+          : t('Flow: 100 % covers the object completely')
       }
       change=${(/** @type {number} */ flow) => setFlow(store, flow / 100)} />`
     }
     ${
       ui.tool === 'adjust' &&
-      html`<${Button} label=${words.toolbar.byNumbers} pressed=${isPanelOpen}
-      tip=${words.toolbar.typeStopsAndMiredForAn} act=${togglePanel} />`
+      html`<${Button} label=${t('By numbers')} pressed=${isPanelOpen}
+      tip=${t('Type stops and mired, for an object or the whole picture')} act=${togglePanel} />`
     }
   </div>`;
 }
@@ -182,9 +186,9 @@ export function AdjustPanel({ ui, app }) {
   const choices = [
     {
       value: WHOLE_PICTURE,
-      label: ui.selection.current ? words.toolbar.selection : words.toolbar.wholePicture,
+      label: ui.selection.current ? t('Selection') : t('Whole picture'),
     },
-    ...(isMissing ? [{ value: object, label: fill(words.toolbar.notInThisView, { object }) }] : []),
+    ...(isMissing ? [{ value: object, label: t('{object}: not in this view', { object }) }] : []),
     ...[...objects]
       .sort((a, b) => a.localeCompare(b))
       .map((name) => ({ value: name, label: name })),
@@ -198,13 +202,13 @@ export function AdjustPanel({ ui, app }) {
     if (event.detail) reveal(/** @type {HTMLElement} */ (event.currentTarget), '.stage', true);
   };
   return html`<div class="ask" data-numbers>
-    <${Select} label=${words.toolbar.area} value=${object ?? WHOLE_PICTURE} choices=${choices}
+    <${Select} label=${t('Area')} value=${object ?? WHOLE_PICTURE} choices=${choices}
       change=${(/** @type {string} */ area) => set({ object: area === WHOLE_PICTURE ? null : area })} />
-    <${NumberField} label=${words.toolbar.brighter} value=${stops} min=${-8} max=${8} step=${0.1} unit=${words.toolbar.st}
+    <${NumberField} label=${t('Brighter')} value=${stops} min=${-8} max=${8} step=${0.1} unit=${t('st')}
       change=${(/** @type {number} */ value) => set({ stops: value })} />
-    <${NumberField} label=${words.toolbar.warmer} value=${mired} min=${-300} max=${300} step=${5} digits=${0}
-      unit=${words.toolbar.mired} change=${(/** @type {number} */ value) => set({ mired: value })} />
-    <${Button} label=${words.toolbar.apply} disabled=${isMissing || (!stops && !mired)} act=${adjust}
-      tip=${words.toolbar.appliedAsOneStrokeWhichCan} />
+    <${NumberField} label=${t('Warmer')} value=${mired} min=${-300} max=${300} step=${5} digits=${0}
+      unit=${t('mired')} change=${(/** @type {number} */ value) => set({ mired: value })} />
+    <${Button} label=${t('Apply')} disabled=${isMissing || (!stops && !mired)} act=${adjust}
+      tip=${t('Applied as one stroke, which can be undone')} />
   </div>`;
 }

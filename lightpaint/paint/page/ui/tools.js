@@ -2,7 +2,7 @@
 
 import { toHex } from './paint_colour.js';
 import { exposureOf } from './display_state.js';
-import { words } from '../language/language.js';
+import { t } from '../language/language.js';
 
 /** @typedef {import("./engine_interface.js").Tool} Tool */
 /** @typedef {import("./engine_interface.js").RGB} RGB */
@@ -12,84 +12,86 @@ import { words } from '../language/language.js';
 export const TOOLS = [
   {
     tool: 'brush',
-    label: words.tools.brush,
+    label: t('Brush'),
     icon: 'brush',
-    tip: words.tools.brushPaintLight,
+    tip: t('Brush: paint light'),
   },
   {
     tool: 'eraser',
-    label: words.tools.eraser,
+    label: t('Eraser'),
     icon: 'eraser',
-    tip: words.tools.eraserRemovePaintUnpaintedParts,
+    tip: t('Eraser: remove paint. Unpainted parts stay near their current look.'),
   },
   {
     tool: 'weight',
-    label: words.tools.importance,
+    label: t('Importance'),
     icon: 'weight',
-    tip: words.tools.importanceWhereTheAnswerMust,
+    tip: t('Importance: where the answer must match best'),
   },
   {
     tool: 'pick',
-    label: words.tools.picker,
+    label: t('Picker'),
     icon: 'pick',
-    tip: words.tools.pickerTakePaintFromAPicture,
+    tip: t('Picker: take paint from a picture'),
   },
   {
     tool: 'neutral',
-    label: words.tools.neutral,
+    label: t('Neutral'),
     icon: 'neutral',
-    tip: words.tools.neutralPressWhatShould,
+    tip: t('Neutral: press what should be white or grey, and the rest follows'),
   },
   {
     tool: 'fill',
-    label: words.tools.fill,
+    label: t('Fill'),
     icon: 'fill',
-    tip: words.tools.fillPaintAWholeObject,
+    tip: t('Fill: paint a whole object'),
   },
   {
     tool: 'line',
-    label: words.tools.line,
+    label: t('Line'),
     icon: 'line',
-    tip: words.tools.linePaintAStraightLine,
+    tip: t('Line: paint a straight line'),
   },
   {
     tool: 'adjust',
-    label: words.tools.adjust,
+    label: t('Adjust'),
     icon: 'adjust',
-    tip: words.tools.adjustDragUpForBrighterRight,
+    tip: t('Adjust: drag up for brighter, right for warmer'),
   },
   {
     tool: 'gradient',
-    label: words.tools.gradient,
+    label: t('Gradient'),
     icon: 'gradient',
-    tip: words.tools.gradientLightThatFallsOffFrom,
+    tip: t('Gradient: light that falls off from one place to another'),
   },
   {
     tool: 'select',
-    label: words.tools.select,
+    label: t('Select'),
     icon: 'marquee',
-    tip: words.tools.selectPaintAndAdjustOnlyThere,
+    tip: t('Select: paint and adjust only there. Again for the next shape.'),
   },
 ];
 
 const HINTS = /** @type {Record<Tool, string>} */ ({
-  brush: words.tools.dragOnThePaintingShiftClick,
-  eraser: words.tools.removesPaintUnpaintedPartsStay,
-  weight: words.tools.paintWhereTheAnswerMustMatch,
-  pick: words.tools.clickEitherPictureTheLightThere,
-  neutral: words.tools.clickWhatShouldHaveNoColour,
-  fill: words.tools.clickAnObjectToPaintAll,
-  line: words.tools.dragFromOneEndOfThe,
-  adjust: words.tools.dragOnAPictureUpBrighter,
-  gradient: words.tools.dragFromWhereItBeginsTo,
-  select: words.tools.dragOrClickOnAPicture,
+  brush: t('Drag on the painting. Shift-click paints a line, Alt-click picks a colour.'),
+  eraser: t('Removes paint. Unpainted parts stay near their current look.'),
+  weight: t('Paint where the answer must match best. Above 1× an area counts more, below 1× less.'),
+  pick: t('Click either picture: the light there becomes the paint.'),
+  neutral: t(
+    'Click what should be white or grey, in either picture. The whole picture, or what is selected, gets its tint.',
+  ),
+  fill: t('Click an object to paint all of it.'),
+  line: t('Drag from one end of the line to the other.'),
+  adjust: t('Drag on a picture: up brighter, down darker, right warmer, left cooler.'),
+  gradient: t('Drag from where it begins to where it ends. Its ends can be moved later.'),
+  select: t('Drag, or click, on a picture. Shift adds, Alt subtracts, both together intersect.'),
 });
 
 /** Hints on touch screens. @type {Partial<Record<Tool, string>>} */
 const TOUCH_HINTS = {
-  brush: words.tools.dragOnThePaintingWithOne,
-  pick: words.tools.tapEitherPictureTheLightThere,
-  fill: words.tools.tapAnObjectToPaintAll,
+  brush: t('Drag on the painting with one finger. Two fingers pan and zoom.'),
+  pick: t('Tap either picture: the light there becomes the paint.'),
+  fill: t('Tap an object to paint all of it.'),
 };
 
 /** Return the hint of a tool. @param {Tool} tool */
@@ -99,33 +101,37 @@ export function toolHint(tool) {
 }
 
 const PAINT_HINT = {
-  title: words.tools.paintHowItShouldLook,
-  text: words.tools.chooseAColourAndDragOver,
+  title: t('Paint how it should look'),
+  text: t(
+    'Choose a colour and drag over this picture. The other one shows what the lights can do.',
+  ),
 };
 
 /** First hint on the painting, for tools other than brushes.
  * @type {Partial<Record<Tool, {title: string, text: string}>>} */
 const FIRST_HINTS = {
-  weight: { title: words.tools.markWhatMattersMost, text: words.tools.dragOverItOnThisPicture },
+  weight: { title: t('Mark what matters most'), text: t('Drag over it on this picture.') },
   pick: {
-    title: words.tools.pickLightFromAPicture,
-    text: words.tools.itBecomesThePaintThenChoose,
+    title: t('Pick light from a picture'),
+    text: t('It becomes the paint. Then choose the brush.'),
   },
   neutral: {
-    title: words.tools.pressWhatShouldBeNeutral,
-    text: words.tools.theWholePictureFollows,
+    title: t('Press what should be neutral'),
+    text: t('The whole picture, or what is selected, gets the tint that takes its colour away.'),
   },
   fill: {
     title: PAINT_HINT.title,
-    text: words.tools.chooseAColourThenClickAn,
+    text: t(
+      'Choose a colour, then click an object in this picture. The other one shows what the lights can do.',
+    ),
   },
   select: {
-    title: words.tools.selectAPartOfThePicture,
-    text: words.tools.thenPaintItFillItOr,
+    title: t('Select a part of the picture'),
+    text: t('Then paint it, fill it or adjust it: everything else stays as it is.'),
   },
   adjust: {
-    title: words.tools.adjustHowItShouldLook,
-    text: words.tools.dragOnThisPictureUpBrighter,
+    title: t('Adjust how it should look'),
+    text: t('Drag on this picture: up brighter, down darker, right warmer, left cooler.'),
   },
 };
 

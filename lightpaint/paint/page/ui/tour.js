@@ -1,6 +1,6 @@
 /** A tour of five steps for the first visit: bubbles beside the parts that they are about. */
 
-import { fill, words } from '../language/language.js';
+import { t } from '../language/language.js';
 import { html, useLayoutEffect, useRef, useState } from '../vendor/preact.js';
 import { Button, useId } from './controls.js';
 import { keyText } from './key_bindings.js';
@@ -9,16 +9,57 @@ import { keyText } from './key_bindings.js';
 /** @typedef {import("./ui_state.js").UiStore} UiStore */
 /** @typedef {import("./shortcuts.js").App} App */
 /** A step: the part that it is about, where its bubble is, and what is unfolded for it.
- * @typedef {{part: string, side: "inside" | "right" | "left" | "above", name: "paint" | "answer" | "ask" | "lights" | "looks",
- *   fold?: string}} Step */
+ * @typedef {{part: string, side: "inside" | "right" | "left" | "above", title: string,
+ *   text: (ui: Ui) => string, fold?: string}} Step */
 
 /** @type {Step[]} */
 const STEPS = [
-  { part: '.stage', side: 'inside', name: 'paint' },
-  { part: '.answer', side: 'above', name: 'answer' },
-  { part: '.fold.is-ask', side: 'left', name: 'ask', fold: 'ask' },
-  { part: '.fold.is-lights', side: 'left', name: 'lights', fold: 'lights' },
-  { part: '.looks', side: 'above', name: 'looks' },
+  {
+    part: '.stage',
+    side: 'inside',
+    title: t('Paint how it should look'),
+    text: () =>
+      t('Choose a colour and drag over the picture Painting. The lights follow your brush.'),
+  },
+  {
+    part: '.answer',
+    side: 'above',
+    title: t('See the answer'),
+    text: () =>
+      t(
+        'The picture Answer shows the closest that your lights can come. This sentence says how close that is, what is missing, and why.',
+      ),
+  },
+  {
+    part: '.fold.is-ask',
+    side: 'left',
+    title: t('Ask by numbers'),
+    text: () =>
+      t(
+        'Brighter by so many stops, warmer by so many mireds: for an object, a selection or the whole picture. Adjust, in the tools, does the same by dragging.',
+      ),
+    fold: 'ask',
+  },
+  {
+    part: '.fold.is-lights',
+    side: 'left',
+    title: t('Your lights'),
+    text: () =>
+      t(
+        'Each light with its picture and its level. Lock it, switch it off or give it a colour: the others are solved around it.',
+      ),
+    fold: 'lights',
+  },
+  {
+    part: '.looks',
+    side: 'above',
+    title: t('Keep looks, and export'),
+    text: (ui) =>
+      t(
+        '{key} keeps painting and answer as a look. Export, at the top right, writes the lights for your scene and other programs.',
+        { key: keyText(ui, 'saveLook') },
+      ),
+  },
 ];
 
 /** Size of a painter in pixels below which no tour starts by itself. */
@@ -84,7 +125,6 @@ export function Tour({ ui, app, root }) {
   const { store } = app;
   const at = ui.tour;
   const isLast = at === STEPS.length - 1;
-  const texts = words.tour[step.name];
   const press = (/** @type {KeyboardEvent} */ event) => {
     const next = at + ({ ArrowRight: 1, ArrowLeft: -1 }[event.key] ?? 0);
     if (event.key === 'Escape') endTour(store);
@@ -95,14 +135,14 @@ export function Tour({ ui, app, root }) {
   };
   return html`<div class="tour-ring" ref=${ring} aria-hidden="true"></div>
     <section class="tour" ref=${bubble} aria-labelledby=${id} onKeyDown=${press}>
-      <div aria-live="polite"><h2 id=${id}>${texts.title}</h2>
-        <p>${fill(texts.text, { key: keyText(ui, 'saveLook') })}</p>
-        <p class="faint">${fill(words.tour.step, { number: at + 1, count: STEPS.length })}</p></div>
+      <div aria-live="polite"><h2 id=${id}>${step.title}</h2>
+        <p>${step.text(ui)}</p>
+        <p class="faint">${t('Step {number} of {count}', { number: at + 1, count: STEPS.length })}</p></div>
       <div class="row">
-        <${Button} label=${words.tour.end} act=${() => endTour(store)} />
+        <${Button} label=${t('End the tour')} act=${() => endTour(store)} />
         <span class="spring"></span>
-        <${Button} label=${words.tour.back} disabled=${at === 0} act=${() => goTo(store, at - 1)} />
-        <${Button} label=${isLast ? words.tour.done : words.tour.next} primary
+        <${Button} label=${t('Back')} disabled=${at === 0} act=${() => goTo(store, at - 1)} />
+        <${Button} label=${isLast ? t('Done') : t('Next')} primary
           act=${() => (isLast ? endTour(store) : goTo(store, at + 1))} />
       </div></section>`;
 }

@@ -5,7 +5,7 @@ import { html } from '../vendor/preact.js';
 import { numberText } from './format.js';
 import { viewUpdate } from './state_updates.js';
 import { Thumbnail } from './thumbnail.js';
-import { fill, words } from '../language/language.js';
+import { t } from '../language/language.js';
 import { shortcutsOf } from './key_bindings.js';
 
 /** @typedef {import("./ui_state.js").Ui} Ui */
@@ -27,15 +27,15 @@ export function showNextView(app) {
 /** @param {{ui: Ui, app: App}} props */
 export function ViewTabs({ ui, app }) {
   if (ui.views.length < 2) return null;
-  return html`<div class="views" role="group" aria-label=${words.viewTabs.views}>
+  return html`<div class="views" role="group" aria-label=${t('Views')}>
     ${ui.views.map(({ name }, k) => {
       const picture = nameInView('look', k);
       const closeness = ui.closeness?.[k];
       const note = closeness
-        ? fill(words.viewTabs.deltae, { number: numberText(closeness.delta_e, 2) })
-        : ui.closeness && words.viewTabs.notPainted;
+        ? t('ΔE {number}', { number: numberText(closeness.delta_e, 2) })
+        : ui.closeness && t('not painted');
       return html`<button type="button" class=${`view-tab ${k === ui.view ? 'is-on' : ''}`}
-        key=${name} aria-pressed=${String(k === ui.view)} data-tip=${fill(words.viewTabs.showAndPaint, { name })}
+        key=${name} aria-pressed=${String(k === ui.view)} data-tip=${t('Show and paint {name}', { name })}
         data-keys=${shortcutsOf(ui, 'nextView')} onClick=${() => showView(app, k)}>
         <${Thumbnail} name=${picture} generation=${ui.resources[picture]} app=${app} />
         <span class="view-name">${name}</span>

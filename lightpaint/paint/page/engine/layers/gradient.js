@@ -3,7 +3,7 @@
  * another; the twin of what paint/layers/composition.py does with them, to the bit.
  */
 import { VALUES } from '../../../../viewer/drawing/half_floats.js';
-import { words } from '../../language/language.js';
+import { t } from '../../language/language.js';
 
 /** @typedef {import("../message_frames.js").Region} Region */
 /** @typedef {import("../messages.js").Gradient} Gradient */
@@ -27,7 +27,7 @@ export function gradientLayer({ gradient, rgb, paintMode }, { x, y }) {
   const { shape = 'linear', isAdjusting = false, hasEnd = false, endRgb } = gradient ?? {};
   const { gain = 1, tint = [1, 1, 1] } = gradient ?? {};
   return {
-    name: words.gradient.gradient,
+    name: t('Gradient'),
     ...(isAdjusting ? { gain, tint } : {}),
     gradient: {
       shape,

@@ -1,6 +1,6 @@
 /** The order and properties of layers, the lowest first; the twin of paint/layers/layer_stack.py. */
 
-import { words } from '../../language/language.js';
+import { t } from '../../language/language.js';
 
 /** @typedef {import("../messages.js").Layer} Layer */
 /** @typedef {import("./layer_composition.js").ShownLayer} ShownLayer */
@@ -34,7 +34,7 @@ export function newLayer(id, kind, properties = {}) {
 }
 
 /** The painting of a session without other layers. @type {Layer} */
-export const PAINTING = newLayer(PAINTING_ID, 'pixels', { name: words.layerList.painting });
+export const PAINTING = newLayer(PAINTING_ID, 'pixels', { name: t('Painting') });
 
 /** Return the properties of a layer alone, as requests have them. @param {Layer} layer
  * @returns {Layer} */

@@ -1,6 +1,6 @@
 /** Names of layers, made from what they do: "Knot, +1.2 stops, warmer"; "3 strokes, brighter". */
 import { luminance } from '../../../../viewer/drawing/colour.js';
-import { fill, fillCount, words } from '../../language/language.js';
+import { plural, t } from '../../language/language.js';
 
 /** @typedef {import("../messages.js").Layer} Layer */
 
@@ -16,16 +16,15 @@ function adjustmentText({ gain, tint }) {
   const warmth = Math.log2(tint[0] / tint[2]);
   const parts = [];
   if (Math.abs(stops) >= LEAST_STOPS) parts.push(stopsText(stops));
-  if (Math.abs(warmth) >= LEAST_WARMTH)
-    parts.push(warmth > 0 ? words.layerNames.warmer : words.layerNames.cooler);
-  return parts.join(', ') || words.layerNames.unchanged;
+  if (Math.abs(warmth) >= LEAST_WARMTH) parts.push(warmth > 0 ? t('warmer') : t('cooler'));
+  return parts.join(', ') || t('unchanged');
 }
 
 /** @param {number} stops */
 function stopsText(stops) {
   const size = Math.abs(stops).toFixed(1);
   const signed = `${stops < 0 ? '−' : '+'}${size}`;
-  return fillCount(words.layerNames.stops, Number(size), { signed });
+  return plural(Number(size), { one: '{signed} stop', other: '{signed} stops' }, { signed });
 }
 
 /** Return the name of an adjustment. @param {string} area @param {Layer} layer */
@@ -44,7 +43,11 @@ export function renamed(before, after) {
 
 /** @param {number} times */
 export const importanceName = (times) =>
-  fill(words.layerNames.importance, { value: Number(times.toPrecision(2)) });
+  t('Importance ×{value}', { value: Number(times.toPrecision(2)) });
+
+/** @param {number} count */
+const strokeCountText = (count) =>
+  plural(count, { one: '{count} stroke', other: '{count} strokes' });
 
 /** The number of strokes in a made name. */
 const COUNTED = /\d+/;
@@ -53,10 +56,8 @@ const COUNTED = /\d+/;
  * @param {string} name before @param {string} effect @param {boolean} isNew */
 export function strokesName(name, effect, isNew) {
   const before = Number(COUNTED.exec(name)?.[0] ?? NaN);
-  const isMade = name.startsWith(fillCount(words.layerNames.strokes, before));
-  if (!isNew && !isMade) return name;
-  const strokes = fillCount(words.layerNames.strokes, isNew ? 1 : before + 1);
-  return [strokes, effect].filter(Boolean).join(', ');
+  if (!isNew && !name.startsWith(strokeCountText(before))) return name;
+  return [strokeCountText(isNew ? 1 : before + 1), effect].filter(Boolean).join(', ');
 }
 
 /** Return what becomes of light, in words. @param {number[]} before mean RGB
@@ -64,15 +65,13 @@ export function strokesName(name, effect, isNew) {
 export function effectText(before, after) {
   const [level, now] = [luminance(before), luminance(after)];
   if (!(level > 0) || !(now > 0)) {
-    return now > level ? words.layerNames.brighter : level > 0 ? words.layerNames.dark : '';
+    return now > level ? t('brighter') : level > 0 ? t('dark') : '';
   }
   const stops = Math.log2(now / level);
   const warmth = Math.log2((after[0] * before[2]) / (before[0] * after[2]));
   const parts = [];
-  if (Math.abs(stops) >= LEAST_SEEN)
-    parts.push(stops > 0 ? words.layerNames.brighter : words.layerNames.darker);
-  if (Math.abs(warmth) >= LEAST_SEEN)
-    parts.push(warmth > 0 ? words.layerNames.warmer : words.layerNames.cooler);
+  if (Math.abs(stops) >= LEAST_SEEN) parts.push(stops > 0 ? t('brighter') : t('darker'));
+  if (Math.abs(warmth) >= LEAST_SEEN) parts.push(warmth > 0 ? t('warmer') : t('cooler'));
   return parts.join(', ');
 }
 

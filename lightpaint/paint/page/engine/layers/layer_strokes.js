@@ -5,8 +5,14 @@
  * new one. The eraser takes from the layer that lies at its first point.
  */
 import { gradientLayer } from './gradient.js';
-import { fill, words } from '../../language/language.js';
-import { adjustmentName, areaName, effectText, importanceName, strokesName } from './layer_names.js';
+import { t } from '../../language/language.js';
+import {
+  adjustmentName,
+  areaName,
+  effectText,
+  importanceName,
+  strokesName,
+} from './layer_names.js';
 import { newLayer, PAINTING_ID, plainLayer, withLayers } from './layer_list.js';
 import { LayerCanvas } from './layer_canvas.js';
 import { TILE_SIDE } from './layer_pixels.js';
@@ -139,7 +145,7 @@ export class LayerStrokes {
   layerFor(settings, place, object) {
     const { tool, importance, adjustedArea } = settings;
     const { x, y } = place;
-    const [{ mirror }, { layerStrokes: texts }] = [this, words];
+    const { mirror } = this;
     if (tool === 'gradient') return this.layerNew('gradient', gradientLayer(settings, place));
     const masked = this.maskId === null ? undefined : mirror.layer(this.maskId);
     if (masked && tool !== 'adjust' && tool !== 'fill') return masked;
@@ -147,14 +153,14 @@ export class LayerStrokes {
     const area = areaName(this.objectName(object ?? painting.objectAt(x, y)));
     const isSelection = adjustedArea === 'selection' && this.selection !== null;
     if (tool === 'adjust') {
-      const spot = area ? fill(texts.spotOn, { area }) : texts.spot;
-      const whole = this.selection ? texts.selection : texts.wholePicture;
+      const spot = area ? t('Spot on {area}', { area }) : t('Spot');
+      const whole = this.selection ? t('Selection') : t('Whole picture');
       const isSpot = object === undefined && (adjustedArea !== 'object' || !area);
       const name = isSelection ? whole : isSpot ? spot : area || whole;
       return this.layerNew('adjust', { name });
     }
     if (tool === 'fill')
-      return this.layerNew('paint', { name: isSelection ? texts.selection : area || texts.fill });
+      return this.layerNew('paint', { name: isSelection ? t('Selection') : area || t('Fill') });
     if (tool === 'weight') return this.weighing(importance);
     return tool === 'eraser' ? this.erased(x, y) : this.painted();
   }
@@ -268,10 +274,11 @@ export class LayerStrokes {
 
   /** Return the name of a layer that makes a place neutral. @param {Point} place */
   neutralName({ x, y }) {
-    const { layerStrokes: texts } = words;
-    const whole = this.selection ? texts.selection : texts.wholePicture;
+    const whole = this.selection ? t('Selection') : t('Whole picture');
     const area = areaName(this.objectName(this.mirror.picture?.painting.objectAt(x, y) ?? -1));
-    return area ? fill(texts.neutralAt, { whole, area }) : fill(texts.neutral, { whole });
+    return area
+      ? t('{whole}, neutral at {area}', { whole, area })
+      : t('{whole}, neutral', { whole });
   }
 
   /** Return the name of the step that a stroke makes: what it asks for, or where it paints.
@@ -279,7 +286,7 @@ export class LayerStrokes {
   stepName(tool, { x, y }, layer) {
     if (layer?.name && this.maskId === null && ['adjust', 'fill'].includes(tool)) return layer.name;
     const area = areaName(this.objectName(this.mirror.picture?.painting.objectAt(x, y) ?? -1));
-    return area ? fill(words.layerStrokes.on, { value: LABELS[tool], area }) : LABELS[tool];
+    return area ? t('{value} on {area}', { value: LABELS[tool], area }) : LABELS[tool];
   }
 
   /** Cancel the stroke. @returns {Region | null} what has to be drawn */
@@ -308,7 +315,7 @@ export class LayerStrokes {
       return [layer.name, this.effectOf(layer)].filter(Boolean).join(', ');
     if (layer.kind !== 'paint' || this.maskId !== null) return layer.name;
     if (!isNew || !layer.name) return strokesName(layer.name, this.effectOf(layer), isNew);
-    return [layer.name, this.effectOf(layer) || words.layerStrokes.filled].join(', ');
+    return [layer.name, this.effectOf(layer) || t('filled')].join(', ');
   }
 
   /** Return what a layer does to the light below and above it, in words. @param {Layer} layer */

@@ -6,7 +6,7 @@ import { feathered, grown, inverted, joined } from './mask_operations.js';
 import { FULL, ellipse, polygonMask, rectangle } from './polygon_mask.js';
 import { SelectionMirror } from './selection_mirror.js';
 import { brightnessMask, colourMask, lightMask, objectMask } from './shown_masks.js';
-import { fill, words } from '../../language/language.js';
+import { t } from '../../language/language.js';
 
 /** @typedef {import("../../../../viewer/drawing/view.js").Kind} Kind */
 /** @typedef {import("./mask_operations.js").Mode} Mode */
@@ -28,6 +28,16 @@ import { fill, words } from '../../language/language.js';
  *   isFaint: boolean}} Summary */
 /** `pixels`: negative to shrink.
  * @typedef {{kind: 'none'} | {kind: 'invert'} | {kind: 'feather' | 'grow', pixels: number}} Change */
+
+/** What a step calls the other parts. */
+const NAMES = {
+  rectangle: t('rectangle'),
+  ellipse: t('ellipse'),
+  lasso: t('lasso'),
+  colour: t('by colour'),
+  brightness: t('by brightness'),
+  all: t('all'),
+};
 
 export class Selections {
   /** @param {import("../session_mirror.js").SessionMirror} mirror of the session
@@ -79,17 +89,17 @@ export class Selections {
     const soft = feathered(mask, this.mirror.size, feather);
     this.put(
       joined(this.current?.mask ?? null, soft, mode),
-      fill(words.selections.select, { part: this.nameOf(part) }),
+      t('select {part}', { part: this.nameOf(part) }),
     );
   }
 
   /** Return what a step calls a part. @param {Part} part */
   nameOf(part) {
     const { state } = this.session;
-    if (part.kind === 'object') return state?.objects?.[part.object] ?? words.selections.background;
+    if (part.kind === 'object') return state?.objects?.[part.object] ?? t('background');
     if (part.kind === 'light')
-      return fill(words.selections.whatLights, { name: state?.lights[part.light]?.name });
-    return words.selections[part.kind];
+      return t('what {name} lights', { name: state?.lights[part.light]?.name });
+    return NAMES[part.kind];
   }
 
   /** Change what is selected. @param {Change} change */
@@ -98,15 +108,14 @@ export class Selections {
     const { size } = this.mirror;
     if (!current) return;
     this.count += 1;
-    if (change.kind === 'none') this.put(null, words.selections.deselect);
-    else if (change.kind === 'invert')
-      this.put(inverted(current.mask), words.selections.invertSelection);
+    if (change.kind === 'none') this.put(null, t('deselect'));
+    else if (change.kind === 'invert') this.put(inverted(current.mask), t('invert selection'));
     else if (change.kind === 'feather')
-      this.put(feathered(current.mask, size, change.pixels), words.selections.featherSelection);
+      this.put(feathered(current.mask, size, change.pixels), t('feather selection'));
     else
       this.put(
         grown(current.mask, size, change.pixels),
-        change.pixels < 0 ? words.selections.shrinkSelection : words.selections.growSelection,
+        change.pixels < 0 ? t('shrink selection') : t('grow selection'),
       );
   }
 

@@ -2,7 +2,7 @@
 
 import { html } from '../../vendor/preact.js';
 import { currentLook } from '../look_actions.js';
-import { words } from '../../language/language.js';
+import { t } from '../../language/language.js';
 
 /** @typedef {import("../ui_state.js").Ui} Ui */
 
@@ -19,8 +19,8 @@ export function suggestedName(ui) {
 
 /** @param {{name: string, change: (name: string) => void}} props */
 export function ExportName({ name, change }) {
-  return html`<label class="field export-name" data-tip=${words.exports.nameTip}>
-    <span class="name">${words.exports.name}</span>
+  return html`<label class="field export-name" data-tip=${t('Of a new folder in exports/. Earlier exports stay: a number follows a name that is taken.')}>
+    <span class="name">${t('Name')}</span>
     <input type="text" value=${name} maxlength=${MAX_LENGTH} autocomplete="off" spellcheck="false"
       onInput=${(/** @type {any} */ event) => change(event.currentTarget.value)} />
   </label>`;

@@ -8,20 +8,18 @@ import { Thumbnail } from '../thumbnail.js';
 import { ExportKind } from './export_kind.js';
 import { ExportName, suggestedName } from './export_name.js';
 import { runningRender } from './render_state.js';
-import { fill, words } from '../../language/language.js';
+import { t } from '../../language/language.js';
 
 /** @typedef {import("../ui_state.js").Ui} Ui */
 /** @typedef {import("../shortcuts.js").App} App */
 /** @typedef {import("./render_state.js").Render} Render */
 /** @typedef {import("../../engine/messages.js").Requests["render_final"]} Request */
 
-const texts = words.finalRender;
-
 /** Widths that are one press away, in pixels. */
 const WIDTHS = [
-  { width: 1280, label: texts.hd },
-  { width: 1920, label: texts.fullHd },
-  { width: 3840, label: texts.uhd },
+  { width: 1280, label: t('HD') },
+  { width: 1920, label: t('Full HD') },
+  { width: 3840, label: t('4K') },
 ];
 
 /** Least and largest width, as the session takes it, and samples per pixel. */
@@ -33,16 +31,27 @@ let lastSettings = { width: 1920, spp: 256, formats: ['exr', 'png'] };
 
 /** @type {{format: "exr" | "png", label: string, description: string}[]} */
 const FORMATS = [
-  { format: 'exr', label: texts.exr, description: texts.exrDescription },
-  { format: 'png', label: texts.png, description: texts.pngDescription },
+  {
+    format: 'exr',
+    label: t('EXR'),
+    description: t('render.exr: linear light as rendered, its noise, and a denoised layer'),
+  },
+  {
+    format: 'png',
+    label: t('PNG, 16 bits'),
+    description: t('render.png: denoised, through the view and exposure of the scene'),
+  },
 ];
 
 /** @param {{ui: Ui, app: App, close: () => void}} props */
 export function FinalRenderDialog({ ui, app, close }) {
   const canRender = Boolean(ui.state?.can_render);
-  return html`<${Dialog} title=${words.dialogs.export} close=${close} class="export">
+  return html`<${Dialog} title=${t('Export')} close=${close} class="export">
     <${ExportKind} value="render" app=${app} />
-    ${canRender ? null : html`<p>${texts.noScene}</p>`}
+    ${
+      !canRender &&
+      html`<p>${t('There is no scene to render: this session was opened from a saved basis, or from light groups of another renderer. Export the lighting, and render with it there.')}</p>`
+    }
     <${RenderSettings} ui=${ui} app=${app} disabled=${!canRender} />
     ${ui.renders.length > 0 && html`<${RenderList} ui=${ui} app=${app} />`}
   </${Dialog}>`;
@@ -67,36 +76,37 @@ function RenderSettings({ ui, app, disabled }) {
   const folder = ui.state?.folder ?? '';
   return html`<fieldset class="render-settings" disabled=${disabled}>
     <${ExportName} name=${name} change=${setName} />
-    <div class="row"><${NumberField} label=${texts.width} value=${width} min=${MIN_WIDTH} max=${MAX_WIDTH} digits=${0}
+    <div class="row"><${NumberField} label=${t('Width')} value=${width} min=${MIN_WIDTH} max=${MAX_WIDTH} digits=${0}
         disabled=${disabled} change=${(/** @type {number} */ value) => set({ width: value })} />
-      <span>${fill(texts.byHeight, { height })}</span>
+      <span>${t('× {height} pixels', { height })}</span>
       ${WIDTHS.map(
         (choice) => html`<${Button} key=${choice.width} label=${choice.label} pressed=${choice.width === width}
           disabled=${disabled} act=${() => set({ width: choice.width })} />`,
       )}</div>
-    <div class="row"><${NumberField} label=${texts.samples} value=${spp} min=${2} max=${MAX_SPP} digits=${0} step=${64}
+    <div class="row"><${NumberField} label=${t('Samples')} value=${spp} min=${2} max=${MAX_SPP} digits=${0} step=${64}
         disabled=${disabled} change=${(/** @type {number} */ value) => set({ spp: value })}
-        tip=${texts.samplesTip} /><span class="faint">${texts.perPixel}</span></div>
+        tip=${t('Twice as many take twice the time and leave 0.7 times the noise')} /><span class="faint">${t('per pixel')}</span></div>
     ${FORMATS.map(
       ({ format, label, description }) => html`<div class="export-row" key=${format}>
         <${Checkbox} label=${label} checked=${formats.includes(format)} disabled=${disabled}
           change=${(/** @type {boolean} */ isOn) => toggle(format, isOn)} />
         <span class="faint">${description}</span></div>`,
     )}
-    ${ui.views.length > 1 && html`<p>${fill(texts.ofView, { view: ui.views[ui.view].name })}</p>`}
-    ${ui.master !== 1 && html`<p>${fill(texts.isDimmed, { percent: percentText(ui.master) })}</p>`}
-    <div class="row"><span class="faint folder">${fill(words.dialogs.to, { folder: `${folder}/renders` })}</span>
-      <${Button} icon="camera" label=${texts.render} primary act=${begin}
+    ${ui.views.length > 1 && html`<p>${t('Of the view that is shown, {view}.', { view: ui.views[ui.view].name })}</p>`}
+    ${ui.master !== 1 && html`<p>${t('The master is at {percent}: the render is dimmed.', { percent: percentText(ui.master) })}</p>`}
+    <div class="row"><span class="faint folder">${t('to {folder}', { folder: `${folder}/renders` })}</span>
+      <${Button} icon="camera" label=${t('Render', { context: 'verb' })} primary act=${begin}
         disabled=${disabled || !name.trim() || !formats.length} /></div>
-    <p class="faint">${texts.goesOn}</p>
+    <p class="faint">${t('You can go on painting, and close this window or the page: the render is of the answer as it is now. It ends with the painter.')}</p>
   </fieldset>`;
 }
 
 /** The renders since the painter was started, the newest on top. @param {{ui: Ui, app: App}} props */
 function RenderList({ ui, app }) {
-  return html`<ul class="renders" aria-label=${texts.list}>${[...ui.renders]
-    .reverse()
-    .map((render) => html`<${RenderRow} key=${render.id} render=${render} ui=${ui} app=${app} />`)}</ul>`;
+  const latestFirst = [...ui.renders].reverse();
+  return html`<ul class="renders" aria-label=${t('Final renders, the newest on top')}>${latestFirst.map(
+    (render) => html`<${RenderRow} key=${render.id} render=${render} ui=${ui} app=${app} />`,
+  )}</ul>`;
 }
 
 /** @param {{render: Render, ui: Ui, app: App}} props */
@@ -104,17 +114,17 @@ function RenderRow({ render, ui, app }) {
   const { id, name, width, height, spp, state } = render;
   const isDone = state === 'done';
   const isOpen = state === 'waiting' || state === 'rendering';
-  const size = height ? fill(texts.size, { width, height }) : fill(texts.sizeOfWidth, { width });
+  const size = height ? t('{width} × {height}', { width, height }) : t('{width} wide', { width });
   return html`<li class=${`render is-${state}`}>
     ${isDone && html`<${Thumbnail} name=${`render/${id}`} generation=${id} app=${app} />`}
     <div>
-      <div class="row"><strong>${name}</strong><span class="faint">${size}, ${fill(texts.spp, { spp })}</span>
+      <div class="row"><strong>${name}</strong><span class="faint">${size}, ${t('{spp} samples', { spp })}</span>
         <span class="spring"></span>
         ${
           isOpen
-            ? html`<${Button} icon="close" label=${words.dialogs.stop} tip=${texts.stopTip}
+            ? html`<${Button} icon="close" label=${t('Stop')} tip=${t('Stop this render, which writes no file then')}
               act=${() => app.session.send('stop_render', { render: id })} />`
-            : html`<${Button} icon="trash" tip=${fill(texts.drop, { name })}
+            : html`<${Button} icon="trash" tip=${t('Take {name} off this list; its files stay', { name })}
               act=${() => app.session.send('drop_render', { render: id })} />`
         }</div>
       <${RenderStatus} render=${render} ui=${ui} app=${app} />
@@ -128,19 +138,19 @@ function RenderStatus({ render, ui, app }) {
   if (state === 'rendering') {
     const progress = ui.renderProgress ?? { done: 0, total: 0 };
     const isDenoising = progress.total > 0 && progress.done >= progress.total;
-    return html`<div class="row" role="status"><${ProgressBar} progress=${progress} label=${texts.rendering} />
-      <span class="faint">${isDenoising ? texts.denoising : progressText(progress)}</span></div>`;
+    return html`<div class="row" role="status"><${ProgressBar} progress=${progress} label=${t('Final render')} />
+      <span class="faint">${isDenoising ? t('denoising') : progressText(progress)}</span></div>`;
   }
   if (state === 'failed') return html`<p>${text}</p>`;
   if (state === 'waiting')
-    return html`<p class="faint">${runningRender(ui)?.id === id ? texts.solving : texts.waiting}</p>`;
-  if (state === 'stopped') return html`<p class="faint">${texts.stopped}</p>`;
+    return html`<p class="faint">${runningRender(ui)?.id === id ? t('Finding the exact answer') : t('Waits for the render before it')}</p>`;
+  if (state === 'stopped') return html`<p class="faint">${t('Stopped; no file was written')}</p>`;
   const folder = ui.state?.folder ?? '';
   return html`<ul class="render-files">${files.map((file) => {
     const path = relativePath(file, folder);
     const fileName = path.split(/[/\\]/).at(-1) ?? path;
     return html`<li key=${file}><code>${path}</code>
-      <${Button} icon="export" tip=${fill(texts.download, { name: fileName })}
+      <${Button} icon="export" tip=${t('Download {name}', { name: fileName })}
         act=${() => void download(app, `render_file/${id}/${fileName}`, `${render.name} ${fileName}`)} /></li>`;
   })}</ul>`;
 }

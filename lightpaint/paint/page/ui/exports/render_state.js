@@ -1,7 +1,7 @@
 /** The state of the interface that is about final renders. */
 
 import { relativePath } from '../format.js';
-import { fill, words } from '../../language/language.js';
+import { t } from '../../language/language.js';
 
 /** @typedef {import("../../engine/messages.js").RenderInfo} Render */
 /** @typedef {import("../ui_state.js").Ui} Ui */
@@ -40,8 +40,11 @@ export function endedTexts(renders, { renders: before, state }) {
   const ended = renders.filter((render) => isNew(render) && ['done', 'failed'].includes(render.state));
   return ended.map(({ name, state: now, files, text }) => {
     if (now === 'failed')
-      return { text: fill(words.finalRender.hasFailed, { name, text }), tone: 'warn' };
+      return { text: t('The final render of {name} failed: {text}', { name, text }), tone: 'warn' };
     const paths = files.map((file) => relativePath(file, state?.folder ?? '')).join(', ');
-    return { text: fill(words.finalRender.isDone, { name, paths }), tone: 'info' };
+    return {
+      text: t('The final render of {name} is done: {paths}', { name, paths }),
+      tone: 'info',
+    };
   });
 }

@@ -7,7 +7,7 @@ import { findTie } from '../tied_lights.js';
 import { adjustableLights, isHeld } from '../lamps/many_lights.js';
 import { scaled } from '../lamps/lamp_colours.js';
 import { lightsText } from '../lamps/light_selection.js';
-import { fill, words } from '../../language/language.js';
+import { t } from '../../language/language.js';
 import { meanOf, wholeLight } from './light_images.js';
 
 /** @typedef {import("../engine_interface.js").RGB} RGB */
@@ -40,8 +40,7 @@ export class ImageActions {
     if (!radiance) return;
     const factor = level / luminance(meanOf(image, radiance));
     const stops = Math.log2(level / presentLevel(wholeLight(image, ui.lights)));
-    const label =
-      level > 0 ? fill(words.manyLights.st, { signed: signedText(stops) }) : words.manyLights.dimmedToOff;
+    const label = level > 0 ? t('{signed} st', { signed: signedText(stops) }) : t('off');
     const changes = new Map(image.lights.map((k) => [k, scaled(radiance(k), factor)]));
     this.set(changes, `${image.name}, ${label}`, isFinal);
   }
@@ -51,11 +50,11 @@ export class ImageActions {
     const ui = this.session.store.value;
     const free = texels.filter((k) => !findTie(ui, k));
     if (!free.length) {
-      if (isFinal) this.session.toast(words.images.tiedTexelsKeepTheirColours);
+      if (isFinal) this.session.toast(t('Tied texels keep their colours: untie them first.'));
       return;
     }
     const changes = new Map(free.map((k) => [k, rgb]));
-    const label = fill(words.images.painted, { texels: lightsText(ui, free) });
+    const label = t('{texels}, painted', { texels: lightsText(ui, free) });
     this.set(changes, label, isFinal);
   }
 
@@ -64,8 +63,9 @@ export class ImageActions {
   paintEach(radiances, label, isFinal) {
     const ui = this.session.store.value;
     const changes = new Map([...radiances].filter(([k]) => !findTie(ui, k)));
-    if (changes.size) this.set(changes, `${lightsText(ui, [...changes.keys()])}, ${label}`, isFinal);
-    else if (isFinal) this.session.toast(words.images.tiedTexelsKeepTheirColours);
+    if (changes.size)
+      this.set(changes, `${lightsText(ui, [...changes.keys()])}, ${label}`, isFinal);
+    else if (isFinal) this.session.toast(t('Tied texels keep their colours: untie them first.'));
   }
 
   /** Change constraints on all texels of an image, and keep the others of each.
@@ -86,7 +86,7 @@ export class ImageActions {
         earlier[ui.lights[k].name] = changed;
       } else constraints[ui.lights[k].name] = changed;
     }
-    const label = fill(words.images.limited, { name: image.name });
+    const label = t('{name}, constraints', { name: image.name });
     if (Object.keys(constraints).length) void many.constrain(constraints, label, true, earlier);
   }
 

@@ -4,7 +4,7 @@ import { html } from '../../vendor/preact.js';
 import { isHeld } from '../lamps/many_lights.js';
 import { LevelAndColour } from '../light_constraints.js';
 import { findTie } from '../tied_lights.js';
-import { fill, words } from '../../language/language.js';
+import { t } from '../../language/language.js';
 import { meanOf, wholeLight } from './light_images.js';
 
 /** @typedef {import("../ui_state.js").Constraints} Constraints */
@@ -21,8 +21,8 @@ export function ImageConstraints({ image, ui, app }) {
   const light = wholeLight(image, ui.lights);
   const rgb = meanOf(image, (k) => ui.weights[k] ?? ui.lights[k].present);
   const constraints = sharedBy(free.map((k) => app.session.openConstraints(k)));
-  return html`<div class="asking-light" role="group" aria-label=${fill(words.lightConstraints.constraintsOn, { label: image.name })}>
-    <h3>${words.images.constraintsOnEachTexel}</h3>
+  return html`<div class="asking-light" role="group" aria-label=${t('Constraints on {label}', { label: image.name })}>
+    <h3>${t('Constraints on each texel')}</h3>
     <${LevelAndColour} light=${light} rgb=${rgb} constraints=${constraints} isImage app=${app}
       isTied=${image.lights.some((k) => findTie(ui, k))}
       set=${(/** @type {Constraints} */ limited) => images.constrain(image, changeOf(constraints, limited))} />

@@ -14,7 +14,7 @@ import {
 import { Share, clampStops } from '../light_row.js';
 import { isSelecting, toggleLights } from '../lamps/light_selection.js';
 import { atFullBrightness, luminance, toHex, toKelvin } from '../paint_colour.js';
-import { fill, fillCount, words } from '../../language/language.js';
+import { plural, t } from '../../language/language.js';
 import { heldTexels } from './image_actions.js';
 import { ImageConstraints } from './image_constraints.js';
 import { ImageMap } from './image_map.js';
@@ -44,21 +44,24 @@ export function ImageRow({ image, ui, app }) {
       ? toggleLights(store, lights)
       : store.set({ open: { ...ui.open, [imageKey(image)]: !isOpen } });
   const size = `${image.places[0].length}x${image.places.length}`;
-  const heldText = fillCount(words.images.texelsLocked, held.length);
+  const heldText = plural(held.length, {
+    one: '{count} texel is locked.',
+    other: '{count} texels are locked.',
+  });
   return html`<div class=${`light is-image ${isMute ? 'is-dim' : ''} ${isOpen ? 'is-open' : ''} ${isSelected ? 'is-selected' : ''}`}
       role="group" aria-label=${name} data-light=${name}>
     <div class="light-thumb">
       <${ImageMap} image=${image} weights=${ui.weights} stops=${exposureOf(ui, image)} />
       <${Share} share=${share} pointerShare=${pointerShare} />
-      ${held.length > 0 && html`<span class="badge" data-tip=${heldText}>${fill(words.images.locked, { count: held.length })}</span>`}
+      ${held.length > 0 && html`<span class="badge" data-tip=${heldText}>${t('{count} locked', { count: held.length })}</span>`}
       <button type="button" class="pick" role="checkbox" aria-checked=${String(isSelected)}
-        aria-label=${fill(words.lightRow.select, { label: name })} onClick=${() => toggleLights(store, lights)}
-        data-tip=${words.lightRow.selectForOneActionOnSeveral}>${isSelected && html`<${Icon} name="check" />`}</button>
+        aria-label=${t('Select {label}', { label: name })} onClick=${() => toggleLights(store, lights)}
+        data-tip=${t('Select, for one action on several lights; with Shift all from the last one')}>${isSelected && html`<${Icon} name="check" />`}</button>
     </div>
     <div class="light-main">
       <div class="light-head">
         <button type="button" class="light-name" aria-expanded=${String(isOpen)} aria-label=${name}
-          onClick=${press} data-tip=${fill(words.images.texels, { name, size })}>
+          onClick=${press} data-tip=${t('{name}, an image of {size} texels', { name, size })}>
           <${Icon} name="fold" /><span class="its-name"><span>${name}</span></span></button>
         <${Buttons} image=${image} ui=${ui} app=${app} held=${held} />
       </div>
@@ -85,17 +88,17 @@ function Buttons({ image, ui, app, held }) {
   };
   const isLocked = held.length === lights.length;
   const lock = () => void (isLocked ? session.many.unlock(lights) : session.many.lock(lights));
-  return html`<span class="marks" role="group" aria-label=${words.lightRow.display}>
-      <${Button} label=${words.lightRow.s} class="letter" pressed=${areIn('solo')} act=${toggle('solo')}
-        tip=${fill(words.lightRow.soloShowAloneTheAnswerDoes, { label })} />
-      <${Button} label=${words.lightRow.m} class="letter" pressed=${areIn('mute')} act=${toggle('mute')}
-        tip=${fill(words.lightRow.muteShowThePictureWithoutThe, { label })} />
+  return html`<span class="marks" role="group" aria-label=${t('Display', { context: 'verb' })}>
+      <${Button} label=${t('S')} class="letter" pressed=${areIn('solo')} act=${toggle('solo')}
+        tip=${t('Solo: show {label} alone. The answer does not change.', { label })} />
+      <${Button} label=${t('M')} class="letter" pressed=${areIn('mute')} act=${toggle('mute')}
+        tip=${t('Mute: show the picture without {label}. The answer does not change.', { label })} />
     </span>
-    <span class="marks is-solve" role="group" aria-label=${words.lightRow.solve}>
+    <span class="marks is-solve" role="group" aria-label=${t('Solve')}>
       <${Button} icon="undo" disabled=${!held.length} act=${() => session.images.reset(image)}
-        tip=${fill(words.images.reset, { label })} />
+        tip=${t('Reset {label}: the solve sets all texels again', { label })} />
       <${Button} icon="lock" pressed=${isLocked} act=${lock}
-        tip=${fill(isLocked ? words.lightRow.unlockTheSolveSetsItAgain : words.lightRow.lockAsItIsInThe, { label })} />
+        tip=${isLocked ? t('Unlock {label}: the solve sets it again', { label }) : t('Lock {label} as it is in the answer', { label })} />
     </span>`;
 }
 
@@ -110,8 +113,8 @@ function Numbers({ image, ui }) {
   return html`<div class="light-numbers">
     <span class=${`dot ${level > 0 ? '' : 'is-off'}`} aria-hidden="true"
       style=${{ background: level > 0 ? toHex(atFullBrightness(rgb)) : 'none' }}></span>
-    <span class="values" data-tip=${level > 0 ? fill(words.images.mean, { value, unit }) : undefined}
-      >${level > 0 ? value : words.lightRow.off}</span>
+    <span class="values" data-tip=${level > 0 ? t('{value} {unit}, mean of the image', { value, unit }) : undefined}
+      >${level > 0 ? value : t('off')}</span>
   </div>`;
 }
 
@@ -128,9 +131,9 @@ function Brightness({ image, ui, app, isHeld }) {
       isFinal,
     );
   return html`<div class=${`dimmer ${isHeld ? 'is-held' : ''}`}>
-    <${Slider} plain label=${fill(words.lightRow.stopsFromNow, { label: image.name })} value=${clampStops(stops)}
+    <${Slider} plain label=${t('{label}, stops from now', { label: image.name })} value=${clampStops(stops)}
       min=${DIMMER_MIN_STOPS} max=${DIMMER_MAX_STOPS} step=${0.05} resetValue=${0}
-      text=${luminance(rgb) > 0 ? stopsText(stops) : words.lightRow.off} change=${move} />
+      text=${luminance(rgb) > 0 ? stopsText(stops) : t('off')} change=${move} />
     <${LevelField} light=${light} rgb=${rgb} disabled=${false}
       say=${(/** @type {string} */ text) => app.session.toast(text)}
       change=${(/** @type {RGB} */ newRgb) => images.scale(image, luminance(newRgb), true)} />

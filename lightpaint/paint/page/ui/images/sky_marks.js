@@ -2,7 +2,7 @@
 
 import { html } from '../../vendor/preact.js';
 import { add, dot, normalize, subtract } from '../lamp_geometry.js';
-import { fill, words } from '../../language/language.js';
+import { t } from '../../language/language.js';
 import { skyDirection, skyPlace } from './texel_arithmetic.js';
 
 /** @typedef {import("../ui_state.js").Ui} Ui */
@@ -33,10 +33,10 @@ export function skyViewOf({ rig, view, state }, { name }) {
   const level = (/** @type {number[]} */ v) => normalize(subtract(v, up.map((x) => x * dot(v, up))));
   const steps = Array.from({ length: SIDE_POINTS }, (_, k) => k / SIDE_POINTS);
   const edge = [
-    ...steps.map((t) => rayTo(t * width, 0)),
-    ...steps.map((t) => rayTo(width, t * height)),
-    ...steps.map((t) => rayTo((1 - t) * width, height)),
-    ...steps.map((t) => rayTo(0, (1 - t) * height)),
+    ...steps.map((x) => rayTo(x * width, 0)),
+    ...steps.map((x) => rayTo(width, x * height)),
+    ...steps.map((x) => rayTo((1 - x) * width, height)),
+    ...steps.map((x) => rayTo(0, (1 - x) * height)),
   ];
   return {
     up: toMap(up),
@@ -65,10 +65,13 @@ export function directionText(sky, { places }, place) {
   const side =
     turn === 0 || isPole
       ? ''
-      : fill(turn < 0 ? words.skyMarks.degreesLeft : words.skyMarks.degreesRight, { degrees: Math.abs(turn) });
-  const level = fill(height < 0 ? words.skyMarks.degreesDown : words.skyMarks.degreesUp, {
-    degrees: Math.abs(height),
-  });
+      : turn < 0
+        ? t('{degrees}° left of the view', { degrees: -turn })
+        : t('{degrees}° right of the view', { degrees: turn });
+  const level =
+    height < 0
+      ? t('{degrees}° down', { degrees: -height })
+      : t('{degrees}° up', { degrees: height });
   return [side, level].filter(Boolean).join(', ');
 }
 
@@ -118,17 +121,20 @@ export function SkyMarks({ sky, image }) {
   const labels =
     forward && right
       ? [
-          { text: words.skyMarks.left, place: at(opposite(right)) },
-          { text: words.skyMarks.right, place: at(right) },
-          { text: words.skyMarks.behind, place: at(opposite(forward)) },
-          ...(sky.frame.length ? [] : [{ text: words.skyMarks.front, place: at(forward) }]),
+          { text: t('left'), place: at(opposite(right)) },
+          { text: t('right'), place: at(right) },
+          { text: t('behind'), place: at(opposite(forward)) },
+          ...(sky.frame.length ? [] : [{ text: t('front'), place: at(forward) }]),
         ]
       : [];
   const cornerOf = sky.frame.length ? at(sky.frame[0]) : null;
   return html`<svg class="sky-marks" viewBox="0 0 100 100" preserveAspectRatio="none" aria-hidden="true">
       ${lines(horizonOf(sky), 'sky-horizon')}${lines(sky.frame, 'sky-frame')}</svg>
-    ${[...labels, ...(cornerOf ? [{ text: words.skyMarks.camera, place: cornerOf }] : [])].map(
-      ({ text, place: [x, y] }) => html`<span key=${text} class=${`sky-label ${text === words.skyMarks.camera ? 'is-camera' : ''}`}
-        aria-hidden="true" style=${{ left: `${Math.min(text === words.skyMarks.camera ? 84 : 93, Math.max(7, x))}%`, top: `${y}%` }}>${text}</span>`,
+    ${[...labels, ...(cornerOf ? [{ text: t('camera'), place: cornerOf }] : [])].map(
+      ({
+        text,
+        place: [x, y],
+      }) => html`<span key=${text} class=${`sky-label ${text === t('camera') ? 'is-camera' : ''}`}
+        aria-hidden="true" style=${{ left: `${Math.min(text === t('camera') ? 84 : 93, Math.max(7, x))}%`, top: `${y}%` }}>${text}</span>`,
     )}`;
 }

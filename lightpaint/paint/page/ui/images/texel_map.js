@@ -5,8 +5,15 @@ import { Button, Choice, Slider, useId } from '../controls.js';
 import { signedText, whiteText } from '../format.js';
 import { stopsOf } from '../level_field.js';
 import { atFullBrightness, toHex, toKelvin } from '../paint_colour.js';
-import { html, useEffect, useLayoutEffect, useMemo, useRef, useState } from '../../vendor/preact.js';
-import { fill, words } from '../../language/language.js';
+import {
+  html,
+  useEffect,
+  useLayoutEffect,
+  useMemo,
+  useRef,
+  useState,
+} from '../../vendor/preact.js';
+import { t } from '../../language/language.js';
 import { drawMap } from './image_map.js';
 import { blockAt, exposureOf, firstPlaces, mapStops, wholeLight } from './light_images.js';
 import { SkyMarks, directionText, skyViewOf } from './sky_marks.js';
@@ -29,12 +36,30 @@ import {
 /** @typedef {import("./texel_arithmetic.js").MapPoint} MapPoint */
 
 const TOOLS = [
-  { value: 'paint', label: words.images.paint, tip: words.images.paintTexels },
-  { value: 'fill', label: words.images.fill, tip: words.images.fillTexels },
-  { value: 'gradient', label: words.images.gradient, tip: words.images.gradientTexels },
-  { value: 'sun', label: words.images.sun, tip: words.images.addASun },
-  { value: 'lock', label: words.images.lock, tip: words.images.lockTexels },
-  { value: 'release', label: words.images.release, tip: words.images.releaseTexels },
+  {
+    value: 'paint',
+    label: t('Paint'),
+    tip: t('Give texels the colour below, and lock them there'),
+  },
+  {
+    value: 'fill',
+    label: t('Fill'),
+    tip: t('Give all texels above the horizon, or below it, the colour below'),
+  },
+  {
+    value: 'gradient',
+    label: t('Gradient'),
+    tip: t('Drag from where the colour below begins to where it has become the second one'),
+  },
+  {
+    value: 'sun',
+    label: t('Sun'),
+    tip: t(
+      'Add a sun: at 0 stops it gives a surface as much light as an even sky of the mean does',
+    ),
+  },
+  { value: 'lock', label: t('Lock'), tip: t('Lock texels as they are in the answer') },
+  { value: 'release', label: t('Release'), tip: t('Let the solve set texels again') },
 ];
 
 /** The tools that use paint. @type {Ui["texelTool"][]} */
@@ -54,16 +79,16 @@ export function TexelMap({ image, ui, app, held }) {
   }, []);
   return html`<div class="texels">
     <${Grid} image=${image} ui=${ui} app=${app} held=${held} place=${place} setPlace=${setPlace} sky=${sky} />
-    <p class="faint texel-text">${place ? texelText(image, ui, held, place, sky) : words.images.dragToPaint}</p>
+    <p class="faint texel-text">${place ? texelText(image, ui, held, place, sky) : t('Drag over the map. Alt and a press take the light of a texel.')}</p>
     <${MapExposure} image=${image} ui=${ui} app=${app} />
-    <${Choice} label=${words.images.drag} value=${ui.texelTool} choices=${toolsOf(isSky)}
+    <${Choice} label=${t('Drag over the map')} value=${ui.texelTool} choices=${toolsOf(isSky)}
       change=${(/** @type {Ui["texelTool"]} */ texelTool) => app.store.set({ texelTool })} />
     ${PAINT_TOOLS.includes(ui.texelTool) && html`<${Paint} ui=${ui} app=${app} />`}
     ${ui.texelTool === 'gradient' && html`<${SecondPaint} ui=${ui} app=${app} />`}
     ${
       ui.texelTool === 'sun' &&
-      html`<${Slider} label=${words.images.diameter} value=${ui.sunDiameter} min=${0.5} max=${60} step=${0.5}
-      digits=${1} resetValue=${4} unit="°" tip=${words.images.diameterOfTheSun} curve=${RATIO}
+      html`<${Slider} label=${t('Diameter')} value=${ui.sunDiameter} min=${0.5} max=${60} step=${0.5}
+      digits=${1} resetValue=${4} unit="°" tip=${t('Diameter of the sun: a wider one casts softer shadows, and is as strong')} curve=${RATIO}
       change=${(/** @type {number} */ sunDiameter) => app.store.set({ sunDiameter })} />`
     }
   </div>`;
@@ -72,7 +97,7 @@ export function TexelMap({ image, ui, app, held }) {
 /** Diameters are seen as ratios. */
 const RATIO = {
   toPosition: (/** @type {number} */ x) => Math.log2(x),
-  toValue: (/** @type {number} */ t) => Math.round(2 * 2 ** t) / 2,
+  toValue: (/** @type {number} */ x) => Math.round(2 * 2 ** x) / 2,
 };
 
 /** How bright the map is shown, which stays so while the image changes. @param {{image: LightImage, ui: Ui, app: App}} props */
@@ -83,10 +108,10 @@ function MapExposure({ image, ui, app }) {
   const set = (/** @type {number} */ value) =>
     app.store.set(({ mapExposures }) => ({ mapExposures: { ...mapExposures, [image.name]: value } }));
   return html`<div class="row map-exposure">
-    <${Slider} label=${words.images.exposure} value=${stops - base} min=${-8} max=${8} step=${0.1} digits=${1}
-      unit=${words.images.st} resetValue=${0} tip=${words.images.exposureOfTheMap}
+    <${Slider} label=${t('Map')} value=${stops - base} min=${-8} max=${8} step=${0.1} digits=${1}
+      unit=${t('st')} resetValue=${0} tip=${t('Exposure of the map, which changes no light and stays as it is')}
       change=${(/** @type {number} */ value) => set(base + value)} />
-    <${Button} label=${words.images.fit} tip=${words.images.fitTheExposure}
+    <${Button} label=${t('Fit')} tip=${t('Show the image as it is now, all but its brightest texels')}
       act=${() => set(mapStops(image, ui.weights))} />
   </div>`;
 }
@@ -100,11 +125,11 @@ function SecondPaint({ ui, app }) {
       texelStops: second.stops,
       secondTexelPaint: { colour, stops },
     });
-  return html`<div class="row second-paint"><span class="faint">${words.images.becomes}</span>
+  return html`<div class="row second-paint"><span class="faint">${t('Becomes')}</span>
     <span class="dot" aria-hidden="true" style=${{ background: toHex(second.colour) }}></span>
-    <span>${fill(words.manyLights.st, { signed: signedText(second.stops) })}</span>
+    <span>${t('{signed} st', { signed: signedText(second.stops) })}</span>
     <span class="spring"></span>
-    <${Button} label=${words.images.swap} act=${swap} tip=${words.images.swapTheEnds} /></div>`;
+    <${Button} label=${t('Swap')} act=${swap} tip=${t('Swap the two ends of gradients')} /></div>`;
 }
 
 /** The colour and the brightness of the paint. @param {{ui: Ui, app: App}} props */
@@ -113,18 +138,18 @@ function Paint({ ui, app }) {
   const set = (/** @type {RGB} */ newColour) => {
     if (Math.max(...newColour) > 0) app.store.set({ texelColour: atFullBrightness(newColour) });
   };
-  return html`<div class="lamp-colour colour" role="group" aria-label=${words.images.paintOfTexels}>
+  return html`<div class="lamp-colour colour" role="group" aria-label=${t('Paint of texels')}>
     <div class="colour-row">
       <span class="dot" aria-hidden="true" style=${{ background: toHex(colour) }}></span>
       <${Hex} colour=${colour} set=${set} />
-      <${Choice} label=${words.lampColour.colourModel} value=${mixer} choices=${MIXERS}
+      <${Choice} label=${t('Colour model')} value=${mixer} choices=${MIXERS}
         change=${(/** @type {Ui["texelMixer"]} */ texelMixer) => app.store.set({ texelMixer })} />
     </div>
     ${mixer === 'white' && html`<${White} colour=${colour} set=${set} isPure />`}
     ${mixer === 'hsv' && html`<${Hsv} colour=${colour} set=${set} hasValue=${false} />`}
     ${mixer === 'rgb' && html`<${Rgb} colour=${colour} set=${set} />`}
-    <${Slider} label=${words.images.brightness} value=${texelStops} min=${MIN_STOPS} max=${MAX_STOPS} step=${0.1}
-      digits=${1} resetValue=${0} unit=${words.images.st} tip=${words.images.stopsFromTheMean}
+    <${Slider} label=${t('Brightness')} value=${texelStops} min=${MIN_STOPS} max=${MAX_STOPS} step=${0.1}
+      digits=${1} resetValue=${0} unit=${t('st')} tip=${t('Stops from the mean of the image in the scene')}
       change=${(/** @type {number} */ stops) => app.store.set({ texelStops: stops })} />
   </div>`;
 }
@@ -178,7 +203,7 @@ function Grid({ image, ui, app, held, place, setPlace, sky }) {
     }
   };
   const cellId = `${id}-${key.join('-')}`;
-  return html`<div class="texel-map" role="grid" tabindex="0" aria-label=${fill(words.images.map, { name: image.name })}
+  return html`<div class="texel-map" role="grid" tabindex="0" aria-label=${t('Texels of {name}', { name: image.name })}
     aria-rowcount=${rows} aria-colcount=${columns} aria-activedescendant=${cellId}
     style=${{ aspectRatio: String(image.aspect) }} onKeyDown=${press}
     onFocus=${() => setPlace(key)} onBlur=${() => setPlace(null)}
@@ -271,16 +296,14 @@ function texelText(image, ui, held, [row, column], sky) {
   const k = image.places[row][column];
   const where = { column: column + 1, row: row + 1 };
   const direction = directionText(sky, image, [row, column]);
-  if (k < 0) return fill(words.images.notAdjusted, where);
+  if (k < 0) return t('Column {column}, row {row}: not adjusted alone', where);
   const rgb = ui.weights[k] ?? ui.lights[k].present;
   const stops = stopsOf(rgb, wholeLight(image, ui.lights));
   const white = toKelvin(rgb);
   const colour = white ? whiteText(white.kelvin, white.green) : toHex(atFullBrightness(rgb));
   const light =
-    stops === null
-      ? words.lightRow.off
-      : `${colour} · ${fill(words.manyLights.st, { signed: signedText(stops) })}`;
+    stops === null ? t('off') : `${colour} · ${t('{signed} st', { signed: signedText(stops) })}`;
   const parts = [light, direction].filter(Boolean).join(' · ');
-  const text = fill(words.images.texel, { ...where, light: parts });
-  return held.includes(k) ? fill(words.images.texelLocked, { text }) : text;
+  const text = t('Column {column}, row {row}: {light}', { ...where, light: parts });
+  return held.includes(k) ? t('{text}, locked', { text }) : text;
 }

@@ -5,7 +5,7 @@ import { endOnEscape } from '../escape_key.js';
 import { presentLevel, stopsOf } from '../level_field.js';
 import { atFullBrightness, luminance } from '../paint_colour.js';
 import { useEffect, useRef } from '../../vendor/preact.js';
-import { words } from '../../language/language.js';
+import { t } from '../../language/language.js';
 import { wholeLight } from './light_images.js';
 import { aboveHorizon, skyViewOf } from './sky_marks.js';
 import { gradientLights, radianceOf, sunLights, texelsToFill } from './texel_arithmetic.js';
@@ -128,7 +128,7 @@ export function applyTool(image, ui, app, { texels, start, end }, isFinal) {
   const paint = { colour: texelColour, stops: texelStops };
   if (texelTool === 'gradient') {
     const paints = /** @type {[typeof paint, typeof paint]} */ ([paint, secondTexelPaint]);
-    images.paintEach(gradientLights(image, start, end, paints, mean), words.images.gradientStep, isFinal);
+    images.paintEach(gradientLights(image, start, end, paints, mean), t('gradient'), isFinal);
   } else if (texelTool === 'fill') {
     if (!isFinal) return;
     const filled = texelsToFill(image, end, aboveHorizon(skyViewOf(ui, image), image));
@@ -137,7 +137,7 @@ export function applyTool(image, ui, app, { texels, start, end }, isFinal) {
     if (!isFinal) return;
     const added = sunLights(image, end, ui.sunDiameter, paint, mean);
     const sum = [...added].map(([k, rgb]) => [k, rgb.map((value, c) => value + ui.weights[k][c])]);
-    images.paintEach(new Map(/** @type {[number, RGB][]} */ (sum)), words.images.sunStep, true);
+    images.paintEach(new Map(/** @type {[number, RGB][]} */ (sum)), t('sun'), true);
   } else if (!texels.length) return;
   else if (texelTool === 'paint') images.paint(texels, radianceOf(paint, mean), isFinal);
   else if (isFinal && texelTool === 'lock') many.lock(texels);

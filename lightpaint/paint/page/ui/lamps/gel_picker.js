@@ -6,7 +6,7 @@ import { useId } from '../controls.js';
 import { signedText } from '../format.js';
 import { atFullBrightness, toHex } from '../paint_colour.js';
 import { html, useState } from '../../vendor/preact.js';
-import { fill, words } from '../../language/language.js';
+import { t } from '../../language/language.js';
 
 /** @typedef {import("../../../../viewer/gels/gels.js").Gel} Gel */
 /** @typedef {import("../engine_interface.js").RGB} RGB */
@@ -28,26 +28,26 @@ export function GelPicker({ white, gel, choose }) {
     )?.focus();
   };
   const label = (/** @type {Gel} */ one) =>
-    fill(words.gelPicker.st, {
+    t('{one} {name}, {signed} st', {
       one: gelName(one),
       name: one.name,
       signed: signedText(-lossInStops(one, white)),
     });
   return html`<div class="gels">
-    <label class="field words"><span class="name" id=${id}>${words.gelPicker.filter}</span>
-      <input type="text" value=${text} placeholder=${words.gelPicker.n201R80Amber} spellcheck=${false} autocomplete="off"
-        data-typed=${text ? 'yes' : 'no'} data-tip=${words.gelPicker.numberOrNameEnterTakesThe}
+    <label class="field words"><span class="name" id=${id}>${t('Filter')}</span>
+      <input type="text" value=${text} placeholder=${t('201, R80, amber')} spellcheck=${false} autocomplete="off"
+        data-typed=${text ? 'yes' : 'no'} data-tip=${t('Number or name; Enter takes the first of the list')}
         onInput=${(/** @type {any} */ event) => setText(event.currentTarget.value)}
         onKeyDown=${press} /></label>
-    <select size="6" value=${gel?.code ?? ''} aria-label=${words.gelPicker.filters} data-tip=${words.gelPicker.stopsThatEachCostsOnThis}
+    <select size="6" value=${gel?.code ?? ''} aria-label=${t('Filters')} data-tip=${t('Stops that each costs on this lamp')}
       onChange=${(/** @type {any} */ event) =>
         choose(gels.find(({ code }) => code === event.currentTarget.value) ?? null)}>
-      ${!text && html`<option value="">${words.gelPicker.noFilter}</option>`}
+      ${!text && html`<option value="">${t('No filter')}</option>`}
       ${gels.map(
         (one) => html`<option key=${one.code} value=${one.code}
           style=${{ '--gel': toHex(atFullBrightness(filtered(one, white))) }}>${label(one)}</option>`,
       )}
     </select>
-    ${!gels.length && html`<p class="faint">${words.gelPicker.noFilterHasThisNumberOr}</p>`}
+    ${!gels.length && html`<p class="faint">${t('No filter has this number or name.')}</p>`}
   </div>`;
 }

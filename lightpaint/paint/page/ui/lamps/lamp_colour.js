@@ -9,7 +9,7 @@ import { atFullBrightness, luminance } from '../paint_colour.js';
 import { html } from '../../vendor/preact.js';
 import { GelPicker } from './gel_picker.js';
 import { ownWhite } from './lamp_colours.js';
-import { fill, words } from '../../language/language.js';
+import { t } from '../../language/language.js';
 
 /** @typedef {import("../shortcuts.js").App} App */
 /** @typedef {import("../ui_state.js").Ui} Ui */
@@ -17,7 +17,7 @@ import { fill, words } from '../../language/language.js';
 
 const LAMP_MIXERS = [
   ...MIXERS,
-  { value: 'gel', label: words.lampColour.gel, tip: words.lampColour.colourFiltersByNumber },
+  { value: 'gel', label: t('Gel'), tip: t('Colour filters by number') },
 ];
 
 /** Controls for the colour of some lamps, which keep their levels; they begin at that of the first.
@@ -34,10 +34,10 @@ export function LampColour({ ui, app, lights }) {
   const set = (/** @type {RGB} */ newColour, /** @type {boolean} */ isFinal) => {
     if (Math.max(...newColour) > 0) many.colour(lights, newColour, isFinal);
   };
-  return html`<div class="lamp-colour colour" role="group" aria-label=${words.lampColour.colour}>
+  return html`<div class="lamp-colour colour" role="group" aria-label=${t('Colour')}>
     <div class="colour-row">
       <${Hex} colour=${colour} set=${set} />
-      <${Choice} label=${words.lampColour.colourModel} value=${mixer} choices=${LAMP_MIXERS}
+      <${Choice} label=${t('Colour model')} value=${mixer} choices=${LAMP_MIXERS}
         change=${(/** @type {Ui["lampMixer"]} */ lampMixer) => app.store.set({ lampMixer })} />
     </div>
     ${mixer === 'white' && html`<${White} colour=${colour} set=${set} isPure />`}
@@ -50,7 +50,11 @@ export function LampColour({ ui, app, lights }) {
     }
     ${
       gel &&
-      html`<p class="faint" role="status">${fill(words.lampColour.st, { gel: gelName(gel), name: gel.name, signed: signedText(-lossInStops(gel, white)) })}</p>`
+      html`<p class="faint" role="status">${t('{gel} {name}, {signed} st', {
+        gel: gelName(gel),
+        name: gel.name,
+        signed: signedText(-lossInStops(gel, white)),
+      })}</p>`
     }
   </div>`;
 }

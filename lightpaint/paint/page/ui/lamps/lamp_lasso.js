@@ -1,7 +1,7 @@
 /** A lasso over the pictures, which selects the lights whose marks it encloses. */
 
 import { html, useRef, useState } from '../../vendor/preact.js';
-import { words } from '../../language/language.js';
+import { t } from '../../language/language.js';
 
 /** @typedef {import("../shortcuts.js").App} App */
 /** @typedef {import("../ui_state.js").Ui} Ui */
@@ -39,7 +39,7 @@ export function LampLasso({ ui, app }) {
       isLassoing: false,
       selectedLights: isAdding(event) ? [...new Set([...selectedLights, ...lights])] : lights,
     }));
-    if (!lights.length) app.session.toast(words.lampLasso.noLightIsMarkedThereDraw);
+    if (!lights.length) app.session.toast(t('No light is marked there. Draw around the marks.'));
   };
   const cancel = () => {
     outline.current = [];

@@ -2,8 +2,8 @@
 
 import { imageOf } from '../images/light_images.js';
 import { listedLights } from './listed_lights.js';
-import { shortenName } from '../format.js';
-import { fill, words } from '../../language/language.js';
+import { lightCountText, shortenName } from '../format.js';
+import { t } from '../../language/language.js';
 
 /** @typedef {import("../ui_state.js").Ui} Ui */
 /** @typedef {import("../ui_state.js").UiStore} UiStore */
@@ -48,8 +48,8 @@ export function toggleLights(store, lights) {
 export function lightsText(ui, lights) {
   const texels = texelsText(ui, lights);
   if (texels !== null) return texels;
-  if (lights.length > 2) return fill(words.lightSelection.lights, { count: lights.length });
-  return lights.map((k) => shortenName(ui.lights[k].label, 24)).join(words.lightSelection.and);
+  if (lights.length > 2) return lightCountText(lights.length);
+  return lights.map((k) => shortenName(ui.lights[k].label, 24)).join(t(' and '));
 }
 
 /** Return several texels of one image in words: all by its name. @param {Ui} ui
@@ -59,5 +59,5 @@ export function texelsText({ images }, lights) {
   if (!image || lights.length < 2 || lights.some((k) => imageOf(images, k) !== image)) return null;
   const name = shortenName(image.name, 24);
   if (lights.length === image.lights.length) return name;
-  return fill(words.lightSelection.texels, { count: lights.length, name });
+  return t('{count} texels of {name}', { count: lights.length, name });
 }

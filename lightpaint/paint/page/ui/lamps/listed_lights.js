@@ -3,7 +3,7 @@
 import { imageOf, meanOf } from '../images/light_images.js';
 import { luminance } from '../paint_colour.js';
 import { findTie } from '../tied_lights.js';
-import { fill, words } from '../../language/language.js';
+import { t } from '../../language/language.js';
 
 /** @typedef {import("../ui_state.js").Ui} Ui */
 /** Lights that the list shows together: one row of its own, a group by name, or an image.
@@ -135,8 +135,8 @@ function groupOf(ui, k) {
   if (image) return image.name;
   const tie = findTie(ui, k);
   const otherNames =
-    tie && (tie.length === 2 ? tie[1] : fill(words.listedLights.more, { count: tie.length - 1 }));
-  if (tie) return fill(words.listedLights.andTied, { value: tie[0], otherNames });
+    tie && (tie.length === 2 ? tie[1] : t('{count} more', { count: tie.length - 1 }));
+  if (tie) return t('{value} and {otherNames}, tied', { value: tie[0], otherNames });
   return group ?? (countRows(ui) > MAX_ROWS_WITH_SLIDERS ? namePrefix(name) : null);
 }
 

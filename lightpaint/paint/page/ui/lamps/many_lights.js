@@ -7,7 +7,7 @@ import { lightCountText, signedText } from '../format.js';
 import { findTie, lockedLights, lockingLight } from '../tied_lights.js';
 import { atLevelOf, ownWhite, scaled, warmed, withGel } from './lamp_colours.js';
 import { lightsText } from './light_selection.js';
-import { fill, words } from '../../language/language.js';
+import { t } from '../../language/language.js';
 
 /** @typedef {import("../engine_interface.js").RGB} RGB */
 /** @typedef {import("../ui_state.js").Constraints} Constraints */
@@ -39,23 +39,21 @@ export class ManyLights {
    * @param {number} factor @param {boolean} isFinal false while a slider moves */
   dim(lights, factor, isFinal) {
     const stops =
-      factor > 0
-        ? fill(words.manyLights.st, { signed: signedText(Math.log2(factor)) })
-        : words.manyLights.dimmedToOff;
+      factor > 0 ? t('{signed} st', { signed: signedText(Math.log2(factor)) }) : t('off');
     return this.move(lights, (rgb) => scaled(rgb, factor), stops, isFinal, true);
   }
 
   /** Make lights warmer by some mireds. @param {number[]} lights @param {number} mired
    * @param {boolean} isFinal */
   warm(lights, mired, isFinal) {
-    const text = fill(words.manyLights.mired, { signed: signedText(mired, 0) });
+    const text = t('{signed} mired', { signed: signedText(mired, 0) });
     return this.move(lights, (rgb) => warmed(rgb, mired), text, isFinal);
   }
 
   /** Give lights a colour, each at its own level. @param {number[]} lights @param {RGB} colour
    * @param {boolean} isFinal */
   colour(lights, colour, isFinal) {
-    return this.move(lights, (rgb) => atLevelOf(colour, rgb), words.manyLights.colour, isFinal);
+    return this.move(lights, (rgb) => atLevelOf(colour, rgb), t('colour'), isFinal);
   }
 
   /** Put a filter on lights, instead of the one that is there; null takes it off.
@@ -68,7 +66,7 @@ export class ManyLights {
         const present = gelOn(rgb, ownWhite(all[k]), gelCodes[all[k].name]);
         return withGel(rgb, all[k], gel, present);
       },
-      gel ? gelName(gel) : words.manyLights.noFilter,
+      gel ? gelName(gel) : t('no filter'),
       true,
     );
     const codes = lights.map((k) => [all[k].name, gel?.code ?? '']);
@@ -183,7 +181,7 @@ export class ManyLights {
     this.queue(
       {
         lights: new Map(open.map((k) => [k, ui.weights[k]])),
-        label: fill(words.manyLights.lock, { lights: lightsText(ui, open) }),
+        label: t('lock {lights}', { lights: lightsText(ui, open) }),
         isFinal: true,
       },
       this.session.groupMoves,
@@ -194,10 +192,7 @@ export class ManyLights {
   unlock(lights) {
     const ui = this.store.value;
     const held = leaders(ui, adjustableLights(ui, lights)).filter((k) => isHeld(ui, k));
-    return this.session.unlockLights(
-      held,
-      fill(words.manyLights.unlock, { lights: lightsText(ui, held) }),
-    );
+    return this.session.unlockLights(held, t('unlock {lights}', { lights: lightsText(ui, held) }));
   }
 
   /** Switch lights off. @param {number[]} lights */
@@ -208,7 +203,7 @@ export class ManyLights {
     const entries = lit.map((k) => [ui.lights[k].name, { off: true }]);
     return this.constrain(
       Object.fromEntries(entries),
-      fill(words.manyLights.off, { lights: lightsText(ui, lit) }),
+      t('{lights} off', { lights: lightsText(ui, lit) }),
     );
   }
 
@@ -257,8 +252,8 @@ function leaders(ui, lights) {
 /** @param {number[]} candidates @param {boolean} isLevel */
 function refusalText(candidates, isLevel) {
   if (candidates.length)
-    return fill(words.manyLights.offSwitchOnFirst, { count: lightCountText(candidates.length) });
+    return t('{count} off: switch on first.', { count: lightCountText(candidates.length) });
   return isLevel
-    ? words.manyLights.theseLightsStayAsTheyAre
-    : words.manyLights.tiedLightsAndLightsWithOne;
+    ? t('These lights stay as they are in the scene.')
+    : t('Tied lights, and lights with one number for all channels, keep their colours.');
 }

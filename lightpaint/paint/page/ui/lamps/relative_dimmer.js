@@ -3,7 +3,7 @@
 import { Slider, useDraft } from '../controls.js';
 import { cleanNumberText } from '../format.js';
 import { html, useState } from '../../vendor/preact.js';
-import { fill, words } from '../../language/language.js';
+import { t } from '../../language/language.js';
 
 /** A slider whose middle is no change, and a field for the same in numbers.
  * @param {{label: string, range: number, step: number, text: (amount: number) => string, tip: string,
@@ -24,7 +24,7 @@ export function RelativeSlider(props) {
     setDraft(null);
     if (!typed) return;
     const parsed = parse(cleanNumberText(typed).toLowerCase());
-    if (parsed === null) say(fill(words.relativeDimmer.isNoChange, { typed, hint }));
+    if (parsed === null) say(t('{typed} is no change. {hint}', { typed, hint }));
     else if (parsed !== 0) change(parsed, true);
   };
   const press = (/** @type {any} */ event) => {
@@ -40,7 +40,7 @@ export function RelativeSlider(props) {
     <${Slider} plain label=${label} value=${amount} min=${-range} max=${range} step=${step}
       text=${text(amount)} disabled=${disabled} change=${move} tip=${tip} track=${track} />
     <input class="level" type="text" autocomplete="off" spellcheck=${false} disabled=${disabled}
-      data-typed=${draft === null ? 'no' : 'yes'} aria-label=${fill(words.relativeDimmer.by, { label })} data-tip=${hint}
+      data-typed=${draft === null ? 'no' : 'yes'} aria-label=${t('{label} by', { label })} data-tip=${hint}
       placeholder=${amount ? text(amount) : '±0'} value=${draft ?? ''}
       onInput=${(/** @type {any} */ event) => setDraft(event.currentTarget.value)}
       onBlur=${take} onKeyDown=${press} />

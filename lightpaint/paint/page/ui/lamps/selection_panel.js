@@ -10,7 +10,7 @@ import { html, useState } from '../../vendor/preact.js';
 import { LampColour } from './lamp_colour.js';
 import { adjustableLights, colouredLights, isHeld } from './many_lights.js';
 import { RelativeSlider, parseMired, parseStops } from './relative_dimmer.js';
-import { fill, words } from '../../language/language.js';
+import { t } from '../../language/language.js';
 
 /** @typedef {import("../shortcuts.js").App} App */
 /** @typedef {import("../ui_state.js").Ui} Ui */
@@ -25,9 +25,9 @@ const WARM_TRACK = gradient([9000, 5600, 4000, 3000, 2300].map((kelvin) => fromK
  * @param {{app: App, lights: number[], label: string, isPlain?: boolean, disabled?: boolean}} props */
 export function GroupDimmer({ app, lights, label, isPlain, disabled }) {
   return html`<${RelativeSlider} label=${label} range=${DIM_RANGE} step=${0.1} isPlain=${isPlain}
-    disabled=${disabled} text=${(/** @type {number} */ stops) => fill(words.selectionPanel.st, { signed: signedText(stops) })} parse=${parseStops}
-    tip=${words.selectionPanel.dimsTheseLightsTogetherWhich}
-    hint=${words.selectionPanel.typeStops} say=${(/** @type {string} */ text) => app.session.toast(text)}
+    disabled=${disabled} text=${(/** @type {number} */ stops) => t('{signed} st', { signed: signedText(stops) })} parse=${parseStops}
+    tip=${t('Dims these lights together, which keeps their ratio, and locks them there')}
+    hint=${t('Type stops (-1), percent (50 %) or off.')} say=${(/** @type {string} */ text) => app.session.toast(text)}
     change=${(/** @type {number} */ stops, /** @type {boolean} */ isFinal) =>
       app.session.many.dim(lights, 2 ** stops, isFinal)} />`;
 }
@@ -40,16 +40,16 @@ export function SelectionPanel({ ui, app }) {
   const { many } = app.session;
   const coloured = colouredLights(ui, lights);
   const fixedCount = lights.length - adjustableLights(ui, lights).length;
-  return html`<section class="lamp-selection" aria-label=${words.selectionPanel.selectedLights}>
+  return html`<section class="lamp-selection" aria-label=${t('Selected lights')}>
     <div class="row">
-      <strong role="status">${fill(words.selectionPanel.selected, { count: lightCountText(lights.length) })}</strong>
+      <strong role="status">${t('{count} selected', { count: lightCountText(lights.length) })}</strong>
       <span class="faint">${levelsText(ui, lights)}</span><span class="spring"></span>
-      <${Button} icon="close" tip=${words.selectionPanel.selectNone} keys="Escape" act=${() => app.store.set({ selectedLights: [] })} />
+      <${Button} icon="close" tip=${t('Select none')} keys="Escape" act=${() => app.store.set({ selectedLights: [] })} />
     </div>
-    <${GroupDimmer} app=${app} lights=${lights} label=${words.selectionPanel.dim} disabled=${fixedCount === lights.length} />
-    <${RelativeSlider} label=${words.selectionPanel.warm} range=${WARM_RANGE} step=${5} disabled=${!coloured.length} track=${WARM_TRACK}
-      text=${(/** @type {number} */ mired) => fill(words.selectionPanel.mired, { signed: signedText(mired, 0) })} parse=${parseMired}
-      tip=${words.selectionPanel.warmerToTheRightInMireds} hint=${words.selectionPanel.typeMireds}
+    <${GroupDimmer} app=${app} lights=${lights} label=${t('Dim')} disabled=${fixedCount === lights.length} />
+    <${RelativeSlider} label=${t('Warm')} range=${WARM_RANGE} step=${5} disabled=${!coloured.length} track=${WARM_TRACK}
+      text=${(/** @type {number} */ mired) => t('{signed} mired', { signed: signedText(mired, 0) })} parse=${parseMired}
+      tip=${t('Warmer to the right, in mireds; levels stay')} hint=${t('Type mireds: 20 is warmer, -20 cooler.')}
       say=${(/** @type {string} */ text) => app.session.toast(text)}
       change=${(/** @type {number} */ mired, /** @type {boolean} */ isFinal) =>
         many.warm(lights, mired, isFinal)} />
@@ -58,9 +58,9 @@ export function SelectionPanel({ ui, app }) {
       hasColour &&
       (coloured.length
         ? html`<${LampColour} ui=${ui} app=${app} lights=${coloured} />`
-        : html`<p class="faint">${words.selectionPanel.tiedLightsAndLightsWithOne}</p>`)
+        : html`<p class="faint">${t('Tied lights, and lights with one number for all channels, keep their colours.')}</p>`)
     }
-    ${fixedCount > 0 && html`<p class="faint">${fill(words.selectionPanel.ofTheseCannotBeSet, { count: lightCountText(fixedCount) })}</p>`}
+    ${fixedCount > 0 && html`<p class="faint">${t('{count} of these cannot be set.', { count: lightCountText(fixedCount) })}</p>`}
   </section>`;
 }
 
@@ -80,18 +80,18 @@ function Actions({ ui, app, hasColour, showColour }) {
       solo: isSolo ? solo.filter((k) => !lights.includes(k)) : [...new Set([...solo, ...lights])],
     });
   return html`<div class="row">
-    <${Button} label=${words.selectionPanel.colour} pressed=${hasColour} tip=${words.selectionPanel.setTheColourOfAllWhite}
+    <${Button} label=${t('Colour')} pressed=${hasColour} tip=${t('Set the colour of all: white, HSV, RGB, hex or gel')}
       act=${() => showColour(!hasColour)} />
-    <${Button} label=${areHeld ? words.selectionPanel.unlock : words.selectionPanel.lock} disabled=${!adjustable.length}
-      tip=${areHeld ? words.selectionPanel.letTheSolveSetThemAgain : words.selectionPanel.lockAllAsTheyAreIn}
+    <${Button} label=${areHeld ? t('Unlock') : t('Lock')} disabled=${!adjustable.length}
+      tip=${areHeld ? t('Let the solve set them again') : t('Lock all as they are in the answer')}
       act=${() => void (areHeld ? many.unlock(lights) : many.lock(lights))} />
-    <${Button} label=${areOff ? words.selectionPanel.on : words.selectionPanel.off} disabled=${!adjustable.length}
-      tip=${areOff ? words.selectionPanel.switchAllOnAgain : words.selectionPanel.switchAllOffInEveryAnswer}
+    <${Button} label=${areOff ? t('On') : t('Off')} disabled=${!adjustable.length}
+      tip=${areOff ? t('Switch all on again') : t('Switch all off in every answer')}
       act=${() => void (areOff ? many.unlock(lights) : many.switchOff(lights))} />
-    <${Button} label=${areTied ? words.selectionPanel.untie : words.selectionPanel.tie} disabled=${adjustable.length < 2}
-      tip=${areTied ? words.selectionPanel.giveEachItsOwnDimmer : words.selectionPanel.putAllOnOneDimmer}
+    <${Button} label=${areTied ? t('Untie') : t('Tie')} disabled=${adjustable.length < 2}
+      tip=${areTied ? t('Give each its own dimmer') : t('Put all on one dimmer')}
       act=${() => void (areTied ? many.untie(lights) : many.tie(lights))} />
-    <${Button} label=${words.selectionPanel.solo} pressed=${isSolo} tip=${words.selectionPanel.showTheseAloneTheAnswerDoes}
+    <${Button} label=${t('Solo')} pressed=${isSolo} tip=${t('Show these alone. The answer does not change.')}
       act=${toggleSolo} />
   </div>`;
 }
@@ -101,11 +101,11 @@ function Actions({ ui, app, hasColour, showColour }) {
 export function levelsText(ui, lights) {
   const levels = lights.map((k) => stopsOf(ui.weights[k] ?? ui.lights[k].present, ui.lights[k]));
   const stops = levels.filter((level) => level !== null);
-  if (!stops.length) return words.selectionPanel.allOff;
+  if (!stops.length) return t('off');
   const [low, high] = [Math.min(...stops), Math.max(...stops)];
   const isEqual = stopsText(low) === stopsText(high);
   const text = isEqual
     ? stopsText(low)
-    : fill(words.selectionPanel.toSt, { signed: signedText(low), signed2: signedText(high) });
-  return stops.length < levels.length ? fill(words.selectionPanel.someOff, { text }) : text;
+    : t('{signed} to {signed2} st', { signed: signedText(low), signed2: signedText(high) });
+  return stops.length < levels.length ? t('{text}, some off', { text }) : text;
 }

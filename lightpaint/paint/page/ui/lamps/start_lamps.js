@@ -3,7 +3,7 @@
 import { Button, Slider } from '../controls.js';
 import { lockedLights } from '../tied_lights.js';
 import { html } from '../../vendor/preact.js';
-import { words } from '../../language/language.js';
+import { t } from '../../language/language.js';
 
 /** @typedef {import("../shortcuts.js").App} App */
 /** @typedef {import("../ui_state.js").Ui} Ui */
@@ -26,8 +26,8 @@ export function StartLamps({ ui, app }) {
   if (!ui.isStarted)
     return (
       lockedLights(ui).length > 0 &&
-      html`<div class="start-lamps"><${Button} label=${words.startLamps.startFromMyLamps} class="wide"
-        tip=${words.startLamps.theSolveImprovesThem}
+      html`<div class="start-lamps"><${Button} label=${t('Start from my lamps')} class="wide"
+        tip=${t('The lamps as they are now become the start: the solve improves them and stays near. Locked ones are released')}
         act=${() => session.send('start_from_lamps', { is_on: true })} /></div>`
     );
   const percent = CURVE.toPosition(ui.settings.near ?? DEFAULT);
@@ -36,10 +36,11 @@ export function StartLamps({ ui, app }) {
     if (isFinal) void session.changeSetting('near', near);
     else app.store.set({ settings: { ...ui.settings, near } });
   };
-  return html`<div class="start-lamps" role="group" aria-label=${words.startLamps.startFromMyLamps}>
-    <${Slider} label=${words.startLamps.nearMyLamps} value=${percent} min=${0} max=${100} step=${1} unit="%"
-      resetValue=${CURVE.toPosition(DEFAULT)} tip=${words.startLamps.howNear} change=${set} />
-    <${Button} icon="close" tip=${words.startLamps.startFromTheScene}
+  return html`<div class="start-lamps" role="group" aria-label=${t('Start from my lamps')}>
+    <${Slider} label=${t('Near my lamps')} value=${percent} min=${0} max=${100} step=${1} unit="%"
+      resetValue=${CURVE.toPosition(DEFAULT)} change=${set}
+      tip=${t('How near the solve stays to the lamps that you started from, where the paint does not say otherwise')} />
+    <${Button} icon="close" tip=${t('Start from the scene again')}
       act=${() => session.send('start_from_lamps', { is_on: false })} />
   </div>`;
 }

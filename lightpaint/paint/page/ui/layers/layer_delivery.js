@@ -1,7 +1,7 @@
 /** How much of a layer's wish came: a bar each for brightness and for colour, on its row. */
 
 import { html } from '../../vendor/preact.js';
-import { fill, words } from '../../language/language.js';
+import { t } from '../../language/language.js';
 
 /** @typedef {import("../ui_state.js").Ui} Ui */
 /** @typedef {import("../../engine/messages.js").Layer} Layer */
@@ -51,10 +51,13 @@ export const percentOf = (share) => Math.max(Math.round(100 * share), 0);
 export const knownShares = ({ brightness, color }) =>
   [brightness, color].filter((share) => share !== null);
 
-/** Say how much came: `98 % of the brightness and 43 % of the colour came`. @param {Shares} shares
- * @param {{ofBrightness: string, ofColour: string, ofBoth: string}} [texts] */
-export function deliveryText({ brightness, color }, texts = words.layerDelivery) {
-  if (brightness === null) return fill(texts.ofColour, { value: percentOf(color ?? 0) });
-  if (color === null) return fill(texts.ofBrightness, { value: percentOf(brightness) });
-  return fill(texts.ofBoth, { brightness: percentOf(brightness), colour: percentOf(color) });
+/** Say how much came: `98 % of the brightness and 43 % of the colour came`. @param {Shares} shares */
+function deliveryText({ brightness, color }) {
+  const [value, colour] = [percentOf(brightness ?? 0), percentOf(color ?? 0)];
+  if (brightness === null) return t('{value} % of the change of colour came', { value: colour });
+  if (color === null) return t('{value} % of the change of brightness came', { value });
+  return t(
+    'Of what it asks for, {brightness} % of the brightness and {colour} % of the colour came',
+    { brightness: value, colour },
+  );
 }

@@ -2,7 +2,7 @@
 
 import { html, useEffect, useRef, useState } from '../../vendor/preact.js';
 import { Button, Dialog } from '../controls.js';
-import { fill, words } from '../../language/language.js';
+import { t } from '../../language/language.js';
 import { sendFile } from '../file_parts.js';
 import { addReference, isPicture } from '../references/reference_files.js';
 
@@ -30,7 +30,10 @@ function takeDroppedFile(app, file) {
 export function takeLayerFile({ store, session, engine }, file) {
   if (!file) return;
   if (!ENDINGS.some((ending) => file.name.toLowerCase().endsWith(ending))) {
-    session.toast(fill(words.layerImport.hasNoLayersDropAnOra, { name: file.name }), 'warn');
+    session.toast(
+      t('{name} has no layers: choose an .ora file, or layers.exr.', { name: file.name }),
+      'warn',
+    );
     return;
   }
   const { layers, isPaintingEmpty, views } = store.value;
@@ -43,7 +46,7 @@ export function takeLayerFile({ store, session, engine }, file) {
 /** Send a file to the session. @param {App} app @param {File} file @param {boolean} replaces */
 async function sendLayerFile(app, file, replaces) {
   app.store.set({ layerFile: null });
-  app.session.toast(fill(words.layerImport.importing, { name: file.name }));
+  app.session.toast(t('Importing {name} …', { name: file.name }));
   await sendFile(app, file, 'import_layers', { view: app.store.value.view, replaces });
 }
 
@@ -55,7 +58,7 @@ export function LayerImportButton({ app }) {
     currentTarget.value = ''; // so that the same file can be chosen again
   };
   return html`<div class="layer-import">
-    <${Button} label=${words.layerImport.importLayers} tip=${words.layerImport.fromAnOraFileOfAny}
+    <${Button} label=${t('Import layers …')} tip=${t('From an .ora file of any program, or layers.exr. You can also drop the file here.')}
       act=${() => ref.current?.click()} />
     <input type="file" accept=${ENDINGS.join()} hidden ref=${ref} onChange=${take}
       aria-hidden="true" tabindex="-1" />
@@ -73,20 +76,20 @@ export function LayerImportDialog({ ui, app }) {
     close();
     void addReference(app, file);
   };
-  const title = isReference ? words.references.useAPicture : words.layerImport.importTitle;
+  const title = isReference ? t('Use a picture') : t('Import layers');
   return html`<${Dialog} title=${title} close=${close} class="layer-import-dialog">
-    <p>${words.layerImport.whereDoTheLayersOf} <strong>${file.name}</strong> ${words.layerImport.go}
-      ${isReference && ` ${words.references.orIsItAPicture}`}</p>
+    <p>${t('Where do the layers of')} <strong>${file.name}</strong> ${t('go?')}
+      ${isReference && ` ${t('Or is it a picture to look at?')}`}</p>
     <div class="row">
-      ${isReference && html`<${Button} label=${words.references.useItAsAReference} primary act=${use} />`}
-      <${Button} label=${words.layerImport.putThemOnTop} primary=${!isReference}
+      ${isReference && html`<${Button} label=${t('Use it as a reference')} primary act=${use} />`}
+      <${Button} label=${t('Put them on top')} primary=${!isReference}
         act=${() => sendLayerFile(app, file, false)} />
       ${
         ui.views.length < 2 &&
-        html`<${Button} label=${words.layerImport.replaceAllLayers}
+        html`<${Button} label=${t('Replace all layers')}
           act=${() => sendLayerFile(app, file, true)} />`
       }
-      <${Button} label=${words.layerImport.cancel} act=${close} />
+      <${Button} label=${t('Cancel')} act=${close} />
     </div>
   </${Dialog}>`;
 }
@@ -121,6 +124,6 @@ export function LayerDropFrame({ app, root }) {
   }, []);
   return (
     isOver &&
-    html`<div class="layer-drop" aria-hidden="true"><span>${words.layerImport.dropToImportLayers}</span></div>`
+    html`<div class="layer-drop" aria-hidden="true"><span>${t('Drop a reference picture, or layers')}</span></div>`
   );
 }

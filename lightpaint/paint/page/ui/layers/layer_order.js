@@ -1,6 +1,6 @@
 /** Changes of the layers' order, as requests: moved, grouped, copied and deleted layers. */
 
-import { fill, words } from '../../language/language.js';
+import { t } from '../../language/language.js';
 
 /** @typedef {import("../../engine/messages.js").Layer} Layer */
 /** @typedef {import("../../engine/messages.js").ChangeLayers} ChangeLayers */
@@ -31,7 +31,7 @@ export function movedLayer(layers, id, before, group) {
   return {
     layers: isOther ? [{ ...moved, group }] : [],
     order: rest.map(({ layer }) => layer.id).reverse(),
-    label: words.layerOrder.orderOfLayers,
+    label: t('order of layers'),
   };
 }
 
@@ -71,7 +71,7 @@ export function withoutLayers(layers, ids) {
   const stay = layers.filter(({ id, group }) => !ids.includes(id) && !ids.includes(group ?? -1));
   return {
     order: stay.map(({ id }) => id),
-    label: ids.length > 1 ? words.layerOrder.deleteLayers : words.layerOrder.deleteLayer,
+    label: ids.length > 1 ? t('delete layers') : t('delete layer'),
   };
 }
 
@@ -94,7 +94,7 @@ export function groupedLayers(layers, ids, next) {
     ...top,
     id: next,
     kind: 'group',
-    name: words.layerOrder.group,
+    name: t('Group'),
     group: null,
     is_visible: true,
   };
@@ -111,7 +111,7 @@ export function groupedLayers(layers, ids, next) {
       ...members.map((layer) => ({ ...layer, group: next })),
     ],
     order,
-    label: words.layerOrder.groupLayers,
+    label: t('group layers'),
   };
 }
 
@@ -121,7 +121,7 @@ export function ungroupedLayers(layers, id) {
   return {
     layers: layers.filter(({ group }) => group === id).map((layer) => ({ ...layer, group: null })),
     order: layers.map((layer) => layer.id).filter((one) => one !== id),
-    label: words.layerOrder.ungroupLayers,
+    label: t('ungroup layers'),
   };
 }
 
@@ -136,12 +136,12 @@ export function copiedLayers(layers, id, next) {
     id: /** @type {number} */ (ids.get(layer.id)),
     // A painting that is always there is copied as paint like any other layer of pixels.
     group: layer.group === null ? null : (ids.get(layer.group) ?? layer.group),
-    name: layer.id === id ? fill(words.layerOrder.copy, { name: layer.name }) : layer.name,
+    name: layer.id === id ? t('{name} copy', { name: layer.name }) : layer.name,
   }));
   const order = layers.flatMap((layer) =>
     layer.id === id ? [id, ...made.map((one) => one.id)] : [layer.id],
   );
   const pixels = block.filter(({ kind }) => kind !== 'group');
   const copies = Object.fromEntries(pixels.map((layer) => [ids.get(layer.id), layer.id]));
-  return { layers: made, order, copies, label: words.layerOrder.copyLayer };
+  return { layers: made, order, copies, label: t('copy layer') };
 }

@@ -6,7 +6,7 @@ import { LayerRow } from './layer_row.js';
 import { LayerImportButton } from './layer_import.js';
 import { dragLayer } from './layer_drag.js';
 import { rowsOf } from './layer_order.js';
-import { words } from '../../language/language.js';
+import { t } from '../../language/language.js';
 
 /** @typedef {import("../ui_state.js").Ui} Ui */
 /** @typedef {import("../shortcuts.js").App} App */
@@ -28,11 +28,11 @@ function seenRows(ui) {
 /** @param {{ui: Ui, app: App}} props */
 export function LayerPanel({ ui, app }) {
   if (!hasLayers(ui))
-    return html`<p class="faint layers-none">${words.layerPanel.adjustmentsAndFillsBecomeLayers}</p>
+    return html`<p class="faint layers-none">${t('Adjustments and fills become layers here.')}</p>
       <${LayerImportButton} app=${app} />`;
   const rows = seenRows(ui);
   const leave = () => app.store.set({ hoveredLayer: null });
-  return html`<ul class="layers" aria-label=${words.layerPanel.layersTheTopmostFirst}
+  return html`<ul class="layers" aria-label=${t('Layers, the topmost first')}
     onPointerLeave=${leave}
     onPointerDown=${(/** @type {PointerEvent} */ event) => dragLayer(event, app)}>
     ${rows.map(
@@ -57,7 +57,7 @@ export function MaskNote({ ui, app }) {
   if (!layer) return null;
   const stop = (/** @type {Event} */ event) => event.stopPropagation();
   return html`<div class="mask-note" role="status" onPointerDown=${stop}>
-    <span>${words.layerPanel.maskOf} <strong>${layer.name}</strong>${words.layerPanel.theBrushAddsTheEraserRemoves}</span>
-    <${Button} label=${words.layerPanel.done} act=${() => app.engine.paintMask(null)} />
+    <span>${t('Mask of')} <strong>${layer.name}</strong>${t(': the brush adds, the eraser removes.')}</span>
+    <${Button} label=${t('Done')} act=${() => app.engine.paintMask(null)} />
   </div>`;
 }

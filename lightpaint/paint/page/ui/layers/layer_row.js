@@ -15,7 +15,7 @@ import {
   withoutLayers,
 } from './layer_order.js';
 import { LayerDelivery } from './layer_delivery.js';
-import { fill, words } from '../../language/language.js';
+import { t } from '../../language/language.js';
 
 /** @typedef {import("../ui_state.js").Ui} Ui */
 /** @typedef {import("../shortcuts.js").App} App */
@@ -28,7 +28,7 @@ const THUMBNAIL = { width: 40, height: 24 };
 /** Importance is perceived as a ratio, and snaps to 1. */
 const TIMES = {
   toPosition: (/** @type {number} */ x) => Math.log10(x),
-  toValue: (/** @type {number} */ t) => Number((10 ** (Math.abs(t) < 0.03 ? 0 : t)).toPrecision(2)),
+  toValue: (/** @type {number} */ x) => Number((10 ** (Math.abs(x) < 0.03 ? 0 : x)).toPrecision(2)),
 };
 
 /**
@@ -51,7 +51,7 @@ export function LayerRow({ ui, app, layer, isInner, isActive, isUnfolded, isChos
   const show = () =>
     engine.changeLayers({
       layers: [{ ...layer, is_visible: !isVisible }],
-      label: isVisible ? fill(words.layerRow.hide, { name }) : fill(words.layerRow.show, { name }),
+      label: isVisible ? t('hide {name}', { name }) : t('show {name}', { name }),
     });
   const hover = (/** @type {number | null} */ hoveredLayer) => () => store.set({ hoveredLayer });
   const focus = (/** @type {any} */ event) =>
@@ -59,11 +59,11 @@ export function LayerRow({ ui, app, layer, isInner, isActive, isUnfolded, isChos
   return html`<li class=${kind.filter(Boolean).join(' ')} data-layer=${id}>
     <div class="layer-line" onPointerEnter=${hover(id)} onPointerLeave=${hover(null)}>
       <${Button} icon=${isVisible ? 'eye' : 'hidden'} 
-        tip=${fill(isVisible ? words.layerRow.hideLayer : words.layerRow.showLayer, { name })} act=${show} />
+        tip=${isVisible ? t('Hide {name}', { name }) : t('Show {name}', { name })} act=${show} />
       ${
         isGroup
           ? html`<button type="button" class="layer-fold" aria-expanded=${String(isOpen)}
-              aria-label=${fill(words.layerRow.layersOf, { name })} onClick=${fold}><${Icon} name="fold" /></button>`
+              aria-label=${t('Layers of {name}', { name })} onClick=${fold}><${Icon} name="fold" /></button>`
           : html`<${LayerThumbnail} ui=${ui} app=${app} id=${id} />`
       }
       <button type="button" class="layer-name" aria-current=${isActive ? 'true' : undefined}
@@ -71,10 +71,10 @@ export function LayerRow({ ui, app, layer, isInner, isActive, isUnfolded, isChos
         aria-keyshortcuts="Alt+ArrowUp Alt+ArrowDown Delete" data-tip=${name.length > 24 ? name : undefined}
         onClick=${(/** @type {MouseEvent} */ event) => chooseLayer(event, app, id)} onFocus=${focus}
         onBlur=${hover(null)} onKeyDown=${(/** @type {KeyboardEvent} */ event) =>
-          pressKey(event, app, layer)}>${name || words.layerRow.layer}</button>
+          pressKey(event, app, layer)}>${name || t('Layer')}</button>
       ${layer.strength !== 1 && html`<span class="faint">${Math.round(100 * layer.strength)} %</span>`}
       <${LayerDelivery} ui=${ui} layer=${layer} />
-      <span class="grip" aria-hidden="true" data-tip=${words.layerRow.dragToOrder}><${Icon} name="grip" /></span>
+      <span class="grip" aria-hidden="true" data-tip=${t('Drag to order')}><${Icon} name="grip" /></span>
     </div>
     ${isUnfolded && html`<${LayerControls} ui=${ui} app=${app} layer=${layer} />`}
   </li>`;
@@ -122,14 +122,14 @@ function LayerControls({ ui, app, layer }) {
   // A slider that is let go where it was grasped has no other end.
   const release = () => setTimeout(() => engine.finishLayers());
   return html`<div class="layer-controls" onPointerUp=${release}>
-    <${Slider} label=${words.layerRow.strength} value=${100 * layer.strength} min=${0} max=${200} unit="%" resetValue=${100}
-      tip=${words.layerRow.n100AsAskedFor200Twice}
+    <${Slider} label=${t('Strength')} value=${100 * layer.strength} min=${0} max=${200} unit="%" resetValue=${100}
+      tip=${t('100 %: as asked for; 200 %: twice the stops')}
       change=${(/** @type {number} */ to, /** @type {boolean} */ done) =>
         set({ strength: Math.round(to) / 100 }, 'strength', done)} />
     ${
       kind !== 'weigh' &&
-      html`<${Slider} label=${words.layerRow.importance} value=${layer.importance} min=${0.1} max=${10} curve=${TIMES}
-      step=${0.1} digits=${2} resetValue=${1} unit="×" tip=${words.layerRow.howManyTimesAsMuchThis}
+      html`<${Slider} label=${t('Importance')} value=${layer.importance} min=${0.1} max=${10} curve=${TIMES}
+      step=${0.1} digits=${2} resetValue=${1} unit="×" tip=${t('How many times as much this layer counts')}
       change=${(/** @type {number} */ importance, /** @type {boolean} */ done) =>
         set({ importance }, 'importance', done)} />`
     }
@@ -137,29 +137,29 @@ function LayerControls({ ui, app, layer }) {
     ${(kind === 'adjust' || (layer.gradient && !layer.gradient.light)) && html`<${Adjustment} layer=${layer} set=${set} />`}
     ${
       kind === 'weigh' &&
-      html`<${NumberField} label=${words.layerRow.weight} value=${layer.times} min=${0.01} max=${100} step=${0.5}
+      html`<${NumberField} label=${t('Weight')} value=${layer.times} min=${0.01} max=${100} step=${0.5}
       unit="×" change=${(/** @type {number} */ times) => set({ times }, 'importance')} />`
     }
     <${LayerName} layer=${layer} set=${set} />
-    <div class="layer-acts" role="group" aria-label=${fill(words.layerRow.actionsFor, { name: layer.name })}>
+    <div class="layer-acts" role="group" aria-label=${t('Actions for {name}', { name: layer.name })}>
       ${
         ['adjust', 'weigh', 'gradient'].includes(kind) &&
-        html`<${Button} label=${words.layerRow.mask} pressed=${isMasked} act=${mask}
-        tip=${words.layerRow.paintWhereThisLayerAppliesThe} />`
+        html`<${Button} label=${t('Mask')} pressed=${isMasked} act=${mask}
+        tip=${t('Paint where this layer applies: the brush adds, the eraser removes')} />`
       }
       ${
         kind === 'group'
-          ? html`<${Button} label=${words.layerRow.ungroup} act=${() => change(ungroupedLayers(ui.layers, id))} />`
-          : html`<${Button} icon="group" tip=${ids.length > 1 ? fill(words.layerRow.groupLayers, { count: ids.length }) : words.layerRow.putIntoAGroup}
+          ? html`<${Button} label=${t('Ungroup')} act=${() => change(ungroupedLayers(ui.layers, id))} />`
+          : html`<${Button} icon="group" tip=${ids.length > 1 ? t('Group {count} layers', { count: ids.length }) : t('Put into a group')}
               act=${() => change(groupedLayers(ui.layers, ids, ui.nextLayer))} />`
       }
       <span class="spring"></span>
       ${
         id !== 0 &&
-        html`<${Button} icon="copy" tip=${words.layerRow.duplicate}
+        html`<${Button} icon="copy" tip=${t('Duplicate')}
         act=${() => change(copiedLayers(ui.layers, id, ui.nextLayer))} />`
       }
-      <${Button} icon="trash" tip=${ids.length > 1 ? fill(words.layerRow.deleteLayers, { count: ids.length }) : words.layerRow.delete}
+      <${Button} icon="trash" tip=${ids.length > 1 ? t('Delete {count} layers', { count: ids.length }) : t('Delete')}
         act=${() => change(withoutLayers(ui.layers, ids))} />
     </div>
   </div>`;
@@ -171,10 +171,10 @@ function Adjustment({ layer, set }) {
   const stops = Math.log2(layer.gain);
   const mired = miredOf(layer.tint);
   return html`<div class="layer-wish" data-numbers>
-    <${NumberField} label=${words.layerRow.brighter} value=${stops} min=${-8} max=${8} step=${0.1} unit=${words.layerRow.st}
+    <${NumberField} label=${t('Brighter')} value=${stops} min=${-8} max=${8} step=${0.1} unit=${t('st')}
       change=${(/** @type {number} */ to) => set({ gain: 2 ** to }, 'adjust')} />
-    <${NumberField} label=${words.layerRow.warmer} value=${mired} min=${-300} max=${300} step=${5} digits=${0}
-      unit=${words.layerRow.mired} change=${(/** @type {number} */ to) => set({ tint: warmer(to) }, 'adjust')} />
+    <${NumberField} label=${t('Warmer')} value=${mired} min=${-300} max=${300} step=${5} digits=${0}
+      unit=${t('mired')} change=${(/** @type {number} */ to) => set({ tint: warmer(to) }, 'adjust')} />
   </div>`;
 }
 
@@ -197,13 +197,13 @@ function LayerName({ layer, set }) {
   const take = (/** @type {string} */ text) => {
     setTyped(null);
     const name = text.trim();
-    if (name && name !== layer.name) set({ name }, words.layerRow.renameLayer);
+    if (name && name !== layer.name) set({ name }, t('rename layer'));
   };
   const press = (/** @type {any} */ { key, currentTarget }) => {
     if (key === 'Enter') take(currentTarget.value);
     if (key === 'Escape') setTyped(null);
   };
-  return html`<label class="field layer-label" data-tip=${layer.name.length > 20 ? layer.name : undefined}><span class="name">${words.layerRow.name}</span>
+  return html`<label class="field layer-label" data-tip=${layer.name.length > 20 ? layer.name : undefined}><span class="name">${t('Name')}</span>
     <input type="text" value=${typed ?? layer.name} maxlength="80" autocomplete="off" spellcheck=${false}
       data-typed=${typed === null ? 'no' : 'yes'} onKeyDown=${press}
       onInput=${(/** @type {any} */ event) => setTyped(event.currentTarget.value)}
@@ -241,7 +241,9 @@ function pressKey(event, app, layer) {
     if (change) engine.changeLayers(change);
     store.set({
       layerNote: change
-        ? fill(way < 0 ? words.layerRow.movedUp : words.layerRow.movedDown, { name: layer.name })
+        ? way < 0
+          ? t('{name} moved up', { name: layer.name })
+          : t('{name} moved down', { name: layer.name })
         : '',
     });
     // An element that is moved loses the focus.
@@ -253,7 +255,7 @@ function pressKey(event, app, layer) {
     const ids = selectedLayers.includes(layer.id) ? selectedLayers : [layer.id];
     engine.changeLayers(withoutLayers(layers, ids));
     store.set({
-      layerNote: fill(words.layerRow.deleted, { name: layer.name }),
+      layerNote: t('{name} deleted', { name: layer.name }),
       hoveredLayer: null,
     });
     requestAnimationFrame(() => names()[Math.min(at, names().length - 1)]?.focus());

@@ -1,6 +1,6 @@
 /** Moving a side panel to another place: a drag of its title or its grip, or the arrow keys with Alt. */
 
-import { fill, words } from '../../language/language.js';
+import { t } from '../../language/language.js';
 import { withPanelBefore, withPanelStepped } from './panel_order.js';
 
 /** @typedef {import("../ui_state.js").UiStore} UiStore */
@@ -86,8 +86,12 @@ export function stepPanel(event, store) {
   event.stopPropagation();
   const shown = panelsIn(side).map(nameOf);
   const order = withPanelStepped(store.value.panelOrder, shown, nameOf(panel), step);
-  const place = { name: panel.getAttribute('aria-label') ?? '', place: shown.indexOf(nameOf(panel)) + 1 + (order ? step : 0), count: shown.length };
-  const note = fill(words.panels.place, place);
+  const place = {
+    name: panel.getAttribute('aria-label') ?? '',
+    place: shown.indexOf(nameOf(panel)) + 1 + (order ? step : 0),
+    count: shown.length,
+  };
+  const note = t('{name}: {place} of {count} panels', place);
   store.set(order ? { panelOrder: order, panelNote: note } : { panelNote: note });
   // An element that is moved loses the focus.
   requestAnimationFrame(() => {

@@ -1,6 +1,6 @@
 /** Reference pictures beside the canvas, and *Look like this*, which asks for their light. */
 
-import { fill, words } from '../../language/language.js';
+import { t } from '../../language/language.js';
 import { html, useRef, useState } from '../../vendor/preact.js';
 import { Button, Checkbox, Choice } from '../controls.js';
 import { Thumbnail } from '../thumbnail.js';
@@ -14,10 +14,26 @@ import { shownPairs, shownReference } from './reference_state.js';
 
 /** @type {{value: ComparedAreas, label: string, tip: string}[]} */
 const AREAS = [
-  { value: 'whole', label: words.references.whole, tip: words.references.wholeTip },
-  { value: 'regions', label: words.references.regions, tip: words.references.regionsTip },
-  { value: 'parts', label: words.references.sameView, tip: words.references.sameViewTip },
-  { value: 'pairs', label: words.references.places, tip: words.references.placesTip },
+  {
+    value: 'whole',
+    label: t('Whole'),
+    tip: t('The colour of all of it, of its lit parts and its shadows'),
+  },
+  {
+    value: 'regions',
+    label: t('Regions'),
+    tip: t('Also its top, as ceiling or sky, its middle and its bottom'),
+  },
+  {
+    value: 'parts',
+    label: t('Same view'),
+    tip: t('For a picture of this scene from here: each part, softly'),
+  },
+  {
+    value: 'pairs',
+    label: t('Places'),
+    tip: t('Places that you press, in the reference and in the picture'),
+  },
 ];
 
 /** @param {{ui: Ui, app: App}} props */
@@ -41,11 +57,11 @@ export function ReferencePane({ ui, app }) {
     void addReference(app, event.dataTransfer.files[0]);
   };
   const choose = () => input.current?.click();
-  return html`<aside class=${`reference-pane ${isOver ? 'is-over' : ''}`} aria-label=${words.references.references}
+  return html`<aside class=${`reference-pane ${isOver ? 'is-over' : ''}`} aria-label=${t('References')}
     onDragEnter=${() => setOver(true)} onDragLeave=${() => setOver(false)} onDrop=${drop}>
-    <div class="reference-head"><h2>${words.references.reference}</h2><span class="spring"></span>
-      <${Button} icon="plus" tip=${words.references.addAPicture} act=${choose} />
-      <${Button} icon="close" tip=${words.references.close}
+    <div class="reference-head"><h2>${t('Reference')}</h2><span class="spring"></span>
+      <${Button} icon="plus" tip=${t('Add a picture. You can also drop one, or paste it with Ctrl V.')} act=${choose} />
+      <${Button} icon="close" tip=${t('Close the references')}
         act=${() => store.set({ isReferenceOpen: false, clickAction: null })} />
     </div>
     <input type="file" accept=${[...PICTURE_ENDINGS, 'image/*'].join()} hidden ref=${input} onChange=${take}
@@ -55,11 +71,11 @@ export function ReferencePane({ ui, app }) {
         ? html`<${ReferencePicture} key=${shown.id} reference=${shown} ui=${ui} app=${app} />
           <${ReferenceList} ui=${ui} app=${app} shown=${shown.id} />
           <${LookLikeFields} ui=${ui} app=${app} shown=${shown.id} />`
-        : html`<div class="reference-none"><p>${words.references.aPictureWhoseLight}</p>
-          <p class="faint">${words.references.dropPasteOrChoose}</p>
-          <${Button} label=${words.references.chooseAFile} act=${choose} /></div>`
+        : html`<div class="reference-none"><p>${t('A picture whose light you want here.')}</p>
+          <p class="faint">${t('Drop it, paste it, or choose a file.')}</p>
+          <${Button} label=${t('Choose a file …')} act=${choose} /></div>`
     }
-    ${ui.isReferenceComing && html`<p class="faint" role="status">${words.references.readingThePicture}</p>`}
+    ${ui.isReferenceComing && html`<p class="faint" role="status">${t('Reading the picture …')}</p>`}
   </aside>`;
 }
 
@@ -68,13 +84,13 @@ export function ReferencePane({ ui, app }) {
 function ReferenceList({ ui, app, shown }) {
   const name = ui.references.find(({ id }) => id === shown)?.name ?? '';
   return html`<div class="reference-name"><span class="spring" data-tip=${name}>${name}</span>
-      <${Button} icon="trash" tip=${fill(words.references.remove, { name })}
+      <${Button} icon="trash" tip=${t('Remove {name}. Layers made of it stay.', { name })}
         act=${() => app.session.send('drop_reference', { reference: shown })} /></div>
     ${
       ui.references.length > 1 &&
-      html`<ul class="reference-list" aria-label=${words.references.all}>${ui.references.map(
+      html`<ul class="reference-list" aria-label=${t('All references')}>${ui.references.map(
         ({ id, name: other }) => html`<li key=${id}><button type="button" data-tip=${other}
-          aria-label=${fill(words.references.show, { name: other })} aria-current=${id === shown ? 'true' : undefined}
+          aria-label=${t('Show {name}', { name: other })} aria-current=${id === shown ? 'true' : undefined}
           onClick=${() => app.store.set({ reference: id, clickAction: null })}>
           <${Thumbnail} name=${`reference/${id}`} generation=${0} app=${app} /></button></li>`,
       )}</ul>`
@@ -106,14 +122,14 @@ function LookLikeFields({ ui, app, shown }) {
       store.set(({ open }) => ({ openLayer: group.id, open: { ...open, [`layer ${group.id}`]: false } }));
   };
   return html`<div class="look-like">
-    <${Choice} label=${words.references.whatIsCompared} value=${ui.comparedAreas} choices=${AREAS}
+    <${Choice} label=${t('What is compared')} value=${ui.comparedAreas} choices=${AREAS}
       change=${(/** @type {ComparedAreas} */ comparedAreas) => store.set({ comparedAreas, clickAction: null })} />
     ${arePairs && html`<${PairList} ui=${ui} app=${app} />`}
-    <${Checkbox} label=${words.references.asBrightAsIt} checked=${ui.matchesBrightness}
-      tip=${words.references.asBrightAsItTip}
+    <${Checkbox} label=${t('As bright as it')} checked=${ui.matchesBrightness}
+      tip=${t('Otherwise only the differences within it count, since its exposure is unknown')}
       change=${(/** @type {boolean} */ matchesBrightness) => store.set({ matchesBrightness })} />
-    <${Button} label=${words.references.lookLikeThis} primary disabled=${isBusy || (arePairs && !pairs.length)} act=${() => void ask()}
-      tip=${words.references.lookLikeThisTip} />
+    <${Button} label=${t('Look like this')} primary disabled=${isBusy || (arePairs && !pairs.length)} act=${() => void ask()}
+      tip=${t('Asks for its light in layers. Undo takes them back.')} />
   </div>`;
 }
 
@@ -124,11 +140,11 @@ function PairList({ ui, app }) {
     app.store.set(({ placePairs }) => ({ placePairs: placePairs.filter((other) => other !== pair) }));
   return html`<p class="faint">${
     ui.clickAction?.mode === 'pair'
-      ? words.references.pressItsPlace
-      : words.references.pressAPair
+      ? t('Now press the place in the picture that should look like it.')
+      : t('Press a place in the reference, then one in the picture.')
   }</p>
-  <ul class="pair-list" aria-label=${words.references.pairs}>${pairs.map(
+  <ul class="pair-list" aria-label=${t('Pairs of places')}>${pairs.map(
     (pair, k) => html`<li key=${k}><span class="pair-number">${k + 1}</span>
-      <${Button} icon="close" tip=${fill(words.references.removePair, { number: k + 1 })} act=${() => remove(pair)} /></li>`,
+      <${Button} icon="close" tip=${t('Remove pair {number}', { number: k + 1 })} act=${() => remove(pair)} /></li>`,
   )}</ul>`;
 }

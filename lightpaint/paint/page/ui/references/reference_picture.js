@@ -1,7 +1,7 @@
 /** The picture of a reference: its light can be picked, and places in it compared. */
 
 import { VALUES } from '../../../../viewer/drawing/half_floats.js';
-import { fill, words } from '../../language/language.js';
+import { t } from '../../language/language.js';
 import { html, useRef, useState } from '../../vendor/preact.js';
 import { Thumbnail } from '../thumbnail.js';
 import { pickPaint } from '../tools.js';
@@ -74,7 +74,7 @@ export function ReferencePicture({ reference, ui, app }) {
   const { clickAction } = ui;
   const open = clickAction?.mode === 'pair' ? clickAction.reference : null;
   return html`<div class="reference-picture" role="application" tabindex="0" ref=${frame}
-    aria-label=${fill(words.references.picture, { name: reference.name })}
+    aria-label=${t('{name}. A press takes its light as paint, or a place. Arrow keys and Enter do the same.', { name: reference.name })}
     onPointerDown=${press} onKeyDown=${key} onBlur=${() => setCross(null)}>
     <${Thumbnail} name=${`reference/${reference.id}`} generation=${0} app=${app} />
     ${pairs.map(

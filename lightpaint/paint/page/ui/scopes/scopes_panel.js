@@ -2,7 +2,7 @@
 
 import { html, useEffect, useLayoutEffect, useRef, useState } from '../../vendor/preact.js';
 import { Choice } from '../controls.js';
-import { fill, words } from '../../language/language.js';
+import { t } from '../../language/language.js';
 import { drawScope, VECTOR_SIZE } from './scope_drawing.js';
 import { clippedPart, histogram, percentile, placeOf, SKIN_ANGLE, targets } from './scope_arithmetic.js';
 
@@ -12,15 +12,33 @@ import { clippedPart, histogram, percentile, placeOf, SKIN_ANGLE, targets } from
 /** @typedef {import("./scope_state.js").ScopeKind} ScopeKind */
 
 const KINDS = [
-  { value: 'histogram', label: words.scopes.histogram, tip: words.scopes.histogramTip },
-  { value: 'waveform', label: words.scopes.waveform, tip: words.scopes.waveformTip },
-  { value: 'parade', label: words.scopes.parade, tip: words.scopes.paradeTip },
-  { value: 'vectorscope', label: words.scopes.vectorscope, tip: words.scopes.vectorscopeTip },
+  {
+    value: 'histogram',
+    label: t('Histogram'),
+    tip: t('How much of the picture has each level, in percent of the display'),
+  },
+  {
+    value: 'waveform',
+    label: t('Waveform'),
+    tip: t('Levels of luma from left to right of the picture, in percent of the display'),
+  },
+  {
+    value: 'parade',
+    label: t('Parade'),
+    tip: t('Levels of red, green and blue beside each other'),
+  },
+  {
+    value: 'vectorscope',
+    label: t('Vectorscope'),
+    tip: t(
+      'Hue around the middle, saturation outwards; targets of bars of 75 %, and the line of skin',
+    ),
+  },
 ];
 const PICTURES = [
-  { value: 'painting', label: words.scopes.painting },
-  { value: 'solution', label: words.scopes.answer },
-  { value: 'present', label: words.scopes.original, tip: words.scopes.originalTip },
+  { value: 'painting', label: t('Painting') },
+  { value: 'solution', label: t('Answer') },
+  { value: 'present', label: t('Original'), tip: t('The picture of the scene as it was') },
 ];
 
 /** Least milliseconds between two scopes, and how many times what one takes lies between them: scopes
@@ -60,13 +78,13 @@ export function ScopesPanel({ ui, app }) {
   ]);
   const name = PICTURES.find(({ value }) => value === picture)?.label ?? '';
   const title = KINDS.find(({ value }) => value === kind)?.label ?? '';
-  const text = codes ? levelsText(codes) : words.scopes.none;
+  const text = codes ? levelsText(codes) : t('There is no picture yet.');
   return html`<div class="scopes">
-    <${Choice} label=${words.scopes.scope} value=${kind} choices=${KINDS}
+    <${Choice} label=${t('Scope')} value=${kind} choices=${KINDS}
       change=${(/** @type {ScopeKind} */ scopeKind) => app.store.set({ scopeKind })} />
-    <${Choice} label=${words.scopes.picture} value=${picture} choices=${PICTURES}
+    <${Choice} label=${t('Picture')} value=${picture} choices=${PICTURES}
       change=${(/** @type {Ui["scopePicture"]} */ scopePicture) => app.store.set({ scopePicture })} />
-    <${Scope} kind=${kind} codes=${codes} label=${fill(words.scopes.of, { title, name, text })} />
+    <${Scope} kind=${kind} codes=${codes} label=${t('{title} of the picture: {name}. {text}', { title, name, text })} />
     <p class="faint">${text}</p>
   </div>`;
 }
@@ -76,8 +94,16 @@ function levelsText(codes) {
   const counts = histogram(codes);
   const percent = (/** @type {number} */ value) => `${value.toFixed(value > 0 && value < 9.95 ? 1 : 0)} %`;
   const [low, middle, high] = [0.01, 0.5, 0.99].map((part) => percent(percentile(counts[3], part)));
-  const clipped = { white: percent(100 * clippedPart(counts, 255)), black: percent(100 * clippedPart(counts, 0)) };
-  return fill(words.scopes.levels, { low, middle, high, ...clipped });
+  const clipped = {
+    white: percent(100 * clippedPart(counts, 255)),
+    black: percent(100 * clippedPart(counts, 0)),
+  };
+  return t('Luma {low} to {high}, middle {middle}. White {white}, black {black} of the pixels.', {
+    low,
+    middle,
+    high,
+    ...clipped,
+  });
 }
 
 /** A scope with its lines. @param {{kind: ScopeKind, codes: Codes | null, label: string}} props */

@@ -3,7 +3,7 @@
 import { html, useEffect, useState } from '../../vendor/preact.js';
 import { Button, Dialog } from '../controls.js';
 import { durationText } from '../format.js';
-import { fill, words } from '../../language/language.js';
+import { t } from '../../language/language.js';
 
 /** @typedef {import("../shortcuts.js").App} App */
 /** @typedef {import("../../engine/messages.js").Events["place_estimate"]} Estimate */
@@ -27,20 +27,20 @@ export function MoveDialog({ app, close }) {
     close();
     void session.placeLights();
   };
-  return html`<${Dialog} title=${words.advice.letLightsMove} close=${close} class="move">
-    <p role="status">${estimate ? estimate.text : words.searches.estimating}</p>
+  return html`<${Dialog} title=${t('Let lights move')} close=${close} class="move">
+    <p role="status">${estimate ? estimate.text : t('Estimating the time …')}</p>
     ${estimate && html`<p><strong>${timeText(estimate)}</strong></p>`}
-    <p class="faint">${words.searches.goesOn}</p>
-    <div class="row"><${Button} label=${words.advice.cancel} act=${close} />
-      <${Button} icon="search" label=${words.searches.begin} primary disabled=${!estimate} act=${begin} /></div>
+    <p class="faint">${t('You can go on looking and painting meanwhile, and stop at any time: with the best so far, or with every light where it is.')}</p>
+    <div class="row"><${Button} label=${t('Cancel')} act=${close} />
+      <${Button} icon="search" label=${t('Begin')} primary disabled=${!estimate} act=${begin} /></div>
   </${Dialog}>`;
 }
 
 /** @param {Estimate} estimate */
 function timeText({ seconds, is_measured: isMeasured }) {
   const [low, high] = seconds.map(durationText);
-  const text = isMeasured ? words.searches.measured : words.searches.about;
-  return low === high
-    ? fill(text, { time: low })
-    : fill(text, { time: fill(words.searches.fromTo, { low, high }) });
+  const time = low === high ? low : t('{low} to {high}', { low, high });
+  return isMeasured
+    ? t('About {time}, as an earlier search here.', { time })
+    : t('About {time}.', { time });
 }

@@ -3,7 +3,7 @@
 import { html, useState } from '../../vendor/preact.js';
 import { clockText, durationText } from '../format.js';
 import { Icon } from '../icons.js';
-import { fill, words } from '../../language/language.js';
+import { t } from '../../language/language.js';
 
 /** @typedef {import("../../engine/messages.js").SearchInfo} Search */
 
@@ -18,7 +18,7 @@ export function SearchRow({ search }) {
       <span class="faint">${clockText(stamp)}</span></button>
     ${
       isOpen &&
-      html`<div class="search-tried"><p>${fill(words.searches.took, { time: durationText(seconds) })}</p>
+      html`<div class="search-tried"><p>${t('Took {time}. Tried:', { time: durationText(seconds) })}</p>
       ${tried.map((sentence) => html`<p key=${sentence}>${sentence}</p>`)}</div>`
     }
   </li>`;

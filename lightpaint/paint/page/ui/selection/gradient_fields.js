@@ -5,7 +5,7 @@ import { Button, Choice, NumberField } from '../controls.js';
 import { toHex } from '../paint_colour.js';
 import { exposureOf, paintOf } from '../display_state.js';
 import { GRADIENT_SHAPES } from './gradient_options.js';
-import { words } from '../../language/language.js';
+import { t } from '../../language/language.js';
 
 /** @typedef {import("../ui_state.js").Ui} Ui */
 /** @typedef {import("../../engine/messages.js").Gradient} Gradient */
@@ -14,7 +14,7 @@ import { words } from '../../language/language.js';
 /** @param {{ui: Ui, gradient: Gradient, set: (made: Partial<Layer>, label: string) => void}} props */
 export function GradientFields({ ui, gradient, set }) {
   const change = (/** @type {Partial<Gradient>} */ made) =>
-    set({ gradient: { ...gradient, ...made } }, words.gradientFields.gradient);
+    set({ gradient: { ...gradient, ...made } }, t('gradient'));
   const [rows, columns] = ui.state?.size ?? [1, 1];
   const field = (
     /** @type {"start" | "end"} */ end,
@@ -22,7 +22,7 @@ export function GradientFields({ ui, gradient, set }) {
     /** @type {string} */ label,
   ) =>
     html`<${NumberField} label=${label} value=${gradient[end][k]} min=${-4 * columns} max=${4 * Math.max(rows, columns)}
-      digits=${0} unit=${words.gradientFields.px} change=${(/** @type {number} */ to) => {
+      digits=${0} unit=${t('px')} change=${(/** @type {number} */ to) => {
         /** @type {[number, number]} */
         const place = [...gradient[end]];
         place[k] = to;
@@ -30,20 +30,20 @@ export function GradientFields({ ui, gradient, set }) {
       }} />`;
   const paint = paintOf(ui);
   return html`<div class="gradient-fields" data-numbers>
-    <${Choice} label=${words.gradientFields.shape} value=${gradient.shape} choices=${GRADIENT_SHAPES}
+    <${Choice} label=${t('Shape')} value=${gradient.shape} choices=${GRADIENT_SHAPES}
       change=${(/** @type {any} */ shape) => change({ shape })} />
-    <div class="gradient-place" role="group" aria-label=${words.gradientFields.start}>${field('start', 0, words.gradientFields.fromX)}${field('start', 1, 'y')}</div>
-    <div class="gradient-place" role="group" aria-label=${words.gradientFields.end}>${field('end', 0, words.gradientFields.toX)}${field('end', 1, 'y')}</div>
+    <div class="gradient-place" role="group" aria-label=${t('Start')}>${field('start', 0, t('From x'))}${field('start', 1, 'y')}</div>
+    <div class="gradient-place" role="group" aria-label=${t('End')}>${field('end', 0, t('To x'))}${field('end', 1, 'y')}</div>
     ${
       gradient.light &&
       html`<div class="row">
         <${Light} ui=${ui} light=${gradient.light} />
-        <${Button} label=${words.gradientFields.startInCurrentColour} act=${() => change({ light: paint })} />
+        <${Button} label=${t('Start in current colour')} act=${() => change({ light: paint })} />
       </div>
       <div class="row">
         <${Light} ui=${ui} light=${gradient.end_light} />
-        <${Button} label=${words.gradientFields.endInIt} act=${() => change({ end_light: paint })} />
-        <${Button} label=${words.gradientFields.fadeOut} disabled=${!gradient.end_light} act=${() => change({ end_light: null })} />
+        <${Button} label=${t('End in it')} act=${() => change({ end_light: paint })} />
+        <${Button} label=${t('Fade out')} disabled=${!gradient.end_light} act=${() => change({ end_light: null })} />
       </div>`
     }
   </div>`;

@@ -1,7 +1,7 @@
 /** The ends of the active gradient, on the painting: drag them, or move them by the arrow keys. */
 
 import { html, useRef } from '../../vendor/preact.js';
-import { fill, words } from '../../language/language.js';
+import { t } from '../../language/language.js';
 
 /** @typedef {import("../engine_interface.js").Pane} Pane */
 /** @typedef {import("../ui_state.js").Ui} Ui */
@@ -11,8 +11,8 @@ import { fill, words } from '../../language/language.js';
 
 /** @type {{end: "start" | "end", label: string}[]} */
 const ENDS = [
-  { end: 'start', label: words.gradientHandles.startOfTheGradient },
-  { end: 'end', label: words.gradientHandles.endOfTheGradient },
+  { end: 'start', label: t('Start of the gradient') },
+  { end: 'end', label: t('End of the gradient') },
 ];
 
 /** @param {{ui: Ui, app: App, panes: Pane[]}} props */
@@ -53,7 +53,7 @@ function Handle({ end, label, app, layer, gradient, place, scale }) {
   const move = (/** @type {[number, number]} */ to, /** @type {boolean} */ isFinal) =>
     app.engine.changeLayers({
       layers: [{ ...layer, gradient: { ...gradient, [end]: to } }],
-      label: words.gradientHandles.gradient,
+      label: t('gradient'),
       is_final: isFinal,
     });
   const press = (/** @type {PointerEvent} */ event) => {
@@ -85,7 +85,7 @@ function Handle({ end, label, app, layer, gradient, place, scale }) {
     move([x + step * way[0], y + step * way[1]], true);
   };
   return html`<button type="button" class=${`gradient-end is-${end}`} aria-label=${label}
-    data-tip=${fill(words.gradientHandles.dragItOrMoveItBy, { label })}
+    data-tip=${t('{label}: drag it, or move it by the arrow keys', { label })}
     style=${{ transform: `translate(${place.x}px, ${place.y}px)` }} onPointerDown=${press}
     onPointerMove=${drag} onPointerUp=${release} onPointerCancel=${release} onKeyDown=${key} />`;
 }

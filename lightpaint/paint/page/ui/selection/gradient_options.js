@@ -4,7 +4,7 @@ import { warmer } from '../../../../viewer/drawing/colour.js';
 import { html } from '../../vendor/preact.js';
 import { Choice, NumberField } from '../controls.js';
 import { paintOf } from '../display_state.js';
-import { words } from '../../language/language.js';
+import { t } from '../../language/language.js';
 import { shortcutsOf } from '../key_bindings.js';
 
 /** @typedef {import("../ui_state.js").Ui} Ui */
@@ -14,36 +14,36 @@ import { shortcutsOf } from '../key_bindings.js';
 export const GRADIENT_SHAPES = [
   {
     value: 'linear',
-    label: words.gradientOptions.linear,
-    tip: words.gradientOptions.fromOneLineToAnother,
+    label: t('Linear'),
+    tip: t('From one line to another'),
   },
   {
     value: 'radial',
-    label: words.gradientOptions.radial,
-    tip: words.gradientOptions.aroundThePlaceWhereTheDrag,
+    label: t('Radial'),
+    tip: t('Around the place where the drag begins'),
   },
 ];
 
 const EFFECTS = [
   {
     value: false,
-    label: words.gradientOptions.paint,
-    tip: words.gradientOptions.lightOfTheCurrentColour,
+    label: t('Paint'),
+    tip: t('Light of the current colour'),
   },
   {
     value: true,
-    label: words.gradientOptions.adjust,
-    tip: words.gradientOptions.brighterAndWarmerByNumbers,
+    label: t('Adjust'),
+    tip: t('Brighter and warmer by numbers'),
   },
 ];
 
 /** @param {Ui} ui */
 const endsOf = (ui) => [
-  { value: false, label: words.gradientOptions.toNothing, tip: words.gradientOptions.itFadesOut },
+  { value: false, label: t('To nothing'), tip: t('It fades out') },
   {
     value: true,
-    label: words.gradientOptions.to2ndColour,
-    tip: words.gradientOptions.itBecomesTheSecondColour,
+    label: t('To 2nd colour'),
+    tip: t('It becomes the second colour. The key swaps the two.'),
     keys: shortcutsOf(ui, 'swap'),
   },
 ];
@@ -54,17 +54,17 @@ export function GradientOptions({ ui, app }) {
   const set = (/** @type {Partial<GradientUi>} */ changes) =>
     app.store.set((state) => ({ gradient: { ...state.gradient, ...changes } }));
   return html`
-    <${Choice} label=${words.gradientOptions.shape} value=${gradient.shape} choices=${GRADIENT_SHAPES}
+    <${Choice} label=${t('Shape')} value=${gradient.shape} choices=${GRADIENT_SHAPES}
       change=${(/** @type {any} */ shape) => set({ shape })} />
-    <${Choice} label=${words.gradientOptions.effect} value=${gradient.isAdjusting} choices=${EFFECTS}
+    <${Choice} label=${t('Effect')} value=${gradient.isAdjusting} choices=${EFFECTS}
       change=${(/** @type {boolean} */ isAdjusting) => set({ isAdjusting })} />
     ${
       gradient.isAdjusting
-        ? html`<${NumberField} label=${words.gradientOptions.brighter} value=${gradient.stops} min=${-8} max=${8} step=${0.1}
-            unit=${words.gradientOptions.st} change=${(/** @type {number} */ stops) => set({ stops })} />
-          <${NumberField} label=${words.gradientOptions.warmer} value=${gradient.mired} min=${-300} max=${300} step=${5} digits=${0}
-            unit=${words.gradientOptions.mired} change=${(/** @type {number} */ mired) => set({ mired })} />`
-        : html`<${Choice} label=${words.gradientOptions.end} value=${gradient.hasEnd} choices=${endsOf(ui)}
+        ? html`<${NumberField} label=${t('Brighter')} value=${gradient.stops} min=${-8} max=${8} step=${0.1}
+            unit=${t('st')} change=${(/** @type {number} */ stops) => set({ stops })} />
+          <${NumberField} label=${t('Warmer')} value=${gradient.mired} min=${-300} max=${300} step=${5} digits=${0}
+            unit=${t('mired')} change=${(/** @type {number} */ mired) => set({ mired })} />`
+        : html`<${Choice} label=${t('End')} value=${gradient.hasEnd} choices=${endsOf(ui)}
             change=${(/** @type {boolean} */ hasEnd) => set({ hasEnd })} />`
     }`;
 }

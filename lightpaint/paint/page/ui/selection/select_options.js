@@ -3,7 +3,7 @@
 import { html } from '../../vendor/preact.js';
 import { Button, Choice, Slider } from '../controls.js';
 import { MODES, SHAPES, updateSelection } from './selection_settings.js';
-import { words } from '../../language/language.js';
+import { t } from '../../language/language.js';
 import { shortcutsOf } from '../key_bindings.js';
 
 /** @typedef {import("../ui_state.js").Ui} Ui */
@@ -16,7 +16,7 @@ export const MAX_TOLERANCE = 60;
 /** Small widths matter more. */
 export const FEATHER_CURVE = {
   toPosition: (/** @type {number} */ x) => Math.sqrt(x),
-  toValue: (/** @type {number} */ t) => Math.round(t * t),
+  toValue: (/** @type {number} */ x) => Math.round(x * x),
 };
 
 /** @param {{ui: Ui, app: App}} props */
@@ -34,21 +34,21 @@ export function SelectOptions({ ui, app }) {
   const togglePanel = () =>
     store.set({ side: true, panel: null, open: { ...ui.open, select: !isPanelOpen } });
   return html`
-    <${Choice} label=${words.selectOptions.shape} icons value=${selection.shape} choices=${shapes}
+    <${Choice} label=${t('Shape')} icons value=${selection.shape} choices=${shapes}
       change=${(/** @type {any} */ shape) => updateSelection(store, { shape })} />
-    <${Choice} label=${words.selectOptions.join} icons value=${selection.mode} choices=${MODES}
+    <${Choice} label=${t('Join')} icons value=${selection.mode} choices=${MODES}
       change=${(/** @type {any} */ mode) => updateSelection(store, { mode })} />
-    <${Slider} label=${words.selectOptions.feather} value=${selection.feather} min=${0} max=${MAX_FEATHER} unit=${words.selectOptions.px}
-      curve=${FEATHER_CURVE} tip=${words.selectOptions.widthOfTheSoftEdgeOf} resetValue=${0}
+    <${Slider} label=${t('Feather')} value=${selection.feather} min=${0} max=${MAX_FEATHER} unit=${t('px')}
+      curve=${FEATHER_CURVE} tip=${t('Width of the soft edge of what you select next')} resetValue=${0}
       change=${(/** @type {number} */ feather) => updateSelection(store, { feather })} />
     ${
       selection.shape === 'colour' &&
-      html`<${Slider} label=${words.selectOptions.tolerance} value=${selection.tolerance} min=${1} max=${MAX_TOLERANCE}
-      tip=${words.selectOptions.howFarFromTheClickedColour}
+      html`<${Slider} label=${t('Tolerance')} value=${selection.tolerance} min=${1} max=${MAX_TOLERANCE}
+      tip=${t('How far from the clicked colour, in ΔE of the picture as it is shown')}
       change=${(/** @type {number} */ tolerance) => updateSelection(store, { tolerance })} />`
     }
-    <${Button} label=${words.selectOptions.none} keys=${shortcutsOf(ui, 'selectNone')} tip=${words.selectOptions.selectNothingPaintGoesEverywhere}
+    <${Button} label=${t('None')} keys=${shortcutsOf(ui, 'selectNone')} tip=${t('Select nothing: paint goes everywhere')}
       disabled=${!selection.current} act=${() => engine.selections.change({ kind: 'none' })} />
-    <${Button} label=${words.selectOptions.more} pressed=${isPanelOpen} act=${togglePanel}
-      tip=${words.selectOptions.growShrinkFeatherSelectByNumbers} />`;
+    <${Button} label=${t('More')} pressed=${isPanelOpen} act=${togglePanel}
+      tip=${t('Grow, shrink, feather; select by numbers, brightness, or what a light lights')} />`;
 }

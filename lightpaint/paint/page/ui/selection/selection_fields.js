@@ -4,7 +4,7 @@ import { html } from '../../vendor/preact.js';
 import { Button, Choice, NumberField, Select, reveal } from '../controls.js';
 import { MAX_FEATHER } from './select_options.js';
 import { MODES, selectedText, updateSelection } from './selection_settings.js';
-import { words } from '../../language/language.js';
+import { t } from '../../language/language.js';
 import { shortcutsOf } from '../key_bindings.js';
 
 /** @typedef {import("../ui_state.js").Ui} Ui */
@@ -14,16 +14,16 @@ import { shortcutsOf } from '../key_bindings.js';
 
 /** @type {{value: import("./selection_settings.js").TypedKind, label: string}[]} */
 const KINDS = [
-  { value: 'rectangle', label: words.selectionFields.rectangle },
-  { value: 'ellipse', label: words.selectionFields.ellipse },
-  { value: 'object', label: words.selectionFields.object },
-  { value: 'light', label: words.selectionFields.whatALightLights },
-  { value: 'brightness', label: words.selectionFields.brightness },
+  { value: 'rectangle', label: t('Rectangle') },
+  { value: 'ellipse', label: t('Ellipse') },
+  { value: 'object', label: t('Object') },
+  { value: 'light', label: t('What a light lights') },
+  { value: 'brightness', label: t('Brightness') },
 ];
 
 const PICTURES = [
-  { value: 'painting', label: words.selectionFields.painting },
-  { value: 'solution', label: words.selectionFields.answer },
+  { value: 'painting', label: t('Painting') },
+  { value: 'solution', label: t('Answer') },
 ];
 
 /** @param {{ui: Ui, app: App}} props */
@@ -46,29 +46,29 @@ export function SelectionFields({ ui, app }) {
   };
   return html`<div class="ask select-panel" data-numbers onClick=${leave}>
     <p role="status">${selectedText(selection)}</p>
-    <div class="row" role="group" aria-label=${words.selectionFields.selection}>
-      <${Button} label=${words.selectionFields.all} keys=${shortcutsOf(ui, 'selectAll')} act=${() => engine.selections.select({ kind: 'all' })} />
-      <${Button} label=${words.selectionFields.none} keys=${shortcutsOf(ui, 'selectNone')} disabled=${!current} act=${change({ kind: 'none' })} />
-      <${Button} label=${words.selectionFields.invert} keys=${shortcutsOf(ui, 'invert')} disabled=${!current} act=${change({ kind: 'invert' })} />
+    <div class="row" role="group" aria-label=${t('Selection')}>
+      <${Button} label=${t('All')} keys=${shortcutsOf(ui, 'selectAll')} act=${() => engine.selections.select({ kind: 'all' })} />
+      <${Button} label=${t('None')} keys=${shortcutsOf(ui, 'selectNone')} disabled=${!current} act=${change({ kind: 'none' })} />
+      <${Button} label=${t('Invert')} keys=${shortcutsOf(ui, 'invert')} disabled=${!current} act=${change({ kind: 'invert' })} />
       <span class="spring"></span>
-      <${Button} label=${words.selectionFields.tint} pressed=${selection.show === 'tint'}
-        tip=${words.selectionFields.tintWhatIsNotSelectedInstead}
+      <${Button} label=${t('Tint', { context: 'verb' })} pressed=${selection.show === 'tint'}
+        tip=${t('Tint what is not selected, instead of an outline around what is at least half selected')}
         act=${() => set({ show: selection.show === 'tint' ? 'ants' : 'tint' })} />
     </div>
-    <div class="row" role="group" aria-label=${words.selectionFields.itsEdge}>
-      <${NumberField} label=${words.selectionFields.edge} hidden value=${pixels} min=${1} max=${MAX_FEATHER} digits=${0} unit=${words.selectionFields.px}
+    <div class="row" role="group" aria-label=${t('Its edge')}>
+      <${NumberField} label=${t('Edge')} hidden value=${pixels} min=${1} max=${MAX_FEATHER} digits=${0} unit=${t('px')}
         change=${(/** @type {number} */ value) => set({ pixels: value })} />
-      <${Button} label=${words.selectionFields.grow} disabled=${!current} act=${change({ kind: 'grow', pixels })} />
-      <${Button} label=${words.selectionFields.shrink} disabled=${!current} act=${change({ kind: 'grow', pixels: -pixels })} />
-      <${Button} label=${words.selectionFields.feather} disabled=${!current} act=${change({ kind: 'feather', pixels })} />
+      <${Button} label=${t('Grow')} disabled=${!current} act=${change({ kind: 'grow', pixels })} />
+      <${Button} label=${t('Shrink')} disabled=${!current} act=${change({ kind: 'grow', pixels: -pixels })} />
+      <${Button} label=${t('Feather', { context: 'verb' })} disabled=${!current} act=${change({ kind: 'feather', pixels })} />
     </div>
-    <${Select} label=${words.selectionFields.select} value=${selection.kind} choices=${kinds}
+    <${Select} label=${t('Select')} value=${selection.kind} choices=${kinds}
       change=${(/** @type {any} */ kind) => set({ kind })} />
     <${PartFields} ui=${ui} set=${set} />
     <div class="row">
-      <${Choice} label=${words.selectionFields.join} icons value=${selection.mode} choices=${MODES}
+      <${Choice} label=${t('Join')} icons value=${selection.mode} choices=${MODES}
         change=${(/** @type {any} */ mode) => set({ mode })} />
-      <${Button} label=${words.selectionFields.select} primary disabled=${!part} act=${select} />
+      <${Button} label=${t('Select')} primary disabled=${!part} act=${select} />
     </div>
   </div>`;
 }
@@ -79,20 +79,20 @@ function PartFields({ ui, set }) {
   const { kind, box, brightness } = selection;
   const [height, width] = ui.state?.size ?? [1, 1];
   if (kind === 'object')
-    return html`<${Select} label=${words.selectionFields.object} value=${selection.object}
+    return html`<${Select} label=${t('Object')} value=${selection.object}
       choices=${namesOf(ui.state?.objects ?? [])} change=${(/** @type {string} */ object) => set({ object })} />`;
   if (kind === 'light')
-    return html`<${Select} label=${words.selectionFields.light} value=${selection.light}
+    return html`<${Select} label=${t('Light')} value=${selection.light}
       choices=${namesOf(lights.map(({ name }) => name))}
-      tip=${words.selectionFields.softlyAsMuchAsItsLight} change=${(/** @type {string} */ light) => set({ light })} />`;
+      tip=${t('Softly, as much as its light arrives there')} change=${(/** @type {string} */ light) => set({ light })} />`;
   if (kind === 'brightness')
-    return html`<${Choice} label=${words.selectionFields.ofThePicture} value=${selection.picture} choices=${PICTURES}
+    return html`<${Choice} label=${t('Of the picture')} value=${selection.picture} choices=${PICTURES}
         change=${(/** @type {any} */ picture) => set({ picture })} />
       <div class="row">
-        <${NumberField} label=${words.selectionFields.from} value=${brightness[0]} min=${0} max=${100} digits=${0} unit="%"
-          tip=${words.selectionFields.lightnessLOfThePictureAs}
+        <${NumberField} label=${t('From')} value=${brightness[0]} min=${0} max=${100} digits=${0} unit="%"
+          tip=${t('Lightness L* of the picture as it is shown')}
           change=${(/** @type {number} */ low) => set({ brightness: [low, Math.max(low, brightness[1])] })} />
-        <${NumberField} label=${words.selectionFields.to} value=${brightness[1]} min=${0} max=${100} digits=${0} unit="%"
+        <${NumberField} label=${t('to')} value=${brightness[1]} min=${0} max=${100} digits=${0} unit="%"
           change=${(/** @type {number} */ high) => set({ brightness: [Math.min(high, brightness[0]), high] })} />
       </div>`;
   const field = (
@@ -101,9 +101,9 @@ function PartFields({ ui, set }) {
     /** @type {number} */ max,
   ) =>
     html`<${NumberField} label=${label} value=${box[key]} min=${key === 'x' || key === 'y' ? 0 : 1}
-      max=${max} digits=${0} unit=${words.selectionFields.px} change=${(/** @type {number} */ value) => set({ box: { ...box, [key]: value } })} />`;
-  return html`<div class="row is-pair">${field('x', words.selectionFields.left, width)}${field('y', words.selectionFields.top, height)}</div>
-    <div class="row is-pair">${field('width', words.selectionFields.width, width)}${field('height', words.selectionFields.height, height)}</div>`;
+      max=${max} digits=${0} unit=${t('px')} change=${(/** @type {number} */ value) => set({ box: { ...box, [key]: value } })} />`;
+  return html`<div class="row is-pair">${field('x', t('Left'), width)}${field('y', t('Top'), height)}</div>
+    <div class="row is-pair">${field('width', t('Width'), width)}${field('height', t('Height'), height)}</div>`;
 }
 
 /** Return the part that the panel describes; null while something is missing. @param {Ui} ui
@@ -131,6 +131,6 @@ function partOf({ selection, state, lights }) {
 
 /** @param {string[]} names */
 const namesOf = (names) => [
-  { value: '', label: words.selectionFields.choose },
+  { value: '', label: t('Choose …') },
   ...[...names].sort((a, b) => a.localeCompare(b)).map((name) => ({ value: name, label: name })),
 ];

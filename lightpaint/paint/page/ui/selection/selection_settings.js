@@ -1,6 +1,6 @@
 /** The settings of selecting, and what happens to them when something is selected. */
 
-import { fill, words } from '../../language/language.js';
+import { t } from '../../language/language.js';
 
 /** @typedef {import("../engine_interface.js").Engine} Engine */
 /** @typedef {import("../engine_interface.js").Kind} Kind */
@@ -39,33 +39,33 @@ import { fill, words } from '../../language/language.js';
 export const SHAPES = [
   {
     shape: 'rectangle',
-    label: words.selectionSettings.rectangle,
+    label: t('Rectangle'),
     icon: 'rectangle',
-    hint: words.selectionSettings.dragFromCornerToCorner,
+    hint: t('Drag from corner to corner.'),
   },
   {
     shape: 'ellipse',
-    label: words.selectionSettings.ellipse,
+    label: t('Ellipse'),
     icon: 'ellipse',
-    hint: words.selectionSettings.dragFromCornerToCorner,
+    hint: t('Drag from corner to corner.'),
   },
   {
     shape: 'lasso',
-    label: words.selectionSettings.lasso,
+    label: t('Lasso'),
     icon: 'lasso',
-    hint: words.selectionSettings.dragAroundWhatYouWant,
+    hint: t('Drag around what you want.'),
   },
   {
     shape: 'object',
-    label: words.selectionSettings.object,
+    label: t('Object'),
     icon: 'object',
-    hint: words.selectionSettings.clickAnObject,
+    hint: t('Click an object.'),
   },
   {
     shape: 'colour',
-    label: words.selectionSettings.colour,
+    label: t('Colour'),
     icon: 'wand',
-    hint: words.selectionSettings.clickAColourInAPicture,
+    hint: t('Click a colour in a picture.'),
   },
 ];
 
@@ -73,27 +73,27 @@ export const SHAPES = [
 export const MODES = [
   {
     value: 'replace',
-    label: words.selectionSettings.new,
+    label: t('New'),
     icon: 'join-replace',
-    tip: words.selectionSettings.selectOnlyTheNewPart,
+    tip: t('Select only the new part'),
   },
   {
     value: 'add',
-    label: words.selectionSettings.add,
+    label: t('Add'),
     icon: 'join-add',
-    tip: words.selectionSettings.addToTheSelectionShift,
+    tip: t('Add to the selection (Shift)'),
   },
   {
     value: 'subtract',
-    label: words.selectionSettings.subtract,
+    label: t('Subtract'),
     icon: 'join-subtract',
-    tip: words.selectionSettings.takeFromItAlt,
+    tip: t('Take from it (Alt)'),
   },
   {
     value: 'intersect',
-    label: words.selectionSettings.intersect,
+    label: t('Intersect'),
     icon: 'join-intersect',
-    tip: words.selectionSettings.keepWhatIsInBothShift,
+    tip: t('Keep what is in both (Shift Alt)'),
   },
 ];
 
@@ -161,9 +161,8 @@ export function modeOf({ shiftKey, altKey }, mode) {
 
 /** Return how much is selected, in words. @param {SelectionUi} selection */
 export function selectedText({ current }) {
-  if (!current) return words.selectionSettings.nothingIsSelectedPaintGoes;
+  if (!current) return t('Nothing is selected: paint goes everywhere.');
   const percent = 100 * current.share;
-  const share =
-    percent < 0.1 ? words.selectionSettings.lessThan01 : percent.toFixed(percent < 10 ? 1 : 0);
-  return fill(words.selectionSettings.ofThePictureIsSelected, { share });
+  const share = percent < 0.1 ? t('Less than 0.1') : percent.toFixed(percent < 10 ? 1 : 0);
+  return t('{share} % of the picture is selected.', { share });
 }
