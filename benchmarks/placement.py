@@ -1,7 +1,7 @@
 """How well unknown lights are found: closed rooms by seed, `lp.place`, and rivals in the same run.
 
     python benchmarks/placement.py [--rooms 10] [--first 100] [--kinds point,spot,panel]
-        [--rivals] [--behind] [--gallery]
+        [--rivals] [--behind] [--gallery] [--levels]
 
 Each room is painted by a plain render with 1 to 3 lights that the search does not know (one, for
 panels). Missed shares are Σ (Ψ − picture)² / Σ Ψ²: of the room as it is known, of the scene that
@@ -15,6 +15,7 @@ found one within NEAR of it, too. Seconds are of the processor, all threads, and
 somebody waits.
 `--rivals` adds a choice among fixed random candidates, and Adam through Mitsuba's
 differentiable path integrator from random starts; both are told how many lights there are.
+`--levels` compares the errors of a moved light's place and of all levels with what is stated.
 """
 
 import argparse
@@ -28,6 +29,7 @@ from typing import Any
 
 import numpy as np
 from closed_rooms import ClosedRoom, point
+from coverage import ROOM
 from placement_rivals import CANDIDATES, STARTS, adam, chosen_candidates
 from scipy.optimize import nnls
 
@@ -56,19 +58,25 @@ GALLERY_SPP = 128
 SPP, BASIS_SPP, EXACT_SPP, SIZE = 256, 64, 256, (160, 90)
 
 
+#: Place of the bulb in the room of `--levels`, and the place from which it is searched for.
+BULB, MOVED_BULB = 'x="0.9" y="0.4" z="0.6"', 'x="0.6" y="0.7" z="0.3"'
+
+
 def main() -> None:
     """Print one line for each room, and the sums."""
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("--rooms", type=int, default=10)
     parser.add_argument("--first", type=int, default=100)
     parser.add_argument("--kinds", default=",".join(KINDS))
-    for name in ("rivals", "behind", "gallery"):
+    for name in ("rivals", "behind", "gallery", "levels"):
         parser.add_argument(f"--{name}", action="store_true")
     options = parser.parse_args()
     if options.behind:
         show_behind()
     if options.gallery:
         show_gallery()
+    if options.levels:
+        show_levels()
     kinds = options.kinds.split(",")
     lines = []
     print("room   lights     known  floor  found  excess  cpu s      s  / render  off       turned")
@@ -183,6 +191,39 @@ def show_rivals(
         left = adam(room, scene, kind, count, painted)
         seconds = cpu_s() - start
         print(f"         Adam, {STARTS} starts: {left:.4f} in {seconds:.1f} s", flush=True)
+
+
+def show_levels() -> None:
+    """Print errors of a place and of levels over seeds, root mean square, and those stated."""
+    errors, stated, fixed = [], [], []
+    with tempfile.TemporaryDirectory() as folder:
+        true, start = Path(folder) / "true.xml", Path(folder) / "start.xml"
+        text = ROOM.format(lamp="")
+        true.write_text(text, encoding="utf-8")
+        start.write_text(text.replace(BULB, MOVED_BULB), encoding="utf-8")
+        truth, scene = lp.load_scene(true), lp.load_scene(start)
+        painted = lp.render_basis(truth, spp=4096, seed=99)
+        target = lp.Target.of(painted.current_look)
+        for seed in range(10):
+            basis = lp.render_basis(scene, spp=BASIS_SPP, seed=seed)
+            solution = lp.correct_noise(lp.solve(basis, target, literal=True))
+            placement = lp.place(scene, basis, solution, {"bulb": lp.Freedom(within=0.8)})
+            [move] = placement.moves
+            assert move.new.position is not None
+            assert move.place_error is not None
+            off = math.dist(move.new.position, truth.light("bulb").members[0].site.position)
+            basis = lp.render_basis(placement.scene, spp=BASIS_SPP, seed=seed)
+            solution = lp.correct_noise(lp.solve(basis, target, literal=True))
+            levels = solution.weights[:, 1] / painted.current_weights[:, 1]
+            bars = [lp.error_bars(solution, level_errors=x) for x in ((), placement.level_errors)]
+            here, both = (x.standard_error[:, 1] / painted.current_weights[:, 1] for x in bars)
+            errors.append([off, *(levels - 1)])
+            stated.append([move.place_error, *both])
+            fixed.append([move.place_error, *here])
+    print("place of the bulb, and levels of", *basis.names)
+    for name, rows in (("errors", errors), ("stated", stated), ("for this place", fixed)):
+        rms = np.sqrt(np.mean(np.square(rows), axis=0))
+        print(f"{name:16s}" + "".join(f"{x:9.4f}" for x in rms), flush=True)
 
 
 def show_behind() -> None:

@@ -64,6 +64,17 @@ def test_a_spot_that_may_turn_is_turned_and_nothing_else_is_rendered_again(
         progress=lambda label, done, total, unit="": passes.append(label),
     )
     assert look.placement is not None
+    assert look.analysis is not None
+    assert look.analysis.uncertainty is not None
+    alone = lp.error_bars(look.solution)
+    assert alone is not None
+    relative = dict(look.placement.level_errors)["beam"]
+    assert min(relative) > 0
+    k = look.basis.names.index("beam")
+    by_pose = look.solution.weights[k] * relative
+    np.testing.assert_allclose(
+        look.analysis.uncertainty.scatter[k], np.hypot(alone.scatter[k], by_pose), rtol=1e-9
+    )
     [move] = look.placement.moves
     assert move.name == "beam"
     assert look.verification is not None

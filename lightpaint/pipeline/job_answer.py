@@ -3,7 +3,7 @@
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
-from lightpaint.arrays import RGB, as_rgb
+from lightpaint.arrays import as_rgb
 from lightpaint.basis.basis import Basis
 from lightpaint.lighting.analysis.analysis import Analysis, analyse, with_findings
 from lightpaint.lighting.animated_solve import solve_frames
@@ -15,6 +15,7 @@ from lightpaint.lighting.solve import solution_of
 from lightpaint.pipeline.job.job import Job
 from lightpaint.pipeline.needed_samples import problem_of, without_noise
 from lightpaint.pipeline.results.answer_folder import with_places
+from lightpaint.placement.placement import Placement
 from lightpaint.progress import Listener
 from lightpaint.relit.render_rounds import refine_by_rendering
 from lightpaint.report.basis_memo import make_ahead
@@ -39,11 +40,11 @@ def answer_job(
     bases: list[Basis],
     listen: Listener,
     *,
-    level_errors: Sequence[tuple[str, RGB]] = (),
+    placement: Placement | None = None,
 ) -> JobAnswer:
     """Solve a job and analyse its answer.
 
-    bases: of its views; the list is emptied. level_errors: of lights whose poses were searched for.
+    bases: of its views; the list is emptied. placement: of lights whose places were searched for.
     """
     if job.settings.animate:
         return _animated_answer(job, bases, listen)
@@ -54,6 +55,7 @@ def answer_job(
             make_ahead(basis, prepare_page)
     solution = _reduce_noise(job, solution_of(problem), listen)
     del problem  # some of its arrays are as large as the pictures
+    level_errors = () if placement is None else placement.level_errors
     analyses = analyse(solution, level_errors=level_errors)
     solution.problem.squares.release()
     return JobAnswer(solution, analyses, with_findings(solution, analyses).lighting)

@@ -65,8 +65,7 @@ def run(job: Job, progress: Progress = silent, *, bases: list[Basis] | None = No
     job, obtained = find_suns(job, obtained, listen)
     if job.settings.error is not None:
         obtained = add_needed_samples(job, obtained, listen)
-    level_errors = () if placement is None else placement.level_errors
-    found = answer_job(job, obtained, listen, level_errors=level_errors)
+    found = answer_job(job, obtained, listen, placement=placement)
     rig = _suggest(job, found.solution, placement, listen)
     lighting, scene = found.lighting, job.views[0].scene
     with new_answer(job.results, lighting, scene=scene, groups=job.groups) as answer:

@@ -65,9 +65,9 @@ function Swatches({ ui, app }) {
     ${!ui.recent.length && html`<span class="faint">${t('Recent colours')}</span>`}
     ${ui.recent.map(({ colour, stops }, k) => {
       const stopsLabel = signedText(stops, Math.abs(stops - Math.round(stops)) < 0.05 ? 0 : 1);
-      const brightness = stopsLabel === '0' ? '' : t(', {stopsLabel} stops', { stopsLabel });
+      const brightness = stopsLabel === '0' ? '' : t(', {stops} stops', { stops: stopsLabel });
       return html`<${Swatch} key=${k} rgb=${colour} stops=${brightness && stopsLabel}
-        tip=${t('Recent {k}: {colour}{brightness}', { k: k + 1, colour: toHex(colour), brightness })}
+        tip=${t('Recent {number}: {colour}{brightness}', { number: k + 1, colour: toHex(colour), brightness })}
         act=${() => store.set({ colour, stops })} />`;
     })}
   </div>`;

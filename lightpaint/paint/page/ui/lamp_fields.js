@@ -112,13 +112,10 @@ export function LampFields({ k, ui, app }) {
   const { name, label } = ui.lights[k];
   const isAdded = ui.addedLights.includes(name);
   if (place.immovable_reason)
-    return html`<p class="faint lamp-fields">${t(
-      '{label} {immovable_reason}: it stays where it is.',
-      {
-        label,
-        immovable_reason: place.immovable_reason,
-      },
-    )}</p>`;
+    return html`<p class="faint lamp-fields">${t('{label} {reason}: it stays where it is.', {
+      label,
+      reason: place.immovable_reason,
+    })}</p>`;
   const vectorFields = (
     /** @type {"position" | "target"} */ key,
     /** @type {string} */ title,

@@ -162,9 +162,9 @@ function Mark({ ui, app, light, place, pane, camera, positionOf, isTwin }) {
     app.session.moveLamp(light, { position: place.rail ? onRail(place.rail, position) : position });
   };
   const tip = place.immovable_reason
-    ? t('{label} {immovable_reason}: it stays where it is', {
+    ? t('{label} {reason}: it stays where it is', {
         label,
-        immovable_reason: place.immovable_reason,
+        reason: place.immovable_reason,
       })
     : canDrag
       ? t('{label}: drag to move it, with Shift up and down', { label })

@@ -46,10 +46,10 @@ export function scaleToLevel(rgb, light, level) {
  * plain number means stops if it is unambiguous.
  * @param {string} text @param {Light} light @returns {number | null} a level; null for what is none */
 function parseLevel(text, light) {
-  const cleanText = cleanNumberText(text).toLowerCase();
-  if (cleanText === 'off') return 0;
-  if (/^(as )?now$/.test(cleanText)) return luminance(light.present);
-  const match = /^([+-]?(?:\d+\.?\d*|\.\d+))\s*(%|st|stops?)?$/.exec(cleanText);
+  const typed = cleanNumberText(text).toLowerCase();
+  if (typed === 'off') return 0;
+  if (/^(as )?now$/.test(typed)) return luminance(light.present);
+  const match = /^([+-]?(?:\d+\.?\d*|\.\d+))\s*(%|st|stops?)?$/.exec(typed);
   if (!match) return null;
   const amount = Number(match[1]);
   const maxStops = match[2] ? MAX_TYPED_STOPS : MAX_UNITLESS_STOPS;
@@ -64,18 +64,17 @@ const [MAX_TYPED_STOPS, MAX_UNITLESS_STOPS] = [20, 8];
 
 /** Return why text is not a level, and what would be. @param {string} text @param {Light} light */
 function refusalText(text, light) {
-  const cleanText = text.trim();
+  const typed = text.trim();
   if (!isOnAtPresent(light))
-    return t('{cleanText} is not a level. {label} is off now: type stops (+1.5 st) or off.', {
-      cleanText,
+    return t('{typed} is not a level. {label} is off now: type stops (+1.5 st) or off.', {
+      typed,
       label: light.label,
     });
-  if (Number.isFinite(Number(cleanNumberText(cleanText))))
-    return t('{cleanText} could be stops or percent: add the unit (12 st, 80 %).', { cleanText });
-  return t(
-    '{cleanText} is not a level. Type stops from now (+1.5), percent (80 %), as now, or off.',
-    { cleanText },
-  );
+  if (Number.isFinite(Number(cleanNumberText(typed))))
+    return t('{typed} could be stops or percent: add the unit (12 st, 80 %).', { typed });
+  return t('{typed} is not a level. Type stops from now (+1.5), percent (80 %), as now, or off.', {
+    typed,
+  });
 }
 
 /**
@@ -102,11 +101,8 @@ export function LevelField({ light, rgb, disabled, change, say }) {
     if (stops === null && step < 0) return; // nothing is below off
     const newStops = (stops ?? DIMMER_MIN_STOPS) + step * (event.shiftKey ? 10 : 1);
     take(
-      t('{MAX_TYPED_STOPS} st', {
-        MAX_TYPED_STOPS: Math.min(
-          MAX_TYPED_STOPS,
-          Math.max(-MAX_TYPED_STOPS, Number(newStops.toFixed(1))),
-        ),
+      t('{stops} st', {
+        stops: Math.min(MAX_TYPED_STOPS, Math.max(-MAX_TYPED_STOPS, Number(newStops.toFixed(1)))),
       }),
     );
   };

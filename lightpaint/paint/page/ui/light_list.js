@@ -107,7 +107,7 @@ export function LightListActions({ ui, app }) {
   if (!hasHidden && lockedCount < 2) return null;
   if (!hasHidden) {
     return html`<${Button} label=${t('Unlock all')} class="of-all" act=${() => app.session.unlockAll()}
-      tip=${t('{lockedCount} lights are locked or off. Let the solve set them again.', { lockedCount })} />`;
+      tip=${t('{count} lights are locked or off. Let the solve set them again.', { count: lockedCount })} />`;
   }
   return html`<${Button} label=${t('Show all')} class="of-all"
     tip=${t('Solo or mute hides some lights. The answer has them all.')}

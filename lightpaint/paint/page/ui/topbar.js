@@ -41,9 +41,9 @@ export function TopBar({ ui, app }) {
   return html`<header class="top">
     <div class="title"><${TruncatedText} text=${title} maxLength=${16} tag="strong" /></div>
     <div class="group" role="group" aria-label=${t('History')}>
-      <${Button} icon="undo" tip=${undo ? t('Undo: {undo}', { undo }) : t('Undo')} keys=${shortcutsOf(ui, 'undo')}
+      <${Button} icon="undo" tip=${undo ? t('Undo: {step}', { step: undo }) : t('Undo')} keys=${shortcutsOf(ui, 'undo')}
         disabled=${!undo} act=${() => session.send('undo')} />
-      <${Button} icon="redo" tip=${redo ? t('Redo: {redo}', { redo }) : t('Redo')} keys=${shortcutsOf(ui, 'redo')}
+      <${Button} icon="redo" tip=${redo ? t('Redo: {step}', { step: redo }) : t('Redo')} keys=${shortcutsOf(ui, 'redo')}
         disabled=${!redo} act=${() => session.send('redo')} />
       <${PreviousButton} ui=${ui} app=${app} />
       <${OriginalButton} ui=${ui} app=${app} />

@@ -28,8 +28,8 @@ export function GelPicker({ white, gel, choose }) {
     )?.focus();
   };
   const label = (/** @type {Gel} */ one) =>
-    t('{one} {name}, {signed} st', {
-      one: gelName(one),
+    t('{gel} {name}, {signed} st', {
+      gel: gelName(one),
       name: one.name,
       signed: signedText(-lossInStops(one, white)),
     });

@@ -134,9 +134,8 @@ function groupOf(ui, k) {
   const image = imageOf(ui.images, k);
   if (image) return image.name;
   const tie = findTie(ui, k);
-  const otherNames =
-    tie && (tie.length === 2 ? tie[1] : t('{count} more', { count: tie.length - 1 }));
-  if (tie) return t('{value} and {otherNames}, tied', { value: tie[0], otherNames });
+  const others = tie && (tie.length === 2 ? tie[1] : t('{count} more', { count: tie.length - 1 }));
+  if (tie) return t('{name} and {others}, tied', { name: tie[0], others });
   return group ?? (countRows(ui) > MAX_ROWS_WITH_SLIDERS ? namePrefix(name) : null);
 }
 

@@ -106,6 +106,6 @@ export function levelsText(ui, lights) {
   const isEqual = stopsText(low) === stopsText(high);
   const text = isEqual
     ? stopsText(low)
-    : t('{signed} to {signed2} st', { signed: signedText(low), signed2: signedText(high) });
+    : t('{low} to {high} st', { low: signedText(low), high: signedText(high) });
   return stops.length < levels.length ? t('{text}, some off', { text }) : text;
 }
