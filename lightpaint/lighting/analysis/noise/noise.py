@@ -14,6 +14,7 @@ from lightpaint.arrays import Bools, Doubles, Floats, Indices
 from lightpaint.basis.planes import BLOCK_PIXELS, FEW_LIGHTS, Planes, as_slice
 from lightpaint.lighting.analysis.noise.dominant_pixels import Peaks, t_ratios
 from lightpaint.lighting.analysis.noise.painting_grain import channel_grain
+from lightpaint.lighting.analysis.noise.pixel_gradients import PixelGradients
 from lightpaint.lighting.analysis.noise.residuals import Residuals
 from lightpaint.lighting.normal_equations import NormalEquations
 from lightpaint.lighting.solution import Solution
@@ -41,7 +42,8 @@ class Noise:
     """Sums over pixels of products of half differences, per channel.
 
     power: (3, n, n), N_ij = Σ D h_i h_j, the part of M that is noise. target_noise: (3, n), the
-    part of b that is noise of the current look, where this is a goal.
+    mean error of b: noise of the current look, where this is a goal, and that of squares which
+    follow from noisy light (pixel_gradients.py).
     gradient: (3, n, 3, n), covariance of the gradient. objective_error, objective_noise: as in
     `Uncertainty`.
     hidden: (3, n), variance of a light that a few pixels may hide (dominant_pixels.py).
@@ -182,7 +184,7 @@ class NoisyPixels:
 
     planes, noise: of the basis. weights: (n, 3). weight, share: (p, 1) or (p, 3). unseen: (p,),
     where no emitter is. counted: the pixels that count. pulled: (n, 3), by how much noise moves the
-    pull on the weights.
+    pull on the weights. gradients: of the loss by the light of each pixel.
     """
 
     planes: Planes
@@ -194,6 +196,7 @@ class NoisyPixels:
     unseen: Bools
     counted: Indices
     pulled: Doubles
+    gradients: PixelGradients
 
     @classmethod
     def of(cls, solution: Solution) -> "NoisyPixels":
@@ -209,12 +212,13 @@ class NoisyPixels:
         counted = np.flatnonzero((solution.importance.ravel() > 0) | (unseen & pulled.any()))
         residuals = Residuals.of(solution)
         planes = basis.planes, basis.noise
-        return cls(*planes, weights, weight, share, residuals, unseen, counted, pulled)
+        gradients = PixelGradients.of(solution, residuals)
+        return cls(*planes, weights, weight, share, residuals, unseen, counted, pulled, gradients)
 
     def gradient_noise(self, pixels: slice | Indices) -> Doubles:
         """Return the half differences of the gradient that some pixels make, (3, n, pixels)."""
         arrays = self.noise.pixels(pixels), self.planes.pixels(pixels)
-        missed = self.residuals.residual(pixels), self.residuals.noise(pixels)
+        missed = self.residuals.residual(pixels)
         return np.stack([self._rows(None, pixels, arrays, missed, c) for c in range(3)])
 
     def sums(self, counted: Indices, *, is_coupled: bool) -> _Sums:
@@ -223,7 +227,7 @@ class NoisyPixels:
         for start in range(0, counted.size, BLOCK_PIXELS):
             pixels = as_slice(counted[start : start + BLOCK_PIXELS])
             arrays = self.noise.pixels(pixels), self.planes.pixels(pixels)
-            missed = self.residuals.residual(pixels), self.residuals.noise(pixels)
+            missed = self.residuals.residual(pixels)
             rows = [self._rows(sums, pixels, arrays, missed, c) for c in range(3)]
             for c in range(3):
                 sums.gradient[c, :, c] += rows[c] @ rows[c].T
@@ -242,27 +246,30 @@ class NoisyPixels:
         sums: _Sums | None,
         pixels: slice | Indices,
         arrays: tuple[Floats, Floats],
-        missed: tuple[Doubles, Doubles],
+        missed: Doubles,
         c: int,
     ) -> Doubles:
         """Return the noise in the gradient of a channel, (n, pixels); add all else to `sums`.
 
-        arrays: (n, pixels, 3), noise and planes there. missed: (pixels, 3), residual and the noise
-        of the prediction.
+        arrays: (n, pixels, 3), noise and planes there. missed: (pixels, 3), the residual.
         """
         D = self.weight[pixels, c % self.weight.shape[1]].astype(np.float64)
         h, lit = (x[..., c].astype(np.float64) for x in arrays)
-        residual, mixed = (x[:, c] for x in missed)
-        rows = D * (h * residual - lit * mixed)
+        of_pixels, bend = self.gradients, self.gradients.bend
+        mean, half = (x[pixels, c] for x in (of_pixels.mean, of_pixels.half))
+        rows = h * mean + lit * half
         if sums is not None:
-            size = np.abs(residual) + self.weights[:, c, None] * lit
+            size = np.abs(missed[:, c]) + self.weights[:, c, None] * lit
             sums.peaks[c].add(D * lit * size, rows)
         if self.pulled.any():
             rows += self.pulled[:, c, None] * np.where(self.unseen[pixels], lit, 0) * h
         if sums is None:
             return np.asarray(rows)
         sums.power[c] += (D * h) @ h.T
-        if self.residuals.current is not None:
+        if bend is not None:
+            mixed = self.residuals.half[pixels, c].astype(np.float64)
+            sums.target_noise[c] += h @ (D * mixed + half) + lit @ bend[pixels, c]
+        elif self.residuals.current is not None:
             shared = D * self.share[pixels, c % self.share.shape[1]]
             sums.target_noise[c] += h @ (shared * self.residuals.current[pixels, c])
         return np.asarray(rows)
