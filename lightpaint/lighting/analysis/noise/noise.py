@@ -44,6 +44,7 @@ class Noise:
     power: (3, n, n), N_ij = Σ D h_i h_j, the part of M that is noise. target_noise: (3, n), the
     mean error of b: noise of the current look, where this is a goal, and that of squares which
     follow from noisy light (pixel_gradients.py).
+    doubt: (3, n), an estimate of the error that may be left in target_noise.
     gradient: (3, n, 3, n), covariance of the gradient. objective_error, objective_noise: as in
     `Uncertainty`.
     hidden: (3, n), variance of a light that a few pixels may hide (dominant_pixels.py).
@@ -53,6 +54,7 @@ class Noise:
 
     power: Doubles
     target_noise: Doubles
+    doubt: Doubles
     gradient: Doubles
     objective_error: Doubles
     objective_noise: Doubles
@@ -108,6 +110,7 @@ def noise_sums(solution: Solution) -> Noise:
     return Noise(
         power=np.asarray(sum(x.power for x in sums)),
         target_noise=np.asarray(sum(x.target_noise for x in sums)),
+        doubt=np.asarray(sum(x.doubt for x in sums)),
         gradient=np.asarray(gradient),
         objective_error=2 * np.sqrt(error),
         objective_noise=noise,
@@ -166,6 +169,7 @@ class _Sums:
 
     power: Doubles
     target_noise: Doubles
+    doubt: Doubles
     gradient: Doubles
     fourth: Doubles
     peaks: tuple[Peaks, ...]
@@ -175,7 +179,8 @@ class _Sums:
         """Return sums over no pixels."""
         peaks = tuple(Peaks.empty(n) for _ in range(3))
         gradient, fourth = np.zeros((3, n, 3, n)), np.zeros((3, n))
-        return cls(np.zeros((3, n, n)), np.zeros((3, n)), gradient, fourth, peaks)
+        power, (target_noise, doubt) = np.zeros((3, n, n)), np.zeros((2, 3, n))
+        return cls(power, target_noise, doubt, gradient, fourth, peaks)
 
 
 @dataclass(frozen=True)
@@ -255,7 +260,7 @@ class NoisyPixels:
         """
         D = self.weight[pixels, c % self.weight.shape[1]].astype(np.float64)
         h, lit = (x[..., c].astype(np.float64) for x in arrays)
-        of_pixels, bend = self.gradients, self.gradients.bend
+        of_pixels = self.gradients
         mean, half = (x[pixels, c] for x in (of_pixels.mean, of_pixels.half))
         rows = h * mean + lit * half
         if sums is not None:
@@ -266,9 +271,10 @@ class NoisyPixels:
         if sums is None:
             return np.asarray(rows)
         sums.power[c] += (D * h) @ h.T
-        if bend is not None:
+        if of_pixels.bend is not None and of_pixels.doubt is not None:
             mixed = self.residuals.half[pixels, c].astype(np.float64)
-            sums.target_noise[c] += h @ (D * mixed + half) + lit @ bend[pixels, c]
+            sums.target_noise[c] += h @ (D * mixed + half) + lit @ of_pixels.bend[pixels, c]
+            sums.doubt[c] += lit @ of_pixels.doubt[pixels, c]
         elif self.residuals.current is not None:
             shared = D * self.share[pixels, c % self.share.shape[1]]
             sums.target_noise[c] += h @ (shared * self.residuals.current[pixels, c])

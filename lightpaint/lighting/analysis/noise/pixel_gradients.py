@@ -35,12 +35,14 @@ class PixelGradients:
 
     mean: (p, 3), the tangent of G. half: (p, 3), half its difference between the two halves of the
     samples. bend: (p, 3), by how much G itself exceeds the tangent; None for squares, where G is
-    its own tangent.
+    its own tangent. doubt: (p, 3), by how much G may be too large in the mean by the noise that is
+    left in the steadier light; None for squares.
     """
 
     mean: Doubles
     half: Doubles
     bend: Doubles | None = None
+    doubt: Doubles | None = None
 
     @classmethod
     def of(cls, solution: Solution, residuals: Residuals) -> "PixelGradients":
@@ -50,47 +52,78 @@ class PixelGradients:
             weight = problem.squares.weight
             D = weight.reshape(-1, weight.shape[2]).astype(np.float64)
             return cls(D * residuals.residual(everything), -D * residuals.noise(everything))
-        pixels = problem.loss.pixels
-        light, change, steady = _steadied(solution, residuals.predicted, residuals.half)
-        tangent = _Tangent(pixels, steady)
-        look = look_change = None
+        pixels, look = problem.loss.pixels, None
+        light = _Steadied.of(solution, residuals.predicted, residuals.half)
         if residuals.current is not None:
             shown = solution.basis.current_look.reshape(-1, 3)
-            look, look_change, steady = _steadied(solution, shown, residuals.current)
-            tangent = _Tangent(pixels, tangent.light, steady)
-            look -= steady
-        whole = _gradient(pixels, light)
-        light -= tangent.light
-        mean = tangent.start() + tangent.along(light, look)
-        return cls(mean.T, tangent.along(change, look_change).T, (whole - mean).T)
+            look = _Steadied.of(solution, shown, residuals.current)
+        tangent = _Tangent(pixels, light, look)
+        whole, start = _gradient(pixels, planes_of(residuals.predicted)), tangent.start()
+        mean = start + tangent.along([x.distance for x in tangent.pictures])
+        half = tangent.along([x.noise for x in tangent.pictures])
+        left = [x.noise_left for x in tangent.pictures]
+        ends = [tangent.at([sign * x for x in left]) for sign in (1, -1)]
+        doubt = (ends[0] + ends[1]) / 2 - start
+        return cls(mean.T, half.T, (whole - mean).T, doubt.T)
+
+
+@dataclass(frozen=True)
+class _Steadied:
+    """A picture and its steadier light, (3, p) each.
+
+    steady: the steadier light. distance: of the picture from it. noise: half differences of the
+    picture. noise_left: those of the light between both that the steadier light does not average.
+    """
+
+    steady: Doubles
+    distance: Doubles
+    noise: Doubles
+    noise_left: Doubles
+
+    @classmethod
+    def of(cls, solution: Solution, light: Floats, noise: Floats) -> "_Steadied":
+        """Steady a picture of all views. light: (p, 3); noise: (p, 3), its half differences."""
+        views, size = solution.problem.views, solution.importance.shape
+        counted = (solution.importance > 0).astype(np.float64)[..., None]
+        pictures = light.reshape(*size, 3), noise.reshape(*size, 3), counted
+        parts = []
+        for k in range(len(views)):
+            image, half, counts = (views.part(x, k).astype(np.float64) for x in pictures)
+            parts.append(steadier_light(image, half, counts))
+        steady, share = (planes_of(views.join(x)) for x in zip(*parts, strict=True))
+        own = planes_of(noise)
+        return cls(steady, planes_of(light) - steady, own, np.sqrt(1 - np.square(share)) * own)
 
 
 @dataclass(frozen=True)
 class _Tangent:
-    """The tangent of G at some light, (3, p), and at a current look, if the loss depends on one."""
+    """The tangent of G at the steadier light, and at a steadier look if the loss depends on one."""
 
     pixels: PixelLoss
-    light: Doubles
-    look: Doubles | None = None
+    light: _Steadied
+    look: _Steadied | None
+
+    @property
+    def pictures(self) -> list[_Steadied]:
+        """The light and, if there is one, the look."""
+        return [self.light] if self.look is None else [self.light, self.look]
 
     def start(self) -> Doubles:
         """Return G where the tangent touches it, (3, p)."""
-        return self._at(0.0, self.light, self.look)
+        return self.at([np.zeros(1) for _ in self.pictures])
 
-    def along(self, change: Doubles, look_change: Doubles | None) -> Doubles:
-        """Return the change of the tangent with changes of the light and of the look, (3, p)."""
-        changes = [change] if look_change is None else [change, look_change]
+    def along(self, changes: list[Doubles]) -> Doubles:
+        """Return the change of the tangent, (3, p), with those of the pictures, (3, p) each."""
         size = np.max([np.abs(x).max(axis=0) for x in changes], axis=0)
-        step = STEP * self.light.max(axis=0) / np.where(size > 0, size, 1)
-        above, below = (self._at(sign * step, change, look_change) for sign in (1, -1))
+        step = STEP * np.abs(self.light.steady).max(axis=0) / np.where(size > 0, size, 1)
+        above, below = (self.at([sign * step * x for x in changes]) for sign in (1, -1))
         return np.asarray((above - below) / np.where(step > 0, 2 * step, 1))
 
-    def _at(self, step: Doubles | float, change: Doubles, look_change: Doubles | None) -> Doubles:
-        """Return G after `step` of the changes."""
-        pixels = self.pixels
-        if self.look is not None and look_change is not None:
-            pixels = pixels.over_look(self.look + step * look_change)
-        return _gradient(pixels, self.light + step * change)
+    def at(self, changes: list[Doubles]) -> Doubles:
+        """Return G, (3, p), where the pictures change by that much."""
+        places = [x.steady + change for x, change in zip(self.pictures, changes, strict=True)]
+        pixels = self.pixels if self.look is None else self.pixels.over_look(places[1])
+        return _gradient(pixels, places[0])
 
 
 def _gradient(pixels: PixelLoss, light: Doubles) -> Doubles:
@@ -101,23 +134,9 @@ def _gradient(pixels: PixelLoss, light: Doubles) -> Doubles:
     return image
 
 
-def _steadied(solution: Solution, light: Floats, noise: Floats) -> tuple[Doubles, Doubles, Doubles]:
-    """Return light, its half differences and the steadier light of all views, (3, p) each.
-
-    light, noise: (p, 3).
-    """
-    views, size = solution.problem.views, solution.importance.shape
-    counted = (solution.importance > 0).astype(np.float64)[..., None]
-    pictures = light.reshape(*size, 3), noise.reshape(*size, 3), counted
-    parts = []
-    for k in range(len(views)):
-        image, half, counts = (views.part(x, k).astype(np.float64) for x in pictures)
-        parts.append(steadier_light(image, half, counts))
-    return planes_of(light), planes_of(noise), planes_of(views.join(parts))
-
-
-def steadier_light(light: Doubles, noise: Doubles, counted: Doubles) -> Doubles:
-    """Return light moved towards the mean of its neighbours as far as only noise differs there.
+def steadier_light(light: Doubles, noise: Doubles, counted: Doubles) -> tuple[Doubles, Doubles]:
+    """Return light moved towards the mean of its neighbours as far as only noise differs there,
+    and the share of the way that it moves, (h, w, 3) each.
 
     The share is V / (V + B) with the variance V and the squared change B around the pixel, without
     the pixel itself: how far it moves does not depend on its own noise.
@@ -131,7 +150,7 @@ def steadier_light(light: Doubles, noise: Doubles, counted: Doubles) -> Doubles:
     V, B = (_mean_beside(x, counted, WINDOW) for x in (variance, change))
     total = V + np.maximum(B, 0)
     share = np.divide(V, total, out=np.zeros_like(V), where=V > 0)
-    return np.asarray(light + share * (beside - light))
+    return np.asarray(light + share * (beside - light)), share
 
 
 def _mean_beside(image: Doubles, counted: Doubles, radius: int) -> Doubles:
