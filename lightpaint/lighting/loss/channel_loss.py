@@ -45,6 +45,10 @@ class PaintedPixels(PixelLoss):
         """Return the pixels with importance multiplied by `factors`, (p,)."""
         return replace(self, importance=self.importance * factors)
 
+    def over_look(self, look: Doubles) -> "PaintedPixels":
+        """Return the same pixels over another current look, (3, p)."""
+        return replace(self, current=look, encoded=None)
+
     @property
     def has_clipping(self) -> bool:
         """True if a display clips the pixels."""

@@ -14,6 +14,7 @@ from lightpaint.arrays import Bools, Doubles, Floats, Indices
 from lightpaint.basis.planes import BLOCK_PIXELS, FEW_LIGHTS, Planes, as_slice
 from lightpaint.lighting.analysis.noise.dominant_pixels import Peaks, t_ratios
 from lightpaint.lighting.analysis.noise.painting_grain import channel_grain
+from lightpaint.lighting.analysis.noise.pixel_gradients import PixelGradients
 from lightpaint.lighting.analysis.noise.pixel_pairs import UNCORRECTED, factor, own_share
 from lightpaint.lighting.analysis.noise.residuals import Residuals
 from lightpaint.lighting.normal_equations import NormalEquations
@@ -42,7 +43,9 @@ class Noise:
     """Sums over pixels of products of half differences, per channel.
 
     power: (3, n, n), N_ij = Σ D h_i h_j, the part of M that is noise. target_noise: (3, n), the
-    part of b that is noise of the current look, where this is a goal.
+    mean error of b: noise of the current look, where this is a goal, and that of squares which
+    follow from noisy light (pixel_gradients.py).
+    doubt: (3, n), an estimate of the error that may be left in target_noise.
     gradient: (3, n, 3, n), covariance of the gradient. objective_error, objective_noise: as in
     `Uncertainty`.
     hidden: (3, n), variance of a light that a few pixels may hide (dominant_pixels.py).
@@ -52,6 +55,7 @@ class Noise:
 
     power: Doubles
     target_noise: Doubles
+    doubt: Doubles
     gradient: Doubles
     objective_error: Doubles
     objective_noise: Doubles
@@ -111,6 +115,7 @@ def noise_sums(solution: Solution, *, removed: float | None = None) -> Noise:
     return Noise(
         power=np.asarray(sum(x.power for x in sums)),
         target_noise=np.asarray(sum(x.target_noise for x in sums)),
+        doubt=np.asarray(sum(x.doubt for x in sums)),
         gradient=np.asarray(gradient),
         objective_error=2 * np.sqrt(error),
         objective_noise=noise,
@@ -169,6 +174,7 @@ class _Sums:
 
     power: Doubles
     target_noise: Doubles
+    doubt: Doubles
     gradient: Doubles
     fourth: Doubles
     peaks: tuple[Peaks, ...]
@@ -178,7 +184,8 @@ class _Sums:
         """Return sums over no pixels."""
         peaks = tuple(Peaks.empty(n) for _ in range(3))
         gradient, fourth = np.zeros((3, n, 3, n)), np.zeros((3, n))
-        return cls(np.zeros((3, n, n)), np.zeros((3, n)), gradient, fourth, peaks)
+        power, (target_noise, doubt) = np.zeros((3, n, n)), np.zeros((2, 3, n))
+        return cls(power, target_noise, doubt, gradient, fourth, peaks)
 
 
 @dataclass(frozen=True)
@@ -187,7 +194,8 @@ class NoisyPixels:
 
     planes, noise: of the basis. weights: (n, 3). weight, share: (p, 1) or (p, 3). unseen: (p,),
     where no emitter is. counted: the pixels that count. pulled: (n, 3), by how much noise moves the
-    pull on the weights. own_share: see `pixel_pairs`.
+    pull on the weights. gradients: of the loss by the light of each pixel. own_share: see
+    `pixel_pairs`.
     """
 
     planes: Planes
@@ -199,6 +207,7 @@ class NoisyPixels:
     unseen: Bools
     counted: Indices
     pulled: Doubles
+    gradients: PixelGradients
     own_share: float
 
     @classmethod
@@ -214,15 +223,16 @@ class NoisyPixels:
         unseen = ~basis.emitters_seen.ravel()
         counted = np.flatnonzero((solution.importance.ravel() > 0) | (unseen & pulled.any()))
         residuals = Residuals.of(solution)
-        planes, own = (basis.planes, basis.noise), own_share(problem, removed)
-        return cls(*planes, weights, weight, share, residuals, unseen, counted, pulled, own)
+        of_pixels = PixelGradients.of(solution, residuals), own_share(problem, removed)
+        planes = basis.planes, basis.noise
+        return cls(*planes, weights, weight, share, residuals, unseen, counted, pulled, *of_pixels)
 
     def gradient_noise(self, pixels: slice | Indices) -> Doubles:
         """Return the half differences of the gradient that some pixels make by their own samples
         alone, (3, n, pixels).
         """
         arrays = self.noise.pixels(pixels), self.planes.pixels(pixels)
-        missed = self.residuals.residual(pixels), self.residuals.noise(pixels)
+        missed = self.residuals.residual(pixels)
         return np.stack([self._rows(None, pixels, arrays, missed, c) for c in range(3)])
 
     def sums(self, counted: Indices, *, is_coupled: bool) -> _Sums:
@@ -231,7 +241,7 @@ class NoisyPixels:
         for start in range(0, counted.size, BLOCK_PIXELS):
             pixels = as_slice(counted[start : start + BLOCK_PIXELS])
             arrays = self.noise.pixels(pixels), self.planes.pixels(pixels)
-            missed = self.residuals.residual(pixels), self.residuals.noise(pixels)
+            missed = self.residuals.residual(pixels)
             rows = [self._rows(sums, pixels, arrays, missed, c) for c in range(3)]
             for c in range(3):
                 sums.gradient[c, :, c] += rows[c] @ rows[c].T
@@ -250,22 +260,22 @@ class NoisyPixels:
         sums: _Sums | None,
         pixels: slice | Indices,
         arrays: tuple[Floats, Floats],
-        missed: tuple[Doubles, Doubles],
+        missed: Doubles,
         c: int,
     ) -> Doubles:
         """Return the noise in the gradient of a channel, (n, pixels); add all else to `sums`.
 
-        arrays: (n, pixels, 3), noise and planes there. missed: (pixels, 3), residual and the noise
-        of the prediction.
+        arrays: (n, pixels, 3), noise and planes there. missed: (pixels, 3), the residual.
         """
         D = self.weight[pixels, c % self.weight.shape[1]].astype(np.float64)
         h, lit = (x[..., c].astype(np.float64) for x in arrays)
-        residual, mixed = (x[:, c] for x in missed)
+        of_pixels = self.gradients
+        mean, half = (x[pixels, c] for x in (of_pixels.mean, of_pixels.half))
         # One by one, pixels show their own noise; in sums none is multiplied by itself.
         own = 1.0 if sums is None else self.own_share
-        rows = D * (h * factor(residual, mixed, own) - factor(lit, h, own) * mixed)
+        rows = h * factor(mean, half, own) + factor(lit, h, own) * half
         if sums is not None:
-            size = np.abs(residual) + self.weights[:, c, None] * lit
+            size = np.abs(missed[:, c]) + self.weights[:, c, None] * lit
             sums.peaks[c].add(D * lit * size, rows)
         if self.pulled.any():
             # The noise correction leaves the pull as it is.
@@ -274,7 +284,11 @@ class NoisyPixels:
         if sums is None:
             return np.asarray(rows)
         sums.power[c] += (D * h) @ h.T
-        if self.residuals.current is not None:
+        if of_pixels.bend is not None and of_pixels.doubt is not None:
+            mixed = self.residuals.half[pixels, c].astype(np.float64)
+            sums.target_noise[c] += h @ (D * mixed + half) + lit @ of_pixels.bend[pixels, c]
+            sums.doubt[c] += lit @ of_pixels.doubt[pixels, c]
+        elif self.residuals.current is not None:
             shared = D * self.share[pixels, c % self.share.shape[1]]
             sums.target_noise[c] += h @ (shared * self.residuals.current[pixels, c])
         return np.asarray(rows)

@@ -137,6 +137,10 @@ def error_bars(
         by_painting = weight_spread(
             solution, of_painting, scatters, unbiased, weights + bias
         ).inside
+    unsteady = np.zeros_like(weights)
+    if noise.doubt.any():
+        bent = replace(unbiased, b=unbiased.b - noise.doubt)
+        unsteady = solve_for(solution, bent) - weights - bias
     doubts = noise_doubts(solution, noise.power)
     if doubts.any():
         weak = weakest_matrix(solution, noise.power, doubts, unbiased.M)
@@ -150,7 +154,10 @@ def error_bars(
     by_poses = _scatter_by_poses(solution, level_errors)
     sides, wide = (
         [_root(*parts, exit_, moved, by_poses) for exit_ in spread.exits]
-        for parts in ((spread.inside,), (spread.inside * noise.widening, by_painting))
+        for parts in (
+            (spread.inside, unsteady),
+            (spread.inside * noise.widening, by_painting, unsteady),
+        )
     )
     is_determined = np.where(solution.reached, 1, np.nan)
     interval = _interval(solution, bias * is_determined, wide)
