@@ -116,7 +116,7 @@ def room(lamp: str, integrator: str = "path") -> Callable[[Path], str]:
 
 def hall(folder: Path) -> str:
     """Return the text of a hall with 48 lamps."""
-    text = write_hall(folder, 48, width=80, height=45).read_text(encoding="utf-8")
+    text = write_hall(folder, 48, width=48, height=27).read_text(encoding="utf-8")
     return text.replace("</film>", '<rfilter type="box"/></film>')
 
 
