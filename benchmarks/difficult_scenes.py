@@ -1,6 +1,6 @@
 """Do answers hold in scenes with what other people's scenes have?
 
-    python benchmarks/difficult_scenes.py [--scenes glass screen ...] [--seeds 12] [--spp 32]
+    python benchmarks/difficult_scenes.py [--scenes glass screen ...] [--seeds 6] [--spp 32]
     python benchmarks/difficult_scenes.py --quick
 
 Small scenes, each with one difficulty: a bulb in glass and a lamp in a mirror, which paths find
@@ -116,7 +116,7 @@ def room(lamp: str, integrator: str = "path") -> Callable[[Path], str]:
 
 def hall(folder: Path) -> str:
     """Return the text of a hall with 48 lamps."""
-    text = write_hall(folder, 48, width=80, height=45).read_text(encoding="utf-8")
+    text = write_hall(folder, 48, width=48, height=27).read_text(encoding="utf-8")
     return text.replace("</film>", '<rfilter type="box"/></film>')
 
 
@@ -138,7 +138,7 @@ def main() -> None:
     """Print a line for each scene."""
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("--scenes", nargs="+", default=list(SCENES), choices=SCENES)
-    parser.add_argument("--seeds", type=int, default=12, metavar="N")
+    parser.add_argument("--seeds", type=int, default=6, metavar="N")
     parser.add_argument("--spp", type=int, default=32)
     parser.add_argument("--quick", action="store_true", help="two scenes, two seeds, 4 samples")
     options = parser.parse_args()

@@ -197,7 +197,9 @@ def test_other_colours_are_offered_once():
         for colors, delta_e in (("free", 4.6), ("gentle", 5.9))
     )
     reason = Reason("colors", (), 0.12, delta_e=(5.9, 4.6))
-    appearance = SimpleNamespace(reasons=(reason,), reasons_wish="", is_close=False)
+    appearance = SimpleNamespace(
+        reasons=(reason,), reasons_wish="", is_close=False, compensating_lights=()
+    )
     constraints = SimpleNamespace(constraints=Constraints())
     look = SimpleNamespace(
         solution=SimpleNamespace(problem=constraints),

@@ -72,9 +72,11 @@ def test_the_price_is_that_of_each_light_by_itself(make_basis: Any, transform: A
         slope = (ahead - back) / (0.04 * look)
     # Light that is dark for the picture has a smaller relative change.
     slope = slope * look / (look + DARK * look.mean())
-    change = basis.images * (weights - basis.current_weights)[:, None, None]
+    own = basis.images * basis.current_weights[:, None, None]
     rest = unpainted_weight_of(made.views, made.fit) * (1 - importance[..., None])
-    expected = RESTRAINT * (rest * np.square(slope * change)).sum(axis=(0, 1, 2))
+    energy = (rest * np.square(slope * own)).sum(axis=(1, 2, 3), keepdims=True)[..., 0, 0]
+    change = np.square(weights / basis.current_weights - 1)
+    expected = (RESTRAINT * energy / 3 * change).sum(axis=0)
     assert made.restraint is not None
     # Importance and pictures are in single precision.
     np.testing.assert_allclose(made.restraint.objective(weights), expected, rtol=1e-5)

@@ -29,6 +29,9 @@ RESTRAINT = 0.25
 #: Approximate number of blocks of pixels over which that price is summed.
 RESTRAINT_BLOCKS = 2**11
 
+#: Least emission of a channel, relative to the brightest, by which its changes are measured.
+LEAST_CHANNEL = 0.05
+
 #: Largest factor of dimming that strengthens the pull to a light's colour.
 MAX_DIMMING = 100.0
 
@@ -107,9 +110,10 @@ def restrain_lights(
     A hold counts what all lights together do there: one light may be turned off to make up for what
     another spills, although nobody painted that. So each light also pays for its own change,
 
-        s ū Σᵢ Σ (1 − D) |A Φᵢ (wᵢ − pᵢ) / L|²
+        s ū Σᵢ Eᵢ/3 Σ_c (wᵢ/pᵢ − 1)²,     Eᵢ = Σ (1 − D) |A Φᵢ pᵢ / L|²
 
-    with A, the change of a value of the loss with a relative change of the look L.
+    with A, the change of a value of the loss with a relative change of the look L. Equal shares of
+    all channels cost the same, so that the price is none on a light's colour.
 
     reference: (n, 3), the weights p that the look has. transform: the view transform of the loss;
     None for linear light. unpainted: ū, the weight of each unpainted pixel.
@@ -126,7 +130,11 @@ def restrain_lights(
     rows = np.square(wash.rows[:, :, sampled])
     per_block = (slope**2 * rest).astype(np.float32)
     energy = np.stack([x @ y for x, y in zip(rows, per_block, strict=True)], axis=1)
-    return pull_to_current(RESTRAINT * unpainted * energy.astype(np.float64), reference)
+    change = (energy * np.square(reference)).sum(axis=1, keepdims=True) / 3
+    # A light that is off has no level to keep; one without blue pays for blue as for very little.
+    scale = np.maximum(reference, LEAST_CHANNEL * reference.max(axis=1, keepdims=True))
+    power = change / np.where(scale > 0, np.square(scale), np.inf)
+    return pull_to_current(RESTRAINT * unpainted * power, reference)
 
 
 def pull_to_colors(power: Doubles, current: Doubles, lights: Bools) -> NormalEquations:
