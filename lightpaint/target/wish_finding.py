@@ -31,6 +31,10 @@ MAX_WISHES = 8
 #: Radius over which the ratio is averaged, and that joins strokes, in widths of the picture.
 SMOOTHING, JOINING = 1 / 160, 1 / 80
 
+#: Grain of a ratio, in stops, for which a radius of one pixel suffices. A look of few samples per
+#: pixel under a clean painting has some.
+GRAIN = 0.05
+
 #: Light below which a ratio says little, relative to the mean of the look.
 DARK = 0.01
 
@@ -96,10 +100,23 @@ def asked_ratio(image: Floats, importance: Floats, current_look: Floats) -> Floa
         for x in (image, current_look)
     )
     counts = (importance > 0).astype(np.float32)
-    summed = np.concatenate([np.log2(asked / now) * counts, counts[None]])
-    radius = SMOOTHING * importance.shape[1]
+    stops = np.log2(asked / now) * counts
+    summed = np.concatenate([stops, counts[None]])
+    radius = max(SMOOTHING * importance.shape[1], _grain(stops, counts > 0) / GRAIN)
     wash = gaussian_filter(summed, (0, radius, radius))
     return np.asarray(counts / np.maximum(wash[3], 1e-6) * wash[:3], np.float32)
+
+
+def _grain(stops: Floats, painted: Bools) -> float:
+    """Return the typical noise of a pixel of a ratio in stops, (3, h, w), of the painted ones.
+
+    It is the median difference of neighbours, which edges of strokes hardly change.
+    """
+    both = painted[:, 1:] & painted[:, :-1]
+    if not both.any():
+        return 0.0
+    steps = np.abs(np.diff(stops, axis=2)).max(axis=0)[both]
+    return float(np.median(steps))
 
 
 def _owners(painted: Bools, ratio: Floats) -> tuple[npt.NDArray[np.int64], int]:

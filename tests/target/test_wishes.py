@@ -50,6 +50,18 @@ def test_texture_makes_no_wishes():
     assert len(find_wishes(target(0.5 * look), look)) == 1
 
 
+@pytest.mark.parametrize("seed", range(3))
+def test_noise_of_the_look_makes_no_wishes(seed):
+    """A clean painting over a render of few samples: its ratio to the look has the look's noise."""
+    image = np.full((60, 80, 3), 0.1, np.float32)
+    image[20:40, 10:30] *= 4  # 400 pixels
+    noise = np.random.default_rng(seed).gamma(9, 1 / 9, (60, 80, 1))
+    look = (0.2 * noise * np.ones(3)).astype(np.float32)
+    areas = sorted(float(wish.area.sum()) for wish in find_wishes(lp.Target.of(image), look))
+    assert len(areas) == 2
+    assert areas[0] == pytest.approx(400, rel=0.5)  # a wash, of a radius of some pixels
+
+
 def test_layers_stay_as_they_are():
     areas = separate([np.ones(LOOK.shape[:2]), box(10, 30, 20, 40).astype(float)])
     layers = tuple(
