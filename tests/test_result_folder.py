@@ -216,10 +216,10 @@ def test_what_comes_to_the_folder_during_a_run_is_kept(
     analyse = job_answer.analyse
     with monkeypatch.context() as patch:
 
-        def write_meanwhile(*arguments: Any) -> Any:
+        def write_meanwhile(*arguments: Any, **options: Any) -> Any:
             patch.setattr(job_answer, "analyse", analyse)
             lp.run(other)
-            return analyse(*arguments)
+            return analyse(*arguments, **options)
 
         patch.setattr(job_answer, "analyse", write_meanwhile)
         with pytest.raises(OutputError, match=r"holds the answer to gallery/evening\.exr"):

@@ -15,8 +15,7 @@ from lightpaint.lighting.answer.certificate import Certificate
 from lightpaint.lighting.answer.light_setting import LightSetting
 from lightpaint.lighting.answer.lighting import EmitterPlace, Lighting
 from lightpaint.lighting.answer.lighting_file import FORMAT
-from lightpaint.paint.protocol.events import EVENTS
-from lightpaint.paint.protocol.requests import REQUESTS
+from lightpaint.paint.protocol import Event, Request
 from lightpaint.pipeline.results.result_folder import _Record
 from lightpaint.placement.placement_record import PlacementRecord
 from lightpaint.relit.export import fixtures
@@ -37,8 +36,8 @@ def schemas() -> dict[str, tuple[str, Schema]]:
             schema_of(PlacementRecord),
         ),
         "fixtures": ("``fixtures.json``, an answer for consoles", fixtures_schema()),
-        "requests": ("what clients send to the painter", _messages(REQUESTS)),
-        "events": ("what the painter sends to clients", _messages(EVENTS)),
+        "requests": ("what clients send to the painter", _messages(Request.kinds)),
+        "events": ("what the painter sends to clients", _messages(Event.kinds)),
     }
 
 

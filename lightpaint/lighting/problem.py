@@ -154,7 +154,7 @@ class Problem(LinearProblem):
         )
         reference = start_weights(all_constraints.start, whole.lights)
         gamuts = gamuts_for(whole, views, fit, reference)
-        painted = _wash_fields(views, fit, reference)
+        painted = wash_fields(views, fit, reference)
         whites = whites_for(painted.get("expected"), fit)
         reduction = reduce_lights(all_constraints, whole.lights, fit, gamuts, whites)
         return cls(
@@ -311,14 +311,18 @@ def whites_for(expected: ExpectedLights | None, fit: Fit) -> WhiteLimits | None:
     return painted_whites(expected.painted)
 
 
-def _wash_fields(views: Views, fit: Fit, own: Doubles) -> dict[str, Any]:
-    """Return what a sketch lets one expect, and its terms of the loss, as fields of a problem."""
-    reads_wishes = fit.reads_wishes(is_sketch=_are_sketches(views))
+def wash_fields(views: Views, fit: Fit, own: Doubles) -> dict[str, Any]:
+    """Return what a sketch lets one expect, and its terms of the loss, as fields of a problem.
+
+    own: (n, 3), weights with the colours that lights have.
+    """
+    none = dict.fromkeys(("expected", "contrast", "restraint"))
+    reads_wishes = fit.reads_wishes(is_sketch=are_sketches(views))
     if not (reads_wishes or fit.colors == "white"):
-        return {}
+        return none
     wash = wash_of(views)
     if not reads_wishes:
-        return {"expected": expected_for(views, fit, own, wash)}
+        return {**none, "expected": expected_for(views, fit, own, wash)}
     strength = sum(float(x.importance.sum(dtype=np.float64)) for x in views.targets)
     unpainted = unpainted_weight_of(views, fit)
     return {
@@ -328,7 +332,7 @@ def _wash_fields(views: Views, fit: Fit, own: Doubles) -> dict[str, Any]:
     }
 
 
-def _are_sketches(views: Views) -> bool:
+def are_sketches(views: Views) -> bool:
     """Return whether any view was painted over the current look, or as a display shows it."""
     return any(target.over_look or target.through_view for target in views.targets)
 
@@ -338,7 +342,7 @@ def gamuts_for(basis: Basis, views: Views, fit: Fit, own: Doubles | None = None)
 
     own: (n, 3), weights with the colours that lights have, by default the current ones.
     """
-    if not fit.keeps_to_hues(is_sketch=_are_sketches(views)):
+    if not fit.keeps_to_hues(is_sketch=are_sketches(views)):
         return None
     views_of_paint = [
         (view_basis, target.image, _color_importance(target))

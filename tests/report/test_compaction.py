@@ -49,6 +49,17 @@ def test_a_style_sheet_has_those_that_it_imports_in_their_place() -> None:
     assert {f"styles/{sheet.name}" for sheet in folder.glob("styles/*")} == {*parts}
 
 
+def test_pseudo_classes_of_descendants_stay_theirs() -> None:
+    """`.a :is(.b)` is another selector than `.a:is(.b)`, also in blocks like `@container`."""
+    parts = re.findall(r'"(styles/\w+\.css)"', source("paint/page/style.css"))
+    descendant = re.compile(r"[\w)\]] (?:\*)?:(?:has|is|not|where)\(")
+    counts = [
+        sum(len(descendant.findall(text(f"paint/page/{part}"))) for part in parts)
+        for text in (source, styles)
+    ]
+    assert counts[0] == counts[1] > 20
+
+
 def test_names_and_texts_of_the_mixer_stay() -> None:
     words = re.compile(r"[\w$]{3,}")
     script = bundled("viewer/mixer/mixer.js")

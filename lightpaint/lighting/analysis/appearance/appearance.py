@@ -120,8 +120,8 @@ class Appearance:
     deliveries: tuple[Delivery, ...] = ()
     lit_delta_e: float = 0.0
     reasons_wish: str = ""
-    undetermined_lights: tuple[str, ...] = ()
     compensating_lights: tuple[str, ...] = ()
+    undetermined_lights: tuple[str, ...] = ()
 
     __repr__ = short_repr
 

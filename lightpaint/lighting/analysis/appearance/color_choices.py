@@ -27,7 +27,14 @@ from lightpaint.lighting.loss.reweighting import (
 )
 from lightpaint.lighting.loss.warm_start import sample_pixels
 from lightpaint.lighting.normal_equations import NormalEquations
-from lightpaint.lighting.problem import Problem, expected_for, gamuts_for, whites_for
+from lightpaint.lighting.problem import (
+    Problem,
+    are_sketches,
+    expected_for,
+    gamuts_for,
+    wash_fields,
+    whites_for,
+)
 from lightpaint.lighting.solution import Solution
 from lightpaint.lighting.unknowns.reduced_problem import solve_reduced
 from lightpaint.lighting.unknowns.reduction import only_knobs
@@ -163,7 +170,9 @@ def _with_colors(problem: Problem, colors: Colors) -> Problem:
 
     Raises ConstraintError if a light cannot have it.
     """
-    fit = replace(problem.fit, colors=colors)
+    fit, is_sketch = replace(problem.fit, colors=colors), are_sketches(problem.views)
+    if problem.fit.reads_wishes(is_sketch=is_sketch) != fit.reads_wishes(is_sketch=is_sketch):
+        problem = replace(problem, **wash_fields(problem.views, fit, problem.reference))
     expected = problem.expected or expected_for(problem.views, fit, problem.reference)
     gamuts = gamuts_for(problem.basis, problem.views, fit, problem.reference)
     full = reduce_lights(
