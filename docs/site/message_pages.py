@@ -146,8 +146,10 @@ def _entry(entry: Entry, places: Mapping[str, str], page: str) -> list[str]:
     rows += [(f"`{x}`", f"array {meaning}", "") for x, meaning in buffers.items()]
     named = {**places, entry.name: ""}
     lines = [f"### `{entry.name}`", *(_mentions(x, named, page) for x in entry.text)]
+    if getattr(entry.record, "is_observed", False):
+        lines.append("Observers receive it, too.")
     if rows:
-        table = ["| field | type | |", "|---|---|---|"]
+        table = ["| field | type | meaning |", "|---|---|---|"]
         for name, kind, field_name in rows:
             meaning = _mentions(entry.meanings.get(field_name.rstrip("?"), ""), named, page)
             table.append(f"| {name} | {kind} | {meaning.replace('|', chr(92) + '|')} |")
