@@ -14,7 +14,7 @@ from typing import Any, Literal
 
 from lightpaint.validation import SWITCH, Check, checks_of
 
-#: What options are for, in the order in which `--help` shows them.
+#: Purposes of options, in the order in which `--help` shows them.
 Theme = Literal[
     "Painting",
     "What the painting means",
@@ -59,7 +59,7 @@ class Option:
 
     @property
     def metavar(self) -> str | None:
-        """What stands for its value in the help; None for a switch, or one of a few words."""
+        """The name of its value in the help; None for a switch, or for one of a few words."""
         return self.usage.partition(" ")[2] or None
 
 
