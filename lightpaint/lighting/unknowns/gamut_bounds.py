@@ -9,7 +9,7 @@ import numpy as np
 
 from lightpaint.arrays import Doubles
 from lightpaint.colour.color_hull import ColorHull
-from lightpaint.lighting.algebra.optimum import Method
+from lightpaint.lighting.algebra.method import Method
 from lightpaint.lighting.normal_equations import NormalEquations
 from lightpaint.lighting.unknowns.reduced_problem import ReducedOptimum, solve_reduced
 from lightpaint.lighting.unknowns.reduction import Reduction

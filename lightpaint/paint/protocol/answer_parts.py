@@ -26,7 +26,11 @@ class Advice:
 
 @dataclass(frozen=True)
 class Closeness:
-    """Closeness of an answer in one view. delta_e_present: ΔE of the current look."""
+    """Closeness of an answer in one view. delta_e_present: ΔE of the current look.
+
+    headline: how close it is, in words. help: a constraint to loosen; null for none. delta_e: mean
+    ΔE over the paint. sentences: what stands below the headline.
+    """
 
     headline: str
     help: Advice | None
@@ -46,7 +50,8 @@ class WishDelivery:
     a stroke in a layer.
 
     layers: ids of its layers. brightness, color: share of the asked change that came; null if none
-    was asked. delta_e: of its lit parts, against the painting.
+    was asked. delta_e: of its lit parts, against the painting. name: of the layer, group or stroke.
+    kind: `layer`, `group` or `wish`.
     """
 
     name: str
@@ -64,7 +69,7 @@ class AnswerChoice:
     is_chosen: whether it is the answer itself. delta_e: its mean ΔE over the paint. brightness,
     color: mean share of the asked changes that came, from 0 to 1, in which each wish counts alike;
     null if none was asked. worst: the wish of which least came; null if at least three quarters of
-    each did.
+    each did. colors: the choice.
     """
 
     colors: AnswerColors
@@ -82,6 +87,8 @@ class LightAnswer:
     stops: relative to its current emission; null if it is, or was, off. kelvin: null for a colour
     that is not white. share: of the light in the picture. error: its uncertainty, in words.
     is_constrained: whether a constraint limits it. is_unreached: whether no paint depends on it.
+    emission: linear, in the unit of the light. swatch: its colour for a screen, as in CSS. is_on:
+    whether it shines.
     """
 
     emission: RGB
@@ -101,7 +108,8 @@ class Findings:
 
     lights: in the order of the state. shares: of each light, by view, if there are several.
     closeness: of each view; null for unpainted views. deliveries: how much of each wish came, in
-    all views together.
+    all views together. headline, help, delta_e, delta_e_present, sentences: as in `Closeness`, of
+    the view with the largest error.
     """
 
     lights: tuple[LightAnswer, ...] | None = field(default=None, metadata=OPTIONAL)

@@ -17,7 +17,8 @@ class LightInfo:
     present: its emission before anything was painted. parameter, plugin: its definition in the
     scene. form: how the scene writes its emission. members: its emitters, if it is a group. group:
     name of that group; null for a single emitter. is_fixed: whether it is not adjusted. is_scalar:
-    whether one number stands for all channels. scale: factor of its stored plane.
+    whether one number stands for all channels. scale: factor of its stored plane. name, label: its
+    name in the scene, and as people read it. unit: of its emission.
     """
 
     name: str
@@ -101,8 +102,8 @@ class SkyAxes:
 class Camera:
     """A camera without a lens. Pixel (x, y) sees origin + s · (x · x_axis + y · y_axis + forward).
 
-    is_parallel: all rays have the direction `forward` and begin at
-    origin + x · x_axis + y · y_axis.
+    is_parallel: all rays have the direction `forward` and begin at origin + x · x_axis + y ·
+    y_axis. origin, x_axis, y_axis, forward: vectors in units of the scene.
     """
 
     origin: Place
@@ -145,7 +146,10 @@ class LayerInfo(Layer):
 
 @dataclass(frozen=True)
 class LayerList:
-    """The layers of the painting, the lowest first. next: the id of the next new one."""
+    """The layers of the painting, the lowest first. next: the id of the next new one.
+
+    layers: of the painting.
+    """
 
     layers: tuple[LayerInfo, ...]
     next: int
@@ -167,7 +171,8 @@ class LookInfo:
     """A kept look. stamp: time in seconds since 1970. thumbnail: name of its picture.
 
     lights: names of its lights, which may differ from the current ones. weights: of each. places:
-    as in `EditState`.
+    as in `EditState`. id: a number that no other look has. is_proposal: whether an observer has
+    proposed it.
     """
 
     id: int
@@ -182,7 +187,10 @@ class LookInfo:
 
 @dataclass(frozen=True)
 class TransformInfo:
-    """The view transform that the pictures are seen through, and its exposure in stops."""
+    """The view transform that the pictures are seen through, and its exposure in stops.
+
+    name: of the transform. stops: exposure.
+    """
 
     name: str
     stops: float
@@ -190,7 +198,10 @@ class TransformInfo:
 
 @dataclass(frozen=True)
 class TableInfo:
-    """The grid of the view transforms' tables: points on a side, lowest and highest log2 light."""
+    """The grid of the view transforms' tables: points on a side, lowest and highest log2 light.
+
+    side: points on a side. low, high: lowest and highest log2 light.
+    """
 
     side: int
     low: float
@@ -199,7 +210,11 @@ class TableInfo:
 
 @dataclass(frozen=True)
 class SampleCount:
-    """Samples per pixel: of the current basis, and of the final one."""
+    """Samples per pixel: of the current basis, and of the final one.
+
+    spp: of the current basis. target_spp: of the final one. is_complete: whether all samples are
+    there.
+    """
 
     spp: int
     target_spp: int
@@ -208,7 +223,10 @@ class SampleCount:
 
 @dataclass(frozen=True)
 class HistoryInfo:
-    """Labels of the last steps that can be undone and redone; count: of all steps."""
+    """Labels of the last steps that can be undone and redone; count: of all steps.
+
+    undo, redo: labels of steps.
+    """
 
     undo: tuple[str, ...]
     redo: tuple[str, ...]
@@ -221,7 +239,7 @@ class StepInfo:
 
     id: a number that no other step has; the picture `step/ID` shows the answer after it.
     is_milestone: the last step before a pause or before everything was replaced, or the last of
-    many.
+    many. label: what was done.
     """
 
     id: int
@@ -236,7 +254,7 @@ class SearchInfo:
 
     after: id of the last step when it ended, which is its own if it found something; 0 for none.
     title: what was searched for. text: what came of it. tried: sentences on what was tried. stamp:
-    time in seconds since 1970.
+    time in seconds since 1970. id: a number that no other search has. seconds: that it took.
     """
 
     id: int
@@ -252,7 +270,7 @@ class SearchInfo:
 class PresetInfo:
     """A preset: a request for a whole scene. Its picture is `preset/NAME`.
 
-    has_subject: whether it is about one object.
+    has_subject: whether it is about one object. name: in requests. title, description: for people.
     """
 
     name: str
@@ -265,6 +283,8 @@ class PresetInfo:
 class ReferenceInfo:
     """A reference. Its pictures are `reference/ID`, (h, w, 3) uint8 as the session's view transform
     shows it, and `reference_light/ID`, its light, reduced, (h, w, 3) float16.
+
+    id: a number that no other reference has. name: of its file.
     """
 
     id: int
@@ -278,7 +298,8 @@ class RenderInfo:
 
     name: as requested. height: null until it is known. state: `waiting` for an earlier one; the
     others speak for themselves. done, total: its passes. text: why it has failed. files: paths of
-    those that were written.
+    those that were written. id: a number that no other render has. view, width, spp, formats: as
+    requested.
     """
 
     id: int
@@ -297,7 +318,10 @@ class RenderInfo:
 
 @dataclass(frozen=True)
 class PlacePair:
-    """Two places that should look alike: (x, y) as shares of width and height, 0 to 1."""
+    """Two places that should look alike: (x, y) as shares of width and height, 0 to 1.
+
+    reference: the place in the reference. picture: the place in the view.
+    """
 
     reference: tuple[float, float]
     picture: tuple[float, float]
@@ -305,7 +329,10 @@ class PlacePair:
 
 @dataclass(frozen=True)
 class ResolvedFit:
-    """The resolved values of all settings, as in `lightpaint.Fit`."""
+    """The resolved values of all settings, as in `lightpaint.Fit`.
+
+    space: `display` or `linear`. hold: strength of the hold. colors: freedom of the lights.
+    """
 
     space: str | None
     hold: float | None
@@ -325,7 +352,8 @@ class EditState:
 
     earlier: constraints of lights that are locked or off, by name, from before they were, to be
     sent when they are released. kept: names of those that are locked only since they were moved.
-    is_started: whether the solve starts from lamps that were set by hand.
+    is_started: whether the solve starts from lamps that were set by hand. history: labels of steps
+    to undo and redo.
     """
 
     history: HistoryInfo | None = field(default=None, metadata=OPTIONAL)

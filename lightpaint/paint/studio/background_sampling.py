@@ -12,7 +12,7 @@ from lightpaint.paint.session_access import SessionAccess
 from lightpaint.paint.studio.session_bases import SessionBases
 from lightpaint.paint.subject import Subject
 from lightpaint.progress import Progress, silent
-from lightpaint.scene.properties.film import MAX_SPP
+from lightpaint.scene.limits import MAX_SPP
 from lightpaint.scene.runtime.render_lock import MITSUBA
 
 #: Name of this task in reports of progress.
