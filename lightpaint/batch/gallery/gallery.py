@@ -2,15 +2,13 @@
 
 import base64
 from collections.abc import Mapping, Sequence
-from dataclasses import asdict
-from html import escape
-from importlib import resources
+from dataclasses import asdict, dataclass
 from pathlib import Path
-from string import Template
 from typing import Any
 from urllib.parse import quote
 
 import numpy as np
+from markupsafe import Markup
 from PIL import Image, ImageDraw, ImageFont
 
 from lightpaint.batch.gallery.gallery_mixers import mixers_html, script_json, transforms_of
@@ -34,6 +32,8 @@ from lightpaint.images.formats.png import png_bytes
 from lightpaint.pipeline.results.placement_changes import hung_of
 from lightpaint.placement.placement_record import PlacementRecord
 from lightpaint.report.comparison import shorten_to_width
+from lightpaint.report.page.html import html
+from lightpaint.report.rig.hung_lights import LightChange
 from lightpaint.version import __version__
 from lightpaint.viewer.bundle import bundled, styles
 
@@ -45,6 +45,15 @@ MAX_PICTURES, COLUMNS, WIDTH, GAP, CAPTION_HEIGHT = 120, 6, 240, 14, 22
 
 #: Colours of the sheet: background, text, faint text, warnings.
 GROUND, TEXT, FAINT, WARNING = (24, 24, 26), (226, 226, 226), (142, 142, 146), (255, 140, 120)
+
+
+@dataclass(frozen=True)
+class GroupPlaces:
+    """The moved lights of a group of looks, for the page. picture: data: URI; "" without one."""
+
+    sentence: str
+    changes: Sequence[LightChange]
+    picture: str
 
 
 def write_gallery(
@@ -76,7 +85,7 @@ def bases_of_rows(folder: Path, plan: Plan) -> dict[str, str]:
 
 
 def _page(folder: Path, plan: Plan, rows: Sequence[SummaryRow], bases: Mapping[str, str]) -> str:
-    return gallery_page(folder, plan.manifest.name, rows, bases, places=places_section(plan))
+    return gallery_page(folder, plan.manifest.name, rows, bases, places=places_of(plan))
 
 
 def gallery_page(
@@ -85,12 +94,12 @@ def gallery_page(
     rows: Sequence[SummaryRow],
     bases: Mapping[str, str] | None = None,
     *,
-    places: str = "",
+    places: Sequence[GroupPlaces] = (),
 ) -> str:
     """Return the page as HTML text.
 
     folder: of the small pictures and planes. bases: planes of each row, by its folder. places: the
-    section on lights that hang at the same places in several looks.
+    lights that hang at the same places in several looks.
     """
     finished_rows = [row for row in rows if row.state == "done"]
     mixers = mixers_html(folder, finished_rows, bases or {})
@@ -105,44 +114,36 @@ def gallery_page(
         if (bases or {}).get(row.folder) in mixers:
             record["basis"] = (bases or {})[row.folder]
         records.append(record)
-    template = resources.files("lightpaint.batch.gallery").joinpath("gallery.html.in")
-    return Template(template.read_text(encoding="utf-8")).substitute(
-        title=escape(visible(title)),
-        about=escape(counts_text(rows)),
-        failed=" failed" if any(row.state == "failed" for row in rows) else "",
-        looks=script_json(records),
-        transforms=script_json(transforms_of(finished_rows) if mixers else {}),
-        mixers="\n".join(mixers.values()),
+    return html(
+        "batch/gallery/gallery",
+        title=visible(title),
+        about=counts_text(rows),
+        has_failed=any(row.state == "failed" for row in rows),
+        looks=Markup(script_json(records)),
+        transforms=Markup(script_json(transforms_of(finished_rows) if mixers else {})),
+        mixers=list(mixers.values()),
         places=places,
-        style=styles(*STYLES),
-        script=bundled("batch/gallery/gallery.js"),
-        version=escape(__version__),
+        style=Markup(styles(*STYLES)),
+        script=Markup(bundled("batch/gallery/gallery.js")),
+        version=__version__,
     )
 
 
-def places_section(plan: Plan) -> str:
-    """Return the section on moved lights: for each group of looks a table, a plan and an elevation.
+def places_of(plan: Plan) -> list[GroupPlaces]:
+    """Return the moved lights of each group of looks.
 
     Looks that are placed alone are in their own reports instead.
     """
     placed_groups = [(group, group.read_record()) for group in plan.groups if len(group.tasks) > 1]
-    parts = "".join(
-        _group_html(group, record) for group, record in placed_groups if record is not None
-    )
-    return f'<section class="places"><h2>Where the lights hang</h2>{parts}</section>' * bool(parts)
+    return [_group_places(group, record) for group, record in placed_groups if record is not None]
 
 
-def _group_html(group: PlaceGroup, record: PlacementRecord) -> str:
-    placement = hung_of(record, None)
-    items = "".join(f"<li>{escape(change.text)}</li>" for change in placement.changes)
-    picture = ""
+def _group_places(group: PlaceGroup, record: PlacementRecord) -> GroupPlaces:
+    placement, picture = hung_of(record, None), ""
     if group.picture.is_file():
         data = base64.b64encode(group.picture.read_bytes()).decode("ascii")
-        picture = (
-            '<img alt="Plan and elevation of the room with its lights." '
-            f'src="data:image/png;base64,{data}">'
-        )
-    return f"<p>{escape(placement.shared_sentence)}</p><ul>{items}</ul>{picture}"
+        picture = f"data:image/png;base64,{data}"
+    return GroupPlaces(placement.shared_sentence, placement.changes, picture)
 
 
 def counts_text(rows: Sequence[SummaryRow]) -> str:

@@ -6,6 +6,8 @@ from contextlib import suppress
 from pathlib import Path
 from typing import Any
 
+from markupsafe import Markup
+
 from lightpaint.batch.gallery.small_planes import SUFFIX, read_planes
 from lightpaint.batch.gallery.summary import SummaryRow
 from lightpaint.batch.manifest.folder_names import THUMBNAILS
@@ -26,7 +28,7 @@ MAX_MIXERS, MAX_LIGHTS = 8, 40
 
 def mixers_html(
     folder: Path, rows: Sequence[SummaryRow], bases: Mapping[str, str]
-) -> dict[str, str]:
+) -> dict[str, Markup]:
     """Return the first mixers as sections of HTML, by their names.
 
     folder: of the batch. rows: candidates. bases: name of each row's planes, by the row's folder.
@@ -35,7 +37,7 @@ def mixers_html(
     for row in rows:
         if row.lights and row.folder in bases:
             rows_by_basis.setdefault(bases[row.folder], []).append(row)
-    sections: dict[str, str] = {}
+    sections: dict[str, Markup] = {}
     for name, basis_rows in rows_by_basis.items():
         record = read_planes(folder / THUMBNAILS / f"{name}{SUFFIX}")
         if len(sections) < MAX_MIXERS and record:
@@ -45,7 +47,9 @@ def mixers_html(
     return sections
 
 
-def _mixer(folder: Path, name: str, record: Mapping[str, Any], rows: Sequence[SummaryRow]) -> str:
+def _mixer(
+    folder: Path, name: str, record: Mapping[str, Any], rows: Sequence[SummaryRow]
+) -> Markup:
     """Return one mixer. record: as `write_planes` wrote it."""
     lights = [
         {**light, "answer": light["present"], "kelvin": {"present": None, "answer": None}}
@@ -68,8 +72,11 @@ def _mixer(folder: Path, name: str, record: Mapping[str, Any], rows: Sequence[Su
         "lighting": lighting_data(lighting),
         "command": None,
     }
-    text = f'<script type="application/json">{script_json(data)}</script>'
-    return f'<section class="mixer" data-ready data-basis="{name}" hidden>{text}</section>'
+    section = (
+        '<section class="mixer" data-ready data-basis="{}" hidden>'
+        '<script type="application/json">{}</script></section>'
+    )
+    return Markup(section).format(name, Markup(script_json(data)))
 
 
 def _strongest_lights(record: Mapping[str, Any], rows: Sequence[SummaryRow]) -> list[int]:

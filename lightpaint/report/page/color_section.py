@@ -1,15 +1,14 @@
 """The answers of all choices of `colors`, in words and as a part of the report."""
 
-from html import escape
-
 import numpy as np
+from markupsafe import Markup
 
 from lightpaint.colour.color import cct_and_duv
 from lightpaint.colour.hue_names import hue_name
 from lightpaint.display_text import some_names
 from lightpaint.lighting.analysis.appearance.color_choices import Choices, ColorChoice
 from lightpaint.lighting.fit import Colors
-from lightpaint.report.page.html import row, table
+from lightpaint.report.page.html import html
 
 #: The colours that lamps may have, in few words.
 COLOR_MEANINGS: dict[Colors, str] = {
@@ -18,9 +17,6 @@ COLOR_MEANINGS: dict[Colors, str] = {
     "white": "whites, from warm to cool",
     "own": "their own colour; they only dim",
 }
-
-#: Headings of the table.
-HEADINGS = ("light colours", "mean ΔE", "what would change")
 
 #: ΔE by which a closer choice is mentioned at once, and below which it is as close.
 MIN_GAIN, SAME_DELTA_E = 1.0, 0.1
@@ -63,25 +59,22 @@ def closer_choice(choices: Choices) -> str:
     return spoken_choice(best, chosen)
 
 
-def colors_section(choices: Choices) -> str:
+def colors_section(choices: Choices) -> Markup:
     """Return the section on the choices; empty if there are none."""
     chosen = next((choice for choice in choices if choice.is_chosen), None)
     if chosen is None:
-        return ""
-    rows = [
-        row(
-            f"{choice.colors}{', as solved' if choice.is_chosen else ''}<br>"
-            f"<small>{COLOR_MEANINGS[choice.colors]}</small>",
-            f"{choice.delta_e:.1f}",
-            escape(_change_cell(choice, chosen)),
-        )
+        return Markup("")
+    shown = [
+        {
+            "name": choice.colors,
+            "meaning": COLOR_MEANINGS[choice.colors],
+            "is_chosen": choice.is_chosen,
+            "delta_e": choice.delta_e,
+            "change": _change_cell(choice, chosen),
+        }
         for choice in choices
     ]
-    return (
-        "<section><h2>What light colours cost</h2>"
-        "<p>How close the lights would come with each setting of <code>colors</code>, all else "
-        f"equal. These are quick estimates.</p>{table(HEADINGS, rows, kind='choices')}</section>"
-    )
+    return html("colors", choices=shown)
 
 
 def _change_cell(choice: ColorChoice, chosen: ColorChoice) -> str:

@@ -1,6 +1,9 @@
-"""The section of the report on the cost of constraints to the picture. Returns HTML."""
+"""The section of the report on the cost of constraints to the picture."""
+
+from typing import Any
 
 import numpy as np
+from markupsafe import Markup
 
 from lightpaint.arrays import Doubles
 from lightpaint.basis.basis import Basis
@@ -13,7 +16,7 @@ from lightpaint.report.basis_memo import ROWS_SHOWN, SPARE_ROWS
 from lightpaint.report.clean_pictures import CleanLooks
 from lightpaint.report.measures import relative_residual
 from lightpaint.report.page.figures import PagePicture, figure
-from lightpaint.report.page.html import row, share_cell, table
+from lightpaint.report.page.html import html
 from lightpaint.report.phrases import spoken_percent
 
 #: Least width in pixels of reduced pictures; a whole factor gives up to twice as much.
@@ -30,35 +33,35 @@ def constraints_section(
     *,
     transform: ViewTransform,
     looks: CleanLooks | None = None,
-) -> str:
+) -> Markup:
     """Return the best answer without constraints, `free`, beside the answer, from the basis.
 
     With `sparse`, also the errors of other numbers of lights. Empty without constraints.
     """
     if free is None:
-        return ""
-    start = solution.weights
-    without, with_constraints = (spoken_percent(relative_residual(x)) for x in (free, solution))
+        return Markup("")
+    without, with_constraints = relative_residual(free), relative_residual(solution)
     pictures = [
-        (free.weights, "Without constraints", f"{without} missed."),
-        (start, "With the constraints", f"{with_constraints} missed."),
+        (free.weights, "Without constraints", f"{spoken_percent(without)} missed."),
+        (solution.weights, "With the constraints", f"{spoken_percent(with_constraints)} missed."),
+        *_neighbours(solution),
     ]
-    return (
-        '<section><h2>What the constraints cost</h2><div class="explained"><div>'
-        f"<p>Free to have any colour and brightness, the lights would miss {without} of the "
-        f"painted light (RMS). With the constraints, they miss {with_constraints}. Both pictures "
-        f"are sums of the basis images.</p></div>{_curve(solution, free)}</div>"
-        f'<div class="maps">{_figures(basis, pictures, transform, looks)}'
-        f"{_numbers(basis, solution, transform, looks)}"
-        "</div></section>"
+    curve, shown_rows = _curve(solution, free)
+    return html(
+        "constraints",
+        without=without,
+        with_constraints=with_constraints,
+        curve=curve,
+        shown_rows=shown_rows,
+        figures=_figures(basis, pictures, transform, looks),
     )
 
 
-def _curve(solution: Solution, free: Solution) -> str:
-    """Return, with `sparse`, the table of errors by number of lights."""
+def _curve(solution: Solution, free: Solution) -> tuple[list[dict[str, Any]], int]:
+    """Return, with `sparse`, the errors by number of lights, and how many of them to show."""
     curve = solution.certificate.curve
     if not curve:
-        return ""
+        return [], 0
     used_count, points = _used_count(solution), list(curve)
     if len(curve) > ROWS_SHOWN + SPARE_ROWS:
         nearest = sorted(curve, key=lambda point: abs(point[0] - used_count))
@@ -71,22 +74,17 @@ def _curve(solution: Solution, free: Solution) -> str:
         ("without constraints", relative_residual(free)),
         *((_lights(count), missed) for count, missed in curve if (count, missed) not in points),
     ]
-    rows = [row(label, share_cell(spoken_percent(x), min(x, 1.0))) for label, x in entries]
-    headings = ("lights on, the best set found", "missed")
-    return f"<div>{table(headings, rows, shown=len(points) + 1)}</div>"
+    return [{"label": label, "missed": missed} for label, missed in entries], len(points) + 1
 
 
-def _numbers(
-    basis: Basis, solution: Solution, transform: ViewTransform, looks: CleanLooks | None
-) -> str:
-    """Return, with `sparse`, pictures with fewer and with more lights."""
+def _neighbours(solution: Solution) -> list[tuple[Doubles, str, str]]:
+    """Return, with `sparse`, pictures with fewer and with more lights, as `_figures` takes them."""
     used_count, missed_with = _used_count(solution), dict(solution.certificate.curve)
-    pictures = [
+    return [
         (weights, f"With {_lights(count)}", f"{spoken_percent(missed_with[count])} missed.")
         for count, weights in solution.tried
         if count in missed_with and 0 < abs(count - used_count) <= NEIGHBOURS
     ]
-    return _figures(basis, pictures, transform, looks)
 
 
 def _figures(
@@ -94,7 +92,7 @@ def _figures(
     pictures: list[tuple[Doubles, str, str]],
     transform: ViewTransform,
     looks: CleanLooks | None,
-) -> str:
+) -> list[Markup]:
     """Return pictures of weights (n, 3), each with its name and a caption."""
     factor = max(1, min(basis.size[1] // MIN_WIDTH, *basis.size))
     figures = []
@@ -103,8 +101,8 @@ def _figures(
         image = np.asarray(block_mean(basis.mix(weights), factor), np.float32)
         pixels = transform.encode(denoised(image) if looks and looks.is_clean else image)
         picture = PagePicture(name, f"{name}, predicted.", to_8_bit(pixels))
-        figures.append(figure(picture, caption, ""))
-    return "".join(figures)
+        figures.append(figure(picture, caption))
+    return figures
 
 
 def _used_count(solution: Solution) -> int:

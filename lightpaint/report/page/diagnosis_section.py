@@ -1,8 +1,9 @@
-"""The sections of the report on uncertainty and on the error. Each returns HTML."""
+"""The sections of the report on uncertainty and on the error."""
 
-from html import escape
+from typing import Any
 
 import numpy as np
+from markupsafe import Markup
 
 from lightpaint.arrays import Floats
 from lightpaint.basis.basis import Basis
@@ -25,58 +26,50 @@ from lightpaint.report.answer_pictures import (
 from lightpaint.report.diagnosis_sentences import error_sentences, spoken_hold, spoken_shares
 from lightpaint.report.measures import brightness, energy_shares, relative_errors
 from lightpaint.report.page.figures import PagePicture, figure, signed_scale
-from lightpaint.report.page.html import breakable_name, fold, name_list, row, share_cell, table
+from lightpaint.report.page.html import html
 from lightpaint.report.phrases import spoken_percent
 from lightpaint.report.uncertainty_sentences import spoken_errors, uncertainty_sentence
 
-#: Headings of the table of uncertainty, and rows of both tables that are not folded.
-ERROR_HEADS, SHOWN_ROWS = ("light", "solved", "95 % interval", "of the light", "of the picture"), 6
-
-#: Headings of the table of bounds.
-BOUND_HEADS = ("light", "limited by", "gain without<br>the limit", "slope")
+#: Rows of both tables that are not folded.
+SHOWN_ROWS = 6
 
 #: Bounds with a smaller share of the miss are not worth a row.
 SMALLEST_GAIN = 0.002
 
 
-def sure_section(basis: Basis, solution: Solution, uncertainty: Uncertainty | None) -> str:
+def sure_section(basis: Basis, solution: Solution, uncertainty: Uncertainty | None) -> Markup:
     """Return the section on uncertainty: a sentence, and the lights with notable errors."""
     if uncertainty is None:
-        return ""
+        return Markup("")
     shares = energy_shares(basis, solution.lighting)
     errors, spoken = relative_errors(uncertainty), spoken_errors(uncertainty, len(shares))
     solved, low, high = brightness(uncertainty)
     effect = np.where(np.isfinite(errors) & ~uncertainty.untold, errors, 0) * shares
     # Lights that are off and may be on come last, by their possible brightness.
     order = sorted(range(len(shares)), key=lambda k: (-effect[k], -high[k]))
-    rows = [
-        row(
-            breakable_name(basis.names[k]),
-            f"{solved[k]:.3g}",
-            f"{low[k]:.3g} … {high[k]:.3g}",
-            spoken[k] if np.isfinite(errors[k]) or uncertainty.untold[k] else "–",
-            f"± {spoken_percent(float(effect[k]))}" if effect[k] else "–",
-        )
+    lights = [
+        {
+            "name": basis.names[k],
+            "solved": f"{solved[k]:.3g}",
+            "interval": f"{low[k]:.3g} … {high[k]:.3g}",
+            "error": spoken[k] if np.isfinite(errors[k]) or uncertainty.untold[k] else "–",
+            "effect": f"± {spoken_percent(float(effect[k]))}" if effect[k] else "–",
+        }
         for k in order
         if errors[k] > 0
     ]
-    meaning = (
-        "<p>The table shows the luminance of each light, and the interval that holds its exact "
-        "value in 95 of 100 cases. Lights with nearly the same effect may each be far off, and "
-        "still make up for each other in the picture.</p>"
-    )
-    return (
-        '<section><h2>How sure</h2><div class="explained">'
-        f"<div><p>{escape(uncertainty_sentence(basis, solution, uncertainty))}</p>"
-        "<p>Together these errors are about "
-        f"{spoken_percent(uncertainty.relative_excess)} of the painted light (RMS).</p>"
-        f"{_steps(solution)}{fold('How to read the table', meaning)}</div>"
-        f"<div>{table(ERROR_HEADS, rows, kind='sure', shown=SHOWN_ROWS)}</div></div></section>"
+    return html(
+        "uncertainty",
+        sentence=uncertainty_sentence(basis, solution, uncertainty),
+        excess=uncertainty.relative_excess,
+        steps=_steps(solution),
+        lights=lights,
+        shown_rows=SHOWN_ROWS,
     )
 
 
 def _steps(solution: Solution) -> str:
-    """Return the measures against noise, besides sampling."""
+    """Return the measures against noise, besides sampling, in words."""
     steps = []
     if solution.problem.noise_removed:
         steps.append(
@@ -89,7 +82,7 @@ def _steps(solution: Solution) -> str:
             f"{spoken_percent(solution.problem.refinement.share)} of the last step"
         )
     text = "; ".join(steps)
-    return f"<p>{text[0].upper()}{text[1:]}.</p>" if text else ""
+    return text[:1].upper() + text[1:]
 
 
 #: Advice for light that no dimmer can give.
@@ -108,25 +101,29 @@ def missed_section(
     transform: ViewTransform,
     appearance: Appearance | None = None,
     can_place: bool = False,
-) -> str:
+) -> Markup:
     """Return the section on the error: sentences, shares, maps and bounds.
 
     can_place: whether lights of the scene could move, and none was allowed to.
     """
     if diagnosis is None:
-        return ""
-    sentences = "".join(f"<p>{escape(text)}</p>" for text in error_sentences(diagnosis, appearance))
+        return Markup("")
+    sentences = list(error_sentences(diagnosis, appearance))
     if can_place and appearance is not None and appearance.is_out_of_reach:
-        sentences += f"<p>{OTHER_PLACES}</p>"
-    return (
-        f'<section><h2>The difference</h2><div class="explained"><div>{sentences}</div>'
-        f"{_shares(diagnosis)}</div>"
-        f'<div class="maps">{_maps(solution, diagnosis, current, transform=transform)}</div>'
-        f"{_bounds(diagnosis)}</section>"
+        sentences.append(OTHER_PLACES)
+    return html(
+        "difference",
+        sentences=sentences,
+        shares=_shares(diagnosis),
+        figures=_maps(solution, diagnosis, current, transform=transform),
+        bounds=_bounds(diagnosis),
+        left_out=diagnosis.bounds_left_out,
+        shown_rows=SHOWN_ROWS,
     )
 
 
-def _shares(diagnosis: Diagnosis) -> str:
+def _shares(diagnosis: Diagnosis) -> list[dict[str, Any]]:
+    """Return the parts of the error, with their shares in words and as numbers."""
     d = diagnosis
     by_what = "by zero or by the constraints" if d.is_constrained else "needs light below zero"
     parts = [
@@ -140,20 +137,22 @@ def _shares(diagnosis: Diagnosis) -> str:
     ]
     parts += [part for part in optional_parts if part[2] > 0]
     percents = spoken_shares(d)
-    rows = [
-        row(label, share_cell(percents.get(key, spoken_percent(d.share(energy))), d.share(energy)))
-        for key, label, energy in parts
-    ]
+    shares: list[dict[str, Any]] = []
+    for key, label, energy in parts:
+        share = d.share(energy)
+        text = percents.get(key, spoken_percent(share))
+        shares.append({"label": label, "text": text, "share": share})
     if d.ignored > 0:
         times = d.ignored / d.total if d.total > 0 else np.inf
         text = f"{times:.2g} times as much" if np.isfinite(times) else "all"
-        rows.append(row("elsewhere, where it does not count", text))
-    return f'<table class="shares"><tbody>{"".join(rows)}</tbody></table>'
+        label = "elsewhere, where it does not count"
+        shares.append({"label": label, "text": text, "share": None})
+    return shares
 
 
 def _maps(
     solution: Solution, diagnosis: Diagnosis, current: Floats, *, transform: ViewTransform
-) -> str:
+) -> list[Markup]:
     parts = [
         (
             "Out of reach",
@@ -190,10 +189,10 @@ def _maps(
         )
     if diagnosis.ignored > 0:
         figures.append(_ignored_map(diagnosis, limit))
-    return "".join(figures)
+    return figures
 
 
-def _ignored_map(diagnosis: Diagnosis, limit: float) -> str:
+def _ignored_map(diagnosis: Diagnosis, limit: float) -> Markup:
     """Return the figure of the error that does not count. limit: that of the scale."""
     colours = by_bands(lambda x: to_8_bit(diverging(-x / limit)), diagnosis.ignored_map)
     return figure(
@@ -211,34 +210,20 @@ def maps_limit(solution: Solution, diagnosis: Diagnosis, *, transform: ViewTrans
     return round_up(max(float(np.percentile(sizes, 99)), FINEST_SCALE * 2.0**-transform.stops))
 
 
-def _bounds(diagnosis: Diagnosis) -> str:
-    rows = [
-        row(
-            name_list(bound.lights),
-            escape(_bound_words(bound)),
-            spoken_percent(diagnosis.gain_share(bound)),
-            f'<td class="rgb">{_multiplier(bound)}</td>',
-        )
+def _bounds(diagnosis: Diagnosis) -> list[dict[str, Any]]:
+    """Return the rows of the limits whose removal would gain most."""
+    units = {"emission": "unit of R, G, B", "luminance": "unit of luminance"}
+    return [
+        {
+            "lights": bound.lights,
+            "words": _bound_words(bound),
+            "gain": diagnosis.gain_share(bound),
+            "slope": _slope(bound),
+            "unit": units.get(bound.per, "current brightness"),
+        }
         for bound in diagnosis.bounds
         if diagnosis.gain_share(bound) >= SMALLEST_GAIN
     ]
-    if not rows:
-        return ""
-    left_out = diagnosis.bounds_left_out
-    note = f"<p>{left_out} more seem to matter less and were not analysed.</p>" if left_out else ""
-    meaning = (
-        "<p>Gain: how much of the difference would go if this limit alone were removed. It is a"
-        " share of everything that counts, including the unpainted parts that are held. A light"
-        " that is fixed, locked, limited or tied could then have any emission. A light that is "
-        "off for no other reason would go below zero and take light away, which hints at other "
-        "lights that spill where they should not.</p><p>Slope: the change of the objective, per"
-        " unit, if the limit were raised a little.</p>"
-    )
-    return (
-        '<div class="explained" style="margin-top: 32px"><div><h3>What limits the lights</h3>'
-        f"{note}{fold('How to read the table', meaning)}</div>"
-        f"<div>{table(BOUND_HEADS, rows, kind='bounds', shown=SHOWN_ROWS)}</div></div>"
-    )
 
 
 def _bound_words(bound: Bound) -> str:
@@ -247,7 +232,6 @@ def _bound_words(bound: Bound) -> str:
     return channels.replace("off", "zero") if bound.kind == "zero" else channels
 
 
-def _multiplier(bound: Bound) -> str:
+def _slope(bound: Bound) -> str:
     numbers = [f"{value:+.3g}".replace("-", "−") if value else "0" for value in bound.multiplier]
-    per = {"emission": "unit of R, G, B", "luminance": "unit of luminance"}
-    return f"{', '.join(numbers)} <small>per {per.get(bound.per, 'current brightness')}</small>"
+    return ", ".join(numbers)

@@ -1,4 +1,4 @@
-"""The pictures of the report: the wipe, the maps, thumbnails. HTML with data: URIs."""
+"""The pictures of the report: the wipe, the maps, thumbnails. Pictures are data: URIs."""
 
 import base64
 import io
@@ -6,6 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 import numpy.typing as npt
+from markupsafe import Markup
 from PIL import Image
 
 from lightpaint.arrays import Floats, largest
@@ -23,6 +24,7 @@ from lightpaint.report.answer_pictures import (
     residual_of,
     residual_picture,
 )
+from lightpaint.report.page.html import html, piece
 from lightpaint.report.phrases import spoken_percent
 from lightpaint.threads import parallel_map
 
@@ -61,6 +63,16 @@ class PagePicture:
     alt: str
     pixels: npt.NDArray[np.uint8]
     raw: npt.NDArray[np.uint8] | None = None
+
+    @property
+    def height(self) -> int:
+        """Its height in pixels."""
+        return len(self.pixels)
+
+    @property
+    def width(self) -> int:
+        """Its width in pixels."""
+        return int(self.pixels.shape[1])
 
 
 def data_uri(
@@ -129,57 +141,23 @@ def _raw_uri(look: PagePicture) -> str:
     return data_uri(look.raw, largest_png=0, quality=RAW_QUALITY)
 
 
-def wipe(looks: list[PagePicture]) -> str:
+def wipe(looks: list[PagePicture]) -> Markup:
     """Return two of the looks over each other, with a movable border between them."""
     # The verification may be larger than the rest, which the page then enlarges.
     height, width = max(look.pixels.shape[:2] for look in looks)
     # The prediction first: it is the answer, and less noisy than the render that checks it.
-    a, b = (next(k for k, x in enumerate(looks) if x.name == n) for n in ("painting", "answer"))
-
-    def choices(selected_index: int) -> str:
-        return "".join(
-            f'<option value="{k}"{" selected" if k == selected_index else ""}>{look.name}</option>'
-            for k, look in enumerate(looks)
-        )
-
-    images = _wipe_images(looks, a, b, width=width, height=height)
-    switch = '<label><input type="checkbox" id="raw"> Raw, as rendered</label>'
-    switch = switch if any(look.raw is not None for look in looks) else ""
-    return (
-        f'<figure class="wipe" id="wipe" style="--aspect: {width / height:.5f}">'
-        f'<div class="wipe-stage stage" id="stage" style="aspect-ratio: {width} / {height}">'
-        f"{images}"
-        '<div class="wipe-edge" aria-hidden="true"><i></i></div>'
-        f'<span class="wipe-tag" id="tag-a" aria-hidden="true">{looks[a].name}</span>'
-        f'<span class="wipe-tag is-right" id="tag-b" aria-hidden="true">{looks[b].name}</span>'
-        "</div>"
-        '<figcaption class="controls">'
-        f'<label>Left <select id="a">{choices(a)}</select></label>'
-        '<label class="slide">Wipe <input type="range" id="split" min="0" max="100" step="1" '
-        'value="50"></label>'
-        f'<label>Right <select id="b">{choices(b)}</select></label>{switch}</figcaption></figure>'
+    left, right = (
+        next(k for k, x in enumerate(looks) if x.name == n) for n in ("painting", "answer")
     )
-
-
-def _wipe_images(looks: list[PagePicture], a: int, b: int, *, width: int, height: int) -> str:
-    """Return the images of the wipe, on top of each other, and those that are not denoised.
-
-    a, b: the indices of the looks that the wipe shows first.
-    """
-    uris = parallel_map(lambda look: data_uri(look.pixels), looks)
-    raw = parallel_map(_raw_uri, looks)
-    images = "".join(
-        f'<img class="{"is-a" if k == a else "is-b" if k == b else ""}" data-look="{k}" '
-        f'width="{width}" height="{height}" draggable="false" alt="{look.name}: {look.alt}" '
-        f'src="{uris[k]}">'
-        for k, look in enumerate(looks)
-    )
-    return images + "".join(
-        f'<img class="as-rendered" data-look="{k}" data-raw="" width="{width}" '
-        f'height="{height}" draggable="false" alt="{look.name}, raw: {look.alt}" '
-        f'src="{raw[k]}">'
-        for k, look in enumerate(looks)
-        if look.raw is not None
+    return html(
+        "wipe",
+        looks=looks,
+        sources=parallel_map(lambda look: data_uri(look.pixels), looks),
+        raw_sources=parallel_map(_raw_uri, looks),
+        width=width,
+        height=height,
+        left=left,
+        right=right,
     )
 
 
@@ -191,7 +169,7 @@ def maps(
     verification: Verification | None,
     transform: ViewTransform,
     missed: Residual | None = None,
-) -> str:
+) -> Markup:
     """Return false-colour pictures: the error, the importance, and where the render disagrees.
 
     predicted: (h, w, 3) linear, as rendered; current: background of pixels that do not count.
@@ -210,10 +188,10 @@ def maps(
     ]
     if verification is not None:
         figures.append(_verification_map(verification))
-    return "".join(figures)
+    return Markup().join(figures)
 
 
-def _importance_map(importance: Floats, current: Floats, *, transform: ViewTransform) -> str:
+def _importance_map(importance: Floats, current: Floats, *, transform: ViewTransform) -> Markup:
     """Return the figure of how much each pixel counts. importance: (h, w)."""
     picture = importance_picture(importance, current, transform=transform, finish=to_8_bit)
     return figure(
@@ -224,7 +202,7 @@ def _importance_map(importance: Floats, current: Floats, *, transform: ViewTrans
     )
 
 
-def _verification_map(verification: Verification) -> str:
+def _verification_map(verification: Verification) -> Markup:
     """Return the figure of where the render disagrees with the answer."""
     picture, share = verification_picture(verification)
     unmeasured_text = (
@@ -255,25 +233,16 @@ def verification_picture(verification: Verification) -> tuple[npt.NDArray[np.uin
     return to_8_bit(colours), float(1 - is_measured.mean())
 
 
-def figure(picture: PagePicture, caption: str, legend: str) -> str:
+def figure(picture: PagePicture, caption: str, legend: Markup | str = "") -> Markup:
     """Return a map with its legend, from `scale`, and its caption."""
-    height, width = picture.pixels.shape[:2]
-    return (
-        f'<figure><img width="{width}" height="{height}" alt="{picture.alt} {caption}" '
-        f'src="{data_uri(picture.pixels)}">{legend}'
-        f"<figcaption><strong>{picture.name}.</strong> {caption}</figcaption></figure>"
-    )
+    return piece("figure", picture, data_uri(picture.pixels), caption, legend)
 
 
-def signed_scale(limit: float) -> str:
+def signed_scale(limit: float) -> Markup:
     """Return the legend of errors that are too dark or too bright, up to `limit`."""
     return scale(SIGNED, f"−{limit:g} too dark", "0", f"too bright +{limit:g}")
 
 
-def scale(colours: list[str], *ends: str) -> str:
+def scale(colors: list[str], *ends: str) -> Markup:
     """Return the legend of a map: its colours from left to right, and their meaning in words."""
-    words = "".join(f"<span>{end}</span>" for end in ends)
-    gradient = f"linear-gradient(to right, {', '.join(colours)})"
-    return (
-        f'<div class="scale" style="background: {gradient}"></div><div class="ends">{words}</div>'
-    )
+    return piece("scale", colors, ends)

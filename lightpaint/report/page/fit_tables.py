@@ -1,13 +1,12 @@
 """The tables of the report besides that of lights: wishes, fit, renders, verification.
 
-Each function returns HTML. Names of lights, targets and scenes come from other people's files and
-are escaped here.
+Names of lights, targets and scenes come from other people's files; templates escape them.
 """
 
 import platform
-from html import escape
 
 import numpy as np
+from markupsafe import Markup
 
 from lightpaint.basis.basis import Basis
 from lightpaint.display_text import some_of
@@ -27,16 +26,13 @@ from lightpaint.report.measures import (
     noise_residual,
     relative_residual,
 )
-from lightpaint.report.page.html import facts, name_list, row, share_cell, table
+from lightpaint.report.page.html import facts, html, name_list
 from lightpaint.report.uncertainty_sentences import partly_reached
 from lightpaint.target.target import Target
 from lightpaint.version import __version__
 
-#: Headings of the table of wishes.
-WISH_HEADINGS = ("wish", "brightness", "colour", "mean ΔE")
 
-
-def wishes_section(appearance: Appearance | None) -> str:
+def wishes_section(appearance: Appearance | None) -> Markup:
     """Return the section on how much of each wish came; "" if none asks for anything visible.
 
     The verdict says it of an only one without a name.
@@ -44,30 +40,11 @@ def wishes_section(appearance: Appearance | None) -> str:
     deliveries = () if appearance is None else appearance.deliveries
     entries = [entry for entry in deliveries if entry.least is not None]
     if not entries or (len(entries) == 1 and is_unnamed(entries[0])):
-        return ""
-    rows = [
-        row(
-            escape(wish_name(entry)),
-            _delivered_cell(entry.brightness),
-            _delivered_cell(entry.color),
-            f"{entry.delta_e:.1f}",
-        )
-        for entry in entries
-    ]
-    return (
-        "<section><h2>What came of it</h2><p>How much of each painted change came, where it is "
-        "lit.</p>"
-        f"{table(WISH_HEADINGS, rows, kind='wishes')}</section>"
-    )
+        return Markup("")
+    return html("wishes", entries=entries, wish_name=wish_name, spoken_share=spoken_share)
 
 
-def _delivered_cell(share: float | None) -> str:
-    if share is None:
-        return '<td class="share"></td>'
-    return share_cell(spoken_share(share), min(max(share, 0.0), 1.0))
-
-
-def fit_table(solution: Solution) -> str:
+def fit_table(solution: Solution) -> Markup:
     """Return rows of the objective with its standard error, optimality and sweeps, per channel and
     in all.
     """
@@ -83,22 +60,29 @@ def fit_table(solution: Solution) -> str:
         q.sweeps,
         strict=True,
     )
-    rows = [
-        row(name, f"{objective:.3g}{error}", f"{np.sqrt(objective):.3g}", f"{kkt:.1e}", f"{sweeps}")
+    channels = [
+        {
+            "name": name,
+            "objective": f"{objective:.3g}{error}",
+            "rms": f"{np.sqrt(objective):.3g}",
+            "kkt": f"{kkt:.1e}",
+            "sweeps": sweeps,
+        }
         for name, objective, error, kkt, sweeps in columns
     ]
-    total = relative_residual(solution)
+    residual = relative_residual(solution)
     # One path carries all channels, so that their errors go together.
-    total_text = "" if errors is None else f" ± {errors.sum() / norm2.sum():.1g}"
-    rows.append(
-        f'<tr class="total"><th scope="row">all</th><td>{total**2:.3g}{total_text}</td>'
-        f"<td>{total:.3g}</td>"
-        f"<td>{max(q.kkt_residual):.1e}</td><td>{max(q.sweeps)}</td></tr>"
-    )
-    return "".join(rows)
+    error = "" if errors is None else f" ± {errors.sum() / norm2.sum():.1g}"
+    total = {
+        "objective": f"{residual**2:.3g}{error}",
+        "rms": f"{residual:.3g}",
+        "kkt": f"{max(q.kkt_residual):.1e}",
+        "sweeps": max(q.sweeps),
+    }
+    return html("fit", channels=channels, total=total)
 
 
-def verification_table(verification: Verification | None) -> str:
+def verification_table(verification: Verification | None) -> Markup:
     """Return the differences of prediction and render, each beside its limit."""
     if verification is None:
         return facts([("Result", "not verified")])
@@ -140,7 +124,7 @@ def render_table(
     solution: Solution,
     predicted: Estimate,
     verification: Verification | None,
-) -> str:
+) -> Markup:
     """Return facts on the origin of the basis, and on pixels and lights that took no part."""
     origin, q = basis.origin, solution.certificate
     height, width = basis.size

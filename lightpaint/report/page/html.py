@@ -1,78 +1,76 @@
-"""Pieces of HTML for several parts of the report; callers escape the contents."""
+"""Templates of the report's parts, which escape what is put into them.
+
+Each section has a template of Jinja2 in `templates/`, and its module finds the values.
+`pieces.html` has the macros that they share.
+"""
 
 import re
-from collections.abc import Iterable, Sequence
-from html import escape
+from collections.abc import Callable, Iterable, Sequence
+from functools import cache
 from typing import Any
 
+import jinja2
+import rcssmin
+from markupsafe import Markup
+
 from lightpaint.report.basis_memo import ROWS_SHOWN, SPARE_ROWS
+from lightpaint.report.phrases import spoken_percent
+from lightpaint.viewer.bundle import compact_script, source, styles, unindented
+
+#: Folder of the report's templates, below the package.
+TEMPLATES = "report/page/templates"
 
 
-class Html(str):
-    """A text that is HTML already, and is not escaped."""
+def html(template: str, /, **values: Any) -> Markup:
+    """Return a template with its values, which are escaped unless they are Markup.
 
-
-def table(
-    headings: Iterable[str], rows: Sequence[str], *, kind: str = "", shown: int = ROWS_SHOWN
-) -> str:
-    """Return a table under its headings, the most important rows first; the rest of many is folded.
-
-    kind: its class. It scrolls if it is wider than the page.
+    template: its name among those of the report, or its path below the package, without `.html`.
     """
-    cells = "".join(f'<th scope="col">{heading}</th>' for heading in headings)
-
-    def part(rows: Iterable[str]) -> str:
-        return (
-            f'<div class="scroll" tabindex="0"><table class="{kind}"><thead><tr>{cells}</tr>'
-            f"</thead><tbody>{''.join(rows)}</tbody></table></div>"
-        )
-
-    if len(rows) <= shown + SPARE_ROWS:
-        return part(rows)
-    return part(rows[:shown]) + fold(f"{len(rows) - shown} more", part(rows[shown:]))
+    return Markup(_environment().get_template(f"{template}.html").render(values))
 
 
-def fold(summary: str, content: str) -> str:
-    """Return content that opens on demand, or if the browser's search finds something in it."""
-    return f'<details class="more"><summary>{summary}</summary>{content}</details>'
+def piece(macro: str, /, *values: Any) -> Markup:
+    """Return what a macro of `pieces.html` makes of some values."""
+    make: Callable[..., Markup] = getattr(_environment().get_template("pieces.html").module, macro)
+    return make(*values)
 
 
-def breakable_name(name: str) -> Html:
-    """Return a name, escaped, that may break after joining characters and in very long words."""
-    words = re.findall(r"[^_./-]{1,14}[_./-]*|[_./-]+", name, re.DOTALL)
-    return Html("<wbr>".join(map(escape, words)))
+@cache
+def _environment() -> jinja2.Environment:
+    environment = jinja2.Environment(
+        loader=jinja2.FunctionLoader(_source),
+        autoescape=True,
+        undefined=jinja2.StrictUndefined,
+        trim_blocks=True,
+    )
+    environment.filters.update(breakable=breakable_name, percent=spoken_percent)
+    environment.globals.update(rows_shown=ROWS_SHOWN, spare_rows=SPARE_ROWS)
+    return environment
 
 
-def name_list(names: Sequence[str]) -> Html:
-    """Return names with commas, escaped; the rest of many is folded."""
-    first, fold_html = names, ""
-    if len(names) > ROWS_SHOWN + SPARE_ROWS:
-        first, further_names = names[:ROWS_SHOWN], names[ROWS_SHOWN:]
-        fold_html = fold(
-            f"and {len(further_names)} more", ", ".join(map(breakable_name, further_names))
-        )
-    return Html(", ".join(map(breakable_name, first)) + fold_html)
-
-
-def row(name: str, *cells: str) -> str:
-    """Return a row of a table, headed by its name."""
-    return f'<tr><th scope="row">{name}</th>{"".join(map(cell, cells))}</tr>'
-
-
-def cell(content: str) -> str:
-    """Return a cell of a row; return a cell unchanged."""
-    return content if content.startswith("<td") else f"<td>{content}</td>"
-
-
-def share_cell(text: str, share: float) -> str:
-    """Return a cell with a share in words, and as a bar."""
+def _source(name: str) -> str:
+    """Return a template without space that has no meaning."""
+    text = unindented(source(name if "/" in name else f"{TEMPLATES}/{name}"))
+    if name != "page.html":
+        return text
+    head, style, body, script, end = re.split("</?(?:style|script)>", text)
     return (
-        f'<td class="share"><span>{text}</span><div class="bar" aria-hidden="true">'
-        f'<i style="width: {100 * share:.2f}%"></i></div></td>'
+        f"{head}<style>{rcssmin.cssmin(style)}{styles('viewer/mixer/wipe.css')}</style>{body}"
+        f"<script>{compact_script(script)}</script>{end}"
     )
 
 
-def facts(entries: Iterable[tuple[str, Any]]) -> str:
-    """Return terms with their values, which are escaped here unless they are HTML."""
-    texts = ((k, v if isinstance(v, Html) else escape(str(v))) for k, v in entries)
-    return "".join(f"<dt>{escape(k)}</dt><dd>{v}</dd>" for k, v in texts)
+def breakable_name(name: str) -> Markup:
+    """Return a name that may break after joining characters and in very long words."""
+    words = re.findall(r"[^_./-]{1,14}[_./-]*|[_./-]+", name, re.DOTALL)
+    return Markup("<wbr>").join(words)
+
+
+def name_list(names: Sequence[str]) -> Markup:
+    """Return names with commas; the rest of many is folded."""
+    return piece("names", names)
+
+
+def facts(entries: Iterable[tuple[str, Any]]) -> Markup:
+    """Return terms with their values."""
+    return piece("facts", list(entries))

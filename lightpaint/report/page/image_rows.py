@@ -1,7 +1,7 @@
-"""Rows of the report's table of lights for images: one for each, with its map."""
+"""Rows of the report's table of lights; of an image one, with its map."""
 
 from collections.abc import Sequence
-from html import escape
+from dataclasses import dataclass
 
 import numpy as np
 
@@ -12,7 +12,6 @@ from lightpaint.colour.color import luminance
 from lightpaint.colour.srgb import encode_display, to_8_bit
 from lightpaint.lighting.solution import Solution
 from lightpaint.report.page.figures import data_uri
-from lightpaint.report.page.html import breakable_name, share_cell
 
 #: Width of the map of an image in pixels.
 MAP_WIDTH = 144
@@ -20,28 +19,76 @@ MAP_WIDTH = 144
 CLIPPED_SHARE = 0.02
 
 
-def image_row(image: LightImage, basis: Basis, solution: Solution, shares: Doubles) -> str:
+@dataclass(frozen=True)
+class RowPicture:
+    """A small picture in a row. source: data: URI. label: its content in words."""
+
+    source: str
+    width: int
+    height: int
+    label: str
+
+
+@dataclass(frozen=True)
+class RowColor:
+    """The colour of a light: `#rrggbb`, None where there is none. notes: what it is in words."""
+
+    hex: str | None
+    notes: tuple[str, ...] = ()
+
+
+@dataclass(frozen=True)
+class Change:
+    """The change of a light in words. notes: what stands below in small print."""
+
+    text: str
+    notes: tuple[str, ...] = ()
+
+
+@dataclass(frozen=True)
+class LightRow:
+    """A row of the table of lights.
+
+    kind: plugin and form. share: of the picture's energy. color, now, new, parameter, unit,
+    amounts: of the emission, a line each; empty for a light that is fixed. is_relative: whether
+    amounts are relative.
+    """
+
+    pictures: Sequence[RowPicture]
+    name: str
+    kind: str
+    change: Change
+    share: float
+    color: RowColor | None = None
+    now: Sequence[str] = ()
+    new: Sequence[str] = ()
+    parameter: str = ""
+    unit: str = ""
+    amounts: Sequence[str] = ()
+    is_relative: bool = False
+
+
+def image_row(image: LightImage, basis: Basis, solution: Solution, shares: Doubles) -> LightRow:
     """Return the row of an image that is whole. shares: (n,), see `energy_shares`."""
     weights = solution.weights
     current = basis.current_weights
     stops = map_stops(image.radiances(weights))
-    maps = "".join(
+    pictures = [
         _map(f"{image.name} {label}", image, image.radiances(radiances), stops)
         for label, radiances in (("now", current), ("solved", weights))
-    )
+    ]
     plugin, domain = basis.lights[int(image.lights[0])].plugin, image.domain
     now, new = (image.mean(radiances) for radiances in (current, weights))
-    share = float(shares[image.lights].sum())
-    return (
-        f'<tr><td class="thumb">{maps}</td>'
-        f'<th scope="row" class="name">{breakable_name(image.name)}'
-        f"<small>{escape(plugin)} · {image.size_text}</small></th>"
-        '<td class="colour"></td>'
-        f'<td class="rgb now">{_rgb(now)}</td><td class="rgb new">{_rgb(new)}</td>'
-        f'<td class="unit">{domain.parameter} '
-        f"<small>{domain.unit}, mean over {domain.whole}</small></td>"
-        f'<td class="rgb amount"></td><td class="change">{luminance_change(now, new)}</td>'
-        f"{share_cell(f'{100 * share:.1f} %', share)}</tr>"
+    return LightRow(
+        pictures,
+        image.name,
+        f"{plugin} · {image.size_text}",
+        luminance_change(now, new),
+        float(shares[image.lights].sum()),
+        now=_rgb(now),
+        new=_rgb(new),
+        parameter=domain.parameter,
+        unit=f"{domain.unit}, mean over {domain.whole}",
     )
 
 
@@ -57,25 +104,22 @@ def map_picture(image: LightImage, radiances: Floats, stops: float, width: int) 
     return encode_display(2.0**stops * image.domain.interpolated(radiances, size))
 
 
-def _map(label: str, image: LightImage, radiances: Floats, stops: float) -> str:
+def _map(label: str, image: LightImage, radiances: Floats, stops: float) -> RowPicture:
     picture = to_8_bit(map_picture(image, radiances, stops, MAP_WIDTH))
-    caption = escape(f"{label}, {image.domain.extent}, shown at {stops:+.1f} stops")
-    return (
-        f'<img src="{data_uri(picture)}" width="{MAP_WIDTH}" height="{len(picture)}" '
-        f'alt="{caption}" title="{caption}">'
-    )
+    label = f"{label}, {image.domain.extent}, shown at {stops:+.1f} stops"
+    return RowPicture(data_uri(picture), MAP_WIDTH, len(picture), label)
 
 
-def _rgb(color: Sequence[float] | Doubles) -> str:
-    return " <br>".join(f"{v:.4g}" for v in color) if any(color) else "off"
+def _rgb(color: Sequence[float] | Doubles) -> list[str]:
+    return [f"{v:.4g}" for v in color] if any(color) else ["off"]
 
 
-def luminance_change(now: Doubles, new: Doubles) -> str:
+def luminance_change(now: Doubles, new: Doubles) -> Change:
     """Return the change of luminance from `now` to `new`, (3,) each, as a ratio and in stops."""
     before, after = (float(luminance(color)) for color in (now, new))
     if after == 0:
-        return "off" if before > 0 else "stays off"
+        return Change("off" if before > 0 else "stays off")
     if before == 0:
-        return "was off, now on"
+        return Change("was off, now on")
     stops = f"{np.log2(after / before):+.2f} stops".replace("-", "−")
-    return f"×{after / before:.3g} <small>{stops}</small>"
+    return Change(f"×{after / before:.3g}", (stops,))

@@ -1,12 +1,10 @@
-"""The table of lights in the report, as HTML.
-
-Names of lights come from other people's files and are escaped here.
-"""
+"""The table of lights in the report."""
 
 from collections.abc import Sequence
-from html import escape
+from dataclasses import replace
 
 import numpy as np
+from markupsafe import Markup
 
 from lightpaint.arrays import RGB, Doubles, Indices
 from lightpaint.basis.basis import Basis
@@ -31,27 +29,21 @@ from lightpaint.report.basis_memo import (
 from lightpaint.report.clean_pictures import MAX_CLEAN_THUMBNAILS
 from lightpaint.report.measures import energy_shares
 from lightpaint.report.page.figures import data_uri, thumbnail
-from lightpaint.report.page.html import breakable_name, fold, share_cell
-from lightpaint.report.page.image_rows import image_row, luminance_change
+from lightpaint.report.page.html import html
+from lightpaint.report.page.image_rows import (
+    Change,
+    LightRow,
+    RowColor,
+    RowPicture,
+    image_row,
+    luminance_change,
+)
 from lightpaint.report.phrases import spoken_percent
 from lightpaint.report.uncertainty_sentences import (
     UNDETERMINED,
     UNTOLD_HERE,
     spoken_errors,
     unreached_channels,
-)
-
-#: Headings of the columns, with the classes of their cells.
-COLUMNS = (
-    ("thumb", "alone"),
-    ("name", "light"),
-    ("colour", "colour"),
-    ("rgb now", "emission now<br>R, G, B"),
-    ("rgb new", "solved<br>R, G, B"),
-    ("unit", "parameter"),
-    ("rgb amount", "{amounts}"),
-    ("change", "luminance"),
-    ("share", "share of the<br>picture’s energy"),
 )
 
 
@@ -61,7 +53,7 @@ def lights_table(
     uncertainty: Uncertainty | None = None,
     *,
     is_clean: bool = False,
-) -> str:
+) -> Markup:
     """Return a row per light, in document order; of many those with the largest shares, and the
     rest folded.
 
@@ -70,80 +62,70 @@ def lights_table(
     """
     is_clean = is_clean and len(basis.lights) <= MAX_CLEAN_THUMBNAILS
     rows = _rows(basis, solution, uncertainty, is_clean=is_clean)
+    lead, shown = "", rows
+    folded: list[tuple[str, list[LightRow]]] = []
     if images := [image for image in light_images(basis.lights) if image.is_whole]:
-        return _table_with_images(images, rows, basis, solution)
-    if len(rows) <= ROWS_SHOWN + SPARE_ROWS:
-        return _table(rows, solution)
-    shares = largest_shares(basis, solution.lighting)
-    visible_indices = most_visible_lights(basis, solution.lighting)
-    other_indices = np.setdiff1d(np.arange(len(rows)), visible_indices)
-    note = (
-        f"{len(other_indices)} more lights, each at most "
-        f"{spoken_percent(float(shares[other_indices].max()))} of the picture, now or as solved"
-    )
-    return (
-        f"<p>The {len(visible_indices)} lights with the largest shares of the picture, "
-        "now or as solved.</p>"
-        + _table([rows[k] for k in visible_indices], solution)
-        + fold(note, _table([rows[k] for k in other_indices], solution))
-    )
+        shown, folded = _fold_images(images, rows, basis, solution)
+    elif len(rows) > ROWS_SHOWN + SPARE_ROWS:
+        shares = largest_shares(basis, solution.lighting)
+        visible_indices = most_visible_lights(basis, solution.lighting)
+        other_indices = np.setdiff1d(np.arange(len(rows)), visible_indices)
+        lead = (
+            f"The {len(visible_indices)} lights with the largest shares of the picture, "
+            "now or as solved."
+        )
+        note = (
+            f"{len(other_indices)} more lights, each at most "
+            f"{spoken_percent(float(shares[other_indices].max()))} of the picture, now or as solved"
+        )
+        shown = [rows[k] for k in visible_indices]
+        folded = [(note, [rows[k] for k in other_indices])]
+    has_scale = solution.lighting.cd_per_unit is not None
+    return html("lights", lead=lead, shown=shown, folded=folded, has_scale=has_scale)
 
 
-def _table_with_images(
-    images: Sequence[LightImage], rows: Sequence[str], basis: Basis, solution: Solution
-) -> str:
-    """Return a row for each image and each other light; the rows of texels are folded."""
+def _fold_images(
+    images: Sequence[LightImage], rows: Sequence[LightRow], basis: Basis, solution: Solution
+) -> tuple[list[LightRow], list[tuple[str, list[LightRow]]]]:
+    """Return a row for each image and each other light; and the folded rows of texels, with what
+    they are.
+    """
     shares = energy_shares(basis, solution.lighting)
     in_images = {int(k) for image in images for k in image.lights}
     shown = [image_row(image, basis, solution, shares) for image in images]
     shown += [row for k, row in enumerate(rows) if k not in in_images]
-    folds = (
-        fold(
-            f"the {len(image.lights)} texels of {escape(image.name)}, row by row from the top",
-            _table([rows[k] for k in image.lights], solution),
+    folded = [
+        (
+            f"the {len(image.lights)} texels of {image.name}, row by row from the top",
+            [rows[k] for k in image.lights],
         )
         for image in images
-    )
-    return _table(shown, solution) + "".join(folds)
-
-
-def _table(rows: list[str], solution: Solution) -> str:
-    amounts = "flux<br>(relative)" if solution.lighting.cd_per_unit is None else "output"
-    cells = "".join(
-        f'<th scope="col" class="{kind}">{heading.format(amounts=amounts)}</th>'
-        for kind, heading in COLUMNS
-    )
-    return (
-        '<div class="scroll" role="region" aria-labelledby="lights" tabindex="0">'
-        f'<table class="lights"><thead><tr>{cells}</tr></thead><tbody>{"".join(rows)}</tbody>'
-        "</table></div>"
-    )
+    ]
+    return shown, folded
 
 
 def _rows(
     basis: Basis, solution: Solution, uncertainty: Uncertainty | None, *, is_clean: bool
-) -> list[str]:
-    shares = energy_shares(basis, solution.lighting)
+) -> list[LightRow]:
+    shares, lighting = energy_shares(basis, solution.lighting), solution.lighting
     errors = spoken_errors(uncertainty, len(shares))
-    settings = {light.name: light for light in solution.lighting.lights}
-
-    rows, thumbnails = [], thumbnails_of(basis, is_clean=is_clean)
+    settings = {light.name: light for light in lighting.lights}
+    rows: list[LightRow] = []
+    thumbnails = thumbnails_of(basis, is_clean=is_clean)
     for k, (light, (uri, shape, stops)) in enumerate(zip(basis.lights, thumbnails, strict=True)):
-        name, setting = escape(light.name), settings[light.name]
+        setting = settings[light.name]
         error = UNTOLD_HERE if errors[k] == UNDETERMINED else errors[k]
-        error = f" <small>{error}</small>" if error else ""
-        caption = f"What {name} lights alone, shown at {stops:+.1f} stops"
-        rows.append(
-            f'<tr><td class="thumb"><img src="{uri}" '
-            f'width="{shape[1]}" height="{shape[0]}" alt="{caption}" '
-            f'title="{caption}"></td>'
-            f'<th scope="row" class="name">{breakable_name(light.name)}'
-            f"<small>{escape(light.plugin)}"
-            f"{' · ' + escape(light.form) if light.form else ''}</small></th>"
-            f"{_emission_cells(light, setting, solution.lighting)}"
-            f'<td class="change">{change(light, setting)}{error}{_constraint_note(setting)}</td>'
-            f"{share_cell(f'{100 * shares[k]:.1f} %', shares[k])}</tr>"
+        changed = change(light, setting)
+        notes = filter(None, (*changed.notes, error, _constraint_note(setting)))
+        label = f"What {light.name} lights alone, shown at {stops:+.1f} stops"
+        row = LightRow(
+            [RowPicture(uri, shape[1], shape[0], label)],
+            light.name,
+            " · ".join(filter(None, (light.plugin, light.form))),
+            Change(changed.text, tuple(notes)),
+            float(shares[k]),
         )
+        rows.append(row if light.is_fixed else _with_emission(row, light, setting, lighting))
     return rows
 
 
@@ -167,43 +149,44 @@ def thumbnails_of(basis: Basis, *, is_clean: bool) -> list[tuple[str, tuple[int,
     )
 
 
-def _emission_cells(light: BasisLight, setting: LightSetting, lighting: Lighting) -> str:
-    """Return cells with colour, emission before and after, their unit, and photometry."""
+def _with_emission(
+    row: LightRow, light: BasisLight, setting: LightSetting, lighting: Lighting
+) -> LightRow:
+    """Return a row with colour, emission before and after, their unit, and photometry."""
     light_photometry = lighting.photometry(setting)
-    if light.is_fixed:
-        return "".join(f'<td class="{kind}"></td>' for kind, _ in COLUMNS[2:7])
-    return (
-        f'<td class="colour">{_swatch(setting, light_photometry)}</td>'
-        f'<td class="rgb now">{_rgb(light.emission)}</td>'
-        f'<td class="rgb new">{_rgb(setting.emission, setting.reached)}</td>'
-        f'<td class="unit">{escape(light.parameter)} <small>{escape(light.unit)}</small></td>'
-        f'<td class="rgb amount{" flux" * (lighting.cd_per_unit is None)}">'
-        f"{_amounts(light_photometry)}</td>"
+    return replace(
+        row,
+        color=_color(setting, light_photometry),
+        now=_rgb(light.emission),
+        new=_rgb(setting.emission, setting.reached),
+        parameter=light.parameter,
+        unit=light.unit,
+        amounts=_amounts(light_photometry),
+        is_relative=lighting.cd_per_unit is None,
     )
 
 
-def change(light: BasisLight, setting: LightSetting) -> str:
+def change(light: BasisLight, setting: LightSetting) -> Change:
     """Return the change of a light in words or as a ratio of luminance, for channels that reach
     anything.
     """
     if light.is_fixed:
-        return "fixed"
+        return Change("fixed")
     if not any(setting.reached):
-        return "unchanged: reaches nothing painted"
-    note = f"<small>{unreached_channels(setting)} unchanged: reaches nothing painted</small>"
-    return _changed(light, setting) + (note if setting.is_partly_reached else "")
-
-
-def _changed(light: BasisLight, setting: LightSetting) -> str:
+        return Change("unchanged: reaches nothing painted")
     is_reached = np.array(setting.reached)
     now, new = (np.where(is_reached, rgb, 0) for rgb in (light.emission, setting.emission))
-    return luminance_change(now, new)
+    changed = luminance_change(now, new)
+    if not setting.is_partly_reached:
+        return changed
+    note = f"{unreached_channels(setting)} unchanged: reaches nothing painted"
+    return Change(changed.text, (*changed.notes, note))
 
 
 def _constraint_note(setting: LightSetting) -> str:
     """Return the constraint on a light, and whether it holds the light."""
     note = " (limits it)" if setting.is_active else ""
-    return f" <small>{escape(setting.constraint)}{note}</small>" if setting.constraint else ""
+    return f"{setting.constraint}{note}" if setting.constraint else ""
 
 
 def hex_color(emission: RGB) -> str | None:
@@ -211,37 +194,35 @@ def hex_color(emission: RGB) -> str | None:
     return rgb_to_hex(np.array(emission)) if any(emission) else None
 
 
-def _swatch(setting: LightSetting, light_photometry: Photometry) -> str:
+def _color(setting: LightSetting, light_photometry: Photometry) -> RowColor:
     """Return the colour of a light; for a multiplier, the colour of its factor."""
     if setting.is_partly_reached:
-        return '<span class="swatch none"></span><small>not known</small>'
+        return RowColor(None, ("not known",))
     emission = setting.emission
     color = light_photometry.hex or hex_color(emission)
     if color is None or not any(emission):
-        return '<span class="swatch none"></span> <small>off</small>'
-    kelvin = "" if light_photometry.kelvin is None else f"{light_photometry.kelvin:.0f} K"
-    duv_text = (
-        "" if light_photometry.duv is None else f"Duv {light_photometry.duv:+.3f}".replace("-", "−")
-    )
-    return (
-        f'<span class="swatch" style="background: {color}"></span><code>{color}</code>'
-        f"{f' <small>{kelvin}</small> <small>{duv_text}</small>' if kelvin else ''}"
-    )
+        return RowColor(None, ("off",))
+    notes = []
+    if light_photometry.kelvin is not None:
+        notes.append(f"{light_photometry.kelvin:.0f} K")
+        if light_photometry.duv is not None:
+            notes.append(f"Duv {light_photometry.duv:+.3f}".replace("-", "−"))
+    return RowColor(color, tuple(notes))
 
 
-def _amounts(light_photometry: Photometry) -> str:
+def _amounts(light_photometry: Photometry) -> list[str]:
     """Return luminous quantity and flux; without a scale, the relative flux."""
     if light_photometry.luminous is not None or light_photometry.flux_lm is not None:
-        return " <br>".join(filter(None, light_photometry.amounts))
-    return "" if light_photometry.flux_y is None else f"{light_photometry.flux_y:.3g}"
+        return list(filter(None, light_photometry.amounts))
+    return [] if light_photometry.flux_y is None else [f"{light_photometry.flux_y:.3g}"]
 
 
-def _rgb(emission: RGB, reached: Sequence[bool] = ALL_REACHED) -> str:
+def _rgb(emission: RGB, reached: Sequence[bool] = ALL_REACHED) -> list[str]:
     """Return a line for each channel, in brackets if it is undetermined."""
     if not any(emission):
-        return "off"
+        return ["off"]
     channels = zip(emission, reached, strict=True)
-    return " <br>".join(f"{v:.4g}" if is_reached else f"({v:.4g})" for v, is_reached in channels)
+    return [f"{v:.4g}" if is_reached else f"({v:.4g})" for v, is_reached in channels]
 
 
 def largest_shares(basis: Basis, lighting: Lighting) -> Doubles:

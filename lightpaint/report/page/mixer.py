@@ -15,6 +15,7 @@ from functools import cache
 from typing import Any, TypedDict, Unpack
 
 import numpy as np
+from markupsafe import Markup
 
 from lightpaint.arrays import Doubles, Floats, Indices
 from lightpaint.basis.basis import Basis
@@ -38,6 +39,7 @@ from lightpaint.report.basis_memo import (
     page_reduction,
 )
 from lightpaint.report.page.figures import CLEAN_REDUCTION, data_uri
+from lightpaint.report.page.html import html
 from lightpaint.report.page.joint_lights import JointLights, rows_of_mixer
 from lightpaint.threads import parallel_map
 from lightpaint.viewer.bundle import bundled, compact_script, source, styles
@@ -48,12 +50,6 @@ COOLEST, WARMEST, STEPS, WHITE = 15000.0, 1500.0, 31, 0.02
 
 #: Points of the table of a transform: as a curve, as each side of a lattice; its ends in stops.
 CURVE, SIDE, LOW, HIGH = 256, 32, -14.0, 7.0
-
-#: The text above the mixer.
-INTRODUCTION = (
-    "Adjust each light by hand, starting from the answer. Stops are relative to the scene. S solos "
-    "a light, M mutes it."
-)
 
 
 class PlaneOptions(TypedDict):
@@ -72,7 +68,7 @@ def mixer_html(
     is_clean: bool = False,
     scene: str | None = None,
     max_pixels: int = MAX_PIXELS,
-) -> str:
+) -> Markup:
     """Return a section of HTML; a page with mixers needs `mixer_assets` after the last.
 
     Args:
@@ -104,17 +100,14 @@ def mixer_html(
     # In a script nothing is escaped, and only `<` can end it.
     text = json.dumps(data, ensure_ascii=False, allow_nan=False, separators=(",", ":"))
     text = text.replace("<", "\\u003c")
-    return (
-        f'<section class="mixer" hidden><h2>Light mixer</h2><p>{INTRODUCTION}</p>'
-        f'<script type="application/json">{text}</script></section>'
-    )
+    return html("mixer", data=Markup(text))
 
 
-def mixer_assets() -> str:
+def mixer_assets() -> Markup:
     """Return style and script of all mixers of a page."""
     style = styles("viewer/mixer/mixer.css")
     script = compact_script(bundled("viewer/mixer/mixer.js"))
-    return f'<style>\n{style}</style><script type="module">\n{script}</script>'
+    return Markup(f'<style>\n{style}</style><script type="module">\n{script}</script>')
 
 
 def _shown_planes(

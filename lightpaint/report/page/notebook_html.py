@@ -1,15 +1,15 @@
 """Small tables and pictures of scenes, bases, targets and answers for notebooks.
 
 `screen.Shown` calls `html_of` and `png_of`. All has inline styles and takes the notebook's own
-colours. Names come from other people's files and are escaped here.
+colours.
 """
 
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Sequence
 from functools import singledispatch
-from html import escape
 from typing import Any
 
 import numpy as np
+from markupsafe import Markup
 from PIL import Image, ImageDraw, ImageFont
 
 from lightpaint.arrays import RGB, Doubles, Floats
@@ -30,6 +30,7 @@ from lightpaint.relit.verification import Verification
 from lightpaint.report.answer_pictures import paint_coverage, report_transform, unpainted_look
 from lightpaint.report.comparison import SURROUND, TEXT, shorten_to_width
 from lightpaint.report.page.figures import THUMBNAIL_WIDTH, data_uri, thumbnail
+from lightpaint.report.page.html import html
 from lightpaint.report.page.lights_table import change, hex_color
 from lightpaint.report.uncertainty_sentences import UNTOLD_HERE
 from lightpaint.report.verdict import agreement, verdict
@@ -57,7 +58,7 @@ def png_of(shown: object) -> bytes | None:
 
 
 @html_of.register
-def scene_html(scene: Scene) -> str:
+def scene_html(scene: Scene) -> Markup:
     """Return the lights of a scene: kind, brightness and form."""
     (height, width), lights = scene.size, scene.lights
 
@@ -66,15 +67,14 @@ def scene_html(scene: Scene) -> str:
         colour = _swatch(x.emission, photometry(x.emission, unit=x.unit, unit_flux=x.unit_flux))
         return x.name, x.plugin, colour, _rgb(x.emission), x.unit, x.form
 
-    return (
-        f"<p>{escape(scene.path.name)}: {len(lights)} lights, {width} × {height} through "
-        f"{escape(scene.sensor_names[scene.sensor])}</p>"
-        + _table(("light", "kind", "colour", "emission", "unit", "form"), row, _sizes(lights))
-    )
+    sensor = scene.sensor_names[scene.sensor]
+    lead = f"{scene.path.name}: {len(lights)} lights, {width} × {height} through {sensor}"
+    headings = ("light", "kind", "colour", "emission", "unit", "form")
+    return _page(lead, _table(headings, row, _sizes(lights)))
 
 
 @html_of.register
-def lighting_html(lighting: Lighting) -> str:
+def lighting_html(lighting: Lighting) -> Markup:
     """Return the lights of a lighting and, of a solve, its certificate."""
 
     def row(k: int) -> Sequence[str]:
@@ -87,18 +87,16 @@ def lighting_html(lighting: Lighting) -> str:
             " ".join(light_photometry.amounts),
         )
         if light.is_partly_reached:
-            colour = _Markup("")
+            colour = Markup("")
         return light.name, colour, _rgb(light.emission), light.unit, output, constraint
 
-    certificate = (
-        "" if lighting.certificate is None else f"<p>{escape(str(lighting.certificate))}</p>"
-    )
+    certificate = "" if lighting.certificate is None else str(lighting.certificate)
     headings = ("light", "colour", "emission", "unit", "output", "asked")
-    return certificate + _table(headings, row, _sizes(lighting.lights))
+    return _page(certificate, _table(headings, row, _sizes(lighting.lights)))
 
 
 @html_of.register
-def solution_html(solution: Solution) -> str:
+def solution_html(solution: Solution) -> Markup:
     """Return the change of each light, for those that change the picture most, and the
     certificate.
     """
@@ -106,29 +104,29 @@ def solution_html(solution: Solution) -> str:
 
     def row(k: int) -> Sequence[str]:
         light, setting = basis.lights[k], lighting.lights[k]
+        changed = change(light, setting)
         # Parts that the report page stacks are side by side here.
-        change_text = change(light, setting).replace("<small>", " ").replace("</small>", "")
+        change_text = " ".join((changed.text, *changed.notes))
         change_text += f", {UNTOLD_HERE}" if setting.untold else ""
         colour = _swatch(setting.emission, lighting.photometry(setting))
-        colour = _Markup("") if setting.is_partly_reached else colour
+        colour = Markup("") if setting.is_partly_reached else colour
         now, new = _rgb(light.emission), _rgb(setting.emission)
         return light.name, colour, now, new, change_text, setting.constraint
 
     change_size = np.abs(solution.weights - basis.current_weights) * basis.totals @ LUMINANCE
     headings = ("light", "colour", "now", "new", "change", "asked")
-    return f"<p>{escape(str(solution.certificate))}</p>" + _table(headings, row, change_size)
+    return _page(str(solution.certificate), _table(headings, row, change_size))
 
 
 @html_of.register
-def verification_html(verification: Verification) -> str:
+def verification_html(verification: Verification) -> Markup:
     """Return the render, and whether it agrees with the prediction."""
-    sentence = agreement(verification)
-    return (
-        _picture("verified", [verification.verified.image], _transform(verification.verified.image))
-        + f"<p>{escape(sentence[0].upper() + sentence[1:])}; ΔE2000 "
-        f"{verification.delta_e_mean:.2f} on average, below {verification.delta_e_95:.2f} in 95 % "
-        "of the pixels.</p>"
+    sentence, image = agreement(verification), verification.verified.image
+    text = (
+        f"{sentence[0].upper() + sentence[1:]}; ΔE2000 {verification.delta_e_mean:.2f} on average, "
+        f"below {verification.delta_e_95:.2f} in 95 % of the pixels."
     )
+    return _page(_picture("verified", [image], _transform(image)), text)
 
 
 def look_html(
@@ -138,7 +136,7 @@ def look_html(
     verification: Verification | None,
     *,
     appearance: Appearance | None = None,
-) -> str:
+) -> Markup:
     """Return painting, prediction and render side by side, the verdict, and the lights."""
     images = [_on_grey(target.image, target.importance), predicted.image]
     names = ["target", "predicted"]
@@ -147,10 +145,9 @@ def look_html(
         names.append("verified")
     transform = report_transform(target, solution.basis, predicted.image)
     sentence = verdict(solution, predicted, verification, appearance=appearance)
-    return (
-        _picture(", ".join(names), images, transform, paintings=1)
-        + f"<p>{', '.join(names)}</p><p>{escape(sentence)}</p>{solution_html(solution)}"
-    )
+    label = ", ".join(names)
+    picture = _picture(label, images, transform, paintings=1)
+    return _page(picture, label, sentence, solution_html(solution))
 
 
 @png_of.register
@@ -190,25 +187,20 @@ def target_png(target: Target) -> bytes:
     return png_bytes(to_8_bit(_wide(share * paint + (1 - share) * rest)))
 
 
-def _table(headings: Sequence[str], row: Callable[[int], Sequence[str]], sizes: Any) -> str:
-    """Return the rows of the largest, and the number of others; texts that are not HTML are
-    escaped.
-    """
+def _page(*parts: str) -> Markup:
+    """Return parts below each other: texts as paragraphs, and Markup as it is."""
+    paragraph = Markup("<p>{}</p>")
+    return Markup().join(
+        part if isinstance(part, Markup) else paragraph.format(part) for part in parts if part
+    )
 
-    def cells(kind: str, texts: Iterable[str]) -> str:
-        texts_html = (x if isinstance(x, _Markup) else escape(_shorten(x)) for x in texts)
-        row = "".join(f'<{kind} style="{CELL}">{x}</{kind}>' for x in texts_html)
-        return f"<tr>{row}</tr>"
 
+def _table(headings: Sequence[str], row: Callable[[int], Sequence[str]], sizes: Any) -> Markup:
+    """Return the rows of the largest, and the number of others."""
     chosen = _largest_indices(np.asarray(sizes, np.float64), MAX_LIGHTS)
-    body = "".join(cells("td", row(k)) for k in chosen)
+    rows = [[x if isinstance(x, Markup) else _shorten(x) for x in row(k)] for k in chosen]
     rest = len(sizes) - len(chosen)
-    note = f"<p>… and {rest} more, which matter less</p>" if rest else ""
-    return f"<table>{cells('th', headings)}{body}</table>{note}"
-
-
-class _Markup(str):
-    """A text that is HTML already."""
+    return html("notebook_table", cell=CELL, headings=headings, rows=rows, rest=rest)
 
 
 def _largest_indices(sizes: Any, count: int) -> list[int]:
@@ -232,14 +224,14 @@ def _rgb(emission: RGB) -> str:
     return " ".join(f"{v:.4g}" for v in emission) if any(emission) else "off"
 
 
-def _swatch(emission: RGB, light_photometry: Photometry) -> _Markup:
+def _swatch(emission: RGB, light_photometry: Photometry) -> Markup:
     """Return the colour of a light; for a multiplier, the colour of its factor."""
     color = (light_photometry.hex or hex_color(emission)) if any(emission) else None
     if color is None:
-        return _Markup("")
+        return Markup("")
     box = f"display: inline-block; width: 1em; height: 1em; background: {color}"
     kelvin = "" if light_photometry.kelvin is None else f" {light_photometry.kelvin:.0f} K"
-    return _Markup(f'<span style="{box}" title="{color}"></span>{kelvin}')
+    return Markup('<span style="{}" title="{}"></span>{}').format(box, color, kelvin)
 
 
 def _transform(image: Floats) -> ViewTransform:
@@ -256,7 +248,7 @@ def _on_grey(image: Floats, importance: Floats) -> Floats:
 
 def _picture(
     alt: str, images: Sequence[Floats], transform: ViewTransform, *, paintings: int = 0
-) -> str:
+) -> Markup:
     """Return linear pictures side by side, at one size, as an element of HTML.
 
     paintings: how many of them, the first, were not rendered.
@@ -269,7 +261,7 @@ def _picture(
     shown = [_wide(transform.encode(image), wide) for image in small]
     height = min(x.shape[0] for x in shown)
     strip = to_8_bit(np.concatenate([x[:height] for x in shown], axis=1))
-    return f'<img alt="{escape(alt)}" src="{data_uri(strip, largest_png=2**13)}">'
+    return Markup('<img alt="{}" src="{}">').format(alt, data_uri(strip, largest_png=2**13))
 
 
 def _sized(image: Floats, width: int) -> Floats:

@@ -1,19 +1,16 @@
 """report.html: one self-contained page about one result.
 
-page.html.in is the frame of the page; the other modules here fill it in. Pictures are data: URIs;
-the page loads nothing from anywhere, which its own content policy forbids.
+templates/page.html is the frame of the page; the other modules here make its sections. Pictures are
+data: URIs; the page loads nothing from anywhere, which its own content policy forbids.
 """
 
-import re
 import shlex
 from collections.abc import Callable, Sequence
-from functools import cache, partial
-from html import escape
-from importlib import resources
+from functools import partial
 from pathlib import Path
-from string import Template
+from typing import Any
 
-import rcssmin
+from markupsafe import Markup
 
 from lightpaint.arrays import Floats
 from lightpaint.basis.basis import Basis
@@ -49,6 +46,7 @@ from lightpaint.report.page.fit_tables import (
     versions,
     wishes_section,
 )
+from lightpaint.report.page.html import html
 from lightpaint.report.page.lights_table import lights_table, thumbnails_of
 from lightpaint.report.page.mixer import mixer_assets, mixer_html, planes_for_page
 from lightpaint.report.page.placement_section import placement_section
@@ -57,7 +55,6 @@ from lightpaint.report.rig.hung_lights import HungLights
 from lightpaint.report.verdict import spoken_samples, verdict
 from lightpaint.report.visible_emitters import emitter_remarks
 from lightpaint.target.target import Target
-from lightpaint.viewer.bundle import compact_script, styles, unindented
 
 
 def report_page(
@@ -98,7 +95,7 @@ def report_page(
     transform = looks.encoder(report_transform(target, basis, predicted.image))
     current = looks.current
     # Most of the time goes into pictures, which are independent of each other.
-    makers: dict[str, Callable[[], str]] = {
+    makers: dict[str, Callable[[], Markup]] = {
         "mixer": partial(_mixer, basis, target, solution, looks, transform=transform),
         "maps": partial(
             maps,
@@ -133,11 +130,12 @@ def report_page(
     }
     results = in_turns(lambda make: make(), tuple(makers.values()), basis.size)
     parts = dict(zip(makers, results, strict=True))
-    parts["missed"] += parts.pop("constraints") + colors_section(color_choices)
-    parts["mixer"] += mixer_assets()
-    return Template(_frame()).substitute(
+    return html(
+        "page",
         **parts,
         **_texts(basis, target, solution, predicted, verification, appearance),
+        mixer_assets=mixer_assets(),
+        colors=colors_section(color_choices),
         exposure=_exposure(transform, predicted.image, looks.denoiser),
         wishes=wishes_section(appearance),
         places=placement_section(hung, to_8_bit(transform.encode(looks.predicted)), basis.features),
@@ -150,7 +148,7 @@ def report_page(
             is_clean=looks.is_clean,
         ),
         sure=sure_section(basis, solution, uncertainty),
-        command=escape(command or "(made from Python, without a command line)"),
+        command=command,
     )
 
 
@@ -160,18 +158,6 @@ def _first_view(solution: Solution) -> str:
     return "" if whole is None else whole.problem.views.bases[0].origin.sensor
 
 
-@cache
-def _frame() -> str:
-    """Return the frame of a page, without space that has no meaning."""
-    template = resources.files("lightpaint.report.page").joinpath("page.html.in")
-    text = unindented(template.read_text(encoding="utf-8"))
-    head, style, body, script, end = re.split("</?(?:style|script)>", text)
-    return (
-        f"{head}<style>{rcssmin.cssmin(style)}{styles('viewer/mixer/wipe.css')}</style>{body}"
-        f"<script>{compact_script(script)}</script>{end}"
-    )
-
-
 def _texts(
     basis: Basis,
     target: Target,
@@ -179,20 +165,24 @@ def _texts(
     predicted: Estimate,
     verification: Verification | None,
     appearance: Appearance | None,
-) -> dict[str, str]:
-    """Return the parts of the page without a picture, by their marks in it."""
+) -> dict[str, Any]:
+    """Return the parts of the page without a picture, by their names in it."""
+    origin = basis.origin
+    counts_all = target.everything and not target.content and origin.scene.endswith(".xml")
     return {
-        "title": escape(f"{target.name} · {basis.origin.scene}"),
-        "target": escape(target.name),
-        "scene": escape(f"{basis.origin.scene}, sensor {basis.origin.sensor}"),
-        "verdict": escape(verdict(solution, predicted, verification, appearance=appearance)),
-        "meant": escape(fit_sentence(solution)),
-        "banner": _banner(verification) + _notes(emitter_remarks(target, solution, predicted)),
+        "title": f"{target.name} · {origin.scene}",
+        "target": target.name,
+        "scene": f"{origin.scene}, sensor {origin.sensor}",
+        "verdict": verdict(solution, predicted, verification, appearance=appearance),
+        "meant": fit_sentence(solution),
+        "verification": verification,
+        "remarks": emitter_remarks(target, solution, predicted),
         "fit": fit_table(solution),
-        "verification": verification_table(verification),
-        "render": render_table(basis, target, solution, predicted, verification),
-        "again": _next_steps(basis, target, verification),
-        "versions": escape(versions(basis)),
+        "verification_facts": verification_table(verification),
+        "render_facts": render_table(basis, target, solution, predicted, verification),
+        "counts_paint": bool(target.content),
+        "scene_to_paint": shlex.quote(_absolute_path(origin.scene)) if counts_all else "",
+        "versions": versions(basis),
     }
 
 
@@ -210,7 +200,7 @@ def _wipe(
     *,
     transform: ViewTransform,
     verified_spp: int | None,
-) -> str:
+) -> Markup:
     """Return the pictures to compare, in the order of the page's lists.
 
     verified_spp: samples per pixel of the render; None if unknown.
@@ -243,7 +233,7 @@ def _wipe(
 
 def _mixer(
     basis: Basis, target: Target, solution: Solution, looks: CleanLooks, *, transform: ViewTransform
-) -> str:
+) -> Markup:
     """Return the mixer of the lights."""
     scene = basis.origin.scene
     return mixer_html(
@@ -261,27 +251,6 @@ def _absolute_path(path: str) -> str:
     return str(Path(path).absolute()) if Path(path).exists() else path
 
 
-def _banner(verification: Verification | None) -> str:
-    """Return the warning that readers must see first, if the render contradicts the prediction."""
-    if verification is None:
-        return (
-            '<p class="note">Not verified: there is no render of the relit scene to compare with, '
-            "because there was only a basis, or because verification was off.</p>"
-        )
-    if verification.agrees:
-        return ""
-    return (
-        '<div class="warning" role="alert"><strong>⚠ Warning: do not trust the prediction.</strong>'
-        "<p>The independent render of the relit scene differs from it by more than the noise of "
-        "both explains. The verification map below shows where. Check that basis and scene "
-        "belong together, and render both with more samples.</p></div>"
-    )
-
-
-def _notes(remarks: list[str]) -> str:
-    return "".join(f'<p class="note">{escape(remark)}.</p>' for remark in remarks)
-
-
 def _exposure(transform: ViewTransform, predicted: Floats, origin: str) -> str:
     """Describe the view transform of the pictures, and how much light exceeds it."""
     exposure_text = (
@@ -292,23 +261,5 @@ def _exposure(transform: ViewTransform, predicted: Floats, origin: str) -> str:
     if clipped > 0:
         text += f" {max(100 * clipped, 0.1):.1f} % of the prediction is brighter than white."
     if origin:
-        text += f" Denoised by {escape(origin)}; all numbers and maps are of the raw renders."
-    return text
-
-
-def _next_steps(basis: Basis, target: Target, verification: Verification | None) -> str:
-    """Return instructions to change the painting and solve again, for readers much later."""
-    text = (
-        "Open the painting with its layers, change it, save it under the same name, and run the "
-        "command again. The basis is kept"
-    )
-    text += "." if verification is None else "; only the verification is rendered anew."
-    if target.content:
-        text += " Only what differs from the template counts."
-    elif target.everything and basis.origin.scene.endswith(".xml"):
-        scene = shlex.quote(_absolute_path(basis.origin.scene))
-        make = f"<code>lightpaint template {escape(scene)}</code>"
-        text += (
-            f" Here every pixel counts. In a painting over the output of {make}, only paint counts."
-        )
+        text += f" Denoised by {origin}; all numbers and maps are of the raw renders."
     return text

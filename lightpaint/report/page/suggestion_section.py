@@ -1,8 +1,9 @@
-"""Suggested lights, in words and as a section of the report. Sections are HTML."""
+"""Suggested lights, in words and as a section of the report."""
 
 from collections.abc import Sequence
-from dataclasses import replace
-from html import escape
+from typing import Any
+
+from markupsafe import Markup
 
 from lightpaint.arrays import Floats
 from lightpaint.colour.display.view_transform import ViewTransform
@@ -10,7 +11,7 @@ from lightpaint.colour.srgb import to_8_bit
 from lightpaint.images.denoiser import denoised
 from lightpaint.placement.suggestions.suggestion import MoveSuggestion, Suggestion
 from lightpaint.report.page.figures import data_uri
-from lightpaint.report.page.html import facts
+from lightpaint.report.page.html import html
 from lightpaint.report.phrases import spoken_percent
 from lightpaint.report.rig.hung_lights import spoken_fraction
 
@@ -49,7 +50,7 @@ def suggestion_section(
     shown_view: str = "",
     cd_per_unit: float | None = None,
     is_clean: bool = False,
-) -> str:
+) -> Markup:
     """Return each suggested light: the picture without and with it, its place, and its XML.
 
     Without any the section is empty. turn: the turn of an existing light, which comes first.
@@ -57,35 +58,27 @@ def suggestion_section(
     is_clean: whether to denoise the pictures.
     """
     if suggestions is None:
-        return ""
-    method = (
-        "<p>Each is a point light that was tried in free space, with all lights solved again "
-        "together with it and those above it. Paste it into <code>&lt;scene&gt;</code> and "
-        "solve again; the small pictures are previews.</p>"
-        if suggestions
-        else ""
-    )
-    shown = "".join(
-        _suggestion_html(
-            replace(x, without=denoised(x.without), with_it=denoised(x.with_it)) if is_clean else x,
-            before=k > 0,
-            transform=transform,
-            cd_per_unit=cd_per_unit,
-        )
-        for k, x in enumerate(suggestions)
-    )
-    return (
-        f"<section><h2>Lights that would help</h2>{_views_html(shown_view)}"
-        f"{_turn_html(turn, transform=transform, is_clean=is_clean)}"
-        f"<p>{escape(spoken_suggestions(suggestions))}</p>{method}{shown}</section>"
-    )
+        return Markup("")
 
+    def pictures(entry: Suggestion | MoveSuggestion) -> dict[str, Any]:
+        pair = {"without": entry.without, "with_it": entry.with_it}
+        return {
+            name: _picture(denoised(image) if is_clean else image, transform)
+            for name, image in pair.items()
+        }
 
-def _views_html(shown_view: str) -> str:
-    """Return the remark on views, if there are several."""
-    if not shown_view:
-        return ""
-    return f"<p>All painted views count; the small pictures show {escape(shown_view)}.</p>"
+    shown_turn = None
+    if turn is not None:
+        words = {"name": turn.name, "sentence": spoken_turn(turn), "toml": turn.toml}
+        shown_turn = {**words, **pictures(turn)}
+    return html(
+        "suggestions",
+        ring=RING,
+        shown_view=shown_view,
+        turn=shown_turn,
+        sentence=spoken_suggestions(suggestions),
+        suggestions=[{**_light(x, cd_per_unit), **pictures(x)} for x in suggestions],
+    )
 
 
 def spoken_turn(turn: MoveSuggestion) -> str:
@@ -95,75 +88,28 @@ def spoken_turn(turn: MoveSuggestion) -> str:
     return f"Turning {turn.name} by {turn.turn:.0f}° would remove {part}."
 
 
-def _turn_html(turn: MoveSuggestion | None, *, transform: ViewTransform, is_clean: bool) -> str:
-    """Return the turn of a light: its pictures, and the lines that let it turn."""
-    if turn is None:
-        return ""
-    pictures = [denoised(x) if is_clean else x for x in (turn.without, turn.with_it)]
-    name = escape(turn.name)
-    return (
-        f"<p>{escape(spoken_turn(turn))} Let it turn in the lights file, and solve again:</p>"
-        f"<pre>{escape(turn.toml)}</pre>"
-        '<div class="maps">'
-        f"{_picture(pictures[0], f'{name} as it is', 'as solved', None, transform)}"
-        f"{_picture(pictures[1], f'{name} turned', 'a preview, solved again', None, transform)}"
-        "</div>"
-    )
-
-
-def _suggestion_html(
-    suggestion: Suggestion, *, before: bool, transform: ViewTransform, cd_per_unit: float | None
-) -> str:
-    """Return one suggested light. before: whether there are earlier ones, which are in both
-    pictures.
-    """
+def _light(suggestion: Suggestion, cd_per_unit: float | None) -> dict[str, Any]:
+    """Return one suggested light for the section, without its pictures."""
     light_photometry = suggestion.photometry(cd_per_unit)
-    amounts = ", ".join(filter(None, light_photometry.amounts))
     entries = [
         ("at", spoken_position(suggestion)),
         ("intensity", f"{' '.join(f'{v:.4g}' for v in suggestion.emission)} W/sr"),
         ("colour", light_photometry.color),
-        ("amount", amounts),
+        ("amount", ", ".join(filter(None, light_photometry.amounts))),
         ("removes", f"{spoken_percent(suggestion.gain_share)} of the difference"),
         ("leaves", f"{spoken_percent(suggestion.missed_share)} of it"),
     ]
-    facts_html = facts((k, v) for k, v in entries if v)
-    swatch = (
-        f'<span class="swatch" style="background: {light_photometry.hex}"></span>'
-        if light_photometry.hex
-        else ""
-    )
-    position = (
-        "the ring marks its position, which may be hidden"
-        if suggestion.seen_at
-        else "its position is outside the picture"
-    )
-    without = "with those above it" if before else "as solved"
-    name = escape(suggestion.name)
-    return (
-        f'<h3 style="margin-top:24px">{name}</h3><div class="maps">'
-        f"{_picture(suggestion.without, f'Without {name}', without, None, transform)}"
-        f"{_picture(suggestion.with_it, f'With {name}', position, suggestion.seen_at, transform)}"
-        f"<div>{swatch}<dl>{facts_html}</dl></div></div>"
-        f'<pre style="margin-top:12px">{escape(suggestion.xml)}</pre>'
-    )
+    return {
+        "name": suggestion.name,
+        "seen_at": suggestion.seen_at,
+        "hex": light_photometry.hex,
+        "facts": [(term, value) for term, value in entries if value],
+        "xml": suggestion.xml,
+    }
 
 
-def _picture(
-    image: Floats,
-    name: str,
-    caption: str,
-    mark: tuple[float, float] | None,
-    transform: ViewTransform,
-) -> str:
+def _picture(image: Floats, transform: ViewTransform) -> dict[str, Any]:
+    """Return a picture of linear light, (h, w, 3), for the section."""
     height, width = image.shape[:2]
-    ring = ""
-    if mark is not None:
-        place = f"left:{100 * mark[0]:.2f}%;top:{100 * mark[1]:.2f}%"
-        ring = f'<span style="{RING};{place}" aria-hidden="true"></span>'
     source = data_uri(to_8_bit(transform.encode(image)))
-    return (
-        f'<figure><div style="position:relative"><img width="{width}" height="{height}" '
-        f'alt="{name}: {caption}." src="{source}">{ring}</div>'
-        f"<figcaption><strong>{name}</strong>: {caption}.</figcaption></figure>"
-    )
+    return {"width": width, "height": height, "source": source}
