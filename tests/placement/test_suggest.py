@@ -289,7 +289,7 @@ def test_the_section_says_what_was_found():
     assert page.count("left:25.00%;top:50.00%") == 1
     assert "b &amp; c" in page
     assert "b & c" not in page
-    assert "&lt;emitter type=&quot;point&quot;" in page
+    assert "&lt;emitter type=&#34;point&#34;" in page
     assert " cd, " in page
     assert " lm" in page
     assert "together" not in spoken_suggestions(two[:1])

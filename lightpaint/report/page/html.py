@@ -50,7 +50,9 @@ def _environment() -> jinja2.Environment:
 
 def _source(name: str) -> str:
     """Return a template without space that has no meaning."""
-    text = unindented(source(name if "/" in name else f"{TEMPLATES}/{name}"))
+    if "/" in name:
+        return unindented(source(name))
+    text = unindented(source(f"{TEMPLATES}/{name}")).replace(">\n<", "><")
     if name != "page.html":
         return text
     head, style, body, script, end = re.split("</?(?:style|script)>", text)
