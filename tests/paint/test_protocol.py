@@ -30,7 +30,7 @@ from lightpaint.paint.protocol import (
     document,
     typescript,
 )
-from lightpaint.paint.server.observers import MAX_OBSERVERS
+from lightpaint.paint.server.session_clients import MAX_OBSERVERS
 from lightpaint.paint.session.look_library import MAX_PROPOSALS
 
 TEXTS = st.text(st.characters(exclude_categories=["Cs"]), max_size=20)
