@@ -185,8 +185,12 @@ class Server:
         # Connections wait at the socket during these imports.
         import uvicorn
 
-        from lightpaint.paint.server.http_connections import bounded_http_protocol
-        from lightpaint.paint.server.shutdown import GracefulServer, PageSocket, stop_on_hangup
+        from lightpaint.paint.server.http_server import (
+            GracefulServer,
+            PageSocket,
+            bounded_http_protocol,
+            stop_on_hangup,
+        )
 
         try:
             files = page_files()
