@@ -29,7 +29,6 @@ from lightpaint.images.formats.openraster_stack import RasterGroup, opened_openr
 from lightpaint.paint import protocol
 from lightpaint.paint.layers import layer_file_reading
 from lightpaint.paint.layers.composition import compose_layer
-from lightpaint.paint.layers.layer import Layer
 from lightpaint.paint.layers.layer_file_reading import read_layers
 from lightpaint.paint.layers.layer_files import (
     KEY,
@@ -38,7 +37,7 @@ from lightpaint.paint.layers.layer_files import (
     write_layers_openraster,
 )
 from lightpaint.paint.layers.layer_pixels import LayerPixels
-from lightpaint.paint.layers.layer_stack import LayerStack
+from lightpaint.paint.layers.layer_stack import Layer, LayerStack
 from lightpaint.paint.layers.layered_paintings import LayeredPaintings
 from lightpaint.paint.layers.view_layers import ViewLayers
 from lightpaint.paint.protocol import Message

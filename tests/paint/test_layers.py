@@ -22,9 +22,8 @@ from lightpaint.paint.layers.composition import (
     compose,
     with_effect,
 )
-from lightpaint.paint.layers.layer import PAINTING, Gradient, Layer
 from lightpaint.paint.layers.layer_pixels import LayerPixels
-from lightpaint.paint.layers.layer_stack import LayerStack, stack_after
+from lightpaint.paint.layers.layer_stack import PAINTING, Gradient, Layer, LayerStack, stack_after
 from lightpaint.paint.session.look_library import LookLibrary
 from lightpaint.paint.session.picture_table import PictureTable
 from lightpaint.paint.store.canvas_pixels import Pixels

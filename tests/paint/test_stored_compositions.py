@@ -17,7 +17,7 @@ from lightpaint.errors import PaintError
 from lightpaint.paint import protocol
 from lightpaint.paint.layers.composed_layers import accent
 from lightpaint.paint.layers.composition import compose_layer
-from lightpaint.paint.layers.layer import Layer
+from lightpaint.paint.layers.layer_stack import Layer
 from lightpaint.paint.session.session import Session
 from lightpaint.paint.store import stored_compositions
 from lightpaint.paint.store.canvas_pixels import Pixels

@@ -15,7 +15,6 @@ from lightpaint.errors import PaintError
 from lightpaint.lighting.live.live_view import LiveView
 from lightpaint.paint.layers.composed_layers import Change, ComposedLayers
 from lightpaint.paint.layers.composition import AlbedoSource
-from lightpaint.paint.layers.layer import Layer
 from lightpaint.paint.layers.layer_pixels import (
     LayerPixels,
     enclosing,
@@ -23,7 +22,7 @@ from lightpaint.paint.layers.layer_pixels import (
     relative,
     shared,
 )
-from lightpaint.paint.layers.layer_stack import LayerStack
+from lightpaint.paint.layers.layer_stack import Layer, LayerStack
 from lightpaint.paint.layers.selection import SELECTION_ID
 from lightpaint.paint.store.canvas_pixels import Pixels, Region, slices
 from lightpaint.paint.store.history_steps import Patch, Step

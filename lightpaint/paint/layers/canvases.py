@@ -9,9 +9,9 @@ from lightpaint.basis.basis import Basis
 from lightpaint.errors import PaintError
 from lightpaint.lighting.live.live_view import LiveView
 from lightpaint.paint.layers.canvas import Canvas
-from lightpaint.paint.layers.layer import PAINTING
 from lightpaint.paint.layers.layer_pixels import enclosing, is_empty
 from lightpaint.paint.layers.layer_stack import (
+    PAINTING,
     LayerStack,
     StackChange,
     next_layer_id,

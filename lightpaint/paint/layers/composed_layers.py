@@ -23,7 +23,6 @@ from lightpaint.paint.layers.composition import (
     compose_over,
     with_effect,
 )
-from lightpaint.paint.layers.layer import Layer
 from lightpaint.paint.layers.layer_pixels import (
     TILE_SIDE,
     LayerPixels,
@@ -31,7 +30,7 @@ from lightpaint.paint.layers.layer_pixels import (
     enclosing,
     is_empty,
 )
-from lightpaint.paint.layers.layer_stack import LayerStack
+from lightpaint.paint.layers.layer_stack import Layer, LayerStack
 from lightpaint.paint.store.canvas_pixels import Pixels, Region, slices
 from lightpaint.paint.store.history_steps import Patch, Step
 from lightpaint.paint.store.stored_compositions import StoredComposition

@@ -19,9 +19,8 @@ from lightpaint.images.formats.openraster_stack import (
     opened_openraster,
 )
 from lightpaint.paint.layers.canvas import MAX_IMPORTANCE, MAX_LIGHT
-from lightpaint.paint.layers.layer import MAX_NAME_LENGTH, Layer
 from lightpaint.paint.layers.layer_files import FORMAT, IMPORTANCE, KEY, LOOK_NAME, MARKS
-from lightpaint.paint.layers.layer_stack import LayerStack
+from lightpaint.paint.layers.layer_stack import MAX_NAME_LENGTH, Layer, LayerStack
 from lightpaint.paint.layers.layered_paintings import LayeredPaintings
 from lightpaint.paint.store.canvas_pixels import Pixels, Region, slices
 from lightpaint.storage.json_records import read_record, strict_json

@@ -18,8 +18,8 @@ from lightpaint.colour.display.view_transform import ViewTransform
 from lightpaint.images.formats.exr_streams import PartHead, write_streamed
 from lightpaint.images.formats.openraster_stack import RasterGroup, RasterLayer, write_openraster
 from lightpaint.images.formats.png import TRANSFORM_KEY
-from lightpaint.paint.layers.layer import Layer
 from lightpaint.paint.layers.layer_pixels import is_empty, relative
+from lightpaint.paint.layers.layer_stack import Layer
 from lightpaint.paint.layers.view_layers import LayerPicture, ViewLayers
 from lightpaint.paint.store.canvas_pixels import Region, slices
 

@@ -9,9 +9,8 @@ import numpy.typing as npt
 
 from lightpaint.errors import PaintError
 from lightpaint.paint.layers.canvases import Canvases
-from lightpaint.paint.layers.layer import PAINTING_ID, Layer
 from lightpaint.paint.layers.layer_pixels import LayerPixels, enclosing, is_empty
-from lightpaint.paint.layers.layer_stack import LayerStack
+from lightpaint.paint.layers.layer_stack import PAINTING_ID, Layer, LayerStack
 from lightpaint.paint.store.canvas_pixels import Pixels, Region
 from lightpaint.paint.store.history_steps import Patch, name_in_view
 

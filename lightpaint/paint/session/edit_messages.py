@@ -8,7 +8,7 @@ import numpy.typing as npt
 
 from lightpaint.paint.layers.canvas import Canvas
 from lightpaint.paint.layers.canvases import Canvases
-from lightpaint.paint.layers.layer import Layer
+from lightpaint.paint.layers.layer_stack import Layer
 from lightpaint.paint.protocol import (
     CanvasPatch,
     LayerInfo,
