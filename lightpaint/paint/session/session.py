@@ -23,7 +23,7 @@ from lightpaint.errors import LightpaintError, PaintError
 from lightpaint.lighting.constraints.constraints import Constraints
 from lightpaint.lighting.solution import Solution
 from lightpaint.paint import protocol
-from lightpaint.paint.layers.layered_paintings import LayeredPaintings
+from lightpaint.paint.layers.canvases import LayeredPaintings
 from lightpaint.paint.protocol import AnswerUpdate, Message
 from lightpaint.paint.session.answer_messages import Judgement, answer_findings
 from lightpaint.paint.session.edit_messages import canvas_patches, edit_state, unpainted_headline

@@ -14,8 +14,8 @@ from lightpaint.errors import LightpaintError, PaintError
 from lightpaint.lighting.constraints.constraints import Constraints
 from lightpaint.lighting.constraints.start_lighting import start_weights
 from lightpaint.paint import protocol
+from lightpaint.paint.layers.canvases import LayeredPaintings
 from lightpaint.paint.layers.layer_stack import PAINTING_ID, LayerStack
-from lightpaint.paint.layers.layered_paintings import LayeredPaintings
 from lightpaint.paint.layers.selection import selection_patch
 from lightpaint.paint.references.likeness_layers import open_request
 from lightpaint.paint.references.reference_table import ReferenceTable

@@ -13,9 +13,9 @@ from lightpaint.errors import LightpaintError, PaintError
 from lightpaint.files import one_line
 from lightpaint.paint import protocol
 from lightpaint.paint.background_threads import BackgroundThreads
-from lightpaint.paint.layers.layer_file_reading import read_layers
+from lightpaint.paint.layers.canvases import LayeredPaintings
+from lightpaint.paint.layers.layer_files import read_layers
 from lightpaint.paint.layers.layer_stack import PAINTING_ID, LayerStack
-from lightpaint.paint.layers.layered_paintings import LayeredPaintings
 from lightpaint.paint.protocol import Message, Notice, TaskStarted
 from lightpaint.paint.publisher import Publisher
 from lightpaint.paint.session.session import Session
