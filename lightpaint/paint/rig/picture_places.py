@@ -17,9 +17,8 @@ from lightpaint.paint.rig.cameras import (
     in_this_thread,
     up_axis,
 )
-from lightpaint.paint.rig.lamp_rig import LampRig
+from lightpaint.paint.rig.lamp_rig import LampRig, RigView
 from lightpaint.paint.rig.pointing import aimed, with_highlight, with_shadow
-from lightpaint.paint.rig.rig_view import RigView
 from lightpaint.scene.lights.new_emitter import NewEmitter
 from lightpaint.scene.properties.pose import Pose
 
