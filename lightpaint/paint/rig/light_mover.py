@@ -30,7 +30,7 @@ from lightpaint.paint.protocol import (
 from lightpaint.paint.publisher import Publisher
 from lightpaint.paint.rig.added_lights import free_name, values_of, with_level
 from lightpaint.paint.rig.lamp_rig import LampRig
-from lightpaint.paint.rig.picture_places import emitter_at_place, pose_change
+from lightpaint.paint.rig.pointing import emitter_at_place, pose_change
 from lightpaint.paint.session.moved_lights import Placed, added_names
 from lightpaint.paint.session.picture_table import Picture, plane_thumbnail
 from lightpaint.paint.session.session import Session
