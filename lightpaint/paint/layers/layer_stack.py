@@ -1,6 +1,7 @@
 """Layers of a painting: one request each, and their order in a session.
 
-A layer has a name, visibility, strength and importance."""
+A layer has a name, visibility, strength and importance.
+"""
 
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import asdict, dataclass, replace

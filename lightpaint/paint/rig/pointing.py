@@ -1,6 +1,7 @@
 """Places of lights that a client marks in a picture: the pose or the new light that they imply.
 
-Closed forms give the pose of a light whose beam, highlight or shadow should fall on a point."""
+Closed forms give the pose of a light whose beam, highlight or shadow should fall on a point.
+"""
 
 from collections.abc import Mapping
 from functools import partial
