@@ -30,7 +30,7 @@ from lightpaint.paint.publisher import Publisher
 from lightpaint.paint.session import picture_table
 from lightpaint.paint.session.session import Session
 from lightpaint.paint.session.snapshot import SessionSnapshot
-from lightpaint.paint.store import write_queue
+from lightpaint.paint.store import database
 from lightpaint.paint.store.store import Store
 from lightpaint.paint.studio import plane_denoiser, session_bases, session_exports
 from lightpaint.paint.studio.studio import Studio
@@ -503,7 +503,7 @@ def test_a_full_disk_is_said_to_pages_and_to_the_terminal(
     at_terminal: list[str] = []
     client.studio.on_unsaved = at_terminal.append
     with monkeypatch.context() as patch:
-        patch.setattr(write_queue, "transaction", full)
+        patch.setattr(database, "transaction", full)
         client.paint(1, 0.8)
         text = client.wait(is_disk_notice).fields["text"]
         assert "disk is full" in text

@@ -28,7 +28,7 @@ import lightpaint as lp
 from lightpaint.errors import ConstraintError, OutputError, PaintError
 from lightpaint.paint import background_threads, protocol
 from lightpaint.paint.notebook import painter_files, widget_arguments
-from lightpaint.paint.store import write_queue
+from lightpaint.paint.store import database
 from lightpaint.paint.store.canvas_pixels import Pixels
 from lightpaint.paint.store.history_steps import Identity
 from lightpaint.paint.store.store import Store
@@ -759,7 +759,7 @@ def test_a_full_disk_is_said_and_tried_again(
     page = Page(painter)
     page.say("hello", version=protocol.VERSION)
     with monkeypatch.context() as patch:
-        patch.setattr(write_queue, "transaction", full)
+        patch.setattr(database, "transaction", full)
         assert page.paint(basis.images[2])["kind"] == "answer"
         [notice] = wait_for(lambda: notices("warn"))
         assert "evening.db cannot be written (database or disk is full)" in notice

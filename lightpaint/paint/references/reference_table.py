@@ -14,8 +14,7 @@ from lightpaint.colour.display.view_transform import ViewTransform
 from lightpaint.errors import PaintError
 from lightpaint.paint.references.reference_file import ReferencePixels
 from lightpaint.paint.store.compression import pack, unpack
-from lightpaint.paint.store.damaged_rows import DAMAGE_ERRORS
-from lightpaint.paint.store.database import REFERENCE_TABLE
+from lightpaint.paint.store.database import DAMAGE_ERRORS, REFERENCE_TABLE
 from lightpaint.paint.store.store import Store
 from lightpaint.storage.json_records import strict_json
 

@@ -64,11 +64,6 @@ def answer_row(database: sqlite3.Connection, step: int) -> tuple[str, bytes] | N
     return row
 
 
-def update_position(database: sqlite3.Connection, position: int) -> None:
-    """Write how many of the steps are done."""
-    database.execute("INSERT OR REPLACE INTO about VALUES (?, ?)", ("position", position))
-
-
 def read_position(database: sqlite3.Connection) -> int | None:
     """Return how many of the steps are done; None if that was never written."""
     row = database.execute("SELECT value FROM about WHERE name = 'position'").fetchone()

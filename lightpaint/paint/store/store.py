@@ -22,9 +22,11 @@ from typing import Any
 from lightpaint.arrays import Floats
 from lightpaint.errors import OutputError, PaintError
 from lightpaint.paint.store.compression import pack_patches
-from lightpaint.paint.store.damaged_rows import DAMAGE_ERRORS
 from lightpaint.paint.store.database import (
+    DAMAGE_ERRORS,
     DamagedError,
+    WriteJob,
+    WriteQueue,
     check_pages,
     damaged_error,
     identify,
@@ -51,7 +53,6 @@ from lightpaint.paint.store.stored_compositions import (
     read_compositions,
     store_compositions,
 )
-from lightpaint.paint.store.write_queue import WriteJob, WriteQueue
 from lightpaint.storage.json_records import strict_json
 
 

@@ -10,8 +10,7 @@ from threading import RLock
 from lightpaint.errors import PaintError
 from lightpaint.paint.store.canvas_pixels import Pixels, Region
 from lightpaint.paint.store.compression import unpack_patches
-from lightpaint.paint.store.damaged_rows import DAMAGE_ERRORS
-from lightpaint.paint.store.database import damaged_error
+from lightpaint.paint.store.database import DAMAGE_ERRORS, damaged_error
 from lightpaint.paint.store.lazy_arrays import PackedArray, PackedArrays, StoredPatch
 from lightpaint.paint.store.session_rows import (
     answer_row,

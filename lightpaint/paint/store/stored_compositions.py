@@ -19,8 +19,7 @@ from lightpaint.arrays import Floats
 from lightpaint.errors import PaintError
 from lightpaint.paint.store.canvas_pixels import Pixels, Region
 from lightpaint.paint.store.compression import pack_pixels, unpack_pixels
-from lightpaint.paint.store.damaged_rows import DAMAGE_ERRORS
-from lightpaint.paint.store.database import transaction
+from lightpaint.paint.store.database import DAMAGE_ERRORS, transaction
 from lightpaint.storage.json_records import strict_json
 
 #: Version of the composition of layers: to be raised when layers come to other bits.
