@@ -15,8 +15,8 @@ from lightpaint.paint.layers.layer_stack import LayerStack
 from lightpaint.paint.session import milestones
 from lightpaint.paint.session.milestones import find_milestones
 from lightpaint.paint.store.history_steps import Step
-from lightpaint.paint.store.step_answers import StepAnswer
 from lightpaint.paint.store.store import Store
+from lightpaint.paint.store.stored_arrays import StepAnswer
 
 
 def listed(session: Any, count: int = 100) -> protocol.StepList:

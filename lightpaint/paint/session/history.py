@@ -23,8 +23,8 @@ from lightpaint.paint.store.canvas_pixels import Region
 from lightpaint.paint.store.database import DamagedError
 from lightpaint.paint.store.history_steps import Patch, Step
 from lightpaint.paint.store.session_requests import SessionRequests
-from lightpaint.paint.store.step_answers import StepAnswer
 from lightpaint.paint.store.store import Store
+from lightpaint.paint.store.stored_arrays import StepAnswer
 
 #: Number of steps listed to a page, backwards and forwards.
 LISTED_STEPS = 50

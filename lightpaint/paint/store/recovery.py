@@ -31,9 +31,8 @@ from lightpaint.paint.store.database import (
     transaction,
 )
 from lightpaint.paint.store.history_steps import Identity, name_in_view
-from lightpaint.paint.store.lazy_arrays import DTYPES
 from lightpaint.paint.store.session_requests import SessionRequests
-from lightpaint.paint.store.session_rows import parse_place
+from lightpaint.paint.store.stored_arrays import DTYPES, parse_place
 from lightpaint.storage.json_records import read_record, strict_json
 
 #: Maximum number of rows of a damaged table that are tried one by one.

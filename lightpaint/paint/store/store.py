@@ -32,21 +32,22 @@ from lightpaint.paint.store.database import (
     identify,
 )
 from lightpaint.paint.store.history_steps import Identity, Step, StoredLook
-from lightpaint.paint.store.lazy_arrays import LookArrays, pack_arrays
 from lightpaint.paint.store.recovery import recover_or_raise
-from lightpaint.paint.store.session_rows import (
+from lightpaint.paint.store.stored_arrays import (
+    LookArrays,
+    StepAnswer,
+    StoredArrays,
     delete_look,
     insert_answer,
     insert_look,
     insert_step,
     look_rows,
+    pack_arrays,
     places_json,
     read_position,
     step_rows,
     to_json,
 )
-from lightpaint.paint.store.step_answers import StepAnswer
-from lightpaint.paint.store.stored_arrays import StoredArrays
 from lightpaint.paint.store.stored_compositions import (
     StoredComposition,
     composition_rows,
