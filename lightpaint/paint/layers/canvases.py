@@ -25,7 +25,7 @@ from lightpaint.paint.layers.layer_stack import (
 from lightpaint.paint.layers.selection import SELECTION_ID, put_selection
 from lightpaint.paint.store.canvas_pixels import Pixels, Region
 from lightpaint.paint.store.history_steps import Patch, Step, name_in_view
-from lightpaint.paint.store.stored_compositions import StoredComposition
+from lightpaint.paint.store.store import StoredComposition
 
 
 class Canvases:

@@ -33,7 +33,7 @@ from lightpaint.paint.layers.layer_pixels import (
 from lightpaint.paint.layers.layer_stack import Layer, LayerStack
 from lightpaint.paint.store.canvas_pixels import Pixels, Region, slices
 from lightpaint.paint.store.history_steps import Patch, Step
-from lightpaint.paint.store.stored_compositions import StoredComposition
+from lightpaint.paint.store.store import StoredComposition
 from lightpaint.target.wish import Wish, separate
 
 #: Importance of the rest of a fully painted picture relative to one layer, and the largest accent,

@@ -25,8 +25,7 @@ from lightpaint.paint.session.moved_lights import MovedLights, Placed, PlaneSour
 from lightpaint.paint.store.canvas_pixels import Pixels
 from lightpaint.paint.store.database import DamagedError
 from lightpaint.paint.store.session_requests import SessionRequests
-from lightpaint.paint.store.store import Store
-from lightpaint.paint.store.stored_compositions import StoredComposition
+from lightpaint.paint.store.store import Store, StoredComposition
 from lightpaint.pipeline.job.settings import Settings
 
 
