@@ -34,7 +34,7 @@ from lightpaint.paint.rig.pointing import emitter_at_place, pose_change
 from lightpaint.paint.session.moved_lights import Placed, added_names
 from lightpaint.paint.session.picture_table import Picture, plane_thumbnail
 from lightpaint.paint.session.session import Session
-from lightpaint.paint.session.view_pictures import plane_scale
+from lightpaint.paint.session.session_state import plane_scale
 from lightpaint.paint.session_access import SessionAccess
 from lightpaint.paint.store.history_steps import name_in_view
 

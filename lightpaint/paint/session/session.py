@@ -31,8 +31,6 @@ from lightpaint.paint.layers.selection import selection_patch
 from lightpaint.paint.protocol import AnswerUpdate, Message
 from lightpaint.paint.references.likeness_layers import open_request
 from lightpaint.paint.references.reference_table import ReferenceTable
-from lightpaint.paint.session.answer_messages import Judgement, answer_findings
-from lightpaint.paint.session.edit_messages import canvas_patches, edit_state, unpainted_headline
 from lightpaint.paint.session.history import Changes, History, Travel, restore
 from lightpaint.paint.session.live_answer import LiveAnswer, weights_by_name
 from lightpaint.paint.session.moved_lights import MovedLights, NoPlaneSource, Placed, PlaneSource
@@ -41,6 +39,13 @@ from lightpaint.paint.session.request_changes import (
     changed_requests,
     move_lights,
     previewed_requests,
+)
+from lightpaint.paint.session.session_messages import (
+    Judgement,
+    answer_findings,
+    canvas_patches,
+    edit_state,
+    unpainted_headline,
 )
 from lightpaint.paint.session.snapshot import SessionSnapshot
 from lightpaint.paint.store.canvas_pixels import Pixels

@@ -21,8 +21,8 @@ from lightpaint.lighting.solution import Solution
 from lightpaint.paint.background_threads import LatestWork
 from lightpaint.paint.protocol import AnswerChoice, AnswerChoices, AnswerColors
 from lightpaint.paint.publisher import Publisher
-from lightpaint.paint.session.answer_messages import wish_delivery
 from lightpaint.paint.session.picture_table import Picture, display_thumbnail
+from lightpaint.paint.session.session_messages import wish_delivery
 from lightpaint.paint.session.snapshot import SessionSnapshot
 from lightpaint.paint.session_access import SessionAccess
 from lightpaint.paint.store.history_steps import name_in_view

@@ -9,8 +9,8 @@ from lightpaint.lighting.solution import Solution
 from lightpaint.paint.background_threads import ExactSolveLoop
 from lightpaint.paint.protocol import AnswerUpdate, Findings
 from lightpaint.paint.publisher import Publisher
-from lightpaint.paint.session.answer_messages import judge
 from lightpaint.paint.session.session import Session
+from lightpaint.paint.session.session_messages import judge
 from lightpaint.paint.session.snapshot import SessionSnapshot
 from lightpaint.paint.session_access import SessionAccess
 from lightpaint.progress import cancellable

@@ -21,8 +21,7 @@ from lightpaint.paint.rig.light_placer import LightPlacer
 from lightpaint.paint.rig.look_comparison import LookComparison
 from lightpaint.paint.session.moved_lights import Placed
 from lightpaint.paint.session.session import Session
-from lightpaint.paint.session.session_state import state_fields
-from lightpaint.paint.session.view_pictures import offer_ground
+from lightpaint.paint.session.session_state import offer_ground, state_fields
 from lightpaint.paint.session_access import SessionAccess
 from lightpaint.paint.store.canvas_pixels import Pixels
 from lightpaint.paint.store.session_requests import SessionRequests

@@ -12,14 +12,14 @@ from lightpaint.paint.publisher import Publisher
 from lightpaint.paint.rig.light_mover import LightMover
 from lightpaint.paint.session.look_library import LookLibrary
 from lightpaint.paint.session.session import Session
-from lightpaint.paint.session.session_state import offered_transforms
-from lightpaint.paint.session.view_pictures import (
+from lightpaint.paint.session.session_state import (
     offer_layers,
     offer_presets,
     offer_references,
     offer_steps,
     offer_transforms,
     offer_view,
+    offered_transforms,
 )
 from lightpaint.paint.session_access import SessionAccess
 from lightpaint.paint.store.history_steps import Identity
