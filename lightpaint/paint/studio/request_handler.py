@@ -25,9 +25,8 @@ from lightpaint.paint.session.session_state import offer_ground, state_fields
 from lightpaint.paint.session_access import SessionAccess
 from lightpaint.paint.store.canvas_pixels import Pixels
 from lightpaint.paint.store.session_requests import SessionRequests
-from lightpaint.paint.studio.answer_choices import ChoiceSolver
 from lightpaint.paint.studio.background_jobs import BackgroundJobs
-from lightpaint.paint.studio.exact_answers import ExactAnswers
+from lightpaint.paint.studio.exact_answers import ChoiceSolver, ExactAnswers
 from lightpaint.paint.studio.final_renders import FinalRenders
 from lightpaint.paint.studio.layer_imports import LayerImports
 from lightpaint.paint.studio.reference_imports import ReferenceImports

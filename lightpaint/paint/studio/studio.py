@@ -38,10 +38,14 @@ from lightpaint.paint.store.canvas_pixels import Pixels
 from lightpaint.paint.store.history_steps import Identity
 from lightpaint.paint.store.session_requests import SessionRequests
 from lightpaint.paint.store.store import Store
-from lightpaint.paint.studio.answer_choices import ChoiceSolver
 from lightpaint.paint.studio.background_jobs import BackgroundJobs
 from lightpaint.paint.studio.background_sampling import BackgroundSampling
-from lightpaint.paint.studio.exact_answers import ExactAnswers, OutdatedError, raise_outdated
+from lightpaint.paint.studio.exact_answers import (
+    ChoiceSolver,
+    ExactAnswers,
+    OutdatedError,
+    raise_outdated,
+)
 from lightpaint.paint.studio.plane_denoiser import PlaneDenoiser
 from lightpaint.paint.studio.request_handler import RequestHandler
 from lightpaint.paint.studio.session_bases import SessionBases
