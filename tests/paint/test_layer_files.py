@@ -44,7 +44,7 @@ from lightpaint.paint.protocol import Message
 from lightpaint.paint.session.session import Session
 from lightpaint.paint.store.canvas_pixels import Pixels
 from lightpaint.paint.store.store import MemoryStore
-from lightpaint.paint.studio.layer_imports import begin_with_layers
+from lightpaint.paint.studio.file_imports import begin_with_layers
 from lightpaint.paint.studio.studio import Studio
 from lightpaint.paint.subject import Subject
 from lightpaint.paint.subject_factory import make_subjects

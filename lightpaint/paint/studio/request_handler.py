@@ -27,9 +27,8 @@ from lightpaint.paint.store.canvas_pixels import Pixels
 from lightpaint.paint.store.session_requests import SessionRequests
 from lightpaint.paint.studio.background_jobs import BackgroundJobs
 from lightpaint.paint.studio.exact_answers import ChoiceSolver, ExactAnswers
+from lightpaint.paint.studio.file_imports import LayerImports, ReferenceImports
 from lightpaint.paint.studio.final_renders import FinalRenders
-from lightpaint.paint.studio.layer_imports import LayerImports
-from lightpaint.paint.studio.reference_imports import ReferenceImports
 
 
 class RequestHandler:

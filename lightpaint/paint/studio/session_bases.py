@@ -24,7 +24,7 @@ from lightpaint.paint.session.session_state import (
 from lightpaint.paint.session_access import SessionAccess
 from lightpaint.paint.store.history_steps import Identity
 from lightpaint.paint.store.store import Store
-from lightpaint.paint.studio.layer_imports import begin_with_layers
+from lightpaint.paint.studio.file_imports import begin_with_layers
 from lightpaint.paint.studio.plane_denoiser import PlaneDenoiser
 from lightpaint.paint.subject import Subject, obtain_bases, painting_transform
 from lightpaint.scene.runtime.render_lock import MITSUBA

@@ -1,4 +1,4 @@
-"""Layers from files: those with which a session begins, and those that pages send."""
+"""Files that pages send in parts, and those that a session begins with: layers and references."""
 
 import hashlib
 import tempfile
@@ -7,6 +7,7 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 import numpy.typing as npt
 
 from lightpaint.errors import LightpaintError, PaintError
@@ -16,14 +17,64 @@ from lightpaint.paint.background_threads import BackgroundThreads
 from lightpaint.paint.layers.canvases import LayeredPaintings
 from lightpaint.paint.layers.layer_files import read_layers
 from lightpaint.paint.layers.layer_stack import PAINTING_ID, LayerStack
-from lightpaint.paint.protocol import Message, Notice, TaskStarted
+from lightpaint.paint.protocol import (
+    AddReference,
+    ImportLayers,
+    Message,
+    Notice,
+    ReferenceInfo,
+    ReferenceList,
+    TaskStarted,
+)
 from lightpaint.paint.publisher import Publisher
+from lightpaint.paint.references.reference_file import read_reference
 from lightpaint.paint.session.session import Session
 from lightpaint.paint.session_access import SessionAccess
-from lightpaint.paint.studio.received_file import ReceivedFile
 
 #: Largest file that a page may send, in bytes.
-MAX_FILE_BYTES = 2**29
+MAX_LAYERS_BYTES = 2**29
+
+#: Largest file of a reference, in bytes.
+MAX_REFERENCE_BYTES = 2**27
+
+
+class ReceivedFile:
+    """A file that arrives in parts; the next one takes its place.
+
+    max_bytes: of the largest that is taken. It is in memory until it has arrived.
+    """
+
+    def __init__(self, max_bytes: int) -> None:
+        self._max_bytes = max_bytes
+        self._parts: list[bytes] = []
+
+    def take(
+        self,
+        message: ImportLayers | AddReference,
+        arrays: Mapping[str, npt.NDArray[Any]],
+    ) -> list[bytes] | None:
+        """Take a part; return all parts after the last one, None before.
+
+        Raises PaintError for anything else than the next part.
+        """
+        part, name = arrays.get("part"), one_line(message.name)
+        if part is None or part.dtype != np.uint8:
+            raise PaintError("a part of a file without its bytes")
+        if message.size > self._max_bytes:
+            raise PaintError(
+                f"{name} has {message.size / 1e9:.1f} GB: expected at most "
+                f"{self._max_bytes / 1e9:.1f} GB"
+            )
+        if message.start == 0:
+            self._parts = []
+        end = message.start + part.size
+        if message.start != sum(map(len, self._parts)) or end > message.size:
+            raise PaintError(f"{name} did not arrive in order: send it again")
+        self._parts.append(part.tobytes())
+        if end < message.size:
+            return None
+        parts, self._parts = self._parts, []
+        return parts
 
 
 def begin_with_layers(session: Session, path: Path) -> bool:
@@ -59,7 +110,7 @@ class LayerImports:
     ) -> None:
         self._access, self._publisher, self._threads = access, publisher, threads
         self._on_loaded = on_loaded
-        self._file = ReceivedFile(MAX_FILE_BYTES)
+        self._file = ReceivedFile(MAX_LAYERS_BYTES)
 
     def handle(
         self, message: protocol.ImportLayers, arrays: Mapping[str, npt.NDArray[Any]]
@@ -105,3 +156,56 @@ class LayerImports:
 def _report(layers: LayerStack, name: str) -> str:
     count = sum(layer.kind != "group" and layer.id != PAINTING_ID for layer in layers)
     return f"Imported {count} layer{'s' * (count != 1)} of {name}; undo leads back."
+
+
+class ReferenceImports:
+    """The references of a session: files become some, and pages drop others."""
+
+    def __init__(
+        self, access: SessionAccess, publisher: Publisher, threads: BackgroundThreads
+    ) -> None:
+        self._access, self._publisher, self._threads = access, publisher, threads
+        self._file = ReceivedFile(MAX_REFERENCE_BYTES)
+
+    def handle(
+        self,
+        message: protocol.AddReference | protocol.DropReference,
+        arrays: Mapping[str, npt.NDArray[Any]],
+    ) -> list[Message]:
+        """Take a part of a file, which becomes a reference after the last one; or drop a reference.
+
+        Raises PaintError if refused.
+        """
+        if isinstance(message, protocol.DropReference):
+            self._access.session.references.drop(message.reference)
+            return [self._list()]
+        self._access.session.references.check_room()
+        if (parts := self._file.take(message, arrays)) is not None:
+            self._threads.start_low_priority(lambda: self._add(message.name, parts), "reference")
+        return [TaskStarted(task="reference")]
+
+    def _add(self, file_name: str, parts: list[bytes]) -> None:
+        """Keep a file that has arrived as a reference, and publish the list or why not."""
+        session, name = self._access.session, one_line(file_name)
+        with tempfile.TemporaryDirectory(prefix="lightpaint-") as folder:
+            path = Path(folder) / "reference"
+            path.write_bytes(b"".join(parts))
+            try:
+                pixels = read_reference(path, session.transform)
+            except LightpaintError as error:
+                text = str(error).replace(str(path), name)
+                self._publisher.publish(Notice(text=text, tone="warn", task="reference"))
+                return
+
+        def add() -> Message:
+            try:
+                session.references.add(Path(name).stem or name, pixels)
+            except LightpaintError as error:
+                return Notice(text=str(error), tone="warn", task="reference")
+            return self._list()
+
+        self._publisher.publish_made(add)
+
+    def _list(self) -> ReferenceList:
+        references = self._access.session.references
+        return ReferenceList(references=tuple(ReferenceInfo(x.id, x.name) for x in references))
