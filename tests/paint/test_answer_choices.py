@@ -14,7 +14,7 @@ from lightpaint.paint import protocol
 from lightpaint.paint.protocol import AnswerChoices
 from lightpaint.paint.session.picture_table import display_thumbnail
 from lightpaint.paint.session.snapshot import SessionSnapshot
-from lightpaint.paint.studio import exact_answers, plane_denoiser
+from lightpaint.paint.studio import exact_answers, session_bases
 
 SIZE = (18, 32)
 
@@ -34,7 +34,7 @@ def basis(make_basis: Any) -> lp.Basis:
 def client(basis: lp.Basis, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[Any]:
     """A studio whose pictures are not denoised."""
     monkeypatch.setattr(
-        plane_denoiser.PlaneDenoiser, "planes_for", lambda _, bases: [None] * len(bases)
+        session_bases.PlaneDenoiser, "planes_for", lambda _, bases: [None] * len(bases)
     )
     new_client = StudioClient(tmp_path, basis)
     yield new_client

@@ -39,16 +39,14 @@ from lightpaint.paint.store.history_steps import Identity
 from lightpaint.paint.store.session_requests import SessionRequests
 from lightpaint.paint.store.store import Store
 from lightpaint.paint.studio.background_jobs import BackgroundJobs
-from lightpaint.paint.studio.background_sampling import BackgroundSampling
 from lightpaint.paint.studio.exact_answers import (
     ChoiceSolver,
     ExactAnswers,
     OutdatedError,
     raise_outdated,
 )
-from lightpaint.paint.studio.plane_denoiser import PlaneDenoiser
 from lightpaint.paint.studio.request_handler import RequestHandler
-from lightpaint.paint.studio.session_bases import SessionBases
+from lightpaint.paint.studio.session_bases import BackgroundSampling, PlaneDenoiser, SessionBases
 from lightpaint.paint.subject import Subject
 from lightpaint.progress import cancellable
 
