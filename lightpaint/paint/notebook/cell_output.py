@@ -1,111 +1,90 @@
-"""The outputs of a cell that shows a painter: its widget, and below it what a saved notebook shows.
+"""A painter in a saved notebook, without a kernel: its last picture, and a mixer.
 
-Two outputs, since JupyterLab would build the widget anew each time that an output with it changes.
-A style hides the one or the other: while the widget is there, the saved view; without a kernel, the
-error message in place of the widget.
+Where a notebook is not trusted, scripts are removed and the picture remains; elsewhere the mixer of
+reports replaces it, in a frame of its own, so that neither its style nor the notebook's reaches the
+other.
 """
 
-from collections.abc import Callable, Mapping
-from threading import Lock, Timer
-from typing import Any
-from uuid import uuid4
+from html import escape
 
-from lightpaint.paint.background_threads import lower_priority
+import numpy as np
 
-#: Seconds without a change before the saved view follows.
-REST_S = 1.5
+from lightpaint.basis.basis import Basis
+from lightpaint.colour.display.view_transform import ViewTransform
+from lightpaint.colour.srgb import to_8_bit
+from lightpaint.images.pixel_blocks import block_mean, fitting_factor
+from lightpaint.lighting.answer.lighting import Lighting
+from lightpaint.report.answer_pictures import target_picture
+from lightpaint.report.page.figures import data_uri
+from lightpaint.report.page.mixer import mixer_assets, mixer_html
+from lightpaint.target.target import Target
+from lightpaint.viewer.bundle import styles
 
-#: What a program without widgets shows in place of one: nothing, since the saved view follows.
-NO_WIDGET = "<!-- the painter, whose last picture follows -->"
+#: Maximum number of pixels in all planes of the mixer: with their scripts these stay below 400 kB.
+MAX_PLANE_PIXELS = 44_000
 
-#: For JupyterLab, where the output of a widget is a panel: with the class of widgets it is an error
-#: message. The page marks a painter that no kernel has answered.
-STYLE = """<style>
-.jp-OutputArea-child:has(> .lm-Panel:not(.jupyter-widgets)):not(:has(.is-unanswered))
-  + .jp-OutputArea-child:has(.lightpaint-saved),
-.jp-OutputArea-child:has(> .jupyter-widgets, .is-unanswered):has(
-  + .jp-OutputArea-child .lightpaint-saved) { display: none }
-</style>"""
+#: Maximum width of the picture in pixels, and of its PNG in bytes, beyond which it is a JPEG.
+MAX_PICTURE_WIDTH, MAX_PICTURE_BYTES = 640, 20_000
+
+#: Maximum heights on the screen, in pixels, of the frame and of the mix in it.
+FRAME_HEIGHT, MIX_HEIGHT = 690, 320
+
+#: The frame takes the height of its page; with a mixer in it, the picture above is superfluous.
+FRAME_SCRIPT = """
+const frame = window.frameElement
+const fit = () => {
+  const height = Math.ceil(document.body.getBoundingClientRect().height)
+  frame.style.height = Math.min(height, HEIGHT) + 'px'
+  if (document.querySelector('.mixer-mix')) frame.previousElementSibling.hidden = true
+}
+if (frame) new ResizeObserver(fit).observe(document.body)
+"""
 
 
-class CellOutput:
-    """The outputs of all cells that show one painter.
+def static_view(
+    basis: Basis, lighting: Lighting, target: Target | None, transform: ViewTransform
+) -> str:
+    """Return a view under a lighting as HTML: a picture, and a mixer that starts from it.
 
-    render: returns the saved view as HTML; None while there is none. call: calls a function in the
-    thread that may publish outputs.
+    target: the painting, for the wipe of the mixer; None if nothing is painted.
     """
-
-    def __init__(
-        self, render: Callable[[], str | None], call: Callable[[Callable[[], None]], None]
-    ) -> None:
-        self._render, self._call = render, call
-        self.id = uuid4().hex
-        self._lock = Lock()  # not held during a render, which takes locks of the session
-        self._timer: Timer | None = None
-        self._changes = 0
-        self._text = ""
-        self._saved: str | None = None
-        self._is_over = False
-
-    def show(self, bundle: tuple[Mapping[str, Any], Mapping[str, Any]], text: str) -> None:
-        """Show a painter in the cell that runs.
-
-        bundle: data of the widget by MIME type, and their metadata. text: for a terminal.
-        """
-        from IPython.display import display
-
-        (data, metadata), self._text, self._saved = bundle, text, self._render()
-        widget = {**data, "text/html": NO_WIDGET}
-        display(widget, raw=True, metadata=metadata, display_id=self._widget_id)  # type: ignore[no-untyped-call]
-        display(self._saved_data(), raw=True, display_id=self.id)  # type: ignore[no-untyped-call]
-
-    def follow(self) -> None:
-        """Show a change in the saved view, once none has followed for a while."""
-        with self._lock:
-            if not self._text or self._is_over:
-                return
-            if self._timer is not None:
-                self._timer.cancel()
-            self._changes += 1
-            self._timer = Timer(REST_S, self._refresh, [self._changes])
-            self._timer.daemon = True
-            self._timer.start()
-
-    def end(self) -> None:
-        """Remove the widget from its cells, which keep the view of now."""
-        saved = self._render() if self._text else None
-        with self._lock:
-            self._is_over = True
-            if self._timer is not None:
-                self._timer.cancel()
-            self._saved = saved or self._saved
-        if self._text:
-            _update({"text/plain": self._text, "text/html": NO_WIDGET}, self._widget_id)
-            self._publish()
-
-    @property
-    def _widget_id(self) -> str:
-        return f"{self.id}-widget"
-
-    def _refresh(self, change: int) -> None:
-        """Render the saved view in this thread, and publish it if it is another."""
-        lower_priority()
-        saved = self._render()
-        with self._lock:
-            if self._is_over or change != self._changes or saved in (None, self._saved):
-                return
-            self._saved = saved
-        self._call(self._publish)
-
-    def _publish(self) -> None:
-        _update(self._saved_data(), self.id)
-
-    def _saved_data(self) -> dict[str, str]:
-        page = f'<div class="lightpaint-saved" data-painter="{self.id}">{self._saved or ""}</div>'
-        return {"text/plain": self._text, "text/html": page + STYLE}
+    light = basis.mix(lighting.weights_for(basis))
+    factor = fitting_factor(basis.size, -(-basis.size[1] // MAX_PICTURE_WIDTH))
+    pixels = to_8_bit(np.clip(transform.encode(block_mean(light, factor)), 0, 1))
+    source = data_uri(pixels, largest_png=MAX_PICTURE_BYTES, quality=85)
+    painting = None
+    if target is not None:
+        painting = target_picture(target, basis.current_look, transform=transform)
+    mixer = mixer_html(basis, lighting, painting, transform=transform, max_pixels=MAX_PLANE_PIXELS)
+    height, width = basis.size
+    page = _page(mixer, mix_width=max(1, MIX_HEIGHT * width // height))
+    quoted = page.replace("&", "&amp;").replace("'", "&#39;")  # most quotes in it are double
+    alt = f"{escape(basis.origin.sensor or 'The scene')}, as the painter showed it last"
+    return (
+        f'<div class="lightpaint-static"><img alt="{alt}" src="{source}" '
+        f'style="display: block; width: 100%; max-width: {max(width, MIX_HEIGHT)}px">'
+        f'<iframe title="Light mixer" loading="lazy" srcdoc=\'{quoted}\' '
+        'style="display: block; width: 100%; height: 0; border: 0"></iframe></div>'
+        "<style>.lightpaint-static > [hidden] { display: none !important }</style>"
+    )
 
 
-def _update(data: Mapping[str, str], display_id: str) -> None:
-    from IPython.display import update_display
-
-    update_display(data, raw=True, display_id=display_id)  # type: ignore[no-untyped-call]
+def _page(mixer: str, *, mix_width: int) -> str:
+    """Return the page in the frame. mix_width: maximum width of the mix on the screen."""
+    style = (
+        "html { color-scheme: dark } * { box-sizing: border-box }"
+        "body { margin: 0; padding: 14px 16px; border-radius: 6px; background: #262626;"
+        "color: #ececec; font: 14px/1.5 system-ui, sans-serif }"
+        "h2 { margin: 0 0 4px; font-size: 16px }"
+        f".mixer > p {{ margin: 0 0 12px }} .mixer-stage {{ width: min(100%, {mix_width}px) }}"
+        # Cells are narrower than reports; mix and lights still fit beside each other.
+        "@media (min-width: 600px) { .mixer-view { display: block } .mixer-stage { position: "
+        "relative } .mixer-wipe, .mixer-buttons { margin-top: 10px } .mixer-lights { max-height: "
+        "520px } .mixer-body { grid-template-columns: minmax(0, 1.1fr) minmax(250px, 1fr) } }"
+    )
+    script = FRAME_SCRIPT.replace("HEIGHT", str(FRAME_HEIGHT))
+    return (
+        '<!doctype html><html lang="en"><meta charset="utf-8"><title>Light mixer</title>'
+        f"<style>{styles('viewer/mixer/wipe.css')}</style><body>{mixer}{mixer_assets()}"
+        f"<style>{style}</style><script>{script}</script></body></html>"
+    )

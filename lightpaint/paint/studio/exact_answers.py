@@ -151,7 +151,7 @@ class ChoiceSolver:
             check()
             solutions = solve_choices(snapshot, solution) if can_change_colors(solution) else {}
             choices = tuple(
-                AnswerChoice(colors=colors, is_chosen=x is solution, **choice_figures(snapshot, x))
+                AnswerChoice(colors=colors, is_chosen=x is solution, **_choice_figures(snapshot, x))
                 for colors, x in solutions.items()
             )
             pictures = {
@@ -210,7 +210,7 @@ def solve_choices(snapshot: SessionSnapshot, solution: Solution) -> dict[AnswerC
     return solutions
 
 
-def choice_figures(snapshot: SessionSnapshot, solution: Solution) -> dict[str, Any]:
+def _choice_figures(snapshot: SessionSnapshot, solution: Solution) -> dict[str, Any]:
     """Return the fields of `AnswerChoice` that say what an answer delivers."""
     picture = solution.basis.mix(solution.weights)
     deliveries = measure_deliveries(solution, picture).deliveries
