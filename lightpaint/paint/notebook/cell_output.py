@@ -1,11 +1,19 @@
-"""A painter in a saved notebook, without a kernel: its last picture, and a mixer.
+"""The outputs of a cell that shows a painter: its widget, and below it what a saved notebook shows.
 
-Where a notebook is not trusted, scripts are removed and the picture remains; elsewhere the mixer of
-reports replaces it, in a frame of its own, so that neither its style nor the notebook's reaches the
-other.
+Two outputs, since JupyterLab would build the widget anew each time that an output with it changes.
+A style hides the one or the other: while the widget is there, the saved view; without a kernel, the
+error message in place of the widget.
+
+The saved view is the last picture, and a mixer. Where a notebook is not trusted, scripts are
+removed and the picture remains; elsewhere the mixer of reports replaces it, in a frame of its own,
+so that neither its style nor the notebook's reaches the other.
 """
 
+from collections.abc import Callable, Mapping
 from html import escape
+from threading import Lock, Timer
+from typing import Any
+from uuid import uuid4
 
 import numpy as np
 
@@ -14,6 +22,7 @@ from lightpaint.colour.display.view_transform import ViewTransform
 from lightpaint.colour.srgb import to_8_bit
 from lightpaint.images.pixel_blocks import block_mean, fitting_factor
 from lightpaint.lighting.answer.lighting import Lighting
+from lightpaint.paint.background_threads import lower_priority
 from lightpaint.report.answer_pictures import target_picture
 from lightpaint.report.page.figures import data_uri
 from lightpaint.report.page.mixer import mixer_assets, mixer_html
@@ -39,6 +48,21 @@ const fit = () => {
 }
 if (frame) new ResizeObserver(fit).observe(document.body)
 """
+
+#: Seconds without a change before the saved view follows.
+REST_S = 1.5
+
+#: What a program without widgets shows in place of one: nothing, since the saved view follows.
+NO_WIDGET = "<!-- the painter, whose last picture follows -->"
+
+#: For JupyterLab, where the output of a widget is a panel: with the class of widgets it is an error
+#: message. The page marks a painter that no kernel has answered.
+STYLE = """<style>
+.jp-OutputArea-child:has(> .lm-Panel:not(.jupyter-widgets)):not(:has(.is-unanswered))
+  + .jp-OutputArea-child:has(.lightpaint-saved),
+.jp-OutputArea-child:has(> .jupyter-widgets, .is-unanswered):has(
+  + .jp-OutputArea-child .lightpaint-saved) { display: none }
+</style>"""
 
 
 def static_view(
@@ -88,3 +112,86 @@ def _page(mixer: str, *, mix_width: int) -> str:
         f"<style>{styles('viewer/mixer/wipe.css')}</style><body>{mixer}{mixer_assets()}"
         f"<style>{style}</style><script>{script}</script></body></html>"
     )
+
+
+class CellOutput:
+    """The outputs of all cells that show one painter.
+
+    render: returns the saved view as HTML; None while there is none. call: calls a function in the
+    thread that may publish outputs.
+    """
+
+    def __init__(
+        self, render: Callable[[], str | None], call: Callable[[Callable[[], None]], None]
+    ) -> None:
+        self._render, self._call = render, call
+        self.id = uuid4().hex
+        self._lock = Lock()  # not held during a render, which takes locks of the session
+        self._timer: Timer | None = None
+        self._changes = 0
+        self._text = ""
+        self._saved: str | None = None
+        self._is_over = False
+
+    def show(self, bundle: tuple[Mapping[str, Any], Mapping[str, Any]], text: str) -> None:
+        """Show a painter in the cell that runs.
+
+        bundle: data of the widget by MIME type, and their metadata. text: for a terminal.
+        """
+        from IPython.display import display
+
+        (data, metadata), self._text, self._saved = bundle, text, self._render()
+        widget = {**data, "text/html": NO_WIDGET}
+        display(widget, raw=True, metadata=metadata, display_id=self._widget_id)  # type: ignore[no-untyped-call]
+        display(self._saved_data(), raw=True, display_id=self.id)  # type: ignore[no-untyped-call]
+
+    def follow(self) -> None:
+        """Show a change in the saved view, once none has followed for a while."""
+        with self._lock:
+            if not self._text or self._is_over:
+                return
+            if self._timer is not None:
+                self._timer.cancel()
+            self._changes += 1
+            self._timer = Timer(REST_S, self._refresh, [self._changes])
+            self._timer.daemon = True
+            self._timer.start()
+
+    def end(self) -> None:
+        """Remove the widget from its cells, which keep the view of now."""
+        saved = self._render() if self._text else None
+        with self._lock:
+            self._is_over = True
+            if self._timer is not None:
+                self._timer.cancel()
+            self._saved = saved or self._saved
+        if self._text:
+            _update({"text/plain": self._text, "text/html": NO_WIDGET}, self._widget_id)
+            self._publish()
+
+    @property
+    def _widget_id(self) -> str:
+        return f"{self.id}-widget"
+
+    def _refresh(self, change: int) -> None:
+        """Render the saved view in this thread, and publish it if it is another."""
+        lower_priority()
+        saved = self._render()
+        with self._lock:
+            if self._is_over or change != self._changes or saved in (None, self._saved):
+                return
+            self._saved = saved
+        self._call(self._publish)
+
+    def _publish(self) -> None:
+        _update(self._saved_data(), self.id)
+
+    def _saved_data(self) -> dict[str, str]:
+        page = f'<div class="lightpaint-saved" data-painter="{self.id}">{self._saved or ""}</div>'
+        return {"text/plain": self._text, "text/html": page + STYLE}
+
+
+def _update(data: Mapping[str, str], display_id: str) -> None:
+    from IPython.display import update_display
+
+    update_display(data, raw=True, display_id=display_id)  # type: ignore[no-untyped-call]

@@ -20,7 +20,7 @@ from lightpaint.lighting.answer.lighting import Lighting
 from lightpaint.lighting.constraints.constraints import Constraints
 from lightpaint.lighting.solution import Solution
 from lightpaint.paint.notebook import widget_arguments
-from lightpaint.paint.notebook.cell_output import CellOutput
+from lightpaint.paint.notebook.cell_output import CellOutput, static_view
 from lightpaint.paint.notebook.painter_files import (
     claim_file,
     open_store,
@@ -29,8 +29,6 @@ from lightpaint.paint.notebook.painter_files import (
     widget_script,
     widget_style,
 )
-from lightpaint.paint.notebook.session_traits import SessionTraits
-from lightpaint.paint.notebook.static_view import static_view
 from lightpaint.paint.notebook.widget_views import KernelThread, WidgetViews
 from lightpaint.paint.protocol import AnswerUpdate, Message, Notice, SessionState
 from lightpaint.paint.studio.studio import Studio
@@ -43,7 +41,7 @@ try:
     import traitlets
     from traitlets import ObserveHandler
 
-    from lightpaint.paint.notebook.callbacks import Callback, LiveTrait
+    from lightpaint.paint.notebook.session_traits import Callback, LiveTrait, SessionTraits
 except ImportError as error:
     raise PaintError("lp.Painter needs anywidget: pip install 'lightpaint[notebook]'") from error
 
