@@ -19,7 +19,6 @@ from lightpaint.paint.layers.layer_stack import Layer
 from lightpaint.paint.protocol import (
     Event,
     Request,
-    answer_parts,
     events,
     light_requests,
     message_parts,
@@ -32,8 +31,7 @@ from lightpaint.paint.protocol.typescript import field_types
 
 def sections() -> dict[str, str]:
     """Return the generated parts of the document by the names of their marks."""
-    modules = (message_parts, answer_parts)
-    records = [x for module in modules for x in vars(module).values() if _is_part(x)]
+    records = [record for record in vars(message_parts).values() if _is_part(record)]
     return {
         "requests": "\n".join(_entry(record.kind, record) for record in _in_order(Request.kinds)),
         "events": "\n".join(_entry(record.kind, record) for record in _in_order(Event.kinds)),
@@ -58,7 +56,7 @@ def replace_sections(text: str) -> str:
 
 
 def _is_part(value: Any) -> bool:
-    names = (message_parts.__name__, answer_parts.__name__, Layer.__module__)
+    names = (message_parts.__name__, message_parts.__name__, Layer.__module__)
     return getattr(value, "__module__", "") in names and isinstance(value, type)
 
 

@@ -11,11 +11,12 @@ import numpy as np
 import numpy.typing as npt
 
 from lightpaint.arrays import Doubles, Floats
-from lightpaint.paint.protocol.answer_parts import AnswerChoice, Findings
 from lightpaint.paint.protocol.base import OPTIONAL, Event
 from lightpaint.paint.protocol.message_parts import (
+    AnswerChoice,
     Camera,
     EditState,
+    Findings,
     ImageInfo,
     LightInfo,
     LightPlace,

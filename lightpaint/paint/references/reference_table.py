@@ -1,106 +1,121 @@
-"""The references of a session: kept in its file, beside its steps and looks."""
+"""Reads files of references: pictures of all formats of paintings, WebP and Radiance HDR."""
 
-import json
-import sqlite3
-from collections.abc import Iterator
-from contextlib import suppress
-from dataclasses import dataclass
-from functools import partial
+from pathlib import Path
+from typing import Any
 
 import numpy as np
+import numpy.typing as npt
 
 from lightpaint.arrays import Floats
+from lightpaint.colour.display.exposure import choose_exposure
 from lightpaint.colour.display.view_transform import ViewTransform
-from lightpaint.errors import PaintError
-from lightpaint.paint.references.reference_file import ReferencePixels
-from lightpaint.paint.store.compression import pack, unpack
-from lightpaint.paint.store.database import DAMAGE_ERRORS, REFERENCE_TABLE
-from lightpaint.paint.store.store import Store
-from lightpaint.storage.json_records import strict_json
+from lightpaint.colour.icc import read_icc
+from lightpaint.errors import ImageError
+from lightpaint.files import first_line, one_line
+from lightpaint.images.formats.bitmap import MAX_PIXELS, Bitmap
+from lightpaint.images.formats.bitmap_decoder import light_of_integers
+from lightpaint.images.formats.file_kinds import head_of
+from lightpaint.images.formats.library_output import silenced, without_pillow_warnings
+from lightpaint.images.picture import read_picture
+from lightpaint.images.resampling import resampled
 
-#: Most references that a session keeps, and characters of a name.
-MAX_REFERENCES, MAX_NAME_LENGTH = 12, 60
+#: Pixels of the longer side of a reference that is kept; larger ones are reduced.
+MAX_SIDE = 1280
+
+#: Largest light of a reference that is kept, where display white is 1.
+MAX_LIGHT = 1000.0
+
+#: Display values (h, w, 3) uint8; of files of light, light float16, whose display white is 1.
+ReferencePixels = npt.NDArray[Any]
 
 
-@dataclass(frozen=True, eq=False)
-class Reference:
-    """A picture that shows which light is wanted. pixels: as `read_reference` returns them."""
+def read_reference(path: Path, transform: ViewTransform) -> ReferencePixels:
+    """Return the picture in a file, at most MAX_SIDE pixels long.
 
-    id: int
-    name: str
-    pixels: ReferencePixels
-
-
-class ReferenceTable:
-    """The references of a session, the oldest first. Updated in place.
-
-    store: of the session; a file without readable references has none. transform: by which the
-    session shows light.
+    transform: by which the session shows light. Raises ImageError, in one line that names the file.
     """
-
-    def __init__(self, store: Store, transform: ViewTransform) -> None:
-        self._store, self._transform = store, transform
-        self._references: dict[int, Reference] = {}
-        for number, *row in store.rows("SELECT id, name, dtype, shape, data FROM reference"):
-            with suppress(PaintError, *DAMAGE_ERRORS):
-                self._references[number] = _read(number, *row)
-        self._last_id = max(self._references, default=0)
-
-    def __iter__(self) -> Iterator[Reference]:
-        return iter(self._references.values())
-
-    def __getitem__(self, number: int) -> Reference:
-        """Return a reference by its id. Raises PaintError if there is none."""
-        if number not in self._references:
-            raise PaintError(f"there is no reference {number}")
-        return self._references[number]
-
-    def light(self, reference: Reference) -> Floats:
-        """Return the light (h, w, 3) of a reference, at the exposure of the session."""
-        pixels, transform = reference.pixels, self._transform
-        if pixels.dtype == np.uint8:
-            return np.asarray(transform.decode(pixels / np.float32(255)), np.float32)
-        return np.asarray(pixels.astype(np.float32) / 2.0**transform.stops, np.float32)
-
-    def picture(self, reference: Reference) -> ReferencePixels:
-        """Return a reference as the session shows it, (h, w, 3) uint8."""
-        if reference.pixels.dtype == np.uint8:
-            return reference.pixels
-        return np.round(255 * self._transform.encode(self.light(reference))).astype(np.uint8)
-
-    def check_room(self) -> None:
-        """Raise PaintError if there is no room for another reference."""
-        if len(self._references) >= MAX_REFERENCES:
-            raise PaintError(f"{MAX_REFERENCES} references are kept: remove one of them first")
-
-    def add(self, name: str, pixels: ReferencePixels) -> Reference:
-        """Keep a reference. Raises PaintError if there are too many."""
-        self.check_room()
-        self._last_id += 1
-        reference = Reference(self._last_id, name[:MAX_NAME_LENGTH], pixels)
-        self._references[reference.id] = reference
-        shape = json.dumps(pixels.shape)
-        row = (reference.id, reference.name, pixels.dtype.name, shape, pack(pixels))
-        self._store.enqueue(partial(_insert, row=row))
-        return reference
-
-    def drop(self, number: int) -> None:
-        """Forget a reference. Raises PaintError if there is none of that id."""
-        del self._references[self[number].id]
-        self._store.enqueue(partial(_delete, number=number))
+    head = head_of(path, 16)
+    is_light = False
+    try:
+        if head.startswith(b"RIFF") and head[8:12] == b"WEBP":
+            light = light_of_integers(_webp(path), None, transform)
+        elif head.startswith(b"#?"):
+            light, is_light = _radiance(path), True
+        else:
+            light, is_light = _light_of_painting(path, transform)
+    except ImageError as error:
+        text = str(error)
+        raise error if str(path) in text else ImageError(f"{path} {one_line(text)}") from None
+    light = np.clip(_reduced(np.nan_to_num(light, posinf=0, neginf=0)), 0, None)
+    if not light.any():
+        raise ImageError(f"{path} is black: choose a picture with light in it")
+    if not is_light:
+        return np.asarray(np.round(255 * transform.encode(light)), np.uint8)
+    exposed = light * 2.0 ** choose_exposure(light)
+    return np.asarray(np.minimum(exposed, MAX_LIGHT), np.float16)
 
 
-def _read(number: int, name: str, dtype: str, shape: str, data: bytes) -> Reference:
-    height, width, channels = map(int, strict_json(shape))
-    if dtype not in ("uint8", "float16") or channels != 3:
-        raise ValueError("no picture")
-    return Reference(int(number), str(name), unpack(data, dtype, (height, width, channels)))
+def _reduced(light: Floats) -> Floats:
+    height, width = light.shape[:2]
+    factor = MAX_SIDE / max(height, width)
+    if factor >= 1:
+        return light
+    return resampled(light, (max(1, round(height * factor)), max(1, round(width * factor))))
 
 
-def _insert(database: sqlite3.Connection, *, row: tuple[int, str, str, str, bytes]) -> None:
-    database.execute(REFERENCE_TABLE)
-    database.execute("INSERT OR REPLACE INTO reference VALUES (?, ?, ?, ?, ?)", row)
+def _light_of_painting(path: Path, transform: ViewTransform) -> tuple[Floats, bool]:
+    """Return the light (h, w, 3) in a file of a kind that paintings have, and whether it holds
+    light.
+    """
+    picture = read_picture(path, transform=transform)
+    light = picture.image
+    if picture.alpha is not None:
+        light = light * np.clip(picture.alpha, 0, 1)[..., None]
+    return light, picture.codes is None
 
 
-def _delete(database: sqlite3.Connection, *, number: int) -> None:
-    database.execute("DELETE FROM reference WHERE id = ?", (number,))
+def _webp(path: Path) -> Bitmap:
+    """Return the picture in a WebP file over black. Raises ImageError, without naming the file."""
+    from PIL import Image, ImageOps
+
+    try:
+        with without_pillow_warnings(), Image.open(path, formats=["WEBP"]) as file:
+            _check_size(file.size)
+            profile = file.info.get("icc_profile")
+            upright = ImageOps.exif_transpose(file).convert("RGBA")
+        values = np.asarray(upright)
+    except (OSError, EOFError, LookupError, SyntaxError, ValueError, Image.DecompressionBombError):
+        raise ImageError("is damaged or cut off: export it again") from None
+    alpha = values[..., 3:].astype(np.float32) / 255
+    display = np.round(values[..., :3] * alpha).astype(np.uint8)
+    icc = None if profile is None else read_icc(profile)
+    return Bitmap("webp", display, None, False, 255, icc, lossy=True)
+
+
+def _radiance(path: Path) -> Floats:
+    """Return the light in a Radiance HDR file, (h, w, 3). Raises ImageError, without naming it."""
+    import OpenImageIO
+
+    with silenced():
+        OpenImageIO.geterror()
+        file = OpenImageIO.ImageInput.open(str(path))
+        if file is None:
+            reason = one_line(first_line(OpenImageIO.geterror(), path=path))
+            raise ImageError(f"is damaged: {reason}")
+        try:
+            spec = file.spec()
+            _check_size((spec.width, spec.height))
+            pixels = file.read_image(0, 0, 0, 3, "float") if spec.nchannels == 3 else None
+            if pixels is None or file.geterror():
+                raise ImageError("is damaged or cut off: export it again")
+        finally:
+            file.close()
+    return np.asarray(pixels, np.float32).reshape(spec.height, spec.width, 3)
+
+
+def _check_size(size: tuple[int, int]) -> None:
+    width, height = size
+    if min(size) < 1 or width * height > MAX_PIXELS:
+        raise ImageError(
+            f"declares {width}x{height} pixels: expected at most {MAX_PIXELS / 1e6:.0f} million"
+        )
