@@ -27,7 +27,7 @@ from lightpaint.paint.protocol import (
     TaskStarted,
 )
 from lightpaint.paint.publisher import Publisher
-from lightpaint.paint.references.reference_file import read_reference
+from lightpaint.paint.references.reference_table import read_reference
 from lightpaint.paint.session.session import Session
 from lightpaint.paint.session_access import SessionAccess
 
