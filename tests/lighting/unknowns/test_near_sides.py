@@ -13,9 +13,8 @@ from lightpaint.lighting.normal_equations import NormalEquations
 from lightpaint.lighting.unknowns import gamut_bounds
 from lightpaint.lighting.unknowns.gamut_bounds import solve_near_sides
 from lightpaint.lighting.unknowns.gamuts import Gamuts, PaintedLight
-from lightpaint.lighting.unknowns.reduced_problem import solve_reduced
+from lightpaint.lighting.unknowns.reduced_problem import nearest_unknowns, solve_reduced
 from lightpaint.lighting.unknowns.reduction import Reduction
-from lightpaint.lighting.unknowns.starting_unknowns import nearest_unknowns
 from lightpaint.lighting.unknowns.white_mixes import next_whites
 
 SIZE = (9, 8)
