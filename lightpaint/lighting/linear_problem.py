@@ -19,9 +19,8 @@ from lightpaint.lighting.loss.expected_lights import ExpectedLights
 from lightpaint.lighting.loss.image_prior import image_prior
 from lightpaint.lighting.loss.weight_penalty import pull_near_start, weight_pull
 from lightpaint.lighting.normal_equations import NormalEquations
-from lightpaint.lighting.unknowns.constraint_reduction import reduce_to
 from lightpaint.lighting.unknowns.gamuts import Gamuts
-from lightpaint.lighting.unknowns.reduction import Reduction
+from lightpaint.lighting.unknowns.reduction import Reduction, reduce_to
 
 
 class LinearProblem:

@@ -14,7 +14,7 @@ from lightpaint.files import scene_name
 from lightpaint.lighting.constraints.constraints import Constraints
 from lightpaint.lighting.constraints.constraints_file import constraints_of
 from lightpaint.lighting.joined_views import check_same_lights
-from lightpaint.lighting.unknowns.constraint_reduction import reduce_to
+from lightpaint.lighting.unknowns.reduction import reduce_to
 from lightpaint.paint.layers.layer_files import check_kind
 from lightpaint.paint.session_file import check_view_names, session_identity
 from lightpaint.paint.store.session_requests import SessionRequests
