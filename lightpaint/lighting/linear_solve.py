@@ -71,7 +71,7 @@ class _Trials:
             chosen = best
 
 
-def choose_knobs(
+def _choose_knobs(
     problems: Sequence[ReducedProblem], reduction: Reduction, count: int
 ) -> list[frozenset[int]]:
     """Return the knobs to use, one more each time, up to a few more than `count`.
@@ -128,7 +128,7 @@ def solve_linear(problem: _Problem, start: Doubles) -> LinearAnswer[_Problem]:
     if count is None or not problem.full.knobs:
         return solve_reduction(problem, start)
     equations, curve = problem.with_pull(problem.solved), []
-    path = choose_knobs(reduced_problems(equations, problem.full), problem.full, count)
+    path = _choose_knobs(reduced_problems(equations, problem.full), problem.full, count)
     for chosen in path:
         _, optimum = solve_on_locus(equations, only_knobs(problem.full, chosen), start)
         curve.append((len(chosen), optimum.weights))

@@ -40,7 +40,6 @@ from lightpaint.lighting.loss.weight_penalty import (
     weight_pull,
 )
 from lightpaint.lighting.normal_equations import NormalEquations
-from lightpaint.lighting.unknowns.gamut_bounds import solve_near_sides
 from lightpaint.lighting.unknowns.gamuts import Gamuts, PaintedLight
 from lightpaint.lighting.unknowns.reduced_problem import solve_reduced
 from lightpaint.lighting.unknowns.reduction import Reduction
@@ -49,6 +48,7 @@ from lightpaint.lighting.unknowns.white_mixes import (
     clip_to_gamuts,
     next_whites,
     snap_to_whites,
+    solve_near_sides,
 )
 from lightpaint.threads import one_thread
 

@@ -20,7 +20,7 @@ from lightpaint.lighting.constraints.values import Level, Lock
 ROUND_OFF = 1e-12
 
 
-def dimmer_limits(
+def _dimmer_limits(
     constraint: LightConstraint, direction: Doubles, light: BasisLight
 ) -> tuple[float, float]:
     """Return bounds on x for an emission of x times `direction`."""
@@ -42,7 +42,7 @@ def dimmer_limits(
     return lower, upper
 
 
-def mix_limits(
+def _mix_limits(
     constraint: LightConstraint, light: BasisLight, count: int
 ) -> tuple[Doubles, Doubles, float, float]:
     """Return bounds on the unknowns, and on the luminance of their sum."""
@@ -63,7 +63,7 @@ def mix_limits(
             lower = np.array(level.amount)
         else:
             upper = np.array(level.amount)
-    check_room(constraint, light, lower, upper)
+    _check_room(constraint, light, lower, upper)
     return lower, upper, least, most
 
 
@@ -80,7 +80,7 @@ def _luminance(level: Level, light: BasisLight, constraint: LightConstraint) -> 
     return level.amount * now
 
 
-def check_grey(constraint: LightConstraint, light: BasisLight) -> None:
+def _check_grey(constraint: LightConstraint, light: BasisLight) -> None:
     """Refuse limits per channel for a light that has one weight for all of them."""
     for level in (constraint.least, constraint.most):
         if light.is_scalar and level is not None and isinstance(level.amount, tuple):
@@ -91,7 +91,7 @@ def check_grey(constraint: LightConstraint, light: BasisLight) -> None:
             )
 
 
-def check_room(constraint: LightConstraint, light: BasisLight, lower: Any, upper: Any) -> None:
+def _check_room(constraint: LightConstraint, light: BasisLight, lower: Any, upper: Any) -> None:
     """Refuse limits that leave nothing between them."""
     if (np.asarray(lower) > np.asarray(upper) * (1 + ROUND_OFF)).any() or np.isinf(lower).any():
         raise ConstraintError(
@@ -120,7 +120,7 @@ class Knob:
     whites: the range of white of a light that keeps to one. window: the two of these
     that its two unknowns currently mix (white_mixes.py).
     gamut: the gamut that confines the light, if it would leave it otherwise: all of it, or the part
-    towards one `side` (gamut_bounds.py).
+    towards one `side` (white_mixes.py).
     """
 
     lights: tuple[int, ...]
@@ -183,15 +183,15 @@ class Knob:
 def mixing_knob(k: int, light: BasisLight, constraint: LightConstraint) -> Knob:
     """Make the knob of a light of several primaries with independent dimmers."""
     colours = np.eye(3) if constraint.primaries is None else np.array(constraint.primaries)
-    lower, upper, least, most = mix_limits(constraint, light, len(colours))
+    lower, upper, least, most = _mix_limits(constraint, light, len(colours))
     unknowns = [
         Unknown(((k, rgb),), float(low), float(high))
         for rgb, low, high in zip(colours, lower, upper, strict=True)
     ]
     coefficients = np.asarray(luminance(colours), np.float64)
     darkest, brightest = float(coefficients @ lower), float(coefficients @ upper)
-    check_room(constraint, light, max(least, darkest), most)
-    check_room(constraint, light, least, min(most, brightest))
+    _check_room(constraint, light, max(least, darkest), most)
+    _check_room(constraint, light, least, min(most, brightest))
     window = (0, constraint.whites.last) if constraint.whites is not None else (0, 0)
     if least == 0 and np.isinf(most):
         return Knob((k,), tuple(unknowns), None, constraint.whites, window)
@@ -211,9 +211,9 @@ def dimmer_knob(k: int, light: BasisLight, constraint: LightConstraint) -> Knob:
             "use lock, limits, tie or off"
         )
     direction = np.ones(3) if constraint.primaries is None else np.array(constraint.primaries[0])
-    check_grey(constraint, light)
-    lower, upper = dimmer_limits(constraint, direction, light)
-    check_room(constraint, light, lower, upper)
+    _check_grey(constraint, light)
+    lower, upper = _dimmer_limits(constraint, direction, light)
+    _check_room(constraint, light, lower, upper)
     # Round-off may have separated equal ends.
     return Knob((k,), (Unknown(((k, direction),), min(lower, upper), upper),))
 
@@ -266,8 +266,8 @@ def _tied_direction(
             "dimmed as a whole"
         )
     direction = current if color is None else np.array(color) * float(luminance(current))
-    check_grey(constraint, light)
-    least, most = dimmer_limits(constraint, direction, light)
+    _check_grey(constraint, light)
+    least, most = _dimmer_limits(constraint, direction, light)
     if constraint.is_fixed:
         emission = (
             np.zeros(3)
