@@ -9,9 +9,8 @@ import numpy as np
 from lightpaint.arrays import Bools, Doubles, as_rgb
 from lightpaint.errors import ConstraintError
 from lightpaint.lighting.algebra.optimum import minimise
-from lightpaint.lighting.answer.certificate import Certificate
+from lightpaint.lighting.answer.certificate import Certificate, Software
 from lightpaint.lighting.answer.lighting import Lighting
-from lightpaint.lighting.answer.software_versions import Software
 from lightpaint.lighting.linear_problem import LinearProblem
 from lightpaint.lighting.normal_equations import NormalEquations
 from lightpaint.lighting.unknowns.knobs import Knob

@@ -14,7 +14,7 @@ from lightpaint.lighting.analysis.appearance.appearance import Appearance
 from lightpaint.lighting.analysis.appearance.limiting_reasons import Reason
 from lightpaint.lighting.analysis.diagnosis import Place, diagnose
 from lightpaint.lighting.analysis.noise.uncertainty import error_bars
-from lightpaint.lighting.answer.active_bound import Bound
+from lightpaint.lighting.answer.certificate import Bound
 from lightpaint.lighting.solve import solve
 from lightpaint.report.diagnosis_sentences import error_sentences, spoken_bound, spoken_hold
 from lightpaint.report.measures import halving_spp

@@ -11,7 +11,7 @@ import numpy as np
 from lightpaint.arrays import Doubles
 from lightpaint.basis.basis import Basis
 from lightpaint.colour.color import LUMINANCE
-from lightpaint.lighting.answer.active_bound import Kind, Per
+from lightpaint.lighting.answer.certificate import Kind, Per
 from lightpaint.lighting.unknowns.knobs import Knob, Unknown
 from lightpaint.lighting.unknowns.reduced_problem import ReducedOptimum
 from lightpaint.lighting.unknowns.reduction import Reduction

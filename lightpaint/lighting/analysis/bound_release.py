@@ -14,7 +14,7 @@ from lightpaint.lighting.analysis.active_bounds import (
     BoundedAnswer,
     find_active_bounds,
 )
-from lightpaint.lighting.answer.active_bound import Bound, Tint
+from lightpaint.lighting.answer.certificate import Bound, Tint
 from lightpaint.lighting.normal_equations import NormalEquations
 from lightpaint.lighting.solution import Solution
 from lightpaint.lighting.unknowns.knobs import Knob

@@ -25,7 +25,7 @@ from lightpaint.lighting.analysis.bound_release import bounds_of
 from lightpaint.lighting.analysis.error_energies import ErrorEnergies, grain_power
 from lightpaint.lighting.analysis.noise.noise import pseudo_inverse
 from lightpaint.lighting.analysis.noise.weight_directions import all_columns
-from lightpaint.lighting.answer.active_bound import Bound
+from lightpaint.lighting.answer.certificate import Bound
 from lightpaint.lighting.solution import Solution
 from lightpaint.lighting.solve import solve_again
 

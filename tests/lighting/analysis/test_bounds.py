@@ -16,7 +16,7 @@ from lightpaint.colour.white_range import white_range
 from lightpaint.errors import LightingError
 from lightpaint.lighting.analysis import active_bounds, bound_release
 from lightpaint.lighting.analysis.diagnosis import diagnose
-from lightpaint.lighting.answer.active_bound import Bound
+from lightpaint.lighting.answer.certificate import Bound
 from lightpaint.lighting.answer.lighting_file import read_lighting, write_lighting
 from lightpaint.lighting.constraints.constraints import Constraints
 from lightpaint.lighting.solve import solve
