@@ -25,7 +25,7 @@ from lightpaint.lighting.analysis.noise.noise import (
 from lightpaint.lighting.analysis.noise.outliers import noise_doubts, weakest_matrix
 from lightpaint.lighting.analysis.noise.weight_directions import solve_for
 from lightpaint.lighting.analysis.noise.weight_spread import weight_spread
-from lightpaint.lighting.answer.light_setting import LightSetting
+from lightpaint.lighting.answer.lighting import LightSetting
 from lightpaint.lighting.normal_equations import NormalEquations
 from lightpaint.lighting.solution import Solution
 
