@@ -18,11 +18,15 @@ from lightpaint.basis.lights import Lights
 from lightpaint.colour.display.view_transform import ViewTransform
 from lightpaint.display_text import short_repr
 from lightpaint.errors import TargetError
+from lightpaint.lighting.constraints.color_restrictions import (
+    WhiteLimits,
+    keep_own_colors,
+    own_color_labels,
+    whiten_open_lights,
+)
 from lightpaint.lighting.constraints.constraints import Constraints
 from lightpaint.lighting.constraints.constraints_file import constraints_of
-from lightpaint.lighting.constraints.own_colors import keep_own_colors, own_color_labels
 from lightpaint.lighting.constraints.start_lighting import start_weights
-from lightpaint.lighting.constraints.white_lights import WhiteLimits, whiten_open_lights
 from lightpaint.lighting.fit import Fit, resolve_fit, resolve_for_targets
 from lightpaint.lighting.loss.expected_lights import ExpectedLights
 from lightpaint.lighting.loss.image_prior import image_prior

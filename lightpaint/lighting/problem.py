@@ -16,10 +16,10 @@ from lightpaint.colour.display.view_transform import ViewTransform
 from lightpaint.display_text import short_repr
 from lightpaint.errors import BasisError, ConstraintError, TargetError
 from lightpaint.keywords import keywords
+from lightpaint.lighting.constraints.color_restrictions import WhiteLimits, painted_whites
 from lightpaint.lighting.constraints.constraints import Constraints
 from lightpaint.lighting.constraints.constraints_file import constraints_of
 from lightpaint.lighting.constraints.start_lighting import held_at_start, start_weights
-from lightpaint.lighting.constraints.white_lights import WhiteLimits, painted_whites
 from lightpaint.lighting.fit import Fit, Space, resolve_for_targets
 from lightpaint.lighting.joined_views import Views, joint_basis
 from lightpaint.lighting.linear_problem import LinearProblem, reduce_lights
