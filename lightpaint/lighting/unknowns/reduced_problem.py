@@ -30,7 +30,7 @@ BOUND_ROUND_OFF = 1e-12
 DARK_PULL = 1e-8
 
 
-def _nearest_unknowns(reduction: Reduction, start: Doubles, reached: Bools) -> Doubles:
+def nearest_unknowns(reduction: Reduction, start: Doubles, reached: Bools) -> Doubles:
     """Return the x (k,) whose emissions are nearest to `start`, (n, 3), within the limits of each
     knob.
 
@@ -202,7 +202,7 @@ def solve_reduced(
     """
     lit = equations.reached
     reached: Bools = np.ones(lit.shape, dtype=bool) if lit.all() else reduction.determined(lit)
-    x = _nearest_unknowns(reduction, start, np.any(reached, axis=1)) if x is None else x.copy()
+    x = nearest_unknowns(reduction, start, np.any(reached, axis=1)) if x is None else x.copy()
     options: dict[str, Any] = {"method": method, "tolerance": tolerance, "max_sweeps": max_sweeps}
     sides = _move_fixed_to_right(equations, reduction, lit, start)
     optima = _solve_blocks(sides, equations.coupling, reduction, x, options)

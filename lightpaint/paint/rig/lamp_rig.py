@@ -69,7 +69,7 @@ class RigView:
         return np.asarray(self.features.position[self.features.normal.any(axis=-1)])
 
 
-def _open_view(subject: Subject, basis: Basis) -> RigView:
+def open_view(subject: Subject, basis: Basis) -> RigView:
     """Load the scene of a view."""
     scene = subject.loaded_scene
     loaded, features = scene.load(), basis.features
@@ -178,7 +178,7 @@ class LampRig:
                 for subject in self.subjects:
                     subject.loaded_scene  # noqa: B018 (it is cached)
                 with in_this_thread():
-                    self.views = tuple(map(_open_view, self.subjects, bases))
+                    self.views = tuple(map(open_view, self.subjects, bases))
 
     def trace_paths(self) -> None:
         """Trace the paths of quick planes of the open rig, before the first light is dragged."""

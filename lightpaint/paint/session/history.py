@@ -59,7 +59,7 @@ Travel = (
 Changes = Sequence[tuple[int, Region]]
 
 
-def _find_milestones(steps: Sequence[Step]) -> frozenset[int]:
+def find_milestones(steps: Sequence[Step]) -> frozenset[int]:
     """Return the indices of the steps that are milestones.
 
     These are the last step before a pause, the last before everything was replaced (a look loaded,
@@ -230,7 +230,7 @@ class History:
         """Return the last `count` steps, including undone ones."""
         steps, ids = self._store.steps, self._store.step_ids
         first = max(0, len(steps) - count)
-        milestones = _find_milestones(steps)
+        milestones = find_milestones(steps)
         listed = tuple(
             StepInfo(ids[k], self._label(steps[k]), steps[k].stamp, k in milestones)
             for k in range(first, len(steps))
