@@ -21,7 +21,7 @@ import numpy.typing as npt
 from lightpaint.arrays import Doubles, Floats, as_rgb
 from lightpaint.display_text import short_repr
 from lightpaint.keywords import keywords
-from lightpaint.lighting.analysis.bound_release import bounds_of
+from lightpaint.lighting.analysis.active_bounds import bounds_of
 from lightpaint.lighting.analysis.error_energies import ErrorEnergies, grain_power
 from lightpaint.lighting.analysis.noise.noise import pseudo_inverse
 from lightpaint.lighting.analysis.noise.weight_directions import all_columns
