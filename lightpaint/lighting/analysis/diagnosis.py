@@ -25,8 +25,7 @@ from lightpaint.images.bands import bands_of
 from lightpaint.keywords import keywords
 from lightpaint.lighting.analysis.active_bounds import bounds_of
 from lightpaint.lighting.analysis.noise.noise import pseudo_inverse
-from lightpaint.lighting.analysis.noise.painting_grain import channel_grain
-from lightpaint.lighting.analysis.noise.residuals import Residuals
+from lightpaint.lighting.analysis.noise.residuals import Residuals, channel_grain
 from lightpaint.lighting.analysis.noise.weight_directions import all_columns
 from lightpaint.lighting.answer.certificate import Bound
 from lightpaint.lighting.solution import Solution

@@ -13,10 +13,9 @@ import numpy as np
 from lightpaint.arrays import Bools, Doubles, Floats, Indices
 from lightpaint.basis.planes import BLOCK_PIXELS, FEW_LIGHTS, Planes, as_slice
 from lightpaint.lighting.analysis.noise.dominant_pixels import Peaks, t_ratios
-from lightpaint.lighting.analysis.noise.painting_grain import channel_grain
 from lightpaint.lighting.analysis.noise.pixel_gradients import PixelGradients
 from lightpaint.lighting.analysis.noise.pixel_pairs import UNCORRECTED, factor, own_share
-from lightpaint.lighting.analysis.noise.residuals import Residuals
+from lightpaint.lighting.analysis.noise.residuals import Residuals, channel_grain
 from lightpaint.lighting.normal_equations import NormalEquations
 from lightpaint.lighting.solution import Solution
 from lightpaint.threads import one_thread, parallel_map
