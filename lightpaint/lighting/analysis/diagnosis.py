@@ -6,7 +6,7 @@ With the closest weights u of any sign, Ψ − ΣuΦ is orthogonal to every ligh
 
 exactly: no mix of the lights can reach the first part, and w >= 0 forbids the second. The first
 part is split further into the noise of the prediction, the noise of the painting if it is a render
-or a photograph (`painting_grain.py`), and the rest. If the lighting answers several views, part of
+or a photograph (`residuals.py`), and the rest. If the lighting answers several views, part of
 the second is the compromise with the others. After reweighting, all parts are of the last linear
 problem: without clipping by a display, and on a scale of its own.
 """

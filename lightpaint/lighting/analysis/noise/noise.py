@@ -14,11 +14,18 @@ from lightpaint.arrays import Bools, Doubles, Floats, Indices
 from lightpaint.basis.planes import BLOCK_PIXELS, FEW_LIGHTS, Planes, as_slice
 from lightpaint.lighting.analysis.noise.dominant_pixels import Peaks, t_ratios
 from lightpaint.lighting.analysis.noise.pixel_gradients import PixelGradients
-from lightpaint.lighting.analysis.noise.pixel_pairs import UNCORRECTED, factor, own_share
 from lightpaint.lighting.analysis.noise.residuals import Residuals, channel_grain
 from lightpaint.lighting.normal_equations import NormalEquations
+from lightpaint.lighting.problem import Problem
 from lightpaint.lighting.solution import Solution
 from lightpaint.threads import one_thread, parallel_map
+
+#: Half differences by which the pixel beside may differ. Beyond, it shows something else: an edge,
+#: or a highlight that both halves have met.
+MAX_HALVES_APART = 1.5
+
+#: Share of a pixel's own value in a factor where all of the noise power is in the equations.
+UNCORRECTED = 0.5
 
 #: The largest share of M, in any direction of the weights, that may be removed as noise. Beyond,
 #: the estimate is itself noise, and the rest of M would soon be indefinite.
@@ -35,6 +42,41 @@ SMALL_MATRIX = 256
 
 #: Eigenvalues of M, scaled to a unit diagonal, below which a direction changes no pixel.
 NULL_EIGENVALUE = 1e-12
+
+
+def own_share(problem: Problem, removed: float | None) -> float:
+    """Return the share of a pixel's own value in the factors of a problem, 0 to UNCORRECTED.
+
+    It is in proportion to the noise power that the equations contain. removed: the share of it that
+    they do not, by default that of the solved ones. A render of the mix has noise of its own,
+    independent of the basis.
+    """
+    refinement = problem.refinement
+    of_basis = 1.0 if refinement is None else 1 - refinement.share
+    return UNCORRECTED * of_basis * (1 - (problem.noise_removed if removed is None else removed))
+
+
+def factor(values: Doubles, halves: Doubles, own_share: float) -> Doubles:
+    """Return values, of which a share is a pixel's own, and the rest that of the pixel beside.
+
+    values, halves: (…, pixels), of pixels in the order of the picture, and their half differences.
+    """
+    if own_share == 1:
+        return values
+    beside = values[..., pixels_beside(values.shape[-1])]
+    is_alike = np.abs(beside - values) <= MAX_HALVES_APART * np.abs(halves)
+    return np.where(is_alike, own_share * values + (1 - own_share) * beside, values)
+
+
+def pixels_beside(count: int) -> Indices:
+    """Return the index of the other pixel of each one's pair, (count,).
+
+    The last of an odd number takes the pixel before it, and a single one itself.
+    """
+    beside = np.arange(count) ^ 1
+    if count % 2:
+        beside[-1] = max(count - 2, 0)
+    return beside
 
 
 @dataclass(frozen=True)
@@ -135,7 +177,7 @@ def painting_covariance(solution: Solution) -> Doubles | None:
     has next to none.
 
     A render that serves as a painting has noise τ, which makes δg = Σ D Φ τ. Its variance is that
-    of the residual from pixel to pixel, less that of the prediction (painting_grain.py).
+    of the residual from pixel to pixel, less that of the prediction (residuals.py).
     """
     pixels, is_coupled = NoisyPixels.of(solution), _is_coupled(solution)
     size, n = solution.basis.size, len(solution.weights)
