@@ -9,7 +9,7 @@ from lightpaint.lighting.analysis.noise import noise
 from lightpaint.lighting.analysis.noise.noise import UNCORRECTED, factor, pixels_beside
 from lightpaint.lighting.analysis.noise.noise_correction import correct_noise
 from lightpaint.lighting.analysis.noise.uncertainty import error_bars
-from lightpaint.lighting.analysis.noise.weight_spread import WeightSpread
+from lightpaint.lighting.analysis.noise.weight_directions import WeightSpread
 from lightpaint.lighting.solve import solve
 from lightpaint.target.target import Target
 

@@ -25,8 +25,7 @@ from lightpaint.lighting.analysis.noise.noise import (
     painting_covariance,
     pseudo_inverse,
 )
-from lightpaint.lighting.analysis.noise.weight_directions import solve_for
-from lightpaint.lighting.analysis.noise.weight_spread import weight_spread
+from lightpaint.lighting.analysis.noise.weight_directions import solve_for, weight_spread
 from lightpaint.lighting.answer.lighting import LightSetting
 from lightpaint.lighting.normal_equations import NormalEquations
 from lightpaint.lighting.solution import Solution
