@@ -61,6 +61,10 @@ def remove_traces(
 ) -> Doubles:
     """Return weights (n, 3) with 0 for those that are visible in no pixel.
 
+    For a painting that is a mix of the layers without a light, the solve finds 10⁻⁹ of that light
+    instead of 0, because numbers in a file are rounded. A reader of −28 stops would take that for
+    an answer.
+
     is_constrained: (n,), lights with constraints, whose weights are kept.
 
     A weight is a trace if it is small, and its light in each pixel is below the round-off of the

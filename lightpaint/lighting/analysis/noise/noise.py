@@ -3,6 +3,13 @@
 The two halves of the samples give two gradients of the objective at the solved weights. Half
 their difference, pixel by pixel, has the covariance of the gradient's noise, once no noise is
 multiplied by itself (docs/method.md, "How sure").
+
+The noise of the gradient is a sum of products: a pixel's half difference times its residual or its
+light. These have the same noise, so a stray bright path that one half alone has met would be in
+both factors. The variance of the product then counts it four times, where the gradient has it once,
+or not at all if the noise correction takes it out of M. So a factor is taken, in part or as a
+whole, from the pixel beside, which shows nearly the same by other samples (docs/method.md, "How
+sure").
 """
 
 from contextlib import nullcontext

@@ -1,4 +1,14 @@
-"""Solves without a share of the basis's noise power in the normal equations."""
+"""Solves without a share of the basis's noise power, of many lights on smooth indirect light.
+
+The more lights share the samples, the noisier each plane is, and the more of M is noise, whose bias
+and variance then decide the answer. An average over 5 x 5 pixels (`SurfaceFilter`) removes most of
+both and changes the sums little. It is linear and the same for both halves, so the noise left in M
+is the sum of averaged half differences.
+
+The weight of the average in a pixel follows from the noise of all lights together and from the
+change beyond it: t = V / (V + B), as for pictures. So with more samples the sums converge to those
+of the basis, and reflections or caustics are kept once they are clean.
+"""
 
 from collections.abc import Sequence
 from dataclasses import replace

@@ -1,4 +1,14 @@
-"""The residual of an answer and the noise of its prediction, for any pixels."""
+"""The residual of an answer, the noise of its prediction, and the grain of its painting.
+
+A render that serves as a painting has noise, which no lights make and no brush paints. A second
+difference along both axes,
+
+    a = N r,  N = [1 −2 1]ᵀ [1 −2 1],
+
+ignores smooth parts, and straight edges along an axis. Noise that is independent between pixels
+gives it the variance 36 σ² and no correlation at a distance: E[a(x) a(x + d)] = 0. An edge or a
+stroke continues there, so these products are subtracted.
+"""
 
 from collections.abc import Iterator
 from dataclasses import dataclass

@@ -1,4 +1,4 @@
-"""The freedom around an answer: directions of the weights, and answers to other equations.
+"""The freedom around an answer: directions and spread of the weights, answers to other equations.
 
 Weights (n, 3) lie flat in a direction, (3 n), channel by channel.
 """
