@@ -61,7 +61,7 @@ def test_what_newtons_steps_do_not_reach_is_certified(
     M, b, upper, caps = problem(seed)
     best = minimise(M, b, upper=upper, caps=caps)
     assert best.steps > 3
-    monkeypatch.setattr(clipped_newton, "MAX_STEPS", 3)
+    monkeypatch.setattr(clipped_newton, "MAX_CAPPED_STEPS", 3)
     near = minimise(M, b, upper=upper, caps=caps)
     assert near.converged
     assert near.sweeps == 0
