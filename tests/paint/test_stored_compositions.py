@@ -19,11 +19,10 @@ from lightpaint.paint.layers.composed_layers import accent
 from lightpaint.paint.layers.composition import compose_layer
 from lightpaint.paint.layers.layer_stack import Layer
 from lightpaint.paint.session.session import Session
-from lightpaint.paint.store import store
 from lightpaint.paint.store.canvas_pixels import Pixels
 from lightpaint.paint.store.compression import ZEROS_LENGTH, pack, pack_patches, unpack_patches
 from lightpaint.paint.store.history_steps import Patch
-from lightpaint.paint.store.store import Store, StoredComposition
+from lightpaint.paint.store.store import COMPOSITION_VERSION, Store, StoredComposition, _digest
 
 
 def keep(session: Session) -> None:
@@ -124,7 +123,7 @@ def test_stale_and_damaged_compositions_are_not_used(tmp_path: Path) -> None:
         assert store.compositions(looks) is not None
         assert store.compositions([2 * looks[0]]) is None
         assert store.compositions([*looks, *looks]) is None
-        with patch.object(store, "COMPOSITION_VERSION", 0):
+        with patch("lightpaint.paint.store.store.COMPOSITION_VERSION", 0):
             assert store.compositions(looks) is None
     for change in (
         "UPDATE composition SET step = step + 1",
@@ -206,9 +205,9 @@ def test_other_bits_of_a_composition_need_another_version() -> None:
         mask = np.maximum(rng.random((40, 30), np.float32) - np.float32(0.3), 0)
         pixels = Pixels(2 * rng.random((40, 30, 3), np.float32), mask)
         target = compose_layer(layer, pixels, target, accent(0.05 * layer.id))
-    digest = store._digest(target.image.data, target.importance.data).hex()
+    digest = _digest(target.image.data, target.importance.data).hex()
     assert digest == "6daa597fe1c54c7e9b591f816f000d6f"
-    assert store.COMPOSITION_VERSION == 1
+    assert COMPOSITION_VERSION == 1
 
 
 def test_zeros_of_masks_are_packed_as_other_numbers_are() -> None:
