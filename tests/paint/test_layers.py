@@ -195,7 +195,7 @@ def test_the_end_of_a_stroke_composes_importance_alone(
     ones = np.ones((30, 40), np.float32)
     layers.put(start, stroke, Pixels(np.repeat(ones[..., None], 3, -1), ones))
     image[100:130, 20:60] = layers.target.image[100:130, 20:60]
-    monkeypatch.setattr("lightpaint.paint.layers.composed_layers.compose_over", None)
+    monkeypatch.setattr(ComposedLayers, "_compose", None)
     change = layers.show(stack, (), at_rest=True)
     assert layers.accent(start) < before
     assert change.with_importance
