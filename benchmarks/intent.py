@@ -95,7 +95,7 @@ Errors = dict[str, list[float]]
 
 @dataclass(frozen=True)
 class Case:
-    """What was meant and how it was painted.
+    """A lighting that was meant, and how it was painted.
 
     meant, current: (h, w, 3) linear. kept: (n,), the luminance of each lamp that was meant,
     relative to its present one.

@@ -3,14 +3,16 @@
 import inspect
 import re
 import sys
+from contextlib import suppress
 from pathlib import Path
-from typing import Any
+from typing import Any, get_type_hints
 
 from docutils import nodes
 
 DOCS = Path(__file__).resolve().parent
 sys.path.insert(0, str(DOCS.parent))
 
+from lightpaint import arrays  # noqa: E402
 from lightpaint.version import __version__  # noqa: E402
 
 project = "lightpaint"
@@ -84,9 +86,19 @@ html_theme_options = {
 
 def setup(app: Any) -> None:
     """Register what is done to every page."""
+    app.connect("autodoc-before-process-signature", show_types)
     app.connect("autodoc-process-docstring", keep_colons, priority=400)  # before napoleon
     app.connect("autodoc-process-docstring", mark_names, priority=400)
     app.connect("doctree-resolved", dash_fields)
+
+
+def show_types(app: Any, value: Any, is_bound: bool) -> None:
+    """Show the types of arguments alone, without the checks and options in their annotations."""
+    function = inspect.unwrap(value)
+    if inspect.isfunction(function):
+        with suppress(NameError):  # a type that only type checkers import
+            # In place: what wraps the function has the same dict.
+            function.__annotations__.update(get_type_hints(function, localns=vars(arrays)))
 
 
 def keep_colons(app: Any, what: str, name: str, value: Any, options: Any, lines: list[str]) -> None:

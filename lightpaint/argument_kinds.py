@@ -31,15 +31,17 @@ _WORDS: dict[Any, str] = {
 def kinds_of(call: Callable[..., Any]) -> dict[str, Any]:
     """Return the annotations of a function's arguments by name, as far as they are known.
 
-    An annotation that only type checkers can read is left out.
+    An annotation that only type checkers can read is left out, unless it is a kind of array.
     """
+    from lightpaint import arrays  # late, as it needs NumPy
+
     kinds = {}
-    namespace = vars(sys.modules[call.__module__])
+    namespace = {**vars(arrays), **vars(sys.modules[call.__module__])}
     for name, parameter in inspect.signature(call).parameters.items():
         kind = parameter.annotation
         if isinstance(kind, str):
             try:
-                kind = eval(kind, dict(namespace))
+                kind = eval(kind, namespace)
             except (AttributeError, NameError, SyntaxError, TypeError):
                 continue
         if kind is not parameter.empty and parameter.kind not in (

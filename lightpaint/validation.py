@@ -21,12 +21,13 @@ class Check:
     """A test of a value.
 
     expectation: text of what was expected, for errors. schema: JSON schema of valid values; empty
-    for values that JSON does not have.
+    for values that JSON does not have. unit: of a number; "" without one.
     """
 
     is_valid: Callable[[Any], bool]
     expectation: str
     schema: Mapping[str, Any] = field(default_factory=dict)
+    unit: str = ""
 
 
 #: More than any light emits, yet small enough for sums and products in float32.
@@ -57,6 +58,15 @@ def parse_whole_number(text: str) -> int:
     return int(text)
 
 
+def parse_share(text: str) -> float:
+    """Return the share that a text is, `2%` or `0.02`. Raises ValueError for other text."""
+    number_text = text.strip().removesuffix("%")
+    try:
+        return parse_number(number_text) / (1 if number_text == text.strip() else 100)
+    except ValueError:
+        raise ValueError(f"{text!r} is not a share like 2% or 0.02") from None
+
+
 def is_amount(value: float) -> bool:
     """Return whether an amount of light or emission is in the range of computations."""
     return 0 <= value <= BRIGHTEST
@@ -76,8 +86,9 @@ def checks_of(kind: Any) -> Mapping[str, Check]:
 
 def _check_of(hint: Any) -> Check:
     if get_origin(hint) is Annotated:
-        [check] = (x for x in get_args(hint)[1:] if isinstance(x, Check))
-        return check
+        hint, *said = get_args(hint)
+        if checks := [x for x in said if isinstance(x, Check)]:
+            return checks[0]
     if get_origin(hint) in (UnionType, Union):  # of one kind and None
         [hint] = (x for x in get_args(hint) if x is not NoneType)
     if hint is bool:
@@ -113,17 +124,21 @@ def whole(least: int, most: float = math.inf) -> Check:
     return Check(is_valid, f"{expectation}, at most {most}", {**schema, "maximum": most})
 
 
-def number(about: str, *, may_be_zero: bool = False) -> Check:
-    """Expect a number > 0, or >= 0, in the range of computations. about: the quantity."""
+def number(unit: str = "", *, about: str = "", may_be_zero: bool = False) -> Check:
+    """Expect a number > 0, or >= 0, in the range of computations.
+
+    unit: of the quantity. about: the quantity, if it has no unit.
+    """
 
     def is_valid(value: Any) -> bool:
         if not isinstance(value, Real) or _is_bool(value):
             return False
         return 0 < float(value) <= BRIGHTEST or (may_be_zero and value == 0)
 
-    expectation = f"{about} {'>= 0' if may_be_zero else '> 0'}, at most {BRIGHTEST:g}"
+    expectation = f"{unit or about} {'>= 0' if may_be_zero else '> 0'}, at most {BRIGHTEST:g}"
     least = {"minimum" if may_be_zero else "exclusiveMinimum": 0}
-    return Check(is_valid, expectation, {"type": "number", **least, "maximum": BRIGHTEST})
+    schema = {"type": "number", **least, "maximum": BRIGHTEST}
+    return Check(is_valid, expectation, schema, unit)
 
 
 def between(least: float, most: float, about: str) -> Check:

@@ -31,6 +31,7 @@ def _loaded_by(code: str) -> set[str]:
     [
         "import lightpaint",
         "import lightpaint as lp; dir(lp); lp.__version__; lp.LightpaintError",
+        "import lightpaint as lp; lp.Settings(spp=64, space='display')",
         *(
             f"import lightpaint.cli as c; c.main({arguments})"
             for arguments in (["--help"], ["--version"], ["solve", "--help"])

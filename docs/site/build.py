@@ -23,6 +23,7 @@ sys.path.insert(0, str(DOCS / "site"))
 
 from api_pages import write_api  # noqa: E402
 from command_pages import write_commands  # noqa: E402
+from message_pages import write_messages  # noqa: E402
 from page_repair import mend_pages  # noqa: E402
 from schema_pages import write_schemas  # noqa: E402
 from site_check import check_site  # noqa: E402
@@ -42,6 +43,7 @@ def main() -> int:
     write_commands(source / "commands")
     write_api(source / "api")
     write_schemas(source / "schemas", extra / "schemas")
+    write_messages(source / "messages")
     if arguments:
         _stage_readme(source)
         return check_links(source, BUILD / "links")

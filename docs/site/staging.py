@@ -40,7 +40,7 @@ _PERCENT = re.compile(r"^( {0,3})%", re.MULTILINE)
 
 
 def stage(source: Path) -> None:
-    """Write the documents, notebooks and pictures into a new folder `source`."""
+    """Write the documents, notebooks, pictures and tables into a new folder `source`."""
     for document in sorted(DOCS.glob("*.md")):
         _write(source, document, source / document.name)
     for name, page in ROOT_PAGES.items():
@@ -50,6 +50,7 @@ def stage(source: Path) -> None:
         _write(source, notebook, source / "notebooks" / notebook.name)
     _list_notebooks(source / "notebooks")
     shutil.copytree(DOCS / "images", source / "images", ignore=shutil.ignore_patterns("*.py"))
+    shutil.copytree(DOCS / "benchmarks", source / "benchmarks")
     _stage_tutorials(source)
 
 

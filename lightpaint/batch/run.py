@@ -8,6 +8,7 @@ from functools import partial
 from typing import Any
 
 from lightpaint.basis.basis import Basis
+from lightpaint.batch.batch_outcome import BatchOutcome
 from lightpaint.batch.cluster.cluster import Cluster
 from lightpaint.batch.distribution.distributed_render import distributed_renderer
 from lightpaint.batch.distribution.distributed_sums import solve_by_sums
@@ -22,7 +23,7 @@ from lightpaint.batch.placed_bases import obtain_placed_bases
 from lightpaint.batch.plan.cost_estimate import look_seconds
 from lightpaint.batch.plan.journal import Journal, JournalLine
 from lightpaint.batch.plan.plan import Plan, PlannedLook, PlanStep, by_bases, waves
-from lightpaint.batch.run_options import BatchOutcome, RunOptions
+from lightpaint.batch.run_options import RunOptions
 from lightpaint.batch.task_bases import has_basis, obtain_bases, save_bases, save_former_looks
 from lightpaint.batch.work.item_execution import (
     OUT_OF_MEMORY_TEXT,

@@ -1,8 +1,13 @@
-"""Options and outcome of a batch run."""
+"""Options of a batch run."""
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass
+from typing import Annotated
 
-from lightpaint.batch.gallery.summary import SummaryRow
+from lightpaint.field_options import Option
+from lightpaint.validation import a, check_fields, number, whole
+
+#: Maximum number of processes, and of repetitions of a step: larger numbers are typing errors.
+MAX_WORKERS, MAX_RETRY = 1024, 100
 
 
 @dataclass(frozen=True)
@@ -16,26 +21,71 @@ class RunOptions:
     cluster: address of a Dask scheduler whose workers do the work. shared_fs: whether they see the
     same files under the same paths. task_limit_s: seconds after which a step is ended: it fails, or
     a cluster counts its worker as hung and lets another try it.
+    Raises LightpaintError for an invalid value.
     """
 
-    workers: int = 1
-    keep_going: bool = True
-    retry: int = 0
-    shares_folder: bool = False
-    cluster: str | None = None
-    shared_fs: bool = False
-    task_limit_s: float | None = None
+    workers: Annotated[
+        int,
+        whole(1, MAX_WORKERS),
+        Option(
+            "--workers N",
+            "number of processes that share the looks",
+            default="%(default)s",
+            theme="Machines",
+        ),
+    ] = 1
+    keep_going: Annotated[
+        bool,
+        Option("--stop-early", "start nothing more after a look has failed", theme="Looks"),
+    ] = True
+    retry: Annotated[
+        int,
+        whole(0, MAX_RETRY),
+        Option(
+            "--retry N",
+            "try a failed step up to N more times",
+            default="%(default)s",
+            theme="Looks",
+        ),
+    ] = 0
+    shares_folder: Annotated[
+        bool,
+        Option(
+            "--apart",
+            "with --only: share the folder with processes that do other looks at the same time; "
+            "the next run without this option writes the gallery",
+            theme="Machines",
+        ),
+    ] = False
+    cluster: Annotated[
+        str | None,
+        a(str, "the address of a scheduler"),
+        Option(
+            "--cluster ADDRESS",
+            "let workers of a Dask cluster do the looks, and parts of bases; ADDRESS is that of "
+            "its scheduler, like tcp://scheduler:8786",
+            theme="Machines",
+        ),
+    ] = None
+    shared_fs: Annotated[
+        bool,
+        Option(
+            "--shared-fs",
+            "with --cluster: send no files, because workers see them all under the same paths",
+            theme="Machines",
+        ),
+    ] = False
+    task_limit_s: Annotated[
+        float | None,
+        number("seconds"),
+        Option(
+            "--task-limit SECONDS",
+            "end a step after this time: its look fails, and the others go on. With --cluster, "
+            "another worker tries it",
+            default="20 times what it is expected to take, at least 300",
+            theme="Machines",
+        ),
+    ] = None
 
-
-@dataclass
-class BatchOutcome:
-    """Outcome of a run. done, failed: names of looks, and reasons. skipped: done earlier.
-
-    waiting: not started. rows: of all looks, as in the summary.
-    """
-
-    done: list[str] = field(default_factory=list)
-    failed: dict[str, str] = field(default_factory=dict)
-    skipped: list[str] = field(default_factory=list)
-    waiting: list[str] = field(default_factory=list)
-    rows: list[SummaryRow] = field(default_factory=list)
+    def __post_init__(self) -> None:
+        check_fields(self)

@@ -9,9 +9,6 @@ import numpy.typing as npt
 
 from lightpaint.arrays import Floats
 
-#: Maximum exposure in stops; a larger number is a typing error.
-MAX_STOPS = 64.0
-
 
 def encode_display(image: Floats, *, stops: float = 0.0) -> Floats:
     """Return linear Rec.709, scaled by 2^stops and clipped, as sRGB-encoded values in [0, 1].

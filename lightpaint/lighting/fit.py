@@ -2,15 +2,17 @@
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
-from typing import Annotated, Literal, TypeVar
+from typing import TYPE_CHECKING, Annotated, Literal, TypeVar
 
-from lightpaint.colour.display.exposure import choose_exposure
 from lightpaint.colour.display.view_transform import ViewTransform
 from lightpaint.errors import LightpaintError, TargetError
+from lightpaint.field_options import Option
 from lightpaint.keywords import keywords
-from lightpaint.lighting.algebra.optimum import Method
-from lightpaint.target.target import Target
+from lightpaint.lighting.algebra.method import Method
 from lightpaint.validation import a, check_fields, number
+
+if TYPE_CHECKING:
+    from lightpaint.target.target import Target
 
 #: The space of the comparison with the painting: light, or display values.
 Space = Literal["linear", "display"]
@@ -69,14 +71,79 @@ class Fit:
         0.5
     """
 
-    space: Space | None = None
-    hold: Annotated[float | None, number("a weight", may_be_zero=True)] = None
-    colors: Colors | None = None
-    unpainted: Annotated[float, number("a weight", may_be_zero=True)] = 0.0
-    literal: bool = False
-    method: Method = "polished"
+    space: Annotated[
+        Space | None,
+        Option(
+            "--space",
+            "compare linear light, or display values through --view, as the eye sees them",
+            default="display for paintings through a view, of 8 or 16 bits, else linear",
+            theme="What the painting means",
+        ),
+    ] = None
+    hold: Annotated[
+        float | None,
+        number(about="a weight", may_be_zero=True),
+        Option(
+            "--hold H",
+            "how strongly unpainted pixels keep the current look: the weight of all of them, "
+            "relative to all painted ones; 0 ignores them",
+            default="4 if the current look was painted over, else 0",
+            theme="What the painting means",
+        ),
+    ] = None
+    colors: Annotated[
+        Colors | None,
+        Option(
+            "--colors",
+            "colours that lights may take. free: any; gentle: their current ones, unless the "
+            "painting needs others; white: 2200 to 9000 K; own: their current ones, so that lights "
+            "only dim",
+            default="gentle if the current look was painted over, or painted through a view, else "
+            "free",
+            theme="What the painting means",
+        ),
+    ] = None
+    unpainted: Annotated[
+        float,
+        number(about="a weight", may_be_zero=True),
+        Option(
+            "--unpainted W",
+            "weight of each unpainted pixel, instead of --hold",
+            default="%(default)s",
+            theme="What the painting means",
+        ),
+    ] = 0.0
+    literal: Annotated[
+        bool,
+        Option(
+            "--literal",
+            "fit the painting exactly as it is, as in the paper: linear light, no hold, any "
+            "colour and no noise correction, unless other options set these",
+            theme="What the painting means",
+        ),
+    ] = False
+    method: Annotated[
+        Method,
+        Option(
+            "--method",
+            "gauss-seidel: only the iteration of the paper, which converges slowly; if it stops "
+            "before the optimum, it says so",
+            default="%(default)s",
+            theme="What the painting means",
+        ),
+    ] = "polished"
     transform: Annotated[ViewTransform | None, _TRANSFORM] = None
-    emitters: Emitters = "auto"
+    emitters: Annotated[
+        Emitters,
+        Option(
+            "--emitters",
+            "whether painted pixels that show an emitter count. auto: only if alpha, mask or "
+            "template mark them as painted; count: always, which fits emitters to their painted "
+            "brightness; skip: never",
+            default="%(default)s",
+            theme="What the painting means",
+        ),
+    ] = "auto"
 
     def reads_wishes(self, *, is_sketch: bool) -> bool:
         """Return whether wishes have contrasts, and the paint says which colours it means.
@@ -109,7 +176,7 @@ class Fit:
             )
 
 
-def resolve_for_targets(fit: F, targets: Sequence[Target]) -> F:
+def resolve_for_targets(fit: F, targets: "Sequence[Target]") -> F:
     """Resolve all open options of `fit` by the way `targets` were painted.
 
     Raises TargetError if they were painted through different transforms, and `fit` chooses none.
@@ -147,8 +214,10 @@ def resolve_fit(
     )
 
 
-def _common_transform(targets: Sequence[Target]) -> ViewTransform:
+def _common_transform(targets: "Sequence[Target]") -> ViewTransform:
     """Return the one view that all targets were painted through."""
+    from lightpaint.colour.display.exposure import choose_exposure  # late, as it needs NumPy
+
     transforms = {target.transform for target in targets if target.transform is not None}
     if len(transforms) > 1:
         names = " and ".join(sorted(f"{x.name} at {x.stops:+g} stops" for x in transforms))

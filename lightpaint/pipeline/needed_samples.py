@@ -29,7 +29,7 @@ from lightpaint.pipeline.job_bases import view_listener
 from lightpaint.progress import Listener
 from lightpaint.report.measures import LEAST_SHARE, picture_errors
 from lightpaint.report.phrases import spoken_percent
-from lightpaint.scene.properties.film import MAX_SPP
+from lightpaint.scene.limits import MAX_SPP
 
 #: Rounds of samples, each of which at most doubles their number.
 MAX_ROUNDS = 20

@@ -6,10 +6,11 @@ saves pixels rather than samples.
 """
 
 from dataclasses import dataclass
-from typing import Literal
+from typing import TYPE_CHECKING, Literal
 
-from lightpaint.scene.properties.film import Film, reduction_to
-from lightpaint.scene.scene import Scene
+if TYPE_CHECKING:
+    from lightpaint.scene.properties.film import Film
+    from lightpaint.scene.scene import Scene
 
 Quality = Literal["preview", "final"]
 
@@ -23,15 +24,17 @@ class Preset:
     spp: int
     pixels: int | None = None
 
-    def reduction(self, film: Film) -> int:
+    def reduction(self, film: "Film") -> int:
         """Return the factor that reduces `film` to `pixels`."""
+        from lightpaint.scene.properties.film import reduction_to  # late, as it needs NumPy
+
         return 1 if self.pixels is None else reduction_to(film, self.pixels)
 
 
 PRESETS: dict[Quality, Preset] = {"preview": Preset(32, 2**15), "final": Preset(256)}
 
 
-def on_film(scene: Scene, quality: Quality | None, resolution: str | None) -> Scene:
+def on_film(scene: "Scene", quality: Quality | None, resolution: str | None) -> "Scene":
     """Return `scene` on the film for its basis: at `resolution`, or else that of the preset.
 
     Raises SceneError if the film cannot be reduced to that resolution.

@@ -31,9 +31,9 @@ MAX_WISHES = 8
 #: Radius over which the ratio is averaged, and that joins strokes, in widths of the picture.
 SMOOTHING, JOINING = 1 / 160, 1 / 80
 
-#: Grain of a ratio, in stops, for which a radius of one pixel suffices. A look of few samples per
-#: pixel under a clean painting has some.
-GRAIN = 0.05
+#: Least radius of averaging, in pixels: single pixels of the look are noisy, as the painting's are
+#: not.
+MIN_RADIUS = 2.0
 
 #: Light below which a ratio says little, relative to the mean of the look.
 DARK = 0.01
@@ -102,21 +102,9 @@ def asked_ratio(image: Floats, importance: Floats, current_look: Floats) -> Floa
     counts = (importance > 0).astype(np.float32)
     stops = np.log2(asked / now) * counts
     summed = np.concatenate([stops, counts[None]])
-    radius = max(SMOOTHING * importance.shape[1], _grain(stops, counts > 0) / GRAIN)
+    radius = max(SMOOTHING * importance.shape[1], MIN_RADIUS)
     wash = gaussian_filter(summed, (0, radius, radius))
     return np.asarray(counts / np.maximum(wash[3], 1e-6) * wash[:3], np.float32)
-
-
-def _grain(stops: Floats, painted: Bools) -> float:
-    """Return the typical noise of a pixel of a ratio in stops, (3, h, w), of the painted ones.
-
-    It is the median difference of neighbours, which edges of strokes hardly change.
-    """
-    both = painted[:, 1:] & painted[:, :-1]
-    if not both.any():
-        return 0.0
-    steps = np.abs(np.diff(stops, axis=2)).max(axis=0)[both]
-    return float(np.median(steps))
 
 
 def _owners(painted: Bools, ratio: Floats) -> tuple[npt.NDArray[np.int64], int]:
@@ -157,10 +145,14 @@ def _distinct_places(stroke: Bools, ratio: Floats, least: float) -> list[Bools]:
     light = np.tensordot(LUMINANCE.astype(np.float32), beyond, 1)
     differs = np.abs(light) > DISTINCT_STOPS
     differs |= beyond.max(axis=0) - beyond.min(axis=0) > DISTINCT_STOPS
-    places = _connected(stroke & differs, 0, least)
+    amount = np.abs(beyond).sum(axis=0)
+    places = [
+        # A wash is half of the amount at the edge.
+        x & (amount > np.median(amount[x]) / 2)
+        for x in _connected(stroke & differs, 0, least)
+    ]
     most = MAX_INNER_SHARE * stroke.sum()
     places = [x for x in places if x.sum() <= most]
-    amount = np.abs(beyond).sum(axis=0)
     return sorted(places, key=lambda x: -float(amount[x].sum()))
 
 

@@ -6,7 +6,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from nightly import seeds
+from nightly import nightly, seeds
 from scipy.optimize import minimize, nnls
 
 from lightpaint.basis.basis import Basis
@@ -442,7 +442,7 @@ def test_nothing_changes_where_nothing_is_saturated_that_counts(make_basis: Any)
     assert a.lighting == b.lighting
 
 
-@pytest.mark.parametrize("transform", [None, SRGB])
+@pytest.mark.parametrize("transform", [nightly(None), SRGB])
 def test_error_bars_hold_the_answer_without_noise(make_basis: Any, transform: ViewTransform | None):
     """95 % intervals over seeds, taken from the last linear problem; and less bias, corrected."""
     size, sigma = (24, 24), 0.15

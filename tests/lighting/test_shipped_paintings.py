@@ -130,7 +130,7 @@ def _solve_by_scipy(basis: lp.Basis, psi: Any, D: Any) -> Any:
     return np.stack([nnls(*_rows(basis, psi, D, c))[0] for c in range(3)], axis=-1)
 
 
-@pytest.mark.parametrize("name", PAINTINGS)
+@pytest.mark.parametrize("name", SUMMED)
 def test_literal_lightings_are_those_of_scipy(planes: Planes, name: str) -> None:
     basis = planes(name)
     target = _painting(name, basis)

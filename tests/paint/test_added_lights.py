@@ -6,6 +6,7 @@ from typing import Any
 import numpy as np
 import pytest
 from moving import MovingStudio, exact_answer, opened_rig, pixel_of, place_lights, stroke
+from nightly import nightly
 
 import lightpaint as lp
 from lightpaint.errors import LightpaintError
@@ -27,7 +28,7 @@ def names(moving: MovingStudio) -> tuple[str, ...]:
     return moving.studio.session.basis.names
 
 
-@pytest.mark.parametrize("kind", ["spot", "point", "panel"])
+@pytest.mark.parametrize("kind", ["spot", nightly("point"), "panel"])
 def test_an_added_light_has_the_plane_of_its_place(moving: MovingStudio, kind: Any) -> None:
     """At once about, and rendered soon; the other planes and the current look stay."""
     session = moving.studio.session

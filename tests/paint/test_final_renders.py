@@ -63,6 +63,7 @@ def test_a_larger_render_has_the_same_frame(tmp_path: Path) -> None:
     np.testing.assert_allclose(blocks.image.mean(), expected.mean(), rtol=0.02)  # noise
 
 
+@pytest.mark.usefixtures("without_reasons")
 def test_a_final_render_is_written_as_light_and_as_a_display_shows_it(
     moving: MovingStudio, tmp_path: Path
 ) -> None:
@@ -110,6 +111,7 @@ def test_a_page_that_opens_later_finds_the_renders_and_their_files(moving: Movin
     assert png.exists()
 
 
+@pytest.mark.usefixtures("without_reasons")
 def test_renders_are_listed_again_by_a_painter_that_is_started_anew(
     moving: MovingStudio, tmp_path: Path
 ) -> None:
@@ -121,7 +123,7 @@ def test_renders_are_listed_again_by_a_painter_that_is_started_anew(
         wait_for(moving, "done", number)
     before = moving.studio.state().fields["renders"]
     pictures = [moving.studio.resource(f"render/{number}") for number in (1, 2)]
-    moving.send(request(width=256, spp=ENDLESS_SPP))
+    moving.send(request(spp=ENDLESS_SPP))
     wait_for(moving, "rendering", 4)
     moving.close()
     [png] = (Path(x) for x in before[2]["files"] if x.endswith(".png"))

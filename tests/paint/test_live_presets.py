@@ -27,10 +27,16 @@ STEPS = 8
 
 
 @pytest.mark.parametrize(
-    ("name", "size"),
-    [("gallery", "80x45"), nightly("gallery", "320x180"), nightly("stage", "320x180")],
+    ("name", "size", "every"),
+    [
+        ("gallery", "80x45", 3),
+        nightly("gallery", "80x45", 1),
+        nightly("gallery", "320x180", 1),
+        nightly("stage", "320x180", 1),
+    ],
 )
-def test_live_and_exact_answers_are_one_picture(name: str, size: str) -> None:
+def test_live_and_exact_answers_are_one_picture(name: str, size: str, every: int) -> None:
+    """Of every so many presets."""
     scene = lp.load_scene(SCENES / name / "scene.xml").reduced(size)
     basis = lp.render_basis(scene, spp=128)
     transform = lp.ViewTransform("srgb", meter_exposure(basis.current_look, basis))
@@ -39,7 +45,7 @@ def test_live_and_exact_answers_are_one_picture(name: str, size: str) -> None:
         return np.asarray(transform.decode(transform.encode(image)) * 2**transform.stops)
 
     differences = {}
-    for preset in PRESETS:
+    for preset in list(PRESETS)[::every]:
         store = MemoryStore(Identity.of([basis]))
         session = Session(
             [basis], [basis.current_look], store, settings=Settings(), transform=transform
@@ -56,5 +62,5 @@ def test_live_and_exact_answers_are_one_picture(name: str, size: str) -> None:
         differences[preset] = float(
             delta_e(displayed(live_picture), displayed(exact_picture)).mean()
         )
-    assert len(differences) >= 8
+    assert len(differences) >= 8 // every
     assert max(differences.values()) <= SAME, differences

@@ -1,8 +1,10 @@
 """Messages of page and session: round trips, and junk that is refused in one line."""
 
+import dataclasses
 import json
 import re
 import struct
+import sys
 from contextlib import suppress
 from pathlib import Path
 from typing import Any
@@ -14,6 +16,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from hypothesis.extra import numpy as arrays
 from raw_message import RawMessage
+from renderer import REPOSITORY
 
 from lightpaint.errors import PaintError
 from lightpaint.paint.message_frames import DTYPES, MAX_TEXT, from_frame, parse_request, to_frame
@@ -27,11 +30,14 @@ from lightpaint.paint.protocol import (
     Request,
     TakeOver,
     TieLights,
-    document,
     typescript,
 )
 from lightpaint.paint.server.session_clients import MAX_OBSERVERS
 from lightpaint.paint.session.look_library import MAX_PROPOSALS
+
+sys.path.insert(0, str(REPOSITORY / "docs" / "site"))
+
+from message_pages import write_messages
 
 TEXTS = st.text(st.characters(exclude_categories=["Cs"]), max_size=20)
 PLAIN = st.recursive(
@@ -213,9 +219,9 @@ def test_what_is_left_out_and_what_is_null() -> None:
     findings = Findings(
         lights=(LightAnswer((1.0, 0.5, float("inf")), None, None, "#fff", True, 1.0),)
     )
-    fields = fake_answer(**{"lights": findings.lights}).fields
-    assert "headline" not in fields
-    assert fields["lights"] == [
+    sent = fake_answer(**{"lights": findings.lights}).fields
+    assert "headline" not in sent
+    assert sent["lights"] == [
         {
             "emission": [1.0, 0.5, None],
             "stops": None,
@@ -227,14 +233,35 @@ def test_what_is_left_out_and_what_is_null() -> None:
     ]
 
 
-def test_the_document_has_every_message_as_it_is() -> None:
-    """Run `python -m lightpaint.paint.protocol.document docs/protocol.md` after a change."""
-    text = (Path(__file__).parents[2] / "docs" / "protocol.md").read_text(encoding="utf-8")
-    assert document.replace_sections(text) == text
-    for kind in (*Request.kinds, *Event.kinds):
-        assert f"### `{kind}`" in text
+def test_the_document_has_the_numbers_of_the_code() -> None:
+    text = (REPOSITORY / "docs" / "protocol.md").read_text(encoding="utf-8")
     assert f'"protocol": {VERSION}' in text
     for limit in (MAX_OBSERVERS, MAX_PROPOSALS):
         assert re.search(rf"\b{limit}\b", text)
     for dtype in DTYPES:
         assert f"`{dtype}`" in text
+    [conversation] = re.findall(r"^## A conversation\n(.*?)^## ", text, re.MULTILINE | re.DOTALL)
+    messages = {**Request.kinds, **Event.kinds}
+    named = {field.name for message in messages.values() for field in dataclasses.fields(message)}
+    assert set(re.findall(r"`(\w+)`", conversation)) - set(messages) - named == set()
+
+
+def test_the_reference_has_every_message_as_it_is(tmp_path: Path) -> None:
+    """Each has an entry, with all words of its docstring, and a row for each field."""
+    write_messages(tmp_path / "messages")
+    for page, messages in (("requests", Request.kinds), ("events", Event.kinds)):
+        text = (tmp_path / "messages" / f"{page}.md").read_text(encoding="utf-8")
+        entries = dict(re.findall(r"^### `(\w+)`\n(.*?)(?=^##|\Z)", text, re.MULTILINE | re.DOTALL))
+        assert set(entries) == set(messages)
+        for kind, message in messages.items():
+            rows = re.findall(r"^\| `(\w+)\??` \| .+? \| (.*) \|$", entries[kind], re.MULTILINE)
+            named = {*(x.name for x in dataclasses.fields(message)), *message.request_buffers}
+            assert {name for name, _ in rows} == named
+            shown = {*_words(entries[kind].partition("| field")[0]), *named}
+            shown |= {word for _, meaning in rows for word in _words(meaning)}
+            assert set(_words(message.__doc__ or "")) - shown == set(), kind
+
+
+def _words(text: str) -> list[str]:
+    """Return the words of a text without links, code marks and punctuation."""
+    return re.findall(r"\w+", re.sub(r"\]\([^)]*\)", "", text))

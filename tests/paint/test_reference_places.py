@@ -6,6 +6,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from nightly import seeds
 
 import lightpaint as lp
 from lightpaint.basis.lights import Lights
@@ -150,7 +151,7 @@ def other_places() -> list[np.ndarray]:
     return pictures
 
 
-@pytest.mark.parametrize("number", range(12))
+@pytest.mark.parametrize("number", seeds(4, 12))
 def test_what_is_asked_for_is_never_farther_from_the_light_of_a_reference(
     make_basis: Any, number: int
 ) -> None:

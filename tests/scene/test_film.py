@@ -16,8 +16,8 @@ from lightpaint.images.pixel_blocks import block_mean, enlarged, whole_factor
 from lightpaint.pipeline.job.remarks import remarks_of_film, remarks_of_target
 from lightpaint.pipeline.job.settings import Settings
 from lightpaint.progress import silent
+from lightpaint.scene.limits import MAX_PIXELS
 from lightpaint.scene.properties.film import (
-    MAX_PIXELS,
     Film,
     even_reductions,
     reduced,

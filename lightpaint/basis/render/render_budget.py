@@ -9,7 +9,7 @@ from lightpaint.basis.basis import Basis
 from lightpaint.display_text import brief
 from lightpaint.errors import SceneError
 from lightpaint.progress import Progress
-from lightpaint.scene.properties.film import MAX_SPP
+from lightpaint.scene.limits import MAX_SPP
 from lightpaint.scene.scene_render import largest_pass, plan_passes
 from lightpaint.validation import whole
 

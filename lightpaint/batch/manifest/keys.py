@@ -11,7 +11,8 @@ from lightpaint.errors import LightpaintError
 from lightpaint.files import one_line
 from lightpaint.pipeline.job.settings import Settings
 from lightpaint.relit.formats.formats import FORMS
-from lightpaint.scene.properties.film import MAX_SPP, check_resolution
+from lightpaint.scene.limits import MAX_SPP
+from lightpaint.scene.properties.film import check_resolution
 from lightpaint.target.target_reader import Paint
 from lightpaint.validation import BRIGHTEST, MAX_LISTED, SWITCH, Check, a, checks_of, one_of, whole
 

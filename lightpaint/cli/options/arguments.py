@@ -2,6 +2,7 @@
 
 import argparse
 import math
+from collections.abc import Callable
 from typing import Any
 
 from lightpaint.validation import BRIGHTEST, parse_number, parse_whole_number
@@ -207,13 +208,16 @@ class at_least:  # noqa: N801 (used as a function)
         return value
 
 
-def share(text: str) -> float:
-    """Parse a share, `2%` or `0.02`."""
-    number = text.strip().removesuffix("%")
-    try:
-        return parse_number(number) / (1 if number == text.strip() else 100)
-    except ValueError:
-        raise argparse.ArgumentTypeError(f"{text!r} is not a share like 2% or 0.02") from None
+def parsed_by(parse: Callable[[str], Any]) -> Callable[[str], Any]:
+    """Return a type that parses text with a function whose ValueError says what is wrong."""
+
+    def parsed(text: str) -> Any:
+        try:
+            return parse(text)
+        except ValueError as error:
+            raise argparse.ArgumentTypeError(str(error)) from None
+
+    return parsed
 
 
 class number:  # noqa: N801 (used as a function)

@@ -2,8 +2,10 @@
 
 import argparse
 
-from lightpaint.cli.options import arguments
-from lightpaint.cli.options.option_groups import add_force, add_output
+from lightpaint.batch.run_options import RunOptions
+from lightpaint.cli.options.option_groups import add_output
+from lightpaint.cli.options.record_options import add_fields
+from lightpaint.pipeline.job.settings import Settings
 
 
 def add_batch(parser: argparse.ArgumentParser) -> None:
@@ -11,12 +13,7 @@ def add_batch(parser: argparse.ArgumentParser) -> None:
     _add_looks(parser)
     _add_failures(parser)
     _add_workers(parser)
-    parser.add_argument(
-        "--apart",
-        action="store_true",
-        help="with --only: share the folder with processes that do other looks at the same time; "
-        "the next run without this option writes the gallery",
-    )
+    add_fields(parser, RunOptions, "shares_folder")
     parser.add_argument(
         "--export",
         choices=("openjd",),
@@ -26,7 +23,7 @@ def add_batch(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--log", metavar="FILE", help="append a line with the time of each step to this file"
     )
-    add_force(parser)
+    add_fields(parser, Settings, "force")
 
 
 def _add_looks(parser: argparse.ArgumentParser) -> None:
@@ -73,47 +70,10 @@ def _add_failures(parser: argparse.ArgumentParser) -> None:
         default=True,
         help="continue with the other looks after one has failed (default)",
     )
-    group.add_argument(
-        "--stop-early",
-        dest="keep_going",
-        action="store_false",
-        help="start nothing more after a look has failed",
-    )
-    parser.add_argument(
-        "--retry",
-        type=arguments.at_least(0, maximum=100),
-        default=0,
-        metavar="N",
-        help="try a failed step up to N more times (default: %(default)s)",
-    )
+    add_fields(group, RunOptions, "keep_going")
+    add_fields(parser, RunOptions, "retry")
 
 
 def _add_workers(parser: argparse.ArgumentParser) -> None:
     """Add options for workers: local processes, or a cluster."""
-    parser.add_argument(
-        "--workers",
-        type=arguments.at_least(1, maximum=1024),
-        default=1,
-        metavar="N",
-        help="number of processes that share the looks (default: %(default)s)",
-    )
-    parser.add_argument(
-        "--cluster",
-        metavar="ADDRESS",
-        help="let workers of a Dask cluster do the looks, and parts of bases; ADDRESS is that of "
-        "its scheduler, like tcp://scheduler:8786",
-    )
-    parser.add_argument(
-        "--shared-fs",
-        dest="shared_fs",
-        action="store_true",
-        help="with --cluster: send no files, because workers see them all under the same paths",
-    )
-    parser.add_argument(
-        "--task-limit",
-        dest="task_limit_s",
-        type=arguments.number(" of seconds"),
-        metavar="SECONDS",
-        help="end a step after this time: its look fails, and the others go on. With --cluster, "
-        "another worker tries it (default: 20 times what it is expected to take, at least 300)",
-    )
+    add_fields(parser, RunOptions, "workers", "cluster", "shared_fs", "task_limit_s")

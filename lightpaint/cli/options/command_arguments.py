@@ -2,6 +2,7 @@
 
 from argparse import Namespace
 from collections.abc import Sequence
+from dataclasses import fields
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -158,15 +159,7 @@ def _run_options(options: Namespace) -> "RunOptions":
         raise BatchError(
             f"--cluster {options.cluster} and --workers {options.workers}: give one of them"
         )
-    return RunOptions(
-        options.workers,
-        options.keep_going,
-        options.retry,
-        options.apart,
-        options.cluster,
-        options.shared_fs,
-        options.task_limit_s,
-    )
+    return RunOptions(**{x.name: getattr(options, x.name) for x in fields(RunOptions)})
 
 
 def _paint_arguments(

@@ -5,6 +5,8 @@ from collections.abc import Callable, Mapping
 from typing import Any
 
 from lightpaint.cli.options import arguments
+from lightpaint.cli.options.record_options import add_fields
+from lightpaint.pipeline.job.settings import Settings
 
 #: Adds an option which may be repeated: its flag, metavar, type and help.
 AddOption = Callable[[str, str, Callable[[str], Any], str], None]
@@ -174,9 +176,4 @@ def add_rigging(parser: argparse.ArgumentParser) -> None:
         metavar="FILE",
         help="hang lights as the places.json of a painter's export says, without a search",
     )
-    group.add_argument(
-        "--no-move",
-        dest="move_lights",
-        action="store_false",
-        help="keep all lights in place, even if the lights file lets them move",
-    )
+    add_fields(group, Settings, "move_lights")

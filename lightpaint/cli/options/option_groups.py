@@ -3,6 +3,8 @@
 import argparse
 
 from lightpaint.cli.options import arguments
+from lightpaint.cli.options.record_options import add_fields
+from lightpaint.pipeline.job.settings import Settings
 
 
 def add_scene(parser: argparse.ArgumentParser) -> None:
@@ -146,93 +148,21 @@ def add_variant(parser: argparse.ArgumentParser) -> None:
     )
 
 
-def add_sampling(parser: argparse.ArgumentParser, *, default: str = "the scene's") -> None:
-    """Add the options for the samples of one picture."""
-    add_spp(parser, default)
-    add_seed(parser)
+def add_sampling(parser: argparse.ArgumentParser, *, default: str = "") -> None:
+    """Add the options for the samples of one picture. default: in words, if it is another."""
+    add_fields(parser, Settings, "spp", default=default)
+    add_fields(parser, Settings, "seed")
 
 
 def add_budget(parser: argparse.ArgumentParser) -> None:
     """Add the options for the samples of a basis."""
-    group = parser.add_mutually_exclusive_group()
-    add_spp(group, "the scene's")
-    group.add_argument(
-        "--time",
-        dest="time_s",
-        type=arguments.number(" of seconds"),
-        metavar="SECONDS",
-        help="seconds to render the basis, instead of --spp. They include compilation, but not "
-        "the verification; samples of earlier runs are added",
-    )
-    parser.add_argument(
-        "--quality",
-        choices=("preview", "final"),
-        help="preview: 32 samples per pixel on about 30,000 pixels, each of which is a block of "
-        "film pixels; final: 256 on the whole film. --spp, --time and --resolution take "
-        "precedence",
-    )
-    add_resolution(parser)
-    add_seed(parser)
-
-
-def add_spp(parser: "argparse._ActionsContainer", default: str) -> None:
-    """Add the option for samples per pixel."""
-    parser.add_argument(
-        "--spp",
-        type=arguments.at_least(2, maximum=2**20),
-        metavar="N",
-        help=f"samples per pixel (default: {default})",
-    )
-
-
-def add_seed(parser: argparse.ArgumentParser) -> None:
-    """Add the option for the random seed."""
-    parser.add_argument(
-        "--seed",
-        type=arguments.at_least(0),
-        default=0,
-        metavar="S",
-        help="random seed (default: %(default)s)",
-    )
-
-
-def add_resolution(parser: argparse.ArgumentParser) -> None:
-    """Add the option for a smaller film."""
-    parser.add_argument(
-        "--resolution",
-        metavar="1/N|WxH",
-        help="render one pixel for each square block of film pixels, like 1/4 or 320x180; "
-        "incomplete blocks at the right and bottom edges are left out (default: the whole "
-        "film)",
-    )
+    add_fields(parser.add_mutually_exclusive_group(), Settings, "spp", "time_s")
+    add_fields(parser, Settings, "quality", "resolution", "seed")
 
 
 def add_cache(parser: argparse.ArgumentParser) -> None:
     """Add the options for the cache of bases."""
-    parser.add_argument(
-        "--no-cache",
-        dest="use_cache",
-        action="store_false",
-        help="do not use bases of earlier runs, and do not keep this one (default: do both)",
-    )
-    parser.add_argument(
-        "--exact-spp",
-        action="store_true",
-        help="use exactly the requested samples per pixel, even if the cache has a basis with "
-        "more (default: use that one)",
-    )
-
-
-def add_unit(parser: argparse.ArgumentParser) -> None:
-    """Add the option for the scale of radiance."""
-    parser.add_argument(
-        "--unit",
-        dest="cd_per_unit",
-        type=arguments.number(" of cd/m²"),
-        metavar="CD/M2",
-        help="luminance in cd/m² of a radiance of 1 in the scene, to show lumen, candela and lux "
-        "(default: relative numbers without units)",
-    )
+    add_fields(parser, Settings, "use_cache", "exact_spp")
 
 
 def add_output(parser: "argparse._ActionsContainer", metavar: str, description: str) -> None:
@@ -273,15 +203,6 @@ def add_server(parser: argparse.ArgumentParser) -> None:
         dest="with_browser",
         action="store_false",
         help="print the address of the page, and open no browser",
-    )
-
-
-def add_force(parser: argparse.ArgumentParser) -> None:
-    """Add the option for replacing results."""
-    parser.add_argument(
-        "--force",
-        action="store_true",
-        help="replace results of another painting, and results changed by hand (default: refuse)",
     )
 
 

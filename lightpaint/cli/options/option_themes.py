@@ -1,27 +1,31 @@
 """Themes of options, by which `--help` and the reference of the commands show them."""
 
 import argparse
+from typing import get_args
 
-#: Options by theme, in order; options of further groups of a parser keep their group.
-THEMES = {
+from lightpaint.cli.output.vocabulary import RECORDS
+from lightpaint.field_options import Theme, options_of
+
+#: Options that no field of a record declares, by theme; those of further groups of a parser keep
+#: their group.
+OTHER_OPTIONS: dict[Theme, str] = {
     "Painting": "--target --mask --layer --template --no-template --paint --view --exposure "
-    "--resize --layers",
-    "What the painting means": "--literal --hold --unpainted --space --colors --emitters "
-    "--no-correct-noise --method --refine",
+    "--layers",
     "Lights": "--lights --group --lights-file --no-lights-file --no-group-alike --split "
-    "--symmetric --sun --pattern --unit",
+    "--symmetric --pattern",
     "Scene and camera": "--scene --stage --sensor -D --integrator --variant",
-    "How much to render": "--spp --time --error --quality --resolution --seed --exact-spp "
-    "--no-cache",
-    "Verification": "--verify-spp --no-verify --max-miss --min-fit",
-    "Shots, looks and advice": "--frames --animate --variations --keep-going --suggest",
-    "Looks": "--init --only --dry-run --retry --stop-early",
-    "Machines": "--workers --cluster --shared-fs --apart --task-limit --export --log",
+    "Verification": "--max-miss --min-fit",
+    "Shots, looks and advice": "--frames --variations --keep-going",
+    "Looks": "--init --only --dry-run",
+    "Machines": "--export --log",
     "Page": "--host --port --no-browser --new",
-    "Results": "--to --output --force --table --map-size --no-sheet --json --quiet --verbose "
+    "Results": "--to --output --table --map-size --no-sheet --json --quiet --verbose "
     "--json-progress --help",
 }
-_THEME_OF = {option: title for title, options in THEMES.items() for option in options.split()}
+_THEME_OF: dict[str, str] = {
+    **{name: theme for theme, names in OTHER_OPTIONS.items() for name in names.split()},
+    **{x.option.name: x.option.theme for record in RECORDS for x in options_of(record).values()},
+}
 
 #: Options up to which a help is one list.
 FEW_OPTIONS = 12
@@ -32,7 +36,7 @@ def by_theme(command: argparse.ArgumentParser) -> dict[str, list[argparse.Action
 
     Constraints, places and other groups of the parser come behind the themes.
     """
-    titles = ["Arguments", *THEMES, *(_title(group) for group in command._action_groups)]
+    titles = ["Arguments", *get_args(Theme), *(_title(group) for group in command._action_groups)]
     themes: dict[str, list[argparse.Action]] = {title: [] for title in titles}
     for group in command._action_groups:
         for action in group._group_actions:
@@ -40,7 +44,7 @@ def by_theme(command: argparse.ArgumentParser) -> dict[str, list[argparse.Action
             if not action.option_strings:
                 title = "Arguments"
             elif group is command._optionals:
-                title = _THEME_OF[action.option_strings[-1]]
+                [title] = [_THEME_OF[x] for x in action.option_strings if x in _THEME_OF]
             themes[title].append(action)
     return {title: actions for title, actions in themes.items() if actions}
 

@@ -10,7 +10,6 @@ from lightpaint.cli.options.constraint_options import add_constraints, add_riggi
 from lightpaint.cli.options.option_groups import (
     add_budget,
     add_cache,
-    add_force,
     add_lights,
     add_map_size,
     add_output,
@@ -19,14 +18,12 @@ from lightpaint.cli.options.option_groups import (
     add_scene,
     add_server,
     add_split,
-    add_spp,
-    add_unit,
     add_variant,
     add_view,
     add_view_transform,
 )
+from lightpaint.cli.options.record_options import add_fields
 from lightpaint.cli.options.solve_options import (
-    add_error,
     add_fit,
     add_frames,
     add_method,
@@ -37,6 +34,7 @@ from lightpaint.cli.options.solve_options import (
     add_variations,
     add_verification,
 )
+from lightpaint.pipeline.job.settings import Settings
 from lightpaint.version import __version__
 
 #: Exit codes, for scripts.
@@ -71,7 +69,7 @@ def _lights(parser: argparse.ArgumentParser) -> None:
     add_scene(parser)
     add_lights(parser)
     add_split(parser)
-    add_unit(parser)
+    add_fields(parser, Settings, "cd_per_unit")
     output_group = parser.add_mutually_exclusive_group()
     add_output(output_group, "F.png", "picture of each light alone (default: lights.png)")
     output_group.add_argument(
@@ -120,7 +118,7 @@ def _template(parser: argparse.ArgumentParser) -> None:
 
 def _demo(parser: argparse.ArgumentParser) -> None:
     add_output(parser, "DIR", "folder for scene, painting and result (default: lightpaint-demo/)")
-    add_spp(parser, "the scene's")
+    add_fields(parser, Settings, "spp")
     add_variant(parser)
 
 
@@ -133,7 +131,7 @@ def _solve(parser: argparse.ArgumentParser) -> None:
     )
     add_paintings(parser)
     add_output(parser, "DIR", "result folder (default: named after the target)")
-    add_force(parser)
+    add_fields(parser, Settings, "force")
     parser.add_argument(
         "--table",
         choices=("short", "full"),
@@ -147,7 +145,7 @@ def _solve(parser: argparse.ArgumentParser) -> None:
     add_method(parser)
     add_verification(parser)
     add_tolerances(parser)
-    add_unit(parser)
+    add_fields(parser, Settings, "cd_per_unit")
     add_lights(parser)
     add_split(parser)
     add_map_size(parser)
@@ -155,7 +153,7 @@ def _solve(parser: argparse.ArgumentParser) -> None:
     add_constraints(parser)
     add_rigging(parser)
     add_budget(parser)
-    add_error(parser)
+    add_fields(parser, Settings, "error")
     add_cache(parser)
     add_view(parser)
 
@@ -181,7 +179,7 @@ def _paint(parser: argparse.ArgumentParser) -> None:
     add_pattern(parser)
     add_constraints(parser)
     add_budget(parser)
-    add_error(parser)
+    add_fields(parser, Settings, "error")
     add_cache(parser)
     add_view(parser, is_repeatable=True)
     # The parser is kept for the command that answers exported paintings.
@@ -222,7 +220,7 @@ def _export(parser: argparse.ArgumentParser) -> None:
     add_map_size(parser)
     add_view(parser)
     add_output(parser, "DIR", "folder for the files (default: that of lighting.json)")
-    add_force(parser)
+    add_fields(parser, Settings, "force")
 
 
 def _blender(parser: argparse.ArgumentParser) -> None:
@@ -242,7 +240,7 @@ def _relight(parser: argparse.ArgumentParser) -> None:
     add_sampling(parser)
     add_map_size(parser)
     add_output(parser, "DIR", "result folder (default: named after the lighting's target)")
-    add_force(parser)
+    add_fields(parser, Settings, "force")
 
 
 def _verify(parser: argparse.ArgumentParser) -> None:

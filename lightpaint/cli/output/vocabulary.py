@@ -5,64 +5,49 @@ import re
 import shlex
 from collections.abc import Sequence
 
-#: Options for the arguments that errors and remarks of the library name.
-OPTIONS = {
-    "animate": "--animate",
-    "cd_per_unit": "--unit",
-    "colors": "--colors",
-    "emitters": "--emitters",
-    "exact_spp": "--exact-spp",
+from lightpaint.batch.run_options import RunOptions
+from lightpaint.field_options import options_of
+from lightpaint.pipeline.job.settings import Settings
+
+#: The records whose fields have options.
+RECORDS = (Settings, RunOptions)
+
+#: Options of arguments that are no fields of these.
+_OTHER_OPTIONS = {
     "folder": "-o",
-    "error": "--error",
-    "force": "--force",
     "frames": "--frames",
     "groups": "--group",
-    "hold": "--hold",
     "integrator": "--integrator",
     "layer": "--layer",
     "light_groups": "--lights",
     "lights": "--lights",
-    "literal": "--literal",
+    "map_size": "--map-size",
     "mask": "--mask",
     "new": "--new",
-    "noise_correction": "--correct-noise",
     "paint": "--paint",
     "parameters": "-D",
     "pattern": "--pattern",
     "placement": "--places",
     "port": "--port",
-    "quality": "--quality",
-    "refine": "--refine",
-    "resize": "--resize",
-    "resolution": "--resolution",
-    "seed": "--seed",
     "scene": "--scene",
     "sensor": "-s",
-    "shared_fs": "--shared-fs",
-    "space": "--space",
     "split": "--split",
-    "symmetric": "--symmetric",
-    "sun": "--sun",
-    "map_size": "--map-size",
-    "spp": "--spp",
     "stage": "--stage",
-    "suggest": "--suggest",
-    "task_limit_s": "--task-limit",
+    "symmetric": "--symmetric",
     "template": "--template",
-    "time_s": "--time",
     "transform": "--view",
     "variant": "-m",
-    "verify_spp": "--verify-spp",
 }
+_OTHER_SPELLINGS = {"group_alike=False": "--no-group-alike", "find=False": "--no-template"}
+
+_DECLARED = [x for record in RECORDS for x in options_of(record).values()]
+
+#: Options for the arguments that errors and remarks of the library name.
+OPTIONS = _OTHER_OPTIONS | {x.field: x.option.name for x in _DECLARED if x.default is not True}
 
 #: Arguments with a value that have an option of their own.
-SPELLINGS = {
-    "group_alike=False": "--no-group-alike",
-    "move_lights=False": "--no-move",
-    "find=False": "--no-template",
-    "noise_correction=False": "--no-correct-noise",
-    "use_cache=False": "--no-cache",
-    "verify=False": "--no-verify",
+SPELLINGS = _OTHER_SPELLINGS | {
+    f"{x.field}=False": x.name_of_false for x in _DECLARED if x.name_of_false
 }
 
 #: The name of the options as the source of constraints and places; the options of their keys that

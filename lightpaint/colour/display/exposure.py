@@ -4,7 +4,7 @@ import numpy as np
 
 from lightpaint.arrays import Bools, Floats, largest
 from lightpaint.colour.color import luminance
-from lightpaint.colour.srgb import MAX_STOPS
+from lightpaint.colour.display.view_transform import MAX_STOPS
 
 #: Luminance of middle grey relative to white; and the percentile of lit pixels that counts as
 #: highlights, so that the few brightest pixels do not decide the exposure.

@@ -15,39 +15,18 @@ Display values lie in [0, 1]. Encoding clips what the display cannot show: light
 
 import math
 from dataclasses import dataclass
-from typing import Protocol
+from typing import TYPE_CHECKING
 
-import numpy as np
-
-from lightpaint.arrays import Floats
-from lightpaint.colour.display.tone_curves import BUILT_IN, Curve
-from lightpaint.colour.srgb import MAX_STOPS
 from lightpaint.errors import ViewError
 from lightpaint.keywords import keywords
 
+# NumPy is imported late, with the curves: --help reads the settings, which have a transform.
+if TYPE_CHECKING:
+    from lightpaint.arrays import Floats
+    from lightpaint.colour.display.encoding import Encoding
 
-class Encoding(Protocol):
-    """An encoding of linear Rec.709 as display values, without exposure. Arrays are (..., 3)."""
-
-    @property
-    def white(self) -> float:
-        """Light of the grey that the display shows as white."""
-
-    def encode(self, image: Floats) -> Floats:
-        """Return linear light as display values in [0, 1]."""
-
-    def decode(self, image_display: Floats) -> Floats:
-        """Return display values in [0, 1] as linear light."""
-
-    def encode_planes(self, planes: Floats) -> Floats:
-        """Return `encode` of linear light with channels first, (3, p)."""
-
-    def with_slopes(self, planes: Floats) -> tuple[Floats, Floats]:
-        """Return display values (3, p) for linear light (3, p), and their derivatives.
-
-        Derivatives are (3, 3, p), of display value i by linear channel j, and 0 where clipped. If
-        channels do not mix, they are (3, p).
-        """
+#: Maximum exposure in stops; a larger number is a typing error.
+MAX_STOPS = 64.0
 
 
 @keywords()
@@ -107,27 +86,31 @@ class ViewTransform:
     @property
     def is_per_channel(self) -> bool:
         """True if each display value depends on its own channel alone, by the same curve."""
+        from lightpaint.colour.display.tone_curves import Curve
+
         encoding = _encoding(self.name)
         return isinstance(encoding, Curve) and encoding.matrix is None
 
     @keywords()
-    def encode(self, image: Floats) -> Floats:
+    def encode(self, image: "Floats") -> "Floats":
         """Return a linear Rec.709 image (..., 3) as display values in [0, 1]."""
         return _encoding(self.name).encode(image * 2.0**self.stops)
 
     @keywords()
-    def decode(self, image_display: Floats) -> Floats:
+    def decode(self, image_display: "Floats") -> "Floats":
         """Return display values in [0, 1], (..., 3), as linear Rec.709. Clipping cannot be
         undone.
         """
+        import numpy as np
+
         linear = _encoding(self.name).decode(np.clip(image_display, 0, 1))
         return np.asarray(linear / 2.0**self.stops)
 
-    def encode_planes(self, planes: Floats) -> Floats:
+    def encode_planes(self, planes: "Floats") -> "Floats":
         """Return `encode` of linear light with channels first, (3, p)."""
         return _encoding(self.name).encode_planes(planes * 2.0**self.stops)
 
-    def with_slopes(self, planes: Floats) -> tuple[Floats, Floats]:
+    def with_slopes(self, planes: "Floats") -> "tuple[Floats, Floats]":
         """Return `encode` of light with channels first, and its derivatives.
 
         planes: (3, p) linear. Returns display values, (3, p), and the derivatives of display value
@@ -191,11 +174,14 @@ class TransformChoice:
         )
 
 
-def _encoding(name: str) -> Encoding:
+def _encoding(name: str) -> "Encoding":
     if name.lower().startswith("ocio:"):
         from lightpaint.colour.display.ocio import ocio_encoding
 
         return ocio_encoding(name[len("ocio:") :])
+
+    from lightpaint.colour.display.tone_curves import BUILT_IN
+
     if name not in BUILT_IN:
         raise ViewError(
             f"there is no view transform {name!r}: expected {', '.join(BUILT_IN)}, ocio or "

@@ -2,7 +2,6 @@
 
 from collections.abc import Iterable
 from dataclasses import dataclass
-from typing import Literal
 
 import numpy as np
 import numpy.typing as npt
@@ -12,13 +11,11 @@ from lightpaint.lighting.algebra.active_set import polish
 from lightpaint.lighting.algebra.clipped_newton import capped_newton, clipped_newton
 from lightpaint.lighting.algebra.gauss_seidel import sweep
 from lightpaint.lighting.algebra.interior_point import interior_point
+from lightpaint.lighting.algebra.method import Method
 from lightpaint.lighting.algebra.nearest_optimum import nearest_equal
 from lightpaint.lighting.algebra.quadratic import UNREACHED_POWER, Cap, Quadratic, scaled
 from lightpaint.progress import cancellation_check
 from lightpaint.threads import one_thread, parallel_map
-
-#: Newton's method on the active set, which falls back on the paper's iteration; or that one alone.
-Method = Literal["polished", "gauss-seidel"]
 
 #: The multipliers of a problem without caps.
 NO_CAPS = np.zeros(0)

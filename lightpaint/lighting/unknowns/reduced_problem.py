@@ -11,7 +11,8 @@ from typing import Any
 import numpy as np
 
 from lightpaint.arrays import Bools, Doubles, Indices
-from lightpaint.lighting.algebra.optimum import Method, Optimum, minimise, minimise_each
+from lightpaint.lighting.algebra.method import Method
+from lightpaint.lighting.algebra.optimum import Optimum, minimise, minimise_each
 from lightpaint.lighting.algebra.quadratic import Cap, clip_to_sums
 from lightpaint.lighting.normal_equations import NormalEquations
 from lightpaint.lighting.unknowns.knobs import Knob

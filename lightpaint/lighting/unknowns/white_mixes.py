@@ -22,7 +22,7 @@ import numpy as np
 from lightpaint.arrays import Doubles, Indices
 from lightpaint.colour.color_hull import ColorHull
 from lightpaint.colour.white_range import WhiteRange
-from lightpaint.lighting.algebra.optimum import Method
+from lightpaint.lighting.algebra.method import Method
 from lightpaint.lighting.normal_equations import NormalEquations
 from lightpaint.lighting.unknowns.knobs import Knob
 from lightpaint.lighting.unknowns.reduced_problem import ReducedOptimum, solve_reduced

@@ -77,7 +77,9 @@ class Layer:
     its importance by `times`, where the layer's mask covers; `gradient` does what `gradient` says,
     within its mask; `group` has no pixels, and holds the layers whose `group` is its id. strength:
     0 to 2; adjustments and `weigh` take it as a power, so that 2 is twice the stops. importance:
-    factor of its importance.
+    factor of its importance. id: its number. name: for people. is_visible: whether it counts.
+    group: id of the group that it is in; null for none. gain, tint: factors of luminance and
+    colour. times: factor of importance. gradient: for this kind alone.
     """
 
     id: int

@@ -8,6 +8,15 @@ Pictures are fetched, and not sent: `resources` of `state` and of later messages
 are, those of views but the first as `plane/3@1`.
 """
 
+from lightpaint.paint.protocol.answer_parts import (
+    Advice,
+    AnswerChoice,
+    AnswerColors,
+    Closeness,
+    Findings,
+    LightAnswer,
+    WishDelivery,
+)
 from lightpaint.paint.protocol.base import Event, Message, Request
 from lightpaint.paint.protocol.events import (
     Acknowledgement,
@@ -44,18 +53,12 @@ from lightpaint.paint.protocol.light_requests import (
     TieLights,
 )
 from lightpaint.paint.protocol.message_parts import (
-    Advice,
-    AnswerChoice,
-    AnswerColors,
     Camera,
-    Closeness,
     EditState,
-    Findings,
     HistoryInfo,
     ImageInfo,
     LayerInfo,
     LayerList,
-    LightAnswer,
     LightInfo,
     LightPlace,
     LookInfo,
@@ -75,7 +78,6 @@ from lightpaint.paint.protocol.message_parts import (
     Tone,
     TransformInfo,
     ViewInfo,
-    WishDelivery,
 )
 from lightpaint.paint.protocol.painting_requests import (
     AddReference,

@@ -11,12 +11,11 @@ import numpy as np
 import numpy.typing as npt
 
 from lightpaint.arrays import Doubles, Floats
+from lightpaint.paint.protocol.answer_parts import AnswerChoice, Findings
 from lightpaint.paint.protocol.base import OPTIONAL, Event
 from lightpaint.paint.protocol.message_parts import (
-    AnswerChoice,
     Camera,
     EditState,
-    Findings,
     ImageInfo,
     LightInfo,
     LightPlace,
@@ -41,7 +40,12 @@ from lightpaint.paint.store.canvas_pixels import Region
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class SessionPending(Event, kind="waiting"):
-    """The state while there is no picture yet; `state` follows. text: an error, if one occurred."""
+    """The state while there is no picture yet; `state` follows. text: an error, if one occurred.
+
+    version: of this protocol. scene, folder: names of the scene file and of the session.
+    can_render: whether there is a scene to render, and not a basis alone. can_report: whether a
+    report can be written. progress: of what it waits for. is_back: as in `state`.
+    """
 
     version: int
     scene: str
@@ -59,15 +63,18 @@ class SessionState(EditState, Event, kind="state", is_observed=True):
     improves. All lists of lights are in the order of `lights`.
 
     version: of this protocol. size: height and width of the first view, and `objects` the names of
-    its objects.
-    lut: the grid of the tables `lut/NAME` of all `transforms`. resources: pictures, with a number
-    that grows when one is replaced. verifications: the last one of each view. renders: the final
-    renders, as in `renders`. is_new: whether
-    the session has no steps yet. stroke: number of the last stroke that arrived. command: solves
-    for the exported paintings. is_back: the client had the session before, and no other client
-    since; also true if unasked. weights: (lights, 3) float64, the last answer.
+    its objects. lut: the grid of the tables `lut/NAME` of all `transforms`. resources: pictures,
+    with a number that grows when one is replaced. verifications: the last one of each view.
+    renders: the final renders, as in `renders`. is_new: whether the session has no steps yet.
+    stroke: number of the last stroke that arrived. command: solves for the exported paintings.
+    is_back: the client had the session before, and no other client since; also true if unasked.
+    weights: (lights, 3) float64, the last answer.
 
-    choices: as the last `choices` had them; empty once the session has changed since.
+    choices: as the last `choices` had them; empty once the session has changed since. scene,
+    folder: names of the scene file and of the session. can_render: whether there is a scene to
+    render, and not a basis alone. can_report: whether a report can be written. images: lights that
+    are images. transforms: names of view transforms. transform: the one in use. basis: how many
+    samples the planes have. answer: how close the last one is.
     """
 
     version: int
@@ -128,7 +135,8 @@ class CanvasPatch(EditState, Event, kind="patch"):
     lists all of these.
 
     image: (rows, columns, 3) float32. importance: (rows, columns) float32. weights: (lights, 3)
-    float64.
+    float64. region: of these pixels. view: index of the view. version, stroke, exact, mode: as in
+    `answer`.
     """
 
     region: Region
@@ -163,7 +171,10 @@ class SelectionUpdate(EditState, Event, kind="selected"):
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class PictureUpdate(Event, kind="renewed", is_observed=True):
-    """New or replaced pictures, and their numbers. Unasked."""
+    """New or replaced pictures, and their numbers. Unasked.
+
+    resources: pictures, with a number that grows when one is replaced.
+    """
 
     resources: Mapping[str, int]
 
@@ -187,7 +198,10 @@ class DraggedPlane(Event, kind="dragged"):
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class PictureData(Event, kind="fetched"):
-    """A picture, as the array `data`: the answer to `fetch`."""
+    """A picture, as the array `data`: the answer to `fetch`.
+
+    name: as requested. data: the picture.
+    """
 
     name: str
     data: npt.NDArray[np.generic]
@@ -221,6 +235,8 @@ class PreviousAnswer(Event, kind="previous"):
 class LookList(Event, kind="looks", is_observed=True):
     """The kept looks, and all pictures: the answer to requests about looks, and unasked when an
     observer has proposed one.
+
+    resources: as in `renewed`.
     """
 
     looks: tuple[LookInfo, ...]
@@ -271,7 +287,10 @@ class Rig(Event, kind="rig"):
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Notice(Event, kind="notice", is_observed=True):
-    """A sentence for users. Unasked. task: the one that it ends."""
+    """A sentence for users. Unasked. task: the one that it ends.
+
+    text: the sentence. tone: whether it is a warning.
+    """
 
     text: str
     tone: Tone = "info"
@@ -280,7 +299,10 @@ class Notice(Event, kind="notice", is_observed=True):
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Failure(Event, kind="failed"):
-    """The reason why a request was refused; nothing has changed."""
+    """The reason why a request was refused; nothing has changed.
+
+    text: the reason, in a sentence. tone: whether it is a warning.
+    """
 
     text: str
     tone: Tone | None = field(default=None, metadata=OPTIONAL)
@@ -290,6 +312,8 @@ class Failure(Event, kind="failed"):
 class Closing(Event, kind="closed"):
     """Notice that the client does not have the session, or has lost it: another client has `taken`
     it, the painter has `ended`, or the client speaks another `version` of this protocol.
+
+    reason: as above. text: the same, in a sentence.
     """
 
     reason: Literal["taken", "ended", "version"]

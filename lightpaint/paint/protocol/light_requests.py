@@ -13,8 +13,7 @@ class ConstrainLight(Request, kind="constrain_light"):
     """New constraints on one light; an empty object frees it. Answered by `answer`.
 
     constraints: keys and values as in a lights file: lock, off, limits, color, kelvin, duv,
-    primaries.
-    is_final: whether it becomes a step; false while a slider moves.
+    primaries. is_final: whether it becomes a step; false while a slider moves. light: its index.
     """
 
     light: int
@@ -29,7 +28,8 @@ class ConstrainLights(Request, kind="constrain_lights"):
 
     is_final: as in `constrain_light`. label: its name for undo; "" for the names of the lights.
     earlier: constraints of lights that are locked or off, by name, which apply once these are
-    released, in place of those from before they were locked.
+    released, in place of those from before they were locked. constraints: by name of light, keys
+    and values.
     """
 
     constraints: Mapping[str, Mapping[str, Any]]
@@ -54,6 +54,8 @@ class StartFromLamps(Request, kind="start_from_lamps"):
     """The lights as they are now become the lighting that the solve starts from and stays near, and
     locked ones are released; or this ends. One step. Answered by `answer`. The setting `near` says
     how near.
+
+    is_on: false to end it.
     """
 
     is_on: bool = True
@@ -98,7 +100,7 @@ class PointLight(Request, kind="point"):
 
     mode: `aim` points it there; `highlight` hangs it so that its reflection appears there; `shadow`
     hangs it so that the shadow of the surface at `edge` ends there. pixel, edge: column and row in
-    pixels. view: index of the view. is_final, step: as in `move`.
+    pixels. view: index of the view. is_final, step: as in `move`. light: its index.
     """
 
     light: int
@@ -130,8 +132,9 @@ class AddLight(Request, kind="add_light"):
 
 @dataclass(frozen=True)
 class RemoveLight(Request, kind="remove_light"):
-    """A request to remove an added light, by name: one step. Answered by `state`; `rig`
-    follows.
+    """A request to remove an added light, by name: one step. Answered by `state`; `rig` follows.
+
+    name: of the light.
     """
 
     name: str
@@ -153,7 +156,7 @@ class PlaceLights(Request, kind="place"):
     new_type: type of lights to add, instead of moving existing ones; null for none. max_count:
     maximum number of them. surfaces: names of rails, surfaces and shapes that they may hang on;
     none for anywhere free. keeps_best: for a stop: whether the best that was found by then becomes
-    a step, once it is judged; otherwise every light stays where it is.
+    a step, once it is judged; otherwise every light stays where it is. run: false to stop.
     """
 
     run: bool = True
@@ -178,6 +181,9 @@ class EstimatePlaces(Request, kind="estimate_place"):
 
 @dataclass(frozen=True)
 class TieLights(Request, kind="tie"):
-    """The lights that share a dimmer: all such groups, of names. Answered by `answer`."""
+    """The lights that share a dimmer: all such groups, of names. Answered by `answer`.
+
+    ties: groups of names of lights.
+    """
 
     ties: tuple[tuple[str, ...], ...]

@@ -17,7 +17,8 @@ class LightInfo:
     present: its emission before anything was painted. parameter, plugin: its definition in the
     scene. form: how the scene writes its emission. members: its emitters, if it is a group. group:
     name of that group; null for a single emitter. is_fixed: whether it is not adjusted. is_scalar:
-    whether one number stands for all channels. scale: factor of its stored plane.
+    whether one number stands for all channels. scale: factor of its stored plane. name, label: its
+    name in the scene, and as people read it. unit: of its emission.
     """
 
     name: str
@@ -101,8 +102,8 @@ class SkyAxes:
 class Camera:
     """A camera without a lens. Pixel (x, y) sees origin + s · (x · x_axis + y · y_axis + forward).
 
-    is_parallel: all rays have the direction `forward` and begin at
-    origin + x · x_axis + y · y_axis.
+    is_parallel: all rays have the direction `forward` and begin at origin + x · x_axis + y ·
+    y_axis. origin, x_axis, y_axis, forward: vectors in units of the scene.
     """
 
     origin: Place
@@ -145,7 +146,10 @@ class LayerInfo(Layer):
 
 @dataclass(frozen=True)
 class LayerList:
-    """The layers of the painting, the lowest first. next: the id of the next new one."""
+    """The layers of the painting, the lowest first. next: the id of the next new one.
+
+    layers: of the painting.
+    """
 
     layers: tuple[LayerInfo, ...]
     next: int
@@ -167,7 +171,8 @@ class LookInfo:
     """A kept look. stamp: time in seconds since 1970. thumbnail: name of its picture.
 
     lights: names of its lights, which may differ from the current ones. weights: of each. places:
-    as in `EditState`.
+    as in `EditState`. id: a number that no other look has. is_proposal: whether an observer has
+    proposed it.
     """
 
     id: int
@@ -182,7 +187,10 @@ class LookInfo:
 
 @dataclass(frozen=True)
 class TransformInfo:
-    """The view transform that the pictures are seen through, and its exposure in stops."""
+    """The view transform that the pictures are seen through, and its exposure in stops.
+
+    name: of the transform. stops: exposure.
+    """
 
     name: str
     stops: float
@@ -190,7 +198,10 @@ class TransformInfo:
 
 @dataclass(frozen=True)
 class TableInfo:
-    """The grid of the view transforms' tables: points on a side, lowest and highest log2 light."""
+    """The grid of the view transforms' tables: points on a side, lowest and highest log2 light.
+
+    side: points on a side. low, high: lowest and highest log2 light.
+    """
 
     side: int
     low: float
@@ -199,7 +210,11 @@ class TableInfo:
 
 @dataclass(frozen=True)
 class SampleCount:
-    """Samples per pixel: of the current basis, and of the final one."""
+    """Samples per pixel: of the current basis, and of the final one.
+
+    spp: of the current basis. target_spp: of the final one. is_complete: whether all samples are
+    there.
+    """
 
     spp: int
     target_spp: int
@@ -208,7 +223,10 @@ class SampleCount:
 
 @dataclass(frozen=True)
 class HistoryInfo:
-    """Labels of the last steps that can be undone and redone; count: of all steps."""
+    """Labels of the last steps that can be undone and redone; count: of all steps.
+
+    undo, redo: labels of steps.
+    """
 
     undo: tuple[str, ...]
     redo: tuple[str, ...]
@@ -221,7 +239,7 @@ class StepInfo:
 
     id: a number that no other step has; the picture `step/ID` shows the answer after it.
     is_milestone: the last step before a pause or before everything was replaced, or the last of
-    many.
+    many. label: what was done.
     """
 
     id: int
@@ -236,7 +254,7 @@ class SearchInfo:
 
     after: id of the last step when it ended, which is its own if it found something; 0 for none.
     title: what was searched for. text: what came of it. tried: sentences on what was tried. stamp:
-    time in seconds since 1970.
+    time in seconds since 1970. id: a number that no other search has. seconds: that it took.
     """
 
     id: int
@@ -252,7 +270,7 @@ class SearchInfo:
 class PresetInfo:
     """A preset: a request for a whole scene. Its picture is `preset/NAME`.
 
-    has_subject: whether it is about one object.
+    has_subject: whether it is about one object. name: in requests. title, description: for people.
     """
 
     name: str
@@ -265,6 +283,8 @@ class PresetInfo:
 class ReferenceInfo:
     """A reference. Its pictures are `reference/ID`, (h, w, 3) uint8 as the session's view transform
     shows it, and `reference_light/ID`, its light, reduced, (h, w, 3) float16.
+
+    id: a number that no other reference has. name: of its file.
     """
 
     id: int
@@ -278,7 +298,8 @@ class RenderInfo:
 
     name: as requested. height: null until it is known. state: `waiting` for an earlier one; the
     others speak for themselves. done, total: its passes. text: why it has failed. files: paths of
-    those that were written.
+    those that were written. id: a number that no other render has. view, width, spp, formats: as
+    requested.
     """
 
     id: int
@@ -297,7 +318,10 @@ class RenderInfo:
 
 @dataclass(frozen=True)
 class PlacePair:
-    """Two places that should look alike: (x, y) as shares of width and height, 0 to 1."""
+    """Two places that should look alike: (x, y) as shares of width and height, 0 to 1.
+
+    reference: the place in the reference. picture: the place in the view.
+    """
 
     reference: tuple[float, float]
     picture: tuple[float, float]
@@ -305,7 +329,10 @@ class PlacePair:
 
 @dataclass(frozen=True)
 class ResolvedFit:
-    """The resolved values of all settings, as in `lightpaint.Fit`."""
+    """The resolved values of all settings, as in `lightpaint.Fit`.
+
+    space: `display` or `linear`. hold: strength of the hold. colors: freedom of the lights.
+    """
 
     space: str | None
     hold: float | None
@@ -325,7 +352,8 @@ class EditState:
 
     earlier: constraints of lights that are locked or off, by name, from before they were, to be
     sent when they are released. kept: names of those that are locked only since they were moved.
-    is_started: whether the solve starts from lamps that were set by hand.
+    is_started: whether the solve starts from lamps that were set by hand. history: labels of steps
+    to undo and redo.
     """
 
     history: HistoryInfo | None = field(default=None, metadata=OPTIONAL)
@@ -346,111 +374,3 @@ class EditState:
 
 #: Tone of a message to the user.
 Tone = Literal["info", "warn"]
-
-
-@dataclass(frozen=True)
-class Advice:
-    """A constraint that keeps the lights from the paint and can be loosened.
-
-    kind: of the constraint; `reach` if there is none, but moving lights may help, and `light` if a
-    new light may, since all that reach the paint light the rest, too. names: its
-    lights. gain: share of the error that disappears without it; null if more is needed. hold: the
-    weaker hold to set. delta_e: mean ΔE over the paint now and without it; null if not known.
-    """
-
-    kind: str
-    names: tuple[str, ...]
-    gain: float | None
-    hold: float | None
-    delta_e: tuple[float, float] | None = None
-
-
-@dataclass(frozen=True)
-class Closeness:
-    """Closeness of an answer in one view. delta_e_present: ΔE of the current look."""
-
-    headline: str
-    help: Advice | None
-    delta_e: float
-    delta_e_present: float
-    sentences: tuple[str, ...]
-
-
-#: The choices of `colors` whose answers can be compared: each lamp as it is, as the paint asks, and
-#: any colour.
-AnswerColors = Literal["own", "gentle", "free"]
-
-
-@dataclass(frozen=True)
-class WishDelivery:
-    """The share of a wish that came: of a `layer`, of a `group` of layers, or of a `wish`, which is
-    a stroke in a layer.
-
-    layers: ids of its layers. brightness, color: share of the asked change that came; null if none
-    was asked. delta_e: of its lit parts, against the painting.
-    """
-
-    name: str
-    kind: str
-    layers: tuple[int, ...]
-    brightness: float | None
-    color: float | None
-    delta_e: float
-
-
-@dataclass(frozen=True)
-class AnswerChoice:
-    """The exact answer with one choice of `colors`. Its picture is `choice/COLORS`, in each view.
-
-    is_chosen: whether it is the answer itself. delta_e: its mean ΔE over the paint. brightness,
-    color: mean share of the asked changes that came, from 0 to 1, in which each wish counts alike;
-    null if none was asked. worst: the wish of which least came; null if at least three quarters of
-    each did.
-    """
-
-    colors: AnswerColors
-    is_chosen: bool
-    delta_e: float
-    brightness: float | None
-    color: float | None
-    worst: WishDelivery | None
-
-
-@dataclass(frozen=True)
-class LightAnswer:
-    """The answer for one light.
-
-    stops: relative to its current emission; null if it is, or was, off. kelvin: null for a colour
-    that is not white. share: of the light in the picture. error: its uncertainty, in words.
-    is_constrained: whether a constraint limits it. is_unreached: whether no paint depends on it.
-    """
-
-    emission: RGB
-    stops: float | None
-    kelvin: float | None
-    swatch: str
-    is_on: bool
-    share: float
-    error: str | None = field(default=None, metadata=OPTIONAL)
-    is_constrained: bool | None = field(default=None, metadata=OPTIONAL)
-    is_unreached: bool | None = field(default=None, metadata=OPTIONAL)
-
-
-@dataclass(frozen=True, kw_only=True)
-class Findings:
-    """Properties of an answer; the sentences follow later than the lights.
-
-    lights: in the order of the state. shares: of each light, by view, if there are several.
-    closeness: of each view; null for unpainted views. deliveries: how much of each wish came, in
-    all views together.
-    """
-
-    lights: tuple[LightAnswer, ...] | None = field(default=None, metadata=OPTIONAL)
-    shares: tuple[tuple[float, ...], ...] | None = field(default=None, metadata=OPTIONAL)
-    headline: str | None = field(default=None, metadata=OPTIONAL)
-    help: Advice | None = field(default=None, metadata=OPTIONAL)
-    delta_e: float | None = field(default=None, metadata=OPTIONAL)
-    delta_e_present: float | None = field(default=None, metadata=OPTIONAL)
-    sentences: tuple[str, ...] | None = field(default=None, metadata=OPTIONAL)
-    closeness: tuple[Closeness | None, ...] | None = field(default=None, metadata=OPTIONAL)
-    deliveries: tuple[WishDelivery, ...] | None = field(default=None, metadata=OPTIONAL)

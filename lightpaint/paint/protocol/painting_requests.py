@@ -26,7 +26,7 @@ class Paint(Request, kind="paint"):
     only then it is kept. label: its name for undo. view: index of the painted view. layer: id of
     the layer of these pixels. For all kinds but `pixels`, `importance` is the coverage, 0 to 1, and
     masks need no `image`. properties: of the layer, from now on; with an unused id they add a layer
-    on top.
+    on top. region: of these pixels.
     """
 
     request_buffers: ClassVar[Mapping[str, str]] = {
@@ -176,7 +176,10 @@ class AddReference(Request, kind="add_reference"):
 
 @dataclass(frozen=True)
 class DropReference(Request, kind="drop_reference"):
-    """Delete a reference. Answered by `references`."""
+    """Delete a reference. Answered by `references`.
+
+    reference: its id.
+    """
 
     reference: int
 
@@ -190,6 +193,7 @@ class LookLike(Request, kind="look_like"):
     these and its `regions`, top, middle and bottom; nine `parts`, for a reference of the same view;
     or `pairs` of places, each in the reference and in the view. matches_brightness: whether the
     picture becomes as bright as the reference; otherwise only differences within it count.
+    reference: its id. pairs: of places, if `areas` is `pairs`. view: index of the view.
     """
 
     reference: int
@@ -220,21 +224,30 @@ class StartOver(Request, kind="start_over"):
 
 @dataclass(frozen=True)
 class SaveLook(Request, kind="save_look"):
-    """Keep painting and answer under a name. Answered by `looks`."""
+    """Keep painting and answer under a name. Answered by `looks`.
+
+    name: of the look.
+    """
 
     name: str
 
 
 @dataclass(frozen=True)
 class LoadLook(Request, kind="load_look"):
-    """Continue from a look; a step that can be undone. Answered by `patch`."""
+    """Continue from a look; a step that can be undone. Answered by `patch`.
+
+    look: its id.
+    """
 
     look: int
 
 
 @dataclass(frozen=True)
 class RenameLook(Request, kind="rename_look"):
-    """Give a look another name. Answered by `looks`."""
+    """Give a look another name. Answered by `looks`.
+
+    look: its id. name: the new one.
+    """
 
     look: int
     name: str
@@ -242,7 +255,10 @@ class RenameLook(Request, kind="rename_look"):
 
 @dataclass(frozen=True)
 class CopyLook(Request, kind="copy_look"):
-    """Keep a copy of a look. Answered by `looks`."""
+    """Keep a copy of a look. Answered by `looks`.
+
+    look: its id.
+    """
 
     look: int
 
@@ -251,6 +267,8 @@ class CopyLook(Request, kind="copy_look"):
 class MixLooks(Request, kind="mix_looks"):
     """Keep a mix of two looks: its lights are locked at the share `part` of the way from the first
     to the second. Answered by `looks`.
+
+    first, second: their ids. part: 0 to 1. name: of the mix.
     """
 
     first: int
@@ -264,6 +282,8 @@ class CompareLooks(Request, kind="compare_looks"):
     """A request for pictures of looks whose lights hang elsewhere than now; for none, to stop.
     Answered by `started`; `renewed` then lists `look_plane/ID` and `look_clean/ID` of each: first
     with estimated planes of lights that hang nowhere else, later with rendered ones.
+
+    looks: their ids.
     """
 
     looks: tuple[int, ...] = ()
@@ -271,7 +291,10 @@ class CompareLooks(Request, kind="compare_looks"):
 
 @dataclass(frozen=True)
 class DropLook(Request, kind="drop_look"):
-    """Delete a look. Answered by `looks`."""
+    """Delete a look. Answered by `looks`.
+
+    look: its id.
+    """
 
     look: int
 
@@ -281,7 +304,8 @@ class Propose(Request, kind="propose"):
     """Propose a lighting to the painter: it becomes a look with each light locked at the proposed
     level, and replaces an earlier proposal of that name. Answered by `looks`.
 
-    lights: emission by name of light; other lights keep that of the current answer.
+    lights: emission by name of light; other lights keep that of the current answer. name: of the
+    proposal.
     """
 
     name: str

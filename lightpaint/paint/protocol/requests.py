@@ -21,8 +21,10 @@ MIN_RENDER_WIDTH, MAX_RENDER_WIDTH, MAX_RENDER_SPP = 16, 2**14, 2**16
 
 @dataclass(frozen=True)
 class Hello(Request, kind="hello"):
-    """The first message of a page, and again after a dropped connection. Answered by `state`, or
-    by `waiting` while there is no picture yet; `state` then comes as soon as there is one.
+    """The first message of a page, and again after a dropped connection. Answered by `state`, or by
+    `waiting` while there is no picture yet; `state` then comes as soon as there is one.
+
+    version: of the protocol that the client speaks.
     """
 
     version: int
@@ -65,7 +67,7 @@ class Export(Request, kind="export"):
     outputs: `target`: a painting of each painted view; `layers`: its layers; `picture`: the
     displayed answer in each view. name: of a new folder in `exports/` for these files; a number
     follows a name that is taken, so that no earlier export is replaced. "" for the folder of the
-    session itself, whose earlier files of the same names are replaced.
+    session itself, whose earlier files of the same names are replaced. run: false to stop.
     """
 
     outputs: tuple[Literal["target", "picture", "lighting", "relit", "report", "layers"], ...]
@@ -101,14 +103,20 @@ class RenderFinal(Request, kind="render_final"):
 
 @dataclass(frozen=True)
 class StopRender(Request, kind="stop_render"):
-    """Stop a final render, which writes nothing then. Answered by `renders`."""
+    """Stop a final render, which writes nothing then. Answered by `renders`.
+
+    render: its id.
+    """
 
     render: int
 
 
 @dataclass(frozen=True)
 class DropRender(Request, kind="drop_render"):
-    """Take a final render that has ended off the list; its files stay. Answered by `renders`."""
+    """Take a final render that has ended off the list; its files stay. Answered by `renders`.
+
+    render: its id.
+    """
 
     render: int
 
@@ -117,6 +125,8 @@ class DropRender(Request, kind="drop_render"):
 class Verify(Request, kind="verify"):
     """Render the answer in a view, or stop that. Answered by `started`, later by `verified`, or by
     `stopped` once the render has ended.
+
+    run: false to stop. view: index of the view.
     """
 
     run: bool = True
@@ -127,6 +137,8 @@ class Verify(Request, kind="verify"):
 class Explain(Request, kind="explain"):
     """A request for the reasons why a view is not closer to its painting. Answered by `started`,
     later by `explained` and the picture `beyond`.
+
+    view: index of the view.
     """
 
     view: int = 0
@@ -141,6 +153,8 @@ class TakeOver(Request, kind="take_over"):
 class Fetch(Request, kind="fetch"):
     """A request for a picture, for clients without HTTP. Answered by `fetched`, with the picture as
     its array.
+
+    name: of the picture, as in `resources`.
     """
 
     name: str
@@ -151,6 +165,8 @@ class Observe(Request, kind="observe"):
     """The first message of an observer: a client that receives lighting, looks and progress, and
     never has the session. It may then send `fetch`, `export` and `propose`, and nothing else.
     Answered by `state` or `waiting`.
+
+    version: as in `hello`.
     """
 
     version: int

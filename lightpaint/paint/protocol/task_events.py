@@ -16,7 +16,8 @@ class ProgressReport(Event, kind="progress", is_observed=True):
     """The progress of a long task. Unasked.
 
     task: `export`, `final` for a final render, `basis`, `sampling` for samples added where the
-    paint needs them, or the renderer's name for the task.
+    paint needs them, or the renderer's name for the task. done, total: steps so far, and in all.
+    unit: of these steps; "" for none.
     """
 
     task: str
@@ -29,7 +30,8 @@ class ProgressReport(Event, kind="progress", is_observed=True):
 class VerificationResult(Event, kind="verified", is_observed=True):
     """The result of a verification; its render is the picture `verified`. Unasked.
 
-    is_old: whether the session has changed since.
+    is_old: whether the session has changed since. agrees: whether the render is the predicted
+    picture but for noise. text: the result, in a sentence. view: index of the view.
     """
 
     agrees: bool
@@ -58,7 +60,10 @@ class TaskStarted(Event, kind="started"):
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class TaskStopped(Event, kind="stopped"):
-    """Notice that a stopped task has ended. Unasked."""
+    """Notice that a stopped task has ended. Unasked.
+
+    task: the request.
+    """
 
     task: Literal["verify"]
 
@@ -68,7 +73,8 @@ class ExportResult(Event, kind="exported", is_observed=True):
     """Files that were written. Unasked.
 
     command: solves for the exported paintings; "" for none. is_stopped: whether the export was
-    stopped before its end. is_unpainted: whether files that need a painting were left out.
+    stopped before its end. is_unpainted: whether files that need a painting were left out. files:
+    their paths.
     """
 
     files: tuple[str, ...]
@@ -90,6 +96,8 @@ class RenderList(Event, kind="renders"):
 class Explanation(Event, kind="explained"):
     """The reasons why a view is not closer to its painting; the picture `beyond` shows where.
     Unasked.
+
+    sentences: the reasons. view: index of the view. is_old: whether the session has changed since.
     """
 
     sentences: tuple[str, ...]
@@ -101,6 +109,9 @@ class Explanation(Event, kind="explained"):
 class PreviewResult(Event, kind="previewed"):
     """The effect of a change, before it is made. Unasked. number: of the preview. is_at_cost:
     whether it changes the unpainted part by more than it gains. before, after: (h, w, 3) uint8.
+
+    view: as requested. text: the effect, in a sentence. is_old: whether the session has changed
+    since.
     """
 
     number: int

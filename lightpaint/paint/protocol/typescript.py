@@ -16,7 +16,7 @@ import numpy as np
 
 from lightpaint.arrays import RGB
 from lightpaint.paint.layers.layer_stack import Layer
-from lightpaint.paint.protocol import Event, Request, message_parts
+from lightpaint.paint.protocol import Event, Request, answer_parts, message_parts
 from lightpaint.paint.store.canvas_pixels import Region
 
 #: The file of types, beside the scripts that use them.
@@ -43,7 +43,10 @@ PRIMITIVES = {str: "string", int: "number", float: "number", bool: "boolean", ty
 def declarations() -> str:
     """Return the whole file."""
     records = [
-        record for record in vars(message_parts).values() if _is_record_of(record, message_parts)
+        record
+        for module in (message_parts, answer_parts)
+        for record in vars(module).values()
+        if _is_record_of(record, module)
     ]
     blocks = [HEADER, *(_interface(record, is_request=False) for record in records)]
     blocks += [_interface(record, is_request=False) for record in Event.kinds.values()]

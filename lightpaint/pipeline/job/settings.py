@@ -4,13 +4,13 @@ from dataclasses import dataclass
 from typing import Annotated, TypedDict
 
 from lightpaint.errors import LightpaintError
+from lightpaint.field_options import Option
 from lightpaint.keywords import keywords
-from lightpaint.lighting.algebra.optimum import Method
+from lightpaint.lighting.algebra.method import Method
 from lightpaint.lighting.fit import Colors, Emitters, Fit, Space
-from lightpaint.scene.lights.texels.texel import MAX_TEXELS
-from lightpaint.scene.properties.film import MAX_SPP, check_resolution
+from lightpaint.scene.limits import MAX_SPP, MAX_TEXELS
 from lightpaint.scene.quality_presets import Quality, samples
-from lightpaint.validation import a, between, number, whole
+from lightpaint.validation import a, between, number, parse_share, whole
 
 #: Maximum number of rounds of rendering and solving again: a larger number is a typing error.
 MAX_REFINE = 100
@@ -83,27 +83,190 @@ class Settings(Fit):
         lightpaint.errors.LightpaintError: refine is -1: expected a whole number >= 0, at most 100
     """
 
-    resize: bool = False
+    resize: Annotated[
+        bool,
+        Option(
+            "--resize",
+            "resample a target whose size differs from the basis",
+            default="refuse it",
+            theme="Painting",
+        ),
+    ] = False
     # The noise is estimated from two halves of the samples.
-    spp: Annotated[int | None, whole(2, MAX_SPP)] = None
-    time_s: Annotated[float | None, number("seconds")] = None
-    error: Annotated[float | None, between(MIN_ERROR, 1, "a share")] = None
-    seed: Annotated[int, whole(0)] = 0
-    resolution: Annotated[str | None, a(str, "a part of the film like '1/4' or '320x180'")] = None
-    quality: Quality | None = None
-    use_cache: bool = True
-    exact_spp: bool = False
-    noise_correction: bool | None = None
-    refine: Annotated[int, whole(0, MAX_REFINE)] = 0
-    suggest: Annotated[int, whole(0, MAX_SUGGEST)] = 0
-    sun: Annotated[int | None, whole(0, MAX_TEXELS)] = None
-    move_lights: bool = True
-    animate: bool = False
-    cd_per_unit: Annotated[float | None, number("cd/m²")] = None
-    verify: bool = True
-    verify_spp: Annotated[int | None, whole(2, MAX_SPP)] = None
+    spp: Annotated[
+        int | None,
+        whole(2, MAX_SPP),
+        Option("--spp N", "samples per pixel", default="the scene's", theme="How much to render"),
+    ] = None
+    time_s: Annotated[
+        float | None,
+        number("seconds"),
+        Option(
+            "--time SECONDS",
+            "seconds to render the basis, instead of --spp. They include compilation, but not "
+            "the verification; samples of earlier runs are added",
+            theme="How much to render",
+        ),
+    ] = None
+    error: Annotated[
+        float | None,
+        between(MIN_ERROR, 1, "a share"),
+        Option(
+            "--error SHARE",
+            "render until no visible light has a larger error than this, like 2%%, instead of "
+            "--spp: 16 samples per pixel come first, then more where the painting needs them; "
+            "--time limits the seconds",
+            theme="How much to render",
+            parse=parse_share,
+        ),
+    ] = None
+    seed: Annotated[
+        int,
+        whole(0),
+        Option("--seed S", "random seed", default="%(default)s", theme="How much to render"),
+    ] = 0
+    resolution: Annotated[
+        str | None,
+        a(str, "a part of the film like '1/4' or '320x180'"),
+        Option(
+            "--resolution 1/N|WxH",
+            "render one pixel for each square block of film pixels, like 1/4 or 320x180; "
+            "incomplete blocks at the right and bottom edges are left out",
+            default="the whole film",
+            theme="How much to render",
+        ),
+    ] = None
+    quality: Annotated[
+        Quality | None,
+        Option(
+            "--quality",
+            "preview: 32 samples per pixel on about 30,000 pixels, each of which is a block of "
+            "film pixels; final: 256 on the whole film. --spp, --time and --resolution take "
+            "precedence",
+            theme="How much to render",
+        ),
+    ] = None
+    use_cache: Annotated[
+        bool,
+        Option(
+            "--no-cache",
+            "do not use bases of earlier runs, and do not keep this one",
+            default="do both",
+            theme="How much to render",
+        ),
+    ] = True
+    exact_spp: Annotated[
+        bool,
+        Option(
+            "--exact-spp",
+            "use exactly the requested samples per pixel, even if the cache has a basis with more",
+            default="use that one",
+            theme="How much to render",
+        ),
+    ] = False
+    noise_correction: Annotated[
+        bool | None,
+        Option(
+            "--correct-noise",
+            "subtract the power of the noise from the equations as far as that helps, so that "
+            "the answer is closer to one from many samples",
+            default="if the noise is known",
+            theme="What the painting means",
+        ),
+    ] = None
+    refine: Annotated[
+        int,
+        whole(0, MAX_REFINE),
+        Option(
+            "--refine K",
+            "render the solved scene K times, with as many samples as the basis, and improve the "
+            "answer each time",
+            default="%(default)s",
+            theme="What the painting means",
+        ),
+    ] = 0
+    suggest: Annotated[
+        int,
+        whole(0, MAX_SUGGEST),
+        Option(
+            "--suggest N",
+            "suggest up to N (3) new point lights that would help most, with XML to paste, and "
+            "the best turn of one spot of the scene; takes about half a minute",
+            theme="Shots, looks and advice",
+            bare=3,
+            least=1,
+        ),
+    ] = 0
+    sun: Annotated[
+        int | None,
+        whole(0, MAX_TEXELS),
+        Option(
+            "--sun N",
+            "find a sun in a sky that is split: split its texels again where the painting gains "
+            "most by it, into N (72) more at most, 24 at a time",
+            default="as the lights file says",
+            theme="Lights",
+            bare=72,
+        ),
+    ] = None
+    move_lights: Annotated[
+        bool,
+        Option(
+            "--no-move",
+            "keep all lights in place, even if the lights file lets them move",
+            theme="Lights",
+        ),
+    ] = True
+    animate: Annotated[
+        bool,
+        Option(
+            "--animate",
+            "of a shot with several painted frames: find a lighting for each, and lights that "
+            "change smoothly between them",
+            default="one lighting for all frames",
+            theme="Shots, looks and advice",
+        ),
+    ] = False
+    cd_per_unit: Annotated[
+        float | None,
+        number("cd/m²"),
+        Option(
+            "--unit CD/M2",
+            "luminance in cd/m² of a radiance of 1 in the scene, to show lumen, candela and lux",
+            default="relative numbers without units",
+            theme="Lights",
+        ),
+    ] = None
+    verify: Annotated[
+        bool,
+        Option(
+            "--no-verify",
+            "do not render the relit scene",
+            default="render it with at most the samples of the basis, and only a part of the film "
+            "if they do not suffice for all of it",
+            theme="Verification",
+        ),
+    ] = True
+    verify_spp: Annotated[
+        int | None,
+        whole(2, MAX_SPP),
+        Option(
+            "--verify-spp N",
+            "samples per pixel of the verification, which then covers the whole film, however "
+            "long it takes",
+            theme="Verification",
+        ),
+    ] = None
     report: bool = True
-    force: bool = False
+    force: Annotated[
+        bool,
+        Option(
+            "--force",
+            "replace results of another painting, and results changed by hand",
+            default="refuse",
+            theme="Results",
+        ),
+    ] = False
     command: Annotated[str, a(str, "the text of a shell command")] = ""
 
     def __post_init__(self) -> None:
@@ -130,6 +293,8 @@ class Settings(Fit):
                 "verification, or its samples"
             )
         if self.resolution is not None:
+            from lightpaint.scene.properties.film import check_resolution  # late: it needs NumPy
+
             check_resolution(self.resolution)
 
     def corrects_noise(self, *, is_known: bool) -> bool:

@@ -16,10 +16,7 @@ from typing import Any
 from lightpaint.display_text import some_names
 from lightpaint.errors import SceneError
 from lightpaint.images.pixel_blocks import blocks_in, left_over, whole_factor
-
-#: Maximum number of pixels of a film, and maximum samples per pixel: larger numbers are mistakes.
-MAX_PIXELS = 2**28
-MAX_SPP = 2**20
+from lightpaint.scene.limits import MAX_PIXELS, MAX_SPP
 
 #: Maximum number of sizes that an error lists.
 LISTED_SIZES = 8

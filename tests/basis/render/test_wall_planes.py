@@ -4,6 +4,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from nightly import nightly
 from renderer import (
     LIGHTS,
     SAME_SAMPLES,
@@ -120,7 +121,7 @@ def test_a_slide_with_a_texel_for_each_pixel_is_as_it_was(tmp_path: Path) -> Non
     np.testing.assert_allclose(predicted, whole, atol=2 * SAME_SAMPLES * whole.max())
 
 
-@pytest.mark.parametrize("kind", LIT)
+@pytest.mark.parametrize("kind", [x if x in ("bitmap", "projector") else nightly(x) for x in LIT])
 def test_a_render_of_the_written_image_confirms_the_prediction(tmp_path: Path, kind: str) -> None:
     scene = split_room(tmp_path, LIT[kind] + LIGHTS["bulb"])
     lighting = painted(scene)

@@ -20,6 +20,7 @@ from lightpaint.lighting.solve import solve
 from lightpaint.report.verdict import headline
 from lightpaint.scene.lights.texels.texel import texel_names
 from lightpaint.target.target import Target
+from lightpaint.target.wish import Wish
 
 SIZE = (24, 48)
 
@@ -204,6 +205,20 @@ def test_what_counts_of_the_few_pixels_is_what_counts_of_all(make_basis: Any):
     np.testing.assert_allclose(weights, solution.weights, rtol=2e-3)  # where both solves stop
 
 
+def test_a_sample_asks_for_the_same_contrasts(make_basis: Any):
+    """Places that ask for something of their own are found where pixels lie, not in a row."""
+    yy, xx = np.mgrid[:40, :50] / 8
+    images = np.stack([2 + np.sin(k + 1 + yy * k) * np.cos(k * xx + yy) for k in range(3)])
+    basis = make_basis(images=images[..., None] * np.ones(3), emission=[[0.02] * 3] * 3)
+    image = 0.5 * _look(basis)
+    image[12:28, 12:28] *= 4
+    target = _paint_over(image, (slice(None), slice(None)), image)
+    solution = solve(basis, target, hold=0.0)
+    sample = PixelSample.of(solution)
+    weights = sample.solve((), sample.other_views)
+    np.testing.assert_allclose(weights, solution.weights, rtol=2e-3)  # where both solves stop
+
+
 @pytest.mark.parametrize("stops", [(1.0, 0.0), (0.8, -0.5)])
 def test_a_weaker_hold_is_the_strongest_that_brings_half(make_basis: Any, stops: Any):
     """One light for both halves of the paint, and a window elsewhere that spills on it."""
@@ -217,6 +232,7 @@ def test_a_weaker_hold_is_the_strongest_that_brings_half(make_basis: Any, stops:
     look = _look(basis)
     target = _paint_over(look, (slice(None), slice(0, 24)), look[:, :24] * 2.0 ** stops[1])
     target.image[:, :12] = look[:, :12] * 2.0 ** stops[0]
+    target = replace(target, wishes=(Wish("paint", target.importance),))
     solution = solve(basis, target, hold=10.0)
     hold = next(x for x in compare_appearance(solution).reasons if x.kind == "hold")
     weaker = hold.loosening

@@ -1,4 +1,4 @@
-"""What noise does to a fit of what a display shows: the tangent of its gradient."""
+"""The effect of noise on a fit in display space: the tangent of its gradient."""
 
 from typing import Any
 

@@ -552,7 +552,9 @@ AT_BOUNDS: dict[str, tuple[dict[str, Any], int]] = {
 
 
 @pytest.mark.parametrize("margin", [nightly(0.4), 1.2])
-@pytest.mark.parametrize("name", AT_BOUNDS)
+@pytest.mark.parametrize(
+    "name", [name if k % 3 == 0 else nightly(name) for k, name in enumerate(AT_BOUNDS)]
+)
 def test_intervals_at_bounds_hold_what_is_just_inside(make_basis: Any, name: str, margin: float):
     """Normal noise of little power, so that coverage is known: 95 % at least, by the binomial.
 

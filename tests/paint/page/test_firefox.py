@@ -160,6 +160,7 @@ def wait_until(is_so: Callable[[], Any], description: str) -> None:
         time.sleep(0.1)
 
 
+@pytest.mark.nightly
 def test_what_is_painted_is_answered_and_shown(
     firefox: Firefox, make_basis: Any, tmp_path: Path
 ) -> None:

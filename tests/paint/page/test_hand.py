@@ -630,7 +630,7 @@ OUTLINE = """(object) => {
 
 @pytest.mark.parametrize("engine", ["", nightly("engine")], ids=["made up", "real"])
 def test_the_object_that_would_be_filled_has_an_outline(new_painter: Any, engine: str) -> None:
-    painter = new_painter(engine)
+    painter = new_painter(engine, is_fresh=True)
     page = painter.page
     page.wait_for_function("() => engine.objects() !== null")
     outline = page.locator(".outline")

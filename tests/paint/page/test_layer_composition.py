@@ -6,6 +6,7 @@ from typing import Any
 import numpy as np
 import pytest
 from layered_sessions import random_gradient, random_mask, random_surfaces
+from nightly import seeds
 
 from lightpaint.paint.layers.composed_layers import accents
 from lightpaint.paint.layers.composition import ShownLayer, compose, with_effect
@@ -70,7 +71,7 @@ def random_layers(rng: np.random.Generator) -> LayerStack:
     return LayerStack.of([*rng.permutation(np.array(layers, object)), group])  # type: ignore[arg-type]
 
 
-@pytest.mark.parametrize("seed", range(6))
+@pytest.mark.parametrize("seed", seeds(2, 6))
 def test_the_page_draws_the_bits_of_the_session(page: Any, site: Any, seed: int) -> None:
     rng = np.random.default_rng(seed)
     present = rng.uniform(0, 2, (H, W, 3)).astype(np.float32)

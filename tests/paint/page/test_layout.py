@@ -393,7 +393,7 @@ def test_panels_leave_the_pictures_of_a_narrow_column_their_room(new_painter: An
         )
 
 
-@pytest.mark.parametrize("state", ["first", "busy", "keys", "export", "settings"])
+@pytest.mark.parametrize("state", ["first", "busy", *map(nightly, ["keys", "export", "settings"])])
 def test_axe_finds_nothing(new_painter: Any, axe: str, state: str) -> None:
     painter = new_painter("first&lights=12", axe=axe)
     if state == "busy":

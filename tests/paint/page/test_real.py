@@ -17,6 +17,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from nightly import nightly
 from patience import PATIENCE_S
 from renderer import REPOSITORY
 
@@ -297,7 +298,7 @@ def open_page(browser: Any) -> Iterator[Callable[..., PainterUser]]:
     assert page_errors == []
 
 
-@pytest.mark.parametrize("view", ["cpu", "gl"])
+@pytest.mark.parametrize("view", [nightly("cpu"), "gl"])
 def test_what_is_painted_and_answered_is_on_the_screen(
     served_painter: ServedPainter, open_page: Any, view: str
 ) -> None:
@@ -506,6 +507,7 @@ def test_strokes_outlive_their_connection(served_painter: ServedPainter, open_pa
     assert not served_painter.studio.session.is_painted
 
 
+@pytest.mark.nightly
 def test_what_is_kept_is_there_again_and_solved_alike_from_its_files(
     served_painter: ServedPainter, open_page: Any
 ) -> None:
@@ -554,6 +556,7 @@ def test_what_is_kept_is_there_again_and_solved_alike_from_its_files(
         np.testing.assert_allclose(weights, session.weights, rtol=1e-9)
 
 
+@pytest.mark.nightly
 def test_pictures_of_the_choices_follow_the_painting_after_a_reload(
     served_painter: ServedPainter, open_page: Any
 ) -> None:

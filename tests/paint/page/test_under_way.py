@@ -59,8 +59,9 @@ def test_reasons_that_are_sought_are_said_to_be(painter: Painter) -> None:
     assert painter.button("Why not closer?").is_enabled()
 
 
-def test_all_that_goes_on_is_counted_alike(painter: Painter) -> None:
+def test_all_that_goes_on_is_counted_alike(new_painter: Any) -> None:
     """In percent, and after a while with the time that is left."""
+    painter = new_painter(is_fresh=True)
     page = painter.page
     for task, name in (
         ("basis", "Rendering the lights"),

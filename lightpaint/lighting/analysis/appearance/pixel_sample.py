@@ -27,6 +27,7 @@ from lightpaint.lighting.problem import Problem
 from lightpaint.lighting.solution import Solution
 from lightpaint.lighting.solve import solution_of
 from lightpaint.target.target import Target
+from lightpaint.target.wish_finding import find_wishes
 
 #: Groups of reasons: the hold of unpainted pixels, colours of lights, constraints, and the
 #: paintings of other views.
@@ -77,7 +78,7 @@ class PixelSample:
                 for x, step in zip((is_painted, ~is_painted), steps, strict=True)
             ]
             places.append(np.sort(np.concatenate(chosen)))
-            sampled = _pixel_row(basis, target, places[-1])
+            sampled = _pixel_row(basis, _with_wishes(target, basis), places[-1])
             bases.append(sampled[0])
             targets.append(sampled[1])
         sensors = tuple(basis.origin.sensor for basis in views.bases)
@@ -255,6 +256,12 @@ def _average_blocks(views: Views, side: int) -> Views:
 def _cropped(image: Floats, counts: Doubles) -> Floats:
     """Return the pixels of whole blocks, those that do not count as 0."""
     return image[: counts.shape[0], : counts.shape[1]] * counts[..., None]
+
+
+def _with_wishes(target: Target, basis: Basis) -> Target:
+    """Return the target with its wishes told apart, which takes pixels at their places."""
+    found = find_wishes(target, basis.current_look)
+    return replace(target, wishes=tuple(replace(wish, has_strokes=False) for wish in found))
 
 
 def _pixel_row(basis: Basis, target: Target, chosen: npt.NDArray[np.intp]) -> tuple[Basis, Target]:

@@ -242,8 +242,8 @@ class NoisyPixels:
 
     planes, noise: of the basis. weights: (n, 3). weight, share: (p, 1) or (p, 3). unseen: (p,),
     where no emitter is. counted: the pixels that count. pulled: (n, 3), by how much noise moves the
-    pull on the weights. gradients: of the loss by the light of each pixel. own_share: see
-    `pixel_pairs`.
+    pull on the weights. gradients: of the loss by the light of each pixel. own_share: as
+    the function of this name returns it.
     """
 
     planes: Planes

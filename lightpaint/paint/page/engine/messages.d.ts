@@ -34,7 +34,9 @@ export interface Gradient {
  * its importance by `times`, where the layer's mask covers; `gradient` does what `gradient` says,
  * within its mask; `group` has no pixels, and holds the layers whose `group` is its id. strength:
  * 0 to 2; adjustments and `weigh` take it as a power, so that 2 is twice the stops. importance:
- * factor of its importance.
+ * factor of its importance. id: its number. name: for people. is_visible: whether it counts.
+ * group: id of the group that it is in; null for none. gain, tint: factors of luminance and
+ * colour. times: factor of importance. gradient: for this kind alone.
  */
 export interface Layer {
   id: number;
@@ -56,7 +58,8 @@ export interface Layer {
  * present: its emission before anything was painted. parameter, plugin: its definition in the
  * scene. form: how the scene writes its emission. members: its emitters, if it is a group. group:
  * name of that group; null for a single emitter. is_fixed: whether it is not adjusted. is_scalar:
- * whether one number stands for all channels. scale: factor of its stored plane.
+ * whether one number stands for all channels. scale: factor of its stored plane. name, label: its
+ * name in the scene, and as people read it. unit: of its emission.
  */
 export interface LightInfo {
   name: string;
@@ -131,8 +134,8 @@ export interface SkyAxes {
 /**
  * A camera without a lens. Pixel (x, y) sees origin + s · (x · x_axis + y · y_axis + forward).
  *
- * is_parallel: all rays have the direction `forward` and begin at
- * origin + x · x_axis + y · y_axis.
+ * is_parallel: all rays have the direction `forward` and begin at origin + x · x_axis + y ·
+ * y_axis. origin, x_axis, y_axis, forward: vectors in units of the scene.
  */
 export interface Camera {
   origin: number[];
@@ -180,6 +183,8 @@ export interface LayerInfo {
 
 /**
  * The layers of the painting, the lowest first. next: the id of the next new one.
+ *
+ * layers: of the painting.
  */
 export interface LayerList {
   layers: LayerInfo[];
@@ -200,7 +205,8 @@ export interface SelectionInfo {
  * A kept look. stamp: time in seconds since 1970. thumbnail: name of its picture.
  *
  * lights: names of its lights, which may differ from the current ones. weights: of each. places:
- * as in `EditState`.
+ * as in `EditState`. id: a number that no other look has. is_proposal: whether an observer has
+ * proposed it.
  */
 export interface LookInfo {
   id: number;
@@ -215,6 +221,8 @@ export interface LookInfo {
 
 /**
  * The view transform that the pictures are seen through, and its exposure in stops.
+ *
+ * name: of the transform. stops: exposure.
  */
 export interface TransformInfo {
   name: string;
@@ -223,6 +231,8 @@ export interface TransformInfo {
 
 /**
  * The grid of the view transforms' tables: points on a side, lowest and highest log2 light.
+ *
+ * side: points on a side. low, high: lowest and highest log2 light.
  */
 export interface TableInfo {
   side: number;
@@ -232,6 +242,9 @@ export interface TableInfo {
 
 /**
  * Samples per pixel: of the current basis, and of the final one.
+ *
+ * spp: of the current basis. target_spp: of the final one. is_complete: whether all samples are
+ * there.
  */
 export interface SampleCount {
   spp: number;
@@ -241,6 +254,8 @@ export interface SampleCount {
 
 /**
  * Labels of the last steps that can be undone and redone; count: of all steps.
+ *
+ * undo, redo: labels of steps.
  */
 export interface HistoryInfo {
   undo: string[];
@@ -253,7 +268,7 @@ export interface HistoryInfo {
  *
  * id: a number that no other step has; the picture `step/ID` shows the answer after it.
  * is_milestone: the last step before a pause or before everything was replaced, or the last of
- * many.
+ * many. label: what was done.
  */
 export interface StepInfo {
   id: number;
@@ -267,7 +282,7 @@ export interface StepInfo {
  *
  * after: id of the last step when it ended, which is its own if it found something; 0 for none.
  * title: what was searched for. text: what came of it. tried: sentences on what was tried. stamp:
- * time in seconds since 1970.
+ * time in seconds since 1970. id: a number that no other search has. seconds: that it took.
  */
 export interface SearchInfo {
   id: number;
@@ -282,7 +297,7 @@ export interface SearchInfo {
 /**
  * A preset: a request for a whole scene. Its picture is `preset/NAME`.
  *
- * has_subject: whether it is about one object.
+ * has_subject: whether it is about one object. name: in requests. title, description: for people.
  */
 export interface PresetInfo {
   name: string;
@@ -294,6 +309,8 @@ export interface PresetInfo {
 /**
  * A reference. Its pictures are `reference/ID`, (h, w, 3) uint8 as the session's view transform
  * shows it, and `reference_light/ID`, its light, reduced, (h, w, 3) float16.
+ *
+ * id: a number that no other reference has. name: of its file.
  */
 export interface ReferenceInfo {
   id: number;
@@ -306,7 +323,8 @@ export interface ReferenceInfo {
  *
  * name: as requested. height: null until it is known. state: `waiting` for an earlier one; the
  * others speak for themselves. done, total: its passes. text: why it has failed. files: paths of
- * those that were written.
+ * those that were written. id: a number that no other render has. view, width, spp, formats: as
+ * requested.
  */
 export interface RenderInfo {
   id: number;
@@ -325,6 +343,8 @@ export interface RenderInfo {
 
 /**
  * Two places that should look alike: (x, y) as shares of width and height, 0 to 1.
+ *
+ * reference: the place in the reference. picture: the place in the view.
  */
 export interface PlacePair {
   reference: [number, number];
@@ -333,6 +353,8 @@ export interface PlacePair {
 
 /**
  * The resolved values of all settings, as in `lightpaint.Fit`.
+ *
+ * space: `display` or `linear`. hold: strength of the hold. colors: freedom of the lights.
  */
 export interface ResolvedFit {
   space: string | null;
@@ -352,7 +374,8 @@ export interface ResolvedFit {
  *
  * earlier: constraints of lights that are locked or off, by name, from before they were, to be
  * sent when they are released. kept: names of those that are locked only since they were moved.
- * is_started: whether the solve starts from lamps that were set by hand.
+ * is_started: whether the solve starts from lamps that were set by hand. history: labels of steps
+ * to undo and redo.
  */
 export interface EditState {
   history?: HistoryInfo;
@@ -389,6 +412,9 @@ export interface Advice {
 
 /**
  * Closeness of an answer in one view. delta_e_present: ΔE of the current look.
+ *
+ * headline: how close it is, in words. help: a constraint to loosen; null for none. delta_e: mean
+ * ΔE over the paint. sentences: what stands below the headline.
  */
 export interface Closeness {
   headline: string;
@@ -403,7 +429,8 @@ export interface Closeness {
  * a stroke in a layer.
  *
  * layers: ids of its layers. brightness, color: share of the asked change that came; null if none
- * was asked. delta_e: of its lit parts, against the painting.
+ * was asked. delta_e: of its lit parts, against the painting. name: of the layer, group or stroke.
+ * kind: `layer`, `group` or `wish`.
  */
 export interface WishDelivery {
   name: string;
@@ -420,7 +447,7 @@ export interface WishDelivery {
  * is_chosen: whether it is the answer itself. delta_e: its mean ΔE over the paint. brightness,
  * color: mean share of the asked changes that came, from 0 to 1, in which each wish counts alike;
  * null if none was asked. worst: the wish of which least came; null if at least three quarters of
- * each did.
+ * each did. colors: the choice.
  */
 export interface AnswerChoice {
   colors: 'own' | 'gentle' | 'free';
@@ -437,6 +464,8 @@ export interface AnswerChoice {
  * stops: relative to its current emission; null if it is, or was, off. kelvin: null for a colour
  * that is not white. share: of the light in the picture. error: its uncertainty, in words.
  * is_constrained: whether a constraint limits it. is_unreached: whether no paint depends on it.
+ * emission: linear, in the unit of the light. swatch: its colour for a screen, as in CSS. is_on:
+ * whether it shines.
  */
 export interface LightAnswer {
   emission: RGB;
@@ -455,7 +484,8 @@ export interface LightAnswer {
  *
  * lights: in the order of the state. shares: of each light, by view, if there are several.
  * closeness: of each view; null for unpainted views. deliveries: how much of each wish came, in
- * all views together.
+ * all views together. headline, help, delta_e, delta_e_present, sentences: as in `Closeness`, of
+ * the view with the largest error.
  */
 export interface Findings {
   lights?: LightAnswer[];
@@ -473,7 +503,8 @@ export interface Findings {
  * The progress of a long task. Unasked.
  *
  * task: `export`, `final` for a final render, `basis`, `sampling` for samples added where the
- * paint needs them, or the renderer's name for the task.
+ * paint needs them, or the renderer's name for the task. done, total: steps so far, and in all.
+ * unit: of these steps; "" for none.
  */
 export interface ProgressReport {
   kind: 'progress';
@@ -488,7 +519,8 @@ export interface ProgressReport {
 /**
  * The result of a verification; its render is the picture `verified`. Unasked.
  *
- * is_old: whether the session has changed since.
+ * is_old: whether the session has changed since. agrees: whether the render is the predicted
+ * picture but for noise. text: the result, in a sentence. view: index of the view.
  */
 export interface VerificationResult {
   kind: 'verified';
@@ -512,6 +544,8 @@ export interface TaskStarted {
 
 /**
  * Notice that a stopped task has ended. Unasked.
+ *
+ * task: the request.
  */
 export interface TaskStopped {
   kind: 'stopped';
@@ -524,7 +558,8 @@ export interface TaskStopped {
  * Files that were written. Unasked.
  *
  * command: solves for the exported paintings; "" for none. is_stopped: whether the export was
- * stopped before its end. is_unpainted: whether files that need a painting were left out.
+ * stopped before its end. is_unpainted: whether files that need a painting were left out. files:
+ * their paths.
  */
 export interface ExportResult {
   kind: 'exported';
@@ -550,6 +585,8 @@ export interface RenderList {
 /**
  * The reasons why a view is not closer to its painting; the picture `beyond` shows where.
  * Unasked.
+ *
+ * sentences: the reasons. view: index of the view. is_old: whether the session has changed since.
  */
 export interface Explanation {
   kind: 'explained';
@@ -563,6 +600,9 @@ export interface Explanation {
 /**
  * The effect of a change, before it is made. Unasked. number: of the preview. is_at_cost:
  * whether it changes the unpainted part by more than it gains. before, after: (h, w, 3) uint8.
+ *
+ * view: as requested. text: the effect, in a sentence. is_old: whether the session has changed
+ * since.
  */
 export interface PreviewResult {
   kind: 'previewed';
@@ -618,6 +658,10 @@ export interface PlacingResult {
 
 /**
  * The state while there is no picture yet; `state` follows. text: an error, if one occurred.
+ *
+ * version: of this protocol. scene, folder: names of the scene file and of the session.
+ * can_render: whether there is a scene to render, and not a basis alone. can_report: whether a
+ * report can be written. progress: of what it waits for. is_back: as in `state`.
  */
 export interface SessionPending {
   kind: 'waiting';
@@ -638,15 +682,18 @@ export interface SessionPending {
  * improves. All lists of lights are in the order of `lights`.
  *
  * version: of this protocol. size: height and width of the first view, and `objects` the names of
- * its objects.
- * lut: the grid of the tables `lut/NAME` of all `transforms`. resources: pictures, with a number
- * that grows when one is replaced. verifications: the last one of each view. renders: the final
- * renders, as in `renders`. is_new: whether
- * the session has no steps yet. stroke: number of the last stroke that arrived. command: solves
- * for the exported paintings. is_back: the client had the session before, and no other client
- * since; also true if unasked. weights: (lights, 3) float64, the last answer.
+ * its objects. lut: the grid of the tables `lut/NAME` of all `transforms`. resources: pictures,
+ * with a number that grows when one is replaced. verifications: the last one of each view.
+ * renders: the final renders, as in `renders`. is_new: whether the session has no steps yet.
+ * stroke: number of the last stroke that arrived. command: solves for the exported paintings.
+ * is_back: the client had the session before, and no other client since; also true if unasked.
+ * weights: (lights, 3) float64, the last answer.
  *
- * choices: as the last `choices` had them; empty once the session has changed since.
+ * choices: as the last `choices` had them; empty once the session has changed since. scene,
+ * folder: names of the scene file and of the session. can_render: whether there is a scene to
+ * render, and not a basis alone. can_report: whether a report can be written. images: lights that
+ * are images. transforms: names of view transforms. transform: the one in use. basis: how many
+ * samples the planes have. answer: how close the last one is.
  */
 export interface SessionState {
   kind: 'state';
@@ -741,7 +788,8 @@ export interface AnswerUpdate {
  * lists all of these.
  *
  * image: (rows, columns, 3) float32. importance: (rows, columns) float32. weights: (lights, 3)
- * float64.
+ * float64. region: of these pixels. view: index of the view. version, stroke, exact, mode: as in
+ * `answer`.
  */
 export interface CanvasPatch {
   kind: 'patch';
@@ -795,6 +843,8 @@ export interface SelectionUpdate {
 
 /**
  * New or replaced pictures, and their numbers. Unasked.
+ *
+ * resources: pictures, with a number that grows when one is replaced.
  */
 export interface PictureUpdate {
   kind: 'renewed';
@@ -823,6 +873,8 @@ export interface DraggedPlane {
 
 /**
  * A picture, as the array `data`: the answer to `fetch`.
+ *
+ * name: as requested. data: the picture.
  */
 export interface PictureData {
   kind: 'fetched';
@@ -861,6 +913,8 @@ export interface PreviousAnswer {
 /**
  * The kept looks, and all pictures: the answer to requests about looks, and unasked when an
  * observer has proposed one.
+ *
+ * resources: as in `renewed`.
  */
 export interface LookList {
   kind: 'looks';
@@ -920,6 +974,8 @@ export interface Rig {
 
 /**
  * A sentence for users. Unasked. task: the one that it ends.
+ *
+ * text: the sentence. tone: whether it is a warning.
  */
 export interface Notice {
   kind: 'notice';
@@ -932,6 +988,8 @@ export interface Notice {
 
 /**
  * The reason why a request was refused; nothing has changed.
+ *
+ * text: the reason, in a sentence. tone: whether it is a warning.
  */
 export interface Failure {
   kind: 'failed';
@@ -944,6 +1002,8 @@ export interface Failure {
 /**
  * Notice that the client does not have the session, or has lost it: another client has `taken`
  * it, the painter has `ended`, or the client speaks another `version` of this protocol.
+ *
+ * reason: as above. text: the same, in a sentence.
  */
 export interface Closing {
   kind: 'closed';
@@ -966,8 +1026,7 @@ export interface Acknowledgement {
  * New constraints on one light; an empty object frees it. Answered by `answer`.
  *
  * constraints: keys and values as in a lights file: lock, off, limits, color, kelvin, duv,
- * primaries.
- * is_final: whether it becomes a step; false while a slider moves.
+ * primaries. is_final: whether it becomes a step; false while a slider moves. light: its index.
  */
 export interface ConstrainLight {
   light: number;
@@ -981,7 +1040,8 @@ export interface ConstrainLight {
  *
  * is_final: as in `constrain_light`. label: its name for undo; "" for the names of the lights.
  * earlier: constraints of lights that are locked or off, by name, which apply once these are
- * released, in place of those from before they were locked.
+ * released, in place of those from before they were locked. constraints: by name of light, keys
+ * and values.
  */
 export interface ConstrainLights {
   constraints: Record<string, Record<string, any>>;
@@ -1004,6 +1064,8 @@ export interface SetMaster {
  * The lights as they are now become the lighting that the solve starts from and stays near, and
  * locked ones are released; or this ends. One step. Answered by `answer`. The setting `near` says
  * how near.
+ *
+ * is_on: false to end it.
  */
 export interface StartFromLamps {
   is_on?: boolean;
@@ -1034,7 +1096,7 @@ export interface MoveLights {
  *
  * mode: `aim` points it there; `highlight` hangs it so that its reflection appears there; `shadow`
  * hangs it so that the shadow of the surface at `edge` ends there. pixel, edge: column and row in
- * pixels. view: index of the view. is_final, step: as in `move`.
+ * pixels. view: index of the view. is_final, step: as in `move`. light: its index.
  */
 export interface PointLight {
   light: number;
@@ -1061,8 +1123,9 @@ export interface AddLight {
 }
 
 /**
- * A request to remove an added light, by name: one step. Answered by `state`; `rig`
- * follows.
+ * A request to remove an added light, by name: one step. Answered by `state`; `rig` follows.
+ *
+ * name: of the light.
  */
 export interface RemoveLight {
   name: string;
@@ -1083,7 +1146,7 @@ export interface ShowRig {
  * new_type: type of lights to add, instead of moving existing ones; null for none. max_count:
  * maximum number of them. surfaces: names of rails, surfaces and shapes that they may hang on;
  * none for anywhere free. keeps_best: for a stop: whether the best that was found by then becomes
- * a step, once it is judged; otherwise every light stays where it is.
+ * a step, once it is judged; otherwise every light stays where it is. run: false to stop.
  */
 export interface PlaceLights {
   run?: boolean;
@@ -1107,6 +1170,8 @@ export interface EstimatePlaces {
 
 /**
  * The lights that share a dimmer: all such groups, of names. Answered by `answer`.
+ *
+ * ties: groups of names of lights.
  */
 export interface TieLights {
   ties: string[][];
@@ -1120,7 +1185,7 @@ export interface TieLights {
  * only then it is kept. label: its name for undo. view: index of the painted view. layer: id of
  * the layer of these pixels. For all kinds but `pixels`, `importance` is the coverage, 0 to 1, and
  * masks need no `image`. properties: of the layer, from now on; with an unused id they add a layer
- * on top.
+ * on top. region: of these pixels.
  */
 export interface Paint {
   stroke: number;
@@ -1247,6 +1312,8 @@ export interface AddReference {
 
 /**
  * Delete a reference. Answered by `references`.
+ *
+ * reference: its id.
  */
 export interface DropReference {
   reference: number;
@@ -1260,6 +1327,7 @@ export interface DropReference {
  * these and its `regions`, top, middle and bottom; nine `parts`, for a reference of the same view;
  * or `pairs` of places, each in the reference and in the view. matches_brightness: whether the
  * picture becomes as bright as the reference; otherwise only differences within it count.
+ * reference: its id. pairs: of places, if `areas` is `pairs`. view: index of the view.
  */
 export interface LookLike {
   reference: number;
@@ -1284,6 +1352,8 @@ export interface StartOver {
 
 /**
  * Keep painting and answer under a name. Answered by `looks`.
+ *
+ * name: of the look.
  */
 export interface SaveLook {
   name: string;
@@ -1291,6 +1361,8 @@ export interface SaveLook {
 
 /**
  * Continue from a look; a step that can be undone. Answered by `patch`.
+ *
+ * look: its id.
  */
 export interface LoadLook {
   look: number;
@@ -1298,6 +1370,8 @@ export interface LoadLook {
 
 /**
  * Give a look another name. Answered by `looks`.
+ *
+ * look: its id. name: the new one.
  */
 export interface RenameLook {
   look: number;
@@ -1306,6 +1380,8 @@ export interface RenameLook {
 
 /**
  * Keep a copy of a look. Answered by `looks`.
+ *
+ * look: its id.
  */
 export interface CopyLook {
   look: number;
@@ -1314,6 +1390,8 @@ export interface CopyLook {
 /**
  * Keep a mix of two looks: its lights are locked at the share `part` of the way from the first
  * to the second. Answered by `looks`.
+ *
+ * first, second: their ids. part: 0 to 1. name: of the mix.
  */
 export interface MixLooks {
   first: number;
@@ -1326,6 +1404,8 @@ export interface MixLooks {
  * A request for pictures of looks whose lights hang elsewhere than now; for none, to stop.
  * Answered by `started`; `renewed` then lists `look_plane/ID` and `look_clean/ID` of each: first
  * with estimated planes of lights that hang nowhere else, later with rendered ones.
+ *
+ * looks: their ids.
  */
 export interface CompareLooks {
   looks?: number[];
@@ -1333,6 +1413,8 @@ export interface CompareLooks {
 
 /**
  * Delete a look. Answered by `looks`.
+ *
+ * look: its id.
  */
 export interface DropLook {
   look: number;
@@ -1342,7 +1424,8 @@ export interface DropLook {
  * Propose a lighting to the painter: it becomes a look with each light locked at the proposed
  * level, and replaces an earlier proposal of that name. Answered by `looks`.
  *
- * lights: emission by name of light; other lights keep that of the current answer.
+ * lights: emission by name of light; other lights keep that of the current answer. name: of the
+ * proposal.
  */
 export interface Propose {
   name: string;
@@ -1350,8 +1433,10 @@ export interface Propose {
 }
 
 /**
- * The first message of a page, and again after a dropped connection. Answered by `state`, or
- * by `waiting` while there is no picture yet; `state` then comes as soon as there is one.
+ * The first message of a page, and again after a dropped connection. Answered by `state`, or by
+ * `waiting` while there is no picture yet; `state` then comes as soon as there is one.
+ *
+ * version: of the protocol that the client speaks.
  */
 export interface Hello {
   version: number;
@@ -1391,7 +1476,7 @@ export interface Preview {
  * outputs: `target`: a painting of each painted view; `layers`: its layers; `picture`: the
  * displayed answer in each view. name: of a new folder in `exports/` for these files; a number
  * follows a name that is taken, so that no earlier export is replaced. "" for the folder of the
- * session itself, whose earlier files of the same names are replaced.
+ * session itself, whose earlier files of the same names are replaced. run: false to stop.
  */
 export interface Export {
   outputs: ('target' | 'picture' | 'lighting' | 'relit' | 'report' | 'layers')[];
@@ -1418,6 +1503,8 @@ export interface RenderFinal {
 
 /**
  * Stop a final render, which writes nothing then. Answered by `renders`.
+ *
+ * render: its id.
  */
 export interface StopRender {
   render: number;
@@ -1425,6 +1512,8 @@ export interface StopRender {
 
 /**
  * Take a final render that has ended off the list; its files stay. Answered by `renders`.
+ *
+ * render: its id.
  */
 export interface DropRender {
   render: number;
@@ -1433,6 +1522,8 @@ export interface DropRender {
 /**
  * Render the answer in a view, or stop that. Answered by `started`, later by `verified`, or by
  * `stopped` once the render has ended.
+ *
+ * run: false to stop. view: index of the view.
  */
 export interface Verify {
   run?: boolean;
@@ -1442,6 +1533,8 @@ export interface Verify {
 /**
  * A request for the reasons why a view is not closer to its painting. Answered by `started`,
  * later by `explained` and the picture `beyond`.
+ *
+ * view: index of the view.
  */
 export interface Explain {
   view?: number;
@@ -1456,6 +1549,8 @@ export interface TakeOver {
 /**
  * A request for a picture, for clients without HTTP. Answered by `fetched`, with the picture as
  * its array.
+ *
+ * name: of the picture, as in `resources`.
  */
 export interface Fetch {
   name: string;
@@ -1465,6 +1560,8 @@ export interface Fetch {
  * The first message of an observer: a client that receives lighting, looks and progress, and
  * never has the session. It may then send `fetch`, `export` and `propose`, and nothing else.
  * Answered by `state` or `waiting`.
+ *
+ * version: as in `hello`.
  */
 export interface Observe {
   version: number;

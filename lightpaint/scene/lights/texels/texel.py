@@ -19,11 +19,10 @@ from lightpaint.scene.lights.texels.texel_layout import (
     TexelLayout,
     coarsest,
 )
+from lightpaint.scene.limits import MAX_TEXELS
 
 #: Longest side of a written image, in pixels: a larger one is a typing error.
 MAX_MAP_SIDE = 8192
-#: Most texels of an image: each is a light with pictures of its own.
-MAX_TEXELS = 4096
 
 _SIZE = re.compile(r"([0-9]{1,9})\s*[x×,]\s*([0-9]{1,9})")
 _NAME = re.compile(r"(.+?)(?:\.sun([1-9]))?\.x([0-9]{1,6})\.y([0-9]{1,6})", re.DOTALL)

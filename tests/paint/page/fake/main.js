@@ -13,30 +13,44 @@ import { FakeModel } from './model.js';
 import { split } from './image.js';
 import { makeRoom } from './room.js';
 
-const asked = new URLSearchParams(location.search);
-const room = makeRoom(Number(asked.get('lights') ?? 7), asked.get('size') ?? '192x108');
-const host = new FakeHost(room, {
-  isFirst: asked.has('first'),
-  isElsewhere: asked.has('elsewhere'),
-});
-if (asked.has('crowd')) crowd(host);
-if (asked.has('image')) split(host, asked.get('image') ?? '', asked.get('finer'));
-let element = /** @type {HTMLElement} */ (document.getElementById('lightpaint'));
-if (asked.has('shadow')) {
-  const shadow = element.attachShadow({ mode: 'open' });
-  for (const link of document.querySelectorAll('link[rel=stylesheet]')) {
-    shadow.append(link.cloneNode());
-    if (/style/.test(link.href)) link.remove();
-  }
-  element = document.createElement('div');
-  element.style.height = '100%';
-  shadow.append(element);
-}
-const model = new FakeModel(host);
-model.isTaken = asked.get('model') === 'taken';
-const session = asked.has('model') ? new ModelHost(model) : host;
+/** @type {(() => void) | null} */
+let close = null;
 
-async function start() {
+/** End the painter that is open. */
+function end() {
+  close?.();
+  close = null;
+}
+
+/** Open a painter as a query asks, in place of the one before.
+ *
+ * Tests do so in a page that is there already, whose modules are compiled: a page that loads anew
+ * takes several times as long. */
+async function open(query = location.search) {
+  end();
+  const asked = new URLSearchParams(query);
+  history.replaceState(null, '', `?${asked}`);
+  const room = makeRoom(Number(asked.get('lights') ?? 7), asked.get('size') ?? '192x108');
+  const host = new FakeHost(room, {
+    isFirst: asked.has('first'),
+    isElsewhere: asked.has('elsewhere'),
+  });
+  if (asked.has('crowd')) crowd(host);
+  if (asked.has('image')) split(host, asked.get('image') ?? '', asked.get('finer'));
+  let element = /** @type {HTMLElement} */ (document.getElementById('lightpaint'));
+  if (asked.has('shadow')) {
+    const shadow = element.attachShadow({ mode: 'open' });
+    for (const link of document.querySelectorAll('link[rel=stylesheet]')) {
+      shadow.append(link.cloneNode());
+      if (/style/.test(link.href)) link.remove();
+    }
+    element = document.createElement('div');
+    element.style.height = '100%';
+    shadow.append(element);
+  }
+  const model = new FakeModel(host);
+  model.isTaken = asked.get('model') === 'taken';
+  const session = asked.has('model') ? new ModelHost(model) : host;
   // `?engine`: the one that ships, over the same session.
   const engine = asked.has('engine')
     ? openEngine(session)
@@ -46,9 +60,14 @@ async function start() {
     engine,
     isGuided: asked.has('tour'),
   });
+  close = painter.close;
   Object.assign(window, { painter, host, engine, model });
   session.open();
 }
 
+// A page with a shadow root keeps it: no other painter can follow.
+if (!new URLSearchParams(location.search).has('shadow')) {
+  Object.assign(window, { openPainter: open, closePainter: end });
+}
 // No module waits at its top: a bundle calls each as a function.
-start();
+open();
