@@ -28,8 +28,8 @@ from lightpaint.lighting.live.live import LiveSolver
 from lightpaint.lighting.live.live_view import LiveView
 from lightpaint.lighting.normal_equations import NormalEquations, inner_products
 from lightpaint.lighting.problem import Problem
-from lightpaint.lighting.unknowns.constraint_reduction import reduce_to
 from lightpaint.lighting.unknowns.reduced_problem import solve_reduced
+from lightpaint.lighting.unknowns.reduction import reduce_to
 from lightpaint.target.target import Target
 from lightpaint.threads import one_thread
 

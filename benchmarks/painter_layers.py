@@ -20,7 +20,7 @@ import numpy as np
 
 import lightpaint as lp
 from lightpaint.paint import protocol
-from lightpaint.paint.layers.layer import Layer
+from lightpaint.paint.layers.layer_stack import Layer
 from lightpaint.paint.session.session import Session
 from lightpaint.paint.store.history_steps import Identity
 from lightpaint.paint.store.store import MemoryStore, Store

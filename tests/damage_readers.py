@@ -61,7 +61,7 @@ class Reader:
             return basis.lights, basis.origin, [(a.shape, a.tobytes()) for a in arrays]
         if self.kind == "layers":
             from lightpaint.colour.display.view_transform import ViewTransform
-            from lightpaint.paint.layers.layer_file_reading import read_layers
+            from lightpaint.paint.layers.layer_files import read_layers
 
             fields, arrays = read_layers(path, (6, 5), ViewTransform()).as_fields()
             return fields, {name: (a.shape, a.tobytes()) for name, a in arrays.items()}

@@ -14,7 +14,7 @@ from lightpaint.basis.lights import BasisLight
 from lightpaint.basis.origin import Origin
 from lightpaint.images.denoiser import Features
 from lightpaint.paint import protocol
-from lightpaint.paint.layers.layer import Gradient, Layer, LayerKind
+from lightpaint.paint.layers.layer_stack import Gradient, Layer, LayerKind
 from lightpaint.paint.layers.selection import selection_mask
 from lightpaint.paint.session.session import Session
 from lightpaint.paint.store.history_steps import Identity

@@ -23,7 +23,7 @@ from nightly import FIFTHS, examples, fifth_of
 from lightpaint.colour.display.view_transform import ViewTransform
 from lightpaint.errors import LightingError, LightpaintError, SceneError, TargetError
 from lightpaint.file_reading import MAX_TEXT
-from lightpaint.lighting.answer.active_bound import Bound
+from lightpaint.lighting.answer.certificate import Bound
 from lightpaint.lighting.answer.lighting import Certificate, Lighting, LightSetting
 from lightpaint.lighting.answer.lighting_file import read_lighting, write_lighting
 from lightpaint.scene.lights.lights_file import read_lights_file

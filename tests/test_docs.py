@@ -19,11 +19,11 @@ from lightpaint.batch.manifest.entries import MAX_LOOKS
 from lightpaint.batch.manifest.keys import MAX_FRAMES
 from lightpaint.cli.commands.render_commands import template_lines
 from lightpaint.cli.options.parser import command_parser
-from lightpaint.lighting.constraints.white_lights import LAMP_KELVINS
+from lightpaint.lighting.constraints.color_restrictions import LAMP_KELVINS
 from lightpaint.lighting.fit import DEFAULT_HOLD
 from lightpaint.paint.server.address import DEFAULT_PORT
 from lightpaint.paint.server.client import MAX_QUEUED, MAX_QUEUED_BYTES
-from lightpaint.paint.server.http_connections import MAX_UNAUTHENTICATED
+from lightpaint.paint.server.http_server import MAX_UNAUTHENTICATED
 from lightpaint.paint.server.session_clients import MAX_PAGES
 from lightpaint.placement.paths import view_paths
 from lightpaint.placement.search import pose_search

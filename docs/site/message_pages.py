@@ -12,7 +12,7 @@ from typing import Any, get_origin, get_type_hints
 
 import numpy as np
 
-from lightpaint.paint.layers.layer import Layer
+from lightpaint.paint.layers.layer_stack import Layer
 from lightpaint.paint.protocol import (
     Event,
     Request,

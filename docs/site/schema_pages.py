@@ -12,8 +12,7 @@ from report_schema import report_schema
 from lightpaint.batch.gallery.summary import SummaryRow
 from lightpaint.batch.manifest.folder_names import SUMMARY_FORMAT
 from lightpaint.lighting.answer.certificate import Certificate
-from lightpaint.lighting.answer.light_setting import LightSetting
-from lightpaint.lighting.answer.lighting import EmitterPlace, Lighting
+from lightpaint.lighting.answer.lighting import EmitterPlace, Lighting, LightSetting
 from lightpaint.lighting.answer.lighting_file import FORMAT
 from lightpaint.paint.protocol import Event, Request
 from lightpaint.pipeline.results.result_folder import _Record

@@ -7,11 +7,10 @@ from pathlib import Path
 from lightpaint.display_text import some_names
 from lightpaint.errors import PaintError
 from lightpaint.files import is_name, one_line
-from lightpaint.paint.lazy_scene import LazyScene
 from lightpaint.paint.server.server import Server
 from lightpaint.paint.store.history_steps import Identity, ViewIdentity
 from lightpaint.paint.store.store import Store
-from lightpaint.paint.subject import Subject, sensor_name
+from lightpaint.paint.subject import LazyScene, Subject, sensor_name
 from lightpaint.scene.scene import Scene
 
 

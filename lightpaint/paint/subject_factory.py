@@ -14,12 +14,11 @@ from lightpaint.files import scene_name
 from lightpaint.lighting.constraints.constraints import Constraints
 from lightpaint.lighting.constraints.constraints_file import constraints_of
 from lightpaint.lighting.joined_views import check_same_lights
-from lightpaint.lighting.unknowns.constraint_reduction import reduce_to
-from lightpaint.paint.layers.layer_file_reading import check_kind
-from lightpaint.paint.lazy_scene import LazyScene
+from lightpaint.lighting.unknowns.reduction import reduce_to
+from lightpaint.paint.layers.layer_files import check_kind
 from lightpaint.paint.session_file import check_view_names, session_identity
 from lightpaint.paint.store.session_requests import SessionRequests
-from lightpaint.paint.subject import Subject
+from lightpaint.paint.subject import LazyScene, Subject
 from lightpaint.pipeline.job.settings import Settings
 from lightpaint.pipeline.job.sources import (
     BasisFile,

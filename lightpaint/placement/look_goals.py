@@ -14,8 +14,7 @@ from lightpaint.lighting.constraints.constraints import Constraints, LightConstr
 from lightpaint.lighting.normal_equations import NormalEquations
 from lightpaint.lighting.problem import Problem
 from lightpaint.lighting.solution import Solution
-from lightpaint.lighting.unknowns.constraint_reduction import reduce_to
-from lightpaint.lighting.unknowns.reduction import Reduction
+from lightpaint.lighting.unknowns.reduction import Reduction, reduce_to
 
 
 @dataclass(frozen=True)

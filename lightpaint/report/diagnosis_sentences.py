@@ -6,7 +6,7 @@ from lightpaint.display_text import some_names
 from lightpaint.lighting.analysis.appearance.appearance import Appearance
 from lightpaint.lighting.analysis.appearance.limiting_reasons import Loosening, Reason
 from lightpaint.lighting.analysis.diagnosis import Diagnosis, error_shares
-from lightpaint.lighting.answer.active_bound import Bound
+from lightpaint.lighting.answer.certificate import Bound
 from lightpaint.report.phrases import (
     CHANNELS,
     spoken_changed,

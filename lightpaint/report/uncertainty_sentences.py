@@ -4,8 +4,7 @@ from lightpaint.basis.basis import Basis
 from lightpaint.basis.light_images import joined_texels
 from lightpaint.display_text import some_of
 from lightpaint.lighting.analysis.noise.uncertainty import Uncertainty
-from lightpaint.lighting.answer.light_setting import LightSetting
-from lightpaint.lighting.answer.lighting import Lighting
+from lightpaint.lighting.answer.lighting import Lighting, LightSetting
 from lightpaint.lighting.solution import Solution
 from lightpaint.report.measures import (
     brightness,

@@ -10,10 +10,9 @@ from lightpaint.errors import BasisError
 from lightpaint.lighting.answer.lighting import Lighting
 from lightpaint.lighting.constraints.constraints import Constraints
 from lightpaint.lighting.fit import Fit, resolve_fit
-from lightpaint.lighting.linear_problem import reduce_lights
+from lightpaint.lighting.linear_problem import Sums, reduce_lights, summed_problem
 from lightpaint.lighting.linear_solve import solve_linear
 from lightpaint.lighting.normal_equations import NormalEquations
-from lightpaint.lighting.problem_sums import Sums, summed_problem
 from lightpaint.scene.lights.lights_file import SceneRequests
 
 

@@ -14,7 +14,7 @@ from lightpaint.lighting.loss.expected_lights import DARK
 from lightpaint.lighting.loss.painting import unpainted_weight_of
 from lightpaint.lighting.loss.weight_penalty import RESTRAINT
 from lightpaint.lighting.problem import Problem
-from lightpaint.paint.session.answer_messages import judge
+from lightpaint.paint.session.session_messages import judge
 
 SIZE = (8, 16)
 

@@ -11,9 +11,12 @@ from lightpaint.basis.lights import BasisLight
 from lightpaint.basis.origin import Origin
 from lightpaint.basis.planes import IndirectLight, as_planes
 from lightpaint.images.denoiser import Features
-from lightpaint.lighting.analysis.noise import smooth_light
-from lightpaint.lighting.analysis.noise.noise_correction import correct_noise
-from lightpaint.lighting.analysis.noise.smooth_light import can_smooth, on_smooth_light
+from lightpaint.lighting.analysis.noise import noise_correction
+from lightpaint.lighting.analysis.noise.noise_correction import (
+    can_smooth,
+    correct_noise,
+    on_smooth_light,
+)
 from lightpaint.lighting.solve import solve
 from lightpaint.target.target import Target
 
@@ -76,7 +79,7 @@ def test_weights_are_nearer_to_the_true_ones(
     target, expected = painting(rng)
     solutions = [solve(noisy_basis(rng), target) for _ in range(3)]
     smooth = np.mean([error(correct_noise(x).weights, expected) for x in solutions])
-    monkeypatch.setattr(smooth_light, "MIN_LIGHTS", LIGHTS + 1)
+    monkeypatch.setattr(noise_correction, "MIN_LIGHTS", LIGHTS + 1)
     as_rendered = np.mean([error(correct_noise(x).weights, expected) for x in solutions])
     assert smooth < 0.7 * as_rendered
 
@@ -159,7 +162,7 @@ def test_few_lights_and_unknown_surfaces_are_solved_as_they_were_rendered(
     assert not can_smooth([replace(basis, indirect=None)])
     assert not can_smooth([basis, replace(basis, indirect=None)])
     assert not can_smooth([replace(basis, features=replace(basis.features, position=None))])
-    few = slice(None, smooth_light.MIN_LIGHTS - 1)
+    few = slice(None, noise_correction.MIN_LIGHTS - 1)
     parts = basis.indirect
     assert parts is not None
     fewer = replace(

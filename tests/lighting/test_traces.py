@@ -10,7 +10,7 @@ from lightpaint.basis.basis import Basis
 from lightpaint.basis.lights import BasisLight
 from lightpaint.basis.origin import Origin
 from lightpaint.lighting.constraints.constraints import Constraints
-from lightpaint.lighting.round_off import remove_traces
+from lightpaint.lighting.problem import remove_traces
 from lightpaint.lighting.solve import solve
 from lightpaint.target.target import Target
 

@@ -14,7 +14,7 @@ from lightpaint.paint import protocol
 from lightpaint.paint.protocol import AnswerChoices
 from lightpaint.paint.session.picture_table import display_thumbnail
 from lightpaint.paint.session.snapshot import SessionSnapshot
-from lightpaint.paint.studio import answer_choices, plane_denoiser
+from lightpaint.paint.studio import exact_answers, session_bases
 
 SIZE = (18, 32)
 
@@ -34,7 +34,7 @@ def basis(make_basis: Any) -> lp.Basis:
 def client(basis: lp.Basis, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[Any]:
     """A studio whose pictures are not denoised."""
     monkeypatch.setattr(
-        plane_denoiser.PlaneDenoiser, "planes_for", lambda _, bases: [None] * len(bases)
+        session_bases.PlaneDenoiser, "planes_for", lambda _, bases: [None] * len(bases)
     )
     new_client = StudioClient(tmp_path, basis)
     yield new_client
@@ -81,7 +81,7 @@ def test_a_click_gives_what_the_picture_shows(client: StudioClient):
         answer = client.exact()
         assert answer.fields["delta_e"] == pytest.approx(choice.delta_e, rel=1e-6)
         light = studio.session.views[0].basis.mix(studio.session.weights)
-        side = answer_choices.PICTURE_SIDE
+        side = exact_answers.PICTURE_SIDE
         expected = display_thumbnail(light, studio.session.transform, side=side)
         np.testing.assert_array_equal(pictures[choice.colors], expected)
         assert [x.colors for x in _choices(client).choices if x.is_chosen] == [choice.colors]
@@ -95,7 +95,7 @@ def test_a_click_gives_what_the_picture_shows(client: StudioClient):
 
 def test_the_next_stroke_cancels_them(client: StudioClient, monkeypatch: pytest.MonkeyPatch):
     first_version = None
-    solve = answer_choices.solve_choices
+    solve = exact_answers.solve_choices
 
     def interrupted(snapshot: SessionSnapshot, solution: Any) -> Any:
         nonlocal first_version
@@ -107,7 +107,7 @@ def test_the_next_stroke_cancels_them(client: StudioClient, monkeypatch: pytest.
             stroke.join()
         return solve(snapshot, solution)
 
-    monkeypatch.setattr(answer_choices, "solve_choices", interrupted)
+    monkeypatch.setattr(exact_answers, "solve_choices", interrupted)
     _paint(client, 1, (0.2, 0.6, 0.3))
     client.wait(lambda m: m.kind == "choices")
     versions = [m.fields["version"] for m in client.messages if m.kind == "choices"]
@@ -140,6 +140,6 @@ def test_pictures_have_the_master_dimmer(client: StudioClient):
     client.exact()
     _choices(client)
     light = studio.session.views[0].basis.mix(0.25 * studio.session.weights)
-    side = answer_choices.PICTURE_SIDE
+    side = exact_answers.PICTURE_SIDE
     expected = display_thumbnail(light, studio.session.transform, side=side)
     np.testing.assert_array_equal(studio.resource("choice/gentle"), expected)

@@ -12,7 +12,7 @@ from patience import PATIENCE_S
 from server_key import bearer
 
 from lightpaint.paint.protocol import VERSION
-from lightpaint.paint.server import http_connections
+from lightpaint.paint.server import http_server
 
 HALF = b"GET / HTTP/1.1\r\nHost: 127.0"
 
@@ -49,7 +49,7 @@ def test_hundreds_of_half_sent_requests_shut_nobody_out(serving: RunningServer) 
     for _ in range(300):
         serving.connection().sendall(HALF)
     wait_until(
-        lambda: len(connected_sockets(serving)) >= http_connections.MAX_UNAUTHENTICATED,
+        lambda: len(connected_sockets(serving)) >= http_server.MAX_UNAUTHENTICATED,
         "they do not come",
     )
     assert status(serving, "/data/present", serving.key) == 200
@@ -58,7 +58,7 @@ def test_hundreds_of_half_sent_requests_shut_nobody_out(serving: RunningServer) 
     for client in (page, another):
         client.send("hello", version=VERSION)
         assert client.receive()[0]["kind"] in ("state", "closed")
-    assert len(connected_sockets(serving)) <= http_connections.MAX_UNAUTHENTICATED + 4
+    assert len(connected_sockets(serving)) <= http_server.MAX_UNAUTHENTICATED + 4
     # The latest have the best chance of being people.
     assert is_cut(serving.connections[1])
 
@@ -67,7 +67,7 @@ def test_a_request_comes_in_time_or_its_connection_is_closed(
     serving: RunningServer, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     # Long enough to connect and to ask on a busy machine.
-    monkeypatch.setattr(http_connections, "REQUEST_TIMEOUT_S", 2.0)
+    monkeypatch.setattr(http_server, "REQUEST_TIMEOUT_S", 2.0)
     page, silent, half = Page(serving), serving.connection(), serving.connection()
     half.sendall(HALF)
     second = serving.connection()
@@ -98,7 +98,7 @@ def test_an_answer_that_is_taken_slowly_is_not_cut(
     serving: RunningServer, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """As the page's own files through a slow tunnel are, by a browser that has no key yet."""
-    monkeypatch.setattr(http_connections, "REQUEST_TIMEOUT_S", 0.1)
+    monkeypatch.setattr(http_server, "REQUEST_TIMEOUT_S", 0.1)
     asking = serving.connection()
     wait_until(lambda: connected_sockets(serving), "it is not there")
     for connection in connected_sockets(serving):  # else the system takes it all

@@ -12,11 +12,11 @@ from layered_sessions import RandomEditor, identity_of, open_session
 from lightpaint.errors import PaintError
 from lightpaint.paint import protocol
 from lightpaint.paint.layers.layer_stack import LayerStack
-from lightpaint.paint.session import milestones
-from lightpaint.paint.session.milestones import find_milestones
+from lightpaint.paint.session import history
+from lightpaint.paint.session.history import find_milestones
 from lightpaint.paint.store.history_steps import Step
-from lightpaint.paint.store.step_answers import StepAnswer
 from lightpaint.paint.store.store import Store
+from lightpaint.paint.store.stored_arrays import StepAnswer
 
 
 def listed(session: Any, count: int = 100) -> protocol.StepList:
@@ -151,10 +151,10 @@ def test_a_cleared_painting_keeps_what_is_asked_of_lights_and_a_new_start_keeps_
 
 
 def test_milestones_are_before_pauses_before_new_starts_and_else_every_so_often() -> None:
-    pause = milestones.PAUSE_SECONDS
+    pause = history.PAUSE_SECONDS
     steps = [Step("stroke", "", {"stamp": float(k)}) for k in range(50)]
     steps += [Step("stroke", "", {"stamp": 50 + pause}), Step("look_loaded", "", {"stamp": 400.0})]
     steps += [Step("stroke", "")]
-    every = milestones.STEPS_BETWEEN
+    every = history.STEPS_BETWEEN
     assert find_milestones(steps) == {every - 1, 2 * every - 1, 49, 50}
     assert find_milestones(steps[:1]) == frozenset()

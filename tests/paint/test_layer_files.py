@@ -27,25 +27,24 @@ from lightpaint.images.formats import openraster_stack
 from lightpaint.images.formats.exr import ExrPart, read_parts, write_parts
 from lightpaint.images.formats.openraster_stack import RasterGroup, opened_openraster
 from lightpaint.paint import protocol
-from lightpaint.paint.layers import layer_file_reading
+from lightpaint.paint.layers import layer_files
+from lightpaint.paint.layers.canvases import LayeredPaintings
 from lightpaint.paint.layers.composition import compose_layer
-from lightpaint.paint.layers.layer import Layer
-from lightpaint.paint.layers.layer_file_reading import read_layers
 from lightpaint.paint.layers.layer_files import (
     KEY,
     LOOK_NAME,
+    read_layers,
     write_layers_exr,
     write_layers_openraster,
 )
 from lightpaint.paint.layers.layer_pixels import LayerPixels
-from lightpaint.paint.layers.layer_stack import LayerStack
-from lightpaint.paint.layers.layered_paintings import LayeredPaintings
+from lightpaint.paint.layers.layer_stack import Layer, LayerStack
 from lightpaint.paint.layers.view_layers import ViewLayers
 from lightpaint.paint.protocol import Message
 from lightpaint.paint.session.session import Session
 from lightpaint.paint.store.canvas_pixels import Pixels
 from lightpaint.paint.store.store import MemoryStore
-from lightpaint.paint.studio.layer_imports import begin_with_layers
+from lightpaint.paint.studio.file_imports import begin_with_layers
 from lightpaint.paint.studio.studio import Studio
 from lightpaint.paint.subject import Subject
 from lightpaint.paint.subject_factory import make_subjects
@@ -363,7 +362,7 @@ def test_the_size_of_a_file_is_compared_before_its_pixels_are_read(
     write_layers_exr(tmp_path / "layers.exr", layered((Layer(1, "paint"), 0.5, 0.5)), "eye")
     (tmp_path / "layers.ora").write_bytes(openraster_of(["a.png"]))
     monkeypatch.setattr(openraster_stack, "read_bitmap", None)
-    monkeypatch.setattr(layer_file_reading, "read_parts", None)
+    monkeypatch.setattr(layer_files, "read_parts", None)
     for name in ("layers.exr", "layers.ora"):
         with pytest.raises(PaintError, match="70x12 pixels, and the view 8x9"):
             read_layers(tmp_path / name, (9, 8), TRANSFORM)
@@ -378,9 +377,9 @@ def test_layers_keep_no_more_pixels_than_fit(
     write_layers_exr(tmp_path / "layers.exr", view, "eye")
     (tmp_path / "layers.ora").write_bytes(openraster_of(["a.png", "b.png"]))
     for name in ("layers.exr", "layers.ora"):
-        monkeypatch.setattr(layer_file_reading, "MAX_KEPT_PIXELS", 100)
+        monkeypatch.setattr(layer_files, "MAX_KEPT_PIXELS", 100)
         assert len(read_layers(tmp_path / name, SIZE, TRANSFORM).pixels) == 2
-        monkeypatch.setattr(layer_file_reading, "MAX_KEPT_PIXELS", 99)
+        monkeypatch.setattr(layer_files, "MAX_KEPT_PIXELS", 99)
         with pytest.raises(PaintError, match="cover more than 0 million pixels together"):
             read_layers(tmp_path / name, SIZE, TRANSFORM)
 

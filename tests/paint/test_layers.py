@@ -22,9 +22,8 @@ from lightpaint.paint.layers.composition import (
     compose,
     with_effect,
 )
-from lightpaint.paint.layers.layer import PAINTING, Gradient, Layer
 from lightpaint.paint.layers.layer_pixels import LayerPixels
-from lightpaint.paint.layers.layer_stack import LayerStack, stack_after
+from lightpaint.paint.layers.layer_stack import PAINTING, Gradient, Layer, LayerStack, stack_after
 from lightpaint.paint.session.look_library import LookLibrary
 from lightpaint.paint.session.picture_table import PictureTable
 from lightpaint.paint.store.canvas_pixels import Pixels
@@ -196,7 +195,7 @@ def test_the_end_of_a_stroke_composes_importance_alone(
     ones = np.ones((30, 40), np.float32)
     layers.put(start, stroke, Pixels(np.repeat(ones[..., None], 3, -1), ones))
     image[100:130, 20:60] = layers.target.image[100:130, 20:60]
-    monkeypatch.setattr("lightpaint.paint.layers.composed_layers.compose_over", None)
+    monkeypatch.setattr(ComposedLayers, "_compose", None)
     change = layers.show(stack, (), at_rest=True)
     assert layers.accent(start) < before
     assert change.with_importance

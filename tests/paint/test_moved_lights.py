@@ -26,7 +26,6 @@ from lightpaint.errors import LightpaintError
 from lightpaint.paint import protocol
 from lightpaint.paint.rig import lamp_rig
 from lightpaint.paint.rig.light_placer import SearchNotes
-from lightpaint.paint.rig.rig_state import rig_state
 from lightpaint.paint.session.request_changes import changed_requests
 from lightpaint.paint.store.session_requests import SessionRequests
 from lightpaint.paint.store.store import Store
@@ -325,7 +324,7 @@ def point_light(moving: MovingStudio, name: str, click: Any, place: Any, **field
     opened_rig(moving)
     light = moving.light(name)
     moving.send(protocol.PointLight(light, click, pixel_of(moving, place), **fields))
-    return rig_state(moving.studio.rig, moving.studio.session.requests.poses).lights[light]
+    return moving.studio.rig.state(moving.studio.session.requests.poses).lights[light]
 
 
 def test_pages_see_points_where_the_camera_does(moving: MovingStudio) -> None:

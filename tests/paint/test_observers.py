@@ -31,7 +31,7 @@ from lightpaint.paint.protocol import (
     SaveLook,
     SessionPending,
 )
-from lightpaint.paint.server import client, observers
+from lightpaint.paint.server import client, session_clients
 from lightpaint.paint.server.address import Address, Reach
 from lightpaint.paint.server.guard import Guard
 from lightpaint.paint.server.server import page_app
@@ -317,7 +317,7 @@ def test_who_has_the_session_does_not_become_an_observer(served_session: ServedS
 def test_observers_are_few_and_speak_this_version(
     served_session: ServedSession, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(observers, "MAX_OBSERVERS", 1)
+    monkeypatch.setattr(session_clients, "MAX_OBSERVERS", 1)
     with served_session.program() as one, served_session.program() as other:
         send_request(one, "observe", version=VERSION + 1)
         assert receive(one)["reason"] == "version"
@@ -402,7 +402,7 @@ class DeafSocket:
 def test_what_waits_for_a_slow_observer_is_replaced_and_nothing_asked_is_lost() -> None:
     slow = client.Client(DeafSocket())
     slow.is_observer = True
-    line = observers.Observers([slow])
+    line = session_clients.Observers([slow])
     history = HistoryInfo(("stroke",), (), 1)
     line.send(fake_answer(version=0, history=history, constraints={"lamp": {"off": True}}))
     for k in range(1, 2000):
@@ -432,7 +432,7 @@ def test_of_what_a_canvas_holds_observers_get_the_lighting() -> None:
         importance=pixels[..., 0],
         weights=np.ones((2, 3)),
     )
-    observers.Observers([slow]).send(patch)
+    session_clients.Observers([slow]).send(patch)
     [(message, _)] = slow._unsent
     assert message.kind == "answer"
     assert list(message.arrays) == ["weights"]

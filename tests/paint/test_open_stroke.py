@@ -7,9 +7,9 @@ import numpy.typing as npt
 from hypothesis import given
 from hypothesis import strategies as st
 
-from lightpaint.paint.layers import open_stroke
+from lightpaint.paint.layers import canvas
+from lightpaint.paint.layers.canvas import OpenStroke
 from lightpaint.paint.layers.layer_pixels import LayerPixels
-from lightpaint.paint.layers.open_stroke import OpenStroke
 from lightpaint.paint.store.canvas_pixels import Pixels, Region
 
 HEIGHT, WIDTH = 21, 34
@@ -45,7 +45,7 @@ def test_what_was_before_is_given_back(
     if is_new:
         before = Pixels.unpainted(np.zeros((HEIGHT, WIDTH, 3), np.float32))
     layer.put((0, HEIGHT, 0, WIDTH), before)
-    with patch.object(open_stroke, "SQUARE_SIDE", side):
+    with patch.object(canvas, "SQUARE_SIDE", side):
         stroke = OpenStroke()
         for k, region in enumerate(regions):
             stroke.touch(region, layer)

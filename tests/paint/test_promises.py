@@ -13,7 +13,7 @@ from lightpaint.lighting.analysis.analysis import Analysis, analyse
 from lightpaint.lighting.analysis.appearance.appearance import INVISIBLE
 from lightpaint.lighting.constraints.constraints import Constraints
 from lightpaint.paint.protocol import Advice
-from lightpaint.paint.session.answer_messages import advice, sketch_headline
+from lightpaint.paint.session.session_messages import advice, sketch_headline
 from lightpaint.paint.session.snapshot import SessionSnapshot
 from lightpaint.paint.store.session_requests import SessionRequests
 from lightpaint.pipeline.job.settings import Settings

@@ -32,7 +32,7 @@ from lightpaint.paint.protocol import (
     TieLights,
     typescript,
 )
-from lightpaint.paint.server.observers import MAX_OBSERVERS
+from lightpaint.paint.server.session_clients import MAX_OBSERVERS
 from lightpaint.paint.session.look_library import MAX_PROPOSALS
 
 sys.path.insert(0, str(REPOSITORY / "docs" / "site"))

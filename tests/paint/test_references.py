@@ -23,8 +23,12 @@ from lightpaint.paint.references.light_match import (
     contrast_of_light,
     match_light,
 )
-from lightpaint.paint.references.reference_file import MAX_SIDE, read_reference
-from lightpaint.paint.references.reference_table import MAX_REFERENCES, ReferenceTable
+from lightpaint.paint.references.reference_table import (
+    MAX_REFERENCES,
+    MAX_SIDE,
+    ReferenceTable,
+    read_reference,
+)
 from lightpaint.paint.references.tones import LightTones
 from lightpaint.paint.session.session import Session
 from lightpaint.paint.store.history_steps import Identity

@@ -16,8 +16,8 @@ from lightpaint.basis.render import guide_training
 from lightpaint.paint import protocol
 from lightpaint.paint.background_threads import LatestWork
 from lightpaint.paint.store.store import MemoryStore
-from lightpaint.paint.studio import plane_denoiser
-from lightpaint.paint.studio.background_sampling import SAMPLING, add_round
+from lightpaint.paint.studio import session_bases
+from lightpaint.paint.studio.session_bases import SAMPLING, add_round
 from lightpaint.paint.studio.studio import Studio
 from lightpaint.paint.subject import Subject
 from lightpaint.pipeline.job.settings import Settings
@@ -93,13 +93,13 @@ def test_planes_with_added_samples_are_denoised_anew(
 ):
     """Once there are enough, and not after each round."""
     denoised: list[tuple[float, int]] = []
-    inner = plane_denoiser.denoise_to_halves
+    inner = session_bases.denoise_to_halves
 
     def denoise(basis: Any, k: int) -> Any:
         denoised.append((basis.origin.extra_spp, k))
         return inner(basis, k)
 
-    monkeypatch.setattr(plane_denoiser, "denoise_to_halves", denoise)
+    monkeypatch.setattr(session_bases, "denoise_to_halves", denoise)
     studio = Studio([subject], MemoryStore)
     studio.start()
     try:

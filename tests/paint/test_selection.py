@@ -11,7 +11,7 @@ from lightpaint.errors import PaintError
 from lightpaint.paint import protocol
 from lightpaint.paint.layers.selection import selection_mask
 from lightpaint.paint.session.picture_table import PictureTable
-from lightpaint.paint.session.view_pictures import offer_layers
+from lightpaint.paint.session.session_state import offer_layers
 from lightpaint.paint.store.canvas_pixels import Region
 
 H, W = SIZES[0]

@@ -10,7 +10,7 @@ import pytest
 from mixer_canvas import mixer_pixels
 
 import lightpaint as lp
-from lightpaint.paint.notebook.static_view import static_view
+from lightpaint.paint.notebook.cell_output import static_view
 
 pytest.importorskip("anywidget", reason="anywidget")
 

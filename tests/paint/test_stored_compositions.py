@@ -17,14 +17,12 @@ from lightpaint.errors import PaintError
 from lightpaint.paint import protocol
 from lightpaint.paint.layers.composed_layers import accent
 from lightpaint.paint.layers.composition import compose_layer
-from lightpaint.paint.layers.layer import Layer
+from lightpaint.paint.layers.layer_stack import Layer
 from lightpaint.paint.session.session import Session
-from lightpaint.paint.store import stored_compositions
 from lightpaint.paint.store.canvas_pixels import Pixels
 from lightpaint.paint.store.compression import ZEROS_LENGTH, pack, pack_patches, unpack_patches
 from lightpaint.paint.store.history_steps import Patch
-from lightpaint.paint.store.store import Store
-from lightpaint.paint.store.stored_compositions import StoredComposition
+from lightpaint.paint.store.store import COMPOSITION_VERSION, Store, StoredComposition, _digest
 
 
 def keep(session: Session) -> None:
@@ -125,7 +123,7 @@ def test_stale_and_damaged_compositions_are_not_used(tmp_path: Path) -> None:
         assert store.compositions(looks) is not None
         assert store.compositions([2 * looks[0]]) is None
         assert store.compositions([*looks, *looks]) is None
-        with patch.object(stored_compositions, "COMPOSITION_VERSION", 0):
+        with patch("lightpaint.paint.store.store.COMPOSITION_VERSION", 0):
             assert store.compositions(looks) is None
     for change in (
         "UPDATE composition SET step = step + 1",
@@ -207,9 +205,9 @@ def test_other_bits_of_a_composition_need_another_version() -> None:
         mask = np.maximum(rng.random((40, 30), np.float32) - np.float32(0.3), 0)
         pixels = Pixels(2 * rng.random((40, 30, 3), np.float32), mask)
         target = compose_layer(layer, pixels, target, accent(0.05 * layer.id))
-    digest = stored_compositions._digest(target.image.data, target.importance.data).hex()
+    digest = _digest(target.image.data, target.importance.data).hex()
     assert digest == "6daa597fe1c54c7e9b591f816f000d6f"
-    assert stored_compositions.COMPOSITION_VERSION == 1
+    assert COMPOSITION_VERSION == 1
 
 
 def test_zeros_of_masks_are_packed_as_other_numbers_are() -> None:

@@ -30,9 +30,9 @@ from lightpaint.paint.publisher import Publisher
 from lightpaint.paint.session import picture_table
 from lightpaint.paint.session.session import Session
 from lightpaint.paint.session.snapshot import SessionSnapshot
-from lightpaint.paint.store import write_queue
+from lightpaint.paint.store import database
 from lightpaint.paint.store.store import Store
-from lightpaint.paint.studio import plane_denoiser, session_bases, session_exports
+from lightpaint.paint.studio import session_bases, session_exports
 from lightpaint.paint.studio.studio import Studio
 from lightpaint.paint.subject import Subject
 from lightpaint.report.phrases import spoken_amount
@@ -260,7 +260,7 @@ def test_denoised_planes_of_few_samples_do_until_there_are_better_ones(
     better = replace(basis, planes=basis.images * np.float32(1.5))
     is_taken, release = threading.Event(), threading.Event()
     cleaned: list[lp.Basis] = []
-    real = plane_denoiser.denoise_to_halves
+    real = session_bases.denoise_to_halves
 
     def denoise_to_halves(noisy_basis: lp.Basis, k: int) -> Any:
         if noisy_basis.images is better.images:
@@ -269,7 +269,7 @@ def test_denoised_planes_of_few_samples_do_until_there_are_better_ones(
         cleaned.append(noisy_basis)
         return real(noisy_basis, k)
 
-    monkeypatch.setattr(plane_denoiser, "denoise_to_halves", denoise_to_halves)
+    monkeypatch.setattr(session_bases, "denoise_to_halves", denoise_to_halves)
     monkeypatch.setattr(session_bases, "obtain_bases", lambda *_: iter([[basis], [better]]))
     client = StudioClient(tmp_path, basis)
     assert is_taken.wait(PATIENCE_S)
@@ -503,7 +503,7 @@ def test_a_full_disk_is_said_to_pages_and_to_the_terminal(
     at_terminal: list[str] = []
     client.studio.on_unsaved = at_terminal.append
     with monkeypatch.context() as patch:
-        patch.setattr(write_queue, "transaction", full)
+        patch.setattr(database, "transaction", full)
         client.paint(1, 0.8)
         text = client.wait(is_disk_notice).fields["text"]
         assert "disk is full" in text
@@ -547,7 +547,7 @@ def test_a_preview_shows_what_the_change_does_then(
 ):
     """To the last pixel, where no clean planes are there; and nothing is done before."""
     monkeypatch.setattr(
-        plane_denoiser.PlaneDenoiser, "planes_for", lambda _, bases: [None] * len(bases)
+        session_bases.PlaneDenoiser, "planes_for", lambda _, bases: [None] * len(bases)
     )
     client.paint(1, 1.2)
     client.paint(2, 0.02, (3, 12, 20, 30))

@@ -14,7 +14,7 @@ from lightpaint.lighting.analysis.appearance.limiting_reasons import Loosening, 
 from lightpaint.lighting.analysis.appearance.unpainted_change import UnpaintedChange
 from lightpaint.lighting.analysis.diagnosis import Place
 from lightpaint.paint.protocol import Advice
-from lightpaint.paint.session.answer_messages import (
+from lightpaint.paint.session.session_messages import (
     ADVICE_TEXTS,
     advice,
     answer_findings,

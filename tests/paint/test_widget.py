@@ -27,8 +27,8 @@ from renderer import LIGHTS, REPOSITORY, write_room
 import lightpaint as lp
 from lightpaint.errors import ConstraintError, OutputError, PaintError
 from lightpaint.paint import background_threads, protocol
-from lightpaint.paint.notebook import painter_files, widget_arguments
-from lightpaint.paint.store import write_queue
+from lightpaint.paint.notebook import widget, widget_arguments
+from lightpaint.paint.store import database
 from lightpaint.paint.store.canvas_pixels import Pixels
 from lightpaint.paint.store.history_steps import Identity
 from lightpaint.paint.store.store import Store
@@ -759,7 +759,7 @@ def test_a_full_disk_is_said_and_tried_again(
     page = Page(painter)
     page.say("hello", version=protocol.VERSION)
     with monkeypatch.context() as patch:
-        patch.setattr(write_queue, "transaction", full)
+        patch.setattr(database, "transaction", full)
         assert page.paint(basis.images[2])["kind"] == "answer"
         [notice] = wait_for(lambda: notices("warn"))
         assert "evening.db cannot be written (database or disk is full)" in notice
@@ -864,12 +864,12 @@ def test_without_the_extra_there_is_one_line(monkeypatch: pytest.MonkeyPatch) ->
 
 
 def test_the_script_is_one_module() -> None:
-    text = painter_files.widget_script()
+    text = widget.widget_script()
     assert text.endswith(".default\n")
     assert text.count("\nexport ") == 1
     assert "\nimport " not in text
     assert "http:" not in text.replace("http://www.w3.org", "")
-    assert ".lightpaint" in painter_files.widget_style()
+    assert ".lightpaint" in widget.widget_style()
     # Of what others wrote, who wrote it and under which licence.
     assert "MIT" in text
     assert text == bundled.__wrapped__("paint/page/widget.js")

@@ -14,7 +14,7 @@ from lightpaint.lighting.analysis.appearance.appearance import Appearance
 from lightpaint.lighting.analysis.appearance.limiting_reasons import Reason
 from lightpaint.lighting.analysis.diagnosis import Place, diagnose
 from lightpaint.lighting.analysis.noise.uncertainty import error_bars
-from lightpaint.lighting.answer.active_bound import Bound
+from lightpaint.lighting.answer.certificate import Bound
 from lightpaint.lighting.solve import solve
 from lightpaint.report.diagnosis_sentences import error_sentences, spoken_bound, spoken_hold
 from lightpaint.report.measures import halving_spp
@@ -151,7 +151,7 @@ def test_sentence_and_table_give_the_same_percentages(make_basis: Any):
     current = basis.mix(basis.current_weights)
     page = missed_section(solution, split, current, transform=ViewTransform())
     sentence, _, rest = page.partition("</p>")
-    [table] = re.findall(r'<table class="shares">(.*?)</table>', rest)
+    [table] = re.findall(r'<table class="shares">(.*?)</table>', rest, re.DOTALL)
     shares = re.findall(r"([\d.]+) %", sentence)
     assert len(shares) == 3
     assert sum(map(int, shares)) == 100

@@ -17,7 +17,7 @@ from lightpaint.batch.work.task import Task
 from lightpaint.batch.work.work_items import ItemResult, PaintingOfSums, SceneFilm, SumsOfRows
 from lightpaint.batch.work.worker_cache import WorkerCache
 from lightpaint.errors import BasisError
-from lightpaint.lighting.problem_sums import Sums
+from lightpaint.lighting.linear_problem import Sums
 from lightpaint.pipeline.job.job import Job
 from lightpaint.pipeline.job.sources import Painting
 from lightpaint.progress import Listener

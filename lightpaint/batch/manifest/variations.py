@@ -10,8 +10,7 @@ from lightpaint.arrays import RGB
 from lightpaint.colour.color import kelvin_to_rgb, luminance
 from lightpaint.colour.photometry import photometry
 from lightpaint.errors import BatchError
-from lightpaint.lighting.answer.light_setting import LightSetting
-from lightpaint.lighting.answer.lighting import Lighting
+from lightpaint.lighting.answer.lighting import Lighting, LightSetting
 from lightpaint.lighting.constraints.constraints import Constraints
 from lightpaint.lighting.fit import DEFAULT_HOLD
 from lightpaint.pipeline.job.settings import Settings

@@ -20,8 +20,8 @@ from lightpaint.errors import LOOK_ERRORS, BatchError, LightpaintError
 from lightpaint.lighting.answer.lighting_file import read_lighting
 from lightpaint.lighting.constraints.constraints import Constraints
 from lightpaint.lighting.constraints.start_lighting import start_weights
-from lightpaint.lighting.problem_sums import reason_against_sums
-from lightpaint.lighting.unknowns.constraint_reduction import reduce_to
+from lightpaint.lighting.linear_problem import reason_against_sums
+from lightpaint.lighting.unknowns.reduction import reduce_to
 from lightpaint.pipeline.job.job import Job
 from lightpaint.pipeline.job.sources import check_nothing_unused, content
 from lightpaint.relit.relight import scene_of

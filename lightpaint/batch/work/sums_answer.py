@@ -9,9 +9,9 @@ from lightpaint.batch.work.work_items import SumsOfRows
 from lightpaint.batch.work.worker_cache import WorkerCache
 from lightpaint.lighting.answer.lighting import Lighting
 from lightpaint.lighting.fit import Fit
+from lightpaint.lighting.linear_problem import Sums, sum_rows, summed_problem
 from lightpaint.lighting.linear_solve import solve_linear
 from lightpaint.lighting.problem import Problem
-from lightpaint.lighting.problem_sums import Sums, sum_rows, summed_problem
 from lightpaint.lighting.solve import solution_of
 from lightpaint.pipeline.job.job import Job
 from lightpaint.pipeline.results.answer_folder import new_answer
@@ -39,7 +39,7 @@ def answer_by_sums(job: Job, basis: Basis) -> None:
     [view] = job.views
     basis = basis if view.scene is None else basis.with_requests(view.scene.requests)
     if not basis.knows_noise:
-        # Only pixels show which differences are rounding alone (see lighting/round_off.py).
+        # Only pixels show which differences are rounding alone (see lighting/problem.py).
         problem = Problem.of(basis, view.target, constraints=job.all_constraints, fit=job.fit)
         publish_lighting_only(job, solution_of(problem).lighting)
         return

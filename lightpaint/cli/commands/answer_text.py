@@ -17,7 +17,7 @@ from lightpaint.colour.color import LUMINANCE, luminance, rgb_to_hex
 from lightpaint.display_text import some_names, some_of
 from lightpaint.lighting.analysis.appearance.constraint_kinds import KEYS_BY_KIND
 from lightpaint.lighting.analysis.appearance.limiting_reasons import Reason
-from lightpaint.lighting.answer.light_setting import LightSetting
+from lightpaint.lighting.answer.lighting import LightSetting
 from lightpaint.pipeline.job.settings import Settings
 from lightpaint.pipeline.results.results import Look
 from lightpaint.report.answer_pictures import spoken_view

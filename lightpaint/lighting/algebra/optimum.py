@@ -8,8 +8,7 @@ import numpy.typing as npt
 
 from lightpaint.arrays import Doubles, Indices
 from lightpaint.lighting.algebra.active_set import polish
-from lightpaint.lighting.algebra.capped_newton import capped_newton
-from lightpaint.lighting.algebra.clipped_newton import clipped_newton
+from lightpaint.lighting.algebra.clipped_newton import capped_newton, clipped_newton
 from lightpaint.lighting.algebra.gauss_seidel import sweep
 from lightpaint.lighting.algebra.interior_point import interior_point
 from lightpaint.lighting.algebra.method import Method

@@ -6,7 +6,7 @@ With the closest weights u of any sign, Ψ − ΣuΦ is orthogonal to every ligh
 
 exactly: no mix of the lights can reach the first part, and w >= 0 forbids the second. The first
 part is split further into the noise of the prediction, the noise of the painting if it is a render
-or a photograph (`painting_grain.py`), and the rest. If the lighting answers several views, part of
+or a photograph (`residuals.py`), and the rest. If the lighting answers several views, part of
 the second is the compromise with the others. After reweighting, all parts are of the last linear
 problem: without clipping by a display, and on a scale of its own.
 """
@@ -19,19 +19,98 @@ import numpy as np
 import numpy.typing as npt
 
 from lightpaint.arrays import Doubles, Floats, as_rgb
+from lightpaint.colour.color import luminance
 from lightpaint.display_text import short_repr
+from lightpaint.images.bands import bands_of
 from lightpaint.keywords import keywords
-from lightpaint.lighting.analysis.bound_release import bounds_of
-from lightpaint.lighting.analysis.error_energies import ErrorEnergies, grain_power
+from lightpaint.lighting.analysis.active_bounds import bounds_of
 from lightpaint.lighting.analysis.noise.noise import pseudo_inverse
+from lightpaint.lighting.analysis.noise.residuals import Residuals, channel_grain
 from lightpaint.lighting.analysis.noise.weight_directions import all_columns
-from lightpaint.lighting.answer.active_bound import Bound
+from lightpaint.lighting.answer.certificate import Bound
 from lightpaint.lighting.solution import Solution
 from lightpaint.lighting.solve import solve_again
+from lightpaint.threads import parallel_map
 
 #: Blocks along each side of the image for finding where light is missing, and regions along each
 #: side that sentences name: left, middle, right.
 BLOCKS, REGIONS = 12, 3
+
+
+@dataclass(frozen=True)
+class ErrorEnergies:
+    """Sums over pixels. total, out_of_reach, noise, ignored: as in `Diagnosis`, uncut. painted:
+    Σ D Ψ².
+    """
+
+    total: float
+    out_of_reach: float
+    noise: float
+    ignored: float
+    painted: float
+
+    @classmethod
+    def of(
+        cls,
+        solution: Solution,
+        predicted: Floats,
+        forbidden: Floats,
+        unreachable_map: Doubles,
+        ignored_map: Doubles,
+    ) -> "ErrorEnergies":
+        """Sum, band by band, and fill the maps: (h, w, 3) and (h, w)."""
+        [target] = solution.problem.views.targets
+        residuals, loss, width = Residuals.of(solution), solution.problem.loss, predicted.shape[1]
+
+        def sums(rows: slice) -> Doubles:
+            D, importance = (
+                x[rows].astype(np.float64) for x in (solution.weight, solution.importance)
+            )
+            image, mixed = solution.image[rows].astype(np.float64), predicted[rows]
+            missed = image - mixed
+            unreachable = missed - forbidden[rows]
+            # This excludes noise that the painting shares, where it equals the current look.
+            noise = residuals.noise(slice(rows.start * width, rows.stop * width))
+            uncounted = _uncounted(importance, target.image[rows])
+            outside = target.image[rows].astype(np.float64) - mixed
+            is_linear = solution.problem.is_linear
+            residual = outside if is_linear else loss.cut(lambda x: x[rows]).residual(mixed)
+            unreachable_map[rows] = unreachable
+            ignored_map[rows] = uncounted * luminance(outside)
+            return np.array(
+                [
+                    (D * np.square(missed)).sum(),
+                    (D * np.square(unreachable)).sum(),
+                    (D * np.square(noise.reshape(missed.shape))).sum(),
+                    (uncounted[..., None] * np.square(residual)).sum(),
+                    (D * np.square(image)).sum(),
+                ]
+            )
+
+        energies = np.sum(parallel_map(sums, bands_of(predicted.shape)), axis=0).tolist()
+        total, out_of_reach, noise, ignored, painted = energies
+        return cls(total, out_of_reach, noise, ignored, painted)
+
+
+def _uncounted(importance: Doubles, image: Floats) -> Doubles:
+    """Return the share of pixels, (h, w), that does not count, in which `image` has a colour."""
+    # Black target pixels have no colour to miss.
+    return np.where(np.any(image > 0, axis=-1), np.maximum(1 - importance, 0), 0)
+
+
+def grain_power(solution: Solution, unreachable: Doubles) -> float:
+    """Return the power of the painting's noise in the part out of reach.
+
+    Grain is measured with the weights of the fit: otherwise a mean would give dark pixels the grain
+    of bright neighbours, and more than the whole error.
+    """
+    counted, weight = solution.importance > 0, solution.weight
+    power = 0.0
+    for c in range(3):
+        root_weight = np.sqrt(weight[..., c % weight.shape[2]].astype(np.float64))
+        root_weight *= unreachable[..., c]
+        power += float(channel_grain(root_weight, counted).sum())
+    return power
 
 
 @dataclass(frozen=True)

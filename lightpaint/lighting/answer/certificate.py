@@ -1,15 +1,87 @@
-"""The proof of how good an answer is."""
+"""The certificate of an answer, with the bounds that hold it and the software behind it."""
 
+import importlib.metadata
 import math
 from dataclasses import dataclass, replace
+from functools import cache
+from typing import Literal
 
 import numpy as np
 
 from lightpaint.arrays import RGB, Doubles, as_rgb
 from lightpaint.display_text import short_repr
 from lightpaint.keywords import keywords
-from lightpaint.lighting.answer.active_bound import Bound
-from lightpaint.lighting.answer.software_versions import Software
+from lightpaint.threads import linear_algebra
+from lightpaint.version import __version__
+
+#: Kinds of bounds: light is not negative; a light is not adjusted; constraints.
+Kind = Literal["zero", "kept", "lock", "off", "left out", "tie", "limits", "colour"]
+
+#: The unit of a multiplier.
+Per = Literal["emission", "luminance", "dimmer"]
+
+#: The side of its whites to which a light would go; "" for neither.
+Tint = Literal["", "greener", "pinker"]
+
+
+@dataclass(frozen=True)
+class Software:
+    """Installed versions, and the kernel for the processor.
+
+    blas: library of linear algebra under NumPy, and its version. kernel: of that library for the
+    processor, such as `Haswell`; "" if unknown. mitsuba: "" if it is not installed.
+    """
+
+    lightpaint: str
+    numpy: str
+    blas: str
+    kernel: str
+    mitsuba: str = ""
+
+    @classmethod
+    @cache
+    def installed(cls) -> "Software":
+        """Return the versions of this process."""
+        blas, kernel = linear_algebra()
+        return cls(__version__, version("numpy"), blas, kernel, version("mitsuba"))
+
+
+def version(package: str) -> str:
+    """Return the version of an installed package; "" if it is not."""
+    try:
+        return importlib.metadata.version(package)
+    except importlib.metadata.PackageNotFoundError:
+        return ""  # a saved basis needs no renderer
+
+
+@dataclass(frozen=True)
+class Bound:
+    """A bound that holds back one light, or several on one dimmer.
+
+    held_by: the constraint in few words (`LightSetting.constraint`); else the kind.
+    gain: decrease of the objective, all channels together, if only this bound were released. A
+    fixed, locked, limited, coloured or tied light may then have any emission >= 0, an unselected
+    light any that its constraints allow, and a light at zero negative emission. A pull towards the
+    current lighting stays; it is not part of the objective, so the gain may be negative.
+    multiplier: derivative of the objective by the bound: >= 0 at a lower limit, such as zero, and
+    <= 0 at an upper one, such as `off`. Three channels per `emission`; one number per `luminance`
+    of the emission; per unit of a `dimmer`, 1 being the current level, one number for each tied
+    light moved separately, or one for all.
+    tint: the side of its range of white to which the light would go.
+    """
+
+    lights: tuple[str, ...]
+    kind: Kind
+    held_by: str
+    gain: float
+    multiplier: tuple[float, ...]
+    per: Per
+    tint: Tint = ""
+
+    @property
+    def is_switched_off(self) -> bool:
+        """True if the user, or a choice of few lights, switched the light off."""
+        return self.kind in ("off", "left out")
 
 
 @keywords()

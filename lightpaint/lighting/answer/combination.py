@@ -13,8 +13,7 @@ from lightpaint.display_text import some_of
 from lightpaint.errors import LightingError, UnknownLightError
 from lightpaint.images.estimate import Estimate
 from lightpaint.keywords import keywords
-from lightpaint.lighting.answer.light_setting import LightSetting
-from lightpaint.lighting.answer.lighting import Lighting
+from lightpaint.lighting.answer.lighting import Lighting, LightSetting
 
 
 @keywords()

@@ -11,8 +11,7 @@ from lightpaint.file_reading import read_text
 from lightpaint.files import one_line, write_text
 from lightpaint.keywords import keywords
 from lightpaint.lighting.answer.certificate import Certificate
-from lightpaint.lighting.answer.light_setting import ALL_REACHED, LightSetting
-from lightpaint.lighting.answer.lighting import Lighting
+from lightpaint.lighting.answer.lighting import ALL_REACHED, Lighting, LightSetting
 from lightpaint.lighting.answer.lighting_keys import LightingKey
 from lightpaint.scene.properties.site import EmitterPlace
 from lightpaint.storage.json_records import fields_of, read_record, strict_json

@@ -21,9 +21,9 @@ from typing import Any
 from lightpaint.arrays import RGB, Doubles
 from lightpaint.basis.basis import Basis
 from lightpaint.basis.light_images import texel_lights
+from lightpaint.lighting.constraints.color_restrictions import WhiteLimits, painted_whites
 from lightpaint.lighting.constraints.constraints import Constraints
 from lightpaint.lighting.constraints.start_lighting import start_weights
-from lightpaint.lighting.constraints.white_lights import WhiteLimits, painted_whites
 from lightpaint.lighting.fit import Fit, Space
 from lightpaint.lighting.linear_problem import reduce_lights
 from lightpaint.lighting.live.live_sums import MAX_FILM_PIXELS, Films, SmallFilm
@@ -40,7 +40,6 @@ from lightpaint.lighting.loss.weight_penalty import (
     weight_pull,
 )
 from lightpaint.lighting.normal_equations import NormalEquations
-from lightpaint.lighting.unknowns.gamut_bounds import solve_near_sides
 from lightpaint.lighting.unknowns.gamuts import Gamuts, PaintedLight
 from lightpaint.lighting.unknowns.reduced_problem import solve_reduced
 from lightpaint.lighting.unknowns.reduction import Reduction
@@ -49,6 +48,7 @@ from lightpaint.lighting.unknowns.white_mixes import (
     clip_to_gamuts,
     next_whites,
     snap_to_whites,
+    solve_near_sides,
 )
 from lightpaint.threads import one_thread
 

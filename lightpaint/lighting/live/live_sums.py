@@ -11,9 +11,9 @@ from lightpaint.basis.basis import Basis
 from lightpaint.colour.display.view_transform import ViewTransform
 from lightpaint.images.pixel_blocks import block_mean, block_sums, enlarged
 from lightpaint.lighting.live.tiles import MAX_CHEAP_LIGHTS, TiledEquations
-from lightpaint.lighting.loss.channel_loss import PaintedPixels, join_pixels
 from lightpaint.lighting.loss.expected_lights import Wash, exact_share, wish_shares
 from lightpaint.lighting.loss.loss import STRIP_PIXELS
+from lightpaint.lighting.loss.painting_loss import PaintedPixels, join_pixels
 from lightpaint.lighting.loss.reweighting import interpolate
 from lightpaint.lighting.normal_equations import NormalEquations
 from lightpaint.target.wish import Wish

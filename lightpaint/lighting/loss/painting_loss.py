@@ -1,6 +1,6 @@
 """The loss of a painting with "at least this bright", in light or as a display shows it."""
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import Any
@@ -8,16 +8,277 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from lightpaint.arrays import Bools, Doubles, Floats
+from lightpaint.arrays import Bools, Doubles, Floats, Indices
 from lightpaint.colour.display.view_transform import ViewTransform
 from lightpaint.images.bands import BAND_PIXELS, by_bands
 from lightpaint.images.pixel_blocks import block_sums
-from lightpaint.lighting.loss.channel_loss import PaintedPixels
-from lightpaint.lighting.loss.loss import STRIP_PIXELS, Cut, Loss, image_of, planes_of
+from lightpaint.lighting.loss.loss import (
+    STRIP_PIXELS,
+    Cut,
+    Loss,
+    PixelLoss,
+    contiguous_rows,
+    image_of,
+    planes_of,
+)
 from lightpaint.threads import parallel_map
 
 #: Fields of a loss that are pictures.
 PICTURES = ("painted", "importance", "share", "current", "at_least")
+
+
+@dataclass(frozen=True)
+class PaintedPixels(PixelLoss):
+    """Pixels of a `PaintingLoss`, in which the formula stands.
+
+    painted, current: (3, p), linear, of any precision. importance, share: (p,). at_least: (3, p),
+    None if brighter is nowhere as good. encoded: V of painted and of current, if computed already.
+    """
+
+    painted: Floats
+    importance: Doubles
+    share: Doubles
+    current: Floats
+    at_least: Bools | None
+    transform: ViewTransform | None
+    encoded: tuple[Doubles, Doubles] | None = None
+
+    def subset(self, which: slice | Indices) -> "PaintedPixels":
+        """Return some of the pixels."""
+        return replace(
+            self,
+            painted=contiguous_rows(self.painted, which),
+            importance=self.importance[which],
+            share=self.share[which],
+            current=contiguous_rows(self.current, which),
+            at_least=None if self.at_least is None else contiguous_rows(self.at_least, which),
+            encoded=None
+            if self.encoded is None
+            else (self.encoded[0][:, which], self.encoded[1][:, which]),
+        )
+
+    def scaled(self, factors: Doubles) -> "PaintedPixels":
+        """Return the pixels with importance multiplied by `factors`, (p,)."""
+        return replace(self, importance=self.importance * factors)
+
+    def over_look(self, look: Doubles) -> "PaintedPixels":
+        """Return the same pixels over another current look, (3, p)."""
+        return replace(self, current=look, encoded=None)
+
+    @property
+    def has_clipping(self) -> bool:
+        """True if a display clips the pixels."""
+        return self.transform is not None
+
+    @property
+    def has_pieces(self) -> bool:
+        """True if light itself is compared."""
+        return self.transform is None
+
+    def encode(self, x: Floats) -> Doubles:
+        """Return V(x), (3, p)."""
+        light: Doubles = x.astype(np.float64, copy=False)
+        if self.transform is None:
+            return light
+        return np.asarray(self.transform.encode_planes(light), np.float64)
+
+    def _with_slopes(self, x: Floats) -> tuple[Doubles, Doubles]:
+        """Return V(x), and its derivatives in the form of `ViewTransform.with_slopes`."""
+        assert self.transform is not None
+        shown, slopes = self.transform.with_slopes(x.astype(np.float64, copy=False))
+        return np.asarray(shown, np.float64), np.asarray(slopes, np.float64)
+
+    def exceeds(self, x: Doubles) -> Bools | None:
+        """Return where x, (3, p), is brighter than paint that means "at least"; None for
+        nowhere."""
+        if self.at_least is None:
+            return None
+        exceeded = self.at_least & (x > self.painted)
+        return exceeded if exceeded.any() else None
+
+    def objective(self, x: Doubles) -> Doubles:
+        """Return F per channel, (3,), of x, (3, p)."""
+
+        def strip_objective(strip: slice, part: "PaintedPixels") -> Doubles:
+            return part._objective(np.ascontiguousarray(x[:, strip], np.float64))
+
+        return np.asarray(sum(self.map_strips(strip_objective)))
+
+    def _objective(self, x: Doubles, shown: Doubles | None = None) -> Doubles:
+        shown, q = self.encode(x) if shown is None else shown, self.share
+        missed = self._shown_painting - shown
+        if (exceeds := self.exceeds(x)) is not None:
+            columns = np.flatnonzero(exceeds.any(axis=0))
+            goal = np.where(exceeds, x, self.painted)[:, columns]
+            missed[:, columns] = self.encode(goal) - shown[:, columns]
+        terms = np.square(missed)
+        if self._is_shared:
+            terms *= 1 - q
+            terms += q * np.square(self._shown_current - shown)
+            terms -= self._unavoidable
+        return np.asarray(terms @ self.importance)
+
+    def squares(self, x: Doubles, *, from_clipping: bool) -> tuple[Doubles, Doubles]:
+        """Return image and weight, (3, p) each, of squares with the gradient of F at x, (3, p)."""
+        image, weight = np.empty((2, *x.shape))
+
+        def fill(strip: slice, part: "PaintedPixels") -> None:
+            lit = np.ascontiguousarray(x[:, strip], np.float64)
+            gradient, factor = part.gradient(lit, from_clipping=from_clipping)
+            has_weight = factor > 0
+            gradient /= factor if has_weight.all() else np.where(has_weight, factor, 1)
+            np.add(lit, gradient, out=image[:, strip])
+            np.multiply(factor, part.importance, out=weight[:, strip])
+
+        self.map_strips(fill)
+        return image, weight
+
+    def objective_and_gradient(self, x: Doubles) -> tuple[float, Doubles]:
+        """Return F of few pixels, (3, p), and half its gradient, (3, p)."""
+        encoded = None if self.transform is None else self._with_slopes(x)
+        slope, _ = self.gradient(x, encoded=encoded)
+        slope *= -self.importance
+        return float(self._objective(x, None if encoded is None else encoded[0]).sum()), slope
+
+    def gradient(
+        self,
+        x: Doubles,
+        *,
+        from_clipping: bool = False,
+        encoded: tuple[Doubles, Doubles] | None = None,
+    ) -> tuple[Doubles, Doubles]:
+        """Return half the negative gradient of F, and the weights of its squares, without
+        importance; (3, p) each.
+        """
+        q, exceeds = self.share, self.exceeds(x)
+        if self.transform is None:
+            counts = (1 - q) * (np.ones_like(x) if exceeds is None else ~exceeds)
+            return counts * (self.painted - x) + q * (self.current - x), counts + q
+        shown, own_slope = self._with_slopes(x) if encoded is None else encoded
+        slope, missed, distance = own_slope, self._shown_painting - shown, self.painted - x
+        if exceeds is not None:
+            # The goal there moves along with x.
+            columns = np.flatnonzero(exceeds.any(axis=0))
+            goal = np.where(exceeds, x, self.painted)[:, columns]
+            moved_shown, moved_slope = self._with_slopes(goal)
+            missed[:, columns] = moved_shown - shown[:, columns]
+            slope = own_slope.copy()
+            slope[..., columns] -= moved_slope * exceeds[:, columns]
+            distance[exceeds] = 0
+        if from_clipping:
+            slope = _with_chords(own_slope, slope, missed, distance)
+        gradient, factor = _square_terms(slope, missed)
+        if self._is_shared:
+            slope, missed = own_slope, self._shown_current - shown
+            if from_clipping:
+                slope = _with_chords(own_slope, slope, missed, self.current - x)
+            of_current = _square_terms(slope, missed)
+            gradient, factor = (
+                (1 - q) * a + q * b for a, b in zip((gradient, factor), of_current, strict=True)
+            )
+        return gradient, factor
+
+    def shares(self, x: Doubles, weight: Doubles) -> Doubles:
+        """Return the share of squares made at x that follow the current look, (3, p). weight:
+        theirs.
+        """
+        if not self._is_shared:
+            return super().shares(x, weight)
+        share = np.zeros_like(x)
+
+        def fill(strip: slice, part: "PaintedPixels") -> None:
+            steep = part._slope_product(x[:, strip]) * part.share * part.importance
+            np.divide(steep, weight[:, strip], out=share[:, strip], where=weight[:, strip] > 0)
+
+        self.map_strips(fill)
+        return share
+
+    def _slope_product(self, x: Doubles) -> Doubles:
+        """Return the product of the slopes of V at x and at C, (3, p)."""
+        if self.transform is None:
+            return np.ones_like(x)
+        own_slope, current = (self._with_slopes(y)[1] for y in (x, self.current))
+        product = own_slope * current
+        return product if product.ndim == 2 else np.asarray(product.sum(axis=0))
+
+    def has_same_squares(self, a: Doubles, b: Doubles) -> bool:
+        """Return whether the squares made for two pictures are equal, and so exact between them."""
+        if self.transform is not None:
+            return False
+        return self.at_least is None or not (self._is_above(a) != self._is_above(b)).any()
+
+    def _is_above(self, x: Doubles) -> Bools:
+        assert self.at_least is not None
+        return np.asarray(self.at_least & (x > self.painted))
+
+    @cached_property
+    def _is_shared(self) -> bool:
+        return bool(self.share.any())
+
+    @cached_property
+    def _shown_painting(self) -> Doubles:
+        return self.encode(self.painted) if self.encoded is None else self.encoded[0]
+
+    @cached_property
+    def _shown_current(self) -> Doubles:
+        return self.encode(self.current) if self.encoded is None else self.encoded[1]
+
+    @cached_property
+    def _unavoidable(self) -> Doubles:
+        """The least loss between painting and current look, (3, p), without importance."""
+        distance = np.square(self._shown_painting - self._shown_current)
+        if self.at_least is not None:
+            distance[self.at_least & (self.current >= self.painted)] = 0
+        return np.asarray(self.share * (1 - self.share) * distance)
+
+
+def join_pixels(parts: Sequence[PaintedPixels]) -> PaintedPixels:
+    """Join pixels of several pictures into one set, where brighter is nowhere as good."""
+    first = parts[0]
+
+    def concatenate(read: Callable[[PaintedPixels], Floats]) -> Doubles:
+        return np.concatenate([read(part) for part in parts], axis=-1, dtype=np.float64)
+
+    return PaintedPixels(
+        concatenate(lambda part: part.painted),
+        concatenate(lambda part: part.importance),
+        concatenate(lambda part: part.share),
+        concatenate(lambda part: part.current),
+        None,
+        first.transform,
+        (
+            concatenate(lambda part: part._shown_painting),
+            concatenate(lambda part: part._shown_current),
+        ),
+    )
+
+
+def _square_terms(slope: Doubles, missed: Doubles) -> tuple[Doubles, Doubles]:
+    """Return half the negative gradient of squared errors, and weights of single-channel squares
+    that are nowhere below; (3, p) each, from the derivatives.
+    """
+    if slope.ndim == 2:
+        return slope * missed, np.square(slope)
+    mixed = np.einsum("kcp,kdp->cdp", slope, slope)
+    return np.einsum("kcp,kp->cp", slope, missed), np.abs(mixed, out=mixed).sum(axis=1)
+
+
+def _with_chords(own_slope: Doubles, slope: Doubles, missed: Doubles, distance: Doubles) -> Doubles:
+    """Return `slope` with chords in place of derivatives where display values are flat and off.
+
+    own_slope: of the picture itself, which tells where values are flat.
+    """
+    is_flat = own_slope == 0 if own_slope.ndim == 2 else ~own_slope.any(axis=1)
+    flat = is_flat & (missed * distance > 0)
+    if not flat.any():
+        return slope
+    slope = slope.copy()
+    if slope.ndim == 2:
+        slope[flat] += missed[flat] / distance[flat]
+        return slope
+    k, columns = np.nonzero(flat)
+    slope[k, k, columns] += missed[k, columns] / distance[k, columns]
+    return slope
 
 
 @dataclass(frozen=True)

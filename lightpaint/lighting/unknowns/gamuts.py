@@ -25,7 +25,7 @@ from lightpaint.colour.color_hull import (
     sides_of,
 )
 from lightpaint.colour.white_range import white_range
-from lightpaint.lighting.constraints.white_lights import LAMP_KELVINS
+from lightpaint.lighting.constraints.color_restrictions import LAMP_KELVINS
 
 #: Whites that paint may ask for, in kelvin: those that have a name.
 ALL_KELVINS = (1901, 100_000)

@@ -3,6 +3,7 @@
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
+from typing import Any
 
 import numpy as np
 
@@ -13,14 +14,91 @@ from lightpaint.colour.color_hull import ColorHull
 from lightpaint.colour.white_range import WhiteRange
 from lightpaint.errors import ConstraintError
 from lightpaint.lighting.constraints.constraints import LightConstraint, Tie
-from lightpaint.lighting.constraints.emission_limits import (
-    ROUND_OFF,
-    check_grey,
-    check_room,
-    dimmer_limits,
-    mix_limits,
-)
-from lightpaint.lighting.constraints.values import Lock
+from lightpaint.lighting.constraints.values import Level, Lock
+
+#: Share by which a lower limit may exceed an upper one before they contradict: round-off.
+ROUND_OFF = 1e-12
+
+
+def _dimmer_limits(
+    constraint: LightConstraint, direction: Doubles, light: BasisLight
+) -> tuple[float, float]:
+    """Return bounds on x for an emission of x times `direction`."""
+    lower, upper = 0.0, np.inf
+    for level, is_least in ((constraint.least, True), (constraint.most, False)):
+        if level is None:
+            continue
+        if isinstance(level.amount, tuple):
+            with np.errstate(divide="ignore", invalid="ignore"):
+                bounds = np.array(level.amount) / direction
+            # A light without a channel satisfies any upper limit there, and no lower one.
+            bounds = np.where(direction > 0, bounds, np.inf)
+            if is_least:
+                bounds = np.where((direction == 0) & (np.array(level.amount) == 0), 0, bounds)
+            bound = float(bounds.max() if is_least else bounds.min())
+        else:
+            bound = _luminance(level, light, constraint) / float(luminance(direction))
+        lower, upper = (max(lower, bound), upper) if is_least else (lower, min(upper, bound))
+    return lower, upper
+
+
+def _mix_limits(
+    constraint: LightConstraint, light: BasisLight, count: int
+) -> tuple[Doubles, Doubles, float, float]:
+    """Return bounds on the unknowns, and on the luminance of their sum."""
+    lower, upper = np.zeros(count), np.full(count, np.inf)
+    least, most = 0.0, np.inf
+    for level, is_least in ((constraint.least, True), (constraint.most, False)):
+        if level is None:
+            continue
+        if not isinstance(level.amount, tuple):
+            value = _luminance(level, light, constraint)
+            least, most = (value, most) if is_least else (least, value)
+        elif constraint.primaries is not None:
+            raise ConstraintError(
+                f"{constraint.where}.limits has {level} for a light that mixes primaries: give a "
+                "luminance like 2.5 or a share like 40%"
+            )
+        elif is_least:
+            lower = np.array(level.amount)
+        else:
+            upper = np.array(level.amount)
+    _check_room(constraint, light, lower, upper)
+    return lower, upper, least, most
+
+
+def _luminance(level: Level, light: BasisLight, constraint: LightConstraint) -> float:
+    assert not isinstance(level.amount, tuple)
+    if not level.is_share:
+        return level.amount
+    now = float(luminance(np.array(light.emission)))
+    if now == 0:
+        raise ConstraintError(
+            f"{constraint.where}.limits has {level} of the current luminance, but "
+            f"{light.name!r} is currently off: give a number"
+        )
+    return level.amount * now
+
+
+def _check_grey(constraint: LightConstraint, light: BasisLight) -> None:
+    """Refuse limits per channel for a light that has one weight for all of them."""
+    for level in (constraint.least, constraint.most):
+        if light.is_scalar and level is not None and isinstance(level.amount, tuple):
+            raise ConstraintError(
+                f"{constraint.where}.limits has {level}, and {light.name!r} can only be dimmed as "
+                f"a "
+                "whole: give one number"
+            )
+
+
+def _check_room(constraint: LightConstraint, light: BasisLight, lower: Any, upper: Any) -> None:
+    """Refuse limits that leave nothing between them."""
+    if (np.asarray(lower) > np.asarray(upper) * (1 + ROUND_OFF)).any() or np.isinf(lower).any():
+        raise ConstraintError(
+            f"{constraint.where} asks {light.name!r} for {constraint.label}, which leaves it no "
+            f"emission "
+            "at all: widen the limits"
+        )
 
 
 @dataclass(frozen=True)
@@ -42,7 +120,7 @@ class Knob:
     whites: the range of white of a light that keeps to one. window: the two of these
     that its two unknowns currently mix (white_mixes.py).
     gamut: the gamut that confines the light, if it would leave it otherwise: all of it, or the part
-    towards one `side` (gamut_bounds.py).
+    towards one `side` (white_mixes.py).
     """
 
     lights: tuple[int, ...]
@@ -105,15 +183,15 @@ class Knob:
 def mixing_knob(k: int, light: BasisLight, constraint: LightConstraint) -> Knob:
     """Make the knob of a light of several primaries with independent dimmers."""
     colours = np.eye(3) if constraint.primaries is None else np.array(constraint.primaries)
-    lower, upper, least, most = mix_limits(constraint, light, len(colours))
+    lower, upper, least, most = _mix_limits(constraint, light, len(colours))
     unknowns = [
         Unknown(((k, rgb),), float(low), float(high))
         for rgb, low, high in zip(colours, lower, upper, strict=True)
     ]
     coefficients = np.asarray(luminance(colours), np.float64)
     darkest, brightest = float(coefficients @ lower), float(coefficients @ upper)
-    check_room(constraint, light, max(least, darkest), most)
-    check_room(constraint, light, least, min(most, brightest))
+    _check_room(constraint, light, max(least, darkest), most)
+    _check_room(constraint, light, least, min(most, brightest))
     window = (0, constraint.whites.last) if constraint.whites is not None else (0, 0)
     if least == 0 and np.isinf(most):
         return Knob((k,), tuple(unknowns), None, constraint.whites, window)
@@ -133,9 +211,9 @@ def dimmer_knob(k: int, light: BasisLight, constraint: LightConstraint) -> Knob:
             "use lock, limits, tie or off"
         )
     direction = np.ones(3) if constraint.primaries is None else np.array(constraint.primaries[0])
-    check_grey(constraint, light)
-    lower, upper = dimmer_limits(constraint, direction, light)
-    check_room(constraint, light, lower, upper)
+    _check_grey(constraint, light)
+    lower, upper = _dimmer_limits(constraint, direction, light)
+    _check_room(constraint, light, lower, upper)
     # Round-off may have separated equal ends.
     return Knob((k,), (Unknown(((k, direction),), min(lower, upper), upper),))
 
@@ -188,8 +266,8 @@ def _tied_direction(
             "dimmed as a whole"
         )
     direction = current if color is None else np.array(color) * float(luminance(current))
-    check_grey(constraint, light)
-    least, most = dimmer_limits(constraint, direction, light)
+    _check_grey(constraint, light)
+    least, most = _dimmer_limits(constraint, direction, light)
     if constraint.is_fixed:
         emission = (
             np.zeros(3)

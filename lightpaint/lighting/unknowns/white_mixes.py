@@ -1,4 +1,4 @@
-"""Lights that keep to a range of white, and the two neighbouring whites that each of them mixes.
+"""Lights that keep to a range of white or to a gamut, and the neighbouring colours that each mixes.
 
 The whites of a range lie on a curve, so that the mixes of all of them are no convex set. Those of
 two neighbours are. Each step solves such a convex problem, certified as any other, and finds the
@@ -7,6 +7,10 @@ those that are off and would be on with another white, and at last single lights
 better with a white elsewhere in their range. Wide windows over many whites, which get narrower,
 lead near the end quickly. No step between neighbours raises the objective, and in the end none
 lowers it.
+
+A gamut is a polygon of many corners, and many mixes of them give the same colour. Exact answers use
+all corners. Under the moving brush each light mixes the corners of one triangle, made of the centre
+and one side, and moves to the next triangle when it reaches the edge.
 """
 
 from collections.abc import Collection, Mapping, Sequence
@@ -16,7 +20,9 @@ from typing import Any
 import numpy as np
 
 from lightpaint.arrays import Doubles, Indices
+from lightpaint.colour.color_hull import ColorHull
 from lightpaint.colour.white_range import WhiteRange
+from lightpaint.lighting.algebra.method import Method
 from lightpaint.lighting.normal_equations import NormalEquations
 from lightpaint.lighting.unknowns.knobs import Knob
 from lightpaint.lighting.unknowns.reduced_problem import ReducedOptimum, solve_reduced
@@ -33,6 +39,9 @@ ROUND_OFF = 1e-9
 
 #: Ends of windows, by the places of their knobs.
 Windows = Mapping[int, tuple[int, int]]
+
+#: Maximum number of times that lights move to other sides for one answer.
+MAX_TURNS = 3
 
 
 @dataclass(frozen=True)
@@ -90,7 +99,7 @@ def next_whites(
     groups = _groups(reduction, only)
     optimum = solve_reduced(equations, reduction, _snap(groups, start), **options)
     for _ in range(steps):
-        beyond = knobs_outside_gamuts(reduction, optimum.weights)
+        beyond = _knobs_outside_gamuts(reduction, optimum.weights)
         windows = {} if beyond else _better_windows(equations, reduction, groups, optimum)
         if not (windows or beyond):
             break
@@ -115,7 +124,7 @@ def snap_to_whites(reduction: Reduction, weights: Doubles) -> Doubles:
     return _snap(_groups(reduction), weights) if reduction.white_knobs else weights
 
 
-def knobs_outside_gamuts(reduction: Reduction, weights: Doubles) -> list[int]:
+def _knobs_outside_gamuts(reduction: Reduction, weights: Doubles) -> list[int]:
     """Return places of knobs whose lights have colours, in weights (n, 3), outside their gamuts.
 
     Lights first may have any colour: if all colours then lie in their gamuts, the answer is the
@@ -283,3 +292,83 @@ def move_to_best_white(knob: Knob, gradient: Doubles) -> Knob:
         return knob
     best = int(np.argmin(knob.whites.colors @ gradient[knob.lights[0]]))
     return knob.with_window(knob.whites.window(float(best), 1))
+
+
+def solve_near_sides(
+    equations: NormalEquations, reduction: Reduction, start: Doubles, *, method: Method
+) -> tuple[Reduction, Doubles]:
+    """Solve with each light kept within its gamut towards the side where it would leave it.
+
+    start: (n, 3). Return the reduction with the sides that lights came to, and the weights (n, 3).
+    """
+    reduction = reduction.confined_to_sides(_repainted_sides(reduction))
+    optimum = solve_reduced(equations, reduction, start, method=method)
+    for _ in range(MAX_TURNS):
+        sides = _sides_outside(reduction, optimum.weights) | _next_sides(
+            equations, reduction, optimum
+        )
+        if not sides:
+            break
+        reduction = reduction.confined_to_sides(sides)
+        optimum = solve_reduced(equations, reduction, optimum.weights, method=method)
+    return reduction, optimum.weights
+
+
+def _repainted_sides(reduction: Reduction) -> dict[int, int]:
+    """Return places of the knobs whose gamuts the painting has changed, and their sides of now."""
+    sides, gamuts = {}, reduction.gamuts
+    for k in reduction.confined_knobs:
+        gamut, side, light = _confined_gamut(reduction, k)
+        assert gamuts is not None
+        if gamuts[light] is not gamut:
+            sides[k] = gamuts[light].side_towards(gamut.fan(side)[1:].sum(axis=0))
+    return sides
+
+
+def _sides_outside(reduction: Reduction, weights: Doubles) -> dict[int, int]:
+    """Return places of the knobs of lights that leave their gamuts, and the sides where they do."""
+    sides, gamuts = {}, reduction.gamuts
+    for k in _knobs_outside_gamuts(reduction, weights):
+        assert gamuts is not None
+        light = reduction.knobs[k].lights[0]
+        sides[k] = gamuts[light].side_towards(weights[light])
+    return sides
+
+
+def _next_sides(
+    equations: NormalEquations, reduction: Reduction, optimum: ReducedOptimum
+) -> dict[int, int]:
+    """Return places of the knobs that would gain beyond the ends of their sides, and the next
+    sides.
+
+    A mix of both ends of a side that is best in its triangle is best in the whole gamut: an
+    objective that rises towards the middle, and is level along a side, rises towards all other
+    corners.
+    """
+    sides: dict[int, int] = {}
+    if not reduction.confined_knobs:
+        return sides
+    gradient = equations.gradient(optimum.weights)
+    for k in reduction.confined_knobs:
+        gamut, side, light = _confined_gamut(reduction, k)
+        x = optimum.x[list(reduction.places[k])]
+        if x[1] and x[2]:
+            continue
+        slopes = gamut.primaries @ gradient[light]
+        best, count = int(np.argmin(slopes)), len(slopes)
+        first, last = side % count, (side + 1) % count
+        if slopes[best] >= min(slopes[first], slopes[last], 0.0):
+            continue
+        if not x.any():
+            sides[k] = best
+        else:
+            sides[k] = side - 1 if x[2] == 0 else side + 1
+    return sides
+
+
+def _confined_gamut(reduction: Reduction, k: int) -> tuple[ColorHull, int, int]:
+    """Return the gamut that a knob is kept within, towards which side, and its light."""
+    knob = reduction.knobs[k]
+    assert knob.gamut is not None
+    assert knob.side is not None
+    return knob.gamut, knob.side, knob.lights[0]

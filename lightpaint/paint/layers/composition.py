@@ -16,7 +16,6 @@ import numpy.typing as npt
 
 from lightpaint.arrays import RGB, Bools, Floats
 from lightpaint.colour.color import LUMINANCE
-from lightpaint.paint.layers.layer import Gradient, Layer, LayerKind
 from lightpaint.paint.layers.layer_pixels import (
     MIN_COVERAGE,
     LayerPixels,
@@ -24,6 +23,7 @@ from lightpaint.paint.layers.layer_pixels import (
     relative,
     shared,
 )
+from lightpaint.paint.layers.layer_stack import Gradient, Layer, LayerKind
 from lightpaint.paint.store.canvas_pixels import Pixels, Region, slices
 
 #: Lower and upper bound of importance under repeated weighing.

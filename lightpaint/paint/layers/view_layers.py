@@ -15,9 +15,8 @@ from lightpaint.paint.layers.composition import (
     effect_of,
     gradient_pixels,
 )
-from lightpaint.paint.layers.layer import MAX_STRENGTH, Layer
 from lightpaint.paint.layers.layer_pixels import LayerPixels, is_empty, relative, shared
-from lightpaint.paint.layers.layer_stack import LayerStack
+from lightpaint.paint.layers.layer_stack import MAX_STRENGTH, Layer, LayerStack
 from lightpaint.paint.store.canvas_pixels import Pixels, Region, slices
 
 _Array = npt.NDArray[np.float32]

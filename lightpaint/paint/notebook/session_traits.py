@@ -1,18 +1,65 @@
-"""Traits of a painter that equal its session: cells set them, and observers hear of changes."""
+"""Traits of a painter that equal its session, which cells set, and callbacks that observe them.
+
+Imported only where ipywidgets is installed.
+"""
 
 import traceback
 from collections.abc import Callable, Iterator
 from contextlib import AbstractContextManager, contextmanager
-from typing import Any, Protocol
+from dataclasses import dataclass, field
+from types import TracebackType
+from typing import TYPE_CHECKING, Any, Generic, Protocol, TypeVar
 
+import traitlets
+
+from lightpaint.files import first_line
 from lightpaint.lighting.answer.combination import dimmed
 from lightpaint.paint.background_threads import error_text
 from lightpaint.paint.notebook.widget_arguments import LOADERS, LoadArguments, same_paintings
 from lightpaint.paint.protocol import Message
 from lightpaint.paint.studio.studio import Studio
 
+Readable = TypeVar("Readable")
+Assignable = TypeVar("Assignable")
+
 #: Maximum number of rounds in which callbacks react to values set by callbacks.
 MAX_CALLBACK_ROUNDS = 20
+
+
+class LiveTrait(traitlets.Any, Generic[Readable, Assignable]):  # type: ignore[misc]
+    """A trait that the session sets with `set_trait`; assignments in cells become requests."""
+
+    if TYPE_CHECKING:
+
+        def __get__(self, obj: Any, cls: Any = None) -> Readable: ...
+
+    def __set__(self, obj: Any, value: Assignable) -> None:
+        obj._assign(self.name, value)
+
+
+@dataclass(frozen=True)
+class Callback:
+    """A function that observes changes; an error in it does not stop other callbacks.
+
+    warn: receives its error in one line.
+    """
+
+    handler: Callable[[Any], Any]
+    warn: Callable[[str], None] = field(compare=False)
+
+    def __call__(self, change: Any) -> None:
+        try:
+            self.handler(change)
+        except Exception as error:
+            # The traceback begins at the callback's own line.
+            traceback.print_exception(error.with_traceback(_from_caller(error)))
+            text = f"{type(error).__name__}: {first_line(error)}"
+            self.warn(f"a callback of painter.{change['name']} failed: {text}")
+
+
+def _from_caller(error: Exception) -> TracebackType | None:
+    frames = error.__traceback__
+    return frames and (frames.tb_next or frames)
 
 
 class TraitOwner(Protocol):

@@ -5,37 +5,38 @@ Without a loop, as in a script, they send them themselves.
 """
 
 import atexit
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from functools import partial
 from inspect import signature
 from pathlib import Path
 from threading import Event, RLock
 from typing import Any, Unpack
+from weakref import WeakValueDictionary
 
 from lightpaint.colour.display.view_transform import TransformChoice, ViewTransform
 from lightpaint.errors import PaintError
 from lightpaint.lighting.analysis.analysis import analyse, with_findings
 from lightpaint.lighting.answer.combination import dimmed
 from lightpaint.lighting.answer.lighting import Lighting
+from lightpaint.lighting.answer.lighting_file import write_lighting
 from lightpaint.lighting.constraints.constraints import Constraints
 from lightpaint.lighting.solution import Solution
 from lightpaint.paint.notebook import widget_arguments
-from lightpaint.paint.notebook.cell_output import CellOutput
-from lightpaint.paint.notebook.painter_files import (
-    claim_file,
-    open_store,
-    save_answer,
-    store_path,
-    widget_script,
-    widget_style,
-)
-from lightpaint.paint.notebook.session_traits import SessionTraits
-from lightpaint.paint.notebook.static_view import static_view
+from lightpaint.paint.notebook.cell_output import CellOutput, static_view
+from lightpaint.paint.notebook.widget_arguments import notebook_advice
 from lightpaint.paint.notebook.widget_views import KernelThread, WidgetViews
 from lightpaint.paint.protocol import AnswerUpdate, Message, Notice, SessionState
+from lightpaint.paint.session.snapshot import SessionSnapshot
+from lightpaint.paint.store.history_steps import Identity
+from lightpaint.paint.store.store import MemoryStore, Store
 from lightpaint.paint.studio.studio import Studio
 from lightpaint.pipeline.job.settings import SettingsByName
+from lightpaint.target.painting_file import write_painting
 from lightpaint.target.target import Target
+from lightpaint.viewer.bundle import bundled, styles
+
+#: Painters of this process that keep their session in a file, by its path.
+_PAINTERS_BY_FILE: WeakValueDictionary[Path, "Painter"] = WeakValueDictionary()
 
 try:
     import anywidget
@@ -43,7 +44,7 @@ try:
     import traitlets
     from traitlets import ObserveHandler
 
-    from lightpaint.paint.notebook.callbacks import Callback, LiveTrait
+    from lightpaint.paint.notebook.session_traits import Callback, LiveTrait, SessionTraits
 except ImportError as error:
     raise PaintError("lp.Painter needs anywidget: pip install 'lightpaint[notebook]'") from error
 
@@ -55,6 +56,54 @@ MIN_HEIGHT = 240
 
 #: Default layout: without a width, an HBox gives the painter none.
 DEFAULT_LAYOUT = {"width": "100%", "min_width": "320px"}
+
+
+def _claim_file(path: Path, painter: "Painter") -> None:
+    """Register `painter` for the session at `path`, and close the painter that had it before."""
+    if (earlier := _PAINTERS_BY_FILE.get(path.resolve())) is not None:
+        earlier.close()  # the user has run its cell again
+    _PAINTERS_BY_FILE[path.resolve()] = painter
+
+
+def _store_path(store: Any) -> Path | None:
+    """Return the path of the session file, if one is given. Raises PaintError for anything else."""
+    if not isinstance(store, str | Path | None):
+        raise PaintError(f"store is {store!r}: expected the path of a file, like 'evening.db'")
+    return None if store is None else Path(store)
+
+
+def _open_store(path: Path | None, identity: Identity) -> Store:
+    """Return the session at `path`, or one in memory without a path. Raises LightpaintError."""
+    if path is None:
+        return MemoryStore(identity)
+    with notebook_advice():
+        return Store.open(path, identity)
+
+
+def _save_answer(
+    path: Path, snapshot: SessionSnapshot, lighting: Callable[[], Lighting], *, view: int
+) -> None:
+    """Write the painting of a view (`.exr`), or the lighting (`.json`). See `Painter.save`."""
+    if view not in range(len(snapshot.targets)):
+        raise PaintError(f"view is {view!r}: expected one of {len(snapshot.targets)}, from 0 on")
+    if path.suffix == ".json":
+        write_lighting(path, lighting())
+    elif path.suffix != ".exr":
+        raise PaintError(f"{path}: expected .exr for the painting, .json for the lighting")
+    elif (target := snapshot.targets[view]) is None:
+        raise PaintError("nothing is painted yet: there is no painting to keep")
+    else:
+        write_painting(path, target)
+
+
+def widget_script() -> str:
+    """Return the painter as one ES module, whose default export is an anywidget's."""
+    return bundled("paint/page/widget.js")
+
+
+def widget_style() -> str:
+    """Return the style sheet of the painter."""
+    return styles("paint/page/style.css")
 
 
 class Painter(anywidget.AnyWidget):  # type: ignore[misc]
@@ -138,10 +187,10 @@ class Painter(anywidget.AnyWidget):  # type: ignore[misc]
         )
         if target is not None:
             widget_arguments.check_target_sizes(target, subjects)
-        path = store_path(store)
+        path = _store_path(store)
         if path is not None:
-            claim_file(path, self)
-        self._studio = Studio(subjects, partial(open_store, path))
+            _claim_file(path, self)
+        self._studio = Studio(subjects, partial(_open_store, path))
         self._views = WidgetViews(self._studio, self._lock, self._send_to_pages)
         self._session_traits = SessionTraits(
             self, self._studio, self._lock, send=self._views.send, warn=self._warn
@@ -218,7 +267,7 @@ class Painter(anywidget.AnyWidget):  # type: ignore[misc]
         Raises PaintError if nothing is painted yet, for another kind of file, and for an unknown
         view.
         """
-        save_answer(Path(path), self._studio.snapshot(), self._lighting, view=view)
+        _save_answer(Path(path), self._studio.snapshot(), self._lighting, view=view)
 
     def close(self) -> None:
         """End the painter; a session with a file can be continued. Closing twice does nothing.

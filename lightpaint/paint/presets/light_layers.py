@@ -8,7 +8,7 @@ import numpy as np
 from lightpaint.arrays import RGB, Bools, Doubles, Floats, as_rgb
 from lightpaint.basis.basis import Basis
 from lightpaint.colour.color import luminance
-from lightpaint.paint.layers.layer import Layer
+from lightpaint.paint.layers.layer_stack import Layer
 from lightpaint.paint.presets.view_areas import Mask
 
 #: Least and most stops by which the light of lamps changes.

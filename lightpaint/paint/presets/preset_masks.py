@@ -14,7 +14,7 @@ from lightpaint.images.pixel_blocks import block_mean, fitting_factor
 from lightpaint.paint.layers.canvas import Canvas
 from lightpaint.paint.layers.canvases import Canvases
 from lightpaint.paint.layers.composition import compose_layer
-from lightpaint.paint.layers.layer import MAX_NAME_LENGTH, Layer
+from lightpaint.paint.layers.layer_stack import MAX_NAME_LENGTH, Layer
 from lightpaint.paint.layers.selection import FULL, selection_mask
 from lightpaint.paint.presets.lamp_roles import LampRoles
 from lightpaint.paint.presets.light_layers import (

@@ -5,7 +5,7 @@ from dataclasses import dataclass, field
 from typing import Any, Literal
 
 from lightpaint.arrays import RGB
-from lightpaint.paint.layers.layer import Gradient, Layer
+from lightpaint.paint.layers.layer_stack import Gradient, Layer
 from lightpaint.paint.protocol.base import OPTIONAL
 from lightpaint.paint.store.canvas_pixels import Region
 

@@ -5,7 +5,7 @@ from dataclasses import dataclass, field
 from typing import ClassVar, Literal
 
 from lightpaint.arrays import RGB
-from lightpaint.paint.layers.layer import PAINTING_ID, Layer
+from lightpaint.paint.layers.layer_stack import PAINTING_ID, Layer
 from lightpaint.paint.protocol.base import Request
 from lightpaint.paint.protocol.message_parts import PlacePair
 from lightpaint.paint.store.canvas_pixels import Region

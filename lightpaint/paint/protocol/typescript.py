@@ -15,7 +15,7 @@ from typing import Any, Literal, Union, get_args, get_origin, get_type_hints
 import numpy as np
 
 from lightpaint.arrays import RGB
-from lightpaint.paint.layers.layer import Layer
+from lightpaint.paint.layers.layer_stack import Layer
 from lightpaint.paint.protocol import Event, Request, answer_parts, message_parts
 from lightpaint.paint.store.canvas_pixels import Region
 

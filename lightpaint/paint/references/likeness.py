@@ -9,7 +9,7 @@ import numpy as np
 from lightpaint.arrays import Bools, Doubles, Floats, as_rgb
 from lightpaint.colour.color import luminance
 from lightpaint.paint.layers.composition import adjusted
-from lightpaint.paint.layers.layer import Layer
+from lightpaint.paint.layers.layer_stack import Layer
 from lightpaint.paint.presets.view_areas import Mask, ViewAreas
 from lightpaint.paint.references.tones import Tones, Weights
 from lightpaint.paint.references.view_part import Point, ViewPart

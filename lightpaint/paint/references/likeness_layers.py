@@ -8,7 +8,7 @@ from lightpaint.arrays import Floats
 from lightpaint.errors import PaintError
 from lightpaint.paint.layers.canvas import Canvas
 from lightpaint.paint.layers.canvases import Canvases
-from lightpaint.paint.layers.layer import MAX_NAME_LENGTH, Layer
+from lightpaint.paint.layers.layer_stack import MAX_NAME_LENGTH, Layer
 from lightpaint.paint.presets.preset_masks import (
     open_group,
     open_preset,

@@ -11,7 +11,7 @@ from lightpaint.basis.denoised_mixes import denoise_mix
 from lightpaint.errors import PaintError
 from lightpaint.paint.layers.canvas import Canvas
 from lightpaint.paint.layers.composition import compose_layer
-from lightpaint.paint.layers.layer import Layer
+from lightpaint.paint.layers.layer_stack import Layer
 from lightpaint.paint.presets.lamp_roles import LampRoles
 from lightpaint.paint.presets.light_layers import LampGroup, is_divided, layers_of, masks_of
 from lightpaint.paint.presets.preset_masks import reduction

@@ -1,4 +1,4 @@
-"""The references of a session: kept in its file, beside its steps and looks."""
+"""The references of a session: read from files, and kept in its own beside steps and looks."""
 
 import json
 import sqlite3
@@ -6,21 +6,132 @@ from collections.abc import Iterator
 from contextlib import suppress
 from dataclasses import dataclass
 from functools import partial
+from pathlib import Path
+from typing import Any
 
 import numpy as np
+import numpy.typing as npt
 
 from lightpaint.arrays import Floats
+from lightpaint.colour.display.exposure import choose_exposure
 from lightpaint.colour.display.view_transform import ViewTransform
-from lightpaint.errors import PaintError
-from lightpaint.paint.references.reference_file import ReferencePixels
+from lightpaint.colour.icc import read_icc
+from lightpaint.errors import ImageError, PaintError
+from lightpaint.files import first_line, one_line
+from lightpaint.images.formats.bitmap import MAX_PIXELS, Bitmap
+from lightpaint.images.formats.bitmap_decoder import light_of_integers
+from lightpaint.images.formats.file_kinds import head_of
+from lightpaint.images.formats.library_output import silenced, without_pillow_warnings
+from lightpaint.images.picture import read_picture
+from lightpaint.images.resampling import resampled
 from lightpaint.paint.store.compression import pack, unpack
-from lightpaint.paint.store.damaged_rows import DAMAGE_ERRORS
-from lightpaint.paint.store.database import REFERENCE_TABLE
+from lightpaint.paint.store.database import DAMAGE_ERRORS, REFERENCE_TABLE
 from lightpaint.paint.store.store import Store
 from lightpaint.storage.json_records import strict_json
 
+#: Pixels of the longer side of a reference that is kept; larger ones are reduced.
+MAX_SIDE = 1280
+
+#: Largest light of a reference that is kept, where display white is 1.
+MAX_LIGHT = 1000.0
+
+#: Display values (h, w, 3) uint8; of files of light, light float16, whose display white is 1.
+ReferencePixels = npt.NDArray[Any]
+
 #: Most references that a session keeps, and characters of a name.
 MAX_REFERENCES, MAX_NAME_LENGTH = 12, 60
+
+
+def read_reference(path: Path, transform: ViewTransform) -> ReferencePixels:
+    """Return the picture in a file, at most MAX_SIDE pixels long.
+
+    transform: by which the session shows light. Raises ImageError, in one line that names the file.
+    """
+    head = head_of(path, 16)
+    is_light = False
+    try:
+        if head.startswith(b"RIFF") and head[8:12] == b"WEBP":
+            light = light_of_integers(_webp(path), None, transform)
+        elif head.startswith(b"#?"):
+            light, is_light = _radiance(path), True
+        else:
+            light, is_light = _light_of_painting(path, transform)
+    except ImageError as error:
+        text = str(error)
+        raise error if str(path) in text else ImageError(f"{path} {one_line(text)}") from None
+    light = np.clip(_reduced(np.nan_to_num(light, posinf=0, neginf=0)), 0, None)
+    if not light.any():
+        raise ImageError(f"{path} is black: choose a picture with light in it")
+    if not is_light:
+        return np.asarray(np.round(255 * transform.encode(light)), np.uint8)
+    exposed = light * 2.0 ** choose_exposure(light)
+    return np.asarray(np.minimum(exposed, MAX_LIGHT), np.float16)
+
+
+def _reduced(light: Floats) -> Floats:
+    height, width = light.shape[:2]
+    factor = MAX_SIDE / max(height, width)
+    if factor >= 1:
+        return light
+    return resampled(light, (max(1, round(height * factor)), max(1, round(width * factor))))
+
+
+def _light_of_painting(path: Path, transform: ViewTransform) -> tuple[Floats, bool]:
+    """Return the light (h, w, 3) in a file of a kind that paintings have, and whether it holds
+    light.
+    """
+    picture = read_picture(path, transform=transform)
+    light = picture.image
+    if picture.alpha is not None:
+        light = light * np.clip(picture.alpha, 0, 1)[..., None]
+    return light, picture.codes is None
+
+
+def _webp(path: Path) -> Bitmap:
+    """Return the picture in a WebP file over black. Raises ImageError, without naming the file."""
+    from PIL import Image, ImageOps
+
+    try:
+        with without_pillow_warnings(), Image.open(path, formats=["WEBP"]) as file:
+            _check_size(file.size)
+            profile = file.info.get("icc_profile")
+            upright = ImageOps.exif_transpose(file).convert("RGBA")
+        values = np.asarray(upright)
+    except (OSError, EOFError, LookupError, SyntaxError, ValueError, Image.DecompressionBombError):
+        raise ImageError("is damaged or cut off: export it again") from None
+    alpha = values[..., 3:].astype(np.float32) / 255
+    display = np.round(values[..., :3] * alpha).astype(np.uint8)
+    icc = None if profile is None else read_icc(profile)
+    return Bitmap("webp", display, None, False, 255, icc, lossy=True)
+
+
+def _radiance(path: Path) -> Floats:
+    """Return the light in a Radiance HDR file, (h, w, 3). Raises ImageError, without naming it."""
+    import OpenImageIO
+
+    with silenced():
+        OpenImageIO.geterror()
+        file = OpenImageIO.ImageInput.open(str(path))
+        if file is None:
+            reason = one_line(first_line(OpenImageIO.geterror(), path=path))
+            raise ImageError(f"is damaged: {reason}")
+        try:
+            spec = file.spec()
+            _check_size((spec.width, spec.height))
+            pixels = file.read_image(0, 0, 0, 3, "float") if spec.nchannels == 3 else None
+            if pixels is None or file.geterror():
+                raise ImageError("is damaged or cut off: export it again")
+        finally:
+            file.close()
+    return np.asarray(pixels, np.float32).reshape(spec.height, spec.width, 3)
+
+
+def _check_size(size: tuple[int, int]) -> None:
+    width, height = size
+    if min(size) < 1 or width * height > MAX_PIXELS:
+        raise ImageError(
+            f"declares {width}x{height} pixels: expected at most {MAX_PIXELS / 1e6:.0f} million"
+        )
 
 
 @dataclass(frozen=True, eq=False)

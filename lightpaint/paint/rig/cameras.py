@@ -1,6 +1,6 @@
 """The rays of a camera, with which a page draws lamps, and their first hits."""
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
 from typing import Any
@@ -15,6 +15,9 @@ from lightpaint.scene.scene import Scene
 #: Largest deviation from the rays of a pinhole, as through a fisheye lens, relative to a ray's
 #: length.
 STRAIGHT = 1e-3
+
+#: Returns the distance from a point to the first surface in a direction.
+FreeLength = Callable[[Doubles, Doubles], float]
 
 
 @dataclass(frozen=True)

@@ -3,27 +3,28 @@
 import json
 from collections import OrderedDict
 from collections.abc import Callable, Collection, Mapping, Sequence
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from functools import cached_property
 from threading import RLock
 from typing import Any
 
 import numpy as np
 
-from lightpaint.arrays import Doubles
+from lightpaint.arrays import Doubles, Floats
 from lightpaint.basis.basis import Basis
 from lightpaint.basis.lights import Lights
 from lightpaint.errors import PaintError, SceneError
-from lightpaint.paint.protocol import Camera, LightPlace, PlanObject, SkyAxes
+from lightpaint.images.denoiser import Features
+from lightpaint.paint.protocol import Camera, LightPlace, Place, PlanObject, Rig, SkyAxes
 from lightpaint.paint.rig.added_lights import (
     POSE_KEYS,
     light_of_new,
     new_emitter,
     site_of_new,
 )
-from lightpaint.paint.rig.cameras import camera_of, in_this_thread, up_axis
+from lightpaint.paint.rig.cameras import camera_of, free_length, in_this_thread, up_axis
 from lightpaint.paint.rig.moved_bases import one_light_basis, with_planes_of
-from lightpaint.paint.rig.rig_view import RigView, open_view
+from lightpaint.paint.rig.quick_planes import QuickPlanes
 from lightpaint.paint.rig.room_plan import plan_objects, sky_axes
 from lightpaint.paint.session.moved_lights import Placed, added_names
 from lightpaint.paint.subject import Subject
@@ -35,12 +36,46 @@ from lightpaint.placement.rigging.rigging import Rigging, rigging_of
 from lightpaint.scene.properties.pose import Pose, Site, motion_of
 from lightpaint.scene.runtime.render_lock import MITSUBA
 from lightpaint.scene.scene import Scene
+from lightpaint.scene.surfaces import render_features
 
 #: Number of rendered planes, each of all views, that are cached for undo.
 MAX_RENDERED = 32
 
 #: A light and its pose, as text.
 PoseKey = tuple[str, str]
+
+#: Number of places that are kept, which grows with each step of a drag.
+MAX_KNOWN = 1024
+
+
+@dataclass(frozen=True)
+class RigView:
+    """A view of the loaded scene. features: of each pixel, with positions."""
+
+    scene: Scene
+    loaded: Any
+    features: Features
+
+    @cached_property
+    def quick(self) -> QuickPlanes:
+        """The quick planes, whose paths are traced on first use; that takes longer than to load."""
+        with in_this_thread():
+            return QuickPlanes(self.scene, self.loaded, self.features)
+
+    @cached_property
+    def seen_points(self) -> Floats:
+        """The visible points of surfaces, (n, 3)."""
+        assert self.features.position is not None
+        return np.asarray(self.features.position[self.features.normal.any(axis=-1)])
+
+
+def open_view(subject: Subject, basis: Basis) -> RigView:
+    """Load the scene of a view."""
+    scene = subject.loaded_scene
+    loaded, features = scene.load(), basis.features
+    if features is None or features.position is None:
+        features = render_features(scene)
+    return RigView(scene, loaded, features)
 
 
 class LampRig:
@@ -52,7 +87,6 @@ class LampRig:
     Attributes:
         subjects: The views to be painted.
         views: The views of the loaded scene; None before it is loaded.
-        known_places: Places that were found for poses of lights.
         step: While lights are dragged, their quick planes have every step-th pixel of every
             step-th row, repeated.
     """
@@ -62,7 +96,7 @@ class LampRig:
         self._lock = RLock()
         self.views: tuple[RigView, ...] | None = None
         self._rendered = OrderedDict[PoseKey, list[Basis]]()
-        self.known_places: dict[PoseKey, LightPlace] = {}
+        self._known_places: dict[PoseKey, LightPlace] = {}
         self.step, self._drafts = 1, set[str]()
         self._freedoms: Mapping[str, Freedom] | None = None
 
@@ -221,7 +255,7 @@ class LampRig:
 
     def _planes(self, bases: Sequence[Basis], name: str, values: Mapping[str, Any]) -> list[Basis]:
         """Return the plane of a light with a pose in each view."""
-        key = pose_key(name, values)
+        key = _pose_key(name, values)
         with self._lock:
             if (rendered := self._rendered.get(key)) is not None:
                 self._rendered.move_to_end(key)
@@ -257,7 +291,7 @@ class LampRig:
         return light_bases
 
     def _is_rendered(self, name: str, values: Mapping[str, Any]) -> bool:
-        return pose_key(name, values) in self._rendered
+        return _pose_key(name, values) in self._rendered
 
     def unrendered(self, placed: Placed) -> list[str]:
         """Return the moved lights that have only quick planes."""
@@ -295,7 +329,7 @@ class LampRig:
                     )
                 )
         with self._lock:
-            self._rendered[pose_key(name, values)] = light_bases
+            self._rendered[_pose_key(name, values)] = light_bases
             while len(self._rendered) > MAX_RENDERED:
                 self._rendered.popitem(last=False)
 
@@ -305,6 +339,72 @@ class LampRig:
         if number >= len(self.views):
             raise PaintError(f"no view {number}: there are {len(self.views)}")
         return self.views[number]
+
+    # What pages draw
+
+    def state(self, placed: Placed) -> Rig:
+        """Return the places of all lights, for pages. The rig is open."""
+        names = (*(light.name for light in self.scene.lights), *added_names(placed))
+        places = tuple(self._known_place(name, placed.get(name, {})) for name in names)
+        cameras = self.cameras
+        hung = [np.array(place.position) for place in places if place.position is not None]
+        low, high = self.bounds or (np.zeros(3), np.ones(3))
+        low, high = np.min([low, *hung], axis=0), np.max([high, *hung], axis=0)
+        return Rig(
+            lights=places,
+            cameras=cameras,
+            up=up_axis(cameras),
+            low=tuple(map(float, low)),
+            high=tuple(map(float, high)),
+            surfaces=self.surfaces,
+            objects=self.plan_objects,
+            skies=self.skies,
+        )
+
+    def _known_place(self, name: str, values: Mapping[str, Any]) -> LightPlace:
+        """Return the place of a light, found once for each pose since its target takes a ray."""
+        key = _pose_key(name, values)
+        if key not in self._known_places:
+            if len(self._known_places) >= MAX_KNOWN:
+                self._known_places.clear()
+            with in_this_thread():
+                self._known_places[key] = self._place(name, values)
+        return self._known_places[key]
+
+    def _place(self, name: str, values: Mapping[str, Any]) -> LightPlace:
+        reason = self.why_not(name, values)
+        if not reason:
+            site = self.site(name, values)
+        else:
+            members = self.scene.light(name).members
+            site = members[0].site if len(members) == 1 else Site()
+        target = values.get("target") or self._target(site)
+        return LightPlace(
+            position=site.position,
+            direction=site.direction,
+            target=None if target is None else tuple(map(float, target)),
+            cutoff=site.cutoff,
+            beam=site.beam,
+            rail=self._rail(name, site),
+            immovable_reason=reason,
+        )
+
+    def _rail(self, name: str, site: Site) -> tuple[Place, Place] | None:
+        """Return the ends of the rail that a light hangs on, of those in the lights file."""
+        freedom = self.freedoms.get(name)
+        if freedom is None or not freedom.all_rails or site.position is None:
+            return None
+        position = np.array(site.position)
+        return min(freedom.all_rails, key=lambda rail: _distance_to(position, rail))
+
+    def _target(self, site: Site) -> Doubles | None:
+        """Return the point of the first surface along a light's axis."""
+        if site.position is None or site.direction is None:
+            return None
+        place, way = np.array(site.position), np.array(site.direction)
+        length = free_length(self.view(0).loaded, place + 1e-3 * way, way)
+        low, high = self.bounds or (np.zeros(3), np.ones(3))
+        return np.asarray(place + min(length, float(np.linalg.norm(high - low))) * way)
 
 
 def _pose(name: str, values: Mapping[str, Any]) -> Pose:
@@ -319,6 +419,13 @@ def _pose(name: str, values: Mapping[str, Any]) -> Pose:
         raise PaintError(f"{name}: {error}") from None
 
 
-def pose_key(name: str, values: Mapping[str, Any]) -> PoseKey:
+def _pose_key(name: str, values: Mapping[str, Any]) -> PoseKey:
     """Return a light and its pose as a key."""
     return name, json.dumps(values, sort_keys=True)
+
+
+def _distance_to(point: Doubles, rail: tuple[Place, Place]) -> float:
+    """Return the distance of a point from a rail."""
+    start, end = (np.array(x) for x in rail)
+    share = (point - start) @ (end - start) / ((end - start) @ (end - start))
+    return float(np.linalg.norm(point - start - np.clip(share, 0, 1) * (end - start)))

@@ -30,12 +30,11 @@ from lightpaint.paint.protocol import (
 from lightpaint.paint.publisher import Publisher
 from lightpaint.paint.rig.added_lights import free_name, values_of, with_level
 from lightpaint.paint.rig.lamp_rig import LampRig
-from lightpaint.paint.rig.picture_places import emitter_at_place, pose_change
-from lightpaint.paint.rig.rig_state import rig_state
+from lightpaint.paint.rig.pointing import emitter_at_place, pose_change
 from lightpaint.paint.session.moved_lights import Placed, added_names
 from lightpaint.paint.session.picture_table import Picture, plane_thumbnail
 from lightpaint.paint.session.session import Session
-from lightpaint.paint.session.view_pictures import plane_scale
+from lightpaint.paint.session.session_state import plane_scale
 from lightpaint.paint.session_access import SessionAccess
 from lightpaint.paint.store.history_steps import name_in_view
 
@@ -96,7 +95,7 @@ class LightMover:
         """Return the places of lights, if pages have requested them."""
         if not (self._shows_rig and self.rig.is_open):
             return []
-        return [rig_state(self.rig, self._access.session.requests.placed)]
+        return [self.rig.state(self._access.session.requests.placed)]
 
     def move_of(self, request: PointLight) -> MoveLights:
         """Return the move that a pointing request implies. Raises LightpaintError."""

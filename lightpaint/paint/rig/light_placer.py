@@ -27,8 +27,7 @@ from lightpaint.paint.session.moved_lights import Placed
 from lightpaint.paint.session.snapshot import SessionSnapshot
 from lightpaint.paint.session_access import SessionAccess
 from lightpaint.paint.store.session_requests import HOLD_KEYS
-from lightpaint.paint.store.store import Store
-from lightpaint.paint.stored_records import StoredRecords
+from lightpaint.paint.store.store import Store, StoredRecords
 from lightpaint.placement.freedom import Freedom
 from lightpaint.placement.new_lights import NewLights
 from lightpaint.placement.place import place

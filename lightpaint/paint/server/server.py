@@ -16,8 +16,7 @@ from lightpaint.paint.server.address import BoundSocket, listen
 from lightpaint.paint.server.client import Client
 from lightpaint.paint.server.guard import PROTOCOL, App, Guard
 from lightpaint.paint.server.page_files import PageFile, page_files
-from lightpaint.paint.server.served_session import ServedSession
-from lightpaint.paint.server.session_clients import Connections, picture_message
+from lightpaint.paint.server.session_clients import Connections, ServedSession, picture_message
 from lightpaint.paint.store.store import Store
 from lightpaint.version import __version__
 from lightpaint.viewer.bundle import BundleError
@@ -186,8 +185,12 @@ class Server:
         # Connections wait at the socket during these imports.
         import uvicorn
 
-        from lightpaint.paint.server.http_connections import bounded_http_protocol
-        from lightpaint.paint.server.shutdown import GracefulServer, PageSocket, stop_on_hangup
+        from lightpaint.paint.server.http_server import (
+            GracefulServer,
+            PageSocket,
+            bounded_http_protocol,
+            stop_on_hangup,
+        )
 
         try:
             files = page_files()

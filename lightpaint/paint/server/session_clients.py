@@ -9,10 +9,11 @@ An error in the session becomes an answer to the page, and never ends the connec
 
 import asyncio
 import traceback
-from collections.abc import Callable, Coroutine, Mapping
+from collections.abc import Callable, Collection, Coroutine, Mapping
+from concurrent.futures import ThreadPoolExecutor
 from contextlib import suppress
 from functools import partial
-from typing import Any
+from typing import Any, Protocol, TypeVar
 
 import numpy.typing as npt
 
@@ -20,10 +21,14 @@ from lightpaint.errors import LightpaintError, PaintError
 from lightpaint.paint.background_threads import error_text, error_tone
 from lightpaint.paint.protocol import (
     Acknowledgement,
+    CanvasPatch,
     Closing,
     ConstrainLight,
     ConstrainLights,
+    Event,
+    Export,
     Failure,
+    Fetch,
     Message,
     MoveLights,
     Notice,
@@ -36,11 +41,14 @@ from lightpaint.paint.protocol import (
     SessionState,
 )
 from lightpaint.paint.server.client import Client, IncomingMessage
-from lightpaint.paint.server.observers import Observers, check_observer_request
-from lightpaint.paint.server.page_owner import PageOwner, taken_message
-from lightpaint.paint.server.served_session import ServedSession
-from lightpaint.paint.server.session_thread import SessionThread
+from lightpaint.paint.session_owner import SessionOwner
 from lightpaint.paint.store.store import Store
+from lightpaint.progress import cancellable
+
+_Result = TypeVar("_Result")
+
+#: Maximum number of observers.
+MAX_OBSERVERS = 8
 
 #: Maximum number of clients.
 MAX_PAGES = 16
@@ -53,6 +61,122 @@ CLOSING_S = 1.0
 
 #: Requests during a drag, until one with `is_final`.
 LIVE_REQUESTS = (Paint, ConstrainLight, ConstrainLights, MoveLights, PointLight)
+
+
+class ServedSession(Protocol):
+    """The part of a session that the server uses."""
+
+    on_message: Callable[[Message], None] | None
+
+    def handle(self, request: Request, arrays: dict[str, npt.NDArray[Any]]) -> list[Message]:
+        """Return the answers; the first one replies to the request. Raises LightpaintError."""
+
+    def greet(self, *, is_back: bool) -> Message:
+        """Return the state for a page. is_back: it had the session before, and no other since."""
+
+    def state(self) -> Message:
+        """Return the state, and change nothing."""
+
+    def resource(self, name: str) -> npt.NDArray[Any]:
+        """Return a picture. Raises PaintError for an unknown name."""
+
+
+class SessionThread:
+    """A thread for the work of one session.
+
+    check_open: raises PaintError once the session has ended; work in progress is abandoned then.
+    """
+
+    def __init__(self, check_open: Callable[[], None]) -> None:
+        self._check_open = check_open
+        self._worker = ThreadPoolExecutor(1, "lightpaint-session")
+
+    async def run(self, work: Callable[..., _Result], *arguments: Any) -> _Result:
+        """Run work after all earlier work, and return its result. Raises what `check_open` does."""
+        self._check_open()
+        loop = asyncio.get_running_loop()
+        return await loop.run_in_executor(
+            self._worker, partial(self._run_while_open, work, *arguments)
+        )
+
+    async def close(self) -> None:
+        """Wait for the work in progress, and drop what waits."""
+        await asyncio.to_thread(self._worker.shutdown, cancel_futures=True)
+
+    def _run_while_open(self, work: Callable[..., _Result], *arguments: Any) -> _Result:
+        with cancellable(self._check_open):
+            return work(*arguments)
+
+
+class PageOwner(SessionOwner[Client]):
+    """The client that owns the session, if any; a page that reconnected is the same one."""
+
+    def __init__(self) -> None:
+        super().__init__(_is_same_page)
+        self._leaving: asyncio.Future[None] | None = None
+
+    async def release_disconnected(self, client: Client) -> None:
+        """Take the session from another client that has disconnected, after all its requests."""
+        while (page := self.page) not in (None, client) and page.is_disconnected:
+            await page.wait_answered()
+            self.release(page)
+
+    def hand_over(self, client: Client) -> bool:
+        """Give the session to `client`, and notify the client that had it.
+
+        Returns whether `client` had the session before, and no other since.
+        """
+        is_back, displaced = self.give(client)
+        if displaced is not None and _is_same_page(displaced, client):
+            # The connection to it is lost.
+            self._leaving = asyncio.ensure_future(displaced.close(1001))
+        elif displaced is not None:
+            displaced.send(_taken_message("another tab has taken this session over"))
+        return is_back
+
+
+def _taken_message(text: str) -> Message:
+    """Return the notice to a client that does not have the session."""
+    return Closing(reason="taken", text=text)
+
+
+def _is_same_page(first: Client, second: Client) -> bool:
+    """Return whether two connections belong to one page, which reconnected."""
+    return first is second or (first.page != "" and first.page == second.page)
+
+
+class Observers:
+    """The observers among the clients of a session.
+
+    clients: all of them, as they come and go.
+    """
+
+    def __init__(self, clients: Collection[Client]) -> None:
+        self._clients = clients
+
+    def admit(self, client: Client) -> None:
+        """Make a client an observer, for good. Raises PaintError if there are too many."""
+        others = [other for other in self._clients if other.is_observer and other is not client]
+        if len(others) >= MAX_OBSERVERS:
+            raise PaintError(f"{MAX_OBSERVERS} observers are there already: close one of them")
+        client.is_observer = True
+
+    def send(self, message: Message, but: Client | None = None) -> None:
+        """Send observers the events that concern them; newer events replace those that wait."""
+        event = message.answer if isinstance(message, CanvasPatch) else message
+        if isinstance(event, Event) and event.is_observed:
+            for client in self._clients:
+                if client.is_observer and client is not but:
+                    client.send(event)
+
+
+def _check_observer_request(request: Request | None) -> None:
+    """Raise PaintError for requests that observers may not make."""
+    is_export = isinstance(request, Export) and request.run
+    if not (is_export or isinstance(request, Fetch | Propose)):
+        raise PaintError(
+            "an observer may fetch, export and propose: to paint, connect another client"
+        )
 
 
 class Connections:
@@ -162,13 +286,13 @@ class Connections:
             if incoming.asks_for_session:
                 await self._owner.release_disconnected(client)
                 if not (incoming.takes_over or self._owner.is_free_for(client)):
-                    return [taken_message("the painter is open in another tab")]
+                    return [_taken_message("the painter is open in another tab")]
                 is_back = self._owner.hand_over(client)
                 self._brush_up.set()
                 client.withhold_events()
                 return [await self._thread.run(partial(self.session.greet, is_back=is_back))]
             if self._owner.page is not client:
-                return [taken_message("this tab does not have the session")]
+                return [_taken_message("this tab does not have the session")]
             assert incoming.request is not None
             is_live = isinstance(incoming.request, LIVE_REQUESTS) and not incoming.request.is_final
             (self._brush_up.clear if is_live else self._brush_up.set)()
@@ -193,7 +317,7 @@ class Connections:
             await self._brush_up.wait()
             client.withhold_events()  # the state includes earlier ones
             return [await self._thread.run(self.session.state)]
-        check_observer_request(request)
+        _check_observer_request(request)
         await self._brush_up.wait()
         answers = await self._thread.run(self.session.handle, request, {})
         if isinstance(request, Propose):

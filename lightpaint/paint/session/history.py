@@ -2,6 +2,7 @@
 
 import time
 from collections.abc import Mapping, Sequence
+from itertools import pairwise
 from typing import Any
 
 import numpy as np
@@ -17,14 +18,19 @@ from lightpaint.paint.layers.layer_stack import LayerStack
 from lightpaint.paint.layers.selection import put_selection
 from lightpaint.paint.protocol import HistoryInfo, StepInfo, StepList
 from lightpaint.paint.session.live_answer import LiveAnswer
-from lightpaint.paint.session.milestones import find_milestones
 from lightpaint.paint.session.picture_table import display_thumbnail
 from lightpaint.paint.store.canvas_pixels import Region
 from lightpaint.paint.store.database import DamagedError
 from lightpaint.paint.store.history_steps import Patch, Step
 from lightpaint.paint.store.session_requests import SessionRequests
-from lightpaint.paint.store.step_answers import StepAnswer
 from lightpaint.paint.store.store import Store
+from lightpaint.paint.store.stored_arrays import StepAnswer
+
+#: A step becomes a milestone this many steps after the last one.
+STEPS_BETWEEN = 20
+
+#: Seconds without a step before which the last step is a milestone: a person paused there.
+PAUSE_SECONDS = 300.0
 
 #: Number of steps listed to a page, backwards and forwards.
 LISTED_STEPS = 50
@@ -51,6 +57,25 @@ Travel = (
 
 #: Views, and the region of each that changed.
 Changes = Sequence[tuple[int, Region]]
+
+
+def find_milestones(steps: Sequence[Step]) -> frozenset[int]:
+    """Return the indices of the steps that are milestones.
+
+    These are the last step before a pause, the last before everything was replaced (a look loaded,
+    a new start), and, where there is neither, every `STEPS_BETWEEN`th.
+    """
+    milestones, last = set(), -1
+    for k, (step, following) in enumerate(pairwise(steps)):
+        is_pause = (
+            step.stamp is not None
+            and following.stamp is not None
+            and following.stamp - step.stamp >= PAUSE_SECONDS
+        )
+        if is_pause or following.kind == "look_loaded" or k - last >= STEPS_BETWEEN:
+            milestones.add(k)
+            last = k
+    return frozenset(milestones)
 
 
 class History:

@@ -13,8 +13,8 @@ import numpy.typing as npt
 from lightpaint.arrays import Doubles, Floats, as_rgb
 from lightpaint.display_text import some_names
 from lightpaint.errors import LightpaintError, PaintError
+from lightpaint.paint.layers.canvases import LayeredPaintings
 from lightpaint.paint.layers.layer_stack import LayerStack
-from lightpaint.paint.layers.layered_paintings import LayeredPaintings
 from lightpaint.paint.protocol import (
     CopyLook,
     DropLook,

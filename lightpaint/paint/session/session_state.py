@@ -1,10 +1,24 @@
-"""The state of a session for a client that connects: lights, views, pictures and looks."""
+"""The state of a session for a client that connects, and the pictures of its views."""
 
+from collections.abc import Callable, Sequence
+from functools import partial
 from typing import Any
 
+import numpy as np
+import numpy.typing as npt
+
+from lightpaint.basis.basis import Basis
+from lightpaint.basis.cache.denoised_planes import DenoisedPlanes, RoughPlanes, as_halves, scale_of
 from lightpaint.basis.light_images import LightImage, light_images
 from lightpaint.colour.display.view_transform import ViewTransform
-from lightpaint.paint.presets.presets import PRESETS
+from lightpaint.errors import PaintError
+from lightpaint.images.resampling import resampled
+from lightpaint.paint.layers.canvas import Canvas
+from lightpaint.paint.layers.canvases import Canvases
+from lightpaint.paint.layers.layer_stack import Layer
+from lightpaint.paint.layers.selection import selection_mask
+from lightpaint.paint.presets.preset_masks import requested_look
+from lightpaint.paint.presets.presets import PRESETS, find_preset
 from lightpaint.paint.protocol import (
     ImageInfo,
     PresetInfo,
@@ -12,16 +26,189 @@ from lightpaint.paint.protocol import (
     SampleCount,
     TableInfo,
     TransformInfo,
+    ViewInfo,
 )
+from lightpaint.paint.references.reference_table import Reference, ReferenceTable
 from lightpaint.paint.session import picture_table
-from lightpaint.paint.session.answer_messages import light_info
 from lightpaint.paint.session.look_library import LookLibrary
-from lightpaint.paint.session.picture_table import PictureTable
+from lightpaint.paint.session.picture_table import Picture, PictureTable
 from lightpaint.paint.session.session import Session
-from lightpaint.paint.session.view_pictures import view_info
+from lightpaint.paint.session.session_messages import light_info
+from lightpaint.paint.store.history_steps import name_in_view
+
+#: Pixels of the longer side of a reference's light, of which a page picks paint.
+LIGHT_SIDE = 400
 
 #: Width in pixels of a map whose proportions are told.
 ASPECT_PIXELS = 2**12
+
+
+def offer_transforms(table: PictureTable, transforms: Sequence[ViewTransform]) -> None:
+    """Offer the lookup tables of these transforms."""
+    for transform in transforms:
+        table.offer(f"lut/{transform.name}", partial(picture_table.lookup_table, transform))
+
+
+def offer_view(
+    table: PictureTable,
+    view: Canvas,
+    basis: Basis,
+    transform: ViewTransform,
+    clean: DenoisedPlanes | None,
+    small: DenoisedPlanes | None = None,
+) -> None:
+    """Offer the pictures of a view; rough planes replace denoised ones until these are made.
+
+    basis: of the view, with every light at its place in the scene. small: planes of pixel blocks,
+    which improve the rough ones.
+    """
+
+    def offer(name: str, make: Any) -> None:
+        table.offer(name_in_view(name, view.view), make)
+
+    rough = RoughPlanes(basis, view.current, small)
+    is_lit = bool(view.current.any())
+    for k in range(len(basis.lights)):
+        offer(f"plane/{k}", partial(_plane, basis, k))
+        name = name_in_view(f"clean/{k}", view.view)
+        if clean is not None:
+            table.put(name, clean.halves[k])
+        elif is_lit:
+            table.offer(name, partial(_rough_plane, rough, k))
+        else:
+            table.withdraw(name)
+            name = name_in_view(f"plane/{k}", view.view)
+        offer(f"thumb/{k}", partial(_thumbnail, table, name, basis))
+    offer_ground(table, view, transform)
+    offer("painting", lambda: view.image.copy())
+    offer("importance", lambda: view.importance.copy())
+    if basis.features is not None:
+        albedo = basis.features.albedo
+        offer("albedo", lambda: as_halves(albedo))
+    if basis.objects is not None:
+        index = basis.objects.index
+        offer("objects", lambda: index.astype(np.int16))
+
+
+def offer_ground(table: PictureTable, view: Canvas, transform: ViewTransform) -> None:
+    """Offer the look under the painting of a view, in several forms."""
+
+    def offer(name: str, make: Any) -> None:
+        table.offer(name_in_view(name, view.view), make)
+
+    offer("present", lambda: as_halves(view.current))
+    # Layers lie on it, and the page composes them to the bit.
+    offer("ground", lambda: view.current.copy())
+    offer("look", lambda: picture_table.display_thumbnail(view.current, transform))
+
+
+def offer_layers(table: PictureTable, views: Canvases) -> None:
+    """Offer the pixels of the layers, as `layer/3`, and what is selected, as `selection/0`."""
+    table.offer_family("layer", partial(_layer, views))
+    table.offer_family("selection", partial(_selection, views))
+
+
+def offer_presets(table: PictureTable, view: Canvas, transform: ViewTransform) -> None:
+    """Offer a small picture of what each preset asks of a view, as `preset/noir`."""
+    side = picture_table.THUMBNAIL_SIDE
+
+    def picture(name: str) -> Picture:
+        light = requested_look(find_preset(name), view, side)
+        return picture_table.display_thumbnail(light, transform)
+
+    table.offer_family("preset", picture)
+
+
+def offer_steps(table: PictureTable, picture_of: Callable[[int], Picture]) -> None:
+    """Offer the small pictures of the history's steps, as `step/12`."""
+
+    def picture(step: str) -> Picture:
+        if not step.isdecimal():
+            raise PaintError(f"there is no picture {f'step/{step}'[:40]!r}")
+        return picture_of(int(step))
+
+    table.offer_family("step", picture)
+
+
+def offer_references(table: PictureTable, references: ReferenceTable) -> None:
+    """Offer the references as the session shows them, as `reference/2`, and their light, reduced,
+    as `reference_light/2`.
+    """
+
+    def light(name: str) -> Picture:
+        picture = references.light(_numbered(references, "reference_light", name))
+        height, width = picture.shape[:2]
+        factor = min(1.0, LIGHT_SIDE / max(height, width))
+        size = max(1, round(height * factor)), max(1, round(width * factor))
+        return as_halves(resampled(picture, size))
+
+    table.offer_family(
+        "reference", lambda name: references.picture(_numbered(references, "reference", name))
+    )
+    table.offer_family("reference_light", light)
+
+
+def _numbered(references: ReferenceTable, prefix: str, name: str) -> Reference:
+    if not name.isdecimal():
+        raise PaintError(f"there is no picture {f'{prefix}/{name}'[:40]!r}")
+    return references[int(name)]
+
+
+def _layer(views: Canvases, name: str) -> Picture:
+    number, _, view = name.partition("@")
+    if not (number.isdecimal() and (view or "0").isdecimal()):
+        raise PaintError(f"there is no picture {f'layer/{name}'[:40]!r}")
+    return _layer_picture(views.layers[int(number)], views[int(view or 0)])
+
+
+def _layer_picture(layer: Layer, view: Canvas) -> npt.NDArray[np.float32]:
+    """Return the pixels of a layer in its region: (rows, columns, 4), colour and coverage; of a
+    mask (rows, columns, 1).
+    """
+    pixels = view.layer(layer.id)
+    image, coverage, _ = pixels.part(pixels.bounds)
+    mask = coverage[..., None]
+    return mask if layer.is_mask else np.concatenate([image, mask], axis=-1)
+
+
+def _selection(views: Canvases, view: str) -> Picture:
+    if not view.isdecimal():
+        raise PaintError(f"there is no picture {f'selection/{view}'[:40]!r}")
+    return selection_mask(views[int(view)].selection)
+
+
+def _plane(basis: Basis, k: int) -> Picture:
+    plane = basis.planes.plane(k)
+    return as_halves(plane, scale_of(plane))
+
+
+def _thumbnail(table: PictureTable, name: str, basis: Basis) -> Picture:
+    """Return a thumbnail of the plane of that name, as the page shows it."""
+    return picture_table.plane_thumbnail(table[name].astype(np.float32), basis.emitters_seen)
+
+
+def _rough_plane(planes: RoughPlanes, k: int) -> Picture:
+    return as_halves(planes.plane(k), scale_of(planes.basis.planes.plane(k)))
+
+
+def _view_info(view: Canvas, basis: Basis) -> ViewInfo:
+    """Return the description of a view for clients.
+
+    basis: of the view, with lights at their places in the scene, so that moves change no scale.
+    Planes of added lights are sent unscaled.
+    """
+    objects, (height, width) = basis.objects, view.size
+    return ViewInfo(
+        name=view.name,
+        size=(height, width),
+        objects=() if objects is None else tuple(objects.names),
+        scales=tuple(plane_scale(basis, k) for k in range(len(view.basis.lights))),
+    )
+
+
+def plane_scale(basis: Basis, k: int) -> float:
+    """Return the divisor of light k's plane for sending. basis: as in `_view_info`."""
+    return scale_of(basis.planes.plane(k)) if k < len(basis.lights) else 1.0
 
 
 def state_fields(
@@ -32,12 +219,12 @@ def state_fields(
     target_spp: the samples per pixel that the basis will have; None if it is finished.
     """
     basis = session.basis
-    views = tuple(map(view_info, session.views, session.bases))
+    views = tuple(map(_view_info, session.views, session.bases))
     return {
         "size": views[0].size,
         "objects": views[0].objects,
         "lights": tuple(map(light_info, basis.lights, views[0].scales)),
-        "images": tuple(map(image_info, light_images(basis.lights))),
+        "images": tuple(map(_image_info, light_images(basis.lights))),
         "views": views,
         "transforms": tuple(transform.name for transform in offered_transforms(session)),
         "transform": TransformInfo(session.transform.name, session.transform.stops),
@@ -58,7 +245,7 @@ def state_fields(
     }
 
 
-def image_info(image: LightImage) -> ImageInfo:
+def _image_info(image: LightImage) -> ImageInfo:
     """Return the description of an image for clients."""
     width, height = image.domain.picture_size(image.size, ASPECT_PIXELS)
     return ImageInfo(

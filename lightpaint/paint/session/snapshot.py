@@ -24,8 +24,8 @@ from lightpaint.lighting.fit import Colors
 from lightpaint.lighting.problem import Problem
 from lightpaint.lighting.solution import Solution
 from lightpaint.lighting.solve import solution_of
-from lightpaint.paint.session.answer_messages import preview_text, why_not_closer
 from lightpaint.paint.session.picture_table import Picture, display_thumbnail
+from lightpaint.paint.session.session_messages import preview_text, why_not_closer
 from lightpaint.paint.store.session_requests import SessionRequests
 from lightpaint.pipeline.job.settings import Settings
 from lightpaint.target.target import Target

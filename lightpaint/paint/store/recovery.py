@@ -9,25 +9,19 @@ import os
 import shutil
 import sqlite3
 import tempfile
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from contextlib import closing, suppress
-from dataclasses import asdict
+from dataclasses import asdict, dataclass, field
 from pathlib import Path
+from typing import Any
 
 from lightpaint.display_text import some_names
 from lightpaint.errors import LightpaintError, OutputError, PaintError
 from lightpaint.files import flush
 from lightpaint.paint.store.compression import unpack, unpack_patches
-from lightpaint.paint.store.damaged_rows import (
-    DAMAGE_ERRORS,
-    Losses,
-    Row,
-    read_row,
-    readable_rows,
-    row_numbers,
-)
 from lightpaint.paint.store.database import (
     APPLICATION,
+    DAMAGE_ERRORS,
     REFERENCE_TABLE,
     VERSION,
     DamagedError,
@@ -37,16 +31,98 @@ from lightpaint.paint.store.database import (
     transaction,
 )
 from lightpaint.paint.store.history_steps import Identity, name_in_view
-from lightpaint.paint.store.lazy_arrays import DTYPES
 from lightpaint.paint.store.session_requests import SessionRequests
-from lightpaint.paint.store.session_rows import parse_place
+from lightpaint.paint.store.stored_arrays import DTYPES, parse_place
 from lightpaint.storage.json_records import read_record, strict_json
+
+#: Maximum number of rows of a damaged table that are tried one by one.
+MAX_ROWS = 1_000_000
+
+Row = Sequence[Any]
 
 #: Errors raised by rows that cannot be read, or that no session has.
 UNREADABLE_ERRORS = (AssertionError, LightpaintError, *DAMAGE_ERRORS)
 
 #: Bytes of a database's header, and of the longest file that is given its length again.
 HEADER_BYTES, MAX_RESTORED_BYTES = 100, 2**36
+
+
+@dataclass
+class Losses:
+    """Rows that could not be read, by their names, and whether there may be others that nobody can
+    name.
+    """
+
+    names: list[str] = field(default_factory=list)
+    may_be_more: bool = False
+
+    def __bool__(self) -> bool:
+        return bool(self.names) or self.may_be_more
+
+    def text(self, named: str, kind: str) -> str:
+        """Return the losses as text. named: rows with a name. kind: a plural noun for the rows."""
+        if not self.names:
+            return f"an unknown number of {kind}"
+        return named + " and perhaps more" * self.may_be_more
+
+
+def _row_numbers(old: sqlite3.Connection, *columns: tuple[str, str]) -> tuple[set[int], Losses]:
+    """Return the numbers that rows have in any of these tables and columns; and whether there may
+    be more, as no table can be read to its end.
+    """
+    all_numbers: set[int] = set()
+    is_whole = []
+    for table, column in columns:
+        numbers, is_read = _numbers_in(old, table, column)
+        all_numbers |= numbers
+        is_whole.append(is_read)
+    return all_numbers, Losses(may_be_more=not any(is_whole))
+
+
+def _numbers_in(old: sqlite3.Connection, table: str, column: str) -> tuple[set[int], bool]:
+    """Return the numbers of rows, read from both ends of a table that may be damaged in between;
+    and whether it can be read from one end to the other.
+    """
+    query = f"SELECT {column} FROM {table} ORDER BY {column}"
+    numbers, is_whole = set(), False
+    for order in ("", " DESC"):
+        try:
+            for (x,) in old.execute(query + order):
+                if type(x) is int:
+                    numbers.add(x)
+            is_whole = True
+        except sqlite3.Error:  # a damaged page
+            continue
+    with suppress(sqlite3.Error):
+        if len(numbers) > 1 and old.execute(f"PRAGMA integrity_check({table})").fetchone() != (
+            "ok",
+        ):
+            numbers |= set(range(min(numbers), min(max(numbers), min(numbers) + MAX_ROWS)))
+    return {x for x in numbers if _row_exists(old, table, column, x)}, is_whole
+
+
+def _row_exists(old: sqlite3.Connection, table: str, column: str, number: int) -> bool:
+    """Return whether there is such a row, or nobody can tell."""
+    try:
+        query = f"SELECT count(*) FROM {table} WHERE {column} = ?"
+        [(count,)] = old.execute(query, (number,))
+    except sqlite3.Error:
+        return True
+    return bool(count)
+
+
+def _readable_rows(old: sqlite3.Connection, query: str, *values: object) -> Iterator[Row]:
+    """Yield rows until one cannot be read."""
+    with suppress(sqlite3.Error):
+        yield from old.execute(query, values)
+
+
+def _read_row(old: sqlite3.Connection, query: str, *values: object) -> Row | None:
+    """Return one row; None if it does not exist or cannot be read."""
+    with suppress(sqlite3.Error):
+        row: Row | None = old.execute(query, values).fetchone()
+        return row
+    return None
 
 
 def recover_or_raise(path: Path, identity: Identity | None, error: DamagedError | None) -> str:
@@ -154,7 +230,7 @@ def _read_position(old: sqlite3.Connection, ids: Sequence[int]) -> int:
     """Return how many of the readable steps are done."""
     with suppress(*UNREADABLE_ERRORS):
         [(position,)] = old.execute("SELECT value FROM about WHERE name = 'position'")
-        numbers = [number for (number,) in readable_rows(old, "SELECT id FROM step ORDER BY id")]
+        numbers = [number for (number,) in _readable_rows(old, "SELECT id FROM step ORDER BY id")]
         if 0 <= int(position) <= len(numbers):
             done_numbers = set(numbers[: int(position)])
             return sum(number in done_numbers for number in ids)
@@ -166,10 +242,12 @@ def _read_steps(
 ) -> tuple[list[tuple[Row, Row | None]], Losses]:
     """Return rows of steps and their pixels, and numbers of those that cannot be read."""
     steps: list[tuple[Row, Row | None]] = []
-    numbers, lost = row_numbers(old, ("step", "id"), ("pixels", "step"))
+    numbers, lost = _row_numbers(old, ("step", "id"), ("pixels", "step"))
     for number in numbers:
-        row = read_row(old, "SELECT id, kind, label, fields, places FROM step WHERE id = ?", number)
-        pixels = read_row(old, "SELECT before, change FROM pixels WHERE step = ?", number)
+        row = _read_row(
+            old, "SELECT id, kind, label, fields, places FROM step WHERE id = ?", number
+        )
+        pixels = _read_row(old, "SELECT before, change FROM pixels WHERE step = ?", number)
         try:
             _check_step(row, pixels, identity)
         except UNREADABLE_ERRORS:
@@ -208,9 +286,9 @@ def _check_step(row: Row | None, pixels: Row | None, identity: Identity | None) 
 def _read_looks(old: sqlite3.Connection) -> tuple[list[tuple[Row, list[Row]]], Losses]:
     """Return rows of looks and of their arrays, and names of those that cannot be read."""
     looks: list[tuple[Row, list[Row]]] = []
-    numbers, lost = row_numbers(old, ("look", "id"), ("look_array", "look"))
+    numbers, lost = _row_numbers(old, ("look", "id"), ("look_array", "look"))
     for number in numbers:
-        row = read_row(old, "SELECT id, fields FROM look WHERE id = ?", number)
+        row = _read_row(old, "SELECT id, fields FROM look WHERE id = ?", number)
         name = f"of number {number}"
         arrays, unreadable = _read_arrays(old, number)
         try:
@@ -229,10 +307,10 @@ def _read_looks(old: sqlite3.Connection) -> tuple[list[tuple[Row, list[Row]]], L
 def _read_arrays(old: sqlite3.Connection, look: int) -> tuple[list[Row], set[str]]:
     """Return arrays of a look that can be read, and names of those that cannot."""
     arrays, unreadable = [], set()
-    rows = readable_rows(old, "SELECT rowid, name FROM look_array WHERE look = ?", look)
+    rows = _readable_rows(old, "SELECT rowid, name FROM look_array WHERE look = ?", look)
     for rowid, name in rows:
         query = "SELECT name, dtype, shape, data FROM look_array WHERE rowid = ?"
-        array = read_row(old, query, rowid)
+        array = _read_row(old, query, rowid)
         try:
             assert array is not None
             _, dtype, shape, data = array
@@ -249,7 +327,7 @@ def _read_references(old: sqlite3.Connection) -> list[Row]:
     """Return the rows of references that can be read; nobody misses a lost one in the answer."""
     with suppress(*UNREADABLE_ERRORS):
         query = "SELECT id, name, dtype, shape, data FROM reference WHERE id = ?"
-        numbers, _ = row_numbers(old, ("reference", "id"))
-        rows = [read_row(old, query, number) for number in numbers]
+        numbers, _ = _row_numbers(old, ("reference", "id"))
+        rows = [_read_row(old, query, number) for number in numbers]
         return [row for row in rows if row is not None]
     return []

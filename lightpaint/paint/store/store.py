@@ -11,48 +11,161 @@ Pixels are stored packed (`compression.py`) and read when they are needed, so th
 history takes no memory.
 """
 
+import hashlib
+import json
 import sqlite3
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from contextlib import suppress
+from dataclasses import asdict, dataclass
 from functools import partial
 from pathlib import Path
 from threading import RLock
-from typing import Any
+from typing import Any, Generic, TypeVar
+
+import numpy as np
 
 from lightpaint.arrays import Floats
-from lightpaint.errors import OutputError, PaintError
-from lightpaint.paint.store.compression import pack_patches
-from lightpaint.paint.store.damaged_rows import DAMAGE_ERRORS
+from lightpaint.errors import LightpaintError, OutputError, PaintError
+from lightpaint.paint.store.canvas_pixels import Pixels, Region
+from lightpaint.paint.store.compression import pack_patches, pack_pixels, unpack_pixels
 from lightpaint.paint.store.database import (
+    DAMAGE_ERRORS,
     DamagedError,
+    WriteJob,
+    WriteQueue,
     check_pages,
     damaged_error,
     identify,
+    transaction,
 )
 from lightpaint.paint.store.history_steps import Identity, Step, StoredLook
-from lightpaint.paint.store.lazy_arrays import LookArrays, pack_arrays
 from lightpaint.paint.store.recovery import recover_or_raise
-from lightpaint.paint.store.session_rows import (
+from lightpaint.paint.store.stored_arrays import (
+    LookArrays,
+    StepAnswer,
+    StoredArrays,
     delete_look,
     insert_answer,
     insert_look,
     insert_step,
     look_rows,
+    pack_arrays,
     places_json,
     read_position,
     step_rows,
     to_json,
 )
-from lightpaint.paint.store.step_answers import StepAnswer
-from lightpaint.paint.store.stored_arrays import StoredArrays
-from lightpaint.paint.store.stored_compositions import (
-    StoredComposition,
-    composition_rows,
-    read_compositions,
-    store_compositions,
-)
-from lightpaint.paint.store.write_queue import WriteJob, WriteQueue
-from lightpaint.storage.json_records import strict_json
+from lightpaint.storage.json_records import read_record, strict_json
+
+#: Version of the composition of layers: to be raised when layers come to other bits.
+COMPOSITION_VERSION = 1
+
+_COMPOSITION_TABLE = """
+CREATE TABLE IF NOT EXISTS composition
+(view INTEGER PRIMARY KEY, step INTEGER, about TEXT, pixels BLOB, digest BLOB)
+"""
+
+#: Bounds, mean and least coverage of a layer.
+LayerValues = tuple[Region, float, float]
+
+#: View, id of the step, all but the pixels as JSON, packed pixels, and the digest of these.
+CompositionRow = tuple[int, int, str, bytes, bytes]
+
+_Record = TypeVar("_Record")
+
+
+@dataclass(frozen=True, eq=False)
+class StoredComposition:
+    """The target of a view after some step, kept so that a file opens without pixels of layers.
+
+    layers: of each layer, by id, what is known without its pixels. pixels: the target.
+
+    It is stored twice, as it also follows from the steps: a row is used only if its digest is
+    right, if the step that it follows is still there, and if the current look below the layers is
+    the same. Ids of steps are never used twice, so no other steps can lead to such a row. Anything
+    else is composed again.
+    """
+
+    layers: Mapping[int, LayerValues]
+    pixels: Pixels
+
+
+def _composition_rows(
+    step: int, current_looks: Sequence[Floats], compositions: Sequence[StoredComposition]
+) -> list[CompositionRow]:
+    """Return the rows of the compositions of all views after a step."""
+    rows: list[CompositionRow] = []
+    for view, (look, composition) in enumerate(zip(current_looks, compositions, strict=True)):
+        pixels = composition.pixels
+        about = json.dumps(
+            {
+                "version": COMPOSITION_VERSION,
+                "look": _look_text(look),
+                "size": [*pixels.importance.shape],
+                "marked": pixels.at_least is not None,
+                "layers": {str(n): values for n, values in composition.layers.items()},
+            }
+        )
+        blob = pack_pixels(pixels)
+        rows.append((view, step, about, blob, _digest(_digested_text(view, step, about), blob)))
+    return rows
+
+
+def _store_compositions(database: sqlite3.Connection, *, rows: Sequence[CompositionRow]) -> None:
+    """Replace the compositions by those of all views. Where that fails, nothing is lost."""
+    with suppress(sqlite3.Error), transaction(database):
+        database.execute(_COMPOSITION_TABLE)
+        database.execute("DELETE FROM composition")
+        database.executemany("INSERT INTO composition VALUES (?, ?, ?, ?, ?)", rows)
+
+
+def _read_compositions(
+    database: sqlite3.Connection, current_looks: Sequence[Floats]
+) -> tuple[int, list[StoredComposition]] | None:
+    """Return the id of a step and the compositions of all views after it; None if there are none
+    for these current looks.
+    """
+    with suppress(PaintError, *DAMAGE_ERRORS):
+        query = "SELECT view, step, about, pixels, digest FROM composition ORDER BY view"
+        rows: list[CompositionRow] = database.execute(query).fetchall()
+        steps = {step for _, step, *_ in rows}
+        if [view for view, *_ in rows] == list(range(len(current_looks))) and len(steps) == 1:
+            pairs = zip(rows, current_looks, strict=True)
+            return steps.pop(), [_read_composition(row, look) for row, look in pairs]
+    return None
+
+
+def _read_composition(row: CompositionRow, look: Floats) -> StoredComposition:
+    """Return the composition in a row. Raises PaintError or DAMAGE_ERRORS for any other."""
+    view, step, text, blob, digest = row
+    about = strict_json(text)
+    is_own = about["version"] == COMPOSITION_VERSION and about["size"] == [*look.shape[:2]]
+    if not is_own or about["look"] != _look_text(look):
+        raise PaintError("a composition on another look")
+    if digest != _digest(_digested_text(view, step, text), blob):
+        raise PaintError("a damaged composition")
+    height, width = look.shape[:2]
+    layers = {
+        int(number): ((top, bottom, left, right), float(mean), float(least))
+        for number, ((top, bottom, left, right), mean, least) in about["layers"].items()
+    }
+    pixels = unpack_pixels(blob, (0, height, 0, width), marked=bool(about["marked"]))
+    return StoredComposition(layers, pixels)
+
+
+def _look_text(look: Floats) -> str:
+    return _digest(np.ascontiguousarray(look, np.float32).data).hex()
+
+
+def _digested_text(view: int, step: int, about: str) -> bytes:
+    return f"{view} {step} {about}".encode()
+
+
+def _digest(*parts: bytes | memoryview) -> bytes:
+    digest = hashlib.blake2b(digest_size=16)
+    for part in parts:
+        digest.update(part)
+    return digest.digest()
 
 
 class Store:
@@ -235,10 +348,10 @@ class Store:
         compositions: Sequence[StoredComposition],
     ) -> None:
         """Keep the compositions of all views after the step of an id, if the file takes them."""
-        rows = composition_rows(step, current_looks, compositions)
+        rows = _composition_rows(step, current_looks, compositions)
         with self._lock:
             if self.has_file and self.flush() is None:
-                store_compositions(self._database, rows=rows)
+                _store_compositions(self._database, rows=rows)
 
     def compositions(
         self, current_looks: Sequence[Floats]
@@ -248,7 +361,7 @@ class Store:
         None if there are none for these current looks, or they are not of steps that are done.
         """
         with self._lock:
-            found = read_compositions(self._database, current_looks)
+            found = _read_compositions(self._database, current_looks)
             ids = [0, *self._ids[: self.position]]
             return (ids.index(found[0]), found[1]) if found and found[0] in ids else None
 
@@ -314,3 +427,30 @@ class MemoryStore(Store):
 
     def __init__(self, identity: Identity | None = None) -> None:
         super().__init__(None, identity)
+
+
+class StoredRecords(Generic[_Record]):
+    """A list of dataclass records in one row of a session file.
+
+    store: keeps them. name: of the row. kind: the dataclass.
+    """
+
+    def __init__(self, store: Store, name: str, kind: type[_Record]) -> None:
+        self._store, self._name, self._kind = store, name, kind
+
+    def read(self) -> list[_Record]:
+        """Return the records; none if they cannot be read."""
+        for (text,) in self._store.rows(f"SELECT value FROM about WHERE name = '{self._name}'"):
+            with suppress(LightpaintError, ValueError, TypeError):
+                return [read_record(self._kind, entry) for entry in strict_json(str(text))]
+        return []
+
+    def write(self, records: Sequence[_Record]) -> None:
+        """Replace the records, now or once the file takes them."""
+        entries: list[Any] = list(records)
+        content = json.dumps([asdict(entry) for entry in entries], ensure_ascii=False)
+        self._store.enqueue(partial(_write_record, name=self._name, content=content))
+
+
+def _write_record(database: sqlite3.Connection, *, name: str, content: str) -> None:
+    database.execute("INSERT OR REPLACE INTO about VALUES (?, ?)", (name, content))

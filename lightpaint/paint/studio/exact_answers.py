@@ -1,22 +1,48 @@
-"""Exact answers of a session: found with their analysis whenever the brush rests."""
+"""Exact answers of a session, found whenever the brush rests, and those with other colours.
+
+Those with other light colours are to choose from at a glance. They are what a click on them leads
+to: exact answers under the same requests but for `colors`. They are solved after the exact answer
+and its analysis, and the next change cancels them.
+"""
 
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from contextlib import suppress
+from typing import Any, get_args
 
+from lightpaint.basis.basis import Basis
+from lightpaint.basis.cache.denoised_planes import DenoisedPlanes
+from lightpaint.errors import ConstraintError
 from lightpaint.lighting.analysis.analysis import analyse
+from lightpaint.lighting.analysis.appearance.color_choices import can_change_colors
+from lightpaint.lighting.analysis.appearance.delivery import (
+    mean_shares,
+    measure_deliveries,
+    worst_delivery,
+)
 from lightpaint.lighting.solution import Solution
-from lightpaint.paint.background_threads import ExactSolveLoop
-from lightpaint.paint.protocol import AnswerUpdate, Findings
+from lightpaint.paint.background_threads import ExactSolveLoop, LatestWork
+from lightpaint.paint.protocol import (
+    AnswerChoice,
+    AnswerChoices,
+    AnswerColors,
+    AnswerUpdate,
+    Findings,
+)
 from lightpaint.paint.publisher import Publisher
-from lightpaint.paint.session.answer_messages import judge
+from lightpaint.paint.session.picture_table import Picture, display_thumbnail
 from lightpaint.paint.session.session import Session
+from lightpaint.paint.session.session_messages import judge, wish_delivery
 from lightpaint.paint.session.snapshot import SessionSnapshot
 from lightpaint.paint.session_access import SessionAccess
+from lightpaint.paint.store.history_steps import name_in_view
 from lightpaint.progress import cancellable
 
 #: Seconds between two writes of the compositions of layers, which are as large as the pictures.
 KEEP_INTERVAL_S = 60.0
+
+#: Approximate pixels of the longer side of a choice's picture.
+PICTURE_SIDE = 128
 
 
 class OutdatedError(Exception):
@@ -85,3 +111,114 @@ class ExactAnswers:
             return message
 
         self._publisher.publish_made(remember)
+
+
+class ChoiceSolver:
+    """The answers with other light colours, of one studio's session.
+
+    clean_planes: returns the denoised planes of bases; None for each that has none yet.
+    """
+
+    def __init__(
+        self,
+        access: SessionAccess,
+        publisher: Publisher,
+        clean_planes: Callable[[Sequence[Basis]], Sequence[DenoisedPlanes | None]],
+    ) -> None:
+        self._access, self._publisher, self._clean_planes = access, publisher, clean_planes
+        self._last: AnswerChoices | None = None
+        self._loop = LatestWork(self._solve, publisher.publish)
+        self.run, self.stop = self._loop.run, self._loop.stop
+
+    def give(self, snapshot: SessionSnapshot, solution: Solution) -> None:
+        """Replace the exact answer to which there are to be others."""
+        self._loop.give((snapshot, solution))
+
+    def choices_at(self, version: int) -> tuple[AnswerChoice, ...]:
+        """Return the choices of a version of the session; none if they are of another."""
+        is_current = self._last is not None and self._last.version == version
+        return self._last.choices if self._last is not None and is_current else ()
+
+    def _solve(self, answer: tuple[SessionSnapshot, Solution]) -> None:
+        """Solve for the other choices, and publish all of them with their pictures."""
+        snapshot, solution = answer
+
+        def check() -> None:
+            if not self._publisher.is_open or self._access.version != snapshot.version:
+                raise OutdatedError
+
+        with suppress(OutdatedError), cancellable(check):
+            check()
+            solutions = solve_choices(snapshot, solution) if can_change_colors(solution) else {}
+            choices = tuple(
+                AnswerChoice(colors=colors, is_chosen=x is solution, **_choice_figures(snapshot, x))
+                for colors, x in solutions.items()
+            )
+            pictures = {
+                name: picture
+                for colors, x in solutions.items()
+                for name, picture in self._pictures(snapshot, colors, x)
+            }
+            check()
+            self._publisher.publish_made(lambda: self._message(snapshot, choices, pictures))
+
+    def _message(
+        self,
+        snapshot: SessionSnapshot,
+        choices: tuple[AnswerChoice, ...],
+        pictures: dict[str, Picture],
+    ) -> AnswerChoices | None:
+        """Store the pictures, and return the message; None if the session has changed since."""
+        if self._access.version != snapshot.version:
+            return None
+        table = self._publisher.pictures
+        for name, picture in pictures.items():
+            table.put(name, picture)
+        resources = {name: table.generations[name] for name in pictures}
+        self._last = AnswerChoices(version=snapshot.version, choices=choices, resources=resources)
+        return self._last
+
+    def _pictures(
+        self, snapshot: SessionSnapshot, colors: AnswerColors, solution: Solution
+    ) -> list[tuple[str, Picture]]:
+        """Return the names and pictures of a choice, (h, w, 3) uint8, of all views."""
+        weights = snapshot.requests.output(solution.weights, snapshot.bases[0].is_fixed)
+        clean = self._clean_planes(snapshot.bases)
+        return [
+            (
+                name_in_view(f"choice/{colors}", k),
+                display_thumbnail(
+                    (planes or basis).mix(weights), snapshot.transform, side=PICTURE_SIDE
+                ),
+            )
+            for k, (basis, planes) in enumerate(zip(snapshot.bases, clean, strict=True))
+        ]
+
+
+def solve_choices(snapshot: SessionSnapshot, solution: Solution) -> dict[AnswerColors, Solution]:
+    """Return the exact answer with each choice of colours; none for one that is impossible.
+
+    solution: the exact answer to `snapshot`, with its own choice.
+    """
+    solutions: dict[AnswerColors, Solution] = {}
+    for colors in get_args(AnswerColors):
+        if solution.problem.fit.colors == colors:
+            solutions[colors] = solution
+            continue
+        with suppress(ConstraintError):  # another constraint may exclude it
+            solutions[colors] = snapshot.solution_with(colors)
+    return solutions
+
+
+def _choice_figures(snapshot: SessionSnapshot, solution: Solution) -> dict[str, Any]:
+    """Return the fields of `AnswerChoice` that say what an answer delivers."""
+    picture = solution.basis.mix(solution.weights)
+    deliveries = measure_deliveries(solution, picture).deliveries
+    brightness, color = mean_shares(deliveries)
+    worst = worst_delivery(deliveries)
+    return {
+        "delta_e": snapshot.delta_e(solution),
+        "brightness": brightness,
+        "color": color,
+        "worst": None if worst is None else wish_delivery(worst),
+    }

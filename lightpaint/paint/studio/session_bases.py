@@ -1,33 +1,158 @@
-"""The bases of a session: obtained and denoised in the background; the first ones open it."""
+"""The bases of a session: obtained, denoised and sampled further while the user paints."""
 
 from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
 
 from lightpaint.arrays import Floats
 from lightpaint.basis.basis import Basis
-from lightpaint.basis.cache.denoised_planes import DenoisedPlanes
+from lightpaint.basis.cache.denoised_planes import (
+    DenoisedPlanes,
+    cache_denoised_planes,
+    denoise_to_halves,
+    read_denoised_planes,
+)
+from lightpaint.basis.denoised_mixes import denoise_current_look
 from lightpaint.files import one_line
-from lightpaint.paint.background_threads import StoppedError
+from lightpaint.lighting.solution import Solution
+from lightpaint.paint.background_threads import LatestWork, StoppedError
+from lightpaint.paint.layers.canvas import Canvas
 from lightpaint.paint.protocol import ProgressReport, Tone
 from lightpaint.paint.publisher import Publisher
 from lightpaint.paint.rig.light_mover import LightMover
 from lightpaint.paint.session.look_library import LookLibrary
+from lightpaint.paint.session.picture_table import Picture, plane_thumbnail
 from lightpaint.paint.session.session import Session
-from lightpaint.paint.session.session_state import offered_transforms
-from lightpaint.paint.session.view_pictures import (
+from lightpaint.paint.session.session_state import (
     offer_layers,
     offer_presets,
     offer_references,
     offer_steps,
     offer_transforms,
     offer_view,
+    offered_transforms,
 )
+from lightpaint.paint.session.snapshot import SessionSnapshot
 from lightpaint.paint.session_access import SessionAccess
-from lightpaint.paint.store.history_steps import Identity
+from lightpaint.paint.store.history_steps import Identity, name_in_view
 from lightpaint.paint.store.store import Store
-from lightpaint.paint.studio.layer_imports import begin_with_layers
-from lightpaint.paint.studio.plane_denoiser import PlaneDenoiser
+from lightpaint.paint.studio.file_imports import begin_with_layers
 from lightpaint.paint.subject import Subject, obtain_bases, painting_transform
+from lightpaint.progress import Progress, silent
+from lightpaint.report.basis_memo import page_reduction
+from lightpaint.scene.limits import MAX_SPP
 from lightpaint.scene.runtime.render_lock import MITSUBA
+
+#: Name of this task in reports of progress.
+SAMPLING = "sampling"
+
+
+@dataclass(frozen=True)
+class _ViewPlanes:
+    """Denoised planes of one view. basis: their source. is_cached: whether a file has them."""
+
+    basis: Basis
+    planes: DenoisedPlanes
+    is_cached: bool = False
+
+    def matches(self, basis: Basis) -> bool:
+        return self.basis.planes is basis.planes
+
+    def scaled_to(self, basis: Basis) -> DenoisedPlanes:
+        """Return planes that stand in until those of `basis` are denoised."""
+        return self.planes if self.matches(basis) else self.planes.scaled_as(basis)
+
+
+class PlaneDenoiser:
+    """Denoises the planes of a studio's views.
+
+    publish: receives each plane, by its name. is_needed: whether a page still shows them.
+    use_cache: whether they are cached for the next session.
+    """
+
+    def __init__(
+        self,
+        publish: Callable[[str, Picture], None],
+        is_needed: Callable[[], bool],
+        *,
+        use_cache: bool,
+    ) -> None:
+        self._publish, self._is_needed, self._use_cache = publish, is_needed, use_cache
+        self._by_view: dict[int, _ViewPlanes] = {}
+        self._small: dict[int, _ViewPlanes] = {}  # of blocks of pixels, as pages of results have
+
+    def load_cached(self, bases: Sequence[Basis]) -> list[Floats]:
+        """Load cached planes. Returns the current look of each view, denoised."""
+        current_looks = []
+        for k, basis in enumerate(bases):
+            factor = page_reduction(basis, len(basis.lights))
+            cached = read_denoised_planes(basis, factor=factor) if self._use_cache else None
+            if cached is None:
+                current_looks.append(denoise_current_look(basis))
+            else:
+                current_looks.append(cached.current)
+                planes_by_view = self._by_view if cached.is_whole else self._small
+                planes_by_view[k] = _ViewPlanes(basis, cached, is_cached=True)
+        return current_looks
+
+    def planes_for(self, bases: Sequence[Basis]) -> list[DenoisedPlanes | None]:
+        """Return each view's denoised planes, of fewer samples if need be; None if it has none."""
+        return [
+            self._by_view[k].scaled_to(basis) if k in self._by_view else None
+            for k, basis in enumerate(bases)
+        ]
+
+    def clean_planes(self, bases: Sequence[Basis]) -> Sequence[DenoisedPlanes | None]:
+        """Return the denoised planes of these bases; None for each that has none yet.
+
+        Bases with moved lights have none.
+        """
+        if any(basis.former is not None for basis in bases):
+            return [None] * len(bases)
+        return self.planes_for(bases)
+
+    def small_planes_for(self, bases: Sequence[Basis]) -> list[DenoisedPlanes | None]:
+        """Return each view's denoised planes of blocks of pixels, which a result has left."""
+        small = [self._small.get(k) for k in range(len(bases))]
+        return [
+            view_planes.planes if view_planes is not None and view_planes.matches(basis) else None
+            for view_planes, basis in zip(small, bases, strict=True)
+        ]
+
+    def denoise(self, session: Session) -> None:
+        """Denoise the planes that are missing, one view after the other.
+
+        Of moved lights they are those of before, which undo brings back.
+        """
+        for view, basis in zip(session.views, session.bases, strict=True):
+            planes_of_view = self._by_view.get(view.view)
+            if planes_of_view is None or not planes_of_view.matches(basis):
+                self._denoise_view(session, view, basis)
+
+    def _denoise_view(self, session: Session, view: Canvas, basis: Basis) -> None:
+        halves, scales = (
+            np.empty((len(basis.lights), *basis.size, 3), np.float16),
+            np.ones(len(basis.lights)),
+        )
+        planes = DenoisedPlanes(halves, scales, view.current)
+        for k in range(len(basis.lights)):
+            if not self._is_needed() or session.bases[view.view] is not basis:
+                return
+            planes.halves[k], planes.scales[k] = denoise_to_halves(basis, k)
+            if basis.names[k] not in session.requests.placed:
+                self._publish(name_in_view(f"clean/{k}", view.view), planes.halves[k])
+                thumbnail = plane_thumbnail(planes.plane(k), basis.emitters_seen)
+                self._publish(name_in_view(f"thumb/{k}", view.view), thumbnail)
+        self._by_view[view.view] = _ViewPlanes(basis, planes)
+
+    def write_cache(self) -> None:
+        """Cache the planes of the final basis for the next session."""
+        if self._use_cache:
+            for view, planes_of_view in list(self._by_view.items()):
+                if not planes_of_view.is_cached:
+                    cache_denoised_planes(planes_of_view.basis, planes_of_view.planes)
+                    self._by_view[view] = replace(planes_of_view, is_cached=True)
 
 
 class SessionBases:
@@ -144,3 +269,126 @@ class SessionBases:
         """Denoise the planes of the current bases, where that is not done yet, and keep them."""
         self._denoiser.denoise(self._access.session)
         self._denoiser.write_cache()
+
+
+class BackgroundSampling:
+    """A thread's loop that adds samples after each exact answer, until the brush moves."""
+
+    def __init__(
+        self,
+        subjects: Sequence[Subject],
+        access: SessionAccess,
+        bases: SessionBases,
+        publisher: Publisher,
+    ) -> None:
+        self._subjects, self._access = subjects, access
+        self._bases, self._publisher = bases, publisher
+        self._loop = LatestWork(self._add, publisher.publish)
+        self._is_reported = False  # whether pages show that samples are added
+        self.stop = self._loop.stop
+
+    @property
+    def is_wanted(self) -> bool:
+        """True if the settings say how sure the lights are to be."""
+        first = self._subjects[0]
+        return first.scene is not None and first.settings.error is not None
+
+    def run(self) -> None:
+        """Add samples until `stop`, if they are wanted."""
+        if self.is_wanted:
+            self._loop.run()
+
+    def give(self, snapshot: SessionSnapshot, solution: Solution) -> None:
+        """Replace the exact answer that samples are added for."""
+        if self.is_wanted:
+            self._loop.give((snapshot, solution))
+
+    def _add(self, answer: tuple[SessionSnapshot, Solution]) -> None:
+        """Add a round of samples; once there are enough, denoise the planes that have them."""
+        snapshot, solution = answer
+
+        def is_outdated() -> bool:
+            return not self._publisher.is_open or self._access.version != snapshot.version
+
+        # Samples are of the scene, in which no light is moved.
+        bases = None
+        if not (is_outdated() or snapshot.requests.placed):
+            bases = add_round(
+                self._subjects,
+                snapshot,
+                solution,
+                is_enough=is_outdated,
+                progress=self._report,
+            )
+        # After a round the next exact answer says whether another one follows.
+        if self._is_reported and (bases is None or is_outdated()):
+            self._is_reported = False
+            self._publisher.publish(ProgressReport(task=SAMPLING, done=1, total=1, unit=""))
+        if bases is not None:
+            self._bases.use(bases)
+        elif not (is_outdated() or snapshot.requests.placed):
+            self._bases.denoise()
+
+    def _report(self, label: str, done: int, total: int, unit: str = "passes") -> None:
+        self._is_reported = True
+        self._publisher.report_progress(label, done, total, unit)
+
+
+def add_round(
+    subjects: Sequence[Subject],
+    snapshot: SessionSnapshot,
+    solution: Solution,
+    *,
+    is_enough: Callable[[], bool],
+    progress: Progress = silent,
+) -> list[Basis] | None:
+    """Return the bases of all views after a round of samples; None if none is needed or was taken.
+
+    snapshot, solution: the paintings, and their exact answer. is_enough: whether to leave the rest
+    of the round; asked between passes. progress: hears, as `SAMPLING`, which share of the precision
+    that was asked for is reached, in percent.
+    """
+    # Imported here: saved bases need no renderer.
+    from lightpaint.basis.cache.cached_render import top_up_basis
+    from lightpaint.basis.render.pixel_top_up import kept_loaded
+    from lightpaint.basis.render.render_origin import ONE_PASS
+    from lightpaint.pipeline.needed_samples import Certainty, needed_counts
+
+    settings, bases = snapshot.settings, list(snapshot.bases)
+    painted = [bases[k] for k in snapshot.painted_views]
+    is_possible = all(x.origin.method == ONE_PASS and x.origin.mean_spp < MAX_SPP for x in painted)
+    if settings.error is None or not is_possible:
+        return None
+    certainty = Certainty.of(solution)
+    if certainty.error <= settings.error:
+        return None
+    counts = needed_counts(certainty, painted, settings.error)
+    rounds = list(zip(snapshot.painted_views, counts, strict=True))
+    # Squared errors fall as samples grow.
+    share = (settings.error / certainty.error) ** 2
+    have = sum(x.origin.mean_spp * x.size[0] * x.size[1] for x in painted)
+    grown = min(share * (1 + 2 * sum(int(x.sum()) for x in counts) / have), 0.99)
+
+    def of_view(number: int) -> Progress:
+        def hear(label: str, done: int, total: int, unit: str = "passes") -> None:
+            taken = (number + done / max(total, 1)) / len(rounds)
+            progress(SAMPLING, round(100 * (share + (grown - share) * taken)), 100, "percent")
+
+        return hear
+
+    scenes = [subjects[k].loaded_scene for k in snapshot.painted_views]
+    with MITSUBA.low_priority(), kept_loaded(scenes) as tracers:
+        for number, (k, view_counts) in enumerate(rounds):
+            if is_enough():
+                break
+            bases[k] = top_up_basis(
+                scenes[number],
+                bases[k],
+                view_counts,
+                use_cache=settings.use_cache,
+                is_enough=is_enough,
+                progress=of_view(number),
+                tracers=tracers,
+            )
+    taken = zip(bases, snapshot.bases, strict=True)
+    return bases if any(a.origin != b.origin for a, b in taken) else None

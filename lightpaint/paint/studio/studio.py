@@ -1,11 +1,13 @@
 """The studio: one session, and the background work that runs while the brush moves.
 
-Requests are answered at once, by one thread at a time. Rendering the basis, exact answers,
-denoising, exports and verification have threads of their own, which publish through `on_message`.
+Requests of pages and cells are answered at once, by one thread at a time. Rendering the basis,
+exact answers, denoising, exports and verification have threads of their own, which publish through
+`on_message`.
 """
 
 from collections.abc import Callable, Mapping, Sequence
 from contextlib import suppress
+from dataclasses import replace
 from typing import Any
 
 import numpy.typing as npt
@@ -23,6 +25,8 @@ from lightpaint.paint.background_threads import (
 from lightpaint.paint.protocol import (
     Message,
     Notice,
+    PictureData,
+    PreviousAnswer,
     SessionPending,
     SessionState,
     Tone,
@@ -30,21 +34,27 @@ from lightpaint.paint.protocol import (
 from lightpaint.paint.publisher import Publisher
 from lightpaint.paint.rig.lamp_rig import LampRig
 from lightpaint.paint.rig.light_mover import LightMover
+from lightpaint.paint.rig.light_placer import LightPlacer
 from lightpaint.paint.rig.look_comparison import LookComparison
+from lightpaint.paint.session.moved_lights import Placed
 from lightpaint.paint.session.session import Session
+from lightpaint.paint.session.session_state import offer_ground, state_fields
 from lightpaint.paint.session.snapshot import SessionSnapshot
 from lightpaint.paint.session_access import SessionAccess
 from lightpaint.paint.store.canvas_pixels import Pixels
 from lightpaint.paint.store.history_steps import Identity
 from lightpaint.paint.store.session_requests import SessionRequests
 from lightpaint.paint.store.store import Store
-from lightpaint.paint.studio.answer_choices import ChoiceSolver
 from lightpaint.paint.studio.background_jobs import BackgroundJobs
-from lightpaint.paint.studio.background_sampling import BackgroundSampling
-from lightpaint.paint.studio.exact_answers import ExactAnswers, OutdatedError, raise_outdated
-from lightpaint.paint.studio.plane_denoiser import PlaneDenoiser
-from lightpaint.paint.studio.request_handler import RequestHandler
-from lightpaint.paint.studio.session_bases import SessionBases
+from lightpaint.paint.studio.exact_answers import (
+    ChoiceSolver,
+    ExactAnswers,
+    OutdatedError,
+    raise_outdated,
+)
+from lightpaint.paint.studio.file_imports import LayerImports, ReferenceImports
+from lightpaint.paint.studio.final_renders import FinalRenders
+from lightpaint.paint.studio.session_bases import BackgroundSampling, PlaneDenoiser, SessionBases
 from lightpaint.paint.subject import Subject
 from lightpaint.progress import cancellable
 
@@ -103,18 +113,16 @@ class Studio:
         self._exact_answers = ExactAnswers(access, publisher, self._follow_exact)
         self._write_retry = UnsavedRetry(lambda: self.store, self._publish_save_state)
         self._comparison = LookComparison(access, publisher, self._mover, threads)
-        self._requests = RequestHandler(
-            access,
-            publisher,
-            self._mover,
-            self._comparison,
-            BackgroundJobs(
-                access, publisher, self._mover, threads, clean_planes=denoiser.clean_planes
-            ),
-            self._exact_answers,
-            self._choices,
-            threads,
+        self._jobs = BackgroundJobs(
+            access, publisher, self._mover, threads, clean_planes=denoiser.clean_planes
         )
+        self._shown_ground = 0  # number of the look under the painting that pages have
+        self._layer_imports = LayerImports(access, publisher, threads, self._exact_answers.notify)
+        self._reference_imports = ReferenceImports(access, publisher, threads)
+        self._renders = FinalRenders(
+            access, publisher, threads, self.subjects, self._jobs.exact_answer
+        )
+        self._placer = LightPlacer(access, publisher, self.rig, threads, self._hang_lights)
 
     @property
     def on_message(self) -> Callable[[Message], None] | None:
@@ -175,20 +183,157 @@ class Studio:
 
     def state(self) -> SessionState | SessionPending:
         """Return the whole state, for a client that connects."""
-        return self._requests.state()
+        first = self.subjects[0]
+        with self._access.lock:
+            session = self._access.current
+            fields: dict[str, Any] = {
+                "version": protocol.VERSION,
+                "scene": first.name,
+                "folder": str(first.folder.absolute()),
+                "can_render": first.scene is not None,
+                "can_report": first.scene is not None or len(self.subjects) == 1,
+            }
+            if session is None:
+                progress = self.publisher.last_progress  # of the first picture
+                return SessionPending(**fields, text=self._access.failure_text, progress=progress)
+            findings = self._exact_answers.findings_of(session)
+            choices = self._choices.choices_at(session.version)
+            fields |= {"answer": findings, "weights": session.weights, "choices": choices}
+            return SessionState(**fields, **self._state_fields(session), **session.edit_state)
+
+    def _state_fields(self, session: Session) -> dict[str, Any]:
+        """Return fields of the state, including those of background jobs."""
+        painted = [view.name for view in session.views if view.is_painted]
+        sensors = [""] if len(session.views) == 1 else painted
+        return {
+            **state_fields(
+                session,
+                self.publisher.pictures,
+                self._access.looks,
+                target_spp=self.subjects[0].target_spp,
+            ),
+            "renders": self._renders.infos,
+            "verifications": self._jobs.verifications(session.version),
+            "command": self._jobs.solve_command(sensors, session.requests),
+        }
 
     def greet(self, *, is_back: bool) -> Message:
         """Return the state to a page that connects, and keep the open stroke of another page.
 
         is_back: the page had the session before, and no other since: it resends its open stroke.
         """
-        return self._requests.greet(is_back=is_back)
+        with self._access.lock:
+            session = self._access.current
+            if session is not None and session.is_open:
+                self.rig.step = 1
+                session.client_left(with_stroke=not is_back)
+                self._mover.follow(self.publisher.publish)
+                self._exact_answers.notify()
+            state = self.state()
+            return replace(state, is_back=is_back)
 
     def handle(
         self, message: protocol.Request, arrays: Mapping[str, npt.NDArray[Any]]
     ) -> list[Message]:
         """Return the immediate answers to a request. Raises LightpaintError if it is refused."""
-        return self._requests.handle(message, arrays)
+        if isinstance(message, protocol.Hello | protocol.TakeOver):
+            return [self.greet(is_back=True)]
+        if isinstance(message, protocol.Fetch):
+            return [PictureData(name=message.name, data=self.resource(message.name))]
+        with self._access.lock:
+            session, looks = self._access.session, self._access.looks
+            view, self.rig.step = 0, 1
+            version = session.version
+            if isinstance(message, protocol.MoveLights | protocol.PointLight):
+                view = session.views[message.view].view  # before anything has moved
+                self.rig.step = 1 if message.is_final else message.step
+            match message:
+                case protocol.SaveLook() | protocol.RenameLook() | protocol.CopyLook():
+                    return [looks.handle(message)]
+                case protocol.MixLooks() | protocol.DropLook() | protocol.Propose():
+                    return [looks.handle(message)]
+                case protocol.ListSteps():
+                    steps = session.history.list_steps(message.count)
+                    return [replace(steps, searches=self._placer.notes.listed())]
+                case protocol.ShowPrevious():
+                    return [PreviousAnswer(weights=session.history.previous_weights())]
+                case protocol.CompareLooks():
+                    return self._comparison.handle(message)
+                case protocol.Export() | protocol.Verify() | protocol.Explain():
+                    return self._jobs.handle(message)
+                case protocol.RenderFinal() | protocol.StopRender() | protocol.DropRender():
+                    return self._renders.handle(message)
+                case protocol.ImportLayers():
+                    return self._layer_imports.handle(message, arrays)
+                case protocol.AddReference() | protocol.DropReference():
+                    return self._reference_imports.handle(message, arrays)
+                case protocol.Preview():
+                    return self._jobs.start_preview(message, session.preview_requests(message))
+                case protocol.ShowRig():
+                    return self._mover.show_rig()
+                case protocol.PlaceLights():
+                    return self._placer.handle(message)
+                case protocol.EstimatePlaces():
+                    return self._placer.estimate(message)
+                case protocol.PointLight():
+                    messages = session.handle(self._mover.move_of(message), arrays)
+                case protocol.AddLight():
+                    name, values = self._mover.hang(message)
+                    messages = session.hang_lights(f"add {name}", {name: values})
+                case protocol.LoadLook():
+                    messages = looks.load(message)
+                case _:
+                    messages = session.handle(message, arrays)
+            messages = self._show_moves(messages, view=view)
+            has_changed = session.version != version
+        if has_changed:  # a selection changes no light
+            self._exact_answers.notify()
+        return messages
+
+    def _show_moves(
+        self,
+        messages: list[Message],
+        send: Callable[[Message], None] | None = None,
+        *,
+        view: int = 0,
+    ) -> list[Message]:
+        """Show the lights that a request has moved, and return its answers.
+
+        These are the whole state if lights were added or removed, or if another look lies under the
+        painting. send: receives messages about moved lights; by default they are published at once.
+        view: as in `LightMover.follow`.
+        """
+        has_others = self._mover.follow(send or self.publisher.publish, view)
+        has_others |= self._offer_new_ground()
+        return [self.state(), *self._mover.rig_messages()] if has_others else messages
+
+    def _offer_new_ground(self) -> bool:
+        """Offer the look under the painting if it is another; return whether it is."""
+        session = self._access.session
+        if session.ground == self._shown_ground:
+            return False
+        self._shown_ground = session.ground
+        for view in session.views:
+            offer_ground(self.publisher.pictures, view, session.transform)
+        return True
+
+    def _hang_lights(self, label: str, placed: Placed, before: Placed) -> bool:
+        """Move lights and add others, by name, in one step, and notify pages.
+
+        before: their expected places; returns False, and changes nothing, if these have changed.
+        """
+
+        def hang() -> list[Message]:
+            if self._access.session.requests.placed != before:
+                return []
+            news: list[Message] = []
+            answers = self._show_moves(self._access.session.hang_lights(label, placed), news.append)
+            return [*news, *answers]
+
+        is_done = bool(self.publisher.publish_all_made(hang))
+        if is_done:
+            self._exact_answers.notify()
+        return is_done
 
     def load(
         self, paintings: Mapping[int, Pixels], requests: SessionRequests, label: str
@@ -197,11 +342,15 @@ class Studio:
 
         Raises LightpaintError for requests that are refused; nothing is changed then.
         """
-        return self._requests.load(paintings, requests, label)
+        with self._access.lock:
+            messages = self._show_moves(self._access.session.load(paintings, requests, label))
+        self._exact_answers.notify()
+        return messages
 
     def resource(self, name: str) -> npt.NDArray[Any]:
         """Return a picture by name. Raises PaintError if there is none."""
-        return self._requests.resource(name)
+        with self._access.lock:
+            return self.publisher.pictures[name]
 
     def snapshot(self) -> SessionSnapshot:
         """Return the current paintings and requests. Raises PaintError before there is a basis."""
@@ -242,13 +391,13 @@ class Studio:
         self.publisher.publish(Notice(text=self._access.failure_text, tone="warn"))
         if not has_session:
             self.failure = error
-            self.publisher.publish_made(self._requests.state)
+            self.publisher.publish_made(self.state)
         if is_reported and self.publisher.is_open:
             self.on_failure(error)  # type: ignore[misc]
 
     def _show_new_bases(self) -> None:
         """Publish the state with new bases, and renew what was found with the earlier ones."""
-        self.publisher.publish_made(self._requests.state)
+        self.publisher.publish_made(self.state)
         self._mover.render_behind()
         self._comparison.renew()
         self._exact_answers.notify()

@@ -24,7 +24,7 @@ from lightpaint.keywords import keywords
 from lightpaint.lighting.constraints.constraints import Constraints
 from lightpaint.lighting.constraints.constraints_file import constraints_of
 from lightpaint.lighting.fit import resolve_for_targets
-from lightpaint.lighting.unknowns.constraint_reduction import reduce_to
+from lightpaint.lighting.unknowns.reduction import reduce_to
 from lightpaint.pipeline.job.job_checks import (
     check_animation,
     check_inputs,

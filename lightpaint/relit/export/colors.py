@@ -6,8 +6,7 @@ import numpy as np
 
 from lightpaint.arrays import RGB, as_rgb
 from lightpaint.colour.color import luminance
-from lightpaint.lighting.answer.light_setting import LightSetting
-from lightpaint.lighting.answer.lighting import Lighting
+from lightpaint.lighting.answer.lighting import Lighting, LightSetting
 
 #: Width of a 95 % interval, relative to the brightest channel, above which a light is hardly known.
 UNBOUNDED = 1.0

@@ -18,8 +18,7 @@ from lightpaint.errors import LightingError
 from lightpaint.files import write_text
 from lightpaint.images.formats.exr import ExrPart, rgb_channels, write_parts
 from lightpaint.keywords import keywords
-from lightpaint.lighting.answer.light_setting import LightSetting
-from lightpaint.lighting.answer.lighting import Lighting
+from lightpaint.lighting.answer.lighting import Lighting, LightSetting
 from lightpaint.lighting.answer.lighting_keys import key_slopes
 from lightpaint.relit.export.nuke import LAYERS, copied_part, needs_copy, nuke_script
 from lightpaint.relit.export.scene_script import filled_script

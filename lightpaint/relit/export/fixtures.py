@@ -17,8 +17,7 @@ from typing import Any, Literal
 import numpy as np
 
 from lightpaint.arrays import RGB, Position
-from lightpaint.lighting.answer.light_setting import LightSetting
-from lightpaint.lighting.answer.lighting import Lighting
+from lightpaint.lighting.answer.lighting import Lighting, LightSetting
 from lightpaint.relit.export.exports import plain_cell
 from lightpaint.version import __version__
 

@@ -14,7 +14,7 @@ from lightpaint.images.bands import by_bands
 from lightpaint.lighting.analysis.appearance.appearance import Appearance
 from lightpaint.lighting.analysis.diagnosis import Diagnosis
 from lightpaint.lighting.analysis.noise.uncertainty import Uncertainty
-from lightpaint.lighting.answer.active_bound import Bound
+from lightpaint.lighting.answer.certificate import Bound
 from lightpaint.lighting.solution import Solution
 from lightpaint.report.answer_pictures import (
     FINEST_SCALE,

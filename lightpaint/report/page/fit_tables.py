@@ -13,7 +13,7 @@ from lightpaint.display_text import some_of
 from lightpaint.images.estimate import Estimate
 from lightpaint.lighting.analysis.appearance.appearance import Appearance
 from lightpaint.lighting.analysis.appearance.delivery import spoken_share
-from lightpaint.lighting.answer.software_versions import Software, version
+from lightpaint.lighting.answer.certificate import Software, version
 from lightpaint.lighting.loss.painting import ignored_paint
 from lightpaint.lighting.solution import Solution
 from lightpaint.relit.detection_power import ERROR

@@ -16,8 +16,7 @@ from lightpaint.colour.srgb import to_8_bit
 from lightpaint.images.bands import in_turns
 from lightpaint.images.pixel_blocks import block_mean
 from lightpaint.lighting.analysis.noise.uncertainty import Uncertainty
-from lightpaint.lighting.answer.light_setting import ALL_REACHED, LightSetting
-from lightpaint.lighting.answer.lighting import Lighting
+from lightpaint.lighting.answer.lighting import ALL_REACHED, Lighting, LightSetting
 from lightpaint.lighting.solution import Solution
 from lightpaint.report.basis_memo import (
     ROWS_SHOWN,

@@ -29,8 +29,7 @@ from lightpaint.colour.srgb import to_8_bit
 from lightpaint.images.bands import in_turns
 from lightpaint.images.packed_picture import PackedPicture, pack_picture
 from lightpaint.images.pixel_blocks import block_mean
-from lightpaint.lighting.answer.light_setting import ALL_REACHED
-from lightpaint.lighting.answer.lighting import Lighting
+from lightpaint.lighting.answer.lighting import ALL_REACHED, Lighting
 from lightpaint.lighting.answer.lighting_file import lighting_fields
 from lightpaint.report.basis_memo import (
     MAX_PIXELS,

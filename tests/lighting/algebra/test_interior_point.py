@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from lightpaint.arrays import Doubles
-from lightpaint.lighting.algebra import capped_newton
+from lightpaint.lighting.algebra import clipped_newton
 from lightpaint.lighting.algebra.interior_point import interior_point
 from lightpaint.lighting.algebra.optimum import minimise
 from lightpaint.lighting.algebra.quadratic import Cap, Quadratic, scaled
@@ -61,7 +61,7 @@ def test_what_newtons_steps_do_not_reach_is_certified(
     M, b, upper, caps = problem(seed)
     best = minimise(M, b, upper=upper, caps=caps)
     assert best.steps > 3
-    monkeypatch.setattr(capped_newton, "MAX_STEPS", 3)
+    monkeypatch.setattr(clipped_newton, "MAX_CAPPED_STEPS", 3)
     near = minimise(M, b, upper=upper, caps=caps)
     assert near.converged
     assert near.sweeps == 0

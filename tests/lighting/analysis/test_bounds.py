@@ -14,9 +14,9 @@ from scipy.optimize import lsq_linear
 from lightpaint.colour.color import kelvin_to_rgb
 from lightpaint.colour.white_range import white_range
 from lightpaint.errors import LightingError
-from lightpaint.lighting.analysis import active_bounds, bound_release
+from lightpaint.lighting.analysis import active_bounds
 from lightpaint.lighting.analysis.diagnosis import diagnose
-from lightpaint.lighting.answer.active_bound import Bound
+from lightpaint.lighting.answer.certificate import Bound
 from lightpaint.lighting.answer.lighting_file import read_lighting, write_lighting
 from lightpaint.lighting.constraints.constraints import Constraints
 from lightpaint.lighting.solve import solve
@@ -198,7 +198,7 @@ def test_each_gain_is_that_of_the_problem_without_that_one_bound(
     basis, target, solution, ranges = _solve(make_basis, seed)
     R, q = _reduced(basis, target)
     w = solution.lighting.weights_for(basis)
-    bounds, left_out = bound_release.bounds_of(solution)
+    bounds, left_out = active_bounds.bounds_of(solution)
     assert left_out == 0
     assert [b.gain for b in bounds] == sorted((b.gain for b in bounds), reverse=True)
     before, scale = _least_objective(R, q, ranges), q @ q
@@ -257,7 +257,7 @@ def test_each_multiplier_is_how_fast_the_objective_changes(make_basis: Any, seed
     basis, target, solution, ranges = _solve(make_basis, seed)
     R, q = _reduced(basis, target)
     w = solution.lighting.weights_for(basis)
-    bounds, _ = bound_release.bounds_of(solution)
+    bounds, _ = active_bounds.bounds_of(solution)
     for bound in bounds:
         assert len(bound.multiplier) == {"emission": 3, "luminance": 1}.get(
             bound.per, len(bound.lights)
@@ -291,7 +291,7 @@ def test_multipliers_of_the_tests_are_not_small(make_basis: Any) -> None:
         basis, target, solution, _ = _solve(make_basis, seed)
         R, q = _reduced(basis, target)
         allowed = 1e-12 * (q @ q) / STEP + 4 * STEP * np.square(R).sum(axis=0).max() * 6
-        for bound in bound_release.bounds_of(solution)[0]:
+        for bound in active_bounds.bounds_of(solution)[0]:
             size = max(np.abs(bound.multiplier)) / allowed
             sizes.setdefault(bound.kind, []).append(size)
     assert set(sizes) == {"zero", "lock", "off", "tie", "limits", "colour"}
@@ -315,7 +315,7 @@ def test_a_limit_of_luminance(make_basis: Any, seed: int, is_least: bool) -> Non
     before, solution = objective(level)
     if level == 0:
         return
-    [bound] = (b for b in bound_release.bounds_of(solution)[0] if b.kind == "limits")
+    [bound] = (b for b in active_bounds.bounds_of(solution)[0] if b.kind == "limits")
     free = sum(solve(basis, target).certificate.objective)
     norm2 = float(solution.equations.target_norm2.sum())
     assert bound.gain == pytest.approx(before - free, abs=SAME * norm2)
@@ -352,7 +352,7 @@ def test_lights_that_sparse_leaves_out(make_basis: Any, seed: int) -> None:
             _least_objective(R, q, [*(ranges[j] for j in lit_lights), one]) for one in pieces
         )
 
-    bounds = [b for b in bound_release.bounds_of(solution)[0] if b.kind == "left out"]
+    bounds = [b for b in active_bounds.bounds_of(solution)[0] if b.kind == "left out"]
     # Each as what else is asked of it allows: l0 is still white.
     gains = {k: gained(k) for k in set(range(6)) - set(lit_lights)}
     bound_by_light = {basis.names.index(b.lights[0]): b for b in bounds}
@@ -373,7 +373,7 @@ def test_with_a_pull_the_gain_is_of_the_miss_alone(make_basis: Any, seed: int) -
     solution = solve(basis, target, constraints=off_constraints)
     unbounded = solve(basis, target, constraints=Constraints.of(prefer_current=0.02))
     gain = sum(solution.certificate.objective) - sum(unbounded.certificate.objective)
-    off_bounds = [b for b in bound_release.bounds_of(solution)[0] if b.kind == "off"]
+    off_bounds = [b for b in active_bounds.bounds_of(solution)[0] if b.kind == "off"]
     norm2 = float(solution.equations.target_norm2.sum())
     for bound in off_bounds:
         assert bound.gain == pytest.approx(gain, abs=SAME * norm2)
@@ -387,7 +387,7 @@ def test_a_kept_light_stands_in_the_way_under_constraints_too(make_basis: Any) -
     basis_with_kept = replace(basis, lights=(kept_light, *basis.lights[1:]))
     colour_constraint = {"l1": {"color": "3200K"}}
     solution = solve(basis_with_kept, target, constraints=Constraints.of(colour_constraint))
-    [bound] = (b for b in bound_release.bounds_of(solution)[0] if b.kind == "kept")
+    [bound] = (b for b in active_bounds.bounds_of(solution)[0] if b.kind == "kept")
     free = solve(basis, target, constraints=Constraints.of(colour_constraint))
     gain = sum(solution.certificate.objective) - sum(free.certificate.objective)
     assert bound.gain == pytest.approx(gain, rel=1e-8)
@@ -397,7 +397,7 @@ def test_the_scene_with_twelve_lights_has_all_of_its_bounds(make_basis: Any) -> 
     basis, target = _problem(make_basis, 1, 12)
     constraints = {"l?": {"color": "3200K"}, "l11": {"limits": {"max": 0.01}}, "l10": {"off": True}}
     solution = solve(basis, target, constraints=Constraints.of(constraints))
-    bounds, left_out = bound_release.bounds_of(solution)
+    bounds, left_out = active_bounds.bounds_of(solution)
     assert left_out == 0
     active = [light.name for light in solution.lighting.lights if light.is_active]
     assert set(active) == {b.lights[0] for b in bounds if b.kind != "zero"}
@@ -409,9 +409,9 @@ def test_of_many_bounds_those_that_seem_to_matter_most_are_looked_into(
     basis, target = _problem(make_basis, 2)
     constraints = {"l*": {"off": True}, "l5": {"lock": 0.5}}
     solution = solve(basis, target, constraints=Constraints.of(constraints))
-    every, none = bound_release.bounds_of(solution)
+    every, none = active_bounds.bounds_of(solution)
     assert none == 0
-    monkeypatch.setattr(bound_release, "MAX_RELEASED", 2)
+    monkeypatch.setattr(active_bounds, "MAX_RELEASED", 2)
     diagnosis = diagnose(solution)
     assert len(diagnosis.bounds) == 2
     assert diagnosis.bounds_left_out == len(every) - 2
@@ -422,9 +422,9 @@ def test_of_many_bounds_those_that_seem_to_matter_most_are_looked_into(
 def test_the_estimate_is_a_lower_limit(make_basis: Any, seed: int) -> None:
     """By moving one light alone nothing is gained that moving all would not gain."""
     basis, _, solution, _ = _solve(make_basis, seed)
-    answer = bound_release._bounded_answer(solution, solution.problem.solved)
+    answer = active_bounds._bounded_answer(solution, solution.problem.solved)
     norm2 = float(solution.equations.target_norm2.sum())
-    gains = {(b.lights, b.kind): b.gain for b in bound_release.bounds_of(solution)[0]}
+    gains = {(b.lights, b.kind): b.gain for b in active_bounds.bounds_of(solution)[0]}
     for h in active_bounds.find_active_bounds(answer):
         names = tuple(basis.names[k] for k in h.lights)
         if (names, h.kind) in gains and len(names) == 1:

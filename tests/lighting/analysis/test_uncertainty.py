@@ -18,7 +18,7 @@ from lightpaint.lighting.analysis.noise.noise import pseudo_inverse
 from lightpaint.lighting.analysis.noise.noise_correction import correct_noise
 from lightpaint.lighting.analysis.noise.refinement import refine
 from lightpaint.lighting.analysis.noise.uncertainty import error_bars, with_error_bars
-from lightpaint.lighting.analysis.noise.weight_spread import _one_sided
+from lightpaint.lighting.analysis.noise.weight_directions import _one_sided
 from lightpaint.lighting.constraints.constraints import Constraints
 from lightpaint.lighting.solve import solve
 from lightpaint.target.target import Target

@@ -10,13 +10,11 @@ from lightpaint.colour.color_hull import ColorHull, reach_of
 from lightpaint.colour.white_range import white_range
 from lightpaint.lighting.linear_problem import reduce_lights
 from lightpaint.lighting.normal_equations import NormalEquations
-from lightpaint.lighting.unknowns import gamut_bounds
-from lightpaint.lighting.unknowns.gamut_bounds import solve_near_sides
+from lightpaint.lighting.unknowns import white_mixes
 from lightpaint.lighting.unknowns.gamuts import Gamuts, PaintedLight
-from lightpaint.lighting.unknowns.reduced_problem import solve_reduced
+from lightpaint.lighting.unknowns.reduced_problem import nearest_unknowns, solve_reduced
 from lightpaint.lighting.unknowns.reduction import Reduction
-from lightpaint.lighting.unknowns.starting_unknowns import nearest_unknowns
-from lightpaint.lighting.unknowns.white_mixes import next_whites
+from lightpaint.lighting.unknowns.white_mixes import next_whites, solve_near_sides
 
 SIZE = (9, 8)
 
@@ -44,7 +42,7 @@ def test_sides_lead_to_the_optimum_over_whole_gamuts(
     make_basis: Any, monkeypatch: pytest.MonkeyPatch, seed: int
 ) -> None:
     """That of mixes of all corners, which is certified."""
-    monkeypatch.setattr(gamut_bounds, "MAX_TURNS", 60)
+    monkeypatch.setattr(white_mixes, "MAX_TURNS", 60)
     equations, reduction, current = _problem(make_basis, seed)
     over_gamuts, best = next_whites(equations, reduction, current)
     assert best.converged

@@ -10,9 +10,8 @@ from nightly import seeds
 
 from lightpaint.paint.layers.composed_layers import accents
 from lightpaint.paint.layers.composition import ShownLayer, compose, with_effect
-from lightpaint.paint.layers.layer import Layer, LayerKind
 from lightpaint.paint.layers.layer_pixels import LayerPixels
-from lightpaint.paint.layers.layer_stack import LayerStack
+from lightpaint.paint.layers.layer_stack import Layer, LayerKind, LayerStack
 from lightpaint.paint.store.canvas_pixels import Pixels
 
 #: More than one tile in both directions.

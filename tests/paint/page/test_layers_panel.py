@@ -20,10 +20,9 @@ from patience import PATIENCE_S
 
 import lightpaint as lp
 from lightpaint.images.object_map import Objects
-from lightpaint.paint.layers.layer import Layer
 from lightpaint.paint.layers.layer_files import write_layers_openraster
 from lightpaint.paint.layers.layer_pixels import LayerPixels
-from lightpaint.paint.layers.layer_stack import LayerStack
+from lightpaint.paint.layers.layer_stack import Layer, LayerStack
 from lightpaint.paint.layers.view_layers import ViewLayers
 from lightpaint.paint.server.server import Server
 from lightpaint.paint.store.canvas_pixels import Pixels

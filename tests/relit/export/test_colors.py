@@ -7,8 +7,7 @@ from hypothesis import assume, given
 from hypothesis import strategies as st
 
 from lightpaint.colour.color import luminance
-from lightpaint.lighting.answer.light_setting import LightSetting
-from lightpaint.lighting.answer.lighting import Lighting
+from lightpaint.lighting.answer.lighting import Lighting, LightSetting
 from lightpaint.relit.export.colors import UNBOUNDED, with_own_colors
 
 OWN = (3.0, 2.5, 2.0)

@@ -9,8 +9,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from lightpaint.colour.color import kelvin_to_rgb, luminance
-from lightpaint.lighting.answer.light_setting import LightSetting
-from lightpaint.lighting.answer.lighting import Lighting
+from lightpaint.lighting.answer.lighting import Lighting, LightSetting
 from lightpaint.relit.export.fixtures import (
     COLUMNS,
     FULL,

@@ -2,7 +2,7 @@
 
 All shares are of the answer's error over the paint, Σ D ‖V(ψ) − V(x)‖², which the fit minimises
 there; each takes another solve. A sample of the pixels finds reasons, and orders them. The share of
-the first reason, and of a weaker hold, is then measured with all pixels (released_answer.py).
+the first reason, and of a weaker hold, is then measured with all pixels.
 """
 
 from collections.abc import Sequence

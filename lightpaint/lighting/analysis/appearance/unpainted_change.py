@@ -12,7 +12,7 @@ from lightpaint.lighting.analysis.appearance.constraint_kinds import (
     ConstraintsByLight,
 )
 from lightpaint.lighting.analysis.appearance.display_difference import PaintComparison
-from lightpaint.lighting.analysis.appearance.object_miss import NO_NAME
+from lightpaint.lighting.analysis.appearance.error_place import NO_NAME
 from lightpaint.lighting.solution import Solution
 
 #: Smallest unpainted share of the picture for a place to be mentioned.

@@ -9,7 +9,7 @@ import numpy as np
 
 from lightpaint.arrays import Floats
 from lightpaint.images.object_map import Objects
-from lightpaint.lighting.analysis.appearance.object_miss import object_with_most
+from lightpaint.lighting.analysis.appearance.error_place import object_with_most
 from lightpaint.target.wish import Wish
 
 #: A group of layers, a layer, or a part of a layer or of a painting without layers.

@@ -3,6 +3,13 @@
 The two halves of the samples give two gradients of the objective at the solved weights. Half
 their difference, pixel by pixel, has the covariance of the gradient's noise, once no noise is
 multiplied by itself (docs/method.md, "How sure").
+
+The noise of the gradient is a sum of products: a pixel's half difference times its residual or its
+light. These have the same noise, so a stray bright path that one half alone has met would be in
+both factors. The variance of the product then counts it four times, where the gradient has it once,
+or not at all if the noise correction takes it out of M. So a factor is taken, in part or as a
+whole, from the pixel beside, which shows nearly the same by other samples (docs/method.md, "How
+sure").
 """
 
 from contextlib import nullcontext
@@ -13,13 +20,19 @@ import numpy as np
 from lightpaint.arrays import Bools, Doubles, Floats, Indices
 from lightpaint.basis.planes import BLOCK_PIXELS, FEW_LIGHTS, Planes, as_slice
 from lightpaint.lighting.analysis.noise.dominant_pixels import Peaks, t_ratios
-from lightpaint.lighting.analysis.noise.painting_grain import channel_grain
 from lightpaint.lighting.analysis.noise.pixel_gradients import PixelGradients
-from lightpaint.lighting.analysis.noise.pixel_pairs import UNCORRECTED, factor, own_share
-from lightpaint.lighting.analysis.noise.residuals import Residuals
+from lightpaint.lighting.analysis.noise.residuals import Residuals, channel_grain
 from lightpaint.lighting.normal_equations import NormalEquations
+from lightpaint.lighting.problem import Problem
 from lightpaint.lighting.solution import Solution
 from lightpaint.threads import one_thread, parallel_map
+
+#: Half differences by which the pixel beside may differ. Beyond, it shows something else: an edge,
+#: or a highlight that both halves have met.
+MAX_HALVES_APART = 1.5
+
+#: Share of a pixel's own value in a factor where all of the noise power is in the equations.
+UNCORRECTED = 0.5
 
 #: The largest share of M, in any direction of the weights, that may be removed as noise. Beyond,
 #: the estimate is itself noise, and the rest of M would soon be indefinite.
@@ -36,6 +49,41 @@ SMALL_MATRIX = 256
 
 #: Eigenvalues of M, scaled to a unit diagonal, below which a direction changes no pixel.
 NULL_EIGENVALUE = 1e-12
+
+
+def own_share(problem: Problem, removed: float | None) -> float:
+    """Return the share of a pixel's own value in the factors of a problem, 0 to UNCORRECTED.
+
+    It is in proportion to the noise power that the equations contain. removed: the share of it that
+    they do not, by default that of the solved ones. A render of the mix has noise of its own,
+    independent of the basis.
+    """
+    refinement = problem.refinement
+    of_basis = 1.0 if refinement is None else 1 - refinement.share
+    return UNCORRECTED * of_basis * (1 - (problem.noise_removed if removed is None else removed))
+
+
+def factor(values: Doubles, halves: Doubles, own_share: float) -> Doubles:
+    """Return values, of which a share is a pixel's own, and the rest that of the pixel beside.
+
+    values, halves: (…, pixels), of pixels in the order of the picture, and their half differences.
+    """
+    if own_share == 1:
+        return values
+    beside = values[..., pixels_beside(values.shape[-1])]
+    is_alike = np.abs(beside - values) <= MAX_HALVES_APART * np.abs(halves)
+    return np.where(is_alike, own_share * values + (1 - own_share) * beside, values)
+
+
+def pixels_beside(count: int) -> Indices:
+    """Return the index of the other pixel of each one's pair, (count,).
+
+    The last of an odd number takes the pixel before it, and a single one itself.
+    """
+    beside = np.arange(count) ^ 1
+    if count % 2:
+        beside[-1] = max(count - 2, 0)
+    return beside
 
 
 @dataclass(frozen=True)
@@ -136,7 +184,7 @@ def painting_covariance(solution: Solution) -> Doubles | None:
     has next to none.
 
     A render that serves as a painting has noise τ, which makes δg = Σ D Φ τ. Its variance is that
-    of the residual from pixel to pixel, less that of the prediction (painting_grain.py).
+    of the residual from pixel to pixel, less that of the prediction (residuals.py).
     """
     pixels, is_coupled = NoisyPixels.of(solution), _is_coupled(solution)
     size, n = solution.basis.size, len(solution.weights)
@@ -194,8 +242,8 @@ class NoisyPixels:
 
     planes, noise: of the basis. weights: (n, 3). weight, share: (p, 1) or (p, 3). unseen: (p,),
     where no emitter is. counted: the pixels that count. pulled: (n, 3), by how much noise moves the
-    pull on the weights. gradients: of the loss by the light of each pixel. own_share: see
-    `pixel_pairs`.
+    pull on the weights. gradients: of the loss by the light of each pixel. own_share: as
+    the function of this name returns it.
     """
 
     planes: Planes

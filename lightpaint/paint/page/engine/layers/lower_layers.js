@@ -1,7 +1,7 @@
 /**
  * The composition below a layer that is being painted or changed, tile by tile, kept until that
  * changes: a stroke costs the same however many layers lie below. The twin of
- * paint/layers/lower_layers.py.
+ * paint/layers/composed_layers.py.
  */
 
 /** @typedef {import("./layer_composition.js").Composed} Composed */
