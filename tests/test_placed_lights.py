@@ -347,6 +347,7 @@ def test_a_suggestion_is_a_turn_with_its_picture_and_the_line_to_paste(
     assert json.loads((tmp_path / "answer" / "report.json").read_text())["turn"]["name"] == "beam"
 
 
+@pytest.mark.nightly
 def test_the_suggested_line_gives_the_turn_and_the_gain_that_were_promised(tmp_path: Path) -> None:
     """Two spots point elsewhere in the painting; only one of them is turned by the line."""
     second = LIGHTS["beam"].replace('"beam"', '"second"').replace('x="0.8', 'x="-0.8')
