@@ -9,8 +9,8 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from nightly import nightly
 from command import run
+from nightly import nightly
 from renderer import LIGHTS, write_room
 
 import lightpaint as lp
