@@ -10,6 +10,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from command import run
+from nightly import nightly
 from renderer import LIGHTS, write_room
 
 import lightpaint as lp
@@ -121,7 +122,7 @@ def test_no_move_leaves_all_where_it_is(room: Scene, painted: lp.Target, tmp_pat
     ("rigging", "count", "words"),
     [
         (lp.Rigging.of({"bulb": {"move": 0.5}}), 1, "no light is moved: "),
-        (lp.Rigging.of(new=[{"kind": "point"}]), 1, "no light is added: "),
+        nightly(lp.Rigging.of(new=[{"kind": "point"}]), 1, "no light is added: "),
         (lp.Rigging.of({"bulb": {"move": 0.5}}, new=[{"kind": "point"}]), 2, "moved or added: "),
     ],
 )
@@ -346,6 +347,7 @@ def test_a_suggestion_is_a_turn_with_its_picture_and_the_line_to_paste(
     assert json.loads((tmp_path / "answer" / "report.json").read_text())["turn"]["name"] == "beam"
 
 
+@pytest.mark.nightly
 def test_the_suggested_line_gives_the_turn_and_the_gain_that_were_promised(tmp_path: Path) -> None:
     """Two spots point elsewhere in the painting; only one of them is turned by the line."""
     second = LIGHTS["beam"].replace('"beam"', '"second"').replace('x="0.8', 'x="-0.8')

@@ -78,7 +78,9 @@ LATER: dict[str, Callable[[ClusterWorkers], object]] = {
 @pytest.mark.parametrize("call", LATER)
 def test_one_that_ends_later(call: str, caplog: pytest.LogCaptureFixture) -> None:
     options = {"n_workers": 0, "processes": False, "protocol": "tcp://", "dashboard_address": None}
-    with distributed.LocalCluster(**options) as cluster:
+    # Without a dashboard it still listens for HTTP: here on any port that is free.
+    any_port = {"dashboard_address": "127.0.0.1:0"}
+    with distributed.LocalCluster(**options, scheduler_kwargs=any_port) as cluster:
         cluster_workers = ClusterWorkers(cluster.scheduler_address, SilentListener(), "topic")  # type: ignore[arg-type]
     caplog.clear()
     began_s = time.monotonic()
