@@ -114,7 +114,7 @@ def gallery_page(
         if (bases or {}).get(row.folder) in mixers:
             record["basis"] = (bases or {})[row.folder]
         records.append(record)
-    return html(
+    page = html(
         "batch/gallery/gallery",
         title=visible(title),
         about=counts_text(rows),
@@ -127,6 +127,7 @@ def gallery_page(
         script=Markup(bundled("batch/gallery/gallery.js")),
         version=__version__,
     )
+    return str(page)
 
 
 def places_of(plan: Plan) -> list[GroupPlaces]:

@@ -57,7 +57,7 @@ STYLE = """<style>
 
 def static_view(
     basis: Basis, lighting: Lighting, target: Target | None, transform: ViewTransform
-) -> Markup:
+) -> str:
     """Return a view under a lighting as HTML: a picture, and a mixer that starts from it.
 
     target: the painting, for the wipe of the mixer; None if nothing is painted.
@@ -71,15 +71,17 @@ def static_view(
         painting = target_picture(target, basis.current_look, transform=transform)
     mixer = mixer_html(basis, lighting, painting, transform=transform, max_pixels=MAX_PLANE_PIXELS)
     height, width = basis.size
-    page = html(
-        "paint/notebook/static_page",
-        mixer=mixer,
-        assets=mixer_assets(),
-        wipe_style=Markup(styles("viewer/mixer/wipe.css")),
-        mix_width=max(1, MIX_HEIGHT * width // height),
-        frame_height=FRAME_HEIGHT,
+    page = str(
+        html(
+            "paint/notebook/static_page",
+            mixer=mixer,
+            assets=mixer_assets(),
+            wipe_style=Markup(styles("viewer/mixer/wipe.css")),
+            mix_width=max(1, MIX_HEIGHT * width // height),
+            frame_height=FRAME_HEIGHT,
+        )
     )
-    return html(
+    view = html(
         "paint/notebook/static_view",
         name=basis.origin.sensor or "The scene",
         source=source,
@@ -87,6 +89,7 @@ def static_view(
         # Most quotes in it are double.
         page=Markup(page.replace("&", "&amp;").replace("'", "&#39;")),
     )
+    return str(view)
 
 
 class CellOutput:

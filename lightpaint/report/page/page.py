@@ -130,7 +130,7 @@ def report_page(
     }
     results = in_turns(lambda make: make(), tuple(makers.values()), basis.size)
     parts = dict(zip(makers, results, strict=True))
-    return html(
+    page = html(
         "page",
         **parts,
         **_texts(basis, target, solution, predicted, verification, appearance),
@@ -150,6 +150,7 @@ def report_page(
         sure=sure_section(basis, solution, uncertainty),
         command=command,
     )
+    return str(page)
 
 
 def _first_view(solution: Solution) -> str:
