@@ -38,7 +38,7 @@ class RowColor:
 
 
 @dataclass(frozen=True)
-class Change:
+class LevelChange:
     """The change of a light in words. notes: what stands below in small print."""
 
     text: str
@@ -46,7 +46,7 @@ class Change:
 
 
 @dataclass(frozen=True)
-class LightRow:
+class LightEntry:
     """A row of the table of lights.
 
     kind: plugin and form. share: of the picture's energy. color, now, new, parameter, unit,
@@ -57,7 +57,7 @@ class LightRow:
     pictures: Sequence[RowPicture]
     name: str
     kind: str
-    change: Change
+    change: LevelChange
     share: float
     color: RowColor | None = None
     now: Sequence[str] = ()
@@ -68,7 +68,7 @@ class LightRow:
     is_relative: bool = False
 
 
-def image_row(image: LightImage, basis: Basis, solution: Solution, shares: Doubles) -> LightRow:
+def image_row(image: LightImage, basis: Basis, solution: Solution, shares: Doubles) -> LightEntry:
     """Return the row of an image that is whole. shares: (n,), see `energy_shares`."""
     weights = solution.weights
     current = basis.current_weights
@@ -79,7 +79,7 @@ def image_row(image: LightImage, basis: Basis, solution: Solution, shares: Doubl
     ]
     plugin, domain = basis.lights[int(image.lights[0])].plugin, image.domain
     now, new = (image.mean(radiances) for radiances in (current, weights))
-    return LightRow(
+    return LightEntry(
         pictures,
         image.name,
         f"{plugin} · {image.size_text}",
@@ -114,12 +114,12 @@ def _rgb(color: Sequence[float] | Doubles) -> list[str]:
     return [f"{v:.4g}" for v in color] if any(color) else ["off"]
 
 
-def luminance_change(now: Doubles, new: Doubles) -> Change:
+def luminance_change(now: Doubles, new: Doubles) -> LevelChange:
     """Return the change of luminance from `now` to `new`, (3,) each, as a ratio and in stops."""
     before, after = (float(luminance(color)) for color in (now, new))
     if after == 0:
-        return Change("off" if before > 0 else "stays off")
+        return LevelChange("off" if before > 0 else "stays off")
     if before == 0:
-        return Change("was off, now on")
+        return LevelChange("was off, now on")
     stops = f"{np.log2(after / before):+.2f} stops".replace("-", "−")
-    return Change(f"×{after / before:.3g}", (stops,))
+    return LevelChange(f"×{after / before:.3g}", (stops,))

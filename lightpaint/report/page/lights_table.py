@@ -30,8 +30,8 @@ from lightpaint.report.measures import energy_shares
 from lightpaint.report.page.figures import data_uri, thumbnail
 from lightpaint.report.page.html import html
 from lightpaint.report.page.image_rows import (
-    Change,
-    LightRow,
+    LevelChange,
+    LightEntry,
     RowColor,
     RowPicture,
     image_row,
@@ -62,7 +62,7 @@ def lights_table(
     is_clean = is_clean and len(basis.lights) <= MAX_CLEAN_THUMBNAILS
     rows = _rows(basis, solution, uncertainty, is_clean=is_clean)
     lead, shown = "", rows
-    folded: list[tuple[str, list[LightRow]]] = []
+    folded: list[tuple[str, list[LightEntry]]] = []
     if images := [image for image in light_images(basis.lights) if image.is_whole]:
         shown, folded = _fold_images(images, rows, basis, solution)
     elif len(rows) > ROWS_SHOWN + SPARE_ROWS:
@@ -84,8 +84,8 @@ def lights_table(
 
 
 def _fold_images(
-    images: Sequence[LightImage], rows: Sequence[LightRow], basis: Basis, solution: Solution
-) -> tuple[list[LightRow], list[tuple[str, list[LightRow]]]]:
+    images: Sequence[LightImage], rows: Sequence[LightEntry], basis: Basis, solution: Solution
+) -> tuple[list[LightEntry], list[tuple[str, list[LightEntry]]]]:
     """Return a row for each image and each other light; and the folded rows of texels, with what
     they are.
     """
@@ -105,11 +105,11 @@ def _fold_images(
 
 def _rows(
     basis: Basis, solution: Solution, uncertainty: Uncertainty | None, *, is_clean: bool
-) -> list[LightRow]:
+) -> list[LightEntry]:
     shares, lighting = energy_shares(basis, solution.lighting), solution.lighting
     errors = spoken_errors(uncertainty, len(shares))
     settings = {light.name: light for light in lighting.lights}
-    rows: list[LightRow] = []
+    rows: list[LightEntry] = []
     thumbnails = thumbnails_of(basis, is_clean=is_clean)
     for k, (light, (uri, shape, stops)) in enumerate(zip(basis.lights, thumbnails, strict=True)):
         setting = settings[light.name]
@@ -117,11 +117,11 @@ def _rows(
         changed = change(light, setting)
         notes = filter(None, (*changed.notes, error, _constraint_note(setting)))
         label = f"What {light.name} lights alone, shown at {stops:+.1f} stops"
-        row = LightRow(
+        row = LightEntry(
             [RowPicture(uri, shape[1], shape[0], label)],
             light.name,
             " · ".join(filter(None, (light.plugin, light.form))),
-            Change(changed.text, tuple(notes)),
+            LevelChange(changed.text, tuple(notes)),
             float(shares[k]),
         )
         rows.append(row if light.is_fixed else _with_emission(row, light, setting, lighting))
@@ -149,8 +149,8 @@ def thumbnails_of(basis: Basis, *, is_clean: bool) -> list[tuple[str, tuple[int,
 
 
 def _with_emission(
-    row: LightRow, light: BasisLight, setting: LightSetting, lighting: Lighting
-) -> LightRow:
+    row: LightEntry, light: BasisLight, setting: LightSetting, lighting: Lighting
+) -> LightEntry:
     """Return a row with colour, emission before and after, their unit, and photometry."""
     light_photometry = lighting.photometry(setting)
     return replace(
@@ -165,21 +165,21 @@ def _with_emission(
     )
 
 
-def change(light: BasisLight, setting: LightSetting) -> Change:
+def change(light: BasisLight, setting: LightSetting) -> LevelChange:
     """Return the change of a light in words or as a ratio of luminance, for channels that reach
     anything.
     """
     if light.is_fixed:
-        return Change("fixed")
+        return LevelChange("fixed")
     if not any(setting.reached):
-        return Change("unchanged: reaches nothing painted")
+        return LevelChange("unchanged: reaches nothing painted")
     is_reached = np.array(setting.reached)
     now, new = (np.where(is_reached, rgb, 0) for rgb in (light.emission, setting.emission))
     changed = luminance_change(now, new)
     if not setting.is_partly_reached:
         return changed
     note = f"{unreached_channels(setting)} unchanged: reaches nothing painted"
-    return Change(changed.text, (*changed.notes, note))
+    return LevelChange(changed.text, (*changed.notes, note))
 
 
 def _constraint_note(setting: LightSetting) -> str:
