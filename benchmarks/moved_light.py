@@ -60,7 +60,7 @@ def moved(text: str, light: str) -> str:
 
     pattern = rf'(id="{light}">\s*<transform name="to_world">\s*<lookat origin=")([-\d.]+)'
     edited, count = re.subn(pattern, further, text)
-    assert count == 1, f"{light} is no spot of the gallery"
+    assert count == 1, f"{light} is not a spot of the gallery"
     return edited
 
 

@@ -143,7 +143,7 @@ _MAX_NAME = 200
 
 
 def refusal_of(error: OSError) -> AccessError | None:
-    """Return the system's refusal in one line; None for an error that is no refusal."""
+    """Return the system's refusal in one line; None for an error that is not a refusal."""
     if error.errno not in REFUSALS:
         return None
     name = "" if error.filename is None else ascii(os.fsdecode(error.filename))[1:-1]

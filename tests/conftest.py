@@ -27,7 +27,7 @@ from lightpaint.scene.runtime import kernel_threads
 from lightpaint.scene.scene import Scene
 from lightpaint.scene.scene_reader import load_scene
 
-# Shared machines are slow now and then, which is no failure; a fixed choice of examples makes
+# Shared machines are slow now and then, which is not a failure; a fixed choice of examples makes
 # a run repeatable.
 settings.register_profile("check", deadline=None, derandomize=True, max_examples=25)
 settings.register_profile("nightly", deadline=None, derandomize=True, max_examples=100)

@@ -157,7 +157,7 @@ def _names(text: str) -> set[str]:
 def faults(
     translation: dict[str, Any], sentences: dict[str, str | dict[str, str]]
 ) -> list[tuple[str, str]]:
-    """Return keys of a translation with what is wrong there. What it lacks is no fault."""
+    """Return keys of a translation with what is wrong there. What it lacks is not a fault."""
     found = []
     for key, text in translation.items():
         english = sentences.get(key)

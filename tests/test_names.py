@@ -52,7 +52,7 @@ FOREIGN = re.compile(r"Haswell|\w+_\d+|statue_head|ViewLayer\.\w+|shot_key_v1")
 
 
 def _names_in_backticks(token: tokenize.TokenInfo) -> Iterator[str]:
-    """Names with an underscore, a dot or a capital, which are no words of a language."""
+    """Names with an underscore, a dot or a capital, which are not words of a language."""
     for name in re.findall(r"`([A-Za-z_]\w*(?:\.\w+)*)(?:\(\))?`", token.string):
         if ("_" in name or "." in name or name[0].isupper()) and not FOREIGN.fullmatch(name):
             yield name

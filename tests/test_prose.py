@@ -4,7 +4,7 @@ import re
 from pathlib import Path
 
 import pytest
-from test_docs import DOCUMENTS
+from test_docs import DOCUMENTS, ROOT
 
 #: Pages of measurements, derivations and generated tables, whose readers look something up.
 LOOKED_UP = {"benchmarks.md", "decisions.md", "method.md", "protocol.md"}
@@ -17,6 +17,12 @@ MAX_WORDS, MAX_MEAN = 45, 22
 EMPTY = (
     "actually|basically|easily|extremely|fairly|leverage|obviously|of course|powerful|quite|really|"
     "robust|seamless|seamlessly|simply|state-of-the-art|utilize|very"
+)
+
+#: A denial without an article, other than of an amount, a degree or a time.
+NO_ARTICLE = re.compile(
+    r"(?<!there )(?<!There )(?<!where )\bis no "
+    r"(?!longer|more|other|one|such|need|light\b|noise|reason)[a-z]+(?<!er)\b"
 )
 
 
@@ -47,7 +53,14 @@ def test_no_word_is_empty(page: Path) -> None:
     assert re.findall(rf"\b(?:{EMPTY})\b[^.]{{0,30}}", text, re.IGNORECASE) == []
 
 
+def test_what_a_thing_is_not_has_an_article() -> None:
+    """`is not a scene`, not `is no scene`: in documents, docstrings, comments and errors."""
+    places = [*DOCUMENTS, *(ROOT / "lightpaint").rglob("*.py")]
+    assert {p.name: x for p in places if (x := NO_ARTICLE.findall(p.read_text("utf-8")))} == {}
+
+
 def test_the_checks_would_find_it() -> None:
+    assert NO_ARTICLE.findall("It is no scene. There is no light.") == ["is no scene"]
     long = "It " + "is said " * MAX_WORDS + "here."
     assert [x for x in sentences(f"Short one. {long}") if len(x.split()) > MAX_WORDS] == [long]
     assert prose("```\ncode\n```\n\n| table |\n\nText\nof two lines.") == ["", "Text of two lines."]

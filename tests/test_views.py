@@ -220,7 +220,7 @@ def test_error_bars_are_those_of_all_views_together(bases: list[Basis]) -> None:
 
 
 def test_the_same_view_twice_has_the_scatter_of_independent_ones(make_basis: Any) -> None:
-    """Its bias stays as it is. Of lights that are no few bright pixels, which decide otherwise."""
+    """Its bias stays as it is. Of lights that are not few bright pixels, which decide otherwise."""
     rng = np.random.default_rng(4)
     images = rng.uniform(0.2, 1, (4, 20, 24, 3))
     noise = 0.05 * images * rng.standard_normal(images.shape)

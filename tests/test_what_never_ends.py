@@ -1,4 +1,4 @@
-"""What is no file, or has no end, wherever a path is given: one line, at once."""
+"""What is not a file, or has no end, wherever a path is given: one line, at once."""
 
 import errno
 import os

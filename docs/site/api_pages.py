@@ -118,7 +118,7 @@ GROUPS: dict[str, tuple[str, str, tuple[str, ...]]] = {
     ),
 }
 
-#: Classes that are no public names, of values in attributes and arguments of those: by module, in
+#: Classes that are not public names, of values in attributes and arguments of those: by module, in
 #: the order of the groups.
 PARTS: dict[str, tuple[str, ...]] = {
     "scene.lights.light": ("Light",),

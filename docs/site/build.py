@@ -80,7 +80,7 @@ def check_links(source: Path, results: Path) -> int:
 
 
 def _stage_readme(source: Path) -> None:
-    """Write a page with the links of the README, which is no page of the site."""
+    """Write a page with the links of the README, which is not a page of the site."""
     text = (DOCS.parent / "README.md").read_text(encoding="utf-8")
     links = re.findall(r"\]\((https?://[^)\s]+)\)", text)
     lines = ["---", "orphan: true", "---", "# README", "", *(f"- <{link}>" for link in links)]

@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """lightpaint in Blender: light groups, the painter, and the painted light back in the lamps.
 
-`lightpaint blender` packs this folder, which is no part of the library: nothing there imports it,
+`lightpaint blender` packs this folder, which is not part of the library: nothing there imports it,
 and it imports nothing from there.
 """
 

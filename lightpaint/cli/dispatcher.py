@@ -36,7 +36,7 @@ OUT_OF_MEMORY_TEXT = (
 )
 
 
-#: Errors of too little memory, or too low a limit, that are no MemoryError: of Python where no
+#: Errors of too little memory, or too low a limit, that are not MemoryError: of Python where no
 #: thread can be started, and of the loader where there is no room for a library.
 NO_ROOM_TEXTS = "can't start new thread", "failed to map segment from shared object"
 

@@ -1,8 +1,8 @@
 """The solve of a linear problem: its weights, their certificate, and the lighting.
 
-With `sparse`, the choice of lights is no convex problem. A greedy search adds one light at a time,
-always the one that helps most, and at K exchanges lights as long as that helps. Each trial solves
-for its lights in full, so the answer is optimal for the lights it uses.
+With `sparse`, the choice of lights is not a convex problem. A greedy search adds one light at a
+time, always the one that helps most, and at K exchanges lights as long as that helps. Each trial
+solves for its lights in full, so the answer is optimal for the lights it uses.
 """
 
 from collections.abc import Collection, Sequence

@@ -138,7 +138,7 @@ class Solution(Shown):
 
         M: (channel, light, other), ⟨Φ_i, Φ_j⟩. b: (channel, light), ⟨Φ_i, Ψ⟩. weights, current:
         (light, channel). Of one view also target, predicted: (y, x, channel), and importance:
-        (y, x); of several, `views` has those of each. Where the loss is no squares of light, M, b
+        (y, x); of several, `views` has those of each. Where the loss is not squares of light, M, b
         and target are of the squares that stand for it at the answer. Raises LightpaintError
         without xarray.
         """

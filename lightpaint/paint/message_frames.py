@@ -94,7 +94,7 @@ def parse_request(
         content.get("buffers", ()), buffer_types, buffers, strict=True
     ):
         if len(buffer) != math.prod(shape) * np.dtype(dtype).itemsize:
-            raise PaintError(f"{kind}: {len(buffer)} bytes are no array of shape {list(shape)}")
+            raise PaintError(f"{kind}: {len(buffer)} bytes are not an array of shape {list(shape)}")
         array = np.frombuffer(buffer, dtype).reshape(shape)
         if array.dtype.kind == "f" and not np.isfinite(array).all():
             raise PaintError(f"{kind}: {description['name']} holds NaN or Inf")
@@ -122,9 +122,9 @@ def _parse_json(text: bytes) -> dict[str, Any]:
     try:
         content = strict_json(text.decode())
     except (ValueError, UnicodeDecodeError) as error:
-        raise PaintError(one_line(f"a message that is no JSON: {error}")) from None
+        raise PaintError(one_line(f"a message that is not JSON: {error}")) from None
     if not isinstance(content, dict):
-        raise PaintError("a message that is no object")
+        raise PaintError("a message that is not an object")
     return content
 
 

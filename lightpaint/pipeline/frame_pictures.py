@@ -107,8 +107,8 @@ def _check_pictures(job: Job, frames: Sequence[int]) -> dict[int, Path]:
     for file in (pictures[frame] for frame in frames):
         if not job.settings.force and file.exists() and not _mark_in(file):
             raise OutputError(
-                f"{file} exists and is no frame of lightpaint: name another folder (folder=...), "
-                "or pass force=True"
+                f"{file} exists and is not a frame of lightpaint: name another folder "
+                "(folder=...), or pass force=True"
             )
     return pictures
 

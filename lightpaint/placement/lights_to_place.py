@@ -196,7 +196,7 @@ def followers_of(
         first, second = pair.lights
         one, other = (_site(scene, name) for name in pair.lights)
         if scene.light(first).plugin != scene.light(second).plugin:
-            raise SceneError(f"{first!r} and {second!r} are of two kinds: they are no pair")
+            raise SceneError(f"{first!r} and {second!r} are of two kinds: they are not a pair")
         if repeated := named & {first, second}:
             raise SceneError(f"light {min(repeated)!r} is in two pairs: it has one mirror image")
         named |= {first, second}

@@ -41,7 +41,7 @@ class Move:
         is_hardly_visible: Whether the picture hardly tells where it is.
         is_slid_to_end: Whether it hangs at the edge of the places that it may have.
         is_turned_to_end: Whether it turned by all that it may.
-        mirrors: The light of its pair whose mirror image it is; "" if it is no image.
+        mirrors: The light of its pair whose mirror image it is; "" if it is not an image.
 
     Examples:
         >>> solution, scene = lp.solve(basis, target), lp.load_scene("room.xml")

@@ -170,7 +170,7 @@ def test_what_is_in_doubt_is_not_kept(folder: Path, make_basis: Any) -> None:
     # The basis is not there, or not with just these samples.
     other = replace(basis, origin=replace(basis.origin, halves=(8, 8)))
     assert not remember_facts(key, scene, other, remarks=(), began_s=later_s)
-    # The parser reads a file that is no part of the scene later, or looks into another folder.
+    # The parser reads a file that is not part of the scene later, or looks into another folder.
     (folder / "blue.spd").write_text("400 1\n700 2\n")
     spectrum = '<spectrum name="reflectance" filename="blue.spd"/>'
     for addition in (f'<bsdf type="diffuse" id="b">{spectrum}</bsdf>', '<path value="textures"/>'):

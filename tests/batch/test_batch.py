@@ -413,7 +413,7 @@ def test_tasks_are_the_same_wherever_they_are_sent(batch_folder: Path) -> None:
         for step in look.steps:
             assert Task.from_json(step.task.to_json()) == step.task
     for text in ("", "[]", "{}", '{"format": "lightpaint-task 1", "share": "a"}'):
-        with pytest.raises(BatchError, match="this is no task"):
+        with pytest.raises(BatchError, match="this is not a task"):
             Task.from_json(text)
 
 

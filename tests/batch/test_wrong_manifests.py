@@ -19,9 +19,9 @@ WRONG: dict[str, tuple[str, tuple[str, ...]]] = {
     "a key that stands twice": (HEAD + 'want = ["solve"]\n', ("is not TOML",)),
     "no look": (HEAD, ("has no look", "[[look]]")),
     "an unknown table": (FIRST + "[loks]\n", ("unknown key 'loks'", "'look'")),
-    "looks that are no tables": ("look = 3\n", ("look is 3", "[[look]]")),
-    "a look that is no table": ("look = [3]\n", ("look 1", "no table")),
-    "defaults that are no table": ("defaults = 1\n" + LOOK_PARAMETER, ("defaults is 1",)),
+    "looks that are not tables": ("look = 3\n", ("look is 3", "[[look]]")),
+    "a look that is not a table": ("look = [3]\n", ("look 1", "not a table")),
+    "defaults that are not a table": ("defaults = 1\n" + LOOK_PARAMETER, ("defaults is 1",)),
     "an unknown default": (
         '[defaults]\nscen = "a"\n' + LOOK_PARAMETER,
         ("defaults", "mean 'scene'"),

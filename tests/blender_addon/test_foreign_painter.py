@@ -202,7 +202,7 @@ def test_a_link_ends_with_the_words_for_what_came(
 @pytest.mark.parametrize(
     ("link_error", "messages", "words"),
     [
-        ("a frame that is no message (error)", [], "a frame that is no message"),
+        ("a frame that is not a message (error)", [], "a frame that is not a message"),
         ("", [(STATE, {"weights": (-1.0,) * 6})], "a message 'state' with a fault"),
     ],
 )

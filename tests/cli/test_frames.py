@@ -165,7 +165,7 @@ def test_a_foreign_file_among_the_frames_stays(tmp_path: Path) -> None:
     arguments = ("solve", "shot.####.exr", "p.0002.exr", "-o", "out")
     completed = run(tmp_path, *arguments, "--frames", "all")
     assert completed.returncode == 2
-    assert "out/relit.0003.exr exists and is no frame of" in completed.stderr
+    assert "out/relit.0003.exr exists and is not a frame of" in completed.stderr
     assert not (tmp_path / "out" / "lighting.json").exists()  # it is found before the solve
     assert run(tmp_path, *arguments).returncode == 0
     assert relit(tmp_path / "out", 3).shape == (2, 2, 3)

@@ -59,7 +59,7 @@ def _docstrings(file: Path) -> set[str]:
     return {text for text in docstrings if text}
 
 
-#: The command line, and Blender's add-on, which is no part of the library and calls the program.
+#: The command line, and Blender's add-on, which is not part of the library and calls the program.
 SPEAKS_OPTIONS = {"cli", "blender_addon"}
 
 LIBRARY = [

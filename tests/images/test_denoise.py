@@ -92,7 +92,7 @@ def test_a_denoiser_that_is_too_old_is_not_used(
 @pytest.mark.parametrize("value", [0.0, 0.5])
 def test_nothing_comes_of_nothing(method: str, value: float):
     flat = np.full((5, 7, 3), value, np.float32)
-    # A network is no arithmetic: half a percent is what it makes of a flat picture at its best.
+    # A network is not an arithmetic: half a percent is what it makes of a flat picture at its best.
     np.testing.assert_allclose(denoised(flat), flat, rtol=0.01)
 
 

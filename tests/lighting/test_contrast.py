@@ -56,7 +56,7 @@ def test_the_term_vanishes_for_what_was_painted(make_basis: Any) -> None:
     meant = np.array([[0.1, 0.12, 0.2], [0.4, 0.3, 0.2]])
     target = painting(basis, basis.mix(meant))
     rows = contrast_rows(Wash.of(basis, target), target.transform)
-    assert rows.shape == (1, 3, 2)  # the rest is no subject
+    assert rows.shape == (1, 3, 2)  # the rest is not a subject
     np.testing.assert_allclose(np.einsum("kcn,nc->kc", rows, meant), 0, atol=1e-6)
     term = contrast_term(rows, 7.0)
     assert term is not None

@@ -1,4 +1,4 @@
-"""Observers of a session, and programs that are no browser: what they hear, and may not do."""
+"""Observers of a session, and programs that are not browsers: what they hear, and may not do."""
 
 import asyncio
 from collections.abc import Iterator

@@ -39,7 +39,7 @@ def test_a_mask_is_fetched_as_it_was_sent_and_changes_no_light() -> None:
     np.testing.assert_array_equal(picture[2 - top : 7 - top, 8 - left : 68 - left], mask)
     assert picture.sum() == mask.sum()
     assert table["selection/1"].size == 0
-    # The same once more is no step, and a part replaces it.
+    # The same once more is not a step, and a part replaces it.
     assert select(hand, (2, 7, 8, 68), mask).selection.revision == answer.selection.revision
     select(hand, (3, 4, 9, 10), [[7]])
     select(hand, (0, 3, 0, 8), np.full((3, 8), 255), view=1)

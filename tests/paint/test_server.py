@@ -140,7 +140,7 @@ def test_the_token_is_exchanged_for_a_key_and_for_nothing_that_a_browser_keeps(
         assert answer.text not in ("", token)
     key = answer.text
     assert unknown_browser.browser.get("/data/present", headers=bearer(key)).status_code == 200
-    # What opens the door is no key to the rooms; and an address grants nothing.
+    # What opens the door is not a key to the rooms; and an address grants nothing.
     assert unknown_browser.browser.get("/data/present", headers=bearer(token)).status_code == 410
     for secret in (token, key):
         for path in (f"/key?token={secret}", f"/data/present?token={secret}&key={secret}"):

@@ -324,7 +324,7 @@ def test_a_limit_of_file_sizes_loses_nothing_either(tmp_path: Path) -> None:
     assert completed.returncode == 0, completed.stderr
 
 
-# What is no session of this picture
+# What is not a session of this picture
 
 
 def identity_of_views(*views: ViewIdentity) -> Identity:

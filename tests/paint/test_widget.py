@@ -268,7 +268,7 @@ def test_two_threads_may_tell_at_once(
     with ThreadPoolExecutor(2) as threads:
         for future in [threads.submit(tell, pause_s) for pause_s in (0.02, 0.03)]:
             future.result()
-    # What was told is no wish of a cell, and a cell is heard again.
+    # What was told is not a wish of a cell, and a cell is heard again.
     assert not painter._studio.session.store.steps
     painter.constraints = lp.Constraints.of({"fill": {"off": True}})
     assert len(painter._studio.session.store.steps) == 1
@@ -724,7 +724,7 @@ def test_callbacks_come_in_the_thread_of_the_kernel(
                 break
             await asyncio.sleep(0.01)
 
-    # Playwright's loop, which may be there, is no thread's but its own.
+    # Playwright's loop, which may be there, is not a thread's but its own.
     thread = threading.Thread(target=lambda: asyncio.run(cell()))
     thread.start()
     thread.join()

@@ -158,7 +158,7 @@ def test_what_a_light_is_not_free_to_do(
 
 
 def test_a_light_that_hangs_behind_the_wall_may_stay_there(tmp_path: Path) -> None:
-    """Its own place counts as one: it is moved nowhere, and that is no error."""
+    """Its own place counts as one: it is moved nowhere, and that is not an error."""
     hidden = LIGHTS["bulb"].replace('y="1" z="0.5"', 'y="1" z="-2"')
     room = load_scene(write_room(tmp_path, lights=hidden + LIGHTS["sky"])).reduced("1/4")
     assert placed(room, room, {"bulb": lp.Freedom(within=0.2)}).moves == ()

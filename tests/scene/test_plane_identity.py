@@ -88,7 +88,7 @@ def test_a_lamp_that_comes_or_goes_leaves_the_others(tmp_path: Path) -> None:
     after = identities(tmp_path, lights=lamps)
     assert set(after) - set(before) == {"new"}
     assert changed(before, after) == set()
-    # In another order, and without those that are no shape.
+    # In another order, and without those that are not shapes.
     fewer = identities(tmp_path, lights=LIGHTS["sun"] + LIGHTS["panel"])
     assert {name: before[name] for name in ("panel", "sun")} == fewer
     assert changed(before, identities(tmp_path, lights=LIGHTS["sun"] + LIGHTS["bulb"])) == ALL
@@ -124,7 +124,7 @@ def test_another_integrator_is_another_scene(tmp_path: Path) -> None:
 
 
 def test_includes_and_folders_do_not_count(tmp_path: Path) -> None:
-    """Where a scene lies, and over how many files it is spread, is no part of it."""
+    """Where a scene lies, and over how many files it is spread, is not part of it."""
     before = identities(tmp_path)
     other = tmp_path / "other"
     other.mkdir()

@@ -272,7 +272,7 @@ def test_what_a_cropped_exr_does_not_store_is_not_painted(tmp_path: Path) -> Non
     np.testing.assert_array_equal(target.importance[stored] > 0, brush[stored])
     share = f"{100 * brush.mean():.3g} % painted"
     assert target.notes[0].startswith(share)
-    # And a crop that shows the template alone is no painting.
+    # And a crop that shows the template alone is not a painting.
     painted[:] = template.image[10:40, 20:60]
     write_parts(
         tmp_path / "crop.exr",

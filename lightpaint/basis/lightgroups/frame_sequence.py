@@ -72,7 +72,7 @@ class FrameSequence:
         for frame, file in self.files.items():
             if file == Path(path):
                 return frame
-        raise BasisError(f"{visible(str(path))} is no frame of {visible(self.pattern)}")
+        raise BasisError(f"{visible(str(path))} is not a frame of {visible(self.pattern)}")
 
     def with_hashes(self, file: Path, frame: int) -> Path:
         """Return the path of a frame, or of a file in its folder, with `####` for the number."""

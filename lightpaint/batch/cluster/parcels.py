@@ -206,7 +206,7 @@ def _recorded_answers(record: bytes) -> tuple[str, ...]:
     try:
         answers = strict_json(record.decode())["answers"]
         if not (isinstance(answers, list) and all(isinstance(x, str) for x in answers)):
-            raise TypeError("answers is no list of names")
+            raise TypeError("answers is not a list of names")
     except (LookupError, TypeError, ValueError) as error:
         raise OutputError(f"a worker's {RECORD} is damaged: {first_line(error)}") from None
     return tuple(answers)

@@ -211,7 +211,7 @@ def lights_of_answer(folder: Path, report: Mapping[str, Any]) -> tuple[LightRow,
 
 
 def _json(path: Path) -> dict[str, Any]:
-    """Return the object in a JSON file; {} if there is none, or a value that is no object."""
+    """Return the object in a JSON file; {} if there is none, or a value that is not an object."""
     with suppress(LightpaintError, ValueError):
         report = strict_json(read_text(path, "report", LightpaintError))
         return report if isinstance(report, dict) else {}

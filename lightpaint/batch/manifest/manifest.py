@@ -124,7 +124,7 @@ def _tables(
     for k, table in enumerate(raw_tables, start=1):
         label = f"{kind} {k}"
         if not isinstance(table, dict):
-            mistakes.add(label, f"{one_line(repr(table))} is no table: write [[{kind}]]")
+            mistakes.add(label, f"{one_line(repr(table))} is not a table: write [[{kind}]]")
             continue
         if name := _display_name(table):
             label = f"{kind} {name!r}"

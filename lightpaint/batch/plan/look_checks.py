@@ -33,7 +33,7 @@ def collect_errors(entry: LookEntry, cache: WorkerCache, mistakes: Mistakes) -> 
     """Add errors in scene, sensors, settings and constraints, each checked alone, to the mistakes.
 
     cache: scenes and bases that are already loaded. Errors that fail one look alone, like a basis
-    that cannot be read, are no mistakes of the manifest.
+    that cannot be read, are not mistakes of the manifest.
     """
 
     def attempt(call: Callable[[], Any]) -> Any:

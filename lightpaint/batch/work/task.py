@@ -113,7 +113,7 @@ class Task:
             return read_record(Task, {**data, **{k: float(v) for k, v in numbers.items()}})
         except (AttributeError, TypeError, ValueError) as error:
             reason = " ".join(str(error).split())
-            raise BatchError(f"this is no task: {reason}; make one with Task.to_json") from None
+            raise BatchError(f"this is not a task: {reason}; make one with Task.to_json") from None
 
 
 def answer_task(

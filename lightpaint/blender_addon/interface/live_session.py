@@ -178,7 +178,7 @@ class LiveSession:
                 self._link = PainterLink(found["address"], found["token"], PATIENCE_S)
             except (ValueError, KeyError, TypeError):
                 self.end()
-                self.message = "this is no painter of lightpaint: check the add-on's preferences"
+                self.message = "this is not a painter of lightpaint: check the add-on's preferences"
             return True
         if run.code is None:
             return False

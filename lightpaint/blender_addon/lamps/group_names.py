@@ -25,8 +25,8 @@ def group_bytes(view_layer):
 def group_name(name, taken, limit=MAX_GROUP_BYTES):
     """Return a name for a light group that no other has.
 
-    taken: names of the other groups. What is no letter of a name in every file and program becomes
-    an underscore: dots, quotes, line breaks and the like.
+    taken: names of the other groups. What is not a letter of a name in every file and program
+    becomes an underscore: dots, quotes, line breaks and the like.
     """
     plain = "".join(c if c.isalnum() or c in " -+()" else "_" for c in name).strip()
     plain = _cut(plain, limit).strip() or "light"

@@ -2,7 +2,7 @@
 """Emitters of a scene: lamps, meshes with emission, the world; and what cannot be changed.
 
 Linked data, drivers, keyframes of others, emission inside node groups, and lamps at zero or below
-stay as they are. Their light is no light group's, so the painter holds it as `rest`.
+stay as they are. Their light is not a light group's, so the painter holds it as `rest`.
 """
 
 from dataclasses import dataclass, field

@@ -45,7 +45,7 @@ def from_bytes(frame):
         raise
     # A deep JSON is too much for its parser, and everything in it may be of another type.
     except (ValueError, TypeError, KeyError, AttributeError, RecursionError, struct.error) as error:
-        raise MessageError(f"a frame that is no message ({type(error).__name__})") from None
+        raise MessageError(f"a frame that is not a message ({type(error).__name__})") from None
 
 
 def _parsed(frame):
@@ -71,7 +71,7 @@ def _parsed(frame):
 
 
 def _refuse(constant):
-    raise MessageError(f"a message with {constant}, which is no number")
+    raise MessageError(f"a message with {constant}, which is not a number")
 
 
 @dataclass

@@ -36,7 +36,7 @@ def find_program(chosen=""):
     if chosen:
         found = shutil.which(os.path.expanduser(chosen))
         if not found:
-            raise FileNotFoundError(f"{chosen} is no program: correct it in the preferences")
+            raise FileNotFoundError(f"{chosen} is not a program: correct it in the preferences")
         return found
     writer = writing_program()
     found = (shutil.which(writer) if writer else None) or shutil.which("lightpaint")

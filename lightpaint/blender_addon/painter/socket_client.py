@@ -39,7 +39,7 @@ class SocketClient:
     def open(cls, address, token):
         """Connect to `live` under a painter's address.
 
-        Raises OSError if it does not answer, and ValueError for what is no address or token.
+        Raises OSError if it does not answer, and ValueError for what is not an address or token.
         """
         parts = checked_address(address, token)
         connection = socket.create_connection((parts.hostname, parts.port or 80), CONNECT_S)
@@ -132,7 +132,7 @@ def checked_address(address, token):
         raise ValueError("a painter has an address and a token, both texts")
     parts = urlsplit(address)
     if parts.scheme != "http" or not parts.hostname or not _PATH.fullmatch(parts.path):
-        raise ValueError(f"{address[:80]!r} is no address of a painter")
+        raise ValueError(f"{address[:80]!r} is not an address of a painter")
     if not _TOKEN.fullmatch(token):
         raise ValueError("the painter's token has characters that no token has")
     return parts

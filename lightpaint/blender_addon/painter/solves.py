@@ -105,7 +105,7 @@ def read_factors(path):
     try:
         return {name: checked_factor(x["weight"]) for name, x in answer["lights"].items()}
     except (KeyError, TypeError, AttributeError):
-        raise ValueError(f"{path} is no lighting of lightpaint") from None
+        raise ValueError(f"{path} is not a lighting of lightpaint") from None
 
 
 def solve_like(program, shot, picture, session, areas):

@@ -37,8 +37,8 @@ def blender(*, output: Path, force: bool) -> CommandOutcome:
     data = packed_addon(own_program())
     if output.exists() and not force and not is_addon(output):
         raise OutputError(
-            f"{output} exists and is no add-on of lightpaint: name another file (output=...), or "
-            "pass force=True"
+            f"{output} exists and is not an add-on of lightpaint: name another file (output=...), "
+            "or pass force=True"
         )
     write_bytes(output, data)
     terminal.write(str(output))

@@ -228,7 +228,7 @@ def _blender(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--force",
         action="store_true",
-        help="replace a file that is no add-on of lightpaint (default: refuse)",
+        help="replace a file that is not an add-on of lightpaint (default: refuse)",
     )
 
 

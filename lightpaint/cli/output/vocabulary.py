@@ -12,7 +12,7 @@ from lightpaint.pipeline.job.settings import Settings
 #: The records whose fields have options.
 RECORDS = (Settings, RunOptions)
 
-#: Options of arguments that are no fields of these.
+#: Options of arguments that are not fields of these.
 _OTHER_OPTIONS = {
     "folder": "-o",
     "frames": "--frames",

@@ -51,7 +51,7 @@ def combine(
 def dimmed(lighting: Lighting, factor: float) -> Lighting:
     """Return a lighting whose lights, but for fixed ones, shine at `factor` times their emission.
 
-    It is no answer to the painting any more, so that it has no certificate and no error bars.
+    It is not an answer to the painting any more, so that it has no certificate and no error bars.
     """
     if factor == 1:
         return lighting

@@ -126,7 +126,7 @@ def read_lighting(path: str | Path) -> Lighting:
             lighting, lights=lights, certificate=certificate, places=places, animation=keys
         )
     except (AttributeError, KeyError, TypeError, ValueError) as error:
-        raise LightingError(f"{path} is no complete lighting: {one_line(repr(error))}") from None
+        raise LightingError(f"{path} is not a complete lighting: {one_line(repr(error))}") from None
     except LightingError as error:
         raise LightingError(f"{path}: {one_line(str(error))}") from None
 

@@ -36,7 +36,7 @@ class LightingKey:
             raise LightingError(f"a key has the frame {self.frame}: at most {MAX_FRAME}")
         if not all(is_amount(value) for rgb in self.weights for value in rgb):
             raise LightingError(
-                f"the key of frame {self.frame} has a weight that is no number from 0 to "
+                f"the key of frame {self.frame} has a weight that is not a number from 0 to "
                 f"{BRIGHTEST:g}"
             )
 

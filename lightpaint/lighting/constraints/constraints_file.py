@@ -54,7 +54,7 @@ def constraints_of(requests: SceneRequests) -> Constraints:
 
 
 def _without_moves(light: Any, source: str) -> Any:
-    """Return tables of lights without the keys for moves and images, which are no constraints."""
+    """Return tables of lights without the keys for moves and images, which are not constraints."""
     if not isinstance(light, Mapping):
         return light
     tables = {}

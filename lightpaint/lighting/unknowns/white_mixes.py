@@ -1,7 +1,7 @@
 """Lights that keep to a range of white or to a gamut, and the neighbouring colours that each mixes.
 
-The whites of a range lie on a curve, so that the mixes of all of them are no convex set. Those of
-two neighbours are. Each step solves such a convex problem, certified as any other, and finds the
+The whites of a range lie on a curve, so that the mixes of all of them are not a convex set. Those
+of two neighbours are. Each step solves such a convex problem, certified as any other, and finds the
 lights that would gain by other neighbours: those at the end of theirs that would go on from there,
 those that are off and would be on with another white, and at last single lights that would be
 better with a white elsewhere in their range. Wide windows over many whites, which get narrower,

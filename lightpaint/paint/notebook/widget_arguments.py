@@ -276,7 +276,7 @@ def _loaded(value: Any) -> Basis | Scene | LightGroups:
     if isinstance(value, str | Path):
         if Path(value).suffix.lower() == ".exr":
             raise PaintError(
-                f"{value} is no scene: give lp.read_basis({str(value)!r}) or, of another "
+                f"{value} is not a scene: give lp.read_basis({str(value)!r}) or, of another "
                 f"renderer's light groups, lp.read_light_groups({str(value)!r})"
             )
         return load_scene(value)

@@ -33,7 +33,7 @@ LEAST_AMOUNT = 0.005
 #: How much more a lamp lights an object than it lights the picture, to be an accent on it.
 ACCENT = 2.0
 
-#: Share of the picture from which on a lamp is no accent on an exhibit among others.
+#: Share of the picture from which on a lamp is not an accent on an exhibit among others.
 ACCENT_SHARE = 0.16
 
 #: Share of the highest such ratio from which on a lamp is an accent on the same object.

@@ -269,10 +269,10 @@ class AnswerChoices(Event, kind="choices"):
 class Rig(Event, kind="rig"):
     """The places of all lights. Sent after every move, once requested.
 
-    lights: in the order of the state. cameras: of each view; null for one that is no pinhole. up:
-    the axis nearest to upwards, 0, 1 or 2. low, high: corners of a box around the visible scene and
-    all lights. surfaces: names of rails, surfaces and shapes that new lights may hang on. objects:
-    those within that box, the largest first. skies: of images that are skies.
+    lights: in the order of the state. cameras: of each view; null for one that is not a pinhole.
+    up: the axis nearest to upwards, 0, 1 or 2. low, high: corners of a box around the visible scene
+    and all lights. surfaces: names of rails, surfaces and shapes that new lights may hang on.
+    objects: those within that box, the largest first. skies: of images that are skies.
     """
 
     lights: tuple[LightPlace, ...]

@@ -81,7 +81,7 @@ def _interface(record: type[Any], *, is_request: bool) -> str:
 
 
 def field_types(record: type[Any], *, is_request: bool = True) -> list[tuple[str, str]]:
-    """Return name and type of each field that is no array; `name?` for an optional one.
+    """Return name and type of each field that is not an array; `name?` for an optional one.
 
     is_request: whether fields with a default are optional.
     """

@@ -126,7 +126,7 @@ class LampRig:
 
     @cached_property
     def cameras(self) -> tuple[Camera | None, ...]:
-        """The camera of each view; None for one that is no pinhole. The rig is open."""
+        """The camera of each view; None for one that is not a pinhole. The rig is open."""
         assert self.views is not None
         with in_this_thread():
             return tuple(camera_of(view.scene, view.loaded) for view in self.views)

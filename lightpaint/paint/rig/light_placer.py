@@ -61,7 +61,7 @@ class SearchNotes:
     """Notes on the searches of a session: what was tried, and the results. store: keeps them.
 
     They stand in the history beside its steps. A search that finds nothing changes nothing, so it
-    is no step; without a note, nobody would know later that it was tried.
+    is not a step; without a note, nobody would know later that it was tried.
     """
 
     def __init__(self, store: Store) -> None:

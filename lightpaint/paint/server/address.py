@@ -100,7 +100,7 @@ def _resolve(host: str) -> tuple[socket.AddressFamily, str, bool]:
     """Return family and number of an address, and whether it was given as a number."""
     name = host[1:-1] if host.startswith("[") and host.endswith("]") else host
     if not name.strip():
-        raise PaintError(f"an empty host is no address: {ADVICE}")
+        raise PaintError(f"an empty host is not an address: {ADVICE}")
     if "%" in name:
         raise PaintError(f"no browser opens {host}, an address of one network card: {ADVICE}")
     for flags in (socket.AI_NUMERICHOST, 0):
@@ -115,7 +115,7 @@ def _resolve(host: str) -> tuple[socket.AddressFamily, str, bool]:
             candidates, key=lambda candidate: candidate[0] != socket.AF_INET
         )
         return family, str(place[0]), bool(flags)
-    raise PaintError(f"{host[:80]!r} is no address of this machine: {ADVICE}")
+    raise PaintError(f"{host[:80]!r} is not an address of this machine: {ADVICE}")
 
 
 def _bind(host: str, family: socket.AddressFamily, number: str, port: int | None) -> socket.socket:

@@ -4,11 +4,11 @@ Any page that is open in a browser can send requests to servers of the same mach
 name it likes. So the guard checks the host name of a request (a foreign name that leads here is an
 attack) and its origin, the page that it comes from. And it requires a key.
 
-The key is no cookie, since a browser sends a cookie to every port of a host, and so to every other
-server of the machine. The page has the launch token in the fragment of its address, which browsers
-send to nobody; it exchanges the token for the key, keeps the key for its tab, and sends it in a
-header of its requests and in a subprotocol of its socket. Only the page itself is loaded without a
-header; it is the same for everybody.
+The key is not a cookie, since a browser sends a cookie to every port of a host, and so to every
+other server of the machine. The page has the launch token in the fragment of its address, which
+browsers send to nobody; it exchanges the token for the key, keeps the key for its tab, and sends it
+in a header of its requests and in a subprotocol of its socket. Only the page itself is loaded
+without a header; it is the same for everybody.
 """
 
 import ipaddress
@@ -110,7 +110,7 @@ class Guard:
         return is_right and self._refusal(scope, is_socket=is_socket) is None
 
     def is_program(self, scope: Scope) -> bool:
-        """Return whether a request comes from an authorized program that is no browser.
+        """Return whether a request comes from an authorized program that is not a browser.
 
         Browsers send the origin with every socket, and scripts cannot add headers to sockets. Nor
         can a page of another origin add a header to its requests, since no response here allows

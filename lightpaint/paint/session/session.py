@@ -303,7 +303,7 @@ class Session:
         copies = {int(number): source for number, source in request.copies.items()}
         for number, source in copies.items():
             if layers[number].kind != self.views.layers[source].kind:
-                raise PaintError(f"layer {number} is no copy of layer {source}")
+                raise PaintError(f"layer {number} is not a copy of layer {source}")
             if number in self.views.layers.ids:
                 raise PaintError(f"layer {number} is there already")
         if any(view.is_open for view in self.views):

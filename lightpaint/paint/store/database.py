@@ -101,7 +101,7 @@ def _prepare(database: sqlite3.Connection, path: Path | None, identity: Identity
             database.execute(f"PRAGMA application_id = {APPLICATION}")
             database.execute(f"PRAGMA user_version = {VERSION}")
         elif application != APPLICATION:
-            raise PaintError(f"{path} is no session of the painter: {START_AFRESH}")
+            raise PaintError(f"{path} is not a session of the painter: {START_AFRESH}")
         elif version != VERSION:
             raise PaintError(
                 f"{path} was written by another version of lightpaint (format {version}, not "

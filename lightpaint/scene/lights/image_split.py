@@ -119,7 +119,7 @@ def _texels(
             "mesh with texture coordinates (uv) for one flat image"
         )
     if layout.splits and not isinstance(domain, Sky):
-        raise SceneError(f"light {emitter.name!r} is no sky: only its texels can be split again")
+        raise SceneError(f"light {emitter.name!r} is not a sky: only its texels can be split again")
     radiances = _current_radiances(emitter, layout, domain, parsed)
     if is_symmetric:
         mirrored = [layout.number_of.get(layout.mirrored(x), k) for k, x in enumerate(layout.nodes)]

@@ -80,7 +80,7 @@ def test_the_object_that_covers_most_of_a_pixel(tmp_path: Path):
     np.testing.assert_array_equal(objects.mask("Cube"), expected)
     assert objects.index[0, 0] == -1
     assert set(objects.names) == {"Cube", "floor"}
-    assert groups.basis.names == ("a", "b")  # mattes are no lights, and leave no rest
+    assert groups.basis.names == ("a", "b")  # mattes are not lights, and leave no rest
     assert any(x.startswith("objects by Cryptomatte") for x in groups.remarks)
 
 

@@ -159,7 +159,7 @@ def test_of_several_eyes_one_must_be_named():
     choice = _choose(*names, pattern="View.Combined_{name}.left")
     assert list(choice.lights) == ["a", "b"]
     assert choice.beauty == "View.Combined.left"
-    # Names with dots are no eyes.
+    # Names with dots are not eyes.
     assert list(_choose("C", "C_lamp.1", "C_lamp.2", "C_key").lights) == ["lamp.1", "lamp.2", "key"]
 
 

@@ -97,7 +97,7 @@ def test_another_choice_is_another_basis(tmp_path: Path) -> None:
     scenes = [load_scene(path, **choice) for choice in choices]  # type: ignore[arg-type]
     assert len({scene.identity for scene in scenes}) == len(scenes)
     assert scenes[0].identity == scenes[0].content == scenes[1].content
-    # To choose all is to choose nothing, and order is no choice.
+    # To choose all is to choose nothing, and order is not a choice.
     assert load_scene(path, lights=["*"]).identity == scenes[0].identity
     reordered = load_scene(path, groups={"pair": ["twin", "bulb"]})
     assert reordered.identity == scenes[1].identity

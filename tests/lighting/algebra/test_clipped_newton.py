@@ -128,7 +128,7 @@ def test_few_lights_and_pixels_that_are_not_finite():
 
 
 def test_a_matrix_that_is_singular_to_the_last_bit_is_solved():
-    """By the ridge: unknowns that are alike share alike; a row that is no unknown's stays exact."""
+    """By the ridge: unknowns that are alike share alike; the row of none stays exact."""
     alike = np.ones((2, 2))
     with pytest.raises(np.linalg.LinAlgError):
         np.linalg.solve(alike, np.ones(2))

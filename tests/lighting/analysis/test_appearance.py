@@ -112,7 +112,7 @@ def test_an_untouched_picture_is_close(make_basis: Any):
     ],
 )
 def test_a_held_picture_never_meets_the_wish(make_basis: Any, requested: Any, held_share: Any):
-    """What was asked for is swallowed: that is no success, and what swallowed it is told."""
+    """What was asked for is swallowed: that is not a success, and what swallowed it is told."""
     basis = _left_and_right(make_basis, spill=0.5)
     target = _paint_over(_look(basis), (slice(8, 16), slice(4, 12)), 0.6)
     limits = Constraints.of(requested.get("constraints", {}))
@@ -257,7 +257,7 @@ def test_a_weaker_hold_is_the_strongest_that_brings_half(make_basis: Any, stops:
 
 
 def test_what_becomes_of_the_rest_is_seen(make_basis: Any):
-    """In closed form; and what a person did to a light is no harm of the answer."""
+    """In closed form; and what a person did to a light is not a harm of the answer."""
     basis = _four_quarters(make_basis)
     region = (slice(None), slice(0, 12))
     locked = Constraints.of({"*": {"lock": True}, "annex_window": {"lock": 0.4}})

@@ -203,7 +203,8 @@ def test_the_pull_to_the_present(make_basis: Any, seed: int) -> None:
 def _random_feasible(rng: Any, basis: Any, answer: Any) -> Any:
     """A random lighting that keeps to `EVERYTHING`, by its words alone.
 
-    Of a range of white, on the straight piece on which the answer is: the range is no convex set.
+    Of a range of white, on the straight piece on which the answer is: the range itself is not
+    convex.
     """
     whites = white_range(2700, 5000)
     [place] = np.floor(whites.places(answer[[2]]) - 1e-9).clip(0)
@@ -595,14 +596,14 @@ def test_few_lights_among_ties_and_lower_limits(make_basis: Any) -> None:
     assert w[0].any() == w[1].any() == w[2].any()
     with pytest.raises(ConstraintError, match="sparse is 1, but 2 lights have a lower limit"):
         _solve(basis, target, sparse=1, light={"l[34]": limits["l4"]})
-    # More than there are is no constraint.
+    # More than there are is not a constraint.
     all_of_them = _solve(basis, target, sparse=9)[0]
     np.testing.assert_allclose(all_of_them, solve(basis, target).lighting.weights_for(basis))
 
 
 @pytest.mark.parametrize("kind", ["color", "share", "luminance of mixed", "luminance of free"])
 def test_limits_may_leave_one_emission(make_basis: Any, kind: str):
-    """Round-off may part two ends that are the same; that is no contradiction."""
+    """Round-off may part two ends that are the same; that is not a contradiction."""
     rng = np.random.default_rng(1)
     for color in rng.uniform(0.1, 1, (100, 3)):
         level = 0.37 * color

@@ -46,7 +46,7 @@ def _problem(n: int, kind: str, seed: int) -> tuple[Any, Any]:
     columns = _columns(rng, n, kind)
     truth = rng.random((3, n)) * (rng.random((3, n)) < 0.6) / columns.mean(axis=1)
     values = np.einsum("cmi,ci->cm", columns, truth)
-    # What is no mix of the lights at all pushes some of them against their limit.
+    # What is not a mix of the lights at all pushes some of them against their limit.
     values += rng.normal(scale=0.5 * values.std() + 0.1, size=values.shape)
     return columns, values
 

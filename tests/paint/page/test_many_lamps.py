@@ -88,7 +88,7 @@ def test_selected_lights_are_dimmed_in_one_step_and_keep_their_ratio(painter: Pa
         count = len(painter.requests("constrain_lights"))
         painter.type("Dim by", text)
         if factor is None:
-            assert "bright is no change" in painter.ui("toasts")[-1]["text"]
+            assert "bright is not a change" in painter.ui("toasts")[-1]["text"]
             assert len(painter.requests("constrain_lights")) == count
         else:
             np.testing.assert_allclose(last_locks(painter)["key"], level * factor, rtol=1e-9)

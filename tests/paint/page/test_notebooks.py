@@ -1,6 +1,6 @@
 """The painter in a real JupyterLab and in marimo: painted by hand, told to Python, set from a cell.
 
-Both are large and take half a minute each, so that they are no part of what tests install:
+Both are large and take half a minute each, so that they are not part of what tests install:
 
     pip install jupyterlab marimo && pytest tests/paint/page/test_notebooks.py
 """

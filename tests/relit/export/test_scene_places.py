@@ -156,7 +156,7 @@ def test_lamps_that_hang_elsewhere_than_in_the_scene_stay(
     assert after == before
     output = capsys.readouterr().out
     for name in ("spot", "sun", "key", "fill", "window light"):
-        assert f"{name!r} is no lamp, or not where the scene has it" in output
+        assert f"{name!r} is not a lamp, or not where the scene has it" in output
 
 
 @pytest.mark.parametrize(("version", "is_told"), [((4, 1, 1), True), ((4, 2, 0), False)])

@@ -222,7 +222,7 @@ def rules_of(scene: Scene) -> Rules:
     return Rules(
         hide_emitters=integrator.hide_emitters,
         must_bounce=needs_a_bounce(scene),
-        # These are no constants of the kernel, which serves paths of any length.
+        # These are not constants of the kernel, which serves paths of any length.
         max_depth=dr.opaque(mi.UInt32, depth_limit(integrator)),
         rr_depth=dr.opaque(mi.UInt32, integrator.rr_depth),
     )

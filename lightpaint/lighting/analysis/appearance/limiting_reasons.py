@@ -309,7 +309,7 @@ def _weaker_hold(sample: PixelSample, gain: float) -> float:
     def is_enough(hold: float) -> bool:
         return sample.share_of(sample.solve((), sample.other_views, hold=hold)) >= gain
 
-    # Bisection of logarithms between a hold with too too_strong gain and one with enough.
+    # Bisection of logarithms between a hold that is too strong and one that is weak enough.
     too_strong, enough = hold, hold * NO_HOLD
     if not is_enough(enough):
         return 0.0

@@ -218,7 +218,7 @@ def _best_share(
     bias = solve_for(solution, unbiased) - biased
     shares = np.linspace(0, 1, SHARE_STEPS + 1)
     cost = np.square(1 - shares) * np.einsum("ic,cij,jc->", bias, e.M, bias)
-    # A pull keeps the weights from moving, and is no part of the error.
+    # A pull keeps the weights from moving, and is not part of the error.
     pull = solution.problem.pull
     stiffness = np.zeros((3 * n, 3 * n)) if pull is None else pull.full_matrix
     for directions in free_directions(solution):

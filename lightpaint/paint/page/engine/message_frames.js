@@ -88,7 +88,7 @@ export function pictureOf(dtype, shape, buffer, offset = 0) {
   if (!ArrayType)
     throw new Error(`an array of ${dtype}: expected ${Object.keys(DTYPES).join(', ')}`);
   if (offset + length * ArrayType.BYTES_PER_ELEMENT > buffer.byteLength)
-    throw new Error(`${buffer.byteLength} bytes are no array of shape ${shape.join(' × ')}`);
+    throw new Error(`${buffer.byteLength} bytes are not an array of shape ${shape.join(' × ')}`);
   return { data: new ArrayType(buffer, offset, length), shape };
 }
 

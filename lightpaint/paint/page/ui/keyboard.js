@@ -31,7 +31,7 @@ export function isTyping(event) {
 }
 
 /** Return whether a key is pressed in a group of number fields; there, even a button between them,
- * it is no shortcut of the pictures. @param {KeyboardEvent} event */
+ * it is not a shortcut of the pictures. @param {KeyboardEvent} event */
 function isAmongNumbers(event) {
   const element = /** @type {HTMLElement} */ (event.composedPath()[0]);
   return (

@@ -206,7 +206,7 @@ function Badge(props) {
   const { answer, constraints = {}, tie } = props;
   const remarks = listRemarks(props);
   if (!remarks.length) return null;
-  // Constraints on all lights, such as their colours, are no remark on this one.
+  // Constraints on all lights, such as their colours, are not a remark on this one.
   const hasConstraint = Boolean(tie ?? constraints.limits ?? colourConstraint(constraints));
   const isHeldBack =
     Boolean(answer?.is_constrained) &&

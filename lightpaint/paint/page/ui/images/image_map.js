@@ -6,7 +6,7 @@ import { html, useLayoutEffect, useRef } from '../../vendor/preact.js';
 /** @typedef {import("../engine_interface.js").RGB} RGB */
 /** @typedef {import("./image_state.js").LightImage} LightImage */
 
-/** Draw an image on a canvas; texels that are no lights stay transparent.
+/** Draw an image on a canvas; texels that are not lights stay transparent.
  * @param {HTMLCanvasElement} canvas @param {LightImage} image @param {RGB[]} weights
  * @param {number} stops exposure */
 export function drawMap(canvas, { places, lights }, weights, stops) {

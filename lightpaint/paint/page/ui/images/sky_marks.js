@@ -17,7 +17,7 @@ import { skyDirection, skyPlace } from './texel_arithmetic.js';
 const [SIDE_POINTS, HORIZON_POINTS] = [10, 96];
 
 /** Return how a sky lies around the camera of the view, in the map's axes; null before it is known, and
- * for images that are no skies. @param {Ui} ui @param {LightImage} image @returns {SkyView | null} */
+ * for images that are not skies. @param {Ui} ui @param {LightImage} image @returns {SkyView | null} */
 export function skyViewOf({ rig, view, state }, { name }) {
   const axes = rig?.skies.find((sky) => sky.name === name)?.from_world;
   if (!rig || !axes) return null;

@@ -5,7 +5,7 @@ import { cleanNumberText } from '../format.js';
 import { html, useState } from '../../vendor/preact.js';
 import { t } from '../../language/language.js';
 
-/** A slider whose middle is no change, and a field for the same in numbers.
+/** A slider whose middle is not a change, and a field for the same in numbers.
  * @param {{label: string, range: number, step: number, text: (amount: number) => string, tip: string,
  *   parse: (text: string) => number | null, hint: string, change: (amount: number, isFinal: boolean) => void,
  *   say: (text: string) => void, disabled?: boolean, isPlain?: boolean, track?: string}} props
@@ -24,7 +24,7 @@ export function RelativeSlider(props) {
     setDraft(null);
     if (!typed) return;
     const parsed = parse(cleanNumberText(typed).toLowerCase());
-    if (parsed === null) say(t('{typed} is no change. {hint}', { typed, hint }));
+    if (parsed === null) say(t('{typed} is not a change. {hint}', { typed, hint }));
     else if (parsed !== 0) change(parsed, true);
   };
   const press = (/** @type {any} */ event) => {

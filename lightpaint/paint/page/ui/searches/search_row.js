@@ -1,4 +1,4 @@
-/** A search for places of lights in the history: it is no step, but says what was tried. */
+/** A search for places of lights in the history: it is not a step, but says what was tried. */
 
 import { html, useState } from '../../vendor/preact.js';
 import { clockText, durationText } from '../format.js';
