@@ -139,7 +139,7 @@ def correct_noise(solution: Solution, *, share: float | None = None) -> Solution
     Args:
         solution: The solution to correct, where the solve starts.
         share: 0 to 1; by default the one with the least expected error of bias and scatter
-            together. docs/method.md has measurements.
+            together. docs/benchmarks.md has measurements.
 
     Raises:
         BasisError: If the noise is unknown.
