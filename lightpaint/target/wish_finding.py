@@ -35,6 +35,9 @@ SMOOTHING, JOINING = 1 / 160, 1 / 80
 #: not.
 MIN_RADIUS = 2.0
 
+#: Quantile of the amounts in a place, softened by the wash at its border, that is the one within.
+WITHIN = 0.7
+
 #: Light below which a ratio says little, relative to the mean of the look.
 DARK = 0.01
 
@@ -147,8 +150,8 @@ def _distinct_places(stroke: Bools, ratio: Floats, least: float) -> list[Bools]:
     differs |= beyond.max(axis=0) - beyond.min(axis=0) > DISTINCT_STOPS
     amount = np.abs(beyond).sum(axis=0)
     places = [
-        # A wash is half of the amount at the edge.
-        x & (amount > np.median(amount[x]) / 2)
+        # At an edge a wash is half of the amount within.
+        x & (amount > np.quantile(amount[x], WITHIN) / 2)
         for x in _connected(stroke & differs, 0, least)
     ]
     most = MAX_INNER_SHARE * stroke.sum()

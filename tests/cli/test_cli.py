@@ -7,7 +7,7 @@ import shutil
 import subprocess
 import sys
 from dataclasses import replace
-from html import escape
+from html import unescape
 from pathlib import Path
 from typing import Any
 
@@ -87,7 +87,7 @@ def test_the_command_that_a_report_shows_works_from_any_folder(
     command = json.loads((room_folder / "out" / "report.json").read_text(encoding="utf-8"))[
         "command"
     ]
-    assert escape(command) in (room_folder / "out" / "report.html").read_text(encoding="utf-8")
+    assert command in unescape((room_folder / "out" / "report.html").read_text(encoding="utf-8"))
     shutil.rmtree(room_folder / "out")
     path = f"{Path(sys.executable).parent}{os.pathsep}{os.environ['PATH']}"
     options: dict[str, Any] = {"cwd": elsewhere, "env": {**os.environ, "PATH": path}}

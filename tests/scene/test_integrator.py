@@ -2,6 +2,7 @@
 
 import gc
 from dataclasses import replace
+from html import unescape
 from pathlib import Path
 from typing import Any
 
@@ -151,8 +152,8 @@ def test_from_solve_to_verify(tmp_path: Path) -> None:
         "rendered with path:max_depth=6 instead of the scene's own integrator" in completed.stderr
     )
     assert "nothing found against it." in completed.stdout  # of one dim bulb
-    page = (tmp_path / "out" / "report.html").read_text(encoding="utf-8")
-    assert "path:max_depth=6, not the scene&#x27;s own" in page
+    page = unescape((tmp_path / "out" / "report.html").read_text(encoding="utf-8"))
+    assert "path:max_depth=6, not the scene's own" in page
     # The relit scene says it itself.
     assert "agree within noise" in succeed(tmp_path, "verify", "out")
     succeed(tmp_path, "relight", path, "out/lighting.json", *chosen, "-o", "again")
