@@ -329,7 +329,7 @@ def test_what_no_layer_can_be_is_refused_and_nothing_changes() -> None:
         (protocol.ChangeLayers(order=(0, 1, 77)), "no layer 77"),
         (protocol.ChangeLayers(layers=(Layer(1, "adjust"),)), "is of kind paint"),
         (protocol.ChangeLayers(layers=(Layer(1, "paint", group=2),)), "which is none"),
-        (protocol.ChangeLayers(layers=(Layer(3, "paint"),), copies={"3": 2}), "no copy of"),
+        (protocol.ChangeLayers(layers=(Layer(3, "paint"),), copies={"3": 2}), "not a copy of"),
     ):
         with pytest.raises(PaintError, match=text):
             hand.session.handle(request, {})

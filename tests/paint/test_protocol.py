@@ -192,7 +192,7 @@ def test_lengths_that_nobody_has_are_refused_at_once() -> None:
     with pytest.raises(PaintError, match="shorter"):
         from_frame(to_frame({"kind": "paint", "seq": 1, "buffers": [header]}, []))
     deep = b"[" * 50_000
-    with pytest.raises(PaintError, match="no JSON"):
+    with pytest.raises(PaintError, match="not JSON"):
         from_frame(struct.pack("<I", len(deep)) + deep)
 
 

@@ -450,5 +450,5 @@ def test_bounds_stand_in_the_answer_file(make_basis: Any, tmp_path: Any) -> None
         broken = json.loads(json.dumps(data))
         broken["solve"]["bounds"][0][key] = value
         path.write_text(json.dumps(broken), encoding="utf-8")
-        with pytest.raises(LightingError, match="no complete lighting"):
+        with pytest.raises(LightingError, match="not a complete lighting"):
             read_lighting(path)

@@ -13,6 +13,7 @@ from lightpaint.lighting.analysis.diagnosis import diagnose
 from lightpaint.lighting.answer.combination import combine
 from lightpaint.lighting.solve import solve
 from lightpaint.target.target import Target
+from lightpaint.target.wish import Wish
 
 SIZE = (12, 18)
 
@@ -159,7 +160,13 @@ def test_texture_is_no_grain_of_the_painting(make_basis: Any):
     basis = make_basis(images=np.stack([albedo * (0.3 + 0.4 * x), albedo * (0.7 - 0.4 * x)]))
     y = np.linspace(-1, 1, size[0])[:, None, None]
     image = (albedo * 0.5 * 2.0 ** np.where(np.abs(y) < 0.4, 1.0, -0.5)).astype(np.float32)
-    target = replace(Target.of(image), transform=ViewTransform(), through_view=True)
+    target = replace(
+        Target.of(image),
+        transform=ViewTransform(),
+        through_view=True,
+        # Without a contrast of its own, which the shape would have as a place of the painting.
+        wishes=(Wish("painting", np.ones(size, np.float32)),),
+    )
     diagnosis = diagnose(solve(basis, target))
     # Some of it is: albedo from pixel to pixel is finer than any surface's. It was all of it.
     assert diagnosis.share(diagnosis.unreachable) > 0.5
