@@ -1,4 +1,4 @@
-"""What is not a file, or has no end, wherever a path is given: one line, at once."""
+"""A path that leads to no file, or to one without an end: one line, at once."""
 
 import errno
 import os

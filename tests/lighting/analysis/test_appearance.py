@@ -112,7 +112,7 @@ def test_an_untouched_picture_is_close(make_basis: Any):
     ],
 )
 def test_a_held_picture_never_meets_the_wish(make_basis: Any, requested: Any, held_share: Any):
-    """What was asked for is swallowed: that is not a success, and what swallowed it is told."""
+    """A wish that is swallowed is not a success, and the verdict names what swallowed it."""
     basis = _left_and_right(make_basis, spill=0.5)
     target = _paint_over(_look(basis), (slice(8, 16), slice(4, 12)), 0.6)
     limits = Constraints.of(requested.get("constraints", {}))
