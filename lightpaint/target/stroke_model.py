@@ -108,7 +108,7 @@ class _Brush:
 
 
 class _Blend(_Brush):
-    """One colour c over the look n: a c + (1 − a) n, with a from 0 to 1.
+    """A colour c over the look n: a c + (1 − a) n, with a from 0 to 1.
 
     encode, decode: to the values that are mixed, from linear light and back.
     """
@@ -152,7 +152,7 @@ class _Blend(_Brush):
 
 
 class _Gain(_Brush):
-    """One direction of gain, in stops, by amounts of at least 0."""
+    """A direction of gain, in stops, by amounts of at least 0."""
 
     def __init__(
         self, inside: Bools, painted: Floats, look: Floats, dark: float, wash: Wash
