@@ -24,9 +24,9 @@ def fields_of(schema: Schema, path: str = "") -> Iterator[tuple[str, Schema]]:
     for name, value in schema.get("properties", {}).items():
         yield f"{path}{name}", value
         yield from fields_of(value, f"{path}{name}.")
-    if isinstance(values := schema.get("additionalProperties"), Mapping):
+    if isinstance(values := schema.get("additionalProperties"), dict):
         yield from fields_of(values, f"{path}*.")
-    if isinstance(items := schema.get("items"), Mapping):
+    if isinstance(items := schema.get("items"), dict):
         yield from fields_of(items, f"{path.removesuffix('.')}[].")
     for kind in schema.get("anyOf", ()):
         yield from fields_of(kind, path)
