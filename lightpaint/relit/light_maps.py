@@ -13,8 +13,7 @@ from lightpaint.relit.export.sky_maps import SkyMap, lat_long, map_axes, map_siz
 from lightpaint.relit.relight import scene_of
 from lightpaint.relit.relit_files import enlarged, images_of_texels, settings_of
 from lightpaint.scene.lights.emitters import Emitter
-from lightpaint.scene.lights.texels.flat_images import Slide, Wall
-from lightpaint.scene.lights.texels.sky import Sky
+from lightpaint.scene.lights.texels.image_domains import Sky, Slide, Wall
 from lightpaint.scene.scene import Scene
 
 #: Least columns of the image of a wall, whose texels other programs may sample more coarsely, and

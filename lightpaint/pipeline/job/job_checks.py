@@ -20,8 +20,7 @@ from lightpaint.pipeline.job.settings import Settings
 from lightpaint.pipeline.job.sources import Painting, content
 from lightpaint.placement.rigging.rigged_lights import check_names, rigged_lights
 from lightpaint.placement.rigging.rigging import Rigging, rigging_of
-from lightpaint.scene.lights.texels.domains import DOMAINS
-from lightpaint.scene.lights.texels.sky import Sky
+from lightpaint.scene.lights.texels.image_domains import DOMAINS, Sky
 from lightpaint.scene.lights.texels.texel import mirrored_pairs, node_name
 from lightpaint.scene.lights.texels.texel_layout import CHILDREN
 from lightpaint.scene.scene import Scene

@@ -6,8 +6,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from lightpaint.arrays import Doubles, Position
-from lightpaint.scene.properties.rotation import across, rotation_between
-from lightpaint.scene.properties.site import EmitterPlace
+from lightpaint.scene.properties.site import EmitterPlace, across, rotation_between
 
 #: Distance up to which positions count as equal, relative to the largest coordinate of a light.
 SAME_PLACE = 1e-3

@@ -11,9 +11,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from lightpaint.arrays import Doubles, Floats, Position
-from lightpaint.scene.lights.texels.image_domain import GridSize
-from lightpaint.scene.lights.texels.sky import Sky
-from lightpaint.scene.properties.rotation import rotation_between
+from lightpaint.scene.lights.texels.image_domains import GridSize, Sky
+from lightpaint.scene.properties.site import rotation_between
 
 #: Columns and rows of a map, unless the scene is loaded with others.
 MAP_SIZE = (512, 256)
