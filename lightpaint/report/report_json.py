@@ -32,7 +32,7 @@ from lightpaint.report.answer_pictures import (
     report_transform,
     residual_of,
 )
-from lightpaint.report.fit_influences import fit_options
+from lightpaint.report.diagnosis_sentences import UNTOLD_HERE, fit_options
 from lightpaint.report.measures import (
     brightness,
     count_at_least_pixels,
@@ -47,7 +47,6 @@ from lightpaint.report.measures import (
 )
 from lightpaint.report.page.diagnosis_section import maps_limit
 from lightpaint.report.rig.hung_lights import HungLights, placement_numbers
-from lightpaint.report.uncertainty_sentences import UNTOLD_HERE
 from lightpaint.target.target import Target
 from lightpaint.version import __version__
 

@@ -12,8 +12,8 @@ from lightpaint.colour.hue_names import hue_name
 from lightpaint.lighting.analysis.appearance.color_choices import ColorChoice
 from lightpaint.lighting.answer.combination import combine
 from lightpaint.lighting.solve import solve
-from lightpaint.report.fit_influences import fit_options, fit_sentence
-from lightpaint.report.page.color_section import closer_choice, colors_section, spoken_choice
+from lightpaint.report.diagnosis_sentences import fit_options, fit_sentence
+from lightpaint.report.page.constraint_section import closer_choice, colors_section, spoken_choice
 from lightpaint.report.page.page import report_page
 from lightpaint.report.report_json import report_numbers
 from lightpaint.target.target import Target

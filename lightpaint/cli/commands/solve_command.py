@@ -19,7 +19,7 @@ from lightpaint.pipeline.pipeline import run
 from lightpaint.pipeline.results.results import Look
 from lightpaint.placement.placement_record import PlacementRecord, record_of
 from lightpaint.relit.export.exports import EXPORTS
-from lightpaint.report.page.suggestion_section import spoken_turn
+from lightpaint.report.page.placement_section import spoken_turn
 
 if TYPE_CHECKING:
     from lightpaint.cli.solve_variations import LookSet

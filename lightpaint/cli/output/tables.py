@@ -10,7 +10,7 @@ from lightpaint.cli.output import terminal
 from lightpaint.colour.photometry import Photometry, photometry
 from lightpaint.placement.suggestions.suggestion import Suggestion
 from lightpaint.relit.verification import Verification
-from lightpaint.report.page.suggestion_section import spoken_position, spoken_suggestions
+from lightpaint.report.page.placement_section import spoken_position, spoken_suggestions
 from lightpaint.report.phrases import spoken_percent
 from lightpaint.report.verdict import agreement
 from lightpaint.scene.lights.emitters import Emitter

@@ -34,9 +34,8 @@ from lightpaint.report.answer_pictures import (
 )
 from lightpaint.report.basis_memo import ROWS_SHOWN, SPARE_ROWS
 from lightpaint.report.clean_pictures import MAX_CLEAN_THUMBNAILS, CleanLooks
-from lightpaint.report.fit_influences import fit_sentence
-from lightpaint.report.page.color_section import colors_section
-from lightpaint.report.page.constraint_section import constraints_section
+from lightpaint.report.diagnosis_sentences import fit_sentence
+from lightpaint.report.page.constraint_section import colors_section, constraints_section
 from lightpaint.report.page.diagnosis_section import missed_section, sure_section
 from lightpaint.report.page.figures import PagePicture, maps, wipe
 from lightpaint.report.page.fit_tables import (
@@ -49,8 +48,7 @@ from lightpaint.report.page.fit_tables import (
 from lightpaint.report.page.html import html
 from lightpaint.report.page.lights_table import lights_table, thumbnails_of
 from lightpaint.report.page.mixer import mixer_assets, mixer_html, planes_for_page
-from lightpaint.report.page.placement_section import placement_section
-from lightpaint.report.page.suggestion_section import suggestion_section
+from lightpaint.report.page.placement_section import placement_section, suggestion_section
 from lightpaint.report.rig.hung_lights import HungLights
 from lightpaint.report.verdict import spoken_samples, verdict
 from lightpaint.report.visible_emitters import emitter_remarks
