@@ -30,10 +30,13 @@ from lightpaint.placement.suggestions.light_search import suggest_lights
 from lightpaint.placement.suggestions.suggestion import MoveSuggestion, Suggestion
 from lightpaint.progress import Listener, Progress, listener, silent
 from lightpaint.relit.detection_power import LightShares, with_light_tests
-from lightpaint.relit.sample_budget import VerificationBudget, verification_budget
-from lightpaint.relit.sequential_verification import verify_in_stages
 from lightpaint.relit.verification import Verification
-from lightpaint.relit.verification_render import verify
+from lightpaint.relit.verification_render import (
+    VerificationBudget,
+    verification_budget,
+    verify,
+    verify_in_stages,
+)
 from lightpaint.scene.scene import Scene
 
 
