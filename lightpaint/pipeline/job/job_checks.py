@@ -116,22 +116,6 @@ def check_animation(settings: Settings, constraints: Constraints, views: int) ->
         )
 
 
-def check_target(target: object) -> None:
-    """Raise TargetError for anything but a target."""
-    if not isinstance(target, Target):
-        raise TargetError(f"the target is a {type(target).__name__}: pass what read_target returns")
-
-
-def check_same_picture(target: Target, scene: Scene) -> None:
-    """Raise TargetError if the painting's sensor is not that of `scene`."""
-    sensor = scene.sensor_names[scene.sensor]
-    if target.sensor not in ("", sensor):
-        raise TargetError(
-            f"{target.name} was painted on a template of the sensor {target.sensor}, not of "
-            f"{sensor}: choose it with sensor={target.sensor!r}, or pass find=False"
-        )
-
-
 def rigging_for(rigging: Rigging, scenes: Sequence[Scene], settings: Settings) -> Rigging:
     """Return the rigging of the scene.
 

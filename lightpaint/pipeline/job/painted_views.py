@@ -7,8 +7,8 @@ from pathlib import Path
 from lightpaint.arrays import Bools
 from lightpaint.basis.basis import Basis
 from lightpaint.basis.lightgroups.light_groups import LightGroups
+from lightpaint.errors import TargetError
 from lightpaint.images.pixel_blocks import whole_factor
-from lightpaint.pipeline.job.job_checks import check_same_picture, check_target
 from lightpaint.pipeline.job.settings import Settings
 from lightpaint.pipeline.job.sources import Painting
 from lightpaint.pipeline.results.results import checked_names, view_names
@@ -104,3 +104,19 @@ def _resolution(scene: Scene, target: Target, settings: Settings) -> str | None:
         return settings.resolution
     factor = whole_factor(scene.size, target.size)
     return f"1/{factor}" if target.content and factor and factor > 1 else None
+
+
+def check_target(target: object) -> None:
+    """Raise TargetError for anything but a target."""
+    if not isinstance(target, Target):
+        raise TargetError(f"the target is a {type(target).__name__}: pass what read_target returns")
+
+
+def check_same_picture(target: Target, scene: Scene) -> None:
+    """Raise TargetError if the painting's sensor is not that of `scene`."""
+    sensor = scene.sensor_names[scene.sensor]
+    if target.sensor not in ("", sensor):
+        raise TargetError(
+            f"{target.name} was painted on a template of the sensor {target.sensor}, not of "
+            f"{sensor}: choose it with sensor={target.sensor!r}, or pass find=False"
+        )
