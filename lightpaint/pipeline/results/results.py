@@ -4,7 +4,6 @@ import json
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
 
 from lightpaint.basis.basis import Basis
 from lightpaint.basis.origin import Origin
@@ -34,6 +33,7 @@ from lightpaint.report.comparison import comparison_image
 from lightpaint.report.page.notebook_html import look_html
 from lightpaint.report.page.page import report_page
 from lightpaint.report.report_json import report_numbers
+from lightpaint.report.reported_answer import ReportedAnswer
 from lightpaint.report.verdict import verdict
 from lightpaint.report.visible_emitters import emitter_remarks
 from lightpaint.scene.scene import Scene
@@ -201,9 +201,9 @@ def write_report(
     are now; by default that of `look`. is_shown: False to write only the numbers.
     """
     relit = relit or look.relit
-    arguments = _report_arguments(look, command)
+    answer = _reported_answer(look, command)
     if not is_shown:
-        write_text(folder / "report.json", report_numbers(**arguments))
+        write_text(folder / "report.json", report_numbers(answer))
         return
     verified = look.verification.verified.image if look.verification else None
     larger_features = None
@@ -232,32 +232,32 @@ def write_report(
         write_bytes(folder / "comparison.png", png_bytes(sheet, looks.texts))
 
     def page() -> None:
-        write_text(folder / "report.html", report_page(**arguments, looks=looks, missed=missed))
+        write_text(folder / "report.html", report_page(answer, looks=looks, missed=missed))
 
     def numbers() -> None:
-        write_text(folder / "report.json", report_numbers(**arguments, missed=missed))
+        write_text(folder / "report.json", report_numbers(answer, missed=missed))
 
     in_turns(lambda write: write(), (page, comparison, numbers), look.basis.size)
 
 
-def _report_arguments(look: Look, command: str) -> dict[str, Any]:
-    """Return the arguments that page and numbers have in common."""
-    return {
-        "basis": look.basis,
-        "target": look.target,
-        "solution": look.solution,
-        "predicted": look.predicted,
-        "verification": look.verification,
-        "command": command,
-        "uncertainty": look.uncertainty,
-        "diagnosis": look.diagnosis,
-        "unconstrained": look.analysis.unconstrained,
-        "suggestions": look.suggestions,
-        "turn": look.move_suggestion,
-        "hung": None if look.placement is None else hung_of(look.placement, look.lighting),
-        "appearance": look.analysis.appearance,
-        "color_choices": look.analysis.color_choices,
-    }
+def _reported_answer(look: Look, command: str) -> ReportedAnswer:
+    """Return a look as its report takes it."""
+    return ReportedAnswer(
+        basis=look.basis,
+        target=look.target,
+        solution=look.solution,
+        predicted=look.predicted,
+        verification=look.verification,
+        command=command,
+        uncertainty=look.uncertainty,
+        diagnosis=look.diagnosis,
+        unconstrained=look.analysis.unconstrained,
+        suggestions=look.suggestions,
+        turn=look.move_suggestion,
+        hung=None if look.placement is None else hung_of(look.placement, look.lighting),
+        appearance=look.analysis.appearance,
+        color_choices=look.analysis.color_choices,
+    )
 
 
 def verify_result(
