@@ -9,7 +9,6 @@ from pathlib import Path
 from lightpaint.errors import SceneError
 from lightpaint.file_reading import file_length
 from lightpaint.keywords import keywords
-from lightpaint.scene.checks.old_scenes import explain_old_scene
 from lightpaint.scene.checks.xml_checks import MAX_XML
 from lightpaint.scene.lights.emitters import Emitter, check_emitters
 from lightpaint.scene.lights.image_split import images_to_split, with_split
@@ -21,7 +20,7 @@ from lightpaint.scene.lights.texels.texel import mirrored_pairs, parse_map_size,
 from lightpaint.scene.lights.texels.texel_layout import TexelLayout
 from lightpaint.scene.properties.film import check_film, sensor_index
 from lightpaint.scene.properties.integrator import IntegratorChoice
-from lightpaint.scene.runtime.mitsuba_errors import mitsuba_errors
+from lightpaint.scene.runtime.mitsuba_errors import explain_old_scene, mitsuba_errors
 from lightpaint.scene.runtime.render_lock import MITSUBA
 from lightpaint.scene.runtime.variant import use_variant
 from lightpaint.scene.scene import Scene, inspect_scene
