@@ -14,8 +14,8 @@ from lightpaint.basis.light_images import joined_texels
 from lightpaint.colour.photometry import photometry
 from lightpaint.lighting.answer.lighting import Lighting
 from lightpaint.relit.emission_xml import safe_name
-from lightpaint.relit.export.nuke_lights import RigKind, RigLight
-from lightpaint.relit.export.sky_maps import SkyMap, lat_long, map_axes, map_size_for
+from lightpaint.relit.export.nuke import RigKind, RigLight
+from lightpaint.relit.export.program_axes import SkyMap, lat_long, map_axes, map_size_for
 from lightpaint.relit.relight import scene_of
 from lightpaint.relit.relit_files import enlarged, images_of_texels, settings_of
 from lightpaint.scene.lights.emitters import Emitter

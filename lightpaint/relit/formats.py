@@ -19,10 +19,9 @@ from lightpaint.lighting.answer.lighting import Lighting, LightSetting
 from lightpaint.progress import Listener
 from lightpaint.relit.export.exports import blender_script
 from lightpaint.relit.export.fixtures import fixtures_csv, fixtures_json
-from lightpaint.relit.export.nuke import needs_copy, nuke_script, spoken_unreadable
-from lightpaint.relit.export.nuke_lights import nuke_lights
+from lightpaint.relit.export.nuke import needs_copy, nuke_lights, nuke_script, spoken_unreadable
+from lightpaint.relit.export.program_axes import SkyMap
 from lightpaint.relit.export.scene_script import scene_script
-from lightpaint.relit.export.sky_maps import SkyMap
 from lightpaint.relit.export.usd import check_usd, usd_overrides
 from lightpaint.relit.export.usd_groups import usd_multipliers
 from lightpaint.relit.export_format import (
