@@ -9,8 +9,7 @@ from lightpaint.basis.cache.cache_folder import folder
 from lightpaint.basis.cache.cached_render import Render, obtain_basis
 from lightpaint.basis.render.basis_render import render_basis
 from lightpaint.basis.render.render_origin import samples_for
-from lightpaint.pipeline.job.job import Job
-from lightpaint.pipeline.job.painted_views import PaintedView
+from lightpaint.pipeline.job.job import Job, PaintedView
 from lightpaint.pipeline.job.settings import Settings
 from lightpaint.progress import Listener, Progress, labelled, listener
 from lightpaint.scene.scene import Scene

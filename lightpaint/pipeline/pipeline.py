@@ -17,8 +17,7 @@ from lightpaint.lighting.answer.lighting_keys import LightingKey
 from lightpaint.lighting.problem import Problem
 from lightpaint.lighting.solution import Solution
 from lightpaint.lighting.solve import solution_of
-from lightpaint.pipeline.job.job import Job
-from lightpaint.pipeline.job.painted_views import PaintedView
+from lightpaint.pipeline.job.job import Job, PaintedView
 from lightpaint.pipeline.job.settings import Settings
 from lightpaint.pipeline.job_bases import obtain_bases_of, view_listener
 from lightpaint.pipeline.needed_samples import add_needed_samples, problem_of, without_noise

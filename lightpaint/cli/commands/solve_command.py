@@ -13,8 +13,7 @@ from lightpaint.cli.tolerances import Tolerances
 from lightpaint.display_text import some_of
 from lightpaint.errors import LOOK_ERRORS
 from lightpaint.pipeline.frame_pictures import frames_to_write, relight_frames
-from lightpaint.pipeline.job.job import Job
-from lightpaint.pipeline.job.painted_views import PaintedView
+from lightpaint.pipeline.job.job import Job, PaintedView
 from lightpaint.pipeline.pipeline import run
 from lightpaint.pipeline.results.results import Look
 from lightpaint.placement.placement_record import PlacementRecord, record_of
