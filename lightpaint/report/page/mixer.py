@@ -102,18 +102,6 @@ class JointLights:
         }
 
 
-def rows_of_mixer(basis: Basis, lighting: Lighting) -> tuple[Indices, Sequence[JointLights]]:
-    """Return the lights with a row of their own, and those that share one."""
-    images = light_images(basis.lights)
-    texels = [k for image in images for k in image.lights]
-    singles = np.setdiff1d(np.arange(len(basis.lights)), texels)
-    shown = most_visible_lights(basis, lighting, among=singles)
-    joint = [JointLights(image.name, image.lights, image) for image in images]
-    if (others := np.setdiff1d(singles, shown)).size:
-        joint.append(JointLights(f"{len(others)} more lights together", others))
-    return shown, joint
-
-
 def mixer_html(
     basis: Basis,
     lighting: Lighting,
@@ -322,3 +310,15 @@ def lighting_data(lighting: Lighting) -> dict[str, Any]:
     for light in data["lights"].values():
         light.pop("photometry", None)
     return data
+
+
+def rows_of_mixer(basis: Basis, lighting: Lighting) -> tuple[Indices, Sequence[JointLights]]:
+    """Return the lights with a row of their own, and those that share one."""
+    images = light_images(basis.lights)
+    texels = [k for image in images for k in image.lights]
+    singles = np.setdiff1d(np.arange(len(basis.lights)), texels)
+    shown = most_visible_lights(basis, lighting, among=singles)
+    joint = [JointLights(image.name, image.lights, image) for image in images]
+    if (others := np.setdiff1d(singles, shown)).size:
+        joint.append(JointLights(f"{len(others)} more lights together", others))
+    return shown, joint
