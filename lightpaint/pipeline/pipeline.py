@@ -19,8 +19,8 @@ from lightpaint.lighting.solution import Solution
 from lightpaint.lighting.solve import solution_of
 from lightpaint.pipeline.job.job import Job, PaintedView
 from lightpaint.pipeline.job.settings import Settings
-from lightpaint.pipeline.job_bases import obtain_bases_of, view_listener
-from lightpaint.pipeline.needed_samples import add_needed_samples, problem_of, without_noise
+from lightpaint.pipeline.job_bases import obtain_bases_of, problem_of, view_listener, without_noise
+from lightpaint.pipeline.needed_samples import add_needed_samples
 from lightpaint.pipeline.placed_lights import place_lights, suggest_move
 from lightpaint.pipeline.results.answer_folder import (
     AnswerFolder,

@@ -21,8 +21,7 @@ from lightpaint.lighting.solve import solution_of
 from lightpaint.pipeline.job.job import Job
 from lightpaint.pipeline.job.settings import Settings
 from lightpaint.pipeline.job.sources import content
-from lightpaint.pipeline.job_bases import obtain, view_listener
-from lightpaint.pipeline.needed_samples import problem_of, without_noise
+from lightpaint.pipeline.job_bases import obtain, problem_of, view_listener, without_noise
 from lightpaint.pipeline.results.placement_changes import all_changes, spoken_change
 from lightpaint.placement.freedom import Freedom
 from lightpaint.placement.lights_to_place import free_light
