@@ -24,8 +24,7 @@ from lightpaint.placement.space.permitted_places import (
     Places,
     Rails,
 )
-from lightpaint.scene.properties.rotation import across, rotation_between
-from lightpaint.scene.properties.site import Site
+from lightpaint.scene.properties.site import Site, across, rotation_between
 
 #: Scale of a search step, equivalent to sliding by one unit: degrees of the axis, degrees of the
 #: cone, a beam's share of its cone, and the logarithm of a side.

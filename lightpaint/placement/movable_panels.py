@@ -9,11 +9,11 @@ import numpy as np
 from lightpaint.arrays import Position
 from lightpaint.placement.paths.panel_site import Outline, PanelSite
 from lightpaint.placement.space.free_space import as_position
-from lightpaint.scene.changed_emitters import without_emitters
 from lightpaint.scene.lights.light import Light
 from lightpaint.scene.properties.emission import MULTIPLE
 from lightpaint.scene.properties.site import Site
 from lightpaint.scene.scene import Scene
+from lightpaint.scene.scene_tree import without_emitters
 
 #: Cosine of the angle between the sides of a rectangle, up to which it counts as one.
 SHEAR = 1e-4

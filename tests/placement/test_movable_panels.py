@@ -9,7 +9,7 @@ from renderer import write_room
 from lightpaint.placement.movable_panels import is_panel, panel_site, without_panels
 from lightpaint.placement.paths.panel_site import Outline, PanelSite
 from lightpaint.scene.properties.pose import Pose
-from lightpaint.scene.properties.rotation import rotation_between
+from lightpaint.scene.properties.site import rotation_between
 from lightpaint.scene.scene_reader import load_scene
 
 OUTLINE = Outline((0.0, -1.0, 0.0), ((0.5, 0.0, 0.0), (0.0, 0.0, 0.2)))

@@ -16,9 +16,7 @@ import numpy as np
 from lightpaint.basis.render.tracer.finer_texels import NO_TEXELS, FinerTexels, GridCorners
 from lightpaint.scene.lights.emitters import Emitter
 from lightpaint.scene.lights.image_split import even_image
-from lightpaint.scene.lights.texels.flat_images import FlatDomain
-from lightpaint.scene.lights.texels.image_domain import ImageDomain
-from lightpaint.scene.lights.texels.sky import Sky
+from lightpaint.scene.lights.texels.image_domains import FlatDomain, ImageDomain, Sky
 from lightpaint.scene.scene import Scene
 
 
