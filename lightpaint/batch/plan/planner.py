@@ -78,7 +78,7 @@ def plan(
     for _, entry in entries.incomplete:
         planner.collect_errors(entry)
     if manifest_.mistakes.lines:
-        raise BatchError(*manifest_.mistakes.lines)
+        raise BatchError.of(manifest_.mistakes.lines)
     names = frozenset(look.entry.name for look in looks)
     planner.cache.keep_only(())
     cache, remarks = planner.cache, planner.journal.remarks
