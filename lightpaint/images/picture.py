@@ -284,4 +284,4 @@ def _naming_file(file: str) -> Iterator[None]:
     try:
         yield
     except ImageError as error:
-        raise ImageError(f"{file} {one_line(str(error), limit=2000)}") from error
+        raise ImageError(f"{file} ", one_line(error.sentence, limit=2000)) from error

@@ -67,6 +67,7 @@ from lightpaint.placement.rigging.rigging import Rigging
 from lightpaint.placement.suggestions.light_search import check_suggestible
 from lightpaint.relit.export.nuke import spoken_unreadable
 from lightpaint.scene.scene import Scene
+from lightpaint.sentences import Hint, Sentence
 from lightpaint.target.target import Target
 from lightpaint.threads import parallel_map
 
@@ -303,10 +304,13 @@ class Job:
         if self.groups is not None:
             remarks += spoken_unreadable(self.groups, self.folder)
         if len(self.painted_frames) > 1 and not self.settings.animate:
-            remarks.append(
-                f"one lighting for the frames {spoken_frames(self.painted_frames)}: animate=True "
-                "finds one for each, and lights that change between them"
+            frames = spoken_frames(self.painted_frames)
+            remark = Sentence(
+                f"one lighting for the frames {frames}: ",
+                Hint("animate", True),
+                " finds one for each, and lights that change between them",
             )
+            remarks.append(remark)
         rendered_scenes = [] if self.basis is not None else [x.scene for x in self.views if x.scene]
         if (first := self.views[0].scene) is not None:
             remarks += remarks_of_scene(first, is_rendered=bool(rendered_scenes))

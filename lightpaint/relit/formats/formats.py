@@ -23,6 +23,7 @@ from lightpaint.relit.formats.plain_formats import CsvFormat, JsonFormat, Mitsub
 from lightpaint.relit.formats.usd_format import UsdFormat
 from lightpaint.relit.light_maps import sky_maps_of, slide_images_of, wall_images_of
 from lightpaint.relit.relight import scene_of
+from lightpaint.sentences import Hint
 
 #: All formats by their names, as commands and manifests have them.
 FORMS: dict[str, ExportFormat] = {
@@ -45,7 +46,7 @@ def names_of_forms(forms: Iterable[str], source: Source) -> dict[str, str]:
             raise LightpaintError(f"there is no form {form!r}: known are {', '.join(FORMS)}")
         names[form] = FORMS[form].name_for(source)
     if source.stage is not None and UsdFormat.name not in names:
-        raise LightpaintError("stage=... belongs to the form usd: leave it out, or add that")
+        raise LightpaintError(Hint("stage"), " belongs to the form usd: leave it out, or add that")
     return names
 
 
@@ -121,5 +122,6 @@ def _check_groups(export: ExportContext) -> None:
     if lighting.animation and groups.sequence is None:
         raise LightpaintError(
             f"the lights change over a shot, and {groups.path} is one of its frames: give all, "
-            "like light_groups='shot.####.exr'"
+            "like ",
+            Hint("light_groups", "shot.####.exr"),
         )

@@ -6,15 +6,19 @@ from lightpaint.relit.export.nuke import needs_copy, nuke_script, spoken_unreada
 from lightpaint.relit.export.nuke_lights import nuke_lights
 from lightpaint.relit.formats.export_format import ExportContext, ExportFormat, Writer
 from lightpaint.relit.rig_lights import rig_lights
+from lightpaint.sentences import Hint, Sentence
 
 
 class NukeFormat(ExportFormat):
     """A script with nodes of lights, or of layers."""
 
     name, file, file_of_groups = "nuke", "lights.nk", "relit.nk"
-    needed_source = (
-        "nuke needs the scene or the light groups of the lighting: give scene=... for the lights, "
-        "or light_groups=... for multipliers of their layers"
+    needed_source = Sentence(
+        "nuke needs the scene or the light groups of the lighting: give ",
+        Hint("scene"),
+        " for the lights, or ",
+        Hint("light_groups"),
+        " for multipliers of their layers",
     )
 
     def of_scene(self, export: ExportContext) -> Writer:

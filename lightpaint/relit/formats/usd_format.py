@@ -12,6 +12,7 @@ from lightpaint.relit.export.usd_groups import usd_multipliers
 from lightpaint.relit.formats.export_format import ExportContext, ExportFormat, Source, Writer
 from lightpaint.relit.light_maps import SlideImage, WallImage
 from lightpaint.relit.xml_patch import emitters_of
+from lightpaint.sentences import Hint
 
 
 class UsdFormat(ExportFormat):
@@ -29,7 +30,8 @@ class UsdFormat(ExportFormat):
         if source.light_groups is not None and source.stage is None:
             raise LightpaintError(
                 "usd multiplies the lights that light groups were rendered from: give their "
-                "stage with stage=..."
+                "stage with ",
+                Hint("stage"),
             )
         return name
 
