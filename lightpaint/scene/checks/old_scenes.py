@@ -13,6 +13,7 @@ from lightpaint.errors import SceneError
 from lightpaint.file_reading import read_bytes
 from lightpaint.files import one_line
 from lightpaint.scene.checks.tokens import attributes, markup
+from lightpaint.sentences import Sentence
 
 #: Elements that are parameters; a `<default>` may have any name.
 _PARAMETERS = frozenset(
@@ -34,31 +35,41 @@ SUCCESSORS = {
 _REFUSED = re.compile(r"unexpected <(\w+)> element|has no \w+ plugin '(\w+)'")
 
 
+class RefusedSceneError(SceneError):
+    """A scene that Mitsuba rejects, and why. The remedy is "" if none is known."""
+
+    reason = ""
+    remedy = Sentence()
+
+
 @contextmanager
 def explain_old_scene(path: Path) -> Iterator[None]:
     """Explain the error if Mitsuba rejects the scene at `path` because it was written for 0.6."""
     try:
         yield
-    except SceneError as error:
-        # The cause is an exception from Mitsuba if Mitsuba rejected the scene.
-        sign = _sign_of_old_version(path) if error.__cause__ is not None else ""
-        raise (_old_scene_error(path, sign, str(error)) if sign else error) from error.__cause__
+    except RefusedSceneError as error:
+        sign = _sign_of_old_version(path)
+        raise (_old_scene_error(path, sign, error) if sign else error) from error.__cause__
 
 
-def _old_scene_error(path: Path, sign: str, message: str) -> SceneError:
-    reason = message.removeprefix("Mitsuba refuses ").removeprefix(f"{path}: ")
+def _old_scene_error(path: Path, sign: str, refusal: RefusedSceneError) -> SceneError:
+    reason, remedy = refusal.reason, refusal.remedy
     match = _REFUSED.search(reason)
     successor = SUCCESSORS.get(match[1] or match[2]) if match else None
-    hint = "write its equivalent of Mitsuba 3"
+    hint: str = "write its equivalent of Mitsuba 3"
     if successor is not None:
         hint = f"write {successor} there"
     elif not sign.startswith("version"):
         hint = 'write version="0.6.0" in <scene>, so that Mitsuba 3 renames its parameters'
     if match and "integrator plugin" in reason:
-        reason, _, hint = reason.partition("; ")
+        reason, *suggestion = reason.split("; ", 1)
+        hint, remedy = Sentence.joined([*suggestion, remedy], "; "), Sentence()
+    advice = Sentence.joined(filter(None, (reason, remedy, hint)), "; ")
     return SceneError(
         f"{path} is a scene of Mitsuba 0.6 ({sign}), which Mitsuba 3 reads only in part; it "
-        f"stops: {reason}; {hint}, or export the scene for Mitsuba 3"
+        "stops: ",
+        advice,
+        ", or export the scene for Mitsuba 3",
     )
 
 

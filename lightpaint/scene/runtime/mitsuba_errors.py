@@ -7,10 +7,12 @@ from pathlib import Path
 
 from lightpaint.errors import SceneError
 from lightpaint.files import one_line, without_path
+from lightpaint.scene.checks.old_scenes import RefusedSceneError
 from lightpaint.scene.properties.integrator import (
     IntegratorChoice,
 )
 from lightpaint.scene.runtime.plugins import UnknownPluginError
+from lightpaint.sentences import Hint, Sentence, Word
 
 #: Maximum length of quoted Mitsuba errors, whose cause may be at the end.
 MAX_QUOTED_ERROR = 2000
@@ -33,12 +35,16 @@ def mitsuba_errors(path: Path, instead: IntegratorChoice | None = None) -> Itera
     except (RuntimeError, ValueError, TypeError, LookupError, OverflowError) as error:
         text = one_line(_without_places(str(error), path), limit=MAX_QUOTED_ERROR)
         undefined = re.search(r"undefined parameter: \$(\w+)", text)
-        hint = f"; set it with parameters={{'{undefined[1]}': ...}}" if undefined else ""
+        remedy = Sentence()
+        if undefined:
+            remedy = Sentence("set it with ", Hint("parameters", {undefined[1]: ...}))
         if "integrator plugin" in text:
-            hint = f"; the requested integrator is {instead}"
-            hint = hint if instead else '; integrator="path" renders it with another'
+            remedy = Sentence(Hint("integrator", Word("path")), " renders it with another")
+            remedy = Sentence(f"the requested integrator is {instead}") if instead else remedy
         prefix = "" if isinstance(error, UnknownPluginError) else "Mitsuba refuses "
-        raise SceneError(f"{prefix}{path}: {text}{hint}") from error
+        refusal = RefusedSceneError(f"{prefix}{path}: {text}{'; ' * bool(remedy)}", remedy)
+        refusal.reason, refusal.remedy = text, remedy
+        raise refusal from error
 
 
 @contextmanager
@@ -58,7 +64,9 @@ def render_errors(path: Path) -> Iterator[None]:
             first = first.__cause__
         text = one_line(_without_places(str(first), path), limit=MAX_QUOTED_ERROR)
         raise SceneError(
-            f'Mitsuba cannot render {path}: {text}; integrator="path" renders most scenes'
+            f"Mitsuba cannot render {path}: {text}; ",
+            Hint("integrator", Word("path")),
+            " renders most scenes",
         ) from error
 
 
