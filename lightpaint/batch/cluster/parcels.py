@@ -18,6 +18,7 @@ from lightpaint.display_text import some_names
 from lightpaint.errors import BatchError, OutputError
 from lightpaint.files import first_line
 from lightpaint.pipeline.results.result_folder import RECORD, ResultFolder
+from lightpaint.sentences import Hint, Sentence
 from lightpaint.storage.json_records import strict_json
 from lightpaint.storage.staging import is_below
 
@@ -120,8 +121,9 @@ class ParcelStore:
             except BatchError:
                 differs = True
             if differs:
-                failure = (
-                    f"{file} is another on a worker: is its disk shared? leave out shared_fs=True"
+                failure = Sentence(
+                    f"{file} is another on a worker: is its disk shared? leave out ",
+                    Hint("shared_fs", True),
                 )
                 return ItemResult(item.name, item.kind, failure)
         os.chdir(parcel.place)

@@ -39,6 +39,7 @@ from lightpaint.report.uncertainty_sentences import (
     unreached_channels,
     untold_lights,
 )
+from lightpaint.sentences import SourceKey
 
 Table = Literal["short", "full"]
 
@@ -126,7 +127,7 @@ def _spoken_cause(look: Look, reason: Reason) -> str:
         for key in keys
         if key in constraint
         and key != "duv"
-        and origin.startswith(BY_OPTION)
+        and SourceKey.of(origin).source == BY_OPTION
         and any(name == light or fnmatchcase(light, name) for light in reason.names)
     ]
     if not options:
