@@ -41,7 +41,7 @@ def replacing(path: Path) -> Iterator[Path]:
             os.replace(temporary, path)
     except OSError as error:
         reason = error.strerror or str(error)
-        raise OutputError(f"cannot write {path}: {reason}") from error
+        raise OutputError("cannot write ", path, f": {reason}") from error
 
 
 def flush(path: Path) -> None:
@@ -125,7 +125,7 @@ def check_writable(folder: Path) -> None:
         with tempfile.TemporaryFile(dir=existing_folder):
             pass
     except OSError as error:
-        raise OutputError(f"cannot write into {folder}: {error.strerror or error}") from error
+        raise OutputError("cannot write into ", folder, f": {error.strerror or error}") from error
 
 
 def check_files(files: Iterable[Path], inputs: Iterable[Path]) -> None:
@@ -140,13 +140,12 @@ def check_files(files: Iterable[Path], inputs: Iterable[Path]) -> None:
     for file in files:
         check_name(file)
         if file.is_dir():
-            raise OutputError(
-                f"{file} is a folder, but a file is to be written there: move it away"
-            )
+            raise OutputError(file, " is a folder, but a file is to be written there: move it away")
         with suppress(OSError):
             if _inode(file) in by_identity:
                 raise OutputError(
-                    f"{file} is an input of this command, which would overwrite it: write to "
+                    file,
+                    " is an input of this command, which would overwrite it: write to "
                     "another place (",
                     Hint("folder"),
                     ")",

@@ -11,6 +11,7 @@ import json
 from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass, field
 from itertools import groupby
+from pathlib import Path
 from typing import Any, TypeAlias
 
 
@@ -90,9 +91,10 @@ class Lead:
         return f"{self.key}: "
 
 
-#: The data in a sentence, and all its parts.
-Datum: TypeAlias = "Hint | SourceKey | Lead | Remedy"
-Part: TypeAlias = "str | Hint | SourceKey | Lead | Remedy"
+#: The data in a sentence, and all its parts. A path is data, since a file may have another name
+#: for its user.
+Datum: TypeAlias = "Hint | SourceKey | Lead | Remedy | Path"
+Part: TypeAlias = "str | Hint | SourceKey | Lead | Remedy | Path"
 
 #: How a face spells a datum; None for what it has no words of its own for.
 Spelling: TypeAlias = "Callable[[Datum], str | None]"
@@ -143,8 +145,9 @@ class Sentence(str):
         return type(self)(*(_spelled(part, spelling) for part in self.parts))
 
     def mapped(self, change: Callable[[str], str]) -> "Sentence":
-        """Return the sentence with its plain text changed."""
-        return Sentence(*(change(x) if type(x) is str else x for x in self.parts))
+        """Return the sentence with the text of each part changed; a changed datum becomes text."""
+        changed = ((part, change(str(part))) for part in self.parts)
+        return Sentence(*(part if text == str(part) else text for part, text in changed))
 
     def shortened(self, limit: int) -> "Sentence":
         """Return its first `limit` characters; data that do not fit become text."""
@@ -165,9 +168,7 @@ def _parts_of(part: object) -> tuple[Part, ...]:
     part = getattr(part, "sentence", part)
     if isinstance(part, Sentence) and not isinstance(part, Remedy):
         return part.parts
-    if isinstance(part, Hint | SourceKey | Lead | Remedy):
-        return (part,)
-    return (str(part),)
+    return (part,) if isinstance(part, Hint | SourceKey | Lead | Remedy | Path) else (str(part),)
 
 
 def _record_of(hint: Hint) -> dict[str, Any]:
@@ -191,7 +192,7 @@ def _hint_of(
 def _spelled(part: Part, spelling: Spelling) -> object:
     if type(part) is str:
         return part
-    assert isinstance(part, Hint | SourceKey | Lead | Remedy)
+    assert isinstance(part, Hint | SourceKey | Lead | Remedy | Path)
     spelt = spelling(part)
     if spelt is None:
         return part.spelled(spelling) if isinstance(part, Remedy) else part

@@ -20,8 +20,8 @@ from lightpaint.sentences import Hint, Sentence, Word
 #: The sentence for an answer without error.
 NO_ERROR = "The lights can make what is painted."
 
-#: The argument that lets lights have any colour, as Python has it.
-ANY_COLOR = Sentence(Hint("colors", Word("free")))
+#: The argument that lets lights have any colour, for `bound_sentences`.
+ANY_COLOR = Hint("colors", Word("free"))
 
 #: Share of the error, or of a light, that is too small to mention.
 MIN_SHARE = 0.05
@@ -79,7 +79,7 @@ def hold_clause(appearance: Appearance | None) -> str:
 
 
 def bound_sentences(
-    diagnosis: Diagnosis, appearance: Appearance | None = None, *, any_color: str = ANY_COLOR
+    diagnosis: Diagnosis, appearance: Appearance | None = None, *, any_color: str | Hint = ANY_COLOR
 ) -> list[str]:
     """Return at most two sentences on limits of the lights, the most important first, and one on
     lights that are down for unpainted parts alone.
@@ -152,7 +152,7 @@ def spoken_about(appearance: Appearance) -> str:
 
 
 def spoken_cause(
-    reason: Reason, *, weaker: str = "a hold of", any_color: str = ANY_COLOR, about: str = ""
+    reason: Reason, *, weaker: str = "a hold of", any_color: str | Hint = ANY_COLOR, about: str = ""
 ) -> str:
     """Name a cause that limits the answer, and the gain of releasing it; "" for views.
 

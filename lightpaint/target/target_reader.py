@@ -198,8 +198,9 @@ def _open_picture(
     if base is not None and folder is not None and base.size != picture.size:
         if template is not None:
             raise SizeError(
-                f"{path} is {picture.size[1]}x{picture.size[0]} but {folder / SHOWN_FILE} is "
-                f"{base.size[1]}x{base.size[0]}: give the template it was painted on"
+                path,
+                f" is {picture.size[1]}x{picture.size[0]} but {folder / SHOWN_FILE} is "
+                f"{base.size[1]}x{base.size[0]}: give the template it was painted on",
             )
         notes = (f"not compared with {folder / SHOWN_FILE}, which has another size",)
         # The painting has another template, and therefore another transform.
@@ -219,8 +220,11 @@ def _importance(reading: _Reading, mask: str | Path | None) -> tuple[Floats | No
         importance = read_mask(mask)
         if importance.shape != picture.size:
             raise SizeError(
-                f"mask {mask} is {importance.shape[1]}x{importance.shape[0]} but the target {path} "
-                f"is {picture.size[1]}x{picture.size[0]}: export both at one size"
+                "mask ",
+                mask,
+                f" is {importance.shape[1]}x{importance.shape[0]} but the target ",
+                path,
+                f" is {picture.size[1]}x{picture.size[0]}: export both at one size",
             )
         if picture.alpha is not None and picture.weight is None:
             importance = np.where(picture.alpha > 0, importance, np.float32(0))
@@ -247,9 +251,11 @@ def _importance(reading: _Reading, mask: str | Path | None) -> tuple[Floats | No
         if path.resolve() in [
             (folder / name).resolve() for name in (LIGHT_FILE, SHOWN_FILE, CLEAN)
         ]:
-            raise TargetError(f"{path} is the template itself: give the painting made over it")
+            raise TargetError(path, " is the template itself: give the painting made over it")
         raise TargetError(
-            f"nothing in {path} differs from {reading.painted_on}: paint over it, or pass ",
+            "nothing in ",
+            path,
+            f" differs from {reading.painted_on}: paint over it, or pass ",
             Hint("find", False),
             " if all of it counts",
         )
@@ -274,7 +280,9 @@ def _lit(reading: _Reading, counted: Floats) -> tuple[Floats, Floats, list[str]]
     """
     if reading.template is None or reading.template.albedo is None:
         raise TargetError(
-            f"reading {reading.path} as light needs its template, which has the albedo of "
+            "reading ",
+            reading.path,
+            " as light needs its template, which has the albedo of "
             "surfaces: give the folder that lightpaint template wrote as ",
             Hint("template"),
         )
@@ -283,7 +291,7 @@ def _lit(reading: _Reading, counted: Floats) -> tuple[Floats, Floats, list[str]]
     blind = (largest(albedo) <= 0) & (counted > 0)
     counted_light = np.where(blind, 0, counted)
     if not counted_light.any():
-        raise TargetError(f"{reading.path}: no painted pixel shows a surface that reflects light")
+        raise TargetError(reading.path, ": no painted pixel shows a surface that reflects light")
     lost_count = int(blind.sum())
     note = (
         [f"{lost_count} painted pixels show no surface that reflects light"] if lost_count else []

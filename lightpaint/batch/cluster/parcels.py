@@ -150,11 +150,9 @@ class ParcelStore:
         os.chdir(start_folder)
         result = run_item(item.with_paths(self._path_map(parcel, root)))
         if target is None or result.failure:
+            failure = Sentence(result.failure).mapped(lambda text: text.replace(str(root), ""))
             # The full disk is this worker's own; another worker may have room.
-            failure, is_lost = (
-                result.failure.replace(str(root), ""),
-                result.is_lost or result.is_disk_full,
-            )
+            is_lost = result.is_lost or result.is_disk_full
             return replace(result, failure=failure, is_disk_full=False, is_lost=is_lost)
         files = (x for x in sorted(target.rglob("*")) if x.is_file())
         return replace(

@@ -22,6 +22,7 @@ from lightpaint.pipeline.job.settings import Settings
 from lightpaint.pipeline.results.results import Look
 from lightpaint.report.answer_pictures import spoken_view
 from lightpaint.report.diagnosis_sentences import (
+    ANY_COLOR,
     bound_sentences,
     compensation_sentences,
     error_sentences,
@@ -39,7 +40,7 @@ from lightpaint.report.uncertainty_sentences import (
     unreached_channels,
     untold_lights,
 )
-from lightpaint.sentences import SourceKey
+from lightpaint.sentences import Sentence, SourceKey
 
 Table = Literal["short", "full"]
 
@@ -96,7 +97,7 @@ def _sentences(look: Look, table: Table) -> list[str]:
     if table == "short":
         limits = [] if appearance.is_close else limits[:1]
         # One line offers other colours, the one that says which light turns.
-        if closer and any("--colors free" in sentence for sentence in map(spoken, limits)):
+        if closer and any(ANY_COLOR in Sentence(sentence).parts for sentence in limits):
             limits = []
         return [*limits, *down, *closer]
     sentences = [

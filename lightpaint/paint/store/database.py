@@ -21,7 +21,7 @@ from lightpaint.display_text import some_names
 from lightpaint.errors import LightpaintError, OutputError, PaintError
 from lightpaint.files import first_line, flush
 from lightpaint.paint.store.history_steps import Identity, ViewIdentity
-from lightpaint.sentences import Hint, Remedy
+from lightpaint.sentences import Hint, Remedy, Sentence
 from lightpaint.storage.json_records import read_record, strict_json
 
 #: "lpnt", which marks a file as a session, and the version of its tables.
@@ -333,7 +333,7 @@ class WriteQueue:
                     "INSERT OR REPLACE INTO about VALUES (?, ?)", ("position", position)
                 )
         except LightpaintError as error:
-            self.unsaved = f"what was done last is in memory only: {error}"
+            self.unsaved = Sentence("what was done last is in memory only: ", error)
             return self.unsaved
         except sqlite3.Error as error:
             self.unsaved = (

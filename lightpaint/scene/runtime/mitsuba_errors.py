@@ -27,10 +27,10 @@ def mitsuba_errors(path: Path, instead: IntegratorChoice | None = None) -> Itera
     try:
         yield
     except MemoryError:
-        raise SceneError(f"{path} needs more memory than there is") from None
+        raise SceneError(path, " needs more memory than there is") from None
     except UnicodeDecodeError as error:
         raise SceneError(
-            f"{path}, or a file that it refers to, has text that is not UTF-8: {error.reason}"
+            path, f", or a file that it refers to, has text that is not UTF-8: {error.reason}"
         ) from None
     except (RuntimeError, ValueError, TypeError, LookupError, OverflowError) as error:
         text = one_line(_without_places(str(error), path), limit=MAX_QUOTED_ERROR)
@@ -42,7 +42,7 @@ def mitsuba_errors(path: Path, instead: IntegratorChoice | None = None) -> Itera
             remedy = Sentence(Hint("integrator", Word("path")), " renders it with another")
             remedy = Sentence(f"the requested integrator is {instead}") if instead else remedy
         prefix = "" if isinstance(error, UnknownPluginError) else "Mitsuba refuses "
-        refusal = RefusedSceneError(f"{prefix}{path}: {text}{'; ' * bool(remedy)}", remedy)
+        refusal = RefusedSceneError(prefix, path, f": {text}{'; ' * bool(remedy)}", remedy)
         refusal.reason, refusal.remedy = text, remedy
         raise refusal from error
 
@@ -64,7 +64,9 @@ def render_errors(path: Path) -> Iterator[None]:
             first = first.__cause__
         text = one_line(_without_places(str(first), path), limit=MAX_QUOTED_ERROR)
         raise SceneError(
-            f"Mitsuba cannot render {path}: {text}; ",
+            "Mitsuba cannot render ",
+            path,
+            f": {text}; ",
             Hint("integrator", Word("path")),
             " renders most scenes",
         ) from error
