@@ -4,6 +4,7 @@ import copy
 import json
 import pickle
 from multiprocessing import get_context
+from pathlib import Path
 from typing import Any
 
 import pytest
@@ -124,3 +125,11 @@ def test_a_remedy_is_replaced_as_a_whole() -> None:
         ": give one, or start afresh (new=True)"
     )
     assert spoken(sentence) == "it is damaged: choose another (-o), or start afresh (--new)"
+
+
+def test_a_path_can_have_another_name() -> None:
+    path = Path("/tmp/upload-1/layers")
+    error = LightpaintError("cannot read ", path, ": it is damaged")
+    assert str(error) == "cannot read /tmp/upload-1/layers: it is damaged"
+    shown = error.sentence.spelled(lambda datum: "wall.ora" if datum == path else None)
+    assert shown == "cannot read wall.ora: it is damaged"
