@@ -7,7 +7,6 @@ reads `pass resize=True` in Python. A terminal spells the same argument `--resiz
 the words of a sentence.
 """
 
-import json
 from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass, field
 from itertools import groupby
@@ -39,7 +38,7 @@ def _in_python(value: Any) -> str:
     if value is ...:
         return "..."
     if isinstance(value, Word):
-        return json.dumps(value, ensure_ascii=False)
+        return f'"{value}"'
     if isinstance(value, Mapping):
         entries = (f"{key!r}: {_in_python(entry)}" for key, entry in value.items())
         return f"{{{', '.join(entries)}}}"

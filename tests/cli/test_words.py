@@ -13,12 +13,12 @@ import lightpaint
 from lightpaint.batch.run_options import RunOptions
 from lightpaint.cli.options.parser import command_parser
 from lightpaint.cli.options.source_options import LOADING
-from lightpaint.cli.output.vocabulary import OPTIONS, SPELLINGS, spoken
+from lightpaint.cli.output.vocabulary import BY_OPTION, OPTIONS, SPELLINGS, spoken
 from lightpaint.paint.launch import paint_in_browser
 from lightpaint.pipeline.job.settings import Settings
 from lightpaint.pipeline.job.sources import NOT_IN_GROUPS
 from lightpaint.relit.formats.export_format import Source
-from lightpaint.sentences import Hint, Sentence, Word
+from lightpaint.sentences import Hint, Lead, Sentence, SourceKey, Word
 from lightpaint.target.target_reader import read_target
 
 PACKAGE = Path(lightpaint.__file__).parent
@@ -163,6 +163,43 @@ def test_words_of_the_command_line(hint: Hint, python: str, shell: str) -> None:
     sentence = Sentence("size differs: use ", hint, ", or leave it")
     assert sentence == f"size differs: use {python}, or leave it"
     assert spoken(sentence) == f"size differs: use {shell}, or leave it"
+
+
+OPTIONS_SOURCE = SourceKey(BY_OPTION)
+
+
+@pytest.mark.parametrize(
+    ("key", "start"),
+    [
+        (OPTIONS_SOURCE / "light" / "a.b lamp" / "lock", "--lock a.b lamp is"),
+        (OPTIONS_SOURCE / "light" / "key" / "limits" / "min", "--limit key is"),
+        (OPTIONS_SOURCE / "light" / "key" / "duv", "--kelvin key is"),
+        (OPTIONS_SOURCE / "light" / "key", "light.key is"),
+        (OPTIONS_SOURCE / "new" / 2 / "count", "--add 2: count is"),
+        (OPTIONS_SOURCE / "new", "--add: is"),
+        (OPTIONS_SOURCE / "tie", "tie is"),
+        (SourceKey("room.toml", "light", "key", "lock"), "room.toml: light.key.lock is"),
+    ],
+)
+def test_keys_of_options(key: SourceKey, start: str) -> None:
+    sentence = Sentence(key, " is 7: expected less")
+    assert sentence == f"{key} is 7: expected less"
+    assert spoken(sentence) == f"{start} 7: expected less"
+
+
+@pytest.mark.parametrize(
+    ("key", "lead"),
+    [
+        (OPTIONS_SOURCE / "light" / "kex", ""),
+        (OPTIONS_SOURCE / "light" / "kex" / "move", "--move kex: "),
+        (OPTIONS_SOURCE / "new" / 2 / "on", "--add 2: "),
+        (OPTIONS_SOURCE / "new", "--add: "),
+        (OPTIONS_SOURCE / "tie", "tie: "),
+        (SourceKey("room.toml", "light", "kex"), "room.toml: light.kex: "),
+    ],
+)
+def test_a_lead_may_be_left_out(key: SourceKey, lead: str) -> None:
+    assert spoken(Sentence(Lead(key), "no light 'kex'")) == f"{lead}no light 'kex'"
 
 
 @pytest.mark.parametrize(

@@ -6,9 +6,7 @@ from collections.abc import Mapping, Sequence
 
 from lightpaint.batch.run_options import RunOptions
 from lightpaint.field_options import options_of
-from lightpaint.lighting.constraints.constraints import LIGHT_KEYS
 from lightpaint.pipeline.job.settings import Settings
-from lightpaint.scene.lights.lights_file import MOVES
 from lightpaint.sentences import Datum, Hint, Lead, Sentence, SourceKey, Word
 
 #: The records whose fields have options.
@@ -57,9 +55,6 @@ SPELLINGS = _OTHER_SPELLINGS | {
 BY_OPTION = "on the command line"
 OPTIONS_OF_KEYS = {"limits": "limit", "duv": "kelvin"}
 
-#: Keys of a light that have an option.
-_KEYS_OF_LIGHTS = {*LIGHT_KEYS, *MOVES}
-
 
 def spoken(text: str) -> str:
     """Return `text` of the library with the options of the command line."""
@@ -92,7 +87,7 @@ def _option(hint: Hint) -> str | None:
 def _option_of_key(key: SourceKey) -> str | None:
     """Return `--limit NAME`, or `--add 2: count` for a new light; None for other keys."""
     match key.keys:
-        case ("light", name, setting, *_) if setting in _KEYS_OF_LIGHTS:
+        case ("light", name, setting, *_):
             return f"--{OPTIONS_OF_KEYS.get(str(setting), setting)} {name}"
         case ("new", int(number), *setting) if len(setting) < 2:
             return " ".join((f"--add {number}:", *map(str, setting)))
