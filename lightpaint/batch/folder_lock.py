@@ -7,6 +7,7 @@ from contextlib import contextmanager, suppress
 from pathlib import Path
 
 from lightpaint.errors import OutputError
+from lightpaint.sentences import Hint
 
 
 @contextmanager
@@ -27,8 +28,9 @@ def lock_folder(folder: Path, *, shared: bool) -> Iterator[None]:
                 fcntl.flock(descriptor, kind | fcntl.LOCK_NB)
             except BlockingIOError:
                 raise OutputError(
-                    f"another batch is at work in {folder}: wait for it, or name another folder "
-                    "(folder=...)"
+                    f"another batch is at work in {folder}: wait for it, or name another folder (",
+                    Hint("folder"),
+                    ")",
                 ) from None
             except OSError:
                 pass  # the file system has no locks

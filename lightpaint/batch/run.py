@@ -18,7 +18,7 @@ from lightpaint.batch.folder_lock import lock_folder
 from lightpaint.batch.gallery.gallery import write_gallery
 from lightpaint.batch.gallery.small_planes import write_task_planes
 from lightpaint.batch.manifest.folder_names import THUMBNAILS
-from lightpaint.batch.manifest.key_spelling import with_manifest_keys
+from lightpaint.batch.manifest.key_spelling import as_key
 from lightpaint.batch.placed_bases import obtain_placed_bases
 from lightpaint.batch.plan.cost_estimate import look_seconds
 from lightpaint.batch.plan.journal import Journal, JournalLine
@@ -37,6 +37,7 @@ from lightpaint.batch.work.work_items import ItemResult
 from lightpaint.errors import BatchError, LightpaintError, OutputError
 from lightpaint.files import sweep
 from lightpaint.progress import Interrupted, Listener, Progress, listener, silent
+from lightpaint.sentences import Sentence
 
 
 def run_batch(
@@ -80,7 +81,7 @@ def run_batch(
         except LightpaintError as error:
             if not is_disk_full(error):
                 raise
-            raise OutputError(f"{error}: {MAKE_ROOM}") from None
+            raise OutputError(error, ": ", MAKE_ROOM) from None
         return run.outcome
 
 
@@ -162,7 +163,7 @@ class _Run:
             return
         for result in solve_by_sums(tasks, self._engine, self._cache, self._listen):
             if result.is_disk_full:
-                raise OutputError(f"{result.failure}: {MAKE_ROOM}")
+                raise OutputError(result.failure, ": ", MAKE_ROOM)
             self._record(by_look[result.look], result)
 
     def _run_with_bases(self, steps: Sequence[PlanStep]) -> None:
@@ -183,8 +184,9 @@ class _Run:
             except (LightpaintError, MemoryError) as error:
                 if is_disk_full(error):
                     raise
-                is_memory = isinstance(error, MemoryError)
-                reason = OUT_OF_MEMORY_TEXT if is_memory else with_manifest_keys(str(error))
+                reason: str = OUT_OF_MEMORY_TEXT
+                if isinstance(error, LightpaintError):
+                    reason = error.sentence.spelled(as_key)
                 for step in steps:
                     self._fail(self._looks[step.task.look], step, reason)
                 return
@@ -220,9 +222,9 @@ class _Run:
             for result in _close_after(self._results(tasks)):
                 step = by_look[result.look]
                 if result.is_disk_full:
-                    raise OutputError(f"{result.failure}: {MAKE_ROOM}")
+                    raise OutputError(result.failure, ": ", MAKE_ROOM)
                 if result.failure and self._may_retry(result):
-                    self._listen.say(f"{result.look}: {result.failure}; trying again")
+                    self._listen.say(Sentence(f"{result.look}: ", result.failure, "; trying again"))
                     retries.append(step)
                     continue
                 self._record(step, result)

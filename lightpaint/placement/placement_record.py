@@ -11,6 +11,7 @@ from lightpaint.errors import SceneError
 from lightpaint.file_reading import read_text
 from lightpaint.placement.placement import AddedLight, Move, Placement, hung
 from lightpaint.scene.scene import Scene
+from lightpaint.sentences import Hint
 from lightpaint.storage.json_records import read_record, strict_json
 
 FORMAT: Literal["lightpaint-places 1"] = "lightpaint-places 1"
@@ -83,5 +84,7 @@ def read_placement(path: Path) -> PlacementRecord:
         reason = " ".join(str(error).split())
         raise SceneError(
             f"{path} has no places of lights: {reason}; export it again from the painter, or "
-            "leave placement=... out"
+            "leave ",
+            Hint("placement"),
+            " out",
         ) from None

@@ -19,6 +19,7 @@ from lightpaint.basis.render.integrators import plane_count
 from lightpaint.basis.render.sample_halves import mean_and_half_difference
 from lightpaint.errors import SceneError
 from lightpaint.scene.scene import Scene
+from lightpaint.sentences import Hint
 
 if TYPE_CHECKING:
     from lightpaint.basis.render.tracer.one_pass import Tracer
@@ -158,8 +159,9 @@ class FileSums:
             needed_bytes = 4 * int(np.prod(shape))
             raise SceneError(
                 f"rendering needs {needed_bytes / 1e9:.1f} GB in {tempfile.gettempdir()} "
-                f"({error.strerror or error}): set TMPDIR to a folder with more room, or use "
-                "resolution=... or fewer lights"
+                f"({error.strerror or error}): set TMPDIR to a folder with more room, or use ",
+                Hint("resolution"),
+                " or fewer lights",
             ) from error
 
     @property

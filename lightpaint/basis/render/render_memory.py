@@ -7,6 +7,7 @@ from lightpaint.basis.render.render_origin import ONE_PASS, method_of
 from lightpaint.errors import SceneError
 from lightpaint.scene.scene import Scene
 from lightpaint.scene.scene_render import SAMPLES_PER_PASS
+from lightpaint.sentences import Hint
 
 
 def renders_in_bands(scene: Scene, start: Basis | None = None) -> bool:
@@ -42,7 +43,9 @@ def check_memory(scene: Scene, *, in_bands: bool = False) -> None:
         height, width = scene.size
         raise SceneError(
             f"{len(scene.lights)} lights at {width}x{height} need {needed_bytes / 1e9:.1f} GB, and "
-            f"{free_bytes / 1e9:.1f} GB are free: use resolution=... or fewer lights"
+            f"{free_bytes / 1e9:.1f} GB are free: use ",
+            Hint("resolution"),
+            " or fewer lights",
         )
 
 

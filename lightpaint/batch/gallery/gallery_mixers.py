@@ -17,7 +17,6 @@ from lightpaint.lighting.answer.lighting_file import read_lighting
 from lightpaint.report.page.mixer import (
     kelvin_colors,
     lighting_data,
-    packed_gels,
     transform_data,
 )
 
@@ -66,7 +65,6 @@ def _mixer(
             {**image, "levels": {"answer": 1.0, "present": 1.0}} for image in record["images"]
         ],
         "kelvins": kelvin_colors(),
-        "gels": packed_gels(),
         "transform": transform_data(ViewTransform()),
         "painting": None,
         "lighting": lighting_data(lighting),

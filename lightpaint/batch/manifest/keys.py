@@ -13,6 +13,7 @@ from lightpaint.pipeline.job.settings import Settings
 from lightpaint.relit.formats import FORMS
 from lightpaint.scene.limits import MAX_SPP
 from lightpaint.scene.properties.film import check_resolution
+from lightpaint.sentences import Sentence
 from lightpaint.target.target_reader import Paint
 from lightpaint.validation import BRIGHTEST, MAX_LISTED, SWITCH, Check, a, checks_of, one_of, whole
 
@@ -211,7 +212,8 @@ class Mistakes:
 
     def add(self, label: str, text: str) -> None:
         """Add an error. label: the look and the key; "" for the manifest as a whole."""
-        line = one_line(f"{self.source}: {label}{': ' if label else ''}{text}", limit=1000)
+        prefix = f"{self.source}: {label}{': ' if label else ''}"
+        line = one_line(Sentence(prefix, text), limit=1000)
         if line not in self.lines:
             self.lines.append(line)
 
@@ -251,7 +253,7 @@ class Mistakes:
         try:
             Settings(**values)
         except LightpaintError as error:
-            self.add(f"{label}, settings", str(error))
+            self.add(f"{label}, settings", error.sentence)
             return {}
         return values
 
@@ -263,7 +265,7 @@ class Mistakes:
             if "resolution" in values:
                 check_resolution(values["resolution"])
         except LightpaintError as error:
-            self.add(f"{label}, render", str(error))
+            self.add(f"{label}, render", error.sentence)
             return Final()
         return Final(**values)
 

@@ -7,6 +7,7 @@ from pathlib import Path
 
 from lightpaint.errors import BatchError, OutputError
 from lightpaint.files import check_files, write_text
+from lightpaint.sentences import Hint
 
 HEADER = """\
 # Looks to be found in one go:  lightpaint batch {name} -o looks/
@@ -37,7 +38,12 @@ def write_starter_manifest(
             raise BatchError(f"no such file: {file}")
     check_files([path], map(Path, (scene, *paintings)))
     if path.exists() and not force:
-        raise OutputError(f"{path} is there: choose another name with folder=..., or force=True")
+        raise OutputError(
+            f"{path} is there: choose another name with ",
+            Hint("folder"),
+            ", or ",
+            Hint("force", True),
+        )
     base = path.parent
     text = HEADER.format(name=path.name, scene=_quoted(scene, base))
     write_text(

@@ -12,7 +12,7 @@ from lightpaint.basis.lights import BasisLight
 from lightpaint.basis.render.integrators import why_not_one_pass
 from lightpaint.basis.render.render_origin import basis_lights
 from lightpaint.batch.manifest.entries import LookEntry
-from lightpaint.batch.manifest.key_spelling import with_manifest_keys
+from lightpaint.batch.manifest.key_spelling import as_key
 from lightpaint.batch.manifest.keys import Mistakes
 from lightpaint.batch.work.worker_cache import WorkerCache
 from lightpaint.display_text import some_names
@@ -42,7 +42,7 @@ def collect_errors(entry: LookEntry, cache: WorkerCache, mistakes: Mistakes) -> 
         except LOOK_ERRORS:
             return None
         except LightpaintError as error:
-            mistakes.add(entry.label, with_manifest_keys(str(error)))
+            mistakes.add(entry.label, error.sentence.spelled(as_key))
             return None
 
     lights: Sequence[BasisLight] | None = None

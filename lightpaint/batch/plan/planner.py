@@ -9,7 +9,7 @@ from lightpaint.basis.lightgroups.light_groups import LightGroups
 from lightpaint.basis.render.render_memory import memory_needed
 from lightpaint.batch.manifest.entries import LookEntry
 from lightpaint.batch.manifest.folder_names import check_gallery
-from lightpaint.batch.manifest.key_spelling import with_manifest_keys
+from lightpaint.batch.manifest.key_spelling import as_key
 from lightpaint.batch.manifest.keys import Mistakes
 from lightpaint.batch.manifest.look_list import entries_of
 from lightpaint.batch.manifest.manifest import Manifest, read_manifest
@@ -78,7 +78,7 @@ def plan(
     for _, entry in entries.incomplete:
         planner.collect_errors(entry)
     if manifest_.mistakes.lines:
-        raise BatchError(*manifest_.mistakes.lines)
+        raise BatchError.of(manifest_.mistakes.lines)
     names = frozenset(look.entry.name for look in looks)
     planner.cache.keep_only(())
     cache, remarks = planner.cache, planner.journal.remarks
@@ -133,15 +133,15 @@ class _Planner:
 
     def _check_look(self, entry: LookEntry) -> "_CheckedLook":
         """Return one look with all defaults resolved."""
-        failure = ""
+        failure: str = ""
         remarks: tuple[str, ...] = ()
         source_files: tuple[Path, ...] = ()
         try:
             entry, source_files, remarks = self._resolve_entry(entry)
         except LOOK_ERRORS as error:
-            failure = with_manifest_keys(str(error))
+            failure = error.sentence.spelled(as_key)
         except LightpaintError as error:
-            failure = with_manifest_keys(str(error))
+            failure = error.sentence.spelled(as_key)
             self._mistakes.add(entry.label, failure)
             self.collect_errors(entry)
         if not failure and (failed_parts := self._failed_looks & set(entry.combined_looks)):
@@ -157,7 +157,7 @@ class _Planner:
         try:
             groups = group_entries(entries, self._looks_with_moves)
         except LightpaintError as error:
-            self._mistakes.add("", str(error))
+            self._mistakes.add("", error.sentence)
             return {}
         for group in groups:
             file = file_of_group(self._folder, group)

@@ -10,7 +10,7 @@ from typing import Any
 from lightpaint.basis.basis import Basis
 from lightpaint.basis.lightgroups.light_groups import LightGroups
 from lightpaint.basis.render.guide_training import train_guide
-from lightpaint.batch.manifest.key_spelling import with_manifest_keys
+from lightpaint.batch.manifest.key_spelling import as_key
 from lightpaint.batch.manifest.keys import Space
 from lightpaint.batch.manifest.sequence import interpolate
 from lightpaint.batch.manifest.variations import shift
@@ -69,7 +69,7 @@ def attempt(item: WorkItem, work: Callable[[], Any]) -> ItemResult:
     try:
         value = work()
     except LightpaintError as error:
-        failure, disk_full = with_manifest_keys(str(error)), is_disk_full(error)
+        failure, disk_full = error.sentence.spelled(as_key), is_disk_full(error)
     except MemoryError:
         failure, is_lost = OUT_OF_MEMORY_TEXT, True
     except OSError as error:

@@ -20,11 +20,12 @@ from lightpaint.placement.rigging.rigging_values import (
     check_pair,
 )
 from lightpaint.scene.lights.lights_file import MOVES, SceneRequests
+from lightpaint.sentences import SourceKey
 from lightpaint.validation import MAX_LISTED
 
 #: A table of keys and values, and the name of its source in errors; the same with a name before it.
-Table = tuple[Mapping[str, Any], str]
-NamedTable = tuple[str, Mapping[str, Any], str]
+Table = tuple[Mapping[str, Any], SourceKey]
+NamedTable = tuple[str, Mapping[str, Any], SourceKey]
 
 #: Maximum length of an error, which may quote a long value.
 MAX_MESSAGE_LENGTH = 1000
@@ -80,20 +81,22 @@ class Rigging:
 
         Raises ConstraintError, naming the light, the key and what is expected.
         """
-        lead = f"{where}: " if where else ""
+        source = SourceKey(where)
         lights = []
-        for name, table in _table(light, f"{lead}light").items():
-            check_move(table, f"{lead}light.{name}")
-            lights.append((name, dict(table), f"{lead}light.{name}"))
+        for name, table in _table(light, source / "light").items():
+            key = source / "light" / name
+            check_move(table, key)
+            lights.append((name, dict(table), key))
         lights.sort(key=lambda entry: not is_pattern(entry[0]))
         named = []
-        for name, table in _table(on, f"{lead}on").items():
-            check_on(table, f"{lead}on.{name}")
-            named.append((name, dict(table), f"{lead}on.{name}"))
-        added = _tables(new, f"{lead}new")
+        for name, table in _table(on, source / "on").items():
+            key = source / "on" / name
+            check_on(table, key)
+            named.append((name, dict(table), key))
+        added = _tables(new, source / "new")
         for table, place in added:
             check_new(table, place)
-        pairs = _tables(pair, f"{lead}pair")
+        pairs = _tables(pair, source / "pair")
         for table, place in pairs:
             check_pair(table, place)
         return cls(lights=tuple(lights), on=tuple(named), new=added, pairs=pairs)
@@ -129,31 +132,27 @@ def rigging_of(requests: SceneRequests) -> Rigging:
             where=requests.source,
         )
     except ConstraintError as error:
-        raise ConstraintError(one_line(str(error), limit=MAX_MESSAGE_LENGTH)) from None
+        raise ConstraintError(one_line(error.sentence, limit=MAX_MESSAGE_LENGTH)) from None
 
 
-def _table(value: Any, where: str) -> Mapping[str, Any]:
+def _table(value: Any, where: SourceKey) -> Mapping[str, Any]:
     if value is None:
         return {}
     if not isinstance(value, Mapping) or not all(isinstance(x, Mapping) for x in value.values()):
-        key = where.rpartition(": ")[2]
-        raise ConstraintError(f"{where} is {value!r}: expected tables [{key}.NAME]")
+        raise ConstraintError(where, f" is {value!r}: expected tables [{where.path}.NAME]")
     if len(value) > MAX_LISTED:
-        raise ConstraintError(f"{where} has {len(value)} names: at most {MAX_LISTED} are read")
+        raise ConstraintError(where, f" has {len(value)} names: at most {MAX_LISTED} are read")
     return value
 
 
-def _tables(value: Any, where: str) -> tuple[Table, ...]:
+def _tables(value: Any, where: SourceKey) -> tuple[Table, ...]:
     is_list = isinstance(value, Sequence) and not isinstance(value, str)
     if not is_list or not all(isinstance(table, Mapping) for table in value):
-        key = where.rpartition(": ")[2]
-        raise ConstraintError(f"{where} is {value!r}: expected tables [[{key}]]")
+        raise ConstraintError(where, f" is {value!r}: expected tables [[{where.path}]]")
     if len(value) > MAX_LISTED:
-        raise ConstraintError(f"{where} lists {len(value)}: at most {MAX_LISTED} are read")
+        raise ConstraintError(where, f" lists {len(value)}: at most {MAX_LISTED} are read")
     several = len(value) > 1
-    return tuple(
-        (dict(table), f"{where} {k}" if several else where) for k, table in enumerate(value, 1)
-    )
+    return tuple((dict(table), where / k if several else where) for k, table in enumerate(value, 1))
 
 
 def _spoken(table: Mapping[str, Any]) -> str:
