@@ -43,6 +43,10 @@ from lightpaint.lighting.unknowns.white_mixes import next_whites, solve_on_locus
 #: The least number of pixels in a sample, the pixels for each light, and compared painted pixels.
 MIN_SAMPLE, PIXELS_PER_LIGHT, COMPARED_PIXELS = 2**12, 2**6, 2**12
 
+#: Number of lights free to change their colour beyond which no other choice is solved: kept to
+#: gamuts, a thousand of them have six thousand unknowns, and take longer than the answer.
+MAX_LIGHTS = 128
+
 #: Change of a light's picture, relative to the brightest light's, that ends the rounds.
 LAST_STEP = 1e-3
 
@@ -94,7 +98,7 @@ def color_choices(
     """Return, for each view, the answers of `free`, `gentle`, `white` and `own`.
 
     delta_e: of the answer, for each view. best: the result of `best_by_colors`, if known. Empty if
-    no light may change its colour, and for pictures without colour.
+    no light may change its colour, for pictures without colour, and for many lights.
     """
     best = best_by_colors(solution) if best is None else best
     if not best:
@@ -113,10 +117,12 @@ def can_change_colors(solution: Solution) -> bool:
 
 
 def best_by_colors(solution: Solution) -> dict[Colors, Doubles]:
-    """Solve with each choice of `colors`; return weights, (n, 3), none if there is no choice."""
+    """Solve with each choice of `colors`; return weights, (n, 3), none if there is no choice, or
+    if there are more than `MAX_LIGHTS`.
+    """
     problem = solution.problem
     best: dict[Colors, Doubles] = {}
-    if not can_change_colors(solution):
+    if not can_change_colors(solution) or problem.full.is_free.sum() > MAX_LIGHTS:
         return best
     solve_problem = _solver(solution)
     for colors in get_args(Colors):
