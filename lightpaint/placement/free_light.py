@@ -13,7 +13,7 @@ import numpy as np
 from lightpaint.arrays import Doubles, Floats, Position
 from lightpaint.errors import SceneError
 from lightpaint.placement.freedom import EDGE, Freedom
-from lightpaint.placement.paths.panel_site import PanelSite
+from lightpaint.placement.paths.panel_lights import PanelSite
 from lightpaint.placement.space.free_space import as_position, far_apart
 from lightpaint.placement.space.permitted_places import (
     OVERSAMPLING,

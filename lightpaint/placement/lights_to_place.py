@@ -13,9 +13,8 @@ from lightpaint.errors import NoPlaceError, SceneError
 from lightpaint.placement.free_light import FreeLight, places_of
 from lightpaint.placement.freedom import Freedom
 from lightpaint.placement.movable import Movable
-from lightpaint.placement.movable_panels import is_panel, panel_site
 from lightpaint.placement.new_lights import NEW_CONE, MirroredPair, NewLights
-from lightpaint.placement.paths.panel_site import PanelSite
+from lightpaint.placement.paths.panel_lights import PanelSite, is_panel, panel_site
 from lightpaint.placement.paths.view_paths import SearchPaths
 from lightpaint.placement.space.free_space import as_position
 from lightpaint.placement.space.permitted_places import BoxOfPlaces, Places

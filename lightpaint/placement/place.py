@@ -22,9 +22,8 @@ from lightpaint.placement.lights_to_place import (
     new_movables_of,
 )
 from lightpaint.placement.movable import Arrangement, Movable
-from lightpaint.placement.movable_panels import without_panels
 from lightpaint.placement.new_lights import MirroredPair, NewLights
-from lightpaint.placement.paths.panel_site import PanelSite
+from lightpaint.placement.paths.panel_lights import PanelSite, without_panels
 from lightpaint.placement.paths.view_paths import SearchPaths
 from lightpaint.placement.placement import AddedLight, Move, Placement, hung
 from lightpaint.placement.placement_fit import fit_of

@@ -15,7 +15,7 @@ from lightpaint.placement.free_light import FreeLight
 from lightpaint.placement.light_columns import seen_columns
 from lightpaint.placement.look_goals import LookGoal
 from lightpaint.placement.movable import Arrangement, Movable
-from lightpaint.placement.paths.panel_site import PanelSite
+from lightpaint.placement.paths.panel_lights import PanelSite
 from lightpaint.placement.paths.view_paths import SearchPaths
 from lightpaint.placement.placement_fit import PlacementFit
 from lightpaint.placement.search.pose_steps import PoseSteps

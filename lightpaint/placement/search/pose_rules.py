@@ -6,7 +6,7 @@ import numpy as np
 
 from lightpaint.arrays import Bools, Floats
 from lightpaint.placement.movable import Movable
-from lightpaint.placement.paths.panel_site import PanelSite
+from lightpaint.placement.paths.panel_lights import PanelSite
 from lightpaint.placement.paths.view_paths import SearchPaths
 from lightpaint.scene.properties.pose import Site
 

@@ -14,7 +14,7 @@ import numpy as np
 from lightpaint.arrays import Bools, Floats
 from lightpaint.placement.light_columns import with_columns
 from lightpaint.placement.movable import Arrangement, Movable, all_sites, by_column
-from lightpaint.placement.paths.panel_site import PanelSite
+from lightpaint.placement.paths.panel_lights import PanelSite
 from lightpaint.placement.paths.view_paths import SearchPaths
 from lightpaint.placement.placement_fit import Fitted, PlacementFit, Ranking
 from lightpaint.placement.search.pose_candidates import PoseCandidates, best_poses
