@@ -18,7 +18,7 @@ from lightpaint.images.formats.png import png_bytes
 from lightpaint.pipeline.job.settings import Settings
 from lightpaint.pipeline.job.sources import SceneFile
 from lightpaint.pipeline.placed_lights import say_changes
-from lightpaint.placement.placement_record import PlacementRecord, read_placement
+from lightpaint.placement.placement import PlacementRecord, read_placement
 from lightpaint.progress import Listener
 from lightpaint.report.rig.hung_lights import HungLight
 from lightpaint.report.rig.rig_drawing import rig_drawing

@@ -20,7 +20,7 @@ from lightpaint.pipeline.job.settings import Settings
 from lightpaint.pipeline.job.sources import SceneFile
 from lightpaint.pipeline.job_bases import obtain
 from lightpaint.pipeline.placed_lights import moved_basis
-from lightpaint.placement.placement_record import PlacementRecord
+from lightpaint.placement.placement import PlacementRecord
 from lightpaint.progress import Listener
 from lightpaint.scene.quality_presets import on_film
 

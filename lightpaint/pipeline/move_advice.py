@@ -16,9 +16,9 @@ from lightpaint.pipeline.job.job import Job
 from lightpaint.pipeline.needed_samples import problem_of, without_noise
 from lightpaint.placement.freedom import Freedom
 from lightpaint.placement.lights_to_place import free_light
+from lightpaint.placement.look_goals import on_small_film
 from lightpaint.placement.place import place
 from lightpaint.placement.placement import Move
-from lightpaint.placement.search_views import on_small_film
 from lightpaint.placement.suggestions.suggestion import MoveSuggestion
 from lightpaint.progress import Listener
 from lightpaint.scene.scene import Scene

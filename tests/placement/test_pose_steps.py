@@ -12,12 +12,11 @@ import lightpaint as lp
 from lightpaint.lighting.unknowns.knobs import Knob
 from lightpaint.lighting.unknowns.reduction import Reduction
 from lightpaint.placement.free_light import FreeLight
-from lightpaint.placement.light_columns import seen_columns
+from lightpaint.placement.lights_to_place import Arrangement, Movable
 from lightpaint.placement.look_goals import LookGoal
-from lightpaint.placement.movable import Arrangement, Movable
 from lightpaint.placement.paths.panel_lights import PanelSite
 from lightpaint.placement.paths.view_paths import SearchPaths
-from lightpaint.placement.placement_fit import PlacementFit
+from lightpaint.placement.placement_fit import PlacementFit, seen_columns
 from lightpaint.placement.search.pose_steps import PoseSteps
 from lightpaint.scene.properties.rotation import unit
 from lightpaint.scene.properties.site import Site

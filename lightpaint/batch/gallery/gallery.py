@@ -30,7 +30,7 @@ from lightpaint.display_text import visible
 from lightpaint.files import write_bytes, write_text
 from lightpaint.images.formats.png import png_bytes
 from lightpaint.pipeline.results.placement_changes import hung_of
-from lightpaint.placement.placement_record import PlacementRecord
+from lightpaint.placement.placement import PlacementRecord
 from lightpaint.report.comparison import shorten_to_width
 from lightpaint.report.page.html import html
 from lightpaint.report.rig.hung_lights import LightChange

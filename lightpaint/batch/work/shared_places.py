@@ -10,7 +10,7 @@ from lightpaint.batch.work.worker_cache import WorkerCache
 from lightpaint.pipeline.job.job import Job
 from lightpaint.pipeline.job.job_record import decode_job
 from lightpaint.pipeline.placed_lights import find_places
-from lightpaint.placement.placement_record import record_of
+from lightpaint.placement.placement import record_of
 from lightpaint.progress import Listener
 
 

@@ -22,7 +22,7 @@ from lightpaint.batch.work.work_items import (
 )
 from lightpaint.images.estimate import read_estimate
 from lightpaint.pipeline.job.sources import BasisFile, GroupsFile, SceneFile
-from lightpaint.placement.placement_record import read_placement
+from lightpaint.placement.placement import read_placement
 from lightpaint.scene.quality_presets import on_film
 from lightpaint.scene.runtime.render_lock import tracing
 from lightpaint.scene.scene import Scene

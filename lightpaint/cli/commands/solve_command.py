@@ -17,7 +17,7 @@ from lightpaint.pipeline.job.job import Job
 from lightpaint.pipeline.job.painted_views import PaintedView
 from lightpaint.pipeline.pipeline import run
 from lightpaint.pipeline.results.results import Look
-from lightpaint.placement.placement_record import PlacementRecord, record_of
+from lightpaint.placement.placement import PlacementRecord, record_of
 from lightpaint.relit.export.exports import EXPORTS
 from lightpaint.report.page.suggestion_section import spoken_turn
 

@@ -62,7 +62,7 @@ from lightpaint.pipeline.job.sources import (
 from lightpaint.pipeline.results.answer_folder import answer_files
 from lightpaint.pipeline.results.result_folder import ResultFolder
 from lightpaint.pipeline.results.results import SOLVE_RESULTS, VIEW_RESULTS
-from lightpaint.placement.placement_record import PlacementRecord
+from lightpaint.placement.placement import PlacementRecord
 from lightpaint.placement.rigging.rigging import Rigging
 from lightpaint.placement.suggestions.light_search import check_suggestible
 from lightpaint.relit.export.nuke import spoken_unreadable

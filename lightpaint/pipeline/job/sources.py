@@ -17,7 +17,7 @@ from lightpaint.colour.display.view_transform import TransformChoice
 from lightpaint.errors import BasisError
 from lightpaint.keywords import keywords
 from lightpaint.pipeline.job.settings import Settings
-from lightpaint.placement.placement_record import PlacementRecord, read_placement
+from lightpaint.placement.placement import PlacementRecord, read_placement
 from lightpaint.scene.scene import Scene
 from lightpaint.scene.scene_reader import load_scene
 from lightpaint.target.target import Target
