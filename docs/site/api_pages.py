@@ -144,7 +144,7 @@ PARTS: dict[str, tuple[str, ...]] = {
     "lighting.analysis.appearance.limiting_reasons": ("Reason", "Loosening"),
     "lighting.analysis.appearance.unpainted_change": ("UnpaintedChange",),
     "lighting.analysis.diagnosis": ("Place",),
-    "placement.suggestions.suggestion": ("MoveSuggestion",),
+    "placement.suggestion": ("MoveSuggestion",),
     "placement.new_lights": ("Mirror",),
     "progress": ("Progress",),
 }

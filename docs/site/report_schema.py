@@ -14,7 +14,7 @@ from lightpaint.lighting.analysis.appearance.limiting_reasons import Reason
 from lightpaint.lighting.analysis.appearance.unpainted_change import UnpaintedChange
 from lightpaint.lighting.analysis.diagnosis import Place
 from lightpaint.lighting.fit import Fit
-from lightpaint.placement.suggestions.suggestion import MoveSuggestion, Suggestion
+from lightpaint.placement.suggestion import MoveSuggestion, Suggestion
 from lightpaint.report.report_json import FORMAT
 
 _TEXT: Schema = {"type": "string"}

@@ -19,7 +19,7 @@ from lightpaint.placement.lights_to_place import free_light
 from lightpaint.placement.look_goals import on_small_film
 from lightpaint.placement.place import place
 from lightpaint.placement.placement import Move
-from lightpaint.placement.suggestions.suggestion import MoveSuggestion
+from lightpaint.placement.suggestion import MoveSuggestion
 from lightpaint.progress import Listener
 from lightpaint.scene.scene import Scene
 

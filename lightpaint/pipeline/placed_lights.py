@@ -18,7 +18,7 @@ from lightpaint.pipeline.needed_samples import problem_of, without_noise
 from lightpaint.pipeline.results.placement_changes import all_changes, spoken_change
 from lightpaint.placement.place import place
 from lightpaint.placement.placement import Placement, PlacementRecord
-from lightpaint.placement.rigging.rigged_lights import rigged_lights
+from lightpaint.placement.rigged_lights import rigged_lights
 from lightpaint.progress import Listener
 from lightpaint.scene.scene import Scene
 

@@ -12,15 +12,13 @@ from lightpaint.arrays import Floats, Position
 from lightpaint.basis.lights import BasisLight
 from lightpaint.display_text import some_names, with_similar_name
 from lightpaint.errors import NoPlaceError, SceneError
-from lightpaint.placement.free_light import FreeLight, places_of
-from lightpaint.placement.freedom import Freedom
+from lightpaint.placement.free_space import as_position
+from lightpaint.placement.freedom import Freedom, FreeLight, places_of
 from lightpaint.placement.new_lights import NEW_CONE, Mirror, MirroredPair, NewLights
 from lightpaint.placement.paths.panel_lights import PanelSite, is_panel, panel_site
 from lightpaint.placement.paths.view_paths import SearchPaths
+from lightpaint.placement.permitted_places import BoxOfPlaces, Places, places_on
 from lightpaint.placement.placement_fit import Fitted
-from lightpaint.placement.space.free_space import as_position
-from lightpaint.placement.space.permitted_places import BoxOfPlaces, Places
-from lightpaint.placement.space.surface_places import places_on
 from lightpaint.scene.lights.emitters import Emitter
 from lightpaint.scene.lights.light import Light, free_names
 from lightpaint.scene.lights.new_emitter import PLUGIN_OF, NewKind
@@ -30,10 +28,13 @@ from lightpaint.scene.scene import Scene
 
 #: Plugins whose light can be computed along frozen paths.
 SEARCHED = ("point", "spot", "directional")
+
 #: Smallest and largest side of new panels, relative to the spread of visible points.
 SIDES = (0.06, 0.5)
+
 #: Initial width of a new spot's beam, as a share of its cone.
 FIRST_BEAM = 0.7
+
 #: Number of random places of a freedom that are tested for free space.
 TESTED = 200
 

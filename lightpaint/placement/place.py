@@ -13,6 +13,7 @@ from lightpaint.errors import NoPlaceError
 from lightpaint.keywords import keywords
 from lightpaint.lighting.constraints.constraints import Constraints
 from lightpaint.lighting.solution import Solution
+from lightpaint.placement.free_space import as_position, pixels_of
 from lightpaint.placement.freedom import Freedom
 from lightpaint.placement.lights_to_place import (
     Arrangement,
@@ -38,7 +39,6 @@ from lightpaint.placement.search.judgement import (
 )
 from lightpaint.placement.search.new_light_search import STARTS, NewLightSearch
 from lightpaint.placement.search.pose_search import TURNS, PoseRules, PoseSearch
-from lightpaint.placement.space.free_space import as_position, pixels_of
 from lightpaint.progress import Progress, silent
 from lightpaint.scene.lights.new_emitter import NewEmitter
 from lightpaint.scene.properties.pose import Pose, Site

@@ -17,7 +17,7 @@ from lightpaint.display_text import rounded_text
 from lightpaint.errors import SceneError
 from lightpaint.file_reading import read_text
 from lightpaint.keywords import keywords
-from lightpaint.placement.space.free_space import as_position
+from lightpaint.placement.free_space import as_position
 from lightpaint.scene.lights.new_emitter import NewEmitter
 from lightpaint.scene.properties.pose import Pose, Site
 from lightpaint.scene.scene import Scene
@@ -25,11 +25,15 @@ from lightpaint.storage.json_records import read_record, strict_json
 
 #: Advice on a place that the picture hardly determines.
 HARDLY_VISIBLE = "hardly visible from here: paint a second view"
+
 #: Remark on a way or a turn that more freedom might lengthen.
 TO_END = " (as far as it may)"
+
 #: Change of a beam's share of its cone that is worth mentioning.
 LEAST_BEAM_CHANGE = 0.01
+
 FORMAT: Literal["lightpaint-places 1"] = "lightpaint-places 1"
+
 #: Maximum size in bytes of a file.
 MAX_BYTES = 2**22
 

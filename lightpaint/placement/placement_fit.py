@@ -34,6 +34,7 @@ from lightpaint.placement.look_goals import LookGoal, balanced, goal_of
 
 #: Share of a column that others cannot replace, below which it counts as none.
 LEAST_OWN = 1e-3
+
 #: Noise of a pixel, as a share of ‖Ψ‖², above which the pixel tells nothing.
 NOISY = 1e-3
 

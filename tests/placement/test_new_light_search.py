@@ -10,7 +10,7 @@ import pytest
 import lightpaint as lp
 from lightpaint.lighting.unknowns.knobs import Knob
 from lightpaint.lighting.unknowns.reduction import Reduction
-from lightpaint.placement.free_light import FreeLight
+from lightpaint.placement.freedom import FreeLight
 from lightpaint.placement.lights_to_place import Arrangement, Movable
 from lightpaint.placement.look_goals import LookGoal
 from lightpaint.placement.placement_fit import PlacementFit

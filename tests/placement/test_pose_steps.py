@@ -11,7 +11,7 @@ from renderer import write_room
 import lightpaint as lp
 from lightpaint.lighting.unknowns.knobs import Knob
 from lightpaint.lighting.unknowns.reduction import Reduction
-from lightpaint.placement.free_light import FreeLight
+from lightpaint.placement.freedom import FreeLight
 from lightpaint.placement.lights_to_place import Arrangement, Movable
 from lightpaint.placement.look_goals import LookGoal
 from lightpaint.placement.paths.panel_lights import PanelSite

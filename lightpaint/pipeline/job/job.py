@@ -63,8 +63,8 @@ from lightpaint.pipeline.results.answer_folder import answer_files
 from lightpaint.pipeline.results.result_folder import ResultFolder
 from lightpaint.pipeline.results.results import SOLVE_RESULTS, VIEW_RESULTS
 from lightpaint.placement.placement import PlacementRecord
-from lightpaint.placement.rigging.rigging import Rigging
-from lightpaint.placement.suggestions.light_search import check_suggestible
+from lightpaint.placement.rigging import Rigging
+from lightpaint.placement.suggested_lights import check_suggestible
 from lightpaint.relit.export.nuke import spoken_unreadable
 from lightpaint.scene.scene import Scene
 from lightpaint.target.target import Target

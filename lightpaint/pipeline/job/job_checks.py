@@ -18,8 +18,8 @@ from lightpaint.lighting.constraints.constraints import Constraints
 from lightpaint.lighting.joined_views import check_same_lights
 from lightpaint.pipeline.job.settings import Settings
 from lightpaint.pipeline.job.sources import Painting, content
-from lightpaint.placement.rigging.rigged_lights import check_names, rigged_lights
-from lightpaint.placement.rigging.rigging import Rigging, rigging_of
+from lightpaint.placement.rigged_lights import check_names, rigged_lights
+from lightpaint.placement.rigging import Rigging, rigging_of
 from lightpaint.scene.lights.texels.domains import DOMAINS
 from lightpaint.scene.lights.texels.sky import Sky
 from lightpaint.scene.lights.texels.texel import mirrored_pairs, node_name

@@ -23,7 +23,7 @@ from lightpaint.lighting.answer.lighting import Lighting
 from lightpaint.lighting.solution import Solution
 from lightpaint.pipeline.results.placement_changes import hung_of
 from lightpaint.placement.placement import Placement
-from lightpaint.placement.suggestions.suggestion import MoveSuggestion, Suggestion
+from lightpaint.placement.suggestion import MoveSuggestion, Suggestion
 from lightpaint.relit.export.exports import EXPORTS
 from lightpaint.relit.verification import Verification
 from lightpaint.report.answer_pictures import report_transform, residual_of

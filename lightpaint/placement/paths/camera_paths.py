@@ -3,6 +3,7 @@ the segments between them, which a panel in the room blocks.
 
 Paths are traced without the panels that a search tries. But a panel is a thing in the room: light
 that its own front sends to a wall close by would not reach the rest of the room through the panel.
+
 Steps of a search are short. So the segments that pass near a panel are kept, and only these are
 tested at the next place, with the vertices that follow them.
 """
@@ -24,8 +25,10 @@ from lightpaint.scene.scene import Scene
 #: Longest paths, in vertices, of integrators without a limit of their own; their light is frozen
 #: without Russian roulette, and the light beyond is a thousandth even in a bright room.
 MOST_VERTICES = 16
+
 #: Radius of a region, relative to that of the panel in its middle, and number of kept regions.
 REACH, KEPT = 2.0, 4
+
 #: Segments that are tested at once, so that they stay in a processor's cache.
 AT_ONCE = 2**14
 

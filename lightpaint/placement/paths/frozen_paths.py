@@ -52,15 +52,20 @@ from lightpaint.scene.scene_render import Stream, pass_seed
 
 #: Shadow rays of one launch; more would only take more memory.
 LANES = 2**20
+
 #: Number of cached values at vertices, which limits the number of cached origins.
 KEPT_VALUES = 2**24
+
 #: Number of panels of which it is kept what they cover.
 KEPT_PANELS = 64
+
 #: Share of vertices on either side whose distance does not count for the size of cells, and the
 #: number of faces of the box of the others.
 FAR_SHARE, FACES = 0.02, 6
+
 #: Growth of cells, at least, while there are too many of them.
 GROWTH = 1.05
+
 #: Odd factors that spread cells over 64 bits.
 _MIXERS = np.array(
     [0x9E3779B97F4A7C15, 0xC2B2AE3D27D4EB4F, 0x165667B19E3779F9, 0x27D4EB2F165667C5], np.uint64

@@ -14,7 +14,7 @@ from typing import Any
 import numpy as np
 
 from lightpaint.arrays import Doubles, Floats, Indices, Position, aligned
-from lightpaint.placement.space.free_space import as_position
+from lightpaint.placement.free_space import as_position
 from lightpaint.scene.changed_emitters import without_emitters
 from lightpaint.scene.lights.light import Light
 from lightpaint.scene.properties.emission import MULTIPLE
@@ -24,8 +24,10 @@ from lightpaint.scene.scene import Scene
 
 #: Cosine of the angle to the opposite direction from which a rotation is half a turn.
 OPPOSITE = -1 + 1e-6
+
 #: Cosine of the angle between the sides of a rectangle, up to which it counts as one.
 SHEAR = 1e-4
+
 #: Half of a cell, in cells: sight lines go through its middle and the middle of two of its edges.
 _HALF = 0.5
 

@@ -18,14 +18,18 @@ from lightpaint.scene.properties.site import Site
 #: Shadow rays stop short of a light by this, relative to its distance, to miss its mounting
 #: surface.
 SHADOW_EPSILON = 1e-3
+
 #: Steps of the sequence that spreads points over a panel: the reciprocals of the plastic number.
 SPREAD = 0.7548776662466927, 0.5698402909980532
+
 #: Distance from a panel, relative to its radius, within which a vertex samples several of its
 #: points, and the largest number of these: a wall close to a panel is bright, and one point noise.
 NEAR, POINTS = 2.0, 32
+
 #: Degrees by which the cone around several directions of a spot exceeds these, so that small turns
 #: need no further shadow rays, and from which on a cone is all directions.
 MARGIN, WIDEST = 12.0, 120.0
+
 #: Values of an origin that a launch reads: position, axis, two half sides of a panel, kind, and the
 #: cosine of the cone.
 ORIGIN_VALUES = 14

@@ -25,20 +25,26 @@ from lightpaint.scene.properties.pose import Site
 #: Number of trial places of a light: if all lights are on lines, otherwise, and for new lights and
 #: new panels, which have many directions and sides.
 PLACES_ON_LINES, PLACES, PLACES_OF_NEW, PLACES_OF_PANELS = 24, 64, 176, 112
+
 #: Number of further trial places of a panel, where the camera may see it, and their largest
 #: distance, relative to the spread of visible points.
 PLACES_IN_VIEW, REACH = 64, 4.0
+
 #: Number of best places around which more are tried, and the number of these.
 BESIDE, AROUND = 10, 10
+
 #: Largest number of rounds over all lights, and the share by which a round has to lower the error
 #: for another one.
 TURNS, WORTH_A_TURN = 2, 0.15
+
 #: Number of candidates for which all light is computed; number of those that are refined, far apart
 #: in place or direction; and the steps of the refinement.
 COMPARED, REFINED, SHORT_STEPS = 40, 5, 4
+
 #: Least distance between refined candidates, relative to the spread of visible points, and in
 #: degrees.
 NEAREST, NARROWEST = 0.15, 25.0
+
 #: Least decrease of the error for which a trial is kept.
 KEPT_GAIN = 0.005
 

@@ -9,7 +9,7 @@ from lightpaint.arrays import Floats
 from lightpaint.colour.display.view_transform import ViewTransform
 from lightpaint.colour.srgb import to_8_bit
 from lightpaint.images.denoiser import denoised
-from lightpaint.placement.suggestions.suggestion import MoveSuggestion, Suggestion
+from lightpaint.placement.suggestion import MoveSuggestion, Suggestion
 from lightpaint.report.page.figures import data_uri
 from lightpaint.report.page.html import html
 from lightpaint.report.phrases import spoken_percent
