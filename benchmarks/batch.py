@@ -24,10 +24,9 @@ from typing import Any
 
 import numpy as np
 
-from lightpaint.basis.basis import Basis
+from lightpaint.basis.basis import Basis, Origin
 from lightpaint.basis.file.basis_file import write_basis
 from lightpaint.basis.lights import BasisLight
-from lightpaint.basis.origin import Origin
 from lightpaint.batch.cluster.cluster import Cluster
 from lightpaint.batch.distribution.basis_parts import PartwiseRender
 from lightpaint.batch.distribution.engine import Engine, InProcess

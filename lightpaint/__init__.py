@@ -33,8 +33,8 @@ from lightpaint.version import __version__
 
 if TYPE_CHECKING:
     from lightpaint.basis.basis import Basis as Basis
+    from lightpaint.basis.file.basis_file import read_basis as read_basis
     from lightpaint.basis.file.basis_file import write_basis as write_basis
-    from lightpaint.basis.file.basis_reader import read_basis as read_basis
     from lightpaint.basis.lightgroups.frame_sequence import FrameSequence as FrameSequence
     from lightpaint.basis.lightgroups.frame_sequence import find_frames as find_frames
     from lightpaint.basis.lightgroups.light_groups import LightGroups as LightGroups
@@ -158,7 +158,7 @@ _HOMES = {
     "load_scene": "scene.scene_reader",
     "paint_with_light": "pipeline.one_call",
     "place": "placement.place",
-    "read_basis": "basis.file.basis_reader",
+    "read_basis": "basis.file.basis_file",
     "read_constraints": "lighting.constraints.constraints_file",
     "read_light_groups": "basis.lightgroups.light_groups",
     "read_lighting": "lighting.answer.lighting_file",

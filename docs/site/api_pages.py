@@ -125,7 +125,7 @@ PARTS: dict[str, tuple[str, ...]] = {
     "scene.properties.site": ("Site", "EmitterPlace"),
     "basis.lights": ("Lights", "BasisLight"),
     "basis.planes": ("Planes", "IndirectLight"),
-    "basis.origin": ("Origin",),
+    "basis.basis": ("Origin",),
     "basis.lightgroups.render_layers": ("RenderLayer",),
     "lighting.constraints.constraints": ("Tie",),
     "lighting.loss.expected_lights": ("ExpectedLights",),

@@ -9,10 +9,9 @@ from typing import Any
 
 import numpy as np
 
-from lightpaint.basis.basis import Basis
+from lightpaint.basis.basis import Basis, meter_exposure
 from lightpaint.basis.cache import cache, scene_facts
 from lightpaint.basis.cache.scene_facts import SceneFacts
-from lightpaint.basis.exposure_meter import meter_exposure
 from lightpaint.basis.lightgroups.light_groups import LightGroups
 from lightpaint.colour.display.view_transform import TransformChoice, ViewTransform
 from lightpaint.errors import PaintError

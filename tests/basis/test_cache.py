@@ -21,8 +21,7 @@ from lightpaint.basis.cache import cache, cache_folder
 from lightpaint.basis.cache.cache_folder import SUFFIX, SUMS_SUFFIX, TAG
 from lightpaint.basis.cache.cached_render import obtain_basis
 from lightpaint.basis.file import basis_file
-from lightpaint.basis.file.basis_file import write_basis
-from lightpaint.basis.file.basis_reader import read_basis
+from lightpaint.basis.file.basis_file import read_basis, write_basis
 from lightpaint.basis.file.file_planes import FilePlanes
 from lightpaint.basis.render.basis_render import render_basis
 from lightpaint.basis.render.render_origin import is_on_the_way

@@ -18,7 +18,7 @@ from pathlib import Path
 import numpy as np
 
 from lightpaint.arrays import Floats
-from lightpaint.basis.basis import Basis
+from lightpaint.basis.basis import Basis, Origin
 from lightpaint.basis.cache.cache_folder import (
     BASIS_NAME,
     LEFTOVER_NAME,
@@ -30,9 +30,7 @@ from lightpaint.basis.cache.cache_folder import (
     is_own,
     mark_folder,
 )
-from lightpaint.basis.file.basis_file import FORMAT, write_basis
-from lightpaint.basis.file.basis_reader import read_basis, read_origin
-from lightpaint.basis.origin import Origin
+from lightpaint.basis.file.basis_file import FORMAT, read_basis, read_origin, write_basis
 from lightpaint.errors import BasisError, LightpaintError, OutputError
 from lightpaint.files import replacing
 

@@ -13,7 +13,7 @@ import numpy as np
 import numpy.typing as npt
 
 from lightpaint.arrays import Floats
-from lightpaint.basis.basis import Basis
+from lightpaint.basis.basis import LIGHT_GROUPS, Basis, Origin
 from lightpaint.basis.lightgroups.denoising_passes import DenoisingPasses, split_passes
 from lightpaint.basis.lightgroups.frame_sequence import FrameSequence
 from lightpaint.basis.lightgroups.group_remarks import (
@@ -26,7 +26,6 @@ from lightpaint.basis.lightgroups.group_remarks import (
 from lightpaint.basis.lightgroups.layer_roles import Roles, roles_of
 from lightpaint.basis.lightgroups.render_layers import RenderFile, RenderLayer, read_render
 from lightpaint.basis.lights import BasisLight, Lights, free_name
-from lightpaint.basis.origin import LIGHT_GROUPS, Origin
 from lightpaint.basis.planes import IndirectLight, as_planes
 from lightpaint.colour.color import LUMINANCE
 from lightpaint.display_text import short_repr, some_names

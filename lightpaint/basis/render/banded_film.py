@@ -13,8 +13,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from lightpaint.arrays import Bools, Floats
-from lightpaint.basis.file.file_planes import RowPlanes
-from lightpaint.basis.file.temporary_array import TemporaryArray
+from lightpaint.basis.file.file_planes import RowPlanes, TemporaryArray
 from lightpaint.basis.render.integrators import plane_count
 from lightpaint.basis.render.sample_halves import mean_and_half_difference
 from lightpaint.errors import SceneError

@@ -8,7 +8,7 @@ from typing import Any
 
 from lightpaint.arrays import Doubles
 from lightpaint.basis.basis import Basis
-from lightpaint.basis.file.basis_reader import read_basis
+from lightpaint.basis.file.basis_file import read_basis
 from lightpaint.basis.render.render_parts import PartRenderer
 from lightpaint.batch.manifest.keys import Final
 from lightpaint.batch.work.spool import read_guide_table

@@ -11,7 +11,7 @@ from typing import Any, Self
 
 from lightpaint.arrays import Floats
 from lightpaint.basis.basis import Basis
-from lightpaint.basis.file.basis_reader import read_basis
+from lightpaint.basis.file.basis_file import read_basis
 from lightpaint.basis.lightgroups.light_groups import LightGroups, read_light_groups
 from lightpaint.colour.display.view_transform import TransformChoice
 from lightpaint.errors import BasisError

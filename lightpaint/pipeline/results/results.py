@@ -6,8 +6,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from lightpaint.basis.basis import Basis
-from lightpaint.basis.origin import Origin
+from lightpaint.basis.basis import Basis, Origin
 from lightpaint.display_text import some_names
 from lightpaint.errors import SceneError
 from lightpaint.files import is_name, one_line, write_bytes, write_text

@@ -9,8 +9,7 @@ import numpy as np
 import pytest
 from light_groups import SIZE, channels, interleaved, multi_part, pictures, write
 
-from lightpaint.basis.file.basis_file import write_basis
-from lightpaint.basis.file.basis_reader import read_basis
+from lightpaint.basis.file.basis_file import read_basis, write_basis
 from lightpaint.basis.lightgroups.folder_files import is_light_groups
 from lightpaint.basis.lightgroups.light_groups import LightGroups, read_light_groups
 from lightpaint.colour.primaries import to_rec709

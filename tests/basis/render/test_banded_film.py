@@ -14,7 +14,7 @@ import lightpaint.scene.scene_render
 from lightpaint.basis.basis import Basis
 from lightpaint.basis.cache import cache
 from lightpaint.basis.cache.cached_render import obtain_basis
-from lightpaint.basis.file import basis_file, basis_reader
+from lightpaint.basis.file import basis_file
 from lightpaint.basis.file.file_planes import FilePlanes
 from lightpaint.basis.file.half_floats import EncodedPlanes
 from lightpaint.basis.planes import MemoryPlanes
@@ -142,7 +142,7 @@ def test_indirect_planes_of_many_lights_stay_in_their_file(
     path = tmp_path / "a.basis.exr"
     basis_file.write_basis(path, whole_basis)
     rendered, cached = (obtain_basis(small_room, spp=20, seed=3) for _ in range(2))
-    for basis in (rendered, cached, basis_reader.read_basis(path)):
+    for basis in (rendered, cached, basis_file.read_basis(path)):
         assert isinstance(basis.planes, EncodedPlanes)
         assert basis.indirect is not None
         assert isinstance(basis.indirect.planes, FilePlanes)
@@ -157,8 +157,8 @@ def test_indirect_planes_of_another_file_are_not_taken(
     monkeypatch.setattr(basis_file, "SINGLES_MAX_BYTES", 0)
     path = tmp_path / "a.basis.exr"
     basis_file.write_basis(path, render_basis(small_room, spp=4, seed=3))
-    assert basis_reader.leave_indirect(whole_basis, path) is whole_basis
-    assert basis_reader.leave_indirect(whole_basis, tmp_path / "none.exr") is whole_basis
+    assert basis_file.leave_indirect(whole_basis, path) is whole_basis
+    assert basis_file.leave_indirect(whole_basis, tmp_path / "none.exr") is whole_basis
 
 
 def test_memory_is_that_of_half_floats_and_some_bands(

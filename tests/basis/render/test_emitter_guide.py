@@ -9,8 +9,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from renderer import REPOSITORY, assert_equal_bits, write_room
 
-from lightpaint.basis.file.basis_file import write_basis
-from lightpaint.basis.file.basis_reader import read_basis
+from lightpaint.basis.file.basis_file import read_basis, write_basis
 from lightpaint.basis.render import guide_training
 from lightpaint.basis.render.basis_render import _render_one_by_one, render_basis
 from lightpaint.basis.render.render_budget import Budget, Keeper

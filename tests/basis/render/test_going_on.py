@@ -11,8 +11,7 @@ from renderer import LIGHTS, assert_equal_bits, same_basis, write_room
 
 import lightpaint.scene.scene_render
 from lightpaint.basis.basis import Basis
-from lightpaint.basis.file.basis_file import write_basis
-from lightpaint.basis.file.basis_reader import read_basis
+from lightpaint.basis.file.basis_file import read_basis, write_basis
 from lightpaint.basis.render import guide_training
 from lightpaint.basis.render.basis_render import render_basis
 from lightpaint.errors import BasisError

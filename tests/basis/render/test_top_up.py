@@ -15,8 +15,7 @@ import lightpaint.scene.scene_render
 from lightpaint.basis.basis import Basis
 from lightpaint.basis.cache import cache
 from lightpaint.basis.cache.cached_render import obtain_basis, top_up_basis
-from lightpaint.basis.file.basis_file import write_basis
-from lightpaint.basis.file.basis_reader import read_basis
+from lightpaint.basis.file.basis_file import read_basis, write_basis
 from lightpaint.basis.render import guide_training, pixel_top_up
 from lightpaint.basis.render.basis_render import render_basis
 from lightpaint.basis.render.render_origin import is_on_the_way
