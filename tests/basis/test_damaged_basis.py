@@ -22,8 +22,8 @@ from lightpaint.basis.file.basis_file import (
     write_basis,
 )
 from lightpaint.basis.file.file_parts import CHECKSUMS_KEY, LIGHT_KEY
-from lightpaint.basis.lightgroups.folder_files import MAX_FILES, is_light_groups
 from lightpaint.basis.lightgroups.light_groups import read_light_groups
+from lightpaint.basis.lightgroups.render_layers import MAX_FILES, is_light_groups
 from lightpaint.errors import BasisError, ImageError
 from lightpaint.images.formats.exr import ExrPart, read_parts, write_parts, write_rgb
 

@@ -20,7 +20,7 @@ import numpy.typing as npt
 from lightpaint.arrays import Doubles, Floats
 from lightpaint.basis.basis import Basis
 from lightpaint.basis.cache import cache
-from lightpaint.basis.cache.cache_folder import DENOISED_SUFFIX, is_own
+from lightpaint.basis.cache.cache import DENOISED_SUFFIX, is_own
 from lightpaint.basis.denoised_mixes import denoise_current_look, denoise_plane, share_of_clean
 from lightpaint.basis.planes import mix
 from lightpaint.errors import LightpaintError

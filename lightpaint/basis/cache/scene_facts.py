@@ -23,7 +23,7 @@ from typing import Any
 
 from lightpaint.basis.basis import Basis
 from lightpaint.basis.cache import cache as bases
-from lightpaint.basis.cache.cache_folder import FACTS_SUFFIX, folder, is_own
+from lightpaint.basis.cache.cache import FACTS_SUFFIX, folder, is_own
 from lightpaint.basis.lights import BasisLight, Lights
 from lightpaint.errors import LightpaintError
 from lightpaint.files import write_text

@@ -5,8 +5,7 @@ from pathlib import Path
 from typing import Any
 
 from lightpaint.basis.basis import Basis
-from lightpaint.basis.lightgroups.frame_groups import with_equal_lights
-from lightpaint.basis.lightgroups.light_groups import LightGroups
+from lightpaint.basis.lightgroups.light_groups import LightGroups, with_equal_lights
 from lightpaint.errors import (
     BasisError,
     ConstraintError,
