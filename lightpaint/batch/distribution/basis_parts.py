@@ -5,9 +5,8 @@ from typing import Any
 
 from lightpaint.arrays import Floats
 from lightpaint.basis.basis import Basis
-from lightpaint.basis.render.basis_render import render_basis, with_first_hits
-from lightpaint.basis.render.guide_training import training_samples
-from lightpaint.basis.render.render_memory import check_memory
+from lightpaint.basis.render.banded_film import check_memory
+from lightpaint.basis.render.basis_render import render_basis, training_samples, with_first_hits
 from lightpaint.basis.render.render_origin import ONE_PASS, method_of
 from lightpaint.basis.render.render_parts import Part, PartSums, plan_parts
 from lightpaint.batch.distribution.engine import Engine

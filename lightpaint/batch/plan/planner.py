@@ -6,7 +6,7 @@ from pathlib import Path
 from typing import Any
 
 from lightpaint.basis.lightgroups.light_groups import LightGroups
-from lightpaint.basis.render.render_memory import memory_needed
+from lightpaint.basis.render.banded_film import memory_needed
 from lightpaint.batch.manifest.entries import LookEntry
 from lightpaint.batch.manifest.folder_names import check_gallery
 from lightpaint.batch.manifest.key_spelling import with_manifest_keys

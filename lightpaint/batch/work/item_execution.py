@@ -9,7 +9,7 @@ from typing import Any
 
 from lightpaint.basis.basis import Basis
 from lightpaint.basis.lightgroups.light_groups import LightGroups
-from lightpaint.basis.render.guide_training import train_guide
+from lightpaint.basis.render.basis_render import train_guide
 from lightpaint.batch.manifest.key_spelling import with_manifest_keys
 from lightpaint.batch.manifest.keys import Space
 from lightpaint.batch.manifest.sequence import interpolate

@@ -18,10 +18,9 @@ from lightpaint.basis.file import basis_file
 from lightpaint.basis.file.file_planes import FilePlanes
 from lightpaint.basis.file.half_floats import EncodedPlanes
 from lightpaint.basis.planes import MemoryPlanes
-from lightpaint.basis.render import banded_film, guide_training
-from lightpaint.basis.render.banded_film import FileSums, SumPlanes
+from lightpaint.basis.render import banded_film, basis_render
+from lightpaint.basis.render.banded_film import FileSums, SumPlanes, memory_needed, renders_in_bands
 from lightpaint.basis.render.basis_render import render_basis
-from lightpaint.basis.render.render_memory import memory_needed, renders_in_bands
 from lightpaint.errors import SceneError
 from lightpaint.progress import Interrupted
 from lightpaint.scene.scene import Scene
@@ -34,7 +33,7 @@ ROWS = 6
 def small_steps(monkeypatch: pytest.MonkeyPatch) -> None:
     """Steps of four samples of a pixel of a band in each half."""
     monkeypatch.setattr(lightpaint.scene.scene_render, "SAMPLES_PER_PASS", 4 * 4 * 24 * ROWS)
-    monkeypatch.setattr(guide_training, "TRAINING_SAMPLES", (2**12,))
+    monkeypatch.setattr(basis_render, "TRAINING_SAMPLES", (2**12,))
 
 
 @pytest.fixture
