@@ -18,7 +18,7 @@ from lightpaint.batch.folder_lock import lock_folder
 from lightpaint.batch.gallery.gallery import write_gallery
 from lightpaint.batch.gallery.small_planes import write_task_planes
 from lightpaint.batch.manifest.folder_names import THUMBNAILS
-from lightpaint.batch.manifest.key_spelling import with_manifest_keys
+from lightpaint.batch.manifest.keys import with_manifest_keys
 from lightpaint.batch.placed_bases import obtain_placed_bases
 from lightpaint.batch.plan.cost_estimate import look_seconds
 from lightpaint.batch.plan.journal import Journal, JournalLine

@@ -23,7 +23,7 @@ from lightpaint.batch.distribution.processes import Processes
 from lightpaint.batch.gallery.gallery import contact_sheet, gallery_page
 from lightpaint.batch.gallery.summary import LightRow, SummaryRow, summary_csv
 from lightpaint.batch.manifest.folder_names import FILES, is_reserved
-from lightpaint.batch.manifest.key_spelling import with_manifest_keys
+from lightpaint.batch.manifest.keys import with_manifest_keys
 from lightpaint.batch.manifest.manifest import read_manifest
 from lightpaint.batch.plan.planner import plan
 from lightpaint.batch.run import _Run, run_batch

@@ -1,6 +1,11 @@
-"""The keys of a manifest, and the values that each takes."""
+"""The keys of a manifest, and the values that each takes.
+
+The library's arguments are spelled as keys in errors: `find_template = false` for `find=False`.
+"""
 
 import difflib
+import json
+import re
 from collections.abc import Callable, Collection, Iterable, Mapping
 from dataclasses import dataclass, field, replace
 from pathlib import Path
@@ -30,6 +35,17 @@ Space = Literal["log", "oklab"]
 
 #: Maximum number of frames of one sequence.
 MAX_FRAMES = 10_000
+
+#: Keys of arguments that a manifest calls by another name.
+OTHER_NAMES = {"find": "find_template", "transform": "view"}
+
+#: Values of TOML for values of Python.
+TOML_VALUES = {"True": "true", "False": "false"}
+
+#: `name=value` as the library writes it: a separate word, so that no path matches.
+_ARGUMENT = re.compile(
+    r"""(?<![^\s(])(\w+)=(\.\.\.|True|False|\d+|'[^']*'|"\w+")(?=[,;:.)]*(?:\s|$))"""
+)
 
 
 def _texts(value: Any) -> bool:
@@ -79,11 +95,19 @@ def _is_text(value: Any) -> bool:
 
 
 _TEXT_SCHEMA = {"type": "string", "minLength": 1}
+
+
 _TEXTS_SCHEMA = {"type": "array", "items": _TEXT_SCHEMA, "minItems": 1, "maxItems": MAX_LISTED}
 
+
 TEXT = Check(_is_text, "a text", _TEXT_SCHEMA)
+
+
 TEXTS = Check(_texts, f'a list of texts, ["a", "b"], {MAX_LISTED} at most', _TEXTS_SCHEMA)
+
+
 TABLE = a(dict, "a table")
+
 
 #: Keys for loading a scene or its replacement.
 SOURCE_KEYS: dict[str, Check] = {
@@ -122,6 +146,7 @@ SOURCE_KEYS: dict[str, Check] = {
     "map_size": TEXT,
 }
 
+
 #: Keys for reading a painting.
 PAINTING_KEYS: dict[str, Check] = {
     "mask": TEXT,
@@ -132,6 +157,7 @@ PAINTING_KEYS: dict[str, Check] = {
     "exposure": Check(_is_number, "a number of stops", {"type": "number"}),
     "paint": one_of(Paint),
 }
+
 
 #: Keys for constraints, settings and steps.
 REQUEST_KEYS: dict[str, Check] = {
@@ -146,6 +172,7 @@ REQUEST_KEYS: dict[str, Check] = {
     "share": Check(lambda v: v in get_args(Share), '"places"', {"enum": [*get_args(Share)]}),
 }
 
+
 #: Keys of which a look has exactly one.
 SUBJECT_KEYS: dict[str, Check] = {
     "painting": TEXT,
@@ -155,8 +182,13 @@ SUBJECT_KEYS: dict[str, Check] = {
     "lightings": TEXTS,
 }
 
+
 DEFAULT_KEYS: dict[str, Check] = {**SOURCE_KEYS, **PAINTING_KEYS, **REQUEST_KEYS}
+
+
 LOOK_KEYS: dict[str, Check] = {"name": TEXT, **SUBJECT_KEYS, **DEFAULT_KEYS}
+
+
 SEQUENCE_KEYS: dict[str, Check] = {
     "name": TEXT,
     "through": Check(_texts, "a list of names of looks", _TEXTS_SCHEMA),
@@ -167,6 +199,7 @@ SEQUENCE_KEYS: dict[str, Check] = {
     "render": TABLE,
     "export": TABLE,
 }
+
 
 #: Fields of `Settings` that have no other place in a manifest or on the command line, with their
 #: checks.
@@ -280,3 +313,19 @@ class Mistakes:
 def near_key(key: str, keys: Iterable[str]) -> str:
     """Return the known key that a misspelt one probably stands for; "" where none is near."""
     return next(iter(difflib.get_close_matches(key, list(keys), 1)), "")
+
+
+def with_manifest_keys(text: str) -> str:
+    """Return an error of the library with the keys of a manifest for arguments that have one."""
+    return _ARGUMENT.sub(_as_key, text)
+
+
+def _as_key(match: re.Match[str]) -> str:
+    name, value = match.groups()
+    name = OTHER_NAMES.get(name, name)
+    if name in SETTINGS:
+        name = f"settings.{name}"
+    elif name not in DEFAULT_KEYS:
+        return match[0]
+    value = json.dumps(value[1:-1], ensure_ascii=False) if value[0] == "'" else value
+    return f"{name} = {TOML_VALUES.get(value, value)}"

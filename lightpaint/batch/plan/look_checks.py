@@ -12,8 +12,7 @@ from lightpaint.basis.lights import BasisLight
 from lightpaint.basis.render.integrators import why_not_one_pass
 from lightpaint.basis.render.render_origin import basis_lights
 from lightpaint.batch.manifest.entries import LookEntry
-from lightpaint.batch.manifest.key_spelling import with_manifest_keys
-from lightpaint.batch.manifest.keys import Mistakes
+from lightpaint.batch.manifest.keys import Mistakes, with_manifest_keys
 from lightpaint.batch.work.worker_cache import WorkerCache
 from lightpaint.display_text import some_names
 from lightpaint.errors import LOOK_ERRORS, BatchError, LightpaintError

@@ -7,11 +7,9 @@ from typing import Any
 
 from lightpaint.basis.lightgroups.light_groups import LightGroups
 from lightpaint.basis.render.banded_film import memory_needed
-from lightpaint.batch.manifest.entries import LookEntry
+from lightpaint.batch.manifest.entries import LookEntry, entries_of
 from lightpaint.batch.manifest.folder_names import check_gallery
-from lightpaint.batch.manifest.key_spelling import with_manifest_keys
-from lightpaint.batch.manifest.keys import Mistakes
-from lightpaint.batch.manifest.look_list import entries_of
+from lightpaint.batch.manifest.keys import Mistakes, with_manifest_keys
 from lightpaint.batch.manifest.manifest import Manifest, read_manifest
 from lightpaint.batch.manifest.variations import vary
 from lightpaint.batch.plan.fingerprint import Fingerprints

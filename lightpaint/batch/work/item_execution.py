@@ -10,8 +10,7 @@ from typing import Any
 from lightpaint.basis.basis import Basis
 from lightpaint.basis.lightgroups.light_groups import LightGroups
 from lightpaint.basis.render.basis_render import train_guide
-from lightpaint.batch.manifest.key_spelling import with_manifest_keys
-from lightpaint.batch.manifest.keys import Space
+from lightpaint.batch.manifest.keys import Space, with_manifest_keys
 from lightpaint.batch.manifest.sequence import interpolate
 from lightpaint.batch.manifest.variations import shift
 from lightpaint.batch.work.derived_looks import derived_folder, dimmer_lights, publish_derived

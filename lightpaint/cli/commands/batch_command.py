@@ -11,7 +11,7 @@ from lightpaint.batch.batch_outcome import BatchOutcome
 from lightpaint.batch.gallery.gallery import counts_text
 from lightpaint.batch.gallery.summary import SummaryRow, summary_document
 from lightpaint.batch.manifest.folder_names import FILES
-from lightpaint.batch.manifest.starter_manifest import write_starter_manifest
+from lightpaint.batch.manifest.manifest import write_starter_manifest
 from lightpaint.batch.plan.cost_estimate import estimate
 from lightpaint.batch.plan.openjd import LOOK_PARAMETER, write_openjd
 from lightpaint.batch.plan.plan import Plan, PlannedLook
