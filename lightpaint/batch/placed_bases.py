@@ -7,8 +7,7 @@ from lightpaint.basis.basis import Basis
 from lightpaint.batch.distribution.engine import Engine
 from lightpaint.batch.plan.place_groups import PlaceGroup
 from lightpaint.batch.task_bases import obtain_moved_basis, obtain_scene_basis, save_bases
-from lightpaint.batch.work.item_execution import job_fields
-from lightpaint.batch.work.shared_places import SharedPlacing
+from lightpaint.batch.work.item_execution import SharedPlacing, job_fields
 from lightpaint.batch.work.task import Task, key_of_scene
 from lightpaint.batch.work.worker_cache import WorkerCache
 from lightpaint.display_text import some_names

@@ -16,13 +16,12 @@ from lightpaint.batch.distribution.engine import Engine, InProcess
 from lightpaint.batch.distribution.processes import Processes
 from lightpaint.batch.folder_lock import lock_folder
 from lightpaint.batch.gallery.gallery import write_gallery
-from lightpaint.batch.gallery.small_planes import write_task_planes
+from lightpaint.batch.gallery.gallery_mixers import write_task_planes
 from lightpaint.batch.manifest.folder_names import THUMBNAILS
 from lightpaint.batch.manifest.keys import with_manifest_keys
 from lightpaint.batch.placed_bases import obtain_placed_bases
-from lightpaint.batch.plan.cost_estimate import look_seconds
 from lightpaint.batch.plan.journal import Journal, JournalLine
-from lightpaint.batch.plan.plan import Plan, PlannedLook, PlanStep, by_bases, waves
+from lightpaint.batch.plan.plan import Plan, PlannedLook, PlanStep, by_bases, look_seconds, waves
 from lightpaint.batch.run_options import RunOptions
 from lightpaint.batch.task_bases import has_basis, obtain_bases, save_bases, save_former_looks
 from lightpaint.batch.work.item_execution import (

@@ -10,9 +10,8 @@ from lightpaint.basis.render.basis_render import render_basis, training_samples,
 from lightpaint.basis.render.render_origin import ONE_PASS, method_of
 from lightpaint.basis.render.render_parts import Part, PartSums, plan_parts
 from lightpaint.batch.distribution.engine import Engine
-from lightpaint.batch.work.render_cost import render_seconds
 from lightpaint.batch.work.spool import Spool
-from lightpaint.batch.work.work_items import GuideTraining, PartOfBasis, SceneFilm
+from lightpaint.batch.work.work_items import GuideTraining, PartOfBasis, SceneFilm, render_seconds
 from lightpaint.errors import BasisError
 from lightpaint.progress import Progress
 from lightpaint.scene.scene import Scene

@@ -6,9 +6,8 @@ from pathlib import Path
 import numpy as np
 
 from lightpaint.batch.distribution.engine import Engine
-from lightpaint.batch.work.render_cost import SAMPLE_S
 from lightpaint.batch.work.task import Task
-from lightpaint.batch.work.work_items import Passes
+from lightpaint.batch.work.work_items import SAMPLE_S, Passes
 from lightpaint.errors import SceneError
 from lightpaint.images.estimate import Estimate
 from lightpaint.pipeline.job.sources import SceneFile

@@ -9,12 +9,16 @@ from lightpaint.basis.render.render_origin import basis_lights
 from lightpaint.basis.render.render_parts import plan_parts
 from lightpaint.batch.distribution.basis_parts import obtain_guide_table
 from lightpaint.batch.distribution.engine import Engine
-from lightpaint.batch.work.item_execution import attempt, job_fields
-from lightpaint.batch.work.render_cost import render_seconds
+from lightpaint.batch.work.item_execution import attempt, job_fields, publish_solved_lights
 from lightpaint.batch.work.spool import Spool
-from lightpaint.batch.work.sums_answer import publish_solved_lights
 from lightpaint.batch.work.task import Task
-from lightpaint.batch.work.work_items import ItemResult, PaintingOfSums, SceneFilm, SumsOfRows
+from lightpaint.batch.work.work_items import (
+    ItemResult,
+    PaintingOfSums,
+    SceneFilm,
+    SumsOfRows,
+    render_seconds,
+)
 from lightpaint.batch.work.worker_cache import WorkerCache
 from lightpaint.errors import BasisError
 from lightpaint.lighting.linear_problem import Sums
