@@ -23,10 +23,9 @@ from renderer import write_room
 
 from lightpaint.basis.render import basis_render
 from lightpaint.basis.render import render_parts as parts_module
-from lightpaint.batch.batch_outcome import BatchOutcome
 from lightpaint.batch.cluster.cluster import Cluster
 from lightpaint.batch.plan.planner import plan
-from lightpaint.batch.run import run_batch
+from lightpaint.batch.run import BatchOutcome, run_batch
 from lightpaint.batch.run_options import RunOptions
 from lightpaint.images.formats.exr import write_rgb
 from lightpaint.scene import scene_render

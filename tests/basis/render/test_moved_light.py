@@ -21,7 +21,7 @@ from lightpaint.basis.file.basis_file import read_basis, write_basis
 from lightpaint.basis.file.file_planes import FilePlanes
 from lightpaint.basis.render.basis_render import render_basis
 from lightpaint.basis.render.render_budget import Budget, steps
-from lightpaint.batch.distribution.basis_parts import PartwiseRender
+from lightpaint.batch.distributed_work import PartwiseRender
 from lightpaint.batch.work.item_execution import run_item
 from lightpaint.batch.work.work_items import ItemResult, SceneFilm
 from lightpaint.batch.work.worker_cache import WorkerCache
