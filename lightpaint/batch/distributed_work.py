@@ -83,7 +83,7 @@ class PartwiseRender:
         parts = plan_parts(scene, spp, start=start)
         spool = Spool(scene, parts, seed=seed, start=start)
         film = self._film_of(scene)
-        guide_table = obtain_guide_table(self._engine, film, scene, seed, start, spool)
+        guide_table = _obtain_guide_table(self._engine, film, scene, seed, start, spool)
         sums = PartSums(scene, parts, seed=seed, start=start)
         self._add_all(scene, parts, sums, seed, spool, progress)
         basis = sums.basis(guide_table)
@@ -129,7 +129,7 @@ class PartwiseRender:
             progress("basis", len(parts) - len(missing) + count + 1, len(parts), "parts")
 
 
-def obtain_guide_table(
+def _obtain_guide_table(
     engine: Engine,
     film: SceneFilm,
     scene: Scene,
@@ -198,7 +198,7 @@ def _render_sums(
     file = replace(job_fields(task, cache)["scenes"][0])
     film = SceneFilm(file, settings.quality, settings.resolution, tuple(map(str, scene.read_files)))
     spool = Spool(scene, parts, seed=settings.seed, start=None)
-    obtain_guide_table(engine, film, scene, settings.seed, None, spool)
+    _obtain_guide_table(engine, film, scene, settings.seed, None, spool)
     paintings = tuple(
         PaintingOfSums(_file_of(job), job.fit.emitters, job.settings.resize) for job in jobs
     )

@@ -65,12 +65,12 @@ def obtain_bases(
         return []
     settings: Settings = fields["settings"]
     return [
-        obtain_scene_basis(key, scene, settings, engine, worker_cache, listen)
+        _obtain_scene_basis(key, scene, settings, engine, worker_cache, listen)
         for key, scene in zip(task.bases, fields["scenes"], strict=True)
     ]
 
 
-def obtain_scene_basis(
+def _obtain_scene_basis(
     key: str,
     scene: SceneFile,
     settings: Settings,
@@ -89,7 +89,7 @@ def obtain_scene_basis(
     return basis
 
 
-def obtain_moved_basis(
+def _obtain_moved_basis(
     scene: SceneFile,
     unmoved_basis: Basis,
     record: PlacementRecord,
@@ -154,7 +154,7 @@ def obtain_placed_bases(
     views |= dict(zip(keys, fields["scenes"], strict=True))
     settings: Settings = fields["settings"]
     unmoved_bases = {
-        key: obtain_scene_basis(key, scene, settings, engine, cache, listen)
+        key: _obtain_scene_basis(key, scene, settings, engine, cache, listen)
         for key, scene in views.items()
     }
     if record is None:
@@ -164,7 +164,7 @@ def obtain_placed_bases(
         _draw_room(group, record, views[first].content, deciding[first])
     bases = []
     for key, old_key, scene in zip(task.bases, keys, fields["scenes"], strict=True):
-        basis = obtain_moved_basis(
+        basis = _obtain_moved_basis(
             scene, unmoved_bases[old_key], record, str(group.file), settings, engine, listen
         )
         cache.put(key, basis)

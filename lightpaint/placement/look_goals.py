@@ -74,7 +74,7 @@ def films_of(views: Sequence[tuple[Scene, Basis]]) -> tuple[list[Scene], list[Sc
     Raises SceneError if a basis is of another film than its scene.
     """
     large = [on_small_film(scene, basis, FINE_PIXELS // len(views)) for scene, basis in views]
-    return [reduced_film(scene, PIXELS // len(views)) for scene in large], large
+    return [_reduced_film(scene, PIXELS // len(views)) for scene in large], large
 
 
 def on_small_film(scene: Scene, basis: Basis, pixels: int) -> Scene:
@@ -88,10 +88,10 @@ def on_small_film(scene: Scene, basis: Basis, pixels: int) -> Scene:
             f"the basis is {mine_w}x{mine_h}, whose pixels are not blocks of those of the film "
             f"of {scene.path}, {width}x{height}: make it again"
         )
-    return reduced_film(scene.reduced(f"{mine_w}x{mine_h}"), pixels)
+    return _reduced_film(scene.reduced(f"{mine_w}x{mine_h}"), pixels)
 
 
-def reduced_film(scene: Scene, pixels: int) -> Scene:
+def _reduced_film(scene: Scene, pixels: int) -> Scene:
     """Return `scene` on a film of at most `pixels`, if possible without incomplete blocks."""
     return scene.reduced(f"1/{reduction_to(scene.film, pixels)}")
 

@@ -102,19 +102,19 @@ class Rigging:
         lead = f"{where}: " if where else ""
         lights = []
         for name, table in _table(light, f"{lead}light").items():
-            check_move(table, f"{lead}light.{name}")
+            _check_move(table, f"{lead}light.{name}")
             lights.append((name, dict(table), f"{lead}light.{name}"))
         lights.sort(key=lambda entry: not is_pattern(entry[0]))
         named = []
         for name, table in _table(on, f"{lead}on").items():
-            check_on(table, f"{lead}on.{name}")
+            _check_on(table, f"{lead}on.{name}")
             named.append((name, dict(table), f"{lead}on.{name}"))
         added = _tables(new, f"{lead}new")
         for table, place in added:
-            check_new(table, place)
+            _check_new(table, place)
         pairs = _tables(pair, f"{lead}pair")
         for table, place in pairs:
-            check_pair(table, place)
+            _check_pair(table, place)
         return cls(lights=tuple(lights), on=tuple(named), new=added, pairs=pairs)
 
     def and_then(self, others: "Rigging") -> "Rigging":
@@ -188,7 +188,7 @@ def _text(value: Any) -> str:
     return f"{value:g}" if is_number else str(value)
 
 
-def check_move(table: Mapping[str, Any], where: str) -> None:
+def _check_move(table: Mapping[str, Any], where: str) -> None:
     """Raise ConstraintError unless these are valid values of `move`, `aim`, `cone`, `beam`."""
     check_keys(table, MOVES, where)
     if "move" in table:
@@ -196,7 +196,7 @@ def check_move(table: Mapping[str, Any], where: str) -> None:
     _check_turns(table, where)
 
 
-def check_on(table: Mapping[str, Any], where: str) -> None:
+def _check_on(table: Mapping[str, Any], where: str) -> None:
     """Raise ConstraintError unless it is a rail, or a surface of shapes."""
     check_keys(table, ON_KEYS, where)
     if ("line" in table) == ("shapes" in table):
@@ -216,7 +216,7 @@ def check_on(table: Mapping[str, Any], where: str) -> None:
         raise _wrong(f"{where}.clear", table["clear"], "the distance from the surface, like 0.1")
 
 
-def check_new(table: Mapping[str, Any], where: str) -> None:
+def _check_new(table: Mapping[str, Any], where: str) -> None:
     """Raise ConstraintError unless it describes lights to add."""
     check_keys(table, (*NEW_KEYS, *NEW_CONSTRAINTS), where)
     if ("kind" in table) == ("like" in table):
@@ -259,7 +259,7 @@ def constraint_of(table: Mapping[str, Any]) -> dict[str, Any]:
     return {key: value for key, value in table.items() if key in NEW_CONSTRAINTS}
 
 
-def check_pair(table: Mapping[str, Any], where: str) -> None:
+def _check_pair(table: Mapping[str, Any], where: str) -> None:
     """Raise ConstraintError unless it names two lights and a plane between them."""
     check_keys(table, ("lights", "mirror"), where)
     lights: Any = table.get("lights")

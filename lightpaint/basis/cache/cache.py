@@ -153,10 +153,10 @@ def keep(basis: Basis) -> bool:
     """
     try:
         path = _path_of(basis)
-        mark_folder()
+        _mark_folder()
         _write_sums(basis)
         write_basis(path, basis)
-        for other in companions_of(path):
+        for other in _companions_of(path):
             is_old = basis.sums is None or other != _sums_path(basis)
             if other.name.endswith(SUMS_SUFFIX) and is_old:
                 other.unlink()
@@ -246,7 +246,7 @@ def _prune(path: Path) -> None:
             continue
         remaining_bytes -= entry.size
         if remaining_bytes < 0:
-            for file in (*companions_of(entry.path), entry.path):
+            for file in (*_companions_of(entry.path), entry.path):
                 file.unlink(missing_ok=True)
 
 
@@ -278,7 +278,7 @@ def delete_entries(entries: Iterable[Entry]) -> int:
     freed_bytes = 0
     for entry in entries:
         try:
-            for file in (*companions_of(entry.path), entry.path):
+            for file in (*_companions_of(entry.path), entry.path):
                 file.unlink(missing_ok=True)
         except OSError as error:
             raise OutputError(f"cannot delete {entry.path}: {error.strerror or error}") from error
@@ -305,7 +305,7 @@ def _path_of(basis: Basis) -> Path:
 
 
 def _entry(path: Path) -> Entry:
-    size = sum(file.stat().st_size for file in (path, *companions_of(path)))
+    size = sum(file.stat().st_size for file in (path, *_companions_of(path)))
     try:
         origin, image_size, identities = read_origin(path)
     except LightpaintError:
@@ -332,7 +332,7 @@ def folder() -> Path:
     return path
 
 
-def mark_folder() -> None:
+def _mark_folder() -> None:
     """Mark the folder as ours, unless it is marked already. Raises OutputError."""
     tag = folder() / TAG
     if not tag.exists():
@@ -358,7 +358,7 @@ def is_trusted_owner(status: os.stat_result) -> bool:
     return not hasattr(os, "geteuid") or status.st_uid in (os.geteuid(), 0)
 
 
-def companions_of(path: Path) -> list[Path]:
+def _companions_of(path: Path) -> list[Path]:
     """Return the files derived from the basis at `path`."""
     name = path.name.removesuffix(SUFFIX)
     return [companion for companion, stem in _companions() if stem == name]

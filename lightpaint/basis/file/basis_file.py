@@ -127,7 +127,7 @@ def as_stored(basis: Basis, keep: Callable[[Basis], object] = lambda basis: None
     """
     stored_basis = _encoded(basis)
     keep(stored_basis)
-    if is_encoded(len(basis.lights), basis.size):
+    if _is_encoded(len(basis.lights), basis.size):
         return stored_basis
     for planes, stored_planes in zip(plane_sets(basis), plane_sets(stored_basis), strict=True):
         if planes is not stored_planes:
@@ -136,7 +136,7 @@ def as_stored(basis: Basis, keep: Callable[[Basis], object] = lambda basis: None
     return basis.without_cached_values()
 
 
-def is_encoded(lights: int, size: tuple[int, int]) -> bool:
+def _is_encoded(lights: int, size: tuple[int, int]) -> bool:
     """Return whether planes of this number of lights are held in memory in their file's
     encoding.
     """
@@ -237,7 +237,7 @@ def leave_indirect(basis: Basis, path: Path) -> Basis:
     Only denoised pictures need them, so they take no memory otherwise. path: the file that holds
     exactly this basis; if it does not, or has another layout, `basis` is returned unchanged.
     """
-    if basis.indirect is None or not is_encoded(len(basis.lights), basis.size):
+    if basis.indirect is None or not _is_encoded(len(basis.lights), basis.size):
         return basis
     try:
         file = RowFile(path)
@@ -293,7 +293,7 @@ def _basis_of_parts(parts: Sequence[ExrPart], head: Mapping[str, str]) -> Basis:
 
     def planes(order: Sequence[int], number: int) -> Planes:
         channels = [(light_parts[k], scales[k][number]) for k in order]
-        if is_encoded(len(light_parts), light_parts[0].size):
+        if _is_encoded(len(light_parts), light_parts[0].size):
             channel_readers = stored_channels(channels, PLANE_CHANNELS[number])
             return EncodedPlanes(
                 [

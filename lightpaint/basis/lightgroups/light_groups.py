@@ -176,7 +176,7 @@ def _light_groups(
     if beauty is not None:
         remark += f"; the whole picture: {beauty.name or 'R, G, B'}"
     remarks = [*render.remarks, remark, *roles.remarks, missing.remark]
-    remarks += remarks_on_black(roles.lights, missing.share)
+    remarks += _remarks_on_black(roles.lights, missing.share)
     if lights[0].primaries is not None:
         remarks.append(
             "the file has other primaries than Rec.709: multipliers are for linear Rec.709, so a "
@@ -186,7 +186,7 @@ def _light_groups(
         remarks.append(f"{int(holes.sum())} pixels hold NaN or Inf in a layer and count nothing")
     basis = _basis(path, roles, passes, missing.rest, holes)
     basis = replace(basis, objects=render.objects)
-    remarks += remarks_on_passes(basis)
+    remarks += _remarks_on_passes(basis)
     without_pixels = np.empty((0, 0, 3))
     layers = [replace(x, image=without_pixels.astype(x.image.dtype)) for x in lights]
     return LightGroups(
@@ -216,9 +216,9 @@ def _basis(
     images = np.empty((len(lights) + (rest is not None), height, width, 3), np.float32)
     first = next(iter(lights.values()))
     for image, layer in zip(images, lights.values(), strict=False):
-        image[:] = layer.in_rec709(without_holes(layer.image, holes))
+        image[:] = layer.in_rec709(_without_holes(layer.image, holes))
     if rest is not None:
-        basis_lights.append(rest_light(lights))
+        basis_lights.append(_rest_light(lights))
         images[-1] = first.in_rec709(rest)
     unknown_noise = as_planes(np.zeros_like(images))
     indirect = _indirect_planes(roles, passes, images, holes)
@@ -245,11 +245,11 @@ def _indirect_planes(
     indirect = images.copy()
     for plane, part, layer in zip(indirect, parts, roles.lights.values(), strict=False):
         if part is not None:
-            plane[:] = layer.in_rec709(without_holes(part, holes))
+            plane[:] = layer.in_rec709(_without_holes(part, holes))
     return indirect
 
 
-def rest_light(names: Collection[str]) -> BasisLight:
+def _rest_light(names: Collection[str]) -> BasisLight:
     """Return the light that holds what the lights of these names lack of the beauty."""
     name = free_name(REST_NAME, names)
     return _light(name, "beauty less the groups", "rest", is_fixed=True)
@@ -300,8 +300,8 @@ def missing_light(roles: Roles, holes: npt.NDArray[np.bool_]) -> MissingLight:
         elif setting := _setting(roles, "beauty"):
             text += f": render it with them ({setting})"
         return MissingLight(None, None, None, text)
-    whole = without_holes(beauty.image, holes).astype(np.float64)
-    rest = whole - sum(without_holes(layer.image, holes).astype(np.float64) for layer in lights)
+    whole = _without_holes(beauty.image, holes).astype(np.float64)
+    rest = whole - sum(_without_holes(layer.image, holes).astype(np.float64) for layer in lights)
     missing, exceeding = missing_and_exceeding(rest, whole)
     name = free_name(REST_NAME, roles.lights)
     if roles.noisy is not None:
@@ -334,12 +334,12 @@ def _setting(roles: Roles, of: Literal["group", "beauty", "ungrouped"]) -> str:
     return settings[of]
 
 
-def without_holes(image: Floats, holes: npt.NDArray[np.bool_]) -> npt.NDArray[np.float32]:
+def _without_holes(image: Floats, holes: npt.NDArray[np.bool_]) -> npt.NDArray[np.float32]:
     """Return a picture (h, w, 3) that is black in the holes (h, w)."""
     return np.where(holes[..., None], np.float32(0), image.astype(np.float32))
 
 
-def remarks_on_black(lights: Mapping[str, RenderLayer], missing: float | None) -> list[str]:
+def _remarks_on_black(lights: Mapping[str, RenderLayer], missing: float | None) -> list[str]:
     """Return a sentence on lights that are black in the file, with the likely reason."""
     black = [name for name, layer in lights.items() if not layer.image.any()]
     if not black:
@@ -353,7 +353,7 @@ def remarks_on_black(lights: Mapping[str, RenderLayer], missing: float | None) -
     ]
 
 
-def remarks_on_passes(basis: Basis) -> list[str]:
+def _remarks_on_passes(basis: Basis) -> list[str]:
     """Return a sentence on the passes used for denoising, if the file has any."""
     known_parts = ["albedo and normals"] if basis.features is not None else []
     known_parts += ["direct and indirect light"] if basis.indirect is not None else []
@@ -381,7 +381,7 @@ def with_equal_lights(frames: Sequence[LightGroups]) -> list[LightGroups]:
             )
     if not any(frame.has_rest for frame in frames):
         return list(frames)
-    return [frame if frame.has_rest else with_black_rest(frame) for frame in frames]
+    return [frame if frame.has_rest else _with_black_rest(frame) for frame in frames]
 
 
 def first_frame(
@@ -394,7 +394,7 @@ def first_frame(
     """
     groups = read_light_groups(sequence.path(sequence.frames[0]), pattern=pattern)
     groups = replace(groups, sequence=sequence)
-    return with_black_rest(groups) if has_rest and not groups.has_rest else groups
+    return _with_black_rest(groups) if has_rest and not groups.has_rest else groups
 
 
 def group_names(groups: LightGroups) -> tuple[str, ...]:
@@ -402,13 +402,13 @@ def group_names(groups: LightGroups) -> tuple[str, ...]:
     return groups.basis.names[: len(groups.layers)]
 
 
-def with_black_rest(groups: LightGroups) -> LightGroups:
+def _with_black_rest(groups: LightGroups) -> LightGroups:
     """Return groups that add up to the whole picture with a `rest` that is black."""
     basis, indirect = groups.basis, groups.basis.indirect
     noise = as_planes(np.zeros((len(basis.lights) + 1, *basis.size, 3), np.float32))
     with_rest = replace(
         basis,
-        lights=Lights((*basis.lights, rest_light(basis.names))),
+        lights=Lights((*basis.lights, _rest_light(basis.names))),
         planes=_with_black(basis.planes),
         noise=noise,
         indirect=None if indirect is None else IndirectLight(_with_black(indirect.planes), noise),

@@ -99,7 +99,7 @@ def read_render(path: Path, *, leave_out: Iterable[str | Path] = ()) -> RenderFi
     """Return what the file, or the files in the folder, at `path` hold.
 
     In a folder, a file with plain R, G, B becomes a layer named after the file, without the common
-    parts of these names. Files in `leave_out` and others that cannot be lights (`candidate_files`)
+    parts of these names. Files in `leave_out` and others that cannot be lights (`_candidate_files`)
     are skipped, which the remarks report.
 
     Raises ImageError if a file cannot be read, and BasisError if there are no RGB layers, if they
@@ -109,7 +109,7 @@ def read_render(path: Path, *, leave_out: Iterable[str | Path] = ()) -> RenderFi
     remarks: list[str] = []
     files = [path]
     if path.is_dir():
-        files, remarks = candidate_files(path, leave_out)
+        files, remarks = _candidate_files(path, leave_out)
     contents = {file: _content(file) for file in files}
     layers = _joined_layers(contents)
     colours = [layer for layer in layers if not layer.is_vector]
@@ -254,7 +254,7 @@ def is_own_basis(path: Path) -> bool:
     return any(FORMAT_KEY in header for header in read_headers(path)[0])
 
 
-def candidate_files(
+def _candidate_files(
     folder: Path, leave_out: Iterable[str | Path] = ()
 ) -> tuple[list[Path], list[str]]:
     """Return the files of a folder that may hold light groups, by name, and a sentence on those

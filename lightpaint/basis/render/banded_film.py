@@ -31,7 +31,7 @@ if TYPE_CHECKING:
 WHOLE_MAX_BYTES, BAND_BYTES = 2**30, 2**27
 
 
-def is_banded(scene: Scene) -> bool:
+def _is_banded(scene: Scene) -> bool:
     """Return whether a one-pass render of `scene` keeps its sums in a file."""
     height, width = scene.size
     return 2 * 12 * plane_count(scene) * height * width > WHOLE_MAX_BYTES
@@ -262,7 +262,7 @@ def renders_in_bands(scene: Scene, start: Basis | None = None) -> bool:
     start: the basis to continue. Without its exact sums, whole planes are needed.
     """
     can_be_read = start is None or start.sums is not None
-    return can_be_read and method_of(scene) == ONE_PASS and is_banded(scene)
+    return can_be_read and method_of(scene) == ONE_PASS and _is_banded(scene)
 
 
 def memory_needed(scene: Scene, *, in_bands: bool = False) -> int:

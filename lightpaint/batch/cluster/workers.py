@@ -207,7 +207,7 @@ def _connect(address: str) -> Any:
         # Dask's client is slow to report that nobody listens or that it is refused, and logs more.
         place = get_address_host_port(address, strict=True)
         with socket.create_connection(place, timeout=ANSWER_S) as connection:
-            check_trust(address, connection)
+            _check_trust(address, connection)
         # Dask would wait for ever for a server that accepts the connection and stays silent.
         make = partial(Client, address, timeout=ANSWER_S, set_as_default=False)
         return call_with_timeout(make, ANSWER_S + GONE_S)
@@ -220,7 +220,7 @@ def _connect(address: str) -> Any:
         ) from error
 
 
-def check_trust(address: str, connection: socket.socket) -> None:
+def _check_trust(address: str, connection: socket.socket) -> None:
     """Raise BatchError, with advice, unless Dask's configuration can connect to `address`.
 
     connection: a new connection to the scheduler there; a TLS handshake uses it up. Raises OSError

@@ -184,7 +184,7 @@ class _Planner:
 
     def collect_errors(self, entry: LookEntry) -> None:
         """Add all errors of a look that cannot be planned, not only the first."""
-        collect_errors(entry, self.cache, self._mistakes)
+        _collect_errors(entry, self.cache, self._mistakes)
 
     def _steps(
         self, entry: LookEntry, source_files: Sequence[Path], *, is_possible: bool
@@ -232,7 +232,7 @@ class _Planner:
             )
             job = self._job(entry, scenes, basis, settings, constraints)
         if entry.is_by_sums:
-            check_by_sums(job)
+            _check_by_sums(job)
         elif job.all_rigging and entry.basis is None:
             self._looks_with_moves.append(entry.name)
         elif entry.shares_places:
@@ -245,7 +245,7 @@ class _Planner:
             on_film(scenes[0].content, None, entry.final.resolution)
         source_files = tuple(dict.fromkeys(job.results.reads))
         entry = replace(entry, settings=settings, constraints=constraints)
-        return entry, source_files, (*job.remarks, *remarks_on_suns(job))
+        return entry, source_files, (*job.remarks, *_remarks_on_suns(job))
 
     def _job(
         self,
@@ -267,9 +267,9 @@ class _Planner:
         scene = scenes[0] if scenes else None
         basis = None if entry.basis is None else entry.basis.content
         groups = basis if isinstance(basis, LightGroups) else None
-        source_files = files_of_lighting_look(entry, scene, groups)
+        source_files = _files_of_lighting_look(entry, scene, groups)
         if entry.lighting:
-            check_given_lighting(entry, scene, basis)
+            _check_given_lighting(entry, scene, basis)
         folders = [str(self._folders[name] / "lighting.json") for name in entry.combined_looks]
         lightings = tuple([entry.lighting] if entry.lighting else folders)
         views = view_names(scenes) if entry.by_sensor else [""]
@@ -303,7 +303,7 @@ class _Planner:
             )
 
 
-def collect_errors(entry: LookEntry, cache: WorkerCache, mistakes: Mistakes) -> None:
+def _collect_errors(entry: LookEntry, cache: WorkerCache, mistakes: Mistakes) -> None:
     """Add errors in scene, sensors, settings and constraints, each checked alone, to the mistakes.
 
     cache: scenes and bases that are already loaded. Errors that fail one look alone, like a basis
@@ -358,7 +358,7 @@ def _split_constraints(constraints: Constraints) -> Iterator[Constraints]:
     yield replace(constraints, lights=(), ties=(), start={})
 
 
-def check_by_sums(job: Job) -> None:
+def _check_by_sums(job: Job) -> None:
     """Raise BatchError if the lighting of a job does not follow from sums alone."""
     [view] = job.views
     reason = reason_against_sums(view.target, job.fit)
@@ -372,7 +372,7 @@ def check_by_sums(job: Job) -> None:
         raise BatchError(f"want = ['lights'] takes sums alone, and {reason}: want 'solve' instead")
 
 
-def files_of_lighting_look(
+def _files_of_lighting_look(
     entry: LookEntry, scene: Scene | None, groups: LightGroups | None
 ) -> tuple[Path, ...]:
     """Return the files that a look with a given or combined lighting reads."""
@@ -384,7 +384,7 @@ def files_of_lighting_look(
     return (*files, Path(entry.lighting)) if entry.lighting else files
 
 
-def check_given_lighting(
+def _check_given_lighting(
     entry: LookEntry, scene: Scene | None, basis: Basis | LightGroups | None
 ) -> None:
     """Raise BatchError if the lighting of a look has other lights than its scene or basis."""
@@ -403,7 +403,7 @@ def check_given_lighting(
             raise BatchError(f"{entry.lighting} is of other lights than {entry.basis}")
 
 
-def remarks_on_suns(job: Job) -> tuple[str, ...]:
+def _remarks_on_suns(job: Job) -> tuple[str, ...]:
     """Return a remark on a sun that a lights file asks for, and that a batch does not find."""
     scene = next((view.scene for view in job.views if view.scene is not None), None)
     if scene is None or not (suns := {k: n for k, n in scene.requests.sun.items() if n}):

@@ -97,10 +97,10 @@ def _run(item: WorkItem, cache: WorkerCache, listen: Listener) -> Any:
     if isinstance(item, PartOfBasis):
         return cache.renderer(item).render(item.part)
     if isinstance(item, SumsOfRows):
-        return sums_of_rows(item, cache)
+        return _sums_of_rows(item, cache)
     if isinstance(item, SharedPlacing):
         cache.release_renderer()
-        return find_shared_places(item, cache, listen)
+        return _find_shared_places(item, cache, listen)
     if isinstance(item, Passes):
         return cache.frame(item).sum(range(item.first, item.last))
     cache.release_renderer()
@@ -143,7 +143,7 @@ def _answer(task: Task, cache: WorkerCache, listen: Listener) -> None:
     if job.basis is None:
         bases = [basis for key in task.bases if (basis := cache.basis(key)) is not None]
     if task.is_by_sums:
-        answer_by_sums(job, job.views[0].basis or (bases or [])[0])
+        _answer_by_sums(job, job.views[0].basis or (bases or [])[0])
         return
     run(job, listen, bases=bases)
 
@@ -232,7 +232,7 @@ def _export(task: Task, cache: WorkerCache, listen: Listener) -> None:
             write_content(stage / name, make())
 
 
-def sums_of_rows(item: SumsOfRows, cache: WorkerCache) -> list[Sums]:
+def _sums_of_rows(item: SumsOfRows, cache: WorkerCache) -> list[Sums]:
     """Return the sums with each painting over some rows.
 
     The images are those that a whole basis has in these rows, to the last bit.
@@ -249,14 +249,14 @@ def sums_of_rows(item: SumsOfRows, cache: WorkerCache) -> list[Sums]:
     ]
 
 
-def answer_by_sums(job: Job, basis: Basis) -> None:
+def _answer_by_sums(job: Job, basis: Basis) -> None:
     """Solve with the sums of a basis in memory, and write the lighting."""
     [view] = job.views
     basis = basis if view.scene is None else basis.with_requests(view.scene.requests)
     if not basis.knows_noise:
         # Only pixels show which differences are rounding alone (see lighting/problem.py).
         problem = Problem.of(basis, view.target, constraints=job.all_constraints, fit=job.fit)
-        publish_lighting_only(job, solution_of(problem).lighting)
+        _publish_lighting_only(job, solution_of(problem).lighting)
         return
     sums = sum_rows(basis, view.target, slice(None), job.fit)
     origin = basis.origin
@@ -278,10 +278,10 @@ def publish_solved_lights(
         scene_identity=scene_identity,
         spp=spp,
     )
-    publish_lighting_only(job, solve_linear(problem, problem.start).lighting)
+    _publish_lighting_only(job, solve_linear(problem, problem.start).lighting)
 
 
-def publish_lighting_only(job: Job, lighting: Lighting) -> None:
+def _publish_lighting_only(job: Job, lighting: Lighting) -> None:
     """Write the lighting and the relit scene."""
     [view] = job.views
     lighting = replace(lighting, cd_per_unit=job.settings.cd_per_unit)
@@ -325,7 +325,7 @@ class SharedPlacing:
         )
 
 
-def find_shared_places(item: SharedPlacing, cache: WorkerCache, listen: Listener) -> str:
+def _find_shared_places(item: SharedPlacing, cache: WorkerCache, listen: Listener) -> str:
     """Return the record of the places that all looks of an item want."""
     for key, file in zip(item.bases, item.files, strict=True):
         cache.load(key, file)

@@ -186,7 +186,7 @@ class VertexLight:
         if site.position is not None and site.cutoff is not None:
             beam = site.cutoff if site.beam is None else site.beam
             direction = np.asarray(site.direction or (0.0, 0.0, 1.0), np.float32)
-            share = share_in_cone(self._away @ direction, site.cutoff, min(beam, site.cutoff))
+            share = _share_in_cone(self._away @ direction, site.cutoff, min(beam, site.cutoff))
             light = light * share
         return self._at_all(light)
 
@@ -212,7 +212,7 @@ def away_from(place: Sequence[float], points: Floats) -> Floats:
     return np.asarray(away)
 
 
-def share_in_cone(cosine: Floats, cutoff: float, beam: float) -> Floats:
+def _share_in_cone(cosine: Floats, cutoff: float, beam: float) -> Floats:
     """Return the share of its light that a spot sends at cosines to its axis. Angles: degrees.
 
     As Mitsuba's spot has it: 1 within the beam, linear in the angle to 0 at the cutoff.

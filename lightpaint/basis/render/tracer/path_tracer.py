@@ -69,7 +69,7 @@ class View(NamedTuple):
     height: int
 
 
-def camera_rays(view, sampler, numbers, pixel, term):
+def _camera_rays(view, sampler, numbers, pixel, term):
     """Return one ray per sample, with random numbers drawn in the order of Mitsuba's
     SamplingIntegrator.
     """
@@ -124,7 +124,7 @@ def trace_paths(view, sampler, numbers, guide, planes, rules, pixel, place, term
     term: number of the sample. The other parameters are those of `trace_samples`.
     """
     scene = view.scene
-    ray, weight = camera_rays(view, sampler, numbers, pixel, term)
+    ray, weight = _camera_rays(view, sampler, numbers, pixel, term)
     # fmt: off
     throughput = mi.Spectrum(1)                 # Fraction of radiance that reaches the camera
     eta = mi.Float(1)                           # Product of relative indices of refraction
@@ -194,13 +194,13 @@ def trace_paths(view, sampler, numbers, guide, planes, rules, pixel, place, term
         previous_pdf = sample.pdf
         previous_delta = mi.has_flag(sample.sampled_type, mi.BSDFFlags.Delta)
         previous_cell = mi.UInt32(cell)
-        looks_through &= passes_clearly(sample)
+        looks_through &= _passes_clearly(sample)
         depth[si.is_valid()] += 1
         active = _roulette(throughput, eta, depth >= rules.rr_depth, fate, active_next)
         pi = scene.ray_intersect_preliminary(ray, False, active)
 
 
-def passes_clearly(sample):
+def _passes_clearly(sample):
     """Return whether a BSDF sample passes straight through, as in clear glass or a hole."""
     flags = mi.BSDFFlags
     return mi.has_flag(sample.sampled_type, flags.DeltaTransmission) | mi.has_flag(
@@ -337,7 +337,7 @@ def _sees_emitter(view, sampler, pixel, max_depth):
     emitter.
     """
     scene = view.scene
-    ray, _ = camera_rays(view, sampler, None, pixel, None)
+    ray, _ = _camera_rays(view, sampler, None, pixel, None)
     # fmt: off
     depth = mi.UInt32(0)      # Number of surfaces passed
     seen = mi.Bool(False)     # Rays that reached an emitter
@@ -349,7 +349,7 @@ def _sees_emitter(view, sampler, pixel, max_depth):
         active &= ~seen & si.is_valid() & (depth + 1 < max_depth)
         lobe, direction = sampler.next_1d(), sampler.next_2d()
         sample, _ = si.bsdf(ray).sample(mi.BSDFContext(), si, lobe, direction, active)
-        active &= passes_clearly(sample)
+        active &= _passes_clearly(sample)
         ray = si.spawn_ray(si.to_world(sample.wo))
         depth += 1
     return seen
