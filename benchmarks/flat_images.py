@@ -28,7 +28,7 @@ from lightpaint.arrays import Doubles, Floats
 from lightpaint.basis.basis import Basis
 from lightpaint.basis.light_images import light_images
 from lightpaint.images.formats.exr import write_rgb
-from lightpaint.lighting.loss import image_prior
+from lightpaint.lighting.loss import weight_penalty
 from lightpaint.scene.scene_render import Stream, render
 
 STAGE = Path(__file__).parents[1] / "scenes" / "stage"
@@ -81,7 +81,7 @@ def measured(
 ) -> tuple[float, float]:
     """Return the missed share of the light of a known image, and the error of the solved one."""
     [image] = light_images(basis.lights)
-    image_prior.SMOOTHNESS = strength / image.domain.smoothness
+    weight_penalty.SMOOTHNESS = strength / image.domain.smoothness
     solution = lp.solve(
         basis, lp.Target.of(target), space="linear", colors="free", emitters=emitters
     )
@@ -101,18 +101,18 @@ def rows_of(folder: Path, strengths: list[float], spp: int) -> Iterator[str]:
         scene = scene.reduced("160x90") if light == "wall" else scene
         basis = lp.render_basis(scene, spp=spp)
         [image] = light_images(basis.lights)
-        used[light] = image.domain.smoothness * image_prior.SMOOTHNESS
+        used[light] = image.domain.smoothness * weight_penalty.SMOOTHNESS
         for name, known in known_images().items():
             lit = lp.load_scene(folder / f"{light}_{name}.xml")
             lit = lit.reduced("160x90") if light == "wall" else lit
             target = render(lit, spp=TARGET_SPP, seed=5, stream=Stream.TEMPLATE).image
             factor = 10 if light == "slide" else 1
-            default = image_prior.SMOOTHNESS
+            default = weight_penalty.SMOOTHNESS
             for case in (x for x in cases if x[0] == light):
                 for strength in strengths:
                     error = measured(basis, factor * known, target, case[1], strength)
                     errors.setdefault((case, strength), []).append(error)
-            image_prior.SMOOTHNESS = default
+            weight_penalty.SMOOTHNESS = default
     for strength in strengths:
         cells = []
         for case in cases:

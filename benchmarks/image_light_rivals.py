@@ -6,7 +6,7 @@ from pathlib import Path
 import numpy as np
 
 from lightpaint.arrays import Bools, Doubles, Floats
-from lightpaint.scene.lights.texels.image_domain import GridSize
+from lightpaint.scene.lights.texels.image_domains import GridSize
 from lightpaint.scene.runtime.variant import use_variant
 
 #: Samples per pixel of a step, and least radiance: what is black is not sampled any more.

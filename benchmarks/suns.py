@@ -30,7 +30,7 @@ from lightpaint.colour.color import luminance
 from lightpaint.colour.srgb import encode_display, to_8_bit
 from lightpaint.images.formats.exr import write_rgb
 from lightpaint.images.formats.png import png_bytes
-from lightpaint.scene.lights.texels.sky import Sky, solid_angles
+from lightpaint.scene.lights.texels.image_domains import Sky, solid_angles
 from lightpaint.scene.scene_render import Stream, render
 
 POSTS = """<shape type="cube"><transform name="to_world"><scale x="0.05" y="0.7" z="0.05"/>

@@ -3,8 +3,8 @@
 from pathlib import Path
 
 from lightpaint.lighting.answer.lighting import Lighting
-from lightpaint.relit.formats.export_format import Source
-from lightpaint.relit.formats.formats import write_content, writers_of
+from lightpaint.relit.export_format import Source
+from lightpaint.relit.formats import write_content, writers_of
 
 
 class Remarks:

@@ -28,7 +28,8 @@ pytest.importorskip("sphinx", reason="sphinx")
 jsonschema = pytest.importorskip("jsonschema", reason="jsonschema")
 sys.path.insert(0, str(REPOSITORY / "docs" / "site"))
 
-from schema_pages import schemas  # noqa: E402
+from field_pages import described, fields_of  # noqa: E402
+from schema_pages import DESCRIBED_ELSEWHERE, schemas  # noqa: E402
 
 SCHEMAS = {name: schema for name, (_, schema) in schemas().items()}
 
@@ -49,6 +50,19 @@ def fits(value: Any, name: str) -> bool:
 def test_every_schema_is_one() -> None:
     for schema in SCHEMAS.values():
         jsonschema.Draft202012Validator.check_schema(schema)
+
+
+@pytest.mark.parametrize("name", sorted({*SCHEMAS} - {*DESCRIBED_ELSEWHERE}))
+def test_every_field_of_a_file_has_a_meaning(name: str) -> None:
+    """The documents leave them to the page of fields."""
+    meanings = {path: field.get("description", "") for path, field in fields_of(SCHEMAS[name])}
+    assert [path for path, meaning in meanings.items() if len(meaning) < 3] == []
+    assert [path for path, meaning in meanings.items() if "None" in meaning] == []
+
+
+def test_a_meaning_of_no_field_is_found() -> None:
+    with pytest.raises(KeyError, match="basis"):
+        described("report", {"type": "object", "properties": {}})
 
 
 def test_a_lighting_that_is_written_fits_its_schema(tmp_path: Path) -> None:

@@ -1,12 +1,12 @@
 """JSON schemas of dataclasses, and of the values of their annotations."""
 
-import inspect
 from collections.abc import Mapping, Sequence
 from dataclasses import MISSING, fields, is_dataclass
 from types import NoneType
 from typing import Any, Literal, get_args, get_origin, get_type_hints
 
 import numpy as np
+from docstring_fields import described_fields
 
 from lightpaint.storage.json_records import UNIONS
 
@@ -23,7 +23,7 @@ _PLAIN: dict[Any, Schema] = {
 
 
 def schema_of(kind: Any, *left_out: str) -> Schema:
-    """Return the schema of a dataclass, without the fields `left_out`.
+    """Return the schema of a dataclass, described by its docstring, without the fields `left_out`.
 
     Arrays of messages are buffers beside the JSON (docs/protocol.md), and stand in no schema.
     """
@@ -31,9 +31,14 @@ def schema_of(kind: Any, *left_out: str) -> Schema:
     shown = [x for x in fields(kind) if x.name not in left_out and not _is_array(hints[x.name])]
     required = [x.name for x in shown if x.default is MISSING and x.default_factory is MISSING]
     schema: Schema = {"type": "object"}
-    if text := (inspect.getdoc(kind) or "").partition("\n\n")[0]:
-        schema["description"] = " ".join(text.split())
-    schema["properties"] = {x.name: value_schema(hints[x.name]) for x in shown}
+    text, meanings = described_fields(kind)
+    if text:
+        schema["description"] = text[0]
+    schema["properties"] = {
+        x.name: value_schema(hints[x.name])
+        | ({"description": meanings[x.name]} if x.name in meanings else {})
+        for x in shown
+    }
     return {**schema, "required": required} if required else schema
 
 

@@ -3,7 +3,6 @@
 A docstring says what a message is, and then, as `name: meaning.`, what its fields are.
 """
 
-import inspect
 import re
 from collections.abc import Mapping
 from dataclasses import dataclass, fields
@@ -11,6 +10,7 @@ from pathlib import Path
 from typing import Any, get_origin, get_type_hints
 
 import numpy as np
+from docstring_fields import described_fields
 
 from lightpaint.paint.layers.layer_stack import Layer
 from lightpaint.paint.protocol import (
@@ -115,24 +115,10 @@ def _is_part(value: Any, module: Any) -> bool:
 
 def _read(name: str, record: type[Any]) -> Entry:
     """Return an entry, with meanings of fields that it has from a base."""
-    text, meanings = _parsed(record)
+    text, meanings = described_fields(record)
     for base in record.__mro__[1:]:
-        meanings = {**_parsed(base)[1], **meanings}
+        meanings = {**described_fields(base)[1], **meanings}
     return Entry(name, record, tuple(text), meanings)
-
-
-def _parsed(record: type[Any]) -> tuple[list[str], dict[str, str]]:
-    """Return the paragraphs of a docstring, and apart from them the meanings of fields."""
-    names = "|".join(getattr(record, "__dataclass_fields__", {}))
-    pattern = re.compile(rf"(?:^|(?<=[.;] ))((?:{names})(?:, (?:{names}))*): ")
-    text: list[str] = []
-    meanings: dict[str, str] = {}
-    for paragraph in (inspect.getdoc(record) or "").split("\n\n"):
-        before, *found = pattern.split(" ".join(paragraph.split())) if names else [paragraph]
-        text += [before.strip()] if before.strip() else []
-        for some, meaning in zip(found[::2], found[1::2], strict=True):
-            meanings |= dict.fromkeys(some.split(", "), meaning.strip())
-    return text, meanings
 
 
 def _entry(entry: Entry, places: Mapping[str, str], page: str) -> list[str]:

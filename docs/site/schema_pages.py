@@ -6,9 +6,12 @@ from pathlib import Path
 from typing import Any
 
 from dataclass_schemas import Schema, list_of, schema_of
+from field_pages import described, field_page
 from manifest_schema import manifest_schema
 from report_schema import report_schema
 
+from lightpaint.basis.basis import Origin
+from lightpaint.basis.lights import BasisLight
 from lightpaint.batch.gallery.summary import SummaryRow
 from lightpaint.batch.manifest.folder_names import SUMMARY_FORMAT
 from lightpaint.lighting.answer.certificate import Certificate
@@ -22,9 +25,13 @@ from lightpaint.relit.export import fixtures
 DIALECT = "https://json-schema.org/draft/2020-12/schema"
 
 
+#: What other pages describe field by field: batches, exports, and messages of the painter.
+DESCRIBED_ELSEWHERE = ("manifest", "fixtures", "requests", "events")
+
+
 def schemas() -> dict[str, tuple[str, Schema]]:
-    """Return each schema by its name, with what it is of."""
-    return {
+    """Return each schema by its name, with the file or message that it describes."""
+    files = {
         "manifest": ("``looks.toml``, the manifest of a batch", manifest_schema()),
         "lighting": ("``lighting.json``, the answer", lighting_schema()),
         "report": ("``report.json``, the numbers of a report", report_schema()),
@@ -35,9 +42,12 @@ def schemas() -> dict[str, tuple[str, Schema]]:
             schema_of(PlacementRecord),
         ),
         "fixtures": ("``fixtures.json``, an answer for consoles", fixtures_schema()),
+        "origin": ("``lightpaint.origin``, an attribute of a basis", schema_of(Origin)),
+        "light": ("``lightpaint.light``, an attribute of a basis", schema_of(BasisLight)),
         "requests": ("what clients send to the painter", _messages(Request.kinds)),
         "events": ("what the painter sends to clients", _messages(Event.kinds)),
     }
+    return {name: (subject, described(name, schema)) for name, (subject, schema) in files.items()}
 
 
 def lighting_schema() -> Schema:
@@ -116,6 +126,8 @@ def write_schemas(folder: Path, extra: Path) -> None:
         text = json.dumps(titled, indent=1, ensure_ascii=False)
         (extra / f"{name}.schema.json").write_text(text + "\n", encoding="utf-8")
     (folder / "index.rst").write_text("\n".join(_page()) + "\n", encoding="utf-8")
+    files = {name: value for name, value in schemas().items() if name not in DESCRIBED_ELSEWHERE}
+    (folder / "fields.md").write_text(field_page(files), encoding="utf-8")
 
 
 def _page() -> Iterator[str]:
@@ -124,9 +136,9 @@ def _page() -> Iterator[str]:
         "============",
         "",
         "The code that reads and writes these files gives these schemas, in the dialect of",
-        "2020-12. A field that a schema does not require may be absent. :doc:`/formats` says what",
-        "each field means, and :doc:`/batch` what each key of a manifest; :doc:`/messages/index`",
-        "does so for messages, whose arrays are buffers beside the JSON.",
+        "2020-12. A field that a schema does not require may be absent. :doc:`fields` lists the",
+        "same for people; :doc:`/messages/index` does so for messages, whose arrays are buffers",
+        "beside the JSON. :doc:`/formats` and :doc:`/batch` explain the files.",
         "",
         "Any validator of this dialect checks a file, such as the Python package jsonschema:",
         "",
@@ -153,3 +165,4 @@ def _page() -> Iterator[str]:
     for name, (subject, _) in schemas().items():
         yield f"   * - `{name}.schema.json <{name}.schema.json>`__"
         yield f"     - {subject}"
+    yield from ("", ".. toctree::", "   :hidden:", "", "   fields")

@@ -8,8 +8,7 @@ from typing import Protocol
 import numpy as np
 
 from lightpaint.arrays import Bools, Doubles, Indices
-from lightpaint.scene.lights.texels.domains import DOMAINS, domain_of
-from lightpaint.scene.lights.texels.image_domain import GridSize, ImageDomain
+from lightpaint.scene.lights.texels.image_domains import DOMAINS, GridSize, ImageDomain, domain_of
 from lightpaint.scene.lights.texels.texel import image_of, layouts_of, node_name
 from lightpaint.scene.lights.texels.texel_layout import TexelLayout
 

@@ -5,8 +5,7 @@ picture add, so that each machine can sum its part of the basis and send no imag
 """
 
 from dataclasses import dataclass, replace
-from functools import cached_property, reduce
-from operator import add
+from functools import cached_property
 from typing import TYPE_CHECKING, Self
 
 import numpy as np
@@ -29,9 +28,8 @@ from lightpaint.lighting.constraints.constraints_file import constraints_of
 from lightpaint.lighting.constraints.start_lighting import start_weights
 from lightpaint.lighting.fit import Fit, resolve_fit, resolve_for_targets
 from lightpaint.lighting.loss.expected_lights import ExpectedLights
-from lightpaint.lighting.loss.image_prior import image_prior
 from lightpaint.lighting.loss.painting import ignored_paint
-from lightpaint.lighting.loss.weight_penalty import pull_near_start, weight_pull
+from lightpaint.lighting.loss.weight_penalty import PaintTerms, joint_pull
 from lightpaint.lighting.normal_equations import NormalEquations
 from lightpaint.lighting.unknowns.gamuts import Gamuts
 from lightpaint.lighting.unknowns.reduction import Reduction, reduce_to
@@ -120,7 +118,7 @@ class LinearProblem:
     @property
     def keeps_color(self) -> Bools:
         """(n,), the lights with a pull to their colour: those free to leave it that reach
-        something. Texels have an expectation of their own (image_prior.py).
+        something. Texels have an expectation of their own (`image_prior`).
         """
         is_lamp = ~texel_lights(self.lights)
         return self.full.is_free & self.equations.reached.any(axis=1) & is_lamp
@@ -135,26 +133,17 @@ class LinearProblem:
         """The penalty for leaving the current lighting, its colours, the contrasts, unpainted parts
         or the lights at other frames; None if there is none.
         """
-        prior = image_prior(self.lights, self.power, self.fit, self.painted_share, self.expected)
-        pull = weight_pull(
+        return joint_pull(
+            self.lights,
             self.power,
             self.reference,
             self.fit,
-            prefer_current=self.constraints.prefer_current,
+            self.constraints,
+            PaintTerms(self.expected, self.contrast, self.restraint),
             painted_share=self.painted_share,
             keeps_color=self.keeps_color,
-            expected=self.expected,
+            tether=self.tether,
         )
-        near = pull_near_start(
-            self.power,
-            self.reference,
-            self.fit,
-            near=self.constraints.near,
-            painted_share=self.painted_share,
-        )
-        terms = (pull, near, prior, self.contrast, self.restraint, self.tether)
-        pulls = [x for x in terms if x is not None]
-        return reduce(add, pulls) if pulls else None
 
     def with_pull(self, equations: NormalEquations) -> NormalEquations:
         """Return `equations` with the pull on the weights, if there is one."""

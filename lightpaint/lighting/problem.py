@@ -23,7 +23,6 @@ from lightpaint.lighting.constraints.start_lighting import held_at_start, start_
 from lightpaint.lighting.fit import Fit, Space, resolve_for_targets
 from lightpaint.lighting.joined_views import Views, joint_basis
 from lightpaint.lighting.linear_problem import LinearProblem, reduce_lights
-from lightpaint.lighting.loss.contrast import contrast_rows, contrast_term
 from lightpaint.lighting.loss.expected_lights import ExpectedLights, Wash
 from lightpaint.lighting.loss.lit_pixels import LitPixels
 from lightpaint.lighting.loss.loss import Loss, Squares
@@ -36,7 +35,7 @@ from lightpaint.lighting.loss.painting import (
     target_light,
     unpainted_weight_of,
 )
-from lightpaint.lighting.loss.weight_penalty import restrain_lights
+from lightpaint.lighting.loss.weight_penalty import PaintTerms
 from lightpaint.lighting.normal_equations import NormalEquations
 from lightpaint.lighting.unknowns.gamuts import Gamuts, PaintedLight
 from lightpaint.lighting.unknowns.reduction import Reduction
@@ -364,20 +363,16 @@ def wash_fields(views: Views, fit: Fit, own: Doubles) -> dict[str, Any]:
 
     own: (n, 3), weights with the colours that lights have.
     """
-    none = dict.fromkeys(("expected", "contrast", "restraint"))
+    none = vars(PaintTerms())
     reads_wishes = fit.reads_wishes(is_sketch=are_sketches(views))
     if not (reads_wishes or fit.colors == "white"):
         return none
     wash = wash_of(views)
     if not reads_wishes:
         return {**none, "expected": expected_for(views, fit, own, wash)}
-    strength = sum(float(x.importance.sum(dtype=np.float64)) for x in views.targets)
+    importance = sum(float(x.importance.sum(dtype=np.float64)) for x in views.targets)
     unpainted = unpainted_weight_of(views, fit)
-    return {
-        "expected": expected_for(views, fit, own, wash),
-        "contrast": contrast_term(contrast_rows(wash, fit.transform), strength),
-        "restraint": restrain_lights(wash, own, fit.transform, unpainted=unpainted),
-    }
+    return vars(PaintTerms.of(wash, fit, own, importance=importance, unpainted=unpainted))
 
 
 def are_sketches(views: Views) -> bool:

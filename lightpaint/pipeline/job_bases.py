@@ -1,6 +1,7 @@
-"""The bases of a job: given, kept from an earlier run, or rendered."""
+"""The bases of a job: given, kept from an earlier run, or rendered; and the problem on them."""
 
 import time
+from collections.abc import Sequence
 from dataclasses import replace
 
 from lightpaint.basis.basis import Basis
@@ -9,8 +10,10 @@ from lightpaint.basis.cache.cache import folder
 from lightpaint.basis.cache.cached_render import Render, obtain_basis
 from lightpaint.basis.render.basis_render import render_basis
 from lightpaint.basis.render.render_origin import samples_for
-from lightpaint.pipeline.job.job import Job
-from lightpaint.pipeline.job.painted_views import PaintedView
+from lightpaint.lighting.analysis.noise.noise_correction import correct_noise
+from lightpaint.lighting.problem import Problem
+from lightpaint.lighting.solution import Solution
+from lightpaint.pipeline.job.job import Job, PaintedView
 from lightpaint.pipeline.job.settings import Settings
 from lightpaint.progress import Listener, Progress, labelled, listener
 from lightpaint.scene.scene import Scene
@@ -147,3 +150,15 @@ def _basis_of(job: Job, view: PaintedView, listen: Listener) -> Basis:
 def view_listener(job: Job, view: PaintedView, listen: Listener) -> Listener:
     """Return `listen`, which names the view if there are several."""
     return listen if len(job.views) == 1 else labelled(listen, view.folder.name)
+
+
+def problem_of(job: Job, bases: Sequence[Basis]) -> Problem:
+    """Return the problem of a job and the bases of its views."""
+    targets = [view.target for view in job.views]
+    return Problem.of(list(bases), targets, constraints=job.all_constraints, fit=job.fit)
+
+
+def without_noise(job: Job, solution: Solution) -> Solution:
+    """Return a solution whose noise is corrected, if the settings ask for it."""
+    is_known = solution.basis.knows_noise
+    return correct_noise(solution) if job.settings.corrects_noise(is_known=is_known) else solution

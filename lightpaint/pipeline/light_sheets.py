@@ -1,19 +1,22 @@
 """Light sheets: a picture of each light of a scene alone."""
 
+from dataclasses import replace
 from pathlib import Path
 
 from lightpaint.basis.cache import cache
 from lightpaint.basis.cache.cached_render import obtain_basis
 from lightpaint.basis.render.integrators import why_not_one_pass
-from lightpaint.errors import OutputError
+from lightpaint.errors import LightpaintError, OutputError
 from lightpaint.files import check_files, check_writable, write_bytes
 from lightpaint.images.denoiser import denoiser_text
 from lightpaint.images.formats.png import png_bytes, png_has_text
-from lightpaint.pipeline.results.recorded_places import recorded_places
+from lightpaint.lighting.answer.lighting_file import read_lighting
+from lightpaint.pipeline.results.answer_folder import LIGHTING
 from lightpaint.progress import Progress, silent
 from lightpaint.report.light_sheet import light_sheet
 from lightpaint.report.rig.hung_lights import HungLight
 from lightpaint.scene.lights.texels.texel import image_of
+from lightpaint.scene.properties.site import EmitterPlace
 from lightpaint.scene.quality_presets import Preset
 from lightpaint.scene.runtime.variant import use_variant
 from lightpaint.scene.scene import Scene
@@ -81,3 +84,29 @@ def _why_no_sheet(scene: Scene) -> str:
     if reason is None or len(scene.lights) <= MAX_RENDERS:
         return ""
     return f"{reason}, so that each light needs a render of its own"
+
+
+def recorded_places(scene: Scene) -> tuple[EmitterPlace, ...]:
+    """Return the places of a scene's emitters; those that moved or are new say so.
+
+    A relit scene is a plain scene: only the lighting in its folder knows the earlier places. It
+    counts for each light that hangs, points and opens as it says. A folder without a readable
+    lighting changes nothing.
+    """
+    file = scene.path.parent / LIGHTING
+    if not file.is_file():
+        return scene.emitter_places
+    try:
+        recorded = {place.name: place for place in read_lighting(file).places}
+    except LightpaintError:
+        return scene.emitter_places
+    return tuple(_with_change(place, recorded.get(place.name)) for place in scene.emitter_places)
+
+
+def _with_change(place: EmitterPlace, recorded: EmitterPlace | None) -> EmitterPlace:
+    is_the_same = recorded is not None and place.site.is_near(recorded.site)
+    if recorded is None or not is_the_same or place.new or place.moved_from is not None:
+        return place
+    return replace(
+        place, moved_from=recorded.moved_from, new=recorded.new, size=place.size or recorded.size
+    )

@@ -13,19 +13,17 @@ from lightpaint.basis.light_images import texel_lights
 from lightpaint.basis.render.pixel_top_up import KeptTracer, kept_loaded
 from lightpaint.basis.render.render_origin import ONE_PASS
 from lightpaint.colour.color import LUMINANCE
-from lightpaint.lighting.analysis.noise.noise_correction import correct_noise
 from lightpaint.lighting.analysis.noise.sample_demand import (
     pixel_variances,
     sample_demand,
     top_up_counts,
 )
 from lightpaint.lighting.analysis.noise.uncertainty import error_bars
-from lightpaint.lighting.problem import Problem
 from lightpaint.lighting.solution import Solution
 from lightpaint.lighting.solve import solution_of
 from lightpaint.pipeline.job.job import Job
 from lightpaint.pipeline.job.settings import PILOT_SPP
-from lightpaint.pipeline.job_bases import view_listener
+from lightpaint.pipeline.job_bases import problem_of, view_listener, without_noise
 from lightpaint.progress import Listener
 from lightpaint.report.measures import LEAST_SHARE, picture_errors
 from lightpaint.report.phrases import spoken_percent
@@ -59,18 +57,6 @@ class Certainty:
     def error(self) -> float:
         """Error of the least certain light."""
         return float(self.errors.max(initial=0))
-
-
-def problem_of(job: Job, bases: Sequence[Basis]) -> Problem:
-    """Return the problem of a job and the bases of its views."""
-    targets = [view.target for view in job.views]
-    return Problem.of(list(bases), targets, constraints=job.all_constraints, fit=job.fit)
-
-
-def without_noise(job: Job, solution: Solution) -> Solution:
-    """Return a solution whose noise is corrected, if the settings ask for it."""
-    is_known = solution.basis.knows_noise
-    return correct_noise(solution) if job.settings.corrects_noise(is_known=is_known) else solution
 
 
 def add_needed_samples(job: Job, bases: list[Basis], listen: Listener) -> list[Basis]:

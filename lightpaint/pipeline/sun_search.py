@@ -18,8 +18,7 @@ from lightpaint.lighting.solution import Solution
 from lightpaint.lighting.solve import solution_of
 from lightpaint.pipeline.job.job import Job
 from lightpaint.pipeline.job.job_checks import sky_for_sun, wanted_sun
-from lightpaint.pipeline.job_bases import view_listener
-from lightpaint.pipeline.needed_samples import problem_of, without_noise
+from lightpaint.pipeline.job_bases import problem_of, view_listener, without_noise
 from lightpaint.pipeline.placed_lights import moved_basis, on_film_of
 from lightpaint.progress import Listener
 from lightpaint.scene.lights.texels.texel_layout import CHILDREN, MAX_LEVEL, RATIO, Node

@@ -28,8 +28,7 @@ from lightpaint.placement.permitted_places import (
     Rails,
 )
 from lightpaint.scene.properties.pose import FARTHEST
-from lightpaint.scene.properties.rotation import across, rotation_between
-from lightpaint.scene.properties.site import Site
+from lightpaint.scene.properties.site import Site, across, rotation_between
 from lightpaint.validation import parse_number
 
 #: Least width of a beam's soft edge, in degrees.

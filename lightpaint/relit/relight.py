@@ -4,6 +4,7 @@ The original text is edited rather than rewritten, so comments, includes and def
 and a diff shows the lights and nothing else.
 """
 
+import difflib
 import os
 import re
 from collections.abc import Collection
@@ -14,12 +15,13 @@ import numpy as np
 
 from lightpaint.arrays import RGB
 from lightpaint.display_text import some_names
-from lightpaint.errors import LightingError, SceneError
+from lightpaint.errors import LightingError, OutputError, SceneError
 from lightpaint.files import write_bytes
 from lightpaint.images.formats.exr import write_rgb
 from lightpaint.keywords import keywords
 from lightpaint.lighting.answer.lighting import Lighting
 from lightpaint.relit.relit_files import relit_files, settings_of
+from lightpaint.scene.checks.tokens import tag
 from lightpaint.scene.lights.image_split import with_split
 from lightpaint.scene.lights.new_emitter import new_emitter_at
 from lightpaint.scene.lights.texels.texel import image_of, layouts_of
@@ -30,6 +32,9 @@ from lightpaint.scene.scene_reader import load_scene
 
 #: A parameter in Mitsuba's list of unused ones.
 UNUSED_PARAMETER = re.compile(r"- \$(\w+)=")
+
+#: A non-existing folder that stands for any location of the relit scene.
+PATCH_SUFFIX = ".lightpaint-patch"
 
 
 @keywords()
@@ -190,3 +195,41 @@ def placed_scene(scene: Scene, lighting: Lighting) -> Scene:
         and not place.site.is_near(sites[place.name])
     }
     return scene.moved(poses) if poses else scene
+
+
+def scene_patch(scene: Scene, lighting: Lighting) -> str:
+    """Return a unified diff of the scene's files, relative to its folder, that changes only the
+    lights.
+
+    `patch -p1 < relit.patch` in the folder of the scene applies it. Raises SceneError for scaled
+    images, which a text patch cannot contain, and LightingError if the two name different emitters.
+    """
+    scene = scene_of(scene, lighting)
+    root = scene.files[0].resolve()
+    place = root.parent / PATCH_SUFFIX / root.name
+    lines: list[str] = []
+    for file, content in relit_files(scene, lighting.emission, place).items():
+        if not isinstance(content, bytes):
+            raise SceneError(
+                f"{file.name} is an image that this lighting scales, which a text patch cannot "
+                "contain: use lightpaint relight"
+            )
+        name = file.relative_to(place.parent).as_posix()
+        try:
+            old_text = (root.parent / name).read_text(encoding="utf-8")
+        except OSError as error:
+            raise OutputError(f"cannot read {name}: {error.strerror or error}") from error
+        # A file that stays in its folder needs no search path for its assets.
+        origin = os.path.relpath((root.parent / name).parent, file.parent)
+        path_line = r"\r?\n[ \t]*" + re.escape(tag("path", value=Path(origin).as_posix()))
+        new = re.sub(path_line, "", content.decode("utf-8"), count=1)
+        lines += difflib.unified_diff(_lines(old_text), _lines(new), f"a/{name}", f"b/{name}")
+    return "".join(lines)
+
+
+def _lines(text: str) -> list[str]:
+    """Return lines with line ends, adding one to the last line if missing."""
+    lines = text.splitlines(keepends=True)
+    if lines and not lines[-1].endswith("\n"):
+        lines[-1] += "\n"
+    return lines

@@ -14,7 +14,7 @@ from lightpaint.relit.xml_edit import XmlFile
 from lightpaint.scene.checks.tokens import tag
 from lightpaint.scene.lights.emitters import Emitter
 from lightpaint.scene.lights.image_split import texel_image
-from lightpaint.scene.lights.texels.image_domain import GridSize
+from lightpaint.scene.lights.texels.image_domains import GridSize
 from lightpaint.scene.scene import Scene
 
 

@@ -1,16 +1,60 @@
-"""Renders the relit scene independently, and compares it with the prediction."""
+"""Renders the relit scene independently, and compares it with the prediction.
 
-from dataclasses import replace
+By default a verification has at most as many samples as its basis. `verify_in_stages` stops as soon
+as it is conclusive. It is a group-sequential test: it examines the render after a few samples, and
+again each time their number has grown by a third to a half. It continues while an error in a large
+part of the light would probably not be detected and more samples would help. That depends on the
+noise, but not on how well prediction and render agree, so the difference in standard errors has the
+same distribution at every look. Only a difference beyond the limit stops it at once.
 
+The probability of a false alarm is divided among the looks: the limit of each is raised so that all
+looks together pass correct renders as often as a single look does at `LIMIT`, whenever the test
+stops.
+"""
+
+from dataclasses import dataclass, replace
+
+from lightpaint.basis.basis import Basis
 from lightpaint.basis.render.render_budget import check_samples
 from lightpaint.errors import SizeError
 from lightpaint.images.estimate import Estimate
-from lightpaint.images.pixel_blocks import whole_factor
+from lightpaint.images.pixel_blocks import Size, whole_factor
 from lightpaint.keywords import keywords
+from lightpaint.lighting.answer.lighting import Lighting
 from lightpaint.progress import Progress, silent
-from lightpaint.relit.verification import Verification, compare
+from lightpaint.relit.detection_power import (
+    LightShares,
+    detection_power,
+    light_tests,
+    with_light_tests,
+)
+from lightpaint.relit.verification import (
+    LIMIT,
+    LOW_POWER,
+    Verification,
+    compare,
+    differences,
+    largest_difference,
+    limit_of_tests,
+)
 from lightpaint.scene.scene import Scene
-from lightpaint.scene.scene_render import Stream, render
+from lightpaint.scene.scene_render import Stream, render, render_in_stages
+
+#: Numbers of parts, out of ALL_PARTS, of the samples after which the render is examined.
+LOOKS, ALL_PARTS = (2, 3, 4, 6, 8, 12, 16, 24, 32, 48, 64), 64
+
+#: Minimum samples per pixel at a look, one for each half.
+FIRST_LOOK = 2
+
+#: Share of the picture's light in which an error must be detectable before the test stops; and
+#: share from which on a single light must be among it.
+CHECKED, LARGE_SHARE = 0.65, 1 / 7
+
+#: Share of the picture's light that may stay unchecked although more samples would check it.
+UNCHECKED = 0.1
+
+#: Minimum samples per pixel of a verification; with fewer, a smaller film is just as good.
+FEWEST = 4
 
 
 @keywords()
@@ -55,3 +99,135 @@ def verify(
         progress=progress,
     )
     return replace(compare(predicted, verified), spp=relit.spp if spp is None else spp)
+
+
+def verify_in_stages(
+    predicted: Estimate,
+    relit: Scene,
+    basis: Basis,
+    lighting: Lighting,
+    *,
+    spp: int,
+    seed: int = 0,
+    progress: Progress = silent,
+) -> Verification:
+    """Render the relit scene until an error of 5 % in the lights would have been detected.
+
+    It stops when an error would probably be detected in lights that make up CHECKED of the
+    picture's light, including every light with a share of LARGE or more; or when all samples would
+    check less than UNCHECKED in addition. predicted: the sum of `basis` under `lighting`, of the
+    size of `relit` or on a reduced film of it. spp: maximum samples per pixel.
+    """
+    lights, stages = LightShares.of(basis, lighting), stages_of(spp, relit.film.block_pixels)
+    limit = limit_of_tests(len(stages))
+
+    def is_enough(estimate: Estimate, done: int) -> bool:
+        verified = estimate.reduced(whole_factor(estimate.size, predicted.size) or 1)
+        return can_tell(predicted, verified, lights, done / spp, limit=limit)
+
+    verified, done = render_in_stages(
+        relit,
+        stages,
+        is_enough,
+        seed=seed,
+        stream=Stream.VERIFICATION,
+        label="verification",
+        progress=progress,
+    )
+    judged = replace(compare(predicted, verified), limit=limit, spp=done)
+    return with_light_tests(judged, predicted, lights)
+
+
+def stages_of(spp: int, block_pixels: int = 1) -> list[int]:
+    """Return the samples per pixel at each look; the last is `spp`.
+
+    Both halves have equal numbers, in multiples of `block_pixels`.
+    """
+    step = 2 * block_pixels
+    stages = [spp * part // ALL_PARTS for part in LOOKS]
+    looks = {max(samples // step * step, step) for samples in stages if samples >= FIRST_LOOK}
+    return [*sorted(samples for samples in looks if samples < spp), spp]
+
+
+def can_tell(
+    predicted: Estimate,
+    verified: Estimate,
+    lights: LightShares,
+    done: float,
+    *,
+    limit: float = LIMIT,
+) -> bool:
+    """Return whether a verification may stop.
+
+    predicted, verified: as in `compare`, of equal size. done: share of the samples rendered so far.
+    """
+    tests = light_tests(predicted, verified, lights.blocks, lights.noise)
+    z_lights = dict(zip(lights.names, tests.z.tolist(), strict=True))
+    if largest_difference(*differences(predicted, verified), z_lights, limit=limit) > limit:
+        return True
+    shares = lights.luminance()
+    power = detection_power(predicted, verified, lights, tests, limit=limit)
+    weak_shares = [share for name, share in shares.items() if power[name] < LOW_POWER]
+    if sum(weak_shares) <= 1 - CHECKED and max(weak_shares, default=0.0) < LARGE_SHARE:
+        return True
+    # With all samples, the noise of the render would be lower by this factor.
+    at_end = Estimate(verified.image, verified.half_difference * done**0.5)
+    tests = light_tests(predicted, at_end, lights.blocks, lights.noise)
+    power = detection_power(predicted, at_end, lights, tests, limit=limit)
+    later = [share for name, share in shares.items() if power[name] < LOW_POWER]
+    return sum(weak_shares) - sum(later) < UNCHECKED
+
+
+@dataclass(frozen=True)
+class VerificationBudget:
+    """The size and the samples of a verification.
+
+    scene: the relit scene on the film to render. spp: samples per pixel. share: its samples
+    relative to those of the basis.
+    """
+
+    scene: Scene
+    spp: int
+    share: float
+
+
+def verification_budget(
+    relit: Scene,
+    basis_size: Size,
+    basis_spp: int,
+    *,
+    most_spp: int | None = None,
+    asked_spp: int | None = None,
+) -> VerificationBudget:
+    """Return a verification of `relit` that takes no longer than its basis, or the requested one.
+
+    The samples of the basis are spent on the whole film, or on the largest film of whole blocks
+    that has FEWEST in each pixel; the comparison uses means over the blocks of the basis, so either
+    film serves. A sample of an ordinary render costs no more than one of a basis. A film that
+    cannot be divided into blocks gets at least two samples in each pixel, for two halves, whatever
+    the basis has.
+
+    basis_size: (height, width). basis_spp: samples per pixel. most_spp: maximum samples per pixel,
+    unless asked_spp is given. asked_spp: samples per pixel of the whole film, whatever they cost.
+    """
+    samples = basis_spp * basis_size[0] * basis_size[1]
+    film_pixels = relit.size[0] * relit.size[1]
+    if asked_spp is not None:
+        return VerificationBudget(relit, asked_spp, asked_spp * film_pixels / samples)
+    factor = whole_factor(relit.size, basis_size) or 1
+    for part in range(1, factor + 1):
+        if factor % part:
+            continue
+        scene = relit if part == 1 else relit.reduced(f"1/{part}")
+        # A block that is not a pixel of Mitsuba's film costs a sample in each of its film pixels.
+        saves = scene.film.block == relit.film.block
+        if part < factor and not (saves and whole_factor(scene.size, basis_size) == factor // part):
+            continue
+        pixels = scene.size[0] * scene.size[1]
+        spp = samples // pixels
+        if spp >= FEWEST or part == factor:
+            spp = max(2, spp if most_spp is None else min(spp, most_spp))
+            # Each film pixel of a block gets the same number, in both halves.
+            spp = max(spp, 2 * scene.film.block_pixels)
+            return VerificationBudget(scene, spp, spp * pixels / samples)
+    raise AssertionError("the last factor is always taken")

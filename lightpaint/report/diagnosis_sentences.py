@@ -1,12 +1,28 @@
-"""Sentences on why the answer does not look like the painting."""
+"""Sentences on an answer: why it does not look like the painting, how certain it is, which samples
+would make it more certain, and which options of the fit influence it.
+"""
 
 from collections.abc import Sequence
+from typing import Any
 
-from lightpaint.display_text import some_names
+from lightpaint.basis.basis import Basis
+from lightpaint.basis.light_images import joined_texels
+from lightpaint.display_text import some_names, some_of
 from lightpaint.lighting.analysis.appearance.appearance import Appearance
 from lightpaint.lighting.analysis.appearance.limiting_reasons import Loosening, Reason
 from lightpaint.lighting.analysis.diagnosis import Diagnosis, error_shares
+from lightpaint.lighting.analysis.noise.uncertainty import Uncertainty
 from lightpaint.lighting.answer.certificate import Bound
+from lightpaint.lighting.answer.lighting import Lighting, LightSetting
+from lightpaint.lighting.solution import Solution
+from lightpaint.report.measures import (
+    brightness,
+    energy_shares,
+    halving_spp,
+    is_by_painting,
+    most_uncertain,
+    relative_errors,
+)
 from lightpaint.report.phrases import (
     CHANNELS,
     spoken_changed,
@@ -27,6 +43,34 @@ MIN_SHARE = 0.05
 
 #: The same for a light that is switched off, which is easily switched on.
 MIN_SWITCHED_OFF_SHARE = 0.01
+
+#: Clauses on constraints and their release: for one light, and for several.
+RELEASE_CLAUSES = {
+    "off": ("switched off, as asked; switching it on", "switched off, as asked; switching them on"),
+    "lock": ("locked; adjusting it", "locked; adjusting them"),
+    "limits": ("at a limit; removing it", "at their limits; removing them"),
+    "colour": ("limited in colour; any other colour", "limited in colour; other colours"),
+    "tie": (
+        "tied to other lights; adjusting it by itself",
+        "tied together; adjusting each by itself",
+    ),
+}
+
+#: The same for all lights together.
+JOINT_RELEASE_CLAUSES = {
+    "colors": "Lights keep their colours; {any_color}",
+    "sparse": "The number of lights is limited; allowing more",
+    "prefer_current": "Lights are pulled towards their current setting; leaving them free",
+    "near": "Lights stay near the lighting that you started from; leaving them free",
+}
+
+#: Texts for a light without a meaningful error: in a table, and in a sentence.
+UNDETERMINED = "undetermined"
+
+#: Upper end of an interval, relative to the light, beyond which percents say nothing.
+MAX_TIMES = 10.0
+
+UNTOLD_HERE = f"{UNDETERMINED} at this number of samples"
 
 
 def error_sentences(
@@ -122,27 +166,6 @@ def compensation_sentences(names: Sequence[str]) -> list[str]:
         "because unpainted parts are held, and other lights would brighten them: paint what "
         f"{'it lights, or lock it' if is_one else 'they light, or lock them'}."
     ]
-
-
-#: Clauses on constraints and their release: for one light, and for several.
-RELEASE_CLAUSES = {
-    "off": ("switched off, as asked; switching it on", "switched off, as asked; switching them on"),
-    "lock": ("locked; adjusting it", "locked; adjusting them"),
-    "limits": ("at a limit; removing it", "at their limits; removing them"),
-    "colour": ("limited in colour; any other colour", "limited in colour; other colours"),
-    "tie": (
-        "tied to other lights; adjusting it by itself",
-        "tied together; adjusting each by itself",
-    ),
-}
-
-#: The same for all lights together.
-JOINT_RELEASE_CLAUSES = {
-    "colors": "Lights keep their colours; {any_color}",
-    "sparse": "The number of lights is limited; allowing more",
-    "prefer_current": "Lights are pulled towards their current setting; leaving them free",
-    "near": "Lights stay near the lighting that you started from; leaving them free",
-}
 
 
 def spoken_about(appearance: Appearance) -> str:
@@ -244,3 +267,137 @@ def spoken_hold(bound: Bound) -> str:
     multipliers = zip(CHANNELS, bound.multiplier, strict=True)
     channels = [n for n, m in multipliers if m > 0.01 * max(bound.multiplier)]
     return "off" if len(channels) == 3 else f"off in {' and '.join(channels)}"
+
+
+def spoken_errors(uncertainty: Uncertainty | None, count: int) -> list[str]:
+    """Return `± 4 %` for each light; empty for unknown errors.
+
+    At a limit it has one side, `0 … +4 %`; a light that is off has `0 … 0.9`, in its unit; a light
+    that samples do not determine has `undetermined`.
+    """
+    if uncertainty is None:
+        return [""] * count
+    lights = zip(*brightness(uncertainty), uncertainty.untold, strict=True)
+    return [
+        UNDETERMINED if is_undetermined else _spoken_error(*ends)
+        for *ends, is_undetermined in lights
+    ]
+
+
+def untold_lights(lighting: Lighting) -> str:
+    """Return a sentence on the lights that samples do not determine; "" if there are none."""
+    names = [light.name for light in lighting.lights if light.untold]
+    if not names:
+        return ""
+    is_one = len(names) == 1
+    verb, pronoun, clause = ("is", "it", "it shines") if is_one else ("are", "them", "they shine")
+    return (
+        f"{spoken_lights(names, start=True)} {verb} {UNTOLD_HERE}: what was painted shows too "
+        f"little of {pronoun} beside noise. Render more samples, paint where {clause}, or keep "
+        f"{pronoun}."
+    )
+
+
+def _spoken_error(solved: float, low: float, high: float) -> str:
+    if low >= high:
+        return ""
+    if solved == 0:
+        return f"0 … {high:.2g}"
+    if high > MAX_TIMES * solved:
+        return UNDETERMINED
+    below, above = (spoken_percent(float(side / solved)) for side in (solved - low, high - solved))
+    if below == above:
+        return f"± {below}"
+    return f"{f'−{below}' if low < solved else '0'} … {f'+{above}' if high > solved else '0'}"
+
+
+def partly_reached(lighting: Lighting) -> list[str]:
+    """Return a clause for the lights some of whose channels reach nothing painted."""
+    by_channels: dict[str, list[str]] = {}
+    for light in lighting.lights:
+        if light.is_partly_reached:
+            by_channels.setdefault(unreached_channels(light), []).append(light.name)
+    return [
+        f"no painted pixel shows the {channels} of {some_of(names, room=200)}: left unchanged"
+        for channels, names in ((x, joined_texels(y)) for x, y in by_channels.items())
+    ]
+
+
+def unreached_channels(light: LightSetting) -> str:
+    """Return `green and blue`: the channels of a light that reach nothing that counts."""
+    return " and ".join(
+        c for c, is_reached in zip(CHANNELS, light.reached, strict=True) if not is_reached
+    )
+
+
+def uncertainty_sentence(basis: Basis, solution: Solution, uncertainty: Uncertainty) -> str:
+    """Return a sentence on the light whose error changes the picture most, and on the samples to
+    halve it.
+    """
+    k = most_uncertain(basis, solution, uncertainty)
+    is_undetermined = untold_lights(solution.lighting)
+    if k is None and is_undetermined:
+        return is_undetermined
+    if k is None:
+        has_noise = any(x.any() for x in basis.noise)
+        reason = "nothing in it depends on the noise" if has_noise else "the basis has no noise"
+        return f"More samples would change no light: {reason}."
+    shares = energy_shares(basis, solution.lighting)
+    errors = relative_errors(uncertainty)
+    name = solution.lighting.lights[k].name
+    light = f"{spoken_lights([name])}, {spoken_percent(shares[k])} of the picture"
+    change = "as much as all of it" if errors[k] > 1 else f"± {spoken_percent(float(errors[k]))}"
+    if is_by_painting(uncertainty, k):
+        return (
+            f"{is_undetermined} Noise of the painting leaves {light}, open by {change} (95 %): "
+            "more samples would not change that."
+        ).lstrip()
+    sentence = (
+        f"More samples would change {light}, by {change} (95 %); "
+        f"{halving_spp(basis, uncertainty, k)} samples per pixel would halve that."
+    )
+    return f"{is_undetermined} {sentence}" if is_undetermined else sentence
+
+
+def fit_clauses(solution: Solution) -> tuple[str, ...]:
+    """Return clauses on the options of the fit; none for a literal fit."""
+    certificate, fit = solution.certificate, solution.problem.fit
+    has_unpainted = any(not x.is_whole for x in solution.problem.views.targets)
+    clauses = []
+    if certificate.display:
+        clauses.append(f"fitted as the eye sees it ({certificate.display})")
+    if has_unpainted and fit.unpainted:
+        clauses.append(f"each unpainted pixel counts {fit.unpainted:g} times a painted one")
+    elif has_unpainted and fit.hold:
+        clauses.append(f"unpainted parts are held ({fit.hold:g} times the weight of the paint)")
+    if fit.colors == "gentle":
+        clauses.append("lights are pulled to their own colour (gentle)")
+    elif fit.colors == "white":
+        clauses.append("lights are white")
+    elif fit.colors == "own":
+        clauses.append("lights keep their own colour (own)")
+    if certificate.noise_removed:
+        clauses.append("noise is corrected")
+    return tuple(clauses)
+
+
+def fit_sentence(solution: Solution, *, instead: str = "") -> str:
+    """Return a sentence on the options of the fit. instead: a clause on how to switch them off."""
+    if not (clauses := fit_clauses(solution)):
+        return "The painting is fitted literally: linear light, nothing held, any colour."
+    text = "; ".join([*clauses, *([instead] if instead else [])])
+    return f"{text[0].upper()}{text[1:]}."
+
+
+def fit_options(solution: Solution) -> dict[str, Any]:
+    """Return the options of the fit as data, resolved by the painting."""
+    fit, certificate = solution.problem.fit, solution.certificate
+    return {
+        "space": solution.space,
+        "display": certificate.display or None,
+        "hold": fit.hold,
+        "unpainted": fit.unpainted,
+        "colors": fit.colors,
+        "literal": fit.literal,
+        "noise_correction": certificate.noise_removed > 0,
+    }

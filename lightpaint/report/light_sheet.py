@@ -21,7 +21,7 @@ from lightpaint.lighting.answer.lighting import Lighting
 from lightpaint.report.comparison import shorten_to_width
 from lightpaint.report.measures import energy_shares
 from lightpaint.report.page.figures import exposure_of
-from lightpaint.report.page.image_rows import map_picture, map_stops
+from lightpaint.report.page.lights_table import map_picture, map_stops
 from lightpaint.report.phrases import spoken_percent
 from lightpaint.report.rig.hung_lights import HungLight
 from lightpaint.report.rig.rig_drawing import rig_drawing

@@ -15,7 +15,7 @@ from lightpaint.colour.color import luminance
 from lightpaint.colour.display.view_transform import ViewTransform
 from lightpaint.images.estimate import Estimate
 from lightpaint.lighting.analysis.appearance.appearance import Appearance, compare_appearance
-from lightpaint.lighting.analysis.appearance.color_choices import Choices, ColorChoice
+from lightpaint.lighting.analysis.appearance.color_choices import ColorChoice
 from lightpaint.lighting.analysis.appearance.delivery import Delivery
 from lightpaint.lighting.analysis.appearance.limiting_reasons import Reason
 from lightpaint.lighting.analysis.appearance.unpainted_change import UnpaintedChange
@@ -32,7 +32,7 @@ from lightpaint.report.answer_pictures import (
     report_transform,
     residual_of,
 )
-from lightpaint.report.fit_influences import fit_options
+from lightpaint.report.diagnosis_sentences import UNTOLD_HERE, fit_options
 from lightpaint.report.measures import (
     brightness,
     count_at_least_pixels,
@@ -46,54 +46,40 @@ from lightpaint.report.measures import (
     relative_residual,
 )
 from lightpaint.report.page.diagnosis_section import maps_limit
-from lightpaint.report.rig.hung_lights import HungLights, placement_numbers
-from lightpaint.report.uncertainty_sentences import UNTOLD_HERE
+from lightpaint.report.reported_answer import ReportedAnswer
+from lightpaint.report.rig.hung_lights import placement_numbers
 from lightpaint.target.target import Target
 from lightpaint.version import __version__
 
 FORMAT = "lightpaint-report 1"
 
 
-def report_numbers(
-    *,
-    basis: Basis,
-    target: Target,
-    solution: Solution,
-    predicted: Estimate,
-    verification: Verification | None,
-    command: str = "",
-    uncertainty: Uncertainty | None = None,
-    diagnosis: Diagnosis | None = None,
-    unconstrained: Solution | None = None,
-    suggestions: Sequence[Suggestion] | None = None,
-    turn: MoveSuggestion | None = None,
-    hung: HungLights | None = None,
-    appearance: Appearance | None = None,
-    color_choices: Choices = (),
-    missed: Residual | None = None,
-) -> str:
-    """Return the numbers of `report_page`, with its arguments, as JSON."""
+def report_numbers(answer: ReportedAnswer, *, missed: Residual | None = None) -> str:
+    """Return the numbers of a report as JSON. missed: the result of `residual_of`."""
+    basis, target, solution = answer.basis, answer.target, answer.solution
+    predicted, verification = answer.predicted, answer.verification
+    diagnosis, uncertainty = answer.diagnosis, answer.uncertainty
     transform = report_transform(target, basis, predicted.image)
     residual = missed or residual_of(solution, predicted.image, transform=transform)
     numbers = {
         "format": FORMAT,
         "lightpaint": __version__,
         "target": target.name,
-        "command": command,
+        "command": answer.command,
         "basis": _basis(basis),
         "painting": _painting(target, solution),
         "view": _view(predicted, transform, residual),
-        "seen": _appearance(appearance or compare_appearance(solution, predicted)),
+        "seen": _appearance(answer.appearance or compare_appearance(solution, predicted)),
         "meant": fit_options(solution),
-        "colors": {choice.colors: _choice(choice) for choice in color_choices} or None,
-        "fit": _fit(solution, predicted, unconstrained),
+        "colors": {choice.colors: _choice(choice) for choice in answer.color_choices} or None,
+        "fit": _fit(solution, predicted, answer.unconstrained),
         "lights": _lights(basis, solution, uncertainty),
         "missed": None if diagnosis is None else _missed(solution, diagnosis, transform),
         "uncertainty": None if uncertainty is None else _uncertainty(basis, solution, uncertainty),
         "verification": None if verification is None else verification_numbers(verification),
-        "suggestions": _suggestion_list(suggestions, solution.lighting.cd_per_unit),
-        "turn": None if turn is None else _turn(turn),
-        "placement": None if hung is None else placement_numbers(hung),
+        "suggestions": _suggestion_list(answer.suggestions, solution.lighting.cd_per_unit),
+        "turn": None if answer.turn is None else _turn(answer.turn),
+        "placement": None if answer.hung is None else placement_numbers(answer.hung),
     }
     return json.dumps(finite(numbers), indent=2, ensure_ascii=False, allow_nan=False) + "\n"
 

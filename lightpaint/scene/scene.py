@@ -6,16 +6,16 @@ and no reference to one of its emitters may outlive it.
 
 import gc
 import hashlib
-from collections.abc import Callable, Collection, Mapping, Sequence
+from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
-from pathlib import Path
+from functools import cached_property
+from pathlib import Path, PurePath
 from typing import Any, TypeVar
 
-from lightpaint.arrays import RGB, Position
+from lightpaint.arrays import RGB, Floats, Position
 from lightpaint.display_text import Listed, Shown, some_of
 from lightpaint.keywords import keywords
-from lightpaint.scene.changed_emitters import darkened, with_elements, with_motions
-from lightpaint.scene.lights.emitters import Emitter
+from lightpaint.scene.lights.emitters import Emitter, find_emitters
 from lightpaint.scene.lights.image_split import with_split
 from lightpaint.scene.lights.light import (
     Light,
@@ -27,15 +27,17 @@ from lightpaint.scene.lights.light import (
     regrouped,
     settings_for,
 )
-from lightpaint.scene.lights.lights_file import SceneRequests
+from lightpaint.scene.lights.lights_file import SceneRequests, lights_file_beside
 from lightpaint.scene.lights.new_emitter import (
     NewEmitter,
     check_new_names,
     moved_emitter,
     places_of,
 )
-from lightpaint.scene.lights.texels.image_domain import GridSize
+from lightpaint.scene.lights.texels.image_domains import GridSize
 from lightpaint.scene.lights.texels.texel_layout import TexelLayout
+from lightpaint.scene.plane_identity import SceneHasher
+from lightpaint.scene.properties.emission import ENVIRONMENTS, read_emitted_image
 from lightpaint.scene.properties.film import Film, camera_named, reduced, reduction
 from lightpaint.scene.properties.integrator import Integrator, IntegratorChoice
 from lightpaint.scene.properties.pose import Pose, motion_of, upward_axis
@@ -43,11 +45,65 @@ from lightpaint.scene.properties.site import EmitterPlace, Site
 from lightpaint.scene.runtime.kernel_threads import kernels
 from lightpaint.scene.runtime.mitsuba_errors import mitsuba_errors, render_errors
 from lightpaint.scene.runtime.render_lock import MITSUBA
-from lightpaint.scene.scene_files import SceneFiles
-from lightpaint.scene.scene_inspection import inspect_scene
-from lightpaint.scene.scene_tree import ParsedScene
+from lightpaint.scene.scene_tree import ParsedScene, darkened, with_elements, with_motions
 
 _Result_T = TypeVar("_Result_T")
+
+#: A shape that is only visible through instances.
+GROUP = "shapegroup"
+
+
+class SceneFiles:
+    """The files of a `Scene`, which has these attributes and describes them."""
+
+    path: Path
+    files: tuple[Path, ...]
+    lights_file: Path | None
+    parsed: ParsedScene
+
+    @property
+    def moved_elements(self) -> tuple[tuple[Path, int, Mapping[str, str]], ...]:
+        """Elements in the files that `moved` changed.
+
+        For each: its file, the byte offset of its `<`, and the child elements to set, as XML by
+        name.
+        """
+        nodes = self.parsed.state.nodes
+        return tuple(
+            (self.files[nodes[k].file_index], int(nodes[k].offset) - 1, children)
+            for k, children in self.parsed.moved.items()
+        )
+
+    @property
+    def originals(self) -> tuple[Path, ...]:
+        """All files of the scene: XML, meshes, textures, tables."""
+        return (*self.files, *self.parsed.assets())
+
+    @property
+    def read_files(self) -> tuple[Path, ...]:
+        """`originals`, and the lights file if there is one."""
+        return (*self.originals, *([] if self.lights_file is None else [self.lights_file]))
+
+    @property
+    def places(self) -> frozenset[Path]:
+        """Paths of its files, and of files that would change the scene if they existed."""
+        lights_path = self.lights_file or lights_file_beside(self.path)
+        return frozenset({*self.parsed.places(), lights_path})
+
+    @cached_property
+    def shape_names(self) -> tuple[str, ...]:
+        """Names of the shapes, in the order of a loaded scene."""
+        return shape_names(self.parsed)
+
+    @property
+    def replaced_integrators(self) -> tuple[tuple[Path, int], ...]:
+        """The integrators that `instead` replaces: file, and byte offset of the element."""
+        return tuple((self.files[file], offset) for file, offset in self.parsed.replaced)
+
+    def emitted_image(self, emitter: Emitter) -> Floats:
+        """Return the image that `emitter` emits, (h, w, 3) linear Rec.709, without its scale."""
+        assert emitter.kind is not None
+        return read_emitted_image(*self.parsed.image_file(emitter.node, emitter.kind.parameter))
 
 
 @keywords()
@@ -320,3 +376,70 @@ class Scene(SceneFiles, Shown):
         finally:
             del loaded
             gc.collect()
+
+
+def inspect_scene(parsed: ParsedScene, sensor: int) -> dict[str, Any]:
+    """Return the fields of a `Scene` that require loading it."""
+    loaded, hasher = parsed.instantiate({}), SceneHasher(parsed)
+    camera = camera_named(loaded, parsed.sensor_names[sensor])
+    emitters, film = find_emitters(parsed, loaded, hasher), Film.of(camera, sensor)
+    facts = {
+        "emitters": emitters,
+        "film": film,
+        "spp": int(camera.sampler().sample_count()),
+        "has_null": (has_null := _has_null_surfaces(loaded)),
+    }
+    del loaded, camera
+    gc.collect()
+    has_environment = any(emitter.plugin in ENVIRONMENTS for emitter in emitters)
+    return {
+        **facts,
+        "sensor_names": parsed.sensor_names,
+        "integrator": parsed.integrator(),
+        "integrator_choice": parsed.integrator_choice,
+        "has_media": parsed.has_media(),
+        "files": parsed.files,
+        "content": parsed.content(sensor),
+        "unlit_content": hasher.unlit_content(
+            film, has_environment=has_environment, has_null=has_null
+        ),
+    }
+
+
+def _has_null_surfaces(loaded: Any) -> bool:
+    import mitsuba as mi
+
+    bsdfs = (shape.bsdf() for shape in loaded.shapes())
+    return any(b is not None and mi.has_flag(b.flags(), mi.BSDFFlags.Null) for b in bsdfs)
+
+
+def shape_names(parsed: ParsedScene) -> tuple[str, ...]:
+    """Return names of a loaded scene's shapes, in order: id, or else mesh file, material or
+    kind.
+    """
+    import mitsuba as mi
+
+    shapes = parsed.children_of(0, mi.ObjectType.Shape)
+    kinds = (parsed.state.nodes[k].props.plugin_name() for k in shapes)
+    return tuple(
+        next(filter(None, _names_of(parsed, k)))
+        for k, kind in zip(shapes, kinds, strict=True)
+        if kind != GROUP
+    )
+
+
+def _names_of(parsed: ParsedScene, node: int) -> Iterator[str]:
+    """Yield possible names of a shape, best first."""
+    import mitsuba as mi
+
+    def ids(kind: Any) -> Iterator[str]:
+        return (str(parsed.state.nodes[k].props.id()) for k in parsed.children_of(node, kind))
+
+    props = parsed.state.nodes[node].props
+    yield str(props.id())
+    if "filename" in props:
+        yield PurePath(str(props["filename"])).stem
+    # An instance is named after its shape group.
+    yield from ids(mi.ObjectType.Shape)
+    yield from ids(mi.ObjectType.BSDF)
+    yield str(props.plugin_name())

@@ -9,23 +9,21 @@ from pathlib import Path
 from lightpaint.errors import SceneError
 from lightpaint.file_reading import file_length
 from lightpaint.keywords import keywords
-from lightpaint.scene.checks.old_scenes import explain_old_scene
-from lightpaint.scene.checks.xml_limits import MAX_XML
+from lightpaint.scene.checks.xml_checks import MAX_XML
 from lightpaint.scene.lights.emitters import Emitter, check_emitters
 from lightpaint.scene.lights.image_split import images_to_split, with_split
 from lightpaint.scene.lights.light import Light, lights_of
 from lightpaint.scene.lights.light_choice import choose_lights
 from lightpaint.scene.lights.lights_file import LightsFile, lights_file_for
-from lightpaint.scene.lights.texels.image_domain import GridSize
+from lightpaint.scene.lights.texels.image_domains import GridSize
 from lightpaint.scene.lights.texels.texel import mirrored_pairs, parse_map_size, parse_size
 from lightpaint.scene.lights.texels.texel_layout import TexelLayout
 from lightpaint.scene.properties.film import check_film, sensor_index
 from lightpaint.scene.properties.integrator import IntegratorChoice
-from lightpaint.scene.runtime.mitsuba_errors import mitsuba_errors
+from lightpaint.scene.runtime.mitsuba_errors import explain_old_scene, mitsuba_errors
 from lightpaint.scene.runtime.render_lock import MITSUBA
 from lightpaint.scene.runtime.variant import use_variant
-from lightpaint.scene.scene import Scene
-from lightpaint.scene.scene_inspection import inspect_scene
+from lightpaint.scene.scene import Scene, inspect_scene
 from lightpaint.scene.scene_tree import ParsedScene
 
 #: Endings of pictures and lightings, which people give in place of a scene.
@@ -120,12 +118,7 @@ def load_scene(
         whole = inspect_scene(parsed, index)
     sizes = images_to_split(sizes, whole["emitters"], str(path))
     mirrored = _symmetric_images(selection, symmetric, sizes)
-    for name in mirrored:
-        size = sizes[name]
-        layout = size.made_symmetric() if isinstance(size, TexelLayout) else TexelLayout(size)
-        sizes[name] = layout if layout.splits else layout.size
-        pairs = mirrored_pairs(name, layout)
-        selection = replace(selection, groups={**pairs, **selection.groups})
+    sizes, selection = _with_mirror_images(mirrored, sizes, selection)
     with explain_old_scene(path), mitsuba_errors(path):
         facts = with_split(whole, parsed, sizes, mirrored)
     check_film(path, facts["film"], facts["spp"])
@@ -199,6 +192,22 @@ def _symmetric_images(
             raise SceneError(f"symmetric: {pattern!r} is not split into texels: split it")
         names.update(matches)
     return sorted(names)
+
+
+def _with_mirror_images(
+    symmetric: Iterable[str], sizes: Mapping[str, GridSize | TexelLayout], selection: LightsFile
+) -> tuple[dict[str, GridSize | TexelLayout], LightsFile]:
+    """Return sizes in which symmetric images are their own mirror images, and a selection in which
+    each pair of their texels is a group.
+    """
+    sizes = dict(sizes)
+    pairs: dict[str, Sequence[str]] = {}
+    for name in symmetric:
+        size = sizes[name]
+        layout = size.made_symmetric() if isinstance(size, TexelLayout) else TexelLayout(size)
+        sizes[name] = layout if layout.splits else layout.size
+        pairs = {**mirrored_pairs(name, layout), **pairs}
+    return sizes, replace(selection, groups={**pairs, **selection.groups})
 
 
 def _adjusted_images(lights: Sequence[Light]) -> set[str]:

@@ -1,13 +1,14 @@
 """Mitsuba's parsed form of a scene XML, from which loaded scenes are built.
 
 The parsed form is kept and copied for every load, because instantiating changes it, and only one
-loaded scene should exist at a time.
+loaded scene should exist at a time. Copies with moved, black or added emitters need no file read
+again.
 """
 
 import hashlib
 import os
 import re
-from collections.abc import Iterator, Mapping
+from collections.abc import Collection, Iterator, Mapping
 from contextlib import contextmanager
 from copy import copy
 from pathlib import Path
@@ -15,9 +16,7 @@ from typing import Any
 
 from lightpaint.errors import SceneError
 from lightpaint.scene.checks.assets import check_assets
-from lightpaint.scene.checks.required import check_required
-from lightpaint.scene.checks.xml_limits import check_nodes, check_xml
-from lightpaint.scene.normals import make_normals_reproducible
+from lightpaint.scene.checks.xml_checks import check_nodes, check_required, check_xml
 from lightpaint.scene.properties.emission import EmitterSetting, child_named, set_emission
 from lightpaint.scene.properties.film import Film
 from lightpaint.scene.properties.integrator import (
@@ -27,6 +26,8 @@ from lightpaint.scene.properties.integrator import (
     read_integrator,
     replace_integrator,
 )
+from lightpaint.scene.properties.pose import Motion, moved_parameters
+from lightpaint.scene.runtime.kernel_threads import kernels
 from lightpaint.scene.runtime.mitsuba_errors import mitsuba_errors
 from lightpaint.scene.runtime.plugins import check_plugins
 
@@ -35,6 +36,10 @@ GENERATED_ID = re.compile(r"(__)?elm__\d+|_(unnamed|arg)_\d+")
 
 #: The name that Mitsuba's writer gives the emitter of a shape, whatever it is.
 EMITTER_OF_SHAPE = "emitter"
+
+#: Maximum difference at which normals count as computed from the faces rather than read from the
+#: file. Round-off is a hundredth of it.
+NORMAL_TOLERANCE = 1e-5
 
 
 class ParsedScene:
@@ -327,3 +332,126 @@ def _lift_merged(state: Any) -> None:
             is_free = inner not in root
             root[inner if is_free else f"_arg_{len(nodes) + merged[inner].index()}"] = merged[inner]
             del merged[inner]
+
+
+def make_normals_reproducible(scene: Any) -> None:
+    """Recompute normals on one thread, which always adds in the same order.
+
+    When Mitsuba loads a mesh without normals, several threads add up those of the faces around a
+    vertex in varying order, so renders would differ in their last bits between processes. Normals
+    from a file are kept, unless they equal the computed ones. scene: an `mi.Scene`.
+    """
+    import mitsuba as mi
+
+    # Scalar variants use one thread anyway.
+    if mi.variant().startswith("scalar") or not isinstance(scene, mi.Scene):
+        return
+    import drjit as dr
+
+    meshes = [x for x in scene.shapes() if isinstance(x, mi.Mesh) and x.has_vertex_normals()]
+    if not meshes:
+        return
+    with kernels(threads=1):
+        for mesh in meshes:
+            parameters, key = mi.traverse(mesh), "vertex_normals"
+            if key not in parameters:
+                continue
+            loaded = type(parameters[key])(parameters[key])
+            dr.eval(loaded)
+            mesh.recompute_vertex_normals()
+            if not dr.all(dr.abs(mi.traverse(mesh)[key] - loaded) <= NORMAL_TOLERANCE):
+                parameters[key] = loaded
+                parameters.update()
+
+
+def with_motions(parsed: ParsedScene, motions: Mapping[int, Motion]) -> ParsedScene:
+    """Return a copy of a scene with moved emitters. motions: by emitter node."""
+    import mitsuba as mi
+
+    copied = copy(parsed)
+    copied.state = mi.parser.ParserState(parsed.state)
+    copied.moved = dict(parsed.moved)
+    for emitter, motion in motions.items():
+        node = parsed.shape_of.get(emitter, emitter)
+        props = copied.state.nodes[node].props
+        parameters = moved_parameters(props, motion)
+        for parameter in parameters:
+            props[parameter.name] = parameter.value
+        copied.moved[node] = {**parsed.moved.get(node, {}), **{p.name: p.xml for p in parameters}}
+    return copied
+
+
+def darkened(parsed: ParsedScene, dark: Mapping[int, EmitterSetting]) -> ParsedScene:
+    """Return a copy of a scene in which emitters have other settings. dark: settings by emitter
+    node.
+    """
+    import mitsuba as mi
+
+    copied = copy(parsed)
+    copied.state = mi.parser.ParserState(parsed.state)
+    for node, setting in dark.items():
+        set_emission(copied.state, node, setting, on_shape=node in parsed.shape_of)
+    return copied
+
+
+def without_emitters(parsed: ParsedScene, emitters: Collection[int]) -> ParsedScene:
+    """Return a copy of a scene without the emitters of these nodes, and the shapes of theirs."""
+    import mitsuba as mi
+
+    copied = copy(parsed)
+    copied.state = mi.parser.ParserState(parsed.state)
+    copied.emitter_nodes = [node for node in parsed.emitter_nodes if node not in emitters]
+    left_out = {*emitters, *(parsed.shape_of[node] for node in emitters if node in parsed.shape_of)}
+    reference = mi.Properties.Type.ResolvedReference
+    for node in copied.state.nodes:
+        for key in list(node.props):
+            if node.props.type(key) == reference and node.props[key].index() in left_out:
+                del node.props[key]
+    return copied
+
+
+def with_elements(parsed: ParsedScene, elements: Mapping[str, str]) -> ParsedScene:
+    """Return a copy of a scene with emitters added, or earlier added ones replaced.
+
+    elements: XML by the name of its emitter, which must not occur in the files.
+    """
+    import mitsuba as mi
+
+    copied = copy(parsed)
+    copied.state = mi.parser.ParserState(parsed.state)
+    copied.emitter_nodes, copied.names = [*parsed.emitter_nodes], dict(parsed.names)
+    copied.shape_of = dict(parsed.shape_of)
+    node_of = {name: node for node, name in parsed.names.items()}
+    for name, text in elements.items():
+        fragment = mi.parser.parse_string(parsed.config, f'<scene version="3.0.0">{text}</scene>')
+        mi.parser.transform_all(parsed.config, fragment)
+        kinds = [node.type for node in fragment.nodes]
+        inner = kinds.index(mi.ObjectType.Emitter)
+        if name in node_of:
+            first = node_of[name] - inner + 1
+        else:
+            first = len(copied.state.nodes)
+            copied.emitter_nodes.append(first + inner - 1)
+            copied.names[first + inner - 1] = name
+            if inner > 1:
+                copied.shape_of[first + inner - 1] = first
+            root = copied.state.nodes[0].props
+            root[f"{name} of lightpaint"] = mi.Properties.ResolvedReference(first)
+        _put_nodes(copied.state, first, fragment)
+    return copied
+
+
+def _put_nodes(state: Any, first: int, fragment: Any) -> None:
+    """Store the nodes of a parsed fragment, except its root, in `state` from index `first` on."""
+    import mitsuba as mi
+
+    reference = mi.Properties.Type.ResolvedReference
+    for k, node in enumerate(list(fragment.nodes)[1:]):
+        for key in list(node.props):
+            if node.props.type(key) == reference:
+                child = node.props[key].index() - 1 + first
+                node.props[key] = mi.Properties.ResolvedReference(child)
+        if first + k < len(state.nodes):
+            state.nodes[first + k] = node
+        else:
+            state.nodes.append(node)

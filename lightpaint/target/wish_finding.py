@@ -2,12 +2,13 @@
 
 A person who repaints a whole picture darker and three figures in it brighter has asked for four
 things. They lie in one picture; what tells them apart is what is asked: the ratio of the painting
-to the current look, in stops of each channel.
+to the current look, in stops of each channel. But a stroke on part of the picture asks for one
+thing as long as one colour, or one gain, laid over the look explains it.
 """
 
 from collections.abc import Sequence
-from dataclasses import replace
-from functools import partial
+from dataclasses import dataclass, replace
+from functools import cached_property, partial
 from math import ceil
 
 import numpy as np
@@ -16,6 +17,7 @@ import numpy.typing as npt
 from lightpaint.arrays import Bools, Doubles, Floats
 from lightpaint.colour.color import LUMINANCE
 from lightpaint.images.pixel_blocks import block_sums, enlarged
+from lightpaint.target.stroke_model import departure_from_one_stroke
 from lightpaint.target.target import Target
 from lightpaint.target.wish import Wish
 
@@ -24,6 +26,9 @@ DISTINCT_STOPS = 0.5
 
 #: Least share of the picture of a wish, and largest share of the paint of one within other paint.
 MIN_SHARE, MAX_INNER_SHARE = 0.001, 0.5
+
+#: Largest share of the picture that one stroke of a brush covers.
+MAX_STROKE_SHARE = 0.5
 
 #: Largest number of wishes in one layer; places that ask for less stay with their surroundings.
 MAX_WISHES = 8
@@ -74,18 +79,57 @@ def split_wishes(
     side = max(1, ceil((height * width / MAX_PIXELS) ** 0.5))
     small = partial(_block_means, side=side)
     small_importance = small(importance)
-    ratio = asked_ratio(small(image), small_importance, small(current_look))
+    painting = _Painting(small(image), small_importance, small(current_look))
     wishes: list[Wish] = []
     for layer in layers:
         if not layer.has_strokes:
             wishes.append(layer)
             continue
-        owners, count = _owners((small(layer.area) >= PAINTED) & (small_importance > 0), ratio)
+        owners, count = _owners((small(layer.area) >= PAINTED) & (small_importance > 0), painting)
         places = enlarged(owners, side)[:height, :width]
         parts = (np.where(places == k, layer.area, 0) for k in range(1, count + 1))
         found = [replace(layer, area=part.astype(np.float32)) for part in parts]
         wishes += found or [layer]
     return tuple(wishes)
+
+
+@dataclass(frozen=True)
+class _Painting:
+    """A painting without layers: its image and the current look, (h, w, 3) linear, its importance,
+    (h, w).
+    """
+
+    image: Floats
+    importance: Floats
+    look: Floats
+
+    @cached_property
+    def ratio(self) -> Floats:
+        """See `asked_ratio`."""
+        return asked_ratio(self.image, self.importance, self.look)
+
+    @cached_property
+    def channels(self) -> tuple[Floats, Floats]:
+        """The image and the look, (3, h, w)."""
+        return self.image.transpose(2, 0, 1), self.look.transpose(2, 0, 1)
+
+    def beyond(self, stroke: Bools) -> Floats:
+        """Return by how many stops of each channel, (3, h, w), a place asks for something else than
+        the stroke, (h, w), that it is in.
+        """
+        from scipy.ndimage import binary_erosion
+
+        dark = DARK * float(np.mean(self.look))
+        if dark > 0 and stroke.mean() <= MAX_STROKE_SHARE:
+            radius = _wash_radius(stroke.shape[1])
+            departure = departure_from_one_stroke(
+                stroke, *self.channels, dark, radius, DISTINCT_STOPS
+            )
+            # Within a wash of its rim a stroke may end as sharply as it likes.
+            within = binary_erosion(stroke, iterations=round(radius), border_value=1)
+            return np.asarray(departure * within)
+        usual = np.median(self.ratio[:, stroke], axis=1)
+        return np.asarray(self.ratio - usual[:, None, None].astype(np.float32))
 
 
 def asked_ratio(image: Floats, importance: Floats, current_look: Floats) -> Floats:
@@ -105,16 +149,20 @@ def asked_ratio(image: Floats, importance: Floats, current_look: Floats) -> Floa
     counts = (importance > 0).astype(np.float32)
     stops = np.log2(asked / now) * counts
     summed = np.concatenate([stops, counts[None]])
-    radius = max(SMOOTHING * importance.shape[1], MIN_RADIUS)
+    radius = _wash_radius(importance.shape[1])
     wash = gaussian_filter(summed, (0, radius, radius))
     return np.asarray(counts / np.maximum(wash[3], 1e-6) * wash[:3], np.float32)
 
 
-def _owners(painted: Bools, ratio: Floats) -> tuple[npt.NDArray[np.int64], int]:
+def _wash_radius(width: int) -> float:
+    return max(SMOOTHING * width, MIN_RADIUS)
+
+
+def _owners(painted: Bools, painting: _Painting) -> tuple[npt.NDArray[np.int64], int]:
     """Number the strokes of a layer, and the places in them that ask for something else.
 
-    painted: (h, w). ratio: see `asked_ratio`. Returns the number of each pixel, (h, w), 0 for none,
-    and the largest.
+    painted: (h, w), where the layer is. Returns the number of each pixel, (h, w), 0 for none, and
+    the largest.
     """
     least = MIN_SHARE * painted.size
     strokes = _connected(painted, round(JOINING * painted.shape[1]), least)
@@ -123,7 +171,9 @@ def _owners(painted: Bools, ratio: Floats) -> tuple[npt.NDArray[np.int64], int]:
     for stroke in strokes[:MAX_WISHES]:
         count += 1
         owners[stroke] = count
-        for place in _distinct_places(stroke, ratio, least)[: max(MAX_WISHES - count, 0)]:
+        for place in _distinct_places(stroke, painting.beyond(stroke), least)[
+            : max(MAX_WISHES - count, 0)
+        ]:
             count += 1
             owners[place] = count
     return owners, count
@@ -139,12 +189,10 @@ def _block_means(image: Floats, *, side: int) -> Doubles:
     )
 
 
-def _distinct_places(stroke: Bools, ratio: Floats, least: float) -> list[Bools]:
-    """Return connected places in a stroke that ask for something else than most of it, (h, w)
-    each, those that ask for most first.
+def _distinct_places(stroke: Bools, beyond: Floats, least: float) -> list[Bools]:
+    """Return connected places in a stroke that ask for something else than it, (h, w) each, those
+    that ask for most first. beyond: see `_Painting.beyond`.
     """
-    usual = np.median(ratio[:, stroke], axis=1)
-    beyond = ratio - usual[:, None, None].astype(np.float32)
     light = np.tensordot(LUMINANCE.astype(np.float32), beyond, 1)
     differs = np.abs(light) > DISTINCT_STOPS
     differs |= beyond.max(axis=0) - beyond.min(axis=0) > DISTINCT_STOPS

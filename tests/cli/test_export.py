@@ -17,7 +17,7 @@ from renderer import LIGHTS, write_room
 
 from lightpaint.images.formats.exr import write_rgb
 from lightpaint.lighting.answer.lighting_file import read_lighting
-from lightpaint.relit.export.colors import with_own_colors
+from lightpaint.relit.formats import with_own_colors
 from lightpaint.scene.scene_reader import load_scene
 
 #: Emissions are written with nine digits, and read as float32.

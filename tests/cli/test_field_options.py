@@ -8,8 +8,8 @@ from typing import Annotated, Any, Literal
 import pytest
 
 from lightpaint.batch.run_options import RunOptions
+from lightpaint.cli.options.option_groups import add_fields
 from lightpaint.cli.options.parser import command_parser
-from lightpaint.cli.options.record_options import add_fields
 from lightpaint.cli.output.vocabulary import OPTIONS, RECORDS, SPELLINGS
 from lightpaint.field_options import FieldOption, Option, options_of
 from lightpaint.pipeline.job.settings import Settings

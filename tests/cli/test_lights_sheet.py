@@ -13,9 +13,8 @@ from renderer import LIGHTS, write_room
 import lightpaint as lp
 from lightpaint.images.formats.png import png_has_text
 from lightpaint.pipeline import light_sheets
-from lightpaint.pipeline.light_sheets import SHEET_KEY
+from lightpaint.pipeline.light_sheets import SHEET_KEY, recorded_places
 from lightpaint.pipeline.results.answer_folder import write_answer
-from lightpaint.pipeline.results.recorded_places import recorded_places
 from lightpaint.report.rig.rig_drawing import CHANGED
 from lightpaint.scene.lights.new_emitter import NewEmitter
 from lightpaint.scene.runtime.variant import use_variant

@@ -17,7 +17,7 @@ from lightpaint.cli.output.vocabulary import _ARGUMENT, OPTIONS, SPELLINGS, spok
 from lightpaint.paint.launch import paint_in_browser
 from lightpaint.pipeline.job.settings import Settings
 from lightpaint.pipeline.job.sources import NOT_IN_GROUPS
-from lightpaint.relit.formats.export_format import Source
+from lightpaint.relit.export_format import Source
 from lightpaint.target.target_reader import read_target
 
 PACKAGE = Path(lightpaint.__file__).parent

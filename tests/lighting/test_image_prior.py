@@ -12,10 +12,10 @@ from lightpaint.basis.light_images import joined_texels, light_images, texel_lig
 from lightpaint.basis.lights import BasisLight, Lights
 from lightpaint.basis.planes import as_planes
 from lightpaint.lighting.fit import Fit
-from lightpaint.lighting.loss import image_prior as prior_module
-from lightpaint.lighting.loss.image_prior import image_prior
+from lightpaint.lighting.loss import weight_penalty
+from lightpaint.lighting.loss.weight_penalty import image_prior
 from lightpaint.lighting.solve import solve
-from lightpaint.scene.lights.texels.sky import solid_angles
+from lightpaint.scene.lights.texels.image_domains import solid_angles
 from lightpaint.scene.lights.texels.texel import mirrored_pairs, texel_names
 from lightpaint.scene.lights.texels.texel_layout import TexelLayout
 from lightpaint.target.target import Target
@@ -43,14 +43,14 @@ def even_power(size: tuple[int, int]) -> Doubles:
 
 def test_stiffness_is_that_of_the_sphere(monkeypatch: pytest.MonkeyPatch) -> None:
     size = (32, 33)
-    monkeypatch.setattr(prior_module, "STAYING", 0.0)
-    monkeypatch.setattr(prior_module, "COLOR", 0.0)
+    monkeypatch.setattr(weight_penalty, "IMAGE_STAYING", 0.0)
+    monkeypatch.setattr(weight_penalty, "IMAGE_COLOR", 0.0)
     prior = image_prior(sky_lights(size), even_power(size), FREE, 1.0)
     assert prior is not None
     polar = np.linspace(0, np.pi, size[1])
     height = np.repeat(np.cos(polar)[:, None, None], size[0], axis=1) * np.ones(3)
     # ∫ |∇ cos θ|² dω = 8π/3, and E is 1.
-    expected = prior_module.SMOOTHNESS * (8 * np.pi / 3) / (4 * np.pi)
+    expected = weight_penalty.SMOOTHNESS * (8 * np.pi / 3) / (4 * np.pi)
     value = prior.objective(height.reshape(-1, 3))
     np.testing.assert_allclose(value, expected, rtol=2e-3)
 
@@ -133,7 +133,7 @@ def test_a_sky_comes_back_nearer_with_the_expectation_than_without(
         return float(np.linalg.norm(error) / np.linalg.norm(truth[upper]))
 
     with_expectation = miss()
-    monkeypatch.setattr("lightpaint.lighting.linear_problem.image_prior", lambda *_: None)
+    monkeypatch.setattr("lightpaint.lighting.loss.weight_penalty.image_prior", lambda *_: None)
     assert with_expectation < 0.7 * miss()
     assert with_expectation < 0.35
 

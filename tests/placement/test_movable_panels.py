@@ -14,7 +14,7 @@ from lightpaint.placement.paths.panel_lights import (
     without_panels,
 )
 from lightpaint.scene.properties.pose import Pose
-from lightpaint.scene.properties.rotation import rotation_between
+from lightpaint.scene.properties.site import rotation_between
 from lightpaint.scene.scene_reader import load_scene
 
 OUTLINE = Outline((0.0, -1.0, 0.0), ((0.5, 0.0, 0.0), (0.0, 0.0, 0.2)))

@@ -18,8 +18,7 @@ from lightpaint.placement.paths.panel_lights import PanelSite
 from lightpaint.placement.paths.view_paths import SearchPaths
 from lightpaint.placement.placement_fit import PlacementFit, seen_columns
 from lightpaint.placement.search.pose_steps import PoseSteps
-from lightpaint.scene.properties.rotation import unit
-from lightpaint.scene.properties.site import Site
+from lightpaint.scene.properties.site import Site, unit
 from lightpaint.scene.scene_reader import load_scene
 
 BOX = ((-1.0, 0.1, -0.9), (1.0, 2.0, 2.5))

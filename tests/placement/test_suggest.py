@@ -28,7 +28,7 @@ from lightpaint.placement.suggested_lights import (
     suggest_lights,
 )
 from lightpaint.placement.suggestion import Suggestion
-from lightpaint.report.page.suggestion_section import spoken_suggestions, suggestion_section
+from lightpaint.report.page.placement_section import spoken_suggestions, suggestion_section
 from lightpaint.scene.scene import Scene
 from lightpaint.scene.scene_reader import load_scene
 from lightpaint.target.target import Target

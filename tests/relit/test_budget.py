@@ -8,7 +8,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from lightpaint.images.pixel_blocks import whole_factor
-from lightpaint.relit.sample_budget import FEWEST, verification_budget
+from lightpaint.relit.verification_render import FEWEST, verification_budget
 from lightpaint.scene.properties.film import Film, reduced, reduction
 
 

@@ -7,8 +7,7 @@ import numpy as np
 import pytest
 
 from lightpaint.images.estimate import Estimate
-from lightpaint.relit.detection_power import ERROR, LightShares, detection_power
-from lightpaint.relit.light_tests import light_tests
+from lightpaint.relit.detection_power import ERROR, LightShares, detection_power, light_tests
 from lightpaint.relit.verification import (
     LIMIT,
     differences,

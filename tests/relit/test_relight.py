@@ -17,9 +17,8 @@ from lightpaint.errors import LightingError, OutputError, SceneError
 from lightpaint.images.formats.exr import write_rgb
 from lightpaint.lighting.answer.combination import combine
 from lightpaint.lighting.answer.lighting import Lighting, LightSetting
-from lightpaint.relit.relight import check_relightable, relight
+from lightpaint.relit.relight import check_relightable, relight, scene_patch
 from lightpaint.relit.verification_render import verify
-from lightpaint.relit.xml_patch import scene_patch
 from lightpaint.scene.scene import Scene
 from lightpaint.scene.scene_reader import load_scene
 

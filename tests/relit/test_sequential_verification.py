@@ -15,7 +15,8 @@ from lightpaint.lighting.answer.combination import combine
 from lightpaint.lighting.answer.lighting import Lighting
 from lightpaint.relit.detection_power import LightShares
 from lightpaint.relit.relight import relight
-from lightpaint.relit.sequential_verification import (
+from lightpaint.relit.verification import LIMIT, limit_of_tests
+from lightpaint.relit.verification_render import (
     ALL_PARTS,
     FIRST_LOOK,
     LOOKS,
@@ -23,7 +24,6 @@ from lightpaint.relit.sequential_verification import (
     stages_of,
     verify_in_stages,
 )
-from lightpaint.relit.verification import LIMIT, limit_of_tests
 from lightpaint.scene.scene_reader import load_scene
 
 SIZE = (24, 32)

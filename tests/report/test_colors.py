@@ -12,10 +12,11 @@ from lightpaint.colour.hue_names import hue_name
 from lightpaint.lighting.analysis.appearance.color_choices import ColorChoice
 from lightpaint.lighting.answer.combination import combine
 from lightpaint.lighting.solve import solve
-from lightpaint.report.fit_influences import fit_options, fit_sentence
-from lightpaint.report.page.color_section import closer_choice, colors_section, spoken_choice
+from lightpaint.report.diagnosis_sentences import fit_options, fit_sentence
+from lightpaint.report.page.constraint_section import closer_choice, colors_section, spoken_choice
 from lightpaint.report.page.page import report_page
 from lightpaint.report.report_json import report_numbers
+from lightpaint.report.reported_answer import ReportedAnswer
 from lightpaint.target.target import Target
 
 WARM, NEUTRAL, COOL = (tuple(kelvin_to_rgb(k).tolist()) for k in (2700.0, 5000.0, 12000.0))
@@ -110,8 +111,8 @@ def test_what_decided_stands_in_the_page_and_in_its_numbers(make_basis: Any, fit
         "command": "",
     }
     sentence = fit_sentence(solution)
-    assert f'<p class="meant">{sentence}</p>' in report_page(**arguments)
-    meaning = json.loads(report_numbers(**arguments))["meant"]
+    assert f'<p class="meant">{sentence}</p>' in report_page(ReportedAnswer(**arguments))
+    meaning = json.loads(report_numbers(ReportedAnswer(**arguments)))["meant"]
     assert meaning == {k: v for k, v in fit_options(solution).items() if v is not None}
     assert meaning["colors"] == fit_words.get("colors", "free")
     assert meaning["hold"] == fit_words.get("hold", 0)

@@ -42,6 +42,7 @@ from lightpaint.report.answer_pictures import (
 )
 from lightpaint.report.comparison import SURROUND, Tile, comparison_image, compose
 from lightpaint.report.report_json import report_numbers
+from lightpaint.report.reported_answer import ReportedAnswer
 from lightpaint.report.verdict import headline
 from lightpaint.target.target import Target
 from lightpaint.target.target_reader import read_target
@@ -411,7 +412,9 @@ def test_how_much_is_painted_is_one_number(
     )
     comparison_image(**look_fields, predicted=predicted.image, verified=None)
     assert captions[0] == f"{100 * share:.3g} % painted, the rest the current look"
-    numbers = json.loads(report_numbers(**look_fields, predicted=predicted, verification=None))
+    numbers = json.loads(
+        report_numbers(ReportedAnswer(**look_fields, predicted=predicted, verification=None))
+    )
     assert numbers["painting"]["share"] == pytest.approx(share, abs=1e-12)
     assert full.spoken_share == target.spoken_share == f"{100 * share:.3g} %"
 

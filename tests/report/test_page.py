@@ -23,6 +23,7 @@ from lightpaint.report.measures import energy_shares, noise_residual, relative_r
 from lightpaint.report.page.figures import data_uri, thumbnail
 from lightpaint.report.page.lights_table import hex_color
 from lightpaint.report.page.page import report_page
+from lightpaint.report.reported_answer import ReportedAnswer
 from lightpaint.target.target import Target
 
 SIZE = (24, 32)
@@ -112,7 +113,7 @@ def _looks(page: Page) -> dict[str, Any]:
 
 
 def test_nothing_is_loaded_from_anywhere(make_basis: Any):
-    text = report_page(**_result(make_basis))
+    text = report_page(ReportedAnswer(**_result(make_basis)))
     page = Page(text)
     plain = re.sub(r"base64,[A-Za-z0-9+/=]+", "base64,", text)
     assert len(plain) < 60_000
@@ -128,7 +129,7 @@ def test_nothing_is_loaded_from_anywhere(make_basis: Any):
 
 def test_pictures_are_the_display_encoded_images(make_basis: Any):
     result = _result(make_basis)
-    looks = _looks(Page(report_page(**result)))
+    looks = _looks(Page(report_page(ReportedAnswer(**result))))
     current = combine(result["basis"], Lighting.current(result["basis"])).image
     assert list(looks) == ["now", "painting", "answer", "render"]
     for name, image in (
@@ -142,7 +143,7 @@ def test_pictures_are_the_display_encoded_images(make_basis: Any):
 
 
 def test_every_picture_has_its_size_and_words(make_basis: Any):
-    images = Page(report_page(**_result(make_basis))).all("img")
+    images = Page(report_page(ReportedAnswer(**_result(make_basis)))).all("img")
     # Four looks, three maps, three lights.
     assert len(images) == 10
     for image in images:
@@ -152,7 +153,7 @@ def test_every_picture_has_its_size_and_words(make_basis: Any):
 
 
 def test_every_control_has_a_label_and_offers_every_look(make_basis: Any):
-    text = report_page(**_result(make_basis))
+    text = report_page(ReportedAnswer(**_result(make_basis)))
     page = Page(text)
     controls = [*page.all("select"), *page.all("input")]
     assert len(controls) == 3
@@ -166,7 +167,7 @@ def test_names_are_text_whatever_they_are(make_basis: Any):
     evil = ("<script>alert(1)</script>", '"><img src=x onerror=y>', "a & b $title ${x}")
     result = _result(make_basis, names=evil, target="</title><b>'dusk'</b>")
     result["command"] = "lightpaint solve '<b>.xml' && echo $HOME ${title} \"&amp;\""
-    page = Page(report_page(**result))
+    page = Page(report_page(ReportedAnswer(**result)))
     # The wipe's, and the mixer's with its data.
     assert [x.get("type") for x in page.all("script")] == ["application/json", "module", None]
     assert not page.all("b")
@@ -181,7 +182,7 @@ def test_names_are_text_whatever_they_are(make_basis: Any):
 def test_agreement_is_said_calmly(make_basis: Any):
     result = _result(make_basis)
     assert result["verification"].agrees
-    text = report_page(**result)
+    text = report_page(ReportedAnswer(**result))
     assert "Rendered again: equal within noise." in Page(text).text("header")
     assert 'role="alert"' not in text
 
@@ -189,7 +190,7 @@ def test_agreement_is_said_calmly(make_basis: Any):
 @pytest.mark.parametrize("bias", [0.9, 1.1])
 def test_a_disagreement_is_loud(make_basis: Any, bias: float):
     result = _result(make_basis, bias=bias)
-    page = Page(report_page(**result))
+    page = Page(report_page(ReportedAnswer(**result)))
     [warning] = [d for d in page.all("div") if d.get("role") == "alert"]
     assert warning["class"] == "warning"
     assert "header" in warning["inside"].split()
@@ -199,7 +200,7 @@ def test_a_disagreement_is_loud(make_basis: Any, bias: float):
 
 def test_without_a_verification(make_basis: Any):
     result = _result(make_basis)
-    page = Page(report_page(**{**result, "verification": None}))
+    page = Page(report_page(ReportedAnswer(**{**result, "verification": None})))
     assert list(_looks(page)) == ["now", "painting", "answer"]
     assert len(page.all("option")) == 6
     assert "Not verified" in page.text("header")
@@ -218,7 +219,7 @@ def test_how_to_paint_again(make_basis: Any):
         (replace(painting, everything=True), "output of lightpaint template scene.xml"),
     )
     for target, words in cases:
-        page = Page(report_page(**{**result, "target": target}))
+        page = Page(report_page(ReportedAnswer(**{**result, "target": target})))
         assert words in page.text("details")
         assert page.text("summary") == "NumbersChange the painting"
         assert all(x.get("open") is None for x in page.all("details"))
@@ -226,7 +227,7 @@ def test_how_to_paint_again(make_basis: Any):
 
 def test_lights_in_order_with_what_happens_to_them(make_basis: Any):
     result = _result(make_basis)
-    page = Page(report_page(**result))
+    page = Page(report_page(ReportedAnswer(**result)))
     body = "".join(t for open_tags, t in page.texts if "region" not in open_tags)
     rows = re.split("key|fill|back", page.text("tbody").split("red")[0])[1:]
     assert len(rows) == 3
@@ -243,7 +244,7 @@ def test_lights_in_order_with_what_happens_to_them(make_basis: Any):
 def test_the_numbers_are_there(make_basis: Any):
     result = _result(make_basis)
     certificate, checked = result["solution"].certificate, result["verification"]
-    text = Page(report_page(**result)).text("main")
+    text = Page(report_page(ReportedAnswer(**result))).text("main")
     for number in (
         *(f"{value:.3g}" for value in certificate.relative_objective),
         *(f"{value:.1e}" for value in certificate.kkt_residual),
@@ -266,12 +267,14 @@ def test_a_page_of_usual_size_can_be_mailed(make_basis: Any):
     solution = solve(basis, target)
     predicted = combine(basis, solution.lighting)
     page = report_page(
-        basis=basis,
-        target=target,
-        solution=solution,
-        predicted=predicted,
-        verification=compare(predicted, predicted),
-        command="",
+        ReportedAnswer(
+            basis=basis,
+            target=target,
+            solution=solution,
+            predicted=predicted,
+            verification=compare(predicted, predicted),
+            command="",
+        )
     )
     # Independent noise in every pixel is the worst there is to compress.
     assert len(page) < 7_000_000
@@ -291,14 +294,14 @@ def test_the_picture_of_a_render_says_how_many_samples_it_has(
 ):
     result = _result(make_basis)
     verification = replace(result["verification"], spp=spp)
-    page = report_page(**{**result, "verification": verification})
+    page = report_page(ReportedAnswer(**{**result, "verification": verification}))
     assert words in html.unescape(page)
 
 
 def test_another_size_is_refused(make_basis: Any):
     result = _result(make_basis)
     with pytest.raises(SizeError, match="32x24 but the basis is 10x12"):
-        report_page(**{**result, "basis": make_basis(3)})
+        report_page(ReportedAnswer(**{**result, "basis": make_basis(3)}))
 
 
 def test_a_large_picture_becomes_a_good_jpeg():
@@ -399,7 +402,9 @@ def test_colour_and_flux_of_a_light(make_basis: Any, scale: float | None, texts:
     )
     lights = (light, *solution.lighting.lights[1:])
     lighting = replace(solution.lighting, lights=lights, cd_per_unit=scale)
-    text = report_page(**result | {"solution": replace(solution, lighting=lighting)})
+    text = report_page(
+        ReportedAnswer(**result | {"solution": replace(solution, lighting=lighting)})
+    )
     plain = text.replace("<br>", "")
     assert all(words in plain for words in [*texts, "#ffffff"])
     assert (" lm" in plain) == (scale is not None)

@@ -22,6 +22,7 @@ from lightpaint.lighting.solve import solve
 from lightpaint.relit.verification import compare
 from lightpaint.report.page.html import ROWS_SHOWN
 from lightpaint.report.page.page import report_page
+from lightpaint.report.reported_answer import ReportedAnswer
 from lightpaint.target.target import Target
 
 SIZE = (27, 48)
@@ -55,15 +56,18 @@ def _page(make_basis: Any, n: int, name: str = "ceiling_lamp_{}", **options: Any
     solution = solve(basis, target, constraints=constraints)
     predicted = combine(basis, solution.lighting)
     return report_page(
-        basis=basis,
-        target=target,
-        solution=solution,
-        predicted=predicted,
-        verification=compare(predicted, Estimate(predicted.image, -predicted.half_difference)),
-        command="lightpaint solve scenes/hall.xml targets/evening.exr -o results/evening-final-2",
-        uncertainty=_errors(solution),
-        diagnosis=diagnose(solution),
-        unconstrained=without_constraints(solution),
+        ReportedAnswer(
+            basis=basis,
+            target=target,
+            solution=solution,
+            predicted=predicted,
+            verification=compare(predicted, Estimate(predicted.image, -predicted.half_difference)),
+            command="lightpaint solve scenes/hall.xml targets/evening.exr "
+            "-o results/evening-final-2",
+            uncertainty=_errors(solution),
+            diagnosis=diagnose(solution),
+            unconstrained=without_constraints(solution),
+        )
     )
 
 

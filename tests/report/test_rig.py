@@ -12,14 +12,13 @@ from PIL import ImageDraw
 from lightpaint.images.denoiser import Features
 from lightpaint.report.light_sheet import light_sheet
 from lightpaint.report.page.placement_section import aim_picture, placement_section
-from lightpaint.report.rig.drawing_panels import FINER, plan_and_elevation
 from lightpaint.report.rig.hung_lights import (
     HungLight,
     HungLights,
     LightChange,
     spoken_fraction,
 )
-from lightpaint.report.rig.rig_drawing import CHANGED, rig_drawing
+from lightpaint.report.rig.rig_drawing import CHANGED, FINER, plan_and_elevation, rig_drawing
 from lightpaint.report.rig.view_geometry import ViewGeometry
 from lightpaint.scene.properties.site import EmitterPlace, Site
 

@@ -16,7 +16,12 @@ from lightpaint.lighting.analysis.diagnosis import Place, diagnose
 from lightpaint.lighting.analysis.noise.uncertainty import error_bars
 from lightpaint.lighting.answer.certificate import Bound
 from lightpaint.lighting.solve import solve
-from lightpaint.report.diagnosis_sentences import error_sentences, spoken_bound, spoken_hold
+from lightpaint.report.diagnosis_sentences import (
+    error_sentences,
+    spoken_bound,
+    spoken_hold,
+    uncertainty_sentence,
+)
 from lightpaint.report.measures import halving_spp
 from lightpaint.report.page.diagnosis_section import missed_section, sure_section
 from lightpaint.report.phrases import (
@@ -26,7 +31,6 @@ from lightpaint.report.phrases import (
     spoken_percents,
     spoken_place,
 )
-from lightpaint.report.uncertainty_sentences import uncertainty_sentence
 from lightpaint.target.target import Target
 
 SIZE = (12, 12)

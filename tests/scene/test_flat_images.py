@@ -6,11 +6,14 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from lightpaint.errors import SceneError
-from lightpaint.scene.lights.texels.current_image import shown_image
-from lightpaint.scene.lights.texels.domains import DOMAINS, domain_of
-from lightpaint.scene.lights.texels.flat_images import Slide, Wall
-from lightpaint.scene.lights.texels.image_domain import ImageDomain
-from lightpaint.scene.lights.texels.wall_coordinates import why_not_flat
+from lightpaint.scene.lights.image_split import shown_image, why_not_flat
+from lightpaint.scene.lights.texels.image_domains import (
+    DOMAINS,
+    ImageDomain,
+    Slide,
+    Wall,
+    domain_of,
+)
 from lightpaint.scene.runtime.variant import use_variant
 
 SIZES = st.tuples(st.integers(2, 24), st.integers(2, 24))

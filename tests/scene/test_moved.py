@@ -9,7 +9,7 @@ from renderer import write_room
 import lightpaint as lp
 from lightpaint.errors import SceneError
 from lightpaint.lighting.answer.lighting import Lighting
-from lightpaint.scene.properties.rotation import rotation_between
+from lightpaint.scene.properties.site import rotation_between
 from lightpaint.scene.scene import Scene
 from lightpaint.scene.scene_reader import load_scene
 

@@ -5,9 +5,9 @@ from collections.abc import Iterator
 import numpy as np
 import pytest
 
-from lightpaint.scene.normals import make_normals_reproducible
 from lightpaint.scene.runtime.kernel_threads import limit_threads
 from lightpaint.scene.runtime.variant import use_variant
+from lightpaint.scene.scene_tree import make_normals_reproducible
 
 use_variant()
 

@@ -5,7 +5,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from lightpaint.scene.lights.texels.sky import Sky
+from lightpaint.scene.lights.texels.image_domains import Sky
 from lightpaint.scene.lights.texels.texel import (
     coarse_name,
     image_of,

@@ -6,7 +6,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from lightpaint.errors import SceneError
-from lightpaint.scene.lights.texels.sky import Sky, solid_angles, texel_direction
+from lightpaint.scene.lights.texels.image_domains import Sky, solid_angles, texel_direction
 from lightpaint.scene.lights.texels.texel import (
     image_of,
     images_of,

@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 
 import lightpaint as lp
+from lightpaint.colour.srgb import decode_display, encode_display
 from lightpaint.errors import SizeError
 from lightpaint.target.wish import Wish, separate
 from lightpaint.target.wish_finding import asked_ratio, find_wishes
@@ -38,6 +39,70 @@ def test_a_subject_in_a_repainted_picture_is_a_wish_of_its_own():
     overlap = ((found.area > 0) & subject).sum() / ((found.area > 0) | subject).sum()
     assert overlap > 0.8  # its border is as soft as the wash
     np.testing.assert_allclose(rest.area + found.area, 1)
+
+
+def soft(row, column, radius):
+    """An ellipse that fades from its centre to its rim, (h, w), from 0 to 1."""
+    rows, columns = np.mgrid[: WALL.shape[0], : WALL.shape[1]]
+    return np.clip(1 - np.hypot(rows - row, columns - column) / radius, 0, 1)[..., None]
+
+
+#: A white wall with a dark red picture on it.
+WALL = np.full((80, 120, 3), 0.6, np.float32)
+WALL[30:50, 45:70] = (0.1, 0.02, 0.02)
+
+
+def over(look, cover, color):
+    """`look` with a colour over it, as an editor of 8-bit pictures mixes them."""
+    mixed = cover * encode_display(np.array(color)) + (1 - cover) * encode_display(look)
+    return decode_display(mixed).astype(np.float32)
+
+
+def with_light(look, cover, color):
+    """`look` with a colour over it, as an editor of EXR files mixes them."""
+    return (cover * np.array(color) + (1 - cover) * look).astype(np.float32)
+
+
+def gained(look, cover, stops):
+    return (look * 2.0 ** (cover * np.array(stops))).astype(np.float32)
+
+
+@pytest.mark.parametrize("brush", [over, with_light])
+@pytest.mark.parametrize("color", [(0.05, 0.1, 0.5), (0.9, 0.7, 0.3), (0.001, 0.001, 0.002)])
+def test_a_stroke_of_one_color_is_one_wish_whatever_it_covers(brush, color):
+    """The stops that it asks for differ by much: between rim and centre, wall and picture."""
+    cover = 0.8 * soft(40, 60, 34)
+    image = brush(WALL, cover, color)
+    asked = np.abs(np.log2(image / WALL)).sum(axis=-1)[cover[..., 0] > 0.05]
+    assert np.ptp(np.quantile(asked, [0.1, 0.9])) > 1.5
+    assert len(find_wishes(target(image, cover[..., 0].astype(np.float32)), WALL)) == 1
+
+
+@pytest.mark.parametrize("stops", [(-3, -3, -3), (2, 1, -1)])
+def test_a_gain_that_fades_is_one_wish(stops):
+    cover = soft(40, 60, 34)
+    painted = target(gained(WALL, cover, stops), cover[..., 0].astype(np.float32))
+    assert len(find_wishes(painted, WALL)) == 1
+
+
+def test_strokes_of_two_colors_that_touch_are_wishes_of_their_own():
+    warm, cool = soft(40, 40, 26), soft(40, 80, 26)
+    image = over(over(WALL, 0.8 * warm, (0.9, 0.5, 0.1)), 0.8 * cool, (0.05, 0.1, 0.5))
+    cover = np.maximum(warm, cool)[..., 0].astype(np.float32)
+    wishes = find_wishes(target(image, cover), WALL)
+    assert len(wishes) >= 2
+    most = [max(wishes, key=lambda x, k=k: float(x.area[40, k])) for k in (35, 85)]
+    assert most[0] is not most[1]
+
+
+def test_a_subject_within_a_stroke_is_a_wish_of_its_own():
+    look = np.full((80, 120, 3), 0.4, np.float32)
+    image = gained(look, soft(40, 60, 36) ** 0.2, (-2, -2, -2))
+    image[30:50, 50:70] = 0.8
+    cover = (soft(40, 60, 36)[..., 0] > 0).astype(np.float32)
+    areas = sorted(float(wish.area.sum()) for wish in find_wishes(target(image, cover), look))
+    assert len(areas) == 2
+    assert areas[0] == pytest.approx(400, rel=0.5)  # a wash, of a radius of some pixels
 
 
 def test_what_asks_for_one_thing_is_one_wish():

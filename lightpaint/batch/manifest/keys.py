@@ -15,7 +15,7 @@ from lightpaint.batch.manifest.variations import VARIATIONS
 from lightpaint.errors import LightpaintError
 from lightpaint.files import one_line
 from lightpaint.pipeline.job.settings import Settings
-from lightpaint.relit.formats.formats import FORMS
+from lightpaint.relit.formats import FORMS
 from lightpaint.scene.limits import MAX_SPP
 from lightpaint.scene.properties.film import check_resolution
 from lightpaint.target.target_reader import Paint

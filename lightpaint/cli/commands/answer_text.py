@@ -25,20 +25,18 @@ from lightpaint.report.diagnosis_sentences import (
     bound_sentences,
     compensation_sentences,
     error_sentences,
+    fit_sentence,
+    partly_reached,
     spoken_about,
     spoken_cause,
-)
-from lightpaint.report.fit_influences import fit_sentence
-from lightpaint.report.measures import energy_shares
-from lightpaint.report.page.color_section import closer_choice
-from lightpaint.report.phrases import spoken_percent
-from lightpaint.report.uncertainty_sentences import (
-    partly_reached,
     spoken_errors,
     uncertainty_sentence,
     unreached_channels,
     untold_lights,
 )
+from lightpaint.report.measures import energy_shares
+from lightpaint.report.page.constraint_section import closer_choice
+from lightpaint.report.phrases import spoken_percent
 
 Table = Literal["short", "full"]
 

@@ -11,8 +11,8 @@ from lightpaint.errors import OutputError
 from lightpaint.files import check_files, check_writable
 from lightpaint.lighting.answer.lighting_file import read_lighting
 from lightpaint.pipeline.job.sources import GroupsFile, SceneFile, content
-from lightpaint.relit.formats.export_format import Source
-from lightpaint.relit.formats.formats import names_of_forms, write_content, writers_of
+from lightpaint.relit.export_format import Source
+from lightpaint.relit.formats import names_of_forms, write_content, writers_of
 from lightpaint.storage.staging import finish
 
 

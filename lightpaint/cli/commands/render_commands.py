@@ -31,9 +31,8 @@ from lightpaint.pipeline.job.sources import (
 )
 from lightpaint.pipeline.job_bases import obtain
 from lightpaint.pipeline.relit_renders import relight_look, relit_folder
-from lightpaint.pipeline.results.repeated_verification import verify_result
 from lightpaint.pipeline.results.result_folder import ResultFolder
-from lightpaint.pipeline.results.results import result_folders
+from lightpaint.pipeline.results.results import result_folders, verify_result
 from lightpaint.pipeline.templates import (
     look_of_basis,
     render_look,

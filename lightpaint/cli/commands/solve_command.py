@@ -13,13 +13,12 @@ from lightpaint.cli.tolerances import Tolerances
 from lightpaint.display_text import some_of
 from lightpaint.errors import LOOK_ERRORS
 from lightpaint.pipeline.frame_pictures import frames_to_write, relight_frames
-from lightpaint.pipeline.job.job import Job
-from lightpaint.pipeline.job.painted_views import PaintedView
+from lightpaint.pipeline.job.job import Job, PaintedView
 from lightpaint.pipeline.pipeline import run
 from lightpaint.pipeline.results.results import Look
 from lightpaint.placement.placement import PlacementRecord, record_of
 from lightpaint.relit.export.exports import EXPORTS
-from lightpaint.report.page.suggestion_section import spoken_turn
+from lightpaint.report.page.placement_section import spoken_turn
 
 if TYPE_CHECKING:
     from lightpaint.cli.solve_variations import LookSet

@@ -3,8 +3,7 @@
 import argparse
 
 from lightpaint.batch.run_options import RunOptions
-from lightpaint.cli.options.option_groups import add_output
-from lightpaint.cli.options.record_options import add_fields
+from lightpaint.cli.options.option_groups import add_fields, add_output
 from lightpaint.pipeline.job.settings import Settings
 
 

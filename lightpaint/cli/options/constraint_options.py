@@ -5,7 +5,7 @@ from collections.abc import Callable, Mapping
 from typing import Any
 
 from lightpaint.cli.options import arguments
-from lightpaint.cli.options.record_options import add_fields
+from lightpaint.cli.options.option_groups import add_fields
 from lightpaint.pipeline.job.settings import Settings
 
 #: Adds an option which may be repeated: its flag, metavar, type and help.

@@ -10,6 +10,7 @@ from lightpaint.cli.options.constraint_options import add_constraints, add_riggi
 from lightpaint.cli.options.option_groups import (
     add_budget,
     add_cache,
+    add_fields,
     add_lights,
     add_map_size,
     add_output,
@@ -22,7 +23,6 @@ from lightpaint.cli.options.option_groups import (
     add_view,
     add_view_transform,
 )
-from lightpaint.cli.options.record_options import add_fields
 from lightpaint.cli.options.solve_options import (
     add_fit,
     add_frames,

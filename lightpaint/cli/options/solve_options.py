@@ -3,8 +3,7 @@
 import argparse
 
 from lightpaint.cli.options import arguments
-from lightpaint.cli.options.option_groups import add_view_transform
-from lightpaint.cli.options.record_options import add_fields
+from lightpaint.cli.options.option_groups import add_fields, add_view_transform
 from lightpaint.pipeline.job.settings import Settings
 
 #: Names of the variations.

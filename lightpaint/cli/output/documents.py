@@ -10,8 +10,7 @@ from lightpaint.basis.cache import cache
 from lightpaint.cli.doctor import Finding
 from lightpaint.cli.output.tables import photometry_of
 from lightpaint.cli.tolerances import Tolerances
-from lightpaint.pipeline.job.job import Job
-from lightpaint.pipeline.job.painted_views import PaintedView
+from lightpaint.pipeline.job.job import Job, PaintedView
 from lightpaint.pipeline.results.result_folder import RECORD
 from lightpaint.pipeline.results.results import Look
 from lightpaint.relit.verification import Verification

@@ -10,12 +10,12 @@ from lightpaint.cli.output import terminal
 from lightpaint.colour.photometry import Photometry, photometry
 from lightpaint.placement.suggestion import Suggestion
 from lightpaint.relit.verification import Verification
-from lightpaint.report.page.suggestion_section import spoken_position, spoken_suggestions
+from lightpaint.report.page.placement_section import spoken_position, spoken_suggestions
 from lightpaint.report.phrases import spoken_percent
 from lightpaint.report.verdict import agreement
 from lightpaint.scene.lights.emitters import Emitter
 from lightpaint.scene.lights.light import Light
-from lightpaint.scene.lights.texels.domains import domain_of
+from lightpaint.scene.lights.texels.image_domains import domain_of
 from lightpaint.scene.lights.texels.texel import image_of, layouts_of, node_name
 from lightpaint.scene.properties.emission import MULTIPLE
 from lightpaint.scene.scene import Scene

@@ -92,14 +92,17 @@ def indistinguishable(
 
 def _alike_groups(cosines: Doubles, lit: Bools, alike: float) -> list[list[int]]:
     """Return the lights that reach something, in groups with images like that of the first."""
-    groups: list[list[int]] = []
+    # In the channel where two images differ most; images of other channels differ altogether.
+    least = np.where(lit[:, :, None], cosines, np.inf).min(axis=0)
+    is_alike = least > 1 - alike
+    for channel in lit:
+        is_alike &= channel[:, None] == channel
+    groups: dict[int, list[int]] = {}
     for i in np.flatnonzero(lit.any(axis=0)).tolist():
-        home = next((g for g in groups if _least_cosine(cosines, lit, g[0], i) > 1 - alike), None)
-        if home is None:
-            groups.append([i])
-        else:
-            home.append(i)
-    return groups
+        homes = np.fromiter(groups, np.intp, len(groups))
+        alike_homes = homes[is_alike[homes, i]]
+        groups.setdefault(int(alike_homes[0]) if alike_homes.size else i, []).append(i)
+    return list(groups.values())
 
 
 def _cancelling_mixes(
@@ -109,7 +112,10 @@ def _cancelling_mixes(
     mixes: dict[tuple[int, ...], None] = {}
     for c in range(len(cosines)):
         lit_heads = np.array([head for head in heads if lit[c, head]], dtype=int)
-        values, vectors = np.linalg.eigh(cosines[c][np.ix_(lit_heads, lit_heads)])
+        matrix = cosines[c][np.ix_(lit_heads, lit_heads)]
+        if _is_above(matrix, alike):
+            continue
+        values, vectors = np.linalg.eigh(matrix)
         for value, vector in zip(values, vectors.T, strict=True):
             if value <= alike:
                 part = np.abs(vector) > MIN_PART * np.abs(vector).max()
@@ -117,8 +123,12 @@ def _cancelling_mixes(
     return list(mixes)
 
 
-def _least_cosine(cosines: Doubles, lit: Bools, i: int, j: int) -> float:
-    """Return the cosine between two images in the channel where they differ most."""
-    if (lit[:, i] != lit[:, j]).any():
-        return 0.0
-    return float(cosines[lit[:, i], i, j].min(initial=1.0))
+def _is_above(matrix: Doubles, value: float) -> bool:
+    """Return whether all eigenvalues are above a value, in a tenth of the time of computing
+    them.
+    """
+    try:
+        np.linalg.cholesky(matrix - value * np.eye(len(matrix)))
+    except np.linalg.LinAlgError:
+        return False
+    return True

@@ -16,7 +16,6 @@ view.
 from collections.abc import Mapping, Sequence
 from functools import partial, reduce
 from operator import add
-from typing import Any
 
 from lightpaint.arrays import RGB, Doubles
 from lightpaint.basis.basis import Basis
@@ -28,17 +27,10 @@ from lightpaint.lighting.fit import Fit, Space
 from lightpaint.lighting.linear_problem import reduce_lights
 from lightpaint.lighting.live.live_sums import MAX_FILM_PIXELS, Films, SmallFilm
 from lightpaint.lighting.live.live_view import LiveView
-from lightpaint.lighting.loss.contrast import contrast_rows, contrast_term
 from lightpaint.lighting.loss.expected_lights import ExpectedLights, Wash
-from lightpaint.lighting.loss.image_prior import image_prior
 from lightpaint.lighting.loss.painting import unpainted_weight
 from lightpaint.lighting.loss.pixel_bins import block_side
-from lightpaint.lighting.loss.weight_penalty import (
-    pull_near_start,
-    pull_to_current,
-    restrain_lights,
-    weight_pull,
-)
+from lightpaint.lighting.loss.weight_penalty import PaintTerms, joint_pull, pull_to_current
 from lightpaint.lighting.normal_equations import NormalEquations
 from lightpaint.lighting.unknowns.gamuts import Gamuts, PaintedLight
 from lightpaint.lighting.unknowns.reduced_problem import solve_reduced
@@ -46,17 +38,10 @@ from lightpaint.lighting.unknowns.reduction import Reduction
 from lightpaint.lighting.unknowns.white_mixes import (
     center_windows,
     clip_to_gamuts,
-    next_whites,
     snap_to_whites,
-    solve_near_sides,
+    solve_under_brush,
 )
 from lightpaint.threads import one_thread
-
-#: Maximum number of steps between whites for one answer; the next answer continues.
-WHITE_STEPS = 2
-
-#: Width, in pieces of a range of white, of the window in which a light first finds its white.
-WHITE_WIDTH = 8
 
 #: Answers under a moving brush for each time that wishes and gamuts are found anew: from one move
 #: to the next they hardly change.
@@ -239,16 +224,10 @@ class LiveSolver:
 
     def _best(self, equations: NormalEquations, start: Doubles) -> Doubles:
         """Return the best weights (n, 3) under the constraints, from those to begin with."""
-        method, reduction = self._fit.method, self._within
-        if not reduction.white_knobs:
-            self._within, weights = solve_near_sides(equations, reduction, start, method=method)
-            return weights
-        start = snap_to_whites(reduction, start)
-        wide = center_windows(reduction, start, WHITE_WIDTH)
-        start = solve_reduced(equations, wide, start, method=method).weights
-        reduction = center_windows(reduction, start)
-        options: dict[str, Any] = {"steps": WHITE_STEPS, "method": method}
-        return next_whites(equations, reduction, start, **options)[1].weights
+        self._within, weights = solve_under_brush(
+            equations, self._within, start, method=self._fit.method
+        )
+        return weights
 
     def _weight_pull(self, views: tuple[LiveView, ...], unpainted: float) -> NormalEquations | None:
         """Return the pull on the weights, as `Problem.pull`."""
@@ -256,33 +235,20 @@ class LiveSolver:
         # The total importance, relative to the number of pixels.
         total = sum(float(view.counts[0]) for view in views)
         share = total / sum(view.pixels for view in views)
-        expected, contrast, restraint = None, None, None
+        terms = PaintTerms()
         if self._fit.reads_wishes(is_sketch=self._is_sketch):
-            wash = self._wash(views)
-            transform, own = self._fit.transform, self._reference
-            contrast = contrast_term(contrast_rows(wash, transform), total)
-            restraint = restrain_lights(wash, own, transform, unpainted=unpainted)
-            if self._fit.colors == "gentle":
-                expected = ExpectedLights.of(wash, own)
-        pull = weight_pull(
+            wash, own = self._wash(views), self._reference
+            terms = PaintTerms.of(wash, self._fit, own, importance=total, unpainted=unpainted)
+        return joint_pull(
+            lights,
             power,
             self._reference,
             self._fit,
-            prefer_current=self._constraints.prefer_current,
+            self._constraints,
+            terms,
             painted_share=share,
             keeps_color=self._reduction.is_free & power.any(axis=1) & ~texel_lights(lights),
-            expected=expected,
         )
-        near = pull_near_start(
-            power,
-            self._reference,
-            self._fit,
-            near=self._constraints.near,
-            painted_share=share,
-        )
-        prior = image_prior(lights, power, self._fit, share, expected)
-        pulls = [x for x in (pull, near, prior, contrast, restraint) if x is not None]
-        return reduce(add, pulls) if pulls else None
 
     def _joint_films(self, views: tuple[LiveView, ...]) -> Films:
         if self._films is None or self._films[0] != views:

@@ -2,17 +2,31 @@
 
 All are quadratics in w, scaled by the pictures of the lights over the whole picture, so that they
 are alike for all lights. Pixels in which an emitter is visible do not count.
+
+Images in texels have a penalty of their own. A painting hardly tells neighbouring texels apart, and
+without an expectation the best image is a patchwork of saturated colours, whose light adds up to
+what was painted. So an image should be smooth, keep the colours that it has, and stay as it is
+where nothing is seen of it. All three are measured over what the image covers (the solid angle of a
+sky, the area of a wall), in units of the picture that an even image makes, so that their strengths
+suit images of any size (docs/image_lights.md has the measurements).
 """
 
+from dataclasses import dataclass
+from functools import reduce
 from math import ceil
+from operator import add
+from typing import Self
 
 import numpy as np
 
 from lightpaint.arrays import Bools, Doubles
+from lightpaint.basis.light_images import light_images, texel_lights
+from lightpaint.basis.lights import Lights
 from lightpaint.colour.color import LUMINANCE, luminance
 from lightpaint.colour.display.view_transform import ViewTransform
+from lightpaint.lighting.constraints.constraints import Constraints
 from lightpaint.lighting.fit import Fit
-from lightpaint.lighting.loss.contrast import display_amplitude
+from lightpaint.lighting.loss.contrast import contrast_rows, contrast_term, display_amplitude
 from lightpaint.lighting.loss.expected_lights import DARK, ExpectedLights, Wash
 from lightpaint.lighting.normal_equations import NormalEquations
 from lightpaint.threads import one_thread
@@ -34,6 +48,81 @@ LEAST_CHANNEL = 0.05
 
 #: Largest factor of dimming that strengthens the pull to a light's colour.
 MAX_DIMMING = 100.0
+
+#: Strengths of the pulls to an even image in texels, to its current colours, and to the current
+#: image.
+SMOOTHNESS, IMAGE_COLOR, IMAGE_STAYING = 1e-4, 1e-3, 1e-3
+#: Strength of the pull to an image's current colours where lights keep theirs (`colors` is
+#: `gentle`), and the painting asks for no others.
+GENTLE_IMAGE_COLOR = 1e-2
+#: Strength of the pulls at texels that are split again, relative to those at a level above: as much
+#: light in a ninth of the area is nine times as bright, and its square costs nine times as much.
+FINER_SHARE = 1 / 9
+#: Share in the picture, relative to its share of the image, below which a texel counts as
+#: unseen: it stays as it is, however bright its neighbours get.
+SEEN_SHARE = 1e-3
+
+
+@dataclass(frozen=True)
+class PaintTerms:
+    """What a painting lets one expect of the lights, and its terms of the loss in their weights.
+
+    expected: None where colours are free. contrast: of its wishes; restraint: on what each light
+    does to unpainted pixels; None without any.
+    """
+
+    expected: ExpectedLights | None = None
+    contrast: NormalEquations | None = None
+    restraint: NormalEquations | None = None
+
+    @classmethod
+    def of(cls, wash: Wash, fit: Fit, own: Doubles, *, importance: float, unpainted: float) -> Self:
+        """Read the terms of a sketch.
+
+        own: (n, 3), weights with the colours that lights have. importance: of all pixels together.
+        unpainted: the weight of each unpainted pixel.
+        """
+        keeps_colors = fit.colors in ("gentle", "white")
+        return cls(
+            ExpectedLights.of(wash, own) if keeps_colors else None,
+            contrast_term(contrast_rows(wash, fit.transform), importance),
+            restrain_lights(wash, own, fit.transform, unpainted=unpainted),
+        )
+
+
+def joint_pull(
+    lights: Lights,
+    power: Doubles,
+    reference: Doubles,
+    fit: Fit,
+    constraints: Constraints,
+    terms: PaintTerms,
+    *,
+    painted_share: float,
+    keeps_color: Bools,
+    tether: NormalEquations | None = None,
+) -> NormalEquations | None:
+    """Return the sum of all penalties on the weights; None without any.
+
+    reference: (n, 3), the lighting to start from. tether: a pull to lights at other frames. For the
+    other arguments see `weight_pull`.
+    """
+    pull = weight_pull(
+        power,
+        reference,
+        fit,
+        prefer_current=constraints.prefer_current,
+        painted_share=painted_share,
+        keeps_color=keeps_color,
+        expected=terms.expected,
+    )
+    near = pull_near_start(
+        power, reference, fit, near=constraints.near, painted_share=painted_share
+    )
+    prior = image_prior(lights, power, fit, painted_share, terms.expected)
+    parts = (pull, near, prior, terms.contrast, terms.restraint, tether)
+    pulls = [x for x in parts if x is not None]
+    return reduce(add, pulls) if pulls else None
 
 
 def weight_pull(
@@ -154,3 +243,56 @@ def pull_to_colors(power: Doubles, current: Doubles, lights: Bools) -> NormalEqu
     M[:, each, each] = np.einsum("ncc->cn", across)
     across[:, range(3), range(3)] = 0
     return NormalEquations(M, np.zeros((3, n)), np.zeros(3), across)
+
+
+def image_prior(
+    lights: Lights,
+    power: Doubles,
+    fit: Fit,
+    painted_share: float,
+    expected: ExpectedLights | None = None,
+) -> NormalEquations | None:
+    """Return the penalty for all images in texels among `lights`; None if there are none.
+
+    power: (n, 3), ‖Φᵢ‖² of the lights' pictures. painted_share, expected: see `weight_pull`.
+
+    For radiances f of an image, energy E of the picture of an even white one and current chroma c,
+    it is E times the mean of s |∇f|² + IMAGE_COLOR |f − Y(f) c|² + IMAGE_STAYING (f − f₀)² over the
+    image, on which lengths are such that its area is 4π; s is SMOOTHNESS times that of the domain.
+    Where the painting asks for other colours, IMAGE_COLOR is smaller.
+    """
+    images, strength = light_images(lights), fit.brightness * painted_share
+    if not images or strength <= 0:
+        return None
+    n = len(lights)
+    M, shares = np.zeros((3, n, n)), np.zeros((n, 3))
+    for image in images:
+        found = image.index >= 0
+        in_image, areas = image.index[found], image.shares[found]
+        # Texels of a symmetric image share a light, whose picture is that of both.
+        amplitudes = np.sqrt(power[in_image]) / np.bincount(in_image)[in_image, None]
+        # Pictures of texels overlap, so the energy of their sum is about this.
+        energy = strength * amplitudes.sum(axis=0) ** 2
+        # Light of a sun in a part of a texel is as likely as in all of it.
+        levels = np.array([node[0] for node in image.layout.nodes])[found]
+        np.add.at(shares, in_image, energy * (areas * FINER_SHARE**levels)[:, None])
+        seen_share = amplitudes.sum(axis=1) / amplitudes.sum() / areas
+        at = np.where(image.is_split, -1, image.places)
+        seen = np.where(np.isin(at, in_image[seen_share > SEEN_SHARE]), at, -1)
+        smoothness = SMOOTHNESS * image.domain.smoothness
+        for one, other, stiffness in image.domain.neighbours(image.size):
+            first, second = int(seen[one]), int(seen[other])
+            if first < 0 or second < 0 or first == second:
+                continue
+            for i, j, sign in ((first, first, 1), (second, second, 1), (first, second, -1)):
+                M[:, i, j] += sign * smoothness * stiffness * energy
+            M[:, second, first] = M[:, first, second]
+    even = NormalEquations(M, np.zeros((3, n)), np.zeros(3))
+    current = lights.current_weights
+    staying = pull_to_current(IMAGE_STAYING * shares, current)
+    if fit.colors != "gentle":
+        return even + staying + pull_to_colors(IMAGE_COLOR * shares, current, texel_lights(lights))
+    expected = expected or ExpectedLights.unchanged(current)
+    color = (GENTLE_IMAGE_COLOR + expected.clarity * (IMAGE_COLOR - GENTLE_IMAGE_COLOR))[:, None]
+    colors = pull_to_colors(color * shares, current, texel_lights(lights))
+    return even + staying + colors

@@ -40,8 +40,13 @@ ROUND_OFF = 1e-9
 #: Ends of windows, by the places of their knobs.
 Windows = Mapping[int, tuple[int, int]]
 
-#: Maximum number of times that lights move to other sides for one answer.
-MAX_TURNS = 3
+#: Maximum number of times that lights move to other sides for one answer under the brush, and of
+#: steps between whites; the next answer continues.
+MAX_TURNS, BRUSH_STEPS = 3, 2
+
+#: Width, in pieces of a range of white, of the window in which a light under the brush first finds
+#: its white.
+BRUSH_WIDTH = 8
 
 
 @dataclass(frozen=True)
@@ -294,7 +299,24 @@ def move_to_best_white(knob: Knob, gradient: Doubles) -> Knob:
     return knob.with_window(knob.whites.window(float(best), 1))
 
 
-def solve_near_sides(
+def solve_under_brush(
+    equations: NormalEquations, reduction: Reduction, start: Doubles, *, method: Method
+) -> tuple[Reduction, Doubles]:
+    """Solve as `solve_on_locus` does, in few steps from the last answer under a moving brush.
+
+    start: (n, 3). Return the reduction to continue with, and the weights (n, 3).
+    """
+    if not reduction.white_knobs:
+        return _solve_near_sides(equations, reduction, start, method=method)
+    start = snap_to_whites(reduction, start)
+    wide = center_windows(reduction, start, BRUSH_WIDTH)
+    start = solve_reduced(equations, wide, start, method=method).weights
+    centered = center_windows(reduction, start)
+    _, optimum = next_whites(equations, centered, start, steps=BRUSH_STEPS, method=method)
+    return reduction, optimum.weights
+
+
+def _solve_near_sides(
     equations: NormalEquations, reduction: Reduction, start: Doubles, *, method: Method
 ) -> tuple[Reduction, Doubles]:
     """Solve with each light kept within its gamut towards the side where it would leave it.

@@ -7,7 +7,7 @@ import numpy.typing as npt
 
 from lightpaint.arrays import Doubles
 from lightpaint.paint.protocol import Place, PlanObject, SkyAxes
-from lightpaint.scene.lights.texels.sky import Sky
+from lightpaint.scene.lights.texels.image_domains import Sky
 from lightpaint.scene.scene import Scene
 from lightpaint.scene.surfaces import names_by_shape
 

@@ -49,6 +49,7 @@ from lightpaint.report.diagnosis_sentences import (
     bound_sentences,
     compensation_sentences,
     hold_clause,
+    spoken_errors,
     spoken_shares,
 )
 from lightpaint.report.phrases import (
@@ -60,7 +61,6 @@ from lightpaint.report.phrases import (
     spoken_place,
     spoken_progress,
 )
-from lightpaint.report.uncertainty_sentences import spoken_errors
 from lightpaint.report.verdict import (
     headline,
     spoken_lack,

@@ -19,8 +19,7 @@ from lightpaint.pipeline.job.settings import Settings
 from lightpaint.pipeline.job.sources import Painting, content
 from lightpaint.placement.rigged_lights import check_names, rigged_lights
 from lightpaint.placement.rigging import Rigging, rigging_of
-from lightpaint.scene.lights.texels.domains import DOMAINS
-from lightpaint.scene.lights.texels.sky import Sky
+from lightpaint.scene.lights.texels.image_domains import DOMAINS, Sky
 from lightpaint.scene.lights.texels.texel import mirrored_pairs, node_name
 from lightpaint.scene.lights.texels.texel_layout import CHILDREN
 from lightpaint.scene.scene import Scene
@@ -113,22 +112,6 @@ def check_animation(settings: Settings, constraints: Constraints, views: int) ->
         raise ConstraintError(
             "sparse chooses the lights of one lighting, not of every frame apart: leave it or "
             "animate=True out"
-        )
-
-
-def check_target(target: object) -> None:
-    """Raise TargetError for anything but a target."""
-    if not isinstance(target, Target):
-        raise TargetError(f"the target is a {type(target).__name__}: pass what read_target returns")
-
-
-def check_same_picture(target: Target, scene: Scene) -> None:
-    """Raise TargetError if the painting's sensor is not that of `scene`."""
-    sensor = scene.sensor_names[scene.sensor]
-    if target.sensor not in ("", sensor):
-        raise TargetError(
-            f"{target.name} was painted on a template of the sensor {target.sensor}, not of "
-            f"{sensor}: choose it with sensor={target.sensor!r}, or pass find=False"
         )
 
 

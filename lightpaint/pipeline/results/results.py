@@ -1,19 +1,18 @@
-"""The results of a solve in its folder, and reading them back."""
+"""The results of a solve in its folder, reading them back, and verifying them again."""
 
 import json
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
 
 from lightpaint.basis.basis import Basis, Origin
 from lightpaint.display_text import some_names
-from lightpaint.errors import SceneError
+from lightpaint.errors import ImageError, OutputError, SceneError
 from lightpaint.files import is_name, one_line, write_bytes, write_text
 from lightpaint.images.bands import in_turns
-from lightpaint.images.estimate import Estimate, write_estimate
+from lightpaint.images.estimate import Estimate, read_estimate, write_estimate
 from lightpaint.images.formats.png import png_bytes
-from lightpaint.images.pixel_blocks import Size
+from lightpaint.images.pixel_blocks import Size, whole_factor
 from lightpaint.keywords import keywords
 from lightpaint.lighting.analysis.analysis import Analysis
 from lightpaint.lighting.analysis.diagnosis import Diagnosis
@@ -23,18 +22,24 @@ from lightpaint.lighting.solution import Solution
 from lightpaint.pipeline.results.placement_changes import hung_of
 from lightpaint.placement.placement import Placement
 from lightpaint.placement.suggestion import MoveSuggestion, Suggestion
+from lightpaint.progress import Progress, silent
 from lightpaint.relit.export.exports import EXPORTS
 from lightpaint.relit.verification import Verification
+from lightpaint.relit.verification_render import verify
 from lightpaint.report.answer_pictures import report_transform, residual_of
 from lightpaint.report.clean_pictures import CleanLooks
 from lightpaint.report.comparison import comparison_image
 from lightpaint.report.page.notebook_html import look_html
 from lightpaint.report.page.page import report_page
 from lightpaint.report.report_json import report_numbers
+from lightpaint.report.reported_answer import ReportedAnswer
 from lightpaint.report.verdict import verdict
 from lightpaint.report.visible_emitters import emitter_remarks
 from lightpaint.scene.scene import Scene
+from lightpaint.scene.scene_reader import load_scene
+from lightpaint.scene.scene_render import Stream
 from lightpaint.scene.surfaces import render_features
+from lightpaint.storage.json_records import read_record, strict_json
 from lightpaint.storage.staging import finish
 from lightpaint.target.target import Target
 
@@ -195,9 +200,9 @@ def write_report(
     are now; by default that of `look`. is_shown: False to write only the numbers.
     """
     relit = relit or look.relit
-    arguments = _report_arguments(look, command)
+    answer = _reported_answer(look, command)
     if not is_shown:
-        write_text(folder / "report.json", report_numbers(**arguments))
+        write_text(folder / "report.json", report_numbers(answer))
         return
     verified = look.verification.verified.image if look.verification else None
     larger_features = None
@@ -226,29 +231,102 @@ def write_report(
         write_bytes(folder / "comparison.png", png_bytes(sheet, looks.texts))
 
     def page() -> None:
-        write_text(folder / "report.html", report_page(**arguments, looks=looks, missed=missed))
+        write_text(folder / "report.html", report_page(answer, looks=looks, missed=missed))
 
     def numbers() -> None:
-        write_text(folder / "report.json", report_numbers(**arguments, missed=missed))
+        write_text(folder / "report.json", report_numbers(answer, missed=missed))
 
     in_turns(lambda write: write(), (page, comparison, numbers), look.basis.size)
 
 
-def _report_arguments(look: Look, command: str) -> dict[str, Any]:
-    """Return the arguments that page and numbers have in common."""
-    return {
-        "basis": look.basis,
-        "target": look.target,
-        "solution": look.solution,
-        "predicted": look.predicted,
-        "verification": look.verification,
-        "command": command,
-        "uncertainty": look.uncertainty,
-        "diagnosis": look.diagnosis,
-        "unconstrained": look.analysis.unconstrained,
-        "suggestions": look.suggestions,
-        "turn": look.move_suggestion,
-        "hung": None if look.placement is None else hung_of(look.placement, look.lighting),
-        "appearance": look.analysis.appearance,
-        "color_choices": look.analysis.color_choices,
-    }
+def _reported_answer(look: Look, command: str) -> ReportedAnswer:
+    """Return a look as its report takes it."""
+    return ReportedAnswer(
+        basis=look.basis,
+        target=look.target,
+        solution=look.solution,
+        predicted=look.predicted,
+        verification=look.verification,
+        command=command,
+        uncertainty=look.uncertainty,
+        diagnosis=look.diagnosis,
+        unconstrained=look.analysis.unconstrained,
+        suggestions=look.suggestions,
+        turn=look.move_suggestion,
+        hung=None if look.placement is None else hung_of(look.placement, look.lighting),
+        appearance=look.analysis.appearance,
+        color_choices=look.analysis.color_choices,
+    )
+
+
+def verify_result(
+    folder: str | Path,
+    *,
+    spp: int | None = None,
+    seed: int = 0,
+    progress: Progress = silent,
+) -> Verification:
+    """Render the relit.xml of a result folder again and compare it with its predicted.exr.
+
+    spp: samples per pixel, by default those recorded in predicted.exr. Raises OutputError if
+    `folder` holds no such result, ImageError if predicted.exr is damaged.
+    """
+    folder = Path(folder)
+    for candidate in (folder, folder.parent):
+        finish(candidate)
+    relit_xml = folder / "relit.xml"
+    if not relit_xml.is_file() and (folder.parent / "relit.xml").is_file():
+        relit_xml = folder.parent / "relit.xml"  # one of several views
+    missing = [file.name for file in (folder / "predicted.exr", relit_xml) if not file.is_file()]
+    if missing:
+        raise OutputError(
+            f"{folder} is not a result folder with a relit scene: it has no "
+            f"{' and no '.join(missing)}; give one that lightpaint solve made from a scene"
+        )
+    path = folder / "predicted.exr"
+    predicted, attributes = read_estimate(path)
+    view = _read_view(path, attributes.get(VIEW_KEY, "{}"))
+    relit = load_scene(
+        relit_xml, sensor=view.sensor, parameters=view.parameters, use_lights_file=False
+    )
+    if view.width is not None and view.height is not None:
+        film = (view.height, view.width)
+        # A scene that was edited by hand may have another film, which `verify` refuses.
+        if relit.size != film and whole_factor(relit.size, film) is not None:
+            relit = relit.reduced(f"{view.width}x{view.height}")
+    return verify(
+        predicted,
+        relit,
+        spp=view.spp if spp is None else spp,
+        seed=seed,
+        stream=Stream.SECOND_VERIFICATION,
+        progress=progress,
+    )
+
+
+@dataclass(frozen=True)
+class _RecordedView:
+    """The content of VIEW_KEY; None for what is missing.
+
+    spp: samples per pixel. width, height: film of the verification; None for the whole film.
+    parameters: values of `$name` parameters of the scene.
+    """
+
+    sensor: str | None = None
+    spp: int | None = None
+    width: int | None = None
+    height: int | None = None
+    parameters: Mapping[str, str] | None = None
+
+    def __post_init__(self) -> None:
+        if self.spp == 0:
+            raise ValueError("spp is a whole number > 0, not 0")
+
+
+def _read_view(path: Path, text: str) -> _RecordedView:
+    try:
+        return read_record(_RecordedView, strict_json(text), others=True)
+    except ValueError as error:
+        raise ImageError(
+            f"{path} is damaged in its attribute {VIEW_KEY}: {one_line(str(error))}; solve again"
+        ) from None

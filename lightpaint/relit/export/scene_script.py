@@ -11,15 +11,15 @@ import numpy as np
 
 from lightpaint.arrays import RGB, Position
 from lightpaint.colour.primaries import ACESCG, REC2020, from_rec709
-from lightpaint.relit.export.export_places import (
+from lightpaint.relit.export.program_axes import (
     SAME_PLACE,
     axis_conversions,
+    blender_axes,
     conversion_of,
     has_new_cone,
     is_changed,
     old_position,
 )
-from lightpaint.relit.export.sky_maps import blender_axes
 from lightpaint.scene.properties.site import EmitterPlace
 
 #: Blender's quantity for each parameter of Mitsuba's emitters.

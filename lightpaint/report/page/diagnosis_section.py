@@ -23,12 +23,17 @@ from lightpaint.report.answer_pictures import (
     over_unpainted,
     round_up,
 )
-from lightpaint.report.diagnosis_sentences import error_sentences, spoken_hold, spoken_shares
+from lightpaint.report.diagnosis_sentences import (
+    error_sentences,
+    spoken_errors,
+    spoken_hold,
+    spoken_shares,
+    uncertainty_sentence,
+)
 from lightpaint.report.measures import brightness, energy_shares, relative_errors
 from lightpaint.report.page.figures import PagePicture, figure, signed_scale
 from lightpaint.report.page.html import html
 from lightpaint.report.phrases import spoken_percent
-from lightpaint.report.uncertainty_sentences import spoken_errors, uncertainty_sentence
 
 #: Rows of both tables that are not folded.
 SHOWN_ROWS = 6

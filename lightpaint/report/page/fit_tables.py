@@ -19,6 +19,7 @@ from lightpaint.lighting.solution import Solution
 from lightpaint.relit.detection_power import ERROR
 from lightpaint.relit.verification import Verification, limit_of_tests
 from lightpaint.report.delivery_sentences import is_unnamed, wish_name
+from lightpaint.report.diagnosis_sentences import partly_reached
 from lightpaint.report.measures import (
     count_at_least_pixels,
     error_in_codes,
@@ -27,7 +28,6 @@ from lightpaint.report.measures import (
     relative_residual,
 )
 from lightpaint.report.page.html import facts, html, name_list
-from lightpaint.report.uncertainty_sentences import partly_reached
 from lightpaint.target.target import Target
 from lightpaint.version import __version__
 

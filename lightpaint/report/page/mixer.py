@@ -1,8 +1,8 @@
 """The light mixer of a page, which sets lights by hand, without a server.
 
 The page contains a small, compact plane for each light that matters, and two for those that share
-a row (joint_lights.py). The painter's own browser modules mix them, so that a page sent by mail is
-a mixer in any browser, offline.
+a row: the texels of an image, and all lights with small shares. The painter's own browser modules
+mix them, so that a page sent by mail is a mixer in any browser, offline.
 """
 
 import base64
@@ -10,7 +10,7 @@ import json
 import re
 import zlib
 from collections.abc import Sequence
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from functools import cache
 from typing import Any, TypedDict, Unpack
 
@@ -20,8 +20,9 @@ from markupsafe import Markup
 from lightpaint.arrays import Doubles, Floats, Indices
 from lightpaint.basis.basis import Basis
 from lightpaint.basis.denoised_mixes import denoise_mix, denoise_plane
+from lightpaint.basis.light_images import LightImage, light_images
 from lightpaint.basis.lights import BasisLight
-from lightpaint.colour.color import kelvin_to_rgb
+from lightpaint.colour.color import kelvin_to_rgb, luminance
 from lightpaint.colour.display.transform_table import curve_of, lattice_of
 from lightpaint.colour.display.view_transform import ViewTransform
 from lightpaint.colour.photometry import photometry
@@ -31,15 +32,10 @@ from lightpaint.images.packed_picture import PackedPicture, pack_picture
 from lightpaint.images.pixel_blocks import block_mean
 from lightpaint.lighting.answer.lighting import ALL_REACHED, Lighting
 from lightpaint.lighting.answer.lighting_file import lighting_fields
-from lightpaint.report.basis_memo import (
-    MAX_PIXELS,
-    cached_clean_planes,
-    make_once,
-    page_reduction,
-)
+from lightpaint.report.basis_memo import MAX_PIXELS, cached_clean_planes, make_once, page_reduction
 from lightpaint.report.page.figures import CLEAN_REDUCTION, data_uri
 from lightpaint.report.page.html import html
-from lightpaint.report.page.joint_lights import JointLights, rows_of_mixer
+from lightpaint.report.page.lights_table import most_visible_lights
 from lightpaint.threads import parallel_map
 from lightpaint.viewer.bundle import bundled, compact_script, source, styles
 
@@ -56,6 +52,54 @@ class PlaneOptions(TypedDict):
 
     is_clean: bool
     max_pixels: int
+
+
+@dataclass(frozen=True)
+class JointLights:
+    """Several lights in one row of a mixer, which sets them together.
+    label: of the row. lights: their indices. image: if they are the texels of one.
+    """
+
+    label: str
+    lights: Indices
+    image: LightImage | None = None
+
+    def level(self, weights: Doubles, current: Doubles) -> float:
+        """Return the brightness of an image relative to that in the scene; 1 without one.
+
+        weights, current: (n, 3), in a look and in the scene.
+        """
+        if self.image is None:
+            return 1.0
+        now, new = (float(luminance(self.image.mean(x))) for x in (current, weights))
+        return new / now if now > 0 and new > 0 else 1.0
+
+    def mixes(self, lighting: Lighting, basis: Basis) -> list[Doubles]:
+        """Return the weights (n, 3) of its planes: in the answer at the level 1, and in the
+        scene.
+        """
+        answer, current = lighting.weights_for(basis), basis.current_weights
+        is_its = np.isin(np.arange(len(current)), self.lights)[:, None]
+        level = self.level(answer, current)
+        return [np.where(is_its, x, 0) for x in (answer / level, current)]
+
+    def data(self, basis: Basis, lighting: Lighting) -> dict[str, Any]:
+        """Return its record for the page. `columns` and `places` are those of its map, if any."""
+        answer, current = lighting.weights_for(basis), basis.current_weights
+        image = self.image if self.image is not None and self.image.is_whole else None
+
+        def by_name(weights: Doubles) -> dict[str, list[float]]:
+            lights = [k for k in self.lights if not basis.is_fixed[k]]
+            return {basis.names[k]: weights[k].tolist() for k in lights}
+
+        return {
+            "label": self.label,
+            "columns": 0 if image is None else image.size[0],
+            "places": [] if image is None else image.map_order,
+            "levels": {"answer": self.level(answer, current), "present": 1.0},
+            "answer": by_name(answer / self.level(answer, current)),
+            "present": by_name(current),
+        }
 
 
 def mixer_html(
@@ -266,3 +310,15 @@ def lighting_data(lighting: Lighting) -> dict[str, Any]:
     for light in data["lights"].values():
         light.pop("photometry", None)
     return data
+
+
+def rows_of_mixer(basis: Basis, lighting: Lighting) -> tuple[Indices, Sequence[JointLights]]:
+    """Return the lights with a row of their own, and those that share one."""
+    images = light_images(basis.lights)
+    texels = [k for image in images for k in image.lights]
+    singles = np.setdiff1d(np.arange(len(basis.lights)), texels)
+    shown = most_visible_lights(basis, lighting, among=singles)
+    joint = [JointLights(image.name, image.lights, image) for image in images]
+    if (others := np.setdiff1d(singles, shown)).size:
+        joint.append(JointLights(f"{len(others)} more lights together", others))
+    return shown, joint

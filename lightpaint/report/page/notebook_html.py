@@ -29,10 +29,10 @@ from lightpaint.lighting.solution import Solution
 from lightpaint.relit.verification import Verification
 from lightpaint.report.answer_pictures import paint_coverage, report_transform, unpainted_look
 from lightpaint.report.comparison import SURROUND, TEXT, shorten_to_width
+from lightpaint.report.diagnosis_sentences import UNTOLD_HERE
 from lightpaint.report.page.figures import THUMBNAIL_WIDTH, data_uri, thumbnail
 from lightpaint.report.page.html import html
 from lightpaint.report.page.lights_table import change, hex_color
-from lightpaint.report.uncertainty_sentences import UNTOLD_HERE
 from lightpaint.report.verdict import agreement, verdict
 from lightpaint.scene.scene import Scene
 from lightpaint.target.target import Target

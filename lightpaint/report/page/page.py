@@ -5,7 +5,8 @@ data: URIs; the page loads nothing from anywhere, which its own content policy f
 """
 
 import shlex
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
+from dataclasses import replace
 from functools import partial
 from pathlib import Path
 from typing import Any
@@ -17,15 +18,8 @@ from lightpaint.basis.basis import Basis
 from lightpaint.colour.display.view_transform import ViewTransform
 from lightpaint.colour.srgb import to_8_bit
 from lightpaint.images.bands import in_turns
-from lightpaint.images.estimate import Estimate
 from lightpaint.images.pixel_blocks import covered
-from lightpaint.lighting.analysis.appearance.appearance import Appearance
-from lightpaint.lighting.analysis.appearance.color_choices import Choices
-from lightpaint.lighting.analysis.diagnosis import Diagnosis
-from lightpaint.lighting.analysis.noise.uncertainty import Uncertainty
 from lightpaint.lighting.solution import Solution
-from lightpaint.placement.suggestion import MoveSuggestion, Suggestion
-from lightpaint.relit.verification import Verification
 from lightpaint.report.answer_pictures import (
     Residual,
     brighter_than_white,
@@ -34,9 +28,8 @@ from lightpaint.report.answer_pictures import (
 )
 from lightpaint.report.basis_memo import ROWS_SHOWN, SPARE_ROWS
 from lightpaint.report.clean_pictures import MAX_CLEAN_THUMBNAILS, CleanLooks
-from lightpaint.report.fit_influences import fit_sentence
-from lightpaint.report.page.color_section import colors_section
-from lightpaint.report.page.constraint_section import constraints_section
+from lightpaint.report.diagnosis_sentences import fit_sentence
+from lightpaint.report.page.constraint_section import colors_section, constraints_section
 from lightpaint.report.page.diagnosis_section import missed_section, sure_section
 from lightpaint.report.page.figures import PagePicture, maps, wipe
 from lightpaint.report.page.fit_tables import (
@@ -49,106 +42,87 @@ from lightpaint.report.page.fit_tables import (
 from lightpaint.report.page.html import html
 from lightpaint.report.page.lights_table import lights_table, thumbnails_of
 from lightpaint.report.page.mixer import mixer_assets, mixer_html, planes_for_page
-from lightpaint.report.page.placement_section import placement_section
-from lightpaint.report.page.suggestion_section import suggestion_section
-from lightpaint.report.rig.hung_lights import HungLights
+from lightpaint.report.page.placement_section import placement_section, suggestion_section
+from lightpaint.report.reported_answer import ReportedAnswer
 from lightpaint.report.verdict import spoken_samples, verdict
 from lightpaint.report.visible_emitters import emitter_remarks
-from lightpaint.target.target import Target
 
 
 def report_page(
-    *,
-    basis: Basis,
-    target: Target,
-    solution: Solution,
-    predicted: Estimate,
-    verification: Verification | None,
-    command: str,
-    uncertainty: Uncertainty | None = None,
-    diagnosis: Diagnosis | None = None,
-    unconstrained: Solution | None = None,
-    suggestions: Sequence[Suggestion] | None = None,
-    turn: MoveSuggestion | None = None,
-    hung: HungLights | None = None,
-    appearance: Appearance | None = None,
-    looks: CleanLooks | None = None,
-    color_choices: Choices = (),
-    missed: Residual | None = None,
+    answer: ReportedAnswer, *, looks: CleanLooks | None = None, missed: Residual | None = None
 ) -> str:
     """Return the page as HTML text.
 
-    verification: None without a render that checks the prediction.
-    command: the shell command that made the result.
-    uncertainty, diagnosis, unconstrained, suggestions, hung: without them the page has no such
-    section.
-    appearance: the result of `compare_appearance`, if known. looks: the pictures without their
-    grain, which a switch then shows. color_choices: the answers of other colours, if known.
-    missed: the result of `residual_of`.
+    looks: the pictures without their grain, which a switch then shows. missed: the result of
+    `residual_of`.
 
     Raises SizeError if target and basis differ in size.
     """
-    target = target.fitted_to(basis.size, resize=False)
+    basis, solution, predicted = answer.basis, answer.solution, answer.predicted
+    answer = replace(answer, target=answer.target.fitted_to(basis.size, resize=False))
+    verification = answer.verification
     verified = None if verification is None else verification.verified.image
     raw = CleanLooks.raw(basis, predicted.image, verified)
     looks = looks or raw
-    transform = looks.encoder(report_transform(target, basis, predicted.image))
-    current = looks.current
+    transform = looks.encoder(report_transform(answer.target, basis, predicted.image))
     # Most of the time goes into pictures, which are independent of each other.
     makers: dict[str, Callable[[], Markup]] = {
-        "mixer": partial(_mixer, basis, target, solution, looks, transform=transform),
+        "mixer": partial(_mixer, answer, looks, transform=transform),
         "maps": partial(
             maps,
             solution,
             predicted.image,
-            current,
+            looks.current,
             verification=verification,
             transform=transform,
             missed=missed,
         ),
-        "wipe": partial(
-            _wipe,
-            target,
-            looks,
-            raw,
-            transform=transform,
-            verified_spp=None if verification is None else verification.spp,
-        ),
+        "wipe": partial(_wipe, answer, looks, raw, transform=transform),
         "missed": partial(
             missed_section,
             solution,
-            diagnosis,
-            current,
+            answer.diagnosis,
+            looks.current,
             transform=transform,
-            appearance=appearance,
-            can_place=suggestions is None and hung is None and basis.origin.scene.endswith(".xml"),
+            appearance=answer.appearance,
+            can_place=answer.suggestions is None
+            and answer.hung is None
+            and basis.origin.scene.endswith(".xml"),
         ),
         "constraints": partial(
-            constraints_section, basis, solution, unconstrained, transform=transform, looks=looks
+            constraints_section,
+            basis,
+            solution,
+            answer.unconstrained,
+            transform=transform,
+            looks=looks,
         ),
-        "lights": partial(lights_table, basis, solution, uncertainty, is_clean=looks.is_clean),
+        "lights": partial(
+            lights_table, basis, solution, answer.uncertainty, is_clean=looks.is_clean
+        ),
     }
     results = in_turns(lambda make: make(), tuple(makers.values()), basis.size)
     parts = dict(zip(makers, results, strict=True))
+    shown_answer = to_8_bit(transform.encode(looks.predicted))
     page = html(
         "page",
         **parts,
-        **_texts(basis, target, solution, predicted, verification, appearance),
+        **_texts(answer),
         mixer_assets=mixer_assets(),
-        colors=colors_section(color_choices),
+        colors=colors_section(answer.color_choices),
         exposure=_exposure(transform, predicted.image, looks.denoiser),
-        wishes=wishes_section(appearance),
-        places=placement_section(hung, to_8_bit(transform.encode(looks.predicted)), basis.features),
+        wishes=wishes_section(answer.appearance),
+        places=placement_section(answer.hung, shown_answer, basis.features),
         suggestions=suggestion_section(
-            suggestions,
-            turn=turn,
+            answer.suggestions,
+            turn=answer.turn,
             shown_view=_first_view(solution),
             transform=transform,
             cd_per_unit=solution.lighting.cd_per_unit,
             is_clean=looks.is_clean,
         ),
-        sure=sure_section(basis, solution, uncertainty),
-        command=command,
+        sure=sure_section(basis, solution, answer.uncertainty),
+        command=answer.command,
     )
     return str(page)
 
@@ -159,22 +133,17 @@ def _first_view(solution: Solution) -> str:
     return "" if whole is None else whole.problem.views.bases[0].origin.sensor
 
 
-def _texts(
-    basis: Basis,
-    target: Target,
-    solution: Solution,
-    predicted: Estimate,
-    verification: Verification | None,
-    appearance: Appearance | None,
-) -> dict[str, Any]:
+def _texts(answer: ReportedAnswer) -> dict[str, Any]:
     """Return the parts of the page without a picture, by their names in it."""
+    basis, target, solution = answer.basis, answer.target, answer.solution
+    predicted, verification = answer.predicted, answer.verification
     origin = basis.origin
     counts_all = target.everything and not target.content and origin.scene.endswith(".xml")
     return {
         "title": f"{target.name} · {origin.scene}",
         "target": target.name,
         "scene": f"{origin.scene}, sensor {origin.sensor}",
-        "verdict": verdict(solution, predicted, verification, appearance=appearance),
+        "verdict": verdict(solution, predicted, verification, appearance=answer.appearance),
         "meant": fit_sentence(solution),
         "verification": verification,
         "remarks": emitter_remarks(target, solution, predicted),
@@ -195,17 +164,10 @@ def prepare_page(basis: Basis) -> None:
 
 
 def _wipe(
-    target: Target,
-    looks: CleanLooks,
-    raw: CleanLooks,
-    *,
-    transform: ViewTransform,
-    verified_spp: int | None,
+    answer: ReportedAnswer, looks: CleanLooks, raw: CleanLooks, *, transform: ViewTransform
 ) -> Markup:
-    """Return the pictures to compare, in the order of the page's lists.
-
-    verified_spp: samples per pixel of the render; None if unknown.
-    """
+    """Return the pictures to compare, in the order of the page's lists."""
+    target, verification = answer.target, answer.verification
 
     def picture(name: str, alt: str, clean: Floats, raw: Floats) -> PagePicture:
         size = looks.predicted.shape[:2]
@@ -227,20 +189,19 @@ def _wipe(
         ),
     ]
     if looks.verified is not None and raw.verified is not None:
-        caption = f"An independent render of the relit scene{spoken_samples(verified_spp)}."
+        spp = None if verification is None else verification.spp
+        caption = f"An independent render of the relit scene{spoken_samples(spp)}."
         pictures.append(picture("render", caption, looks.verified, raw.verified))
     return wipe(pictures)
 
 
-def _mixer(
-    basis: Basis, target: Target, solution: Solution, looks: CleanLooks, *, transform: ViewTransform
-) -> Markup:
+def _mixer(answer: ReportedAnswer, looks: CleanLooks, *, transform: ViewTransform) -> Markup:
     """Return the mixer of the lights."""
-    scene = basis.origin.scene
+    basis, scene = answer.basis, answer.basis.origin.scene
     return mixer_html(
         basis,
-        solution.lighting,
-        target_picture(target, looks.current, transform=transform),
+        answer.solution.lighting,
+        target_picture(answer.target, looks.current, transform=transform),
         transform=transform,
         is_clean=looks.is_clean,
         scene=shlex.quote(_absolute_path(scene)) if scene.endswith(".xml") else None,

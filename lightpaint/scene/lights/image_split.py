@@ -8,21 +8,42 @@ from typing import Any
 
 import numpy as np
 
-from lightpaint.arrays import RGB, Doubles, Floats, as_rgb
+from lightpaint.arrays import RGB, Doubles, Floats, Indices, as_rgb
 from lightpaint.display_text import some_names
 from lightpaint.errors import SceneError
 from lightpaint.scene.lights.emitters import Emitter
-from lightpaint.scene.lights.texels.current_image import current_image
-from lightpaint.scene.lights.texels.domains import DOMAINS, domain_of
-from lightpaint.scene.lights.texels.image_domain import GridSize, ImageDomain
-from lightpaint.scene.lights.texels.sky import Sky
+from lightpaint.scene.lights.texels.image_domains import (
+    DOMAINS,
+    GridSize,
+    ImageDomain,
+    Sky,
+    domain_of,
+)
 from lightpaint.scene.lights.texels.texel import Texel, node_name
 from lightpaint.scene.lights.texels.texel_layout import RATIO, TexelLayout
-from lightpaint.scene.lights.texels.wall_coordinates import MESHES, why_no_image
 from lightpaint.scene.plane_identity import EmitterDigest
-from lightpaint.scene.properties.emission import EmissionKind, EmittedImage, EmitterSetting, Scaling
+from lightpaint.scene.properties.emission import (
+    EmissionKind,
+    EmittedImage,
+    EmitterSetting,
+    Scaling,
+    child_named,
+    read_emitted_image,
+)
 from lightpaint.scene.properties.site import Site
 from lightpaint.scene.scene_tree import ParsedScene
+
+#: Longest side of the image that is averaged, in pixels.
+MAX_SIDE = 8192
+
+#: Shapes that are meshes, whose texture coordinates are in their files.
+MESHES = ("obj", "ply", "serialized", "cube")
+
+#: Distance by which coordinates may leave the image, from rounding.
+COORDINATE_TOLERANCE = 1e-4
+#: Number of places at which a mesh is searched for a second triangle with the same coordinates, and
+#: number of comparisons in all.
+MAX_PLACES, MAX_COMPARISONS = 512, 2**23
 
 
 def with_split(
@@ -239,3 +260,150 @@ def even_image(texels: Sequence[Emitter], lit: Collection[str]) -> Floats:
         is_lit[k] = texel.name in lit or any(texel.emission)
     shown = layout.image(brightness) * (layout.image(is_lit) > 0)
     return np.asarray(shown[..., 0], np.float32)
+
+
+def current_image(
+    node: int,
+    kind: EmissionKind,
+    emission: RGB,
+    domain: ImageDomain,
+    size: GridSize,
+    parsed: ParsedScene,
+) -> Doubles:
+    """Return the emission that each texel of an emitter has now, (rows, columns, 3), with the same
+    total light.
+
+    node, kind, emission: of the emitter. Raises SceneError for an image that cannot be split.
+    """
+    columns, rows = size
+    scale = float(parsed.state.nodes[node].props.get("scale", 1.0))
+    name = parsed.names[node]
+    if kind.scaling is Scaling.COLOUR:
+        domain.check_size(size, (1, 1), name)
+        return np.broadcast_to(scale * np.array(emission), (rows, columns, 3)).copy()
+    path, is_linear = parsed.image_file(node, kind.parameter)
+    image: Floats = scale * read_emitted_image(path, is_linear).astype(np.float64)
+    if not np.isfinite(image).all() or image.min() < 0:
+        raise SceneError(
+            f"light {name!r} has an image with values that are negative or not "
+            f"finite, {path.name}, so it cannot be split"
+        )
+    domain.check_size(size, image.shape[1::-1], name)
+    texture = child_named(parsed.state, node, kind.parameter)
+    if texture is not None:
+        props = parsed.state.nodes[texture].props
+        image = domain.as_stored(
+            shown_image(
+                image,
+                size,
+                np.array(props["to_uv"].matrix, float) if "to_uv" in props else np.eye(4),
+                filter_type=str(props.get("filter_type", "bilinear")),
+                wrap_mode=str(props.get("wrap_mode", "repeat")),
+            )
+        )
+    return domain.coarse(image, size)
+
+
+def shown_image(
+    image: Floats, size: GridSize, to_uv: Doubles, *, filter_type: str, wrap_mode: str
+) -> Doubles:
+    """Return what a bitmap shows on texture coordinates from 0 to 1, (h, w, 3).
+
+    image: its pixels. size: least columns and rows of the result. to_uv: (4, 4), from these
+    coordinates to those of the bitmap. filter_type, wrap_mode: as Mitsuba names them.
+    """
+    height, width = image.shape[:2]
+    # As many places as the bitmap has pixels there: its own pixels, if nothing is transformed.
+    repeats = np.maximum(1, np.ceil(np.abs(to_uv[:2, :2]).max(axis=1)))
+    counts = np.maximum(repeats * (width, height), size)
+    columns, rows = np.minimum(counts, MAX_SIDE).astype(int).tolist()
+    u, v = np.meshgrid((np.arange(columns) + 0.5) / columns, (np.arange(rows) + 0.5) / rows)
+    (a, b, _, left), (c, d, _, top) = to_uv[:2]
+    x, y = (a * u + b * v + left) * width, (c * u + d * v + top) * height
+    if filter_type == "nearest":
+        return _pixels(image, np.floor(x), np.floor(y), wrap_mode)
+    x, y = x - 0.5, y - 0.5
+    first_column, first_row = np.floor(x), np.floor(y)
+    across, down = (x - first_column)[..., None], (y - first_row)[..., None]
+    upper, lower = (
+        _pixels(image, first_column, row, wrap_mode) * (1 - across)
+        + _pixels(image, first_column + 1, row, wrap_mode) * across
+        for row in (first_row, first_row + 1)
+    )
+    return np.asarray(upper * (1 - down) + lower * down)
+
+
+def _pixels(image: Floats, columns: Doubles, rows: Doubles, wrap_mode: str) -> Doubles:
+    """Return pixels of a bitmap, some of which lie outside of it."""
+    places = (
+        _wrapped(rows.astype(int), image.shape[0], wrap_mode),
+        _wrapped(columns.astype(int), image.shape[1], wrap_mode),
+    )
+    return np.asarray(image[places], np.float64)
+
+
+def _wrapped(index: Indices, count: int, wrap_mode: str) -> Indices:
+    if wrap_mode == "clamp":
+        return np.clip(index, 0, count - 1)
+    if wrap_mode == "mirror":
+        index = index % (2 * count)
+        return np.where(index < count, index, 2 * count - 1 - index)
+    return np.asarray(index % count)
+
+
+def why_no_image(shape: str, mesh: Any) -> str:
+    """Return why a shape cannot show an image, phrased to follow the name of its light; "" if it
+    can.
+
+    shape: its plugin. mesh: the loaded shape, for one of MESHES.
+    """
+    if shape == "rectangle":
+        return ""
+    if shape not in MESHES:
+        return f"is a {shape}, whose texture coordinates no flat image follows"
+    import mitsuba as mi
+
+    if not mesh.has_vertex_texcoords():
+        return "is a mesh without texture coordinates (uv)"
+    parameters = mi.traverse(mesh)
+    coordinates = np.array(parameters["vertex_texcoords"], float).reshape(-1, 2)
+    return why_not_flat(coordinates, np.array(parameters["faces"], int).reshape(-1, 3))
+
+
+def why_not_flat(coordinates: Doubles, faces: Indices) -> str:
+    """Return why the triangles of a mesh do not lie beside each other in an image; "" if they do.
+
+    coordinates: (vertices, 2). faces: (triangles, 3).
+    """
+    used = coordinates[faces]
+    low, high = -COORDINATE_TOLERANCE, 1 + COORDINATE_TOLERANCE
+    if not (used.min() >= low and used.max() <= high):
+        return (
+            f"is a mesh with texture coordinates from {used.min():.3g} to {used.max():.3g}: its "
+            "image is from 0 to 1"
+        )
+    a, b, c = used[:, 0], used[:, 1], used[:, 2]
+    areas = _cross(b - a, c - a)
+    used = used[np.abs(areas) > 1e-12]
+    if not len(used):
+        return "is a mesh whose texture coordinates are all on a line"
+    step = max(1, len(used) // max(1, min(MAX_PLACES, MAX_COMPARISONS // len(used))))
+    middles = used[::step].mean(axis=1)
+    if (_triangles_over(middles, used) > 1).any():
+        return "is a mesh of which several places have the same texture coordinates"
+    return ""
+
+
+def _triangles_over(points: Doubles, triangles: Doubles) -> Indices:
+    """Return the number of triangles, (t, 3, 2), that each point, (p, 2), lies in."""
+    count = np.zeros(len(points), int)
+    a, b, c = triangles[:, 0], triangles[:, 1], triangles[:, 2]
+    for k, point in enumerate(points):
+        sides = [_cross(y - x, point - x) for x, y in ((a, b), (b, c), (c, a))]
+        count[k] = (np.all(np.array(sides) > 0, axis=0) | np.all(np.array(sides) < 0, axis=0)).sum()
+    return count
+
+
+def _cross(a: Doubles, b: Doubles) -> Doubles:
+    """Return the cross products of vectors in a plane, (n, 2) each."""
+    return np.asarray(a[:, 0] * b[..., 1] - a[:, 1] * b[..., 0])

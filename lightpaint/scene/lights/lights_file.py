@@ -13,7 +13,7 @@ from typing import Any
 from lightpaint.errors import SceneError
 from lightpaint.file_reading import read_text
 from lightpaint.files import one_line
-from lightpaint.scene.lights.texels.image_domain import GridSize
+from lightpaint.scene.lights.texels.image_domains import GridSize
 from lightpaint.scene.lights.texels.texel import image_of, parse_size
 from lightpaint.scene.lights.texels.texel_layout import TexelLayout
 from lightpaint.storage.json_records import strict_toml

@@ -23,8 +23,7 @@ from lightpaint.scene.properties.pose import (
     Site,
     pose_of,
 )
-from lightpaint.scene.properties.rotation import across
-from lightpaint.scene.properties.site import EmitterPlace
+from lightpaint.scene.properties.site import EmitterPlace, across
 from lightpaint.scene.properties.site import NewKind as NewKind
 from lightpaint.validation import MAX_NAME, is_amount
 

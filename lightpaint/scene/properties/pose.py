@@ -17,8 +17,8 @@ from lightpaint.errors import SceneError
 from lightpaint.keywords import keywords
 from lightpaint.scene.checks.tokens import tag
 from lightpaint.scene.properties.emission import ENVIRONMENTS
-from lightpaint.scene.properties.rotation import rotation_between, unit
 from lightpaint.scene.properties.site import Site as Site
+from lightpaint.scene.properties.site import rotation_between, unit
 
 #: Mitsuba's default cutoff angle of a spot in degrees, and default ratio of beam width to cutoff.
 DEFAULT_CUTOFF, DEFAULT_BEAM_SHARE = 20.0, 0.75

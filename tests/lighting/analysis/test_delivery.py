@@ -20,6 +20,7 @@ from lightpaint.lighting.analysis.appearance.delivery import (
     newest_delivery,
     worst_delivery,
 )
+from lightpaint.lighting.analysis.appearance.wish_parts import wish_parts
 from lightpaint.lighting.constraints.constraints import Constraints
 from lightpaint.lighting.solve import solve
 from lightpaint.target.target import Target
@@ -234,6 +235,25 @@ def test_strokes_of_one_layer_are_named_by_where_they_lie(make_basis: Any):
     flat = measure_deliveries(solve(basis, replace(target, wishes=())), now.astype(np.float32))
     assert {x.name for x in flat.deliveries} == {"Small vase", "Top left"}
     assert {x.kind for x in flat.deliveries} == {"wish"}
+
+
+def test_places_in_one_part_of_the_picture_are_told_apart_by_what_is_in_them():
+    """By the object that takes a fair part of each, and by a number where that does not help."""
+    areas = [np.zeros(SIZE, np.float32) for _ in range(4)]
+    for k, area in enumerate(areas):
+        area[8:16, 34 + 3 * k : 36 + 3 * k] = 1
+    index = np.tile(np.arange(SIZE[0]) % 2, (SIZE[1], 1)).T.astype(np.int32)  # floor and wall
+    index[8:12, 34:36] = 2
+    index[8:12, 37:39] = 3
+    objects = Objects(index, ("wall", "floor", "small_vase", "bench"))
+    parts = wish_parts([Wish("evening", area) for area in areas], objects)
+    by_name = [part.name for part in parts]
+    assert by_name[:2] == ["Right (small vase)", "Right (bench)"]
+    assert len(set(by_name)) == 4
+    assert [x.name for x in wish_parts([Wish("evening", x) for x in areas[:2]], None)] == [
+        "Right",
+        "Right (2)",
+    ]
 
 
 def test_views_count_by_what_they_ask_for():

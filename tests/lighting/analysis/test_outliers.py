@@ -18,14 +18,14 @@ from lightpaint.lighting.analysis.noise.dominant_pixels import (
 from lightpaint.lighting.analysis.noise.noise_correction import correct_noise
 from lightpaint.lighting.analysis.noise.uncertainty import error_bars, with_error_bars
 from lightpaint.lighting.solve import solve
-from lightpaint.report.page.lights_table import lights_table
-from lightpaint.report.page.notebook_html import html_of
-from lightpaint.report.uncertainty_sentences import (
+from lightpaint.report.diagnosis_sentences import (
     UNTOLD_HERE,
     spoken_errors,
     uncertainty_sentence,
     untold_lights,
 )
+from lightpaint.report.page.lights_table import lights_table
+from lightpaint.report.page.notebook_html import html_of
 from lightpaint.target.target import Target
 
 SIZE = (24, 24)

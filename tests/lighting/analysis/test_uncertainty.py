@@ -2,6 +2,7 @@
 
 from dataclasses import replace
 from functools import partial
+from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
@@ -11,15 +12,22 @@ from scipy.stats import t as student
 from scipy.stats import truncnorm
 
 from lightpaint.basis.basis import Basis
+from lightpaint.basis.planes import MemoryPlanes
 from lightpaint.errors import BasisError, SizeError
 from lightpaint.images.estimate import Estimate
 from lightpaint.lighting.analysis.noise.dominant_pixels import NORMAL_95
-from lightpaint.lighting.analysis.noise.noise import pseudo_inverse
+from lightpaint.lighting.analysis.noise.noise import denoised_matrix, pseudo_inverse
 from lightpaint.lighting.analysis.noise.noise_correction import correct_noise
 from lightpaint.lighting.analysis.noise.refinement import refine
-from lightpaint.lighting.analysis.noise.uncertainty import error_bars, with_error_bars
+from lightpaint.lighting.analysis.noise.uncertainty import (
+    _least_power,
+    error_bars,
+    weakest_matrix,
+    with_error_bars,
+)
 from lightpaint.lighting.analysis.noise.weight_directions import _one_sided
 from lightpaint.lighting.constraints.constraints import Constraints
+from lightpaint.lighting.normal_equations import NormalEquations
 from lightpaint.lighting.solve import solve
 from lightpaint.target.target import Target
 
@@ -608,3 +616,35 @@ def test_a_limit_that_is_met_leaves_one_side(make_basis: Any):
         ends = [end[1] for end in bars.interval]
         np.testing.assert_array_equal(ends[bound_side], bars.weights[1])
         assert (ends[0] < ends[1]).all()
+
+
+def test_the_weakest_matrix_is_that_of_an_inverse_for_each_light():
+    """Against the pseudo-inverse anew after each light; to round-off of the inverses."""
+    rng = np.random.default_rng(1)
+    n, size = 12, (6, 8)
+    image = rng.gamma(0.3, 1, (n, *size, 3)).astype(np.float32)
+    half = (image * rng.normal(size=image.shape)).astype(np.float32)
+    importance = rng.uniform(0.2, 1, (*size, 1)).astype(np.float32)
+    M = np.einsum("nhwc,mhwc,hwd->cnm", image, image, importance, dtype=np.float64)
+    own = np.einsum("nhwc,nhwc,hwd->cn", half, half, importance, dtype=np.float64)
+    power = own[:, :, None] * np.eye(n)
+    corrected = denoised_matrix(NormalEquations(M, np.zeros((3, n)), np.zeros(3)), power)
+    doubts = np.clip(rng.uniform(-0.5, 1.3, (n, 3)), 0, 1)
+    solution = SimpleNamespace(
+        basis=SimpleNamespace(planes=MemoryPlanes(image), noise=MemoryPlanes(half)),
+        equations=SimpleNamespace(M=M),
+        problem=SimpleNamespace(squares=SimpleNamespace(weight=importance)),
+    )
+    weakest = weakest_matrix(solution, power, doubts, corrected)  # type: ignore[arg-type]
+    expected = corrected.copy()
+    for k, c in np.argwhere(doubts > 0):
+        smooth, error = _least_power(
+            image[k, ..., c].ravel(), half[k, ..., c].ravel(), importance.ravel()
+        )
+        noisy, alone = (1 / pseudo_inverse(x[c])[k, k] for x in (M, expected))
+        least = max(
+            noisy - power[c, k, k] - error, alone - expected[c, k, k] + smooth, 1e-3 * M[c, k, k]
+        )
+        expected[c, k, k] -= doubts[k, c] * max(alone - least, 0)
+    assert np.abs(expected - corrected).max() > 0.1
+    np.testing.assert_allclose(weakest, expected, rtol=1e-7, atol=1e-9 * np.abs(M).max())

@@ -14,7 +14,7 @@ from lightpaint.lighting.unknowns import white_mixes
 from lightpaint.lighting.unknowns.gamuts import Gamuts, PaintedLight
 from lightpaint.lighting.unknowns.reduced_problem import nearest_unknowns, solve_reduced
 from lightpaint.lighting.unknowns.reduction import Reduction
-from lightpaint.lighting.unknowns.white_mixes import next_whites, solve_near_sides
+from lightpaint.lighting.unknowns.white_mixes import next_whites, solve_under_brush
 
 SIZE = (9, 8)
 
@@ -47,13 +47,13 @@ def test_sides_lead_to_the_optimum_over_whole_gamuts(
     over_gamuts, best = next_whites(equations, reduction, current)
     assert best.converged
     assert over_gamuts.confined_knobs  # else there is nothing to keep within anything
-    near_sides, weights = solve_near_sides(equations, reduction, current, method="polished")
+    near_sides, weights = solve_under_brush(equations, reduction, current, method="polished")
     assert not (reduction.gamuts or Gamuts).lights_outside(weights, np.arange(len(current)))  # type: ignore[arg-type]
     value, least = (equations.objective(w).sum() for w in (weights, best.weights))
     round_off = 1e-9 * equations.target_norm2.sum()
     assert value == pytest.approx(least, abs=round_off)
     # And from there it stays.
-    second_sides, second_weights = solve_near_sides(
+    second_sides, second_weights = solve_under_brush(
         equations, near_sides, weights, method="polished"
     )
     assert [knob.side for knob in second_sides.knobs] == [knob.side for knob in near_sides.knobs]
@@ -64,16 +64,16 @@ def test_gamuts_of_another_painting_are_heeded(make_basis: Any) -> None:
     equations, reduction, current = _problem(make_basis, 1)
     gamuts = reduction.gamuts
     assert gamuts is not None
-    near_sides, before = solve_near_sides(equations, reduction, current, method="polished")
+    near_sides, before = solve_under_brush(equations, reduction, current, method="polished")
     k = near_sides.confined_knobs[0]
     gamuts.refresh()
-    second_sides, _ = solve_near_sides(equations, near_sides, before, method="polished")
+    second_sides, _ = solve_under_brush(equations, near_sides, before, method="polished")
     assert second_sides.knobs[k].gamut is near_sides.knobs[k].gamut  # nothing else was painted
     # Now whites alone, without its own colour and the margin.
     narrow = reach_of(white_range(3000, 6500).colors)
     gamuts.refresh()
     gamuts._gamuts[near_sides.knobs[k].lights[0]] = ColorHull(narrow, np.ones(3))
-    after, weights = solve_near_sides(equations, near_sides, before, method="polished")
+    after, weights = solve_under_brush(equations, near_sides, before, method="polished")
     light = after.knobs[k].lights[0]
     assert gamuts[light].has(weights[light])
     assert not gamuts[light].has(before[light])
@@ -83,7 +83,7 @@ def test_gamuts_of_another_painting_are_heeded(make_basis: Any) -> None:
 def test_mixes_of_three_colours_are_found_again(make_basis: Any, seed: int) -> None:
     """The x of an emission that three colours make are those that it was made with."""
     equations, reduction, current = _problem(make_basis, seed)
-    near_sides, weights = solve_near_sides(equations, reduction, current, method="polished")
+    near_sides, weights = solve_under_brush(equations, reduction, current, method="polished")
     optimum = solve_reduced(equations, near_sides, weights)
     x = nearest_unknowns(near_sides, near_sides.weights(optimum.x), np.ones(len(current), bool))
     np.testing.assert_allclose(

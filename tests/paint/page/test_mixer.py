@@ -22,6 +22,7 @@ from lightpaint.lighting.answer.lighting import Lighting
 from lightpaint.report.page.html import ROWS_SHOWN
 from lightpaint.report.page.mixer import mixer_assets, mixer_html
 from lightpaint.report.page.page import report_page
+from lightpaint.report.reported_answer import ReportedAnswer
 
 SIZE = (36, 64)
 EVIL = "</script><script>document.title='x'</script>"
@@ -52,7 +53,9 @@ def report(basis: lp.Basis, **options: Any) -> str:
     target, solution = solve_painting(basis, **options)
     predicted = lp.combine(basis, solution.lighting)
     report_data: dict[str, Any] = {"target": target, "solution": solution, "predicted": predicted}
-    return report_page(basis=basis, verification=None, command="lightpaint solve", **report_data)
+    return report_page(
+        ReportedAnswer(basis=basis, verification=None, command="lightpaint solve", **report_data)
+    )
 
 
 @pytest.fixture(scope="module")

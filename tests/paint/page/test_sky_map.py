@@ -7,7 +7,7 @@ import pytest
 from axe import violations
 from painter_page import Painter
 
-from lightpaint.scene.lights.texels.sky import Sky, solid_angles, texel_direction
+from lightpaint.scene.lights.texels.image_domains import Sky, solid_angles, texel_direction
 
 LUMINANCE = np.array([0.2126, 0.7152, 0.0722])
 

@@ -8,7 +8,7 @@ from hypothesis import strategies as st
 
 from lightpaint.colour.color import luminance
 from lightpaint.lighting.answer.lighting import Lighting, LightSetting
-from lightpaint.relit.export.colors import UNBOUNDED, with_own_colors
+from lightpaint.relit.formats import UNBOUNDED, with_own_colors
 
 OWN = (3.0, 2.5, 2.0)
 

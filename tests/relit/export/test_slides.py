@@ -17,9 +17,8 @@ from lightpaint.colour.color import luminance
 from lightpaint.images.formats.exr import write_rgb
 from lightpaint.lighting.answer.lighting import Lighting
 from lightpaint.relit.export.fixtures import fixtures_of
-from lightpaint.relit.formats.export_format import Source
-from lightpaint.relit.light_maps import half_slide, slide_images_of
-from lightpaint.relit.xml_patch import emitters_of
+from lightpaint.relit.export_format import Source
+from lightpaint.relit.exported_lights import emitters_of, half_slide, slide_images_of
 from lightpaint.scene.runtime.variant import use_variant
 from lightpaint.scene.scene import Scene
 

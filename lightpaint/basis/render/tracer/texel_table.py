@@ -18,9 +18,7 @@ import numpy as np
 from lightpaint.arrays import Floats
 from lightpaint.scene.lights.emitters import Emitter
 from lightpaint.scene.lights.image_split import even_image
-from lightpaint.scene.lights.texels.flat_images import FlatDomain
-from lightpaint.scene.lights.texels.image_domain import ImageDomain
-from lightpaint.scene.lights.texels.sky import Sky
+from lightpaint.scene.lights.texels.image_domains import FlatDomain, ImageDomain, Sky
 from lightpaint.scene.lights.texels.texel_layout import RATIO, TexelLayout
 from lightpaint.scene.scene import Scene
 

@@ -38,11 +38,14 @@ GETS_THERE, DOES_MUCH = 0.01, 0.1
 STEP = 2
 
 
-def object_with_most(objects: Objects, index: Indices, missed: Doubles) -> str:
+def object_with_most(
+    objects: Objects, index: Indices, missed: Doubles, least: float = MIN_ERROR_SHARE
+) -> str:
     """Return the object with most of the error, or the first word that several names share; "" for
     none.
 
-    index, missed: (p,), the object and the error, >= 0, of some of the pixels.
+    index, missed: (p,), the object and the error, >= 0, of some of the pixels. least: smallest
+    share of the error.
     """
     on_each = np.bincount(index + 1, weights=missed, minlength=len(objects.names) + 1)[1:]
     size = np.bincount(objects.index.ravel() + 1, minlength=len(objects.names) + 1)[1:]
@@ -55,7 +58,7 @@ def object_with_most(objects: Objects, index: Indices, missed: Doubles) -> str:
             by_name[name_of(name)] += large
         name, most = max(on.items(), key=lambda item: item[1], default=("", 0.0))
         if (
-            most >= MIN_ERROR_SHARE * total > 0
+            most >= least * total > 0
             and by_name[name] <= MAX_PICTURE_SHARE * pixels
             and not NO_NAME.fullmatch(name)
         ):

@@ -18,6 +18,9 @@ WishKind = Literal["wish", "layer", "group"]
 #: Share of the picture from which an area lies in no ninth of it.
 LARGE = 0.5
 
+#: Share of an area that an object takes which tells it from other areas nearby.
+FAIR_SHARE = 0.25
+
 #: Names of the thirds of a picture, from the top and from the left.
 ROWS, COLUMNS = ("top", "middle", "bottom"), ("left", "middle", "right")
 
@@ -61,20 +64,40 @@ def _joint_area(wishes: Sequence[Wish]) -> Floats:
 
 def _names(wishes: Sequence[Wish], objects: Objects | None) -> list[str]:
     """Return names that differ: `Strokes, vase` for a part of a layer; only the place, with a
-    capital, for a part of a painting without layers.
+    capital, for a part of a painting without layers. Parts in one ninth of the picture are told
+    apart by what is in them, `Right (vase)`, or by numbers.
     """
     counts = Counter((wish.layer, wish.name) for wish in wishes)
-    names: list[str] = []
-    for wish in wishes:
-        is_part = counts[wish.layer, wish.name] > 1
-        name = wish.name
-        if is_part:
-            place = _place_name(wish.area, objects)
-            is_flat = wish.layer is None
-            name = f"{place[:1].upper()}{place[1:]}" if is_flat else f"{wish.name}, {place}"
-        alike = sum(x == name or x.startswith(f"{name} (") for x in names)
-        names.append(f"{name} ({alike + 1})" if alike and is_part else name)
+    is_part = [counts[wish.layer, wish.name] > 1 for wish in wishes]
+    names = [
+        _part_name(wish, objects) if part else wish.name
+        for wish, part in zip(wishes, is_part, strict=True)
+    ]
+    alike = Counter(names)
+    if objects is not None:
+        names = [
+            _with_object(name, wish.area, objects) if part and alike[name] > 1 else name
+            for name, wish, part in zip(names, wishes, is_part, strict=True)
+        ]
+    seen: Counter[str] = Counter()
+    for k, name in enumerate(names):
+        seen[name] += 1
+        if is_part[k] and seen[name] > 1:
+            names[k] = f"{name} ({seen[name]})"
     return names
+
+
+def _part_name(wish: Wish, objects: Objects | None) -> str:
+    place = _place_name(wish.area, objects)
+    return f"{place[:1].upper()}{place[1:]}" if wish.layer is None else f"{wish.name}, {place}"
+
+
+def _with_object(name: str, area: Floats, objects: Objects) -> str:
+    """Return a name with the object that takes most of the area, if one takes a fair part of it."""
+    index = objects.index.ravel().astype(np.intp)
+    weights = area.ravel().astype(np.float64)
+    found = object_with_most(objects, index, weights, least=FAIR_SHARE).replace("_", " ").strip()
+    return f"{name} ({found})" if found and found.lower() != name.lower() else name
 
 
 def _place_name(area: Floats, objects: Objects | None) -> str:

@@ -68,19 +68,29 @@ def weakest_matrix(
     basis, M = solution.basis, solution.equations.M
     weight = solution.problem.squares.weight
     weakest = corrected.copy()
-    for k in np.flatnonzero((doubts > 0).any(axis=1)).tolist():
+    in_doubt = np.flatnonzero((doubts > 0).any(axis=1)).tolist()
+    if not in_doubt:
+        return weakest
+    # The power that no other light can replace is 1 over the diagonal of the inverse.
+    noisy_inverse = [np.diag(pseudo_inverse(x)) for x in M]
+    inverse = [pseudo_inverse(x) for x in weakest]
+    for k in in_doubt:
         image, half = (planes.plane(k) for planes in (basis.planes, basis.noise))
         for c in np.flatnonzero(doubts[k] > 0):
             D = weight[..., c % weight.shape[2]].ravel()
             smooth, error = _least_power(image[..., c].ravel(), half[..., c].ravel(), D)
             # Only the part that no other light can replace may shrink.
-            noisy, alone = (1 / float(pseudo_inverse(x[c])[k, k]) for x in (M, weakest))
+            noisy, alone = 1 / float(noisy_inverse[c][k]), 1 / float(inverse[c][k, k])
             least = max(
                 noisy - float(power[c, k, k]) - SAFE_ERRORS * error,
                 alone - float(weakest[c, k, k]) + smooth,
                 MIN_LEFT * float(M[c, k, k]),
             )
-            weakest[c, k, k] -= doubts[k, c] * max(alone - least, 0)
+            less = doubts[k, c] * max(alone - least, 0)
+            weakest[c, k, k] -= less
+            # Sherman and Morrison: the part alone is less by as much.
+            column = inverse[c][:, k].copy()
+            inverse[c] += np.multiply.outer(column * (less / (1 - less / alone)), column)
     return weakest
 
 

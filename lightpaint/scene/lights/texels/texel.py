@@ -2,7 +2,7 @@
 
 Mitsuba interpolates the pixels of an image bilinearly, so a texel shines as a hat: it is 1 at its
 own place and falls to 0 towards its neighbours. Hats sum to one, so an image with a value for each
-texel is the sum of their lights. Where texels lie depends on the kind of light (image_domain.py).
+texel is the sum of their lights. Where texels lie depends on the kind of light (image_domains.py).
 """
 
 import re
@@ -11,7 +11,7 @@ from dataclasses import dataclass
 
 from lightpaint.errors import SceneError
 from lightpaint.files import one_line
-from lightpaint.scene.lights.texels.image_domain import GridSize, ImageDomain
+from lightpaint.scene.lights.texels.image_domains import GridSize, ImageDomain
 from lightpaint.scene.lights.texels.texel_layout import (
     CHILDREN,
     MAX_LEVEL,

@@ -14,7 +14,7 @@ from functools import cached_property
 import numpy as np
 
 from lightpaint.arrays import Doubles, Indices
-from lightpaint.scene.lights.texels.image_domain import GridSize
+from lightpaint.scene.lights.texels.image_domains import GridSize
 
 #: A texel: the level of its grid, of which 0 is the coarsest, its column and its row.
 Node = tuple[int, int, int]

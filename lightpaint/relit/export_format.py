@@ -9,8 +9,8 @@ from lightpaint.basis.lightgroups.light_groups import LightGroups
 from lightpaint.errors import LightpaintError
 from lightpaint.lighting.answer.lighting import Lighting
 from lightpaint.progress import Listener
-from lightpaint.relit.export.sky_maps import SkyMap
-from lightpaint.relit.light_maps import SlideImage, WallImage
+from lightpaint.relit.export.program_axes import SkyMap
+from lightpaint.relit.exported_lights import SlideImage, WallImage
 from lightpaint.scene.scene import Scene
 
 #: The map of an image light.

@@ -1,21 +1,35 @@
-"""The maps of image lights for other programs: of skies all around, walls and slides."""
+"""The lights of an answer for other programs: emissions, lights with a place and one colour, and
+maps of image lights: of skies all around, walls and slides.
+"""
 
+import math
 from collections.abc import Iterator
 from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 
-from lightpaint.arrays import Doubles, Floats, Position
+from lightpaint.arrays import RGB, Doubles, Floats, Position
+from lightpaint.basis.light_images import joined_texels
+from lightpaint.colour.photometry import photometry
 from lightpaint.lighting.answer.lighting import Lighting
 from lightpaint.relit.emission_xml import safe_name
-from lightpaint.relit.export.sky_maps import SkyMap, lat_long, map_axes, map_size_for
+from lightpaint.relit.export.nuke import RigKind, RigLight
+from lightpaint.relit.export.program_axes import SkyMap, lat_long, map_axes, map_size_for
 from lightpaint.relit.relight import scene_of
 from lightpaint.relit.relit_files import enlarged, images_of_texels, settings_of
 from lightpaint.scene.lights.emitters import Emitter
-from lightpaint.scene.lights.texels.flat_images import Slide, Wall
-from lightpaint.scene.lights.texels.sky import Sky
+from lightpaint.scene.lights.texels.image_domains import Sky, Slide, Wall
+from lightpaint.scene.properties.emission import Scaling
 from lightpaint.scene.scene import Scene
+
+#: Kind of light for each plugin; area lights are panels if they are flat.
+KINDS: dict[str, RigKind] = {
+    "point": "point",
+    "spot": "spot",
+    "directional": "sun",
+    "area": "panel",
+}
 
 #: Least columns of the image of a wall, whose texels other programs may sample more coarsely, and
 #: least columns of a texel.
@@ -23,6 +37,85 @@ WALL_COLUMNS, TEXEL_COLUMNS = 512, 4
 
 #: Shapes whose second texture coordinate Mitsuba turns round, unless they say otherwise.
 FLIPPED_SHAPES = ("obj",)
+
+
+def emitters_of(scene: Scene, lighting: Lighting) -> list[tuple[str, str, RGB]]:
+    """Return name, Mitsuba's parameter and emission of every adjusted emitter but texels.
+
+    The parameter is "" if the emission is a multiple of that in the scene, as for a sky. A
+    projector of one colour has the intensity along its axis.
+    """
+    regrouped_scene = scene_of(scene, lighting)
+    return [
+        (emitter.name, *_quantity(emitter, rgb))
+        for emitter, rgb in settings_of(regrouped_scene, lighting.emission)
+        if emitter.texel is None
+    ]
+
+
+def _quantity(emitter: Emitter, rgb: RGB) -> tuple[str, RGB]:
+    kind = emitter.kind
+    if kind is None or kind.scaling is not Scaling.COLOUR:
+        return "", rgb
+    if emitter.plugin != "projector":
+        return kind.parameter, rgb
+    # Its irradiance is π times smaller than what a plane at distance 1 gets.
+    r, g, b = (math.pi * channel for channel in rgb)
+    return "intensity", (r, g, b)
+
+
+def rig_lights(scene: Scene, lighting: Lighting) -> tuple[list[RigLight], list[str]]:
+    """Return points, spots, suns and panels as in `lighting`, and the names of other emitters.
+
+    Lights that stay as they are belong to them; skies, meshes, projectors, and lights that are
+    multiples of a picture are the others. Raises LightingError if the lighting is of another scene.
+    """
+    regrouped_scene = scene_of(scene, lighting)
+    places = {place.name: place for place in lighting.places}
+    rig, left = [], []
+    for light in regrouped_scene.lights:
+        is_known = light.is_fixed or not lighting[light.name].is_partly_reached
+        for emitter in light.members:
+            if not _has_point(emitter):
+                left.append(emitter.name)
+                continue
+            assert emitter.kind is not None
+            rgb = emitter.emission
+            if not light.is_fixed:
+                rgb = light.emission_of(emitter, lighting.emission[light.name])
+            kelvin = photometry(rgb, unit=emitter.kind.unit).kelvin if is_known else None
+            place = places.get(emitter.name)
+            rig.append(
+                RigLight(
+                    emitter.name,
+                    KINDS[emitter.plugin],
+                    _intensity(emitter, rgb),
+                    emitter.site,
+                    kelvin=kelvin,
+                    is_moved=place is not None and place.moved_from is not None,
+                    is_new=place is not None and bool(place.new),
+                )
+            )
+    return rig, joined_texels(left)
+
+
+def _has_point(emitter: Emitter) -> bool:
+    """Return whether an emitter is of one colour, and shines from a point or in one direction."""
+    is_plain = emitter.kind is not None and emitter.kind.scaling is Scaling.COLOUR
+    if emitter.texel is not None or emitter.obstacle or not is_plain:
+        return False
+    if emitter.plugin == "area":
+        return emitter.site.direction is not None and bool(emitter.unit_flux)
+    return emitter.plugin in KINDS
+
+
+def _intensity(emitter: Emitter, rgb: RGB) -> RGB:
+    """Return the emission, of a panel its intensity along its axis: its radiance times its area."""
+    if emitter.plugin != "area":
+        return rgb
+    assert emitter.unit_flux is not None
+    r, g, b = (emitter.unit_flux / math.pi * channel for channel in rgb)
+    return r, g, b
 
 
 @dataclass(frozen=True)

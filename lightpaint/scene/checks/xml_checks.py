@@ -2,7 +2,8 @@
 
 Mitsuba's parser accepts everything: nesting until the stack overflows, includes and parameters that
 multiply without end, pipes that never answer. These functions read the same text within limits, and
-report each such fault as a SceneError.
+report each such fault as a SceneError, as well as missing parameters without which a plugin
+crashes.
 """
 
 import re
@@ -15,7 +16,7 @@ import numpy as np
 from lightpaint.errors import SceneError
 from lightpaint.file_reading import file_length, read_bytes
 from lightpaint.files import one_line
-from lightpaint.scene.checks.tokens import attributes, encoding_of, line_of, markup
+from lightpaint.scene.checks.tokens import attributes, encoding_of, line_of, markup, place_of_node
 
 #: Maximum size of all XML in bytes; a file that is included twice counts twice.
 MAX_XML = 2**26
@@ -36,6 +37,14 @@ _OBJECTS = frozenset(
     b"bsdf emitter field film integrator medium phase rfilter sampler scene sensor shape texture "
     b"volume".split()
 )
+
+#: Plugin → alternative parameters, one of which is required, and XML for the error message. Loading
+#: and rendering each plugin without parameters found these; others report what they lack.
+REQUIRED = {
+    "bitmap": (("filename", "bitmap", "data"), '<string name="filename" value="..."/>'),
+    "blendbsdf": (("weight",), '<float name="weight" value="..."/>'),
+    "volume": (("volume",), '<volume name="volume" type="..."/>'),
+}
 
 
 def check_xml(path: Path, parameters: Mapping[str, str], resolver: Any) -> None:
@@ -234,3 +243,18 @@ def _as_utf8(raw: bytes) -> bytes:
 def _resolved(resolver: Any, name: str) -> str:
     # Mitsuba's file names contain neither invalid Unicode nor NUL.
     return str(resolver.resolve(name.encode("utf-8", "replace").decode().replace("\0", "?")))
+
+
+def check_required(path: Path, state: Any) -> None:
+    """Raise SceneError if a plugin of a parsed scene lacks a parameter without which it crashes."""
+    for node in state.nodes:
+        plugin = str(node.props.plugin_name())
+        names, form = REQUIRED.get(plugin, ((), ""))
+        if names and not any(name in node.props for name in names):
+            kind = str(node.type).rpartition(".")[2].lower()
+            given_names = [name for name in node.props if not name.startswith("_")]
+            has = f", which has {one_line(', '.join(given_names))}," if given_names else ""
+            place = place_of_node(state, node)
+            raise SceneError(
+                f"{path}: {place}the {kind} {plugin!r}{has} needs {names[0]!r}: write {form} in it"
+            )

@@ -1,1 +1,0 @@
-"""The formats in which an answer can be exported, a class each."""
