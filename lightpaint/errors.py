@@ -22,11 +22,16 @@
     └── OutputError      a file or folder that cannot be written
 
 Each message is one line: what came, what was expected, and what to do. The command
-line prints it and exits with 2.
+line prints it and exits with 2. An argument that it names is a `Hint` in it, which
+the command line and manifests spell in their own way.
 """
 
 import errno
 import os
+from collections.abc import Sequence
+from typing import cast
+
+from lightpaint.sentences import Sentence
 
 
 class LightpaintError(Exception):
@@ -39,6 +44,15 @@ class LightpaintError(Exception):
         ...     print(error)
         no such image file: evening.exr
     """
+
+    def __init__(self, *parts: object) -> None:
+        """Make an error of texts, of data like `Hint("resize", True)`, and of other errors."""
+        super().__init__(Sentence(*parts))
+
+    @property
+    def sentence(self) -> Sentence:
+        """The message with its arguments as data."""
+        return cast(Sentence, self.args[0])
 
 
 class BackendError(LightpaintError):
@@ -103,9 +117,18 @@ class BatchError(LightpaintError):
     mistakes: one line each; the message joins them.
     """
 
-    def __init__(self, *mistakes: str) -> None:
-        super().__init__("; ".join(mistakes))
-        self.mistakes = mistakes
+    mistakes: tuple[str, ...]
+
+    def __init__(self, *parts: object) -> None:
+        super().__init__(*parts)
+        self.mistakes = (self.sentence,)
+
+    @classmethod
+    def of(cls, mistakes: Sequence[str]) -> "BatchError":
+        """Return the error of several mistakes."""
+        error = cls(Sentence.joined(mistakes, "; "))
+        error.mistakes = tuple(mistakes)
+        return error
 
 
 class LightingError(LightpaintError):

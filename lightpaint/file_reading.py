@@ -39,24 +39,24 @@ def file_length(
     try:
         status, is_sparse = _call_in_time(lambda: _stat(Path(path), limit))
     except (FileNotFoundError, NotADirectoryError):
-        raise error(f"no such {kind}: {path}") from None
+        raise error(f"no such {kind}: ", path) from None
     except (OSError, ValueError) as reason:  # a name too long, or with a NUL in it
         detail = getattr(reason, "strerror", None) or reason
         raise error(f"cannot read {one_line(str(path))}: {detail}") from None
     if stat.S_ISDIR(status.st_mode):
-        raise error(f"{path} is a folder, not {article} {kind}: name the file in it")
+        raise error(path, f" is a folder, not {article} {kind}: name the file in it")
     if not stat.S_ISREG(status.st_mode):
-        raise error(f"{path} is a device or a pipe, not {article} {kind}")
+        raise error(path, f" is a device or a pipe, not {article} {kind}")
     if status.st_size > limit:
         raise error(
-            f"{path} is {status.st_size} bytes long: no {kind} has more than {limit}, so it is not "
-            "read"
+            path,
+            f" is {status.st_size} bytes long: no {kind} has more than {limit}, so it is not read",
         )
     if status.st_size == 0 and (_is_virtual(status) or not may_be_empty):
-        raise error(f"{path} is empty, or only made up when it is read: expected {article} {kind}")
+        raise error(path, f" is empty, or only made up when it is read: expected {article} {kind}")
     if is_sparse:
         raise error(
-            f"{path} is {status.st_size} bytes long, and nearly all of it was never written"
+            path, f" is {status.st_size} bytes long, and nearly all of it was never written"
         )
     return status.st_size
 
@@ -154,9 +154,9 @@ def read_bytes(
             while len(chunk) == CHUNK and len(data) <= limit:
                 data += (chunk := _call_in_time(lambda: file.read(CHUNK)))
     except OSError as reason:
-        raise error(f"cannot read {path}: {reason.strerror or reason}") from None
+        raise error("cannot read ", path, f": {reason.strerror or reason}") from None
     if len(data) > limit:  # it has grown since: somebody is still writing it
-        raise error(f"{path} has no end: no {kind} has more than {limit} bytes")
+        raise error(path, f" has no end: no {kind} has more than {limit} bytes")
     return bytes(data)
 
 
@@ -169,5 +169,5 @@ def read_text(path: Path, kind: str, error: type[LightpaintError], **options: An
         return read_bytes(path, kind, error, **options).decode("utf-8-sig")
     except UnicodeDecodeError as reason:
         raise error(
-            f"{path} is not text in UTF-8: {reason.reason} at byte {reason.start}"
+            path, f" is not text in UTF-8: {reason.reason} at byte {reason.start}"
         ) from None

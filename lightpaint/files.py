@@ -10,6 +10,7 @@ from pathlib import Path
 
 from lightpaint.display_text import visible
 from lightpaint.errors import OutputError
+from lightpaint.sentences import Hint, Sentence
 
 #: Longest name of a file, in bytes: most systems allow 255, and suffixes are added here.
 LONGEST_NAME = 255 - 32
@@ -40,7 +41,7 @@ def replacing(path: Path) -> Iterator[Path]:
             os.replace(temporary, path)
     except OSError as error:
         reason = error.strerror or str(error)
-        raise OutputError(f"cannot write {path}: {reason}") from error
+        raise OutputError("cannot write ", path, f": {reason}") from error
 
 
 def flush(path: Path) -> None:
@@ -85,6 +86,9 @@ def is_name(text: str) -> bool:
 
 def one_line(text: str, *, limit: int = MAX_QUOTED) -> str:
     """Return foreign text as an error may quote it: one line of at most `limit` characters."""
+    if isinstance(text, Sentence):
+        whole = text.mapped(lambda part: visible(re.sub(r"\s+", " ", part)))
+        return whole if len(whole) <= limit else whole.shortened(limit) + " …"
     text = visible(" ".join(text[: 4 * limit].split()))
     return text if len(text) <= limit else f"{text[:limit]} …"
 
@@ -121,7 +125,7 @@ def check_writable(folder: Path) -> None:
         with tempfile.TemporaryFile(dir=existing_folder):
             pass
     except OSError as error:
-        raise OutputError(f"cannot write into {folder}: {error.strerror or error}") from error
+        raise OutputError("cannot write into ", folder, f": {error.strerror or error}") from error
 
 
 def check_files(files: Iterable[Path], inputs: Iterable[Path]) -> None:
@@ -136,14 +140,15 @@ def check_files(files: Iterable[Path], inputs: Iterable[Path]) -> None:
     for file in files:
         check_name(file)
         if file.is_dir():
-            raise OutputError(
-                f"{file} is a folder, but a file is to be written there: move it away"
-            )
+            raise OutputError(file, " is a folder, but a file is to be written there: move it away")
         with suppress(OSError):
             if _inode(file) in by_identity:
                 raise OutputError(
-                    f"{file} is an input of this command, which would overwrite it: write to "
-                    "another place (folder=...)"
+                    file,
+                    " is an input of this command, which would overwrite it: write to "
+                    "another place (",
+                    Hint("folder"),
+                    ")",
                 )
 
 
@@ -151,7 +156,7 @@ def check_name(path: Path) -> None:
     """Raise OutputError for a name that is not UTF-8: not all libraries can write to one."""
     if not is_utf_8(path):
         raise OutputError(
-            f"the name {one_line(str(path))} is not UTF-8: choose another (folder=...)"
+            f"the name {one_line(str(path))} is not UTF-8: choose another (", Hint("folder"), ")"
         )
 
 

@@ -101,7 +101,7 @@ def test_trouble_leaves_all_as_it_was(look: Path, trouble: BaseException) -> Non
 def test_a_folder_that_is_not_there_appears_whole_or_not_at_all(tmp_path: Path) -> None:
     folder = tmp_path / "new" / "look"
     with pytest.raises(OutputError, match=f"^cannot write {folder}/a$"), staged(folder) as stage:
-        raise OutputError(f"cannot write {stage}/a")
+        raise OutputError("cannot write ", stage / "a")
     assert list(tmp_path.iterdir()) == []
     with staged(folder) as stage:
         fill(stage, LATER)

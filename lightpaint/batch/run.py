@@ -18,7 +18,7 @@ from lightpaint.batch.gallery.gallery import write_gallery
 from lightpaint.batch.gallery.gallery_mixers import write_task_planes
 from lightpaint.batch.gallery.summary import SummaryRow
 from lightpaint.batch.manifest.folder_names import THUMBNAILS
-from lightpaint.batch.manifest.keys import with_manifest_keys
+from lightpaint.batch.manifest.keys import as_key
 from lightpaint.batch.plan.journal import Journal, JournalLine
 from lightpaint.batch.plan.plan import Plan, PlannedLook, PlanStep, by_bases, look_seconds, waves
 from lightpaint.batch.run_options import RunOptions
@@ -41,6 +41,7 @@ from lightpaint.batch.work.work_items import ItemResult
 from lightpaint.errors import BatchError, LightpaintError, OutputError
 from lightpaint.files import sweep
 from lightpaint.progress import Interrupted, Listener, Progress, listener, silent
+from lightpaint.sentences import Hint, Sentence
 
 
 @dataclass
@@ -98,7 +99,7 @@ def run_batch(
         except LightpaintError as error:
             if not is_disk_full(error):
                 raise
-            raise OutputError(f"{error}: {MAKE_ROOM}") from None
+            raise OutputError(error, ": ", MAKE_ROOM) from None
         return run.outcome
 
 
@@ -180,7 +181,7 @@ class _Run:
             return
         for result in solve_by_sums(tasks, self._engine, self._cache, self._listen):
             if result.is_disk_full:
-                raise OutputError(f"{result.failure}: {MAKE_ROOM}")
+                raise OutputError(result.failure, ": ", MAKE_ROOM)
             self._record(by_look[result.look], result)
 
     def _run_with_bases(self, steps: Sequence[PlanStep]) -> None:
@@ -201,8 +202,9 @@ class _Run:
             except (LightpaintError, MemoryError) as error:
                 if is_disk_full(error):
                     raise
-                is_memory = isinstance(error, MemoryError)
-                reason = OUT_OF_MEMORY_TEXT if is_memory else with_manifest_keys(str(error))
+                reason: str = OUT_OF_MEMORY_TEXT
+                if isinstance(error, LightpaintError):
+                    reason = error.sentence.spelled(as_key)
                 for step in steps:
                     self._fail(self._looks[step.task.look], step, reason)
                 return
@@ -238,9 +240,9 @@ class _Run:
             for result in _close_after(self._results(tasks)):
                 step = by_look[result.look]
                 if result.is_disk_full:
-                    raise OutputError(f"{result.failure}: {MAKE_ROOM}")
+                    raise OutputError(result.failure, ": ", MAKE_ROOM)
                 if result.failure and self._may_retry(result):
-                    self._listen.say(f"{result.look}: {result.failure}; trying again")
+                    self._listen.say(Sentence(f"{result.look}: ", result.failure, "; trying again"))
                     retries.append(step)
                     continue
                 self._record(step, result)
@@ -348,8 +350,9 @@ def lock_folder(folder: Path, *, shared: bool) -> Iterator[None]:
                 fcntl.flock(descriptor, kind | fcntl.LOCK_NB)
             except BlockingIOError:
                 raise OutputError(
-                    f"another batch is at work in {folder}: wait for it, or name another folder "
-                    "(folder=...)"
+                    f"another batch is at work in {folder}: wait for it, or name another folder (",
+                    Hint("folder"),
+                    ")",
                 ) from None
             except OSError:
                 pass  # the file system has no locks

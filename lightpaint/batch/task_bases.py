@@ -207,7 +207,7 @@ def _find_places(
         )
         [result] = engine.run([item])
     if result.failure:
-        raise SceneError(f"no places were found: {result.failure}")
+        raise SceneError("no places were found: ", result.failure)
     group.file.parent.mkdir(parents=True, exist_ok=True)
     write_text(group.file, result.value)
     record = read_placement(group.file)

@@ -118,7 +118,7 @@ def _command(name: str) -> Callable[..., CommandOutcome]:
 def _report(command: str, error: Exception, words: Sequence[str]) -> int:
     """Print the error, and return the exit code."""
     if isinstance(error, LightpaintError):
-        for line in error.mistakes if isinstance(error, BatchError) else (str(error),):
+        for line in error.mistakes if isinstance(error, BatchError) else (error.sentence,):
             lines.complain(command, spoken(line))
         return 2
     if isinstance(error, OSError) and (refusal := refusal_of(error)) is not None:

@@ -18,10 +18,11 @@ from lightpaint.batch.work.derived_looks import (
 from lightpaint.batch.work.item_execution import is_disk_full
 from lightpaint.cli.output import terminal
 from lightpaint.cli.output.documents import files_document
-from lightpaint.errors import LOOK_ERRORS, OutputError
+from lightpaint.errors import LOOK_ERRORS, LightpaintError, OutputError
 from lightpaint.lighting.answer.lighting import Lighting
 from lightpaint.pipeline.job.job import Job
 from lightpaint.pipeline.results.result_folder import ResultFolder
+from lightpaint.sentences import Hint, Sentence
 
 
 @dataclass
@@ -53,18 +54,18 @@ class LookSet:
             relation = {"variation": word, "of": str(job.folder)}
             self.shifted_looks.append(files_document(place.folder, files, **relation))
 
-    def continues_after(self, job: Job, error: Exception) -> bool:
+    def continues_after(self, job: Job, error: LightpaintError) -> bool:
         """Return True if the other looks are solved in spite of an error."""
         if not self.keep_going or is_disk_full(error):
             return False
         self._enter(job)
-        self.failures[job.folder.name] = str(error)
+        self.failures[job.folder.name] = error.sentence
         return True
 
     def show(self, bases: Sequence[Basis]) -> None:
         """Print the failures, and write the gallery."""
         for name, reason in self.failures.items():
-            terminal.complain("solve", f"{name}: {reason}")
+            terminal.complain("solve", Sentence(f"{name}: ", reason))
         if self.gallery is None:
             return
         entry_names = {entry.name for entry in self.entries}
@@ -103,7 +104,7 @@ def look_set(
         except LOOK_ERRORS as error:
             if not keep_going:
                 raise
-            failures[job.folder.name] = str(error)
+            failures[job.folder.name] = error.sentence
             continue
         all_jobs += [job, *variations.values()]
         variation_names |= {sibling.folder: word for word, sibling in variations.items()}
@@ -118,7 +119,8 @@ def _check_apart(folders: Sequence[Path], words: Sequence[str]) -> None:
         if folder in folders:
             raise OutputError(
                 f"a variation and a painting would both go to {folder}: solve them separately, "
-                "each with its own folder=..."
+                "each with its own ",
+                Hint("folder"),
             )
 
 

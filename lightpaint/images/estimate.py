@@ -105,16 +105,18 @@ def read_estimate(path: Path) -> tuple[Estimate, Mapping[str, str]]:
     parts = read_parts(path)
     if len(parts) > 1:
         raise ImageError(
-            f"{path} has {len(parts)} parts ({some_names(p.name for p in parts)}) instead of one: "
-            "give an image that lightpaint rendered"
+            path,
+            f" has {len(parts)} parts ({some_names(p.name for p in parts)}) instead of one: "
+            "give an image that lightpaint rendered",
         )
     [part] = parts
     if f"{HALF_DIFFERENCE}.R" not in part.channels:
         raise ImageError(
-            f"{path} has no {HALF_DIFFERENCE} layer, so its noise is unknown: "
-            "give an image that lightpaint rendered"
+            path,
+            f" has no {HALF_DIFFERENCE} layer, so its noise is unknown: "
+            "give an image that lightpaint rendered",
         )
     try:
         return Estimate(part.rgb(), part.rgb(HALF_DIFFERENCE)), part.attributes
     except ImageError as error:
-        raise ImageError(f"{path} is damaged: {one_line(str(error))}") from None
+        raise ImageError(path, f" is damaged: {one_line(str(error))}") from None

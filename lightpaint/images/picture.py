@@ -90,16 +90,16 @@ def read_picture(
     try:
         if kind == "exr":
             parts = read_parts(path)
-            with _naming_file(f"{path}"):
+            with naming_file(path):
                 return _picture_of_layer(choose_layer(parts, layer))
-        with _naming_file(f"{path}"):
+        with naming_file(path):
             if layer is not None:
                 raise ImageError(f"has no layers to choose {layer!r} from: only EXR files have")
             return _picture_of_bitmap(_bitmap(path, kind), TransformChoice.of(transform), otherwise)
     except MemoryError:
-        raise ImageError(f"{path} needs more memory than there is") from None
+        raise ImageError(path, " needs more memory than there is") from None
     except OSError as error:
-        raise ImageError(f"cannot read {path}: {error.strerror or error}") from error
+        raise ImageError("cannot read ", path, f": {error.strerror or error}") from error
 
 
 def read_mask(path: str | Path) -> npt.NDArray[np.float32]:
@@ -112,12 +112,12 @@ def read_mask(path: str | Path) -> npt.NDArray[np.float32]:
     kind = file_kind(path)
     try:
         parts = read_parts(path) if kind == "exr" else []
-        with _naming_file(f"mask {path}"):
+        with naming_file("mask ", path):
             return _mask_in(parts) if parts else _mask_of(_bitmap(path, kind))
     except MemoryError:
-        raise ImageError(f"{path} needs more memory than there is") from None
+        raise ImageError(path, " needs more memory than there is") from None
     except OSError as error:
-        raise ImageError(f"cannot read mask {path}: {error.strerror or error}") from error
+        raise ImageError("cannot read mask ", path, f": {error.strerror or error}") from error
 
 
 def file_kind(path: Path) -> str:
@@ -127,8 +127,9 @@ def file_kind(path: Path) -> str:
         return kind if kind != "zip" else layered_kind(path, head)
     name = name_of(head)
     raise ImageError(
-        f"{path} is {f'a {name} file' if name else 'not a picture that can be read'}: export it as "
-        "OpenEXR, or as PNG or TIFF with 16 bits"
+        path,
+        f" is {f'a {name} file' if name else 'not a picture that can be read'}: export it as "
+        "OpenEXR, or as PNG or TIFF with 16 bits",
     )
 
 
@@ -276,12 +277,12 @@ def _looks_straight(image: Floats, alpha: Floats) -> bool:
 
 
 @contextmanager
-def _naming_file(file: str) -> Iterator[None]:
+def naming_file(*name: str | Path) -> Iterator[None]:
     """Prefix errors such as `is damaged` with the file's name, and escape foreign names in them.
 
-    Names inside the file may contain control characters for a terminal.
+    name: in parts. Names inside the file may contain control characters for a terminal.
     """
     try:
         yield
     except ImageError as error:
-        raise ImageError(f"{file} {one_line(str(error), limit=2000)}") from error
+        raise ImageError(*name, " ", one_line(error.sentence, limit=2000)) from error

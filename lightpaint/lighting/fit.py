@@ -9,6 +9,7 @@ from lightpaint.errors import LightpaintError, TargetError
 from lightpaint.field_options import Option
 from lightpaint.keywords import keywords
 from lightpaint.lighting.algebra.method import Method
+from lightpaint.sentences import Hint
 from lightpaint.validation import a, check_fields, number
 
 if TYPE_CHECKING:
@@ -222,6 +223,7 @@ def _common_transform(targets: "Sequence[Target]") -> ViewTransform:
     if len(transforms) > 1:
         names = " and ".join(sorted(f"{x.name} at {x.stops:+g} stops" for x in transforms))
         raise TargetError(
-            f"the paintings were painted through {names}: choose one of them with transform=..."
+            f"the paintings were painted through {names}: choose one of them with ",
+            Hint("transform"),
         )
     return next(iter(transforms), None) or ViewTransform("srgb", choose_exposure(targets[0].image))

@@ -33,6 +33,7 @@ from lightpaint.lighting.loss.weight_penalty import PaintTerms, joint_pull
 from lightpaint.lighting.normal_equations import NormalEquations
 from lightpaint.lighting.unknowns.gamuts import Gamuts
 from lightpaint.lighting.unknowns.reduction import Reduction, reduce_to
+from lightpaint.sentences import Hint, Word
 from lightpaint.target.target import Target, titled
 
 
@@ -308,7 +309,8 @@ def summed_problem(
     if not sums.equations.target_norm2.any() and not sums.equations.M.any():
         raise TargetError(
             f"{titled(name)}: no light reaches a painted pixel that counts; paint others, too, or "
-            'pass emitters="count"'
+            "pass ",
+            Hint("emitters", Word("count")),
         )
     all_constraints, fit = constraints_of(lights.requests).and_then(constraints), resolve_fit(fit)
     reduction = reduce_lights(all_constraints, lights, fit)

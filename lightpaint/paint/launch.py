@@ -96,7 +96,7 @@ def _write_if_possible(file: "ConnectionFile", say: Callable[[str], None]) -> No
     try:
         file.write()
     except OutputError as error:
-        say(str(error))
+        say(error.sentence)
 
 
 class ConnectionFile:

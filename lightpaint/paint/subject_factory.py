@@ -29,6 +29,7 @@ from lightpaint.pipeline.job.sources import (
 )
 from lightpaint.scene.quality_presets import on_film
 from lightpaint.scene.scene import Scene
+from lightpaint.sentences import Hint
 
 #: Maximum number of bytes of half floats that a page can hold, for all planes of a view.
 MAX_PAGE_BYTES = 2**31
@@ -134,8 +135,10 @@ def _check_size(basis: Basis, name: str) -> None:
     if (needed := 6 * count * height * width) > MAX_PAGE_BYTES:
         raise PaintError(
             f"{name} has {count} lights of {width}x{height}, for which a page would need "
-            f"{needed / 1e9:.1f} GB: paint the scene on a smaller film, with resolution=..., "
-            "export the painting, and solve it with this basis and resize=True"
+            f"{needed / 1e9:.1f} GB: paint the scene on a smaller film, with ",
+            Hint("resolution"),
+            ", export the painting, and solve it with this basis and ",
+            Hint("resize", True),
         )
 
 

@@ -23,6 +23,7 @@ from lightpaint.pipeline.job.sources import GroupsFile
 from lightpaint.pipeline.results.answer_folder import LIGHTING
 from lightpaint.progress import Progress, listener, silent
 from lightpaint.relit.export.exports import relit_part
+from lightpaint.sentences import Hint
 
 #: Header attribute of a frame: the answer and the render that it shows.
 FRAME_KEY = "lightpaint.frame"
@@ -36,7 +37,7 @@ def frames_to_write(job: Job, text: str | None) -> tuple[int, ...]:
     """
     if job.sequence is None:
         if text is not None:
-            raise BasisError("frames=... are of a shot, like 'shot.####.exr': leave it out")
+            raise BasisError(Hint("frames"), " are of a shot, like 'shot.####.exr': leave it out")
         return ()
     chosen = () if text is None else parse_frames(text, job.sequence)
     frames = tuple(sorted({*job.painted_frames, *chosen}))
@@ -107,8 +108,10 @@ def _check_pictures(job: Job, frames: Sequence[int]) -> dict[int, Path]:
     for file in (pictures[frame] for frame in frames):
         if not job.settings.force and file.exists() and not _mark_in(file):
             raise OutputError(
-                f"{file} exists and is not a frame of lightpaint: name another folder "
-                "(folder=...), or pass force=True"
+                f"{file} exists and is not a frame of lightpaint: name another folder (",
+                Hint("folder"),
+                "), or pass ",
+                Hint("force", True),
             )
     return pictures
 

@@ -17,6 +17,7 @@ from lightpaint.pipeline.job.job import Job, PaintedView
 from lightpaint.pipeline.job.settings import Settings
 from lightpaint.progress import Listener, Progress, labelled, listener
 from lightpaint.scene.scene import Scene
+from lightpaint.sentences import Hint, Sentence
 
 
 def obtain(
@@ -82,15 +83,17 @@ class _RenderWatch:
         if self._has_moved:
             self.listen.note(f"{remainder} of {of} lights are rendered where they are now")
             return
-        self.listen.say(
+        text = (
             f"{count} of {of} lights come from an earlier run; "
             f"{remainder} {'is' if remainder == 1 else 'are'} rendered"
-            f"{self.way_to_render('all')}"
         )
+        self.listen.say(text + self.way_to_render("all"))
 
-    def way_to_render(self, what: str) -> str:
+    def way_to_render(self, what: str) -> Sentence:
         """Return how to render it without the cache, if the caller can."""
-        return f" (use_cache=False renders {what} again)" if self._names_cache else ""
+        if not self._names_cache:
+            return Sentence()
+        return Sentence(" (", Hint("use_cache", False), f" renders {what} again)")
 
 
 def _remark_on_samples(
@@ -108,12 +111,15 @@ def _remark_on_samples(
     basis_text = f"basis of {basis.origin.samples_text}"
     requested_spp = scene.spp if spp is None else spp
     if not is_rendered and basis.origin.mean_spp > samples_for(scene, spp):
-        listen.say(
+        remark = Sentence(
             f"{basis_text} kept from an earlier run: more than the {requested_spp} requested, so "
-            "the answer may differ a little from one with exactly these (exact_spp=True)"
+            "the answer may differ a little from one with exactly these (",
+            Hint("exact_spp", True),
+            ")",
         )
+        listen.say(remark)
     elif not is_rendered:
-        listen.say(f"{basis_text} kept from an earlier run{watch.way_to_render('it')}")
+        listen.say(f"{basis_text} kept from an earlier run" + watch.way_to_render("it"))
     elif settings.time_s is None and basis.origin.spp > requested_spp + 1:
         listen.say(
             f"{basis_text}, not {requested_spp}: a block needs a sample in each pixel for each half"

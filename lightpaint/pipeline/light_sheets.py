@@ -20,6 +20,7 @@ from lightpaint.scene.properties.site import EmitterPlace
 from lightpaint.scene.quality_presets import Preset
 from lightpaint.scene.runtime.variant import use_variant
 from lightpaint.scene.scene import Scene
+from lightpaint.sentences import Hint
 
 #: Rendering of a light sheet, and its own seed: answers that continue a cached basis must not
 #: depend on an earlier sheet.
@@ -42,8 +43,10 @@ def check_sheet(scene: Scene, path: Path, *, force: bool = False) -> None:
     check_writable(path.parent)
     if path.exists() and not force and not (path.is_file() and png_has_text(path, SHEET_KEY)):
         raise OutputError(
-            f"{path} exists and is not a light sheet: choose another name with folder=..., or "
-            "pass force=True"
+            f"{path} exists and is not a light sheet: choose another name with ",
+            Hint("folder"),
+            ", or pass ",
+            Hint("force", True),
         )
 
 

@@ -19,6 +19,7 @@ from lightpaint.pipeline.results.results import Look
 from lightpaint.placement.rigging import Rigging
 from lightpaint.progress import Progress, silent
 from lightpaint.scene.scene import Scene
+from lightpaint.sentences import Hint, Sentence
 from lightpaint.target.target import Target
 
 AnyScene = str | Path | Scene
@@ -148,11 +149,11 @@ def _job(
     if scene_options and not scenes:
         check_needed(scene_options, basis)
     if scene_options and not any(isinstance(x, SceneFile) for x in scenes):
-        names = ", ".join(f"{name}=..." for name in scene_options)
-        raise SceneError(f"{names} cannot change a scene that is already loaded: give its path")
+        names = Sentence.joined(map(Hint, scene_options))
+        raise SceneError(names, " cannot change a scene that is already loaded: give its path")
     if unused_options and not any(isinstance(x, Painting) for x in targets):
-        names = ", ".join(f"{name}=..." for name in unused_options)
-        raise TargetError(f"{names} cannot change a target that is already read: give its path")
+        names = Sentence.joined(map(Hint, unused_options))
+        raise TargetError(names, " cannot change a target that is already read: give its path")
     basis = BasisFile(str(basis)) if _is_path(basis) else basis
     options: dict[str, Any] = {"by_sensor": by_sensor, "rigging": rigging}
     return Job(tuple(scenes), tuple(targets), folder, basis, constraints, settings, **options)

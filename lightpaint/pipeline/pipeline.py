@@ -46,6 +46,7 @@ from lightpaint.relit.verification_render import (
 from lightpaint.report.basis_memo import make_ahead
 from lightpaint.report.page.page import prepare_page
 from lightpaint.scene.scene import Scene
+from lightpaint.sentences import Hint, Sentence
 
 
 @keywords()
@@ -228,7 +229,7 @@ def _finish_view(
     write_report(folder, look, command=settings.command, relit=relit, is_shown=settings.report)
     listen.note("report written")
     for remark in look.remarks:
-        listen.say(remark if len(job.views) == 1 else f"{view.folder.name}: {remark}")
+        listen.say(remark if len(job.views) == 1 else Sentence(f"{view.folder.name}: ", remark))
     return look
 
 
@@ -307,16 +308,16 @@ def _budget(settings: Settings, basis: Basis, relit: Scene) -> VerificationBudge
     )
 
 
-def _verification_text(budget: VerificationBudget, basis: Basis, *, is_fixed: bool) -> str:
+def _verification_text(budget: VerificationBudget, basis: Basis, *, is_fixed: bool) -> Sentence:
     """Return the remark on how long a verification takes, shown before it starts."""
     height, width = budget.scene.size
     limit = "" if is_fixed else "at most "
     subject = f"verification of {limit}{budget.spp} samples per pixel on {width}x{height}"
-    hint = "(verify=False skips it)"
+    hint = Sentence(" (", Hint("verify", False), " skips it)")
     if basis.render_s is not None:
         seconds = math.ceil(budget.share * basis.render_s)
         duration = f"{seconds} s" if seconds < 120 else f"{math.ceil(seconds / 60)} min"
-        return f"{subject}: at most {duration} {hint}"
+        return f"{subject}: at most {duration}" + hint
     if budget.share <= 1:
-        return f"{subject}: no longer than that many samples of the basis took {hint}"
-    return f"{subject}: at most {budget.share:.2g} times as long as the basis took {hint}"
+        return f"{subject}: no longer than that many samples of the basis took" + hint
+    return f"{subject}: at most {budget.share:.2g} times as long as the basis took" + hint

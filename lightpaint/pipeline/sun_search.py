@@ -24,6 +24,7 @@ from lightpaint.progress import Listener
 from lightpaint.scene.lights.texels.texel_layout import CHILDREN, MAX_LEVEL, RATIO, Node
 from lightpaint.scene.scene import Scene
 from lightpaint.scene.scene_reader import with_layout
+from lightpaint.sentences import Hint, Sentence
 
 #: Share of the error that splitting a texel must remove, and how much more for each unknown that it
 #: adds, relative to the number of pixels.
@@ -143,16 +144,19 @@ def _excess(image: LightImage, weights: Doubles) -> Doubles:
     return excess
 
 
-def _text(best: _Candidate, started: _Candidate, image: str) -> str:
+def _text(best: _Candidate, started: _Candidate, image: str) -> Sentence:
     """Return what was found, for the user."""
     nodes: Sequence[Node] = best.image(image).layout.nodes
     finer = [node for node in nodes if node[0]]
     if not finer:
-        return f"no sun: finer texels of {image} remove less than a twentieth of the error"
+        return Sentence(
+            f"no sun: finer texels of {image} remove less than a twentieth of the error"
+        )
     part = ("third", "ninth", "27th")[max(x[0] for x in finer) - 1]
     layout = best.image(image).layout
-    return (
+    return Sentence(
         f"{len(finer)} finer texels of {image}, down to a {part} of the width, leave "
         f"{100 * best.missed / started.missed:.0f} % of the error; to paint with them or solve "
-        f"again: split={{{image!r}: {layout.text!r}}}"
+        "again: ",
+        Hint("split", {image: layout.text}),
     )

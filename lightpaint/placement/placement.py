@@ -21,6 +21,7 @@ from lightpaint.placement.free_space import as_position
 from lightpaint.scene.lights.new_emitter import NewEmitter
 from lightpaint.scene.properties.pose import Pose, Site
 from lightpaint.scene.scene import Scene
+from lightpaint.sentences import Hint
 from lightpaint.storage.json_records import read_record, strict_json
 
 #: Advice on a place that the picture hardly determines.
@@ -330,5 +331,7 @@ def read_placement(path: Path) -> PlacementRecord:
         reason = " ".join(str(error).split())
         raise SceneError(
             f"{path} has no places of lights: {reason}; export it again from the painter, or "
-            "leave placement=... out"
+            "leave ",
+            Hint("placement"),
+            " out",
         ) from None

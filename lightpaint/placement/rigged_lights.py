@@ -18,6 +18,7 @@ from lightpaint.placement.new_lights import MirroredPair, NewLights
 from lightpaint.placement.rigging import Rigging, constraint_of, names_of
 from lightpaint.scene.lights.light import Light
 from lightpaint.scene.scene import Scene
+from lightpaint.sentences import Lead, SourceKey
 
 
 @dataclass(frozen=True)
@@ -56,14 +57,14 @@ def check_names(rigging: Rigging, scene: Scene) -> None:
     Those of pairs and surfaces count, too, whether or not a search would use them.
     """
     for name, table, where in rigging.lights:
-        _matches(name, scene, f"{where}.{next(iter(table))}" if table else where)
+        _matches(name, scene, where / next(iter(table)) if table else where)
     lights = [light.name for light in scene.lights]
     for table, where in rigging.pairs:
         for name in table["lights"]:
             if name not in lights:
-                raise _unknown("light", name, lights, f"{where}.lights")
+                raise _unknown("light", name, lights, where / "lights")
     for _, table, where in rigging.on:
-        where_shapes = f"{where}.shapes"
+        where_shapes = where / "shapes"
         for pattern in names_of(table["shapes"], where_shapes) if "shapes" in table else ():
             if not _shapes(pattern, scene):
                 shapes = [*dict.fromkeys(scene.shape_names)]
@@ -77,29 +78,29 @@ def freedoms_of(rigging: Rigging, scene: Scene) -> dict[str, Freedom]:
     unknown names, and for lights that cannot move.
     """
     tables: dict[str, dict[str, Any]] = {}
-    places: dict[str, str] = {}
+    places: dict[str, SourceKey] = {}
     for name, table, where in rigging.lights:
-        matches = _matches(name, scene, f"{where}.{next(iter(table))}" if table else where)
+        matches = _matches(name, scene, where / next(iter(table)) if table else where)
         for key, value in table.items():
-            refused = []
+            refused: list[SceneError] = []
             for light in matches:
                 try:
                     freedom = _freedom({key: value}, light, scene, rigging, where)
                     free_light(scene, light.name, freedom)
                 except SceneError as error:
-                    refused.append(str(error))
+                    refused.append(error)
                     continue
                 tables.setdefault(light.name, {})[key] = value
                 places[light.name] = where
             if len(refused) == len(matches):
-                raise ConstraintError(f"{where}.{key}: {refused[0]}")
+                raise ConstraintError(where / key, ": ", refused[0])
     return {
         name: _freedom(table, scene.light(name), scene, rigging, places[name])
         for name, table in tables.items()
     }
 
 
-def _matches(name: str, scene: Scene, where: str) -> list[Light]:
+def _matches(name: str, scene: Scene, where: SourceKey) -> list[Light]:
     """Return the light of that name, else all that match it as a pattern."""
     lights = [light for light in scene.lights if not light.is_fixed]
     if exact := [light for light in scene.lights if light.name == name]:
@@ -111,7 +112,7 @@ def _matches(name: str, scene: Scene, where: str) -> list[Light]:
 
 
 def _freedom(
-    table: Mapping[str, Any], light: Light, scene: Scene, rigging: Rigging, where: str
+    table: Mapping[str, Any], light: Light, scene: Scene, rigging: Rigging, where: SourceKey
 ) -> Freedom:
     """Return the freedom that the keys `move`, `aim`, `cone` and `beam` give a light."""
     move = table.get("move", {})
@@ -126,7 +127,7 @@ def _freedom(
     if "box" in move:
         places["box"] = _segment(move["box"])
     if "on" in move:
-        places |= _places_on(move["on"], scene, rigging, f"{where}.move.on")
+        places |= _places_on(move["on"], scene, rigging, where / "move" / "on")
     return Freedom(**places, **_turns(table))
 
 
@@ -139,11 +140,13 @@ def _turns(table: Mapping[str, Any]) -> dict[str, Any]:
     }
 
 
-def _new_lights(table: Mapping[str, Any], where: str, scene: Scene, rigging: Rigging) -> NewLights:
+def _new_lights(
+    table: Mapping[str, Any], where: SourceKey, scene: Scene, rigging: Rigging
+) -> NewLights:
     """Return the lights that a table of `new` may add."""
     places: dict[str, Any] = {}
     if "on" in table:
-        places = _places_on(table["on"], scene, rigging, f"{where}.on")
+        places = _places_on(table["on"], scene, rigging, where / "on")
     if "box" in table:
         places["box"] = _segment(table["box"])
     size = table.get("size")
@@ -161,12 +164,12 @@ def _new_lights(table: Mapping[str, Any], where: str, scene: Scene, rigging: Rig
         )
         new_lights_of(scene, [new])
     except SceneError as error:
-        raise ConstraintError(f"{where}: {error}") from None
+        raise ConstraintError(Lead(where), error) from None
     return new
 
 
 def _pair(
-    table: Mapping[str, Any], where: str, scene: Scene, freedoms: dict[str, Freedom]
+    table: Mapping[str, Any], where: SourceKey, scene: Scene, freedoms: dict[str, Freedom]
 ) -> MirroredPair:
     """Return a mirrored pair; its first light has the freedom."""
     first, second = table["lights"]
@@ -176,7 +179,7 @@ def _pair(
         pair = MirroredPair((first, second), table["mirror"])
         followers_of(scene, freedoms, [pair])
     except SceneError as error:
-        raise ConstraintError(f"{where}: {error}") from None
+        raise ConstraintError(Lead(where), error) from None
     return pair
 
 
@@ -191,10 +194,10 @@ def freedom_on(names: Sequence[str], scene: Scene, rigging: Rigging) -> Freedom:
 
     Raises ConstraintError for unknown names.
     """
-    return Freedom(**_places_on(list(names), scene, rigging, "on"))
+    return Freedom(**_places_on(list(names), scene, rigging, SourceKey("", "on")))
 
 
-def _places_on(names: Any, scene: Scene, rigging: Rigging, where: str) -> dict[str, Any]:
+def _places_on(names: Any, scene: Scene, rigging: Rigging, where: SourceKey) -> dict[str, Any]:
     """Return rails and surfaces of these names as fields of a freedom.
 
     A name is that of a table `[on.NAME]`, or else of shapes of the scene.
@@ -224,10 +227,10 @@ def _shapes(pattern: str, scene: Scene) -> list[str]:
     return [x for x in dict.fromkeys(scene.shape_names) if fnmatchcase(x, pattern)]
 
 
-def _unknown(kind: str, name: str, known_names: Sequence[str], where: str) -> ConstraintError:
+def _unknown(kind: str, name: str, known_names: Sequence[str], where: SourceKey) -> ConstraintError:
     """Return the error for a name that nothing of a kind has."""
     hint = with_similar_name(f"there are {some_names(known_names)}", name, known_names)
-    return ConstraintError(f"{where}: no {kind} {name!r}; {hint}")
+    return ConstraintError(Lead(where), f"no {kind} {name!r}; {hint}")
 
 
 def _segment(ends: Sequence[Sequence[float]]) -> tuple[Position, Position]:

@@ -19,11 +19,12 @@ from lightpaint.lighting.constraints.values import check_keys
 from lightpaint.placement.freedom import EDGE
 from lightpaint.scene.lights.lights_file import MOVES, SceneRequests
 from lightpaint.scene.properties.pose import FARTHEST
+from lightpaint.sentences import SourceKey
 from lightpaint.validation import MAX_LISTED, MAX_NAME, is_number, parse_number
 
 #: A table of keys and values, and the name of its source in errors; the same with a name before it.
-Table = tuple[Mapping[str, Any], str]
-NamedTable = tuple[str, Mapping[str, Any], str]
+Table = tuple[Mapping[str, Any], SourceKey]
+NamedTable = tuple[str, Mapping[str, Any], SourceKey]
 
 #: Maximum length of an error, which may quote a long value.
 MAX_MESSAGE_LENGTH = 1000
@@ -99,20 +100,22 @@ class Rigging:
 
         Raises ConstraintError, naming the light, the key and what is expected.
         """
-        lead = f"{where}: " if where else ""
+        source = SourceKey(where)
         lights = []
-        for name, table in _table(light, f"{lead}light").items():
-            _check_move(table, f"{lead}light.{name}")
-            lights.append((name, dict(table), f"{lead}light.{name}"))
+        for name, table in _table(light, source / "light").items():
+            key = source / "light" / name
+            _check_move(table, key)
+            lights.append((name, dict(table), key))
         lights.sort(key=lambda entry: not is_pattern(entry[0]))
         named = []
-        for name, table in _table(on, f"{lead}on").items():
-            _check_on(table, f"{lead}on.{name}")
-            named.append((name, dict(table), f"{lead}on.{name}"))
-        added = _tables(new, f"{lead}new")
+        for name, table in _table(on, source / "on").items():
+            key = source / "on" / name
+            _check_on(table, key)
+            named.append((name, dict(table), key))
+        added = _tables(new, source / "new")
         for table, place in added:
             _check_new(table, place)
-        pairs = _tables(pair, f"{lead}pair")
+        pairs = _tables(pair, source / "pair")
         for table, place in pairs:
             _check_pair(table, place)
         return cls(lights=tuple(lights), on=tuple(named), new=added, pairs=pairs)
@@ -148,31 +151,27 @@ def rigging_of(requests: SceneRequests) -> Rigging:
             where=requests.source,
         )
     except ConstraintError as error:
-        raise ConstraintError(one_line(str(error), limit=MAX_MESSAGE_LENGTH)) from None
+        raise ConstraintError(one_line(error.sentence, limit=MAX_MESSAGE_LENGTH)) from None
 
 
-def _table(value: Any, where: str) -> Mapping[str, Any]:
+def _table(value: Any, where: SourceKey) -> Mapping[str, Any]:
     if value is None:
         return {}
     if not isinstance(value, Mapping) or not all(isinstance(x, Mapping) for x in value.values()):
-        key = where.rpartition(": ")[2]
-        raise ConstraintError(f"{where} is {value!r}: expected tables [{key}.NAME]")
+        raise ConstraintError(where, f" is {value!r}: expected tables [{where.path}.NAME]")
     if len(value) > MAX_LISTED:
-        raise ConstraintError(f"{where} has {len(value)} names: at most {MAX_LISTED} are read")
+        raise ConstraintError(where, f" has {len(value)} names: at most {MAX_LISTED} are read")
     return value
 
 
-def _tables(value: Any, where: str) -> tuple[Table, ...]:
+def _tables(value: Any, where: SourceKey) -> tuple[Table, ...]:
     is_list = isinstance(value, Sequence) and not isinstance(value, str)
     if not is_list or not all(isinstance(table, Mapping) for table in value):
-        key = where.rpartition(": ")[2]
-        raise ConstraintError(f"{where} is {value!r}: expected tables [[{key}]]")
+        raise ConstraintError(where, f" is {value!r}: expected tables [[{where.path}]]")
     if len(value) > MAX_LISTED:
-        raise ConstraintError(f"{where} lists {len(value)}: at most {MAX_LISTED} are read")
+        raise ConstraintError(where, f" lists {len(value)}: at most {MAX_LISTED} are read")
     several = len(value) > 1
-    return tuple(
-        (dict(table), f"{where} {k}" if several else where) for k, table in enumerate(value, 1)
-    )
+    return tuple((dict(table), where / k if several else where) for k, table in enumerate(value, 1))
 
 
 def _spoken(table: Mapping[str, Any]) -> str:
@@ -188,68 +187,70 @@ def _text(value: Any) -> str:
     return f"{value:g}" if is_number else str(value)
 
 
-def _check_move(table: Mapping[str, Any], where: str) -> None:
+def _check_move(table: Mapping[str, Any], where: SourceKey) -> None:
     """Raise ConstraintError unless these are valid values of `move`, `aim`, `cone`, `beam`."""
     check_keys(table, MOVES, where)
     if "move" in table:
-        _check_places(table["move"], f"{where}.move")
+        _check_places(table["move"], where / "move")
     _check_turns(table, where)
 
 
-def _check_on(table: Mapping[str, Any], where: str) -> None:
+def _check_on(table: Mapping[str, Any], where: SourceKey) -> None:
     """Raise ConstraintError unless it is a rail, or a surface of shapes."""
     check_keys(table, ON_KEYS, where)
     if ("line" in table) == ("shapes" in table):
         raise ConstraintError(
-            f"{where} has {'both line and' if 'line' in table else 'neither line nor'} shapes: "
-            "expected line, two points of a rail, or shapes, a list of names"
+            where,
+            f" has {'both line and' if 'line' in table else 'neither line nor'} shapes: "
+            "expected line, two points of a rail, or shapes, a list of names",
         )
     if "line" in table:
         ends = table["line"]
         if not _is_segment(ends) or list(ends[0]) == list(ends[1]):
-            raise _wrong(f"{where}.line", ends, "two different points, [[x, y, z], [x, y, z]]")
+            raise _wrong(where / "line", ends, "two different points, [[x, y, z], [x, y, z]]")
         if "clear" in table:
-            raise ConstraintError(f"{where}.clear is for shapes: a rail hangs where its line is")
+            raise ConstraintError(where / "clear", " is for shapes: a rail hangs where its line is")
         return
-    names_of(table["shapes"], f"{where}.shapes")
+    names_of(table["shapes"], where / "shapes")
     if "clear" in table and not (is_number(table["clear"]) and 0 <= table["clear"] <= FARTHEST):
-        raise _wrong(f"{where}.clear", table["clear"], "the distance from the surface, like 0.1")
+        raise _wrong(where / "clear", table["clear"], "the distance from the surface, like 0.1")
 
 
-def _check_new(table: Mapping[str, Any], where: str) -> None:
+def _check_new(table: Mapping[str, Any], where: SourceKey) -> None:
     """Raise ConstraintError unless it describes lights to add."""
     check_keys(table, (*NEW_KEYS, *NEW_CONSTRAINTS), where)
     if ("kind" in table) == ("like" in table):
         raise ConstraintError(
-            f"{where} has {'both kind and' if 'kind' in table else 'neither kind nor'} like: "
-            f"expected kind, {', '.join(KINDS)}, or like, the name of a light"
+            where,
+            f" has {'both kind and' if 'kind' in table else 'neither kind nor'} like: "
+            f"expected kind, {', '.join(KINDS)}, or like, the name of a light",
         )
     kind = table.get("kind", "")
     if "kind" in table and kind not in KINDS:
-        raise _wrong(f"{where}.kind", kind, f"one of {', '.join(KINDS)}")
+        raise _wrong(where / "kind", kind, f"one of {', '.join(KINDS)}")
     for key in ("like", "name"):
         if key in table and not _is_name(table[key]):
-            raise _wrong(f"{where}.{key}", table[key], "the name of a light")
+            raise _wrong(where / key, table[key], "the name of a light")
     count = table.get("count", 1)
     if not (type(count) is int and 1 <= count <= MAX_COUNT):
-        raise _wrong(f"{where}.count", count, f"a whole number from 1 to {MAX_COUNT}")
+        raise _wrong(where / "count", count, f"a whole number from 1 to {MAX_COUNT}")
     if "on" in table and "box" in table:
-        raise ConstraintError(f"{where} has both on and box: leave one out")
+        raise ConstraintError(where, " has both on and box: leave one out")
     if "on" in table:
-        names_of(table["on"], f"{where}.on")
+        names_of(table["on"], where / "on")
     if "box" in table and not _is_segment(table["box"]):
-        raise _wrong(f"{where}.box", table["box"], "two corners, [[x, y, z], [x, y, z]]")
+        raise _wrong(where / "box", table["box"], "two corners, [[x, y, z], [x, y, z]]")
     if "apart" in table and not (is_number(table["apart"]) and 0 <= table["apart"] <= FARTHEST):
-        raise _wrong(f"{where}.apart", table["apart"], "a distance >= 0, like 0.5")
+        raise _wrong(where / "apart", table["apart"], "a distance >= 0, like 0.5")
     if not isinstance(table.get("in_view", True), bool):
-        raise _wrong(f"{where}.in_view", table["in_view"], "true or false")
+        raise _wrong(where / "in_view", table["in_view"], "true or false")
     if "size" in table:
-        _check_size(table["size"], kind, f"{where}.size")
+        _check_size(table["size"], kind, where / "size")
     for key in ("cone", "beam"):
         if kind in ("point", "panel") and key in table:
-            raise ConstraintError(f"{where} has the key {key!r}: a {kind} has none")
+            raise ConstraintError(where, f" has the key {key!r}: a {kind} has none")
     if kind == "point" and "aim" in table:
-        raise ConstraintError(f"{where} has the key 'aim': a point light points nowhere")
+        raise ConstraintError(where, " has the key 'aim': a point light points nowhere")
     _check_turns(table, where)
     LightConstraint.of(constraint_of(table), where=where)
 
@@ -259,16 +260,16 @@ def constraint_of(table: Mapping[str, Any]) -> dict[str, Any]:
     return {key: value for key, value in table.items() if key in NEW_CONSTRAINTS}
 
 
-def _check_pair(table: Mapping[str, Any], where: str) -> None:
+def _check_pair(table: Mapping[str, Any], where: SourceKey) -> None:
     """Raise ConstraintError unless it names two lights and a plane between them."""
     check_keys(table, ("lights", "mirror"), where)
     lights: Any = table.get("lights")
     if not (_is_list(lights, 2) and all(map(_is_name, lights)) and lights[0] != lights[1]):
-        raise _wrong(f"{where}.lights", lights, 'the names of two lights, ["left", "right"]')
-    mirror_of(table.get("mirror"), f"{where}.mirror")
+        raise _wrong(where / "lights", lights, 'the names of two lights, ["left", "right"]')
+    mirror_of(table.get("mirror"), where / "mirror")
 
 
-def mirror_of(value: Any, where: str) -> tuple[int, float]:
+def mirror_of(value: Any, where: SourceKey) -> tuple[int, float]:
     """Return the axis, 0 to 2, and the coordinate of a plane like `x = 0`."""
     match = _PLANE.fullmatch(value) if isinstance(value, str) and len(value) < MAX_NAME else None
     try:
@@ -280,7 +281,7 @@ def mirror_of(value: Any, where: str) -> tuple[int, float]:
     return "xyz".index(match[1]), at
 
 
-def names_of(value: Any, where: str) -> tuple[str, ...]:
+def names_of(value: Any, where: SourceKey) -> tuple[str, ...]:
     """Return a name, or a list of names."""
     listed = (value,) if isinstance(value, str) else value
     if (
@@ -292,7 +293,7 @@ def names_of(value: Any, where: str) -> tuple[str, ...]:
     return tuple(listed)
 
 
-def _check_places(value: Any, where: str) -> None:
+def _check_places(value: Any, where: SourceKey) -> None:
     """Raise ConstraintError unless it describes permitted places."""
     if is_number(value):
         value = {"within": value}
@@ -302,32 +303,33 @@ def _check_places(value: Any, where: str) -> None:
     given_keys = [key for key in PLACE_KEYS if key in value]
     if given_keys not in (["within"], ["box"], ["on"], ["within", "along"]):
         raise ConstraintError(
-            f"{where} has {' and '.join(given_keys) or 'nothing'}: expected one of within, box, "
-            "on, along and within"
+            where,
+            f" has {' and '.join(given_keys) or 'nothing'}: expected one of within, box, "
+            "on, along and within",
         )
     if "within" in value and not (is_number(value["within"]) and 0 < value["within"] <= FARTHEST):
-        raise _wrong(f"{where}.within", value["within"], "a distance > 0, like 1.0")
+        raise _wrong(where / "within", value["within"], "a distance > 0, like 1.0")
     if "box" in value and not _is_segment(value["box"]):
-        raise _wrong(f"{where}.box", value["box"], "two corners, [[x, y, z], [x, y, z]]")
+        raise _wrong(where / "box", value["box"], "two corners, [[x, y, z], [x, y, z]]")
     if "along" in value and not (_is_point(value["along"]) and any(value["along"])):
-        raise _wrong(f"{where}.along", value["along"], "a direction, like [0, 0, 1]")
+        raise _wrong(where / "along", value["along"], "a direction, like [0, 0, 1]")
     if "on" in value:
-        names_of(value["on"], f"{where}.on")
+        names_of(value["on"], where / "on")
 
 
-def _check_turns(table: Mapping[str, Any], where: str) -> None:
+def _check_turns(table: Mapping[str, Any], where: SourceKey) -> None:
     """Raise ConstraintError for invalid values of `aim`, `cone` and `beam`."""
     aim = table.get("aim", True)
     if not isinstance(aim, bool) and not (is_number(aim) and 0 < aim <= 180):
-        raise _wrong(f"{where}.aim", aim, "degrees from 0 to 180, or true for any direction")
+        raise _wrong(where / "aim", aim, "degrees from 0 to 180, or true for any direction")
     if "cone" in table and not _is_range(table["cone"], 1):
         raise _wrong(
-            f"{where}.cone", table["cone"], "two angles, from 1 to 90 degrees, like [10, 45]"
+            where / "cone", table["cone"], "two angles, from 1 to 90 degrees, like [10, 45]"
         )
     beam = table.get("beam", True)
     if not isinstance(beam, bool) and not _is_range(beam, EDGE):
         raise _wrong(
-            f"{where}.beam",
+            where / "beam",
             beam,
             f"two angles, from {EDGE:g} to 90 degrees, like [5, 20], or true for any in the cone",
         )
@@ -338,9 +340,9 @@ def _is_range(value: Any, least: float) -> bool:
     return _is_list(value, 2) and all(map(is_number, value)) and least < value[0] <= value[1] < 90
 
 
-def _check_size(value: Any, kind: str, where: str) -> None:
+def _check_size(value: Any, kind: str, where: SourceKey) -> None:
     if kind not in ("panel", ""):
-        raise ConstraintError(f"{where} is for panels: a {kind} has no size")
+        raise ConstraintError(where, f" is for panels: a {kind} has no size")
     sides = [value, value] if is_number(value) else value
     if not (
         _is_list(sides, 2) and all(map(is_number, sides)) and 0 < sides[0] <= sides[1] <= FARTHEST
@@ -348,8 +350,8 @@ def _check_size(value: Any, kind: str, where: str) -> None:
         raise _wrong(where, value, "the smallest and the largest side, like [0.3, 0.6]")
 
 
-def _wrong(where: str, value: Any, expected: str) -> ConstraintError:
-    return ConstraintError(f"{where} is {one_line(repr(value))}: expected {expected}")
+def _wrong(where: SourceKey, value: Any, expected: str) -> ConstraintError:
+    return ConstraintError(where, f" is {one_line(repr(value))}: expected {expected}")
 
 
 def _is_segment(value: Any) -> bool:

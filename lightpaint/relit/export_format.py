@@ -12,6 +12,7 @@ from lightpaint.progress import Listener
 from lightpaint.relit.export.program_axes import SkyMap
 from lightpaint.relit.exported_lights import SlideImage, WallImage
 from lightpaint.scene.scene import Scene
+from lightpaint.sentences import Hint, Sentence
 
 #: The map of an image light.
 AnyMap = SkyMap | WallImage | SlideImage
@@ -88,14 +89,17 @@ class ExportFormat(ABC):
         if source.light_groups is not None:
             if self.file_of_groups is None:
                 raise LightpaintError(
-                    f"{self.name} needs a scene: give it with scene=..., and leave "
-                    "light_groups=... out"
+                    f"{self.name} needs a scene: give it with ",
+                    Hint("scene"),
+                    ", and leave ",
+                    Hint("light_groups"),
+                    " out",
                 )
         elif source.scene is None and self.needs_source:
             raise LightpaintError(self.needed_source)
         return self.file if source.light_groups is None else str(self.file_of_groups)
 
     @property
-    def needed_source(self) -> str:
+    def needed_source(self) -> Sentence:
         """The text of the error for a missing source."""
-        return f"{self.name} needs the scene: give it with scene=..."
+        return Sentence(f"{self.name} needs the scene: give it with ", Hint("scene"))

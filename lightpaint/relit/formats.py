@@ -41,6 +41,7 @@ from lightpaint.relit.exported_lights import (
     wall_images_of,
 )
 from lightpaint.relit.relight import scene_of, scene_patch
+from lightpaint.sentences import Hint, Sentence
 
 #: Width of a 95 % interval, relative to the brightest channel, above which a light is hardly known.
 UNBOUNDED = 1.0
@@ -88,7 +89,8 @@ class UsdFormat(ExportFormat):
         if source.light_groups is not None and source.stage is None:
             raise LightpaintError(
                 "usd multiplies the lights that light groups were rendered from: give their "
-                "stage with stage=..."
+                "stage with ",
+                Hint("stage"),
             )
         return name
 
@@ -176,9 +178,12 @@ class NukeFormat(ExportFormat):
     """A script with nodes of lights, or of layers."""
 
     name, file, file_of_groups = "nuke", "lights.nk", "relit.nk"
-    needed_source = (
-        "nuke needs the scene or the light groups of the lighting: give scene=... for the lights, "
-        "or light_groups=... for multipliers of their layers"
+    needed_source = Sentence(
+        "nuke needs the scene or the light groups of the lighting: give ",
+        Hint("scene"),
+        " for the lights, or ",
+        Hint("light_groups"),
+        " for multipliers of their layers",
     )
 
     def of_scene(self, export: ExportContext) -> Writer:
@@ -275,7 +280,7 @@ def names_of_forms(forms: Iterable[str], source: Source) -> dict[str, str]:
             raise LightpaintError(f"there is no form {form!r}: known are {', '.join(FORMS)}")
         names[form] = FORMS[form].name_for(source)
     if source.stage is not None and UsdFormat.name not in names:
-        raise LightpaintError("stage=... belongs to the form usd: leave it out, or add that")
+        raise LightpaintError(Hint("stage"), " belongs to the form usd: leave it out, or add that")
     return names
 
 
@@ -351,7 +356,8 @@ def _check_groups(export: ExportContext) -> None:
     if lighting.animation and groups.sequence is None:
         raise LightpaintError(
             f"the lights change over a shot, and {groups.path} is one of its frames: give all, "
-            "like light_groups='shot.####.exr'"
+            "like ",
+            Hint("light_groups", "shot.####.exr"),
         )
 
 

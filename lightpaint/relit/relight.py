@@ -81,7 +81,7 @@ def relight(scene: Scene, lighting: Lighting, path: str | Path) -> Scene:
         if not np.array_equal(
             np.asarray(new_emission, np.float32), np.asarray(emissions[emitter.name], np.float32)
         ):
-            raise SceneError(f"{path} did not take the emission of light {emitter.name!r}")
+            raise SceneError(path, f" did not take the emission of light {emitter.name!r}")
     return relit
 
 
@@ -150,17 +150,20 @@ def scene_of(scene: Scene, lighting: Lighting) -> Scene:
     scene_names = {emitter.name for emitter in scene.emitters}
     if emitter_names != scene_names:
         raise LightingError(
-            f"the lighting does not fit {scene.path}: it lacks "
+            "the lighting does not fit ",
+            scene.path,
+            ": it lacks "
             f"{some_names(sorted(scene_names - emitter_names)) or 'no light'} and names "
             f"{some_names(sorted(emitter_names - scene_names)) or 'none'} that the scene does not "
-            "have"
+            "have",
         )
     regrouped_scene = scene.with_lights(lighting.members, lighting.fixed)
     for setting in lighting.lights:
         if (unit := regrouped_scene.light(setting.name).unit) != setting.unit:
             raise LightingError(
-                f"the lighting has light {setting.name!r} in {setting.unit}, but in {scene.path} "
-                f"as it is now it would be {unit}: solve again"
+                f"the lighting has light {setting.name!r} in {setting.unit}, but in ",
+                scene.path,
+                f" as it is now it would be {unit}: solve again",
             )
     return regrouped_scene
 

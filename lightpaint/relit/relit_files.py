@@ -181,9 +181,10 @@ def _edit_integrators(scene: Scene, edits: dict[Path, _Edits]) -> None:
 
 def _included_twice(file: Path, first: Emitter, second: Emitter) -> SceneError:
     return SceneError(
-        f"{file} is included more than once, and its light would have to be both "
+        file,
+        " is included more than once, and its light would have to be both "
         f"{first.name!r} and {second.name!r} with different emissions: "
-        "include two copies of it, or tie the two into a group"
+        "include two copies of it, or tie the two into a group",
     )
 
 
@@ -217,8 +218,9 @@ def _place_of_include(file: Path, root: Path) -> Path:
         return file.resolve().relative_to(root.resolve().parent)
     except ValueError:
         raise SceneError(
-            f"{file} has to be edited, but it lies outside the folder of {root}, where an edited "
-            "copy would not be found: move it below that folder"
+            file,
+            f" has to be edited, but it lies outside the folder of {root}, where an edited "
+            "copy would not be found: move it below that folder",
         ) from None
 
 

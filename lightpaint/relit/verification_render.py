@@ -87,8 +87,9 @@ def verify(
     check_samples(seed=seed, spp=spp)
     if whole_factor(relit.size, predicted.size) is None:
         raise SizeError(
-            f"the prediction is {predicted.size[1]}x{predicted.size[0]} but {relit.path} renders "
-            f"{relit.size[1]}x{relit.size[0]}: they belong to different scenes or sensors"
+            f"the prediction is {predicted.size[1]}x{predicted.size[0]} but ",
+            relit.path,
+            f" renders {relit.size[1]}x{relit.size[0]}: they belong to different scenes or sensors",
         )
     verified = render(
         relit,

@@ -57,7 +57,7 @@ class XmlFile:
         try:
             raw = path.read_bytes()
         except OSError as error:
-            raise SceneError(f"cannot read {path}: {error.strerror or error}") from None
+            raise SceneError("cannot read ", path, f": {error.strerror or error}") from None
         self._encoding = encoding_of(raw)
         try:
             # Like Mitsuba, treat any other bytes as UTF-8, unchanged.
@@ -66,7 +66,7 @@ class XmlFile:
             )
             self.root, self._elements = _parse(self.text)
         except ValueError as error:
-            raise SceneError(f"cannot edit {path}: {error}") from None
+            raise SceneError("cannot edit ", path, f": {error}") from None
         self._path = path
         first_break = re.search(rb"\r?\n", self.text)
         self._newline = first_break[0].decode() if first_break else "\n"
@@ -78,7 +78,7 @@ class XmlFile:
             return self._elements[offset]
         except KeyError:
             raise SceneError(
-                f"cannot find the element at byte {offset} of {self._path}: has it changed?"
+                f"cannot find the element at byte {offset} of ", self._path, ": has it changed?"
             ) from None
 
     def place_of(self, element: Element) -> str:

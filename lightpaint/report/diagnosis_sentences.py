@@ -31,12 +31,13 @@ from lightpaint.report.phrases import (
     spoken_percents,
     spoken_place,
 )
+from lightpaint.sentences import Hint, Sentence, Word
 
 #: The sentence for an answer without error.
 NO_ERROR = "The lights can make what is painted."
 
-#: The argument that lets lights have any colour, as Python has it.
-ANY_COLOR = 'colors="free"'
+#: The argument that lets lights have any colour, for `bound_sentences`.
+ANY_COLOR = Hint("colors", Word("free"))
 
 #: Share of the error, or of a light, that is too small to mention.
 MIN_SHARE = 0.05
@@ -58,7 +59,7 @@ RELEASE_CLAUSES = {
 
 #: The same for all lights together.
 JOINT_RELEASE_CLAUSES = {
-    "colors": "Lights keep their colours; {any_color}",
+    "colors": "Lights keep their colours; ",
     "sparse": "The number of lights is limited; allowing more",
     "prefer_current": "Lights are pulled towards their current setting; leaving them free",
     "near": "Lights stay near the lighting that you started from; leaving them free",
@@ -122,7 +123,7 @@ def hold_clause(appearance: Appearance | None) -> str:
 
 
 def bound_sentences(
-    diagnosis: Diagnosis, appearance: Appearance | None = None, *, any_color: str = ANY_COLOR
+    diagnosis: Diagnosis, appearance: Appearance | None = None, *, any_color: str | Hint = ANY_COLOR
 ) -> list[str]:
     """Return at most two sentences on limits of the lights, the most important first, and one on
     lights that are down for unpainted parts alone.
@@ -174,7 +175,7 @@ def spoken_about(appearance: Appearance) -> str:
 
 
 def spoken_cause(
-    reason: Reason, *, weaker: str = "a hold of", any_color: str = ANY_COLOR, about: str = ""
+    reason: Reason, *, weaker: str = "a hold of", any_color: str | Hint = ANY_COLOR, about: str = ""
 ) -> str:
     """Name a cause that limits the answer, and the gain of releasing it; "" for views.
 
@@ -190,8 +191,8 @@ def spoken_cause(
         lights = spoken_lights(reason.names, start=True) + (" is" if is_one else " are")
         return f"{lights} {RELEASE_CLAUSES[reason.kind][not is_one]} {gain_text}."
     if reason.kind in JOINT_RELEASE_CLAUSES:
-        clause = JOINT_RELEASE_CLAUSES[reason.kind].format(any_color=any_color)
-        return f"{clause} {gain_text}."
+        argument = any_color if reason.kind == "colors" else ""
+        return Sentence(JOINT_RELEASE_CLAUSES[reason.kind], argument, f" {gain_text}.")
     if reason.kind == "views":
         return ""
     if (loosening := reason.loosening) is None:

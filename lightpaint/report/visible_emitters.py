@@ -14,10 +14,14 @@ from lightpaint.images.estimate import Estimate
 from lightpaint.lighting.loss.painting import ignored_paint
 from lightpaint.lighting.solution import Solution
 from lightpaint.scene.lights.texels.texel import image_of
+from lightpaint.sentences import Hint, Sentence, Word
 from lightpaint.target.target import Target
 
 #: Ratio to the painted brightness from which an emitter that does not count is worth a warning.
 MIN_RATIO = 4.0
+
+#: The argument that makes emitters in view count.
+COUNT_EMITTERS = Hint("emitters", Word("count"))
 
 #: Share of the painted energy from which emitters that count dominate the answer.
 DOMINANT_SHARE = 0.5
@@ -30,8 +34,11 @@ def emitter_remarks(target: Target, solution: Solution, predicted: Estimate) -> 
     ignored = ignored_paint(target, sees_emitter, solution.problem.fit.emitters)
     if ignored.any():
         return [
-            f"{_share(ignored, painted)}, and count nothing; "
-            'emitters="count" holds the emitters themselves to how bright they were painted',
+            Sentence(
+                f"{_share(ignored, painted)}, and count nothing; ",
+                COUNT_EMITTERS,
+                " holds the emitters themselves to how bright they were painted",
+            ),
             *_known_by_sight_alone(solution, ignored),
             *_too_bright(target, solution, predicted, ignored),
         ]
@@ -51,8 +58,12 @@ def emitter_remarks(target: Target, solution: Solution, predicted: Estimate) -> 
     ).tolist()
     if (part := emitter_energy / (total_energy or 1)) >= DOMINANT_SHARE:
         return [
-            f"{_share(counted, painted)}, which make up {100 * part:.0f} % of the painted energy "
-            'and rule the fit: emitters="skip" leaves them out'
+            Sentence(
+                f"{_share(counted, painted)}, which make up {100 * part:.0f} % of the painted "
+                "energy and rule the fit: ",
+                Hint("emitters", Word("skip")),
+                " leaves them out",
+            )
         ]
     return []
 
@@ -79,9 +90,12 @@ def _known_by_sight_alone(solution: Solution, ignored: Bools) -> list[str]:
         return []
     pronoun, clause = ("it", "it is") if len(names) == 1 else ("them", "they are")
     return [
-        f"WARNING: too few samples show the light of {some_of(joined_texels(names), room=300)} on "
-        f'surfaces, but the camera sees {pronoun}: emitters="count" solves {pronoun} by how bright '
-        f"{clause} painted"
+        Sentence(
+            f"WARNING: too few samples show the light of {some_of(joined_texels(names), room=300)} "
+            f"on surfaces, but the camera sees {pronoun}: ",
+            COUNT_EMITTERS,
+            f" solves {pronoun} by how bright {clause} painted",
+        )
     ]
 
 
@@ -117,8 +131,11 @@ def _too_bright(
     if not texts:
         return []
     return [
-        f"WARNING: brighter than painted where they are seen: {some_of(texts, room=300)}; "
-        'emitters="count" holds them to the painting'
+        Sentence(
+            f"WARNING: brighter than painted where they are seen: {some_of(texts, room=300)}; ",
+            COUNT_EMITTERS,
+            " holds them to the painting",
+        )
     ]
 
 

@@ -12,6 +12,7 @@ from types import NoneType, UnionType
 from typing import Any, Literal, TypeVar, Union, get_args, get_origin, get_type_hints
 
 from lightpaint.display_text import some_names
+from lightpaint.sentences import SourceKey
 
 #: Maximum length of a string in characters, and maximum number of values in a list or an object.
 MAX_CHARACTERS, MAX_VALUES = 2**14, 2**17
@@ -151,6 +152,8 @@ def _read(kind: Any, value: Any, is_exact: bool) -> Any:
         return value
     if kind is str and type(value) is str and len(value) <= MAX_CHARACTERS:
         return value
+    if kind is SourceKey and type(value) is str and len(value) <= MAX_CHARACTERS:
+        return SourceKey.of(value)
     if outer is Literal and type(value) is str and value in inner:
         return value
     if outer in UNIONS:
@@ -194,5 +197,11 @@ def _expected(kind: Any) -> str:
     if outer in (tuple, Sequence):
         number = "" if outer is Sequence or inner[-1] is ... else f"{len(inner)} of: "
         return f"a list ({number}{_expected(inner[0])})"
-    words = {str: "a text", bool: "true or false", float: "a number", int: "a whole number >= 0"}
+    words = {
+        str: "a text",
+        SourceKey: "a text",
+        bool: "true or false",
+        float: "a number",
+        int: "a whole number >= 0",
+    }
     return words.get(kind, "an object")

@@ -16,11 +16,13 @@ import time
 from collections.abc import Iterable, Iterator
 from contextlib import contextmanager, suppress
 from dataclasses import asdict, dataclass
+from functools import partial
 from pathlib import Path
 
 from lightpaint.errors import LightpaintError, OutputError
 from lightpaint.file_reading import MAX_TEXT, read_text
 from lightpaint.files import flush, write_text
+from lightpaint.sentences import Datum
 from lightpaint.signals import interruptible_between_pieces
 from lightpaint.storage.json_records import read_record, strict_json
 
@@ -76,7 +78,7 @@ def staged(folder: Path, gone: Iterable[Path] = ()) -> Iterator[Path]:
     try:
         stage, lock = _make_hidden_folder(folder)
     except OSError as error:
-        raise OutputError(f"cannot write into {folder}: {error.strerror or error}") from error
+        raise OutputError("cannot write into ", folder, f": {error.strerror or error}") from error
     try:
         yield stage
         _flush(stage)
@@ -86,10 +88,18 @@ def staged(folder: Path, gone: Iterable[Path] = ()) -> Iterator[Path]:
         with interruptible_between_pieces():
             _discard(stage, missing_parents)
         if isinstance(error, LightpaintError):
-            raise type(error)(str(error).replace(str(stage), str(folder))) from error
+            raise type(error)(error.sentence.spelled(partial(_renamed, stage, folder))) from error
         raise
     finally:
         os.close(lock)
+
+
+def _renamed(stage: Path, folder: Path, datum: Datum) -> str | None:
+    """Return the place in `folder` of a file in the hidden folder; None for other data."""
+    if not isinstance(datum, Path) or not datum.is_relative_to(stage):
+        return None
+    name = datum.relative_to(stage)
+    return os.path.join(folder, name) if name.parts else str(folder)
 
 
 def finish(folder: Path) -> None:
@@ -168,7 +178,7 @@ def _publish(stage: Path, folder: Path, gone: set[str]) -> None:
         _write_journal(stage, _Journal(tuple(sorted(new)), tuple(sorted(gone - new))))
         _finish_stage(stage, real, is_mine=True)
     except OSError as error:
-        raise OutputError(f"cannot write into {folder}: {error.strerror or error}") from error
+        raise OutputError("cannot write into ", folder, f": {error.strerror or error}") from error
 
 
 def _finish_stage(stage: Path, real: Path, *, is_mine: bool = False) -> None:

@@ -9,6 +9,7 @@ from collections.abc import Iterator
 import numpy as np
 
 from lightpaint.arrays import Doubles, Floats
+from lightpaint.sentences import Hint, Sentence
 
 #: Maximum error of a smooth function of the template's colours, relative to the painting's
 #: contrast. Measured: views and profiles leave at most 0.04, paintings at least 0.2.
@@ -24,9 +25,13 @@ def explain_mismatch(picture: Floats, template: Floats) -> str:
     picture, template: (h, w, 3), display values of painting and template.
     """
     if _is_function(picture, template):
-        return (
+        return Sentence(
             "a single change of colours explains all of it: unless you graded it, it was saved "
-            "through another view or profile (transform=..., mask=...)"
+            "through another view or profile (",
+            Hint("transform"),
+            ", ",
+            Hint("mask"),
+            ")",
         )
     for turn, turned_template in _turned(template):
         if _is_function(picture, turned_template):

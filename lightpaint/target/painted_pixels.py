@@ -21,6 +21,7 @@ from lightpaint.errors import SizeError
 from lightpaint.images.estimate import box_mean
 from lightpaint.images.formats.library_output import without_pillow_warnings
 from lightpaint.images.picture import Picture
+from lightpaint.sentences import Hint
 from lightpaint.target.template import Template
 
 #: Difference in display values from which paint counts fully.
@@ -50,7 +51,8 @@ def painted_where(path: Path, picture: Picture, template: Template) -> npt.NDArr
         raise SizeError(
             f"the painting is {picture.size[1]}x{picture.size[0]} but its template is "
             f"{template.size[1]}x{template.size[0]}: export it at that size, or mark what "
-            "was painted by alpha or mask=..."
+            "was painted by alpha or ",
+            Hint("mask"),
         )
     difference, tolerance = _difference(path, picture, template)
     # The slope is smooth at both ends, so that no pixel is decided by a hair's breadth.

@@ -59,4 +59,4 @@ def painted_of(attributes: Mapping[str, str], path: Path) -> Painted | None:
     try:
         return read_record(Painted, strict_json(attributes[KEY]))
     except ValueError as error:
-        raise TargetError(f"{path}: its attribute {KEY} is damaged: {error}") from None
+        raise TargetError(path, f": its attribute {KEY} is damaged: {error}") from None

@@ -14,6 +14,7 @@ from lightpaint.display_text import Shown
 from lightpaint.errors import SizeError, TargetError
 from lightpaint.images.pixel_blocks import whole_factor
 from lightpaint.keywords import keywords
+from lightpaint.sentences import Hint, Remedy
 from lightpaint.target.target_pixels import TargetPixels
 from lightpaint.target.wish import Wish
 
@@ -37,6 +38,10 @@ def titled(name: str) -> str:
     name.
     """
     return "the target" if name == DEFAULT_NAME else f"target {name}"
+
+
+#: Advice about a painting of another size.
+PASS_RESIZE = Remedy("pass ", Hint("resize", True))
 
 
 @keywords()
@@ -277,13 +282,16 @@ class Target(Shown):
         if self.size != size and not resize:
             raise SizeError(
                 f"{titled(self.name)} is {self.size[1]}x{self.size[0]} but the basis is "
-                f"{size[1]}x{size[0]}: export it at that size, or pass resize=True"
+                f"{size[1]}x{size[0]}: export it at that size, or ",
+                PASS_RESIZE,
             )
         (height, width), (mine_h, mine_w) = size, self.size
         if abs(width * mine_h / (height * mine_w) - 1) > 0.02:
             raise SizeError(
                 f"{titled(self.name)} is {mine_w}x{mine_h}, but the basis is {width}x{height}, "
-                "of another aspect ratio: crop it to that ratio, since resize=True does not stretch"
+                "of another aspect ratio: crop it to that ratio, since ",
+                Hint("resize", True),
+                " does not stretch",
             )
         return self.resized(size)
 

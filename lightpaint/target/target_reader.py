@@ -14,6 +14,7 @@ from lightpaint.errors import SizeError, TargetError
 from lightpaint.images.estimate import box_mean
 from lightpaint.images.picture import Picture, read_mask, read_picture
 from lightpaint.keywords import keywords
+from lightpaint.sentences import Hint, Sentence, Word
 from lightpaint.target.look_match import view_of_look
 from lightpaint.target.lost_template import explain_mismatch
 from lightpaint.target.painted_pixels import SHARP_RADIUS, painted_where
@@ -197,8 +198,9 @@ def _open_picture(
     if base is not None and folder is not None and base.size != picture.size:
         if template is not None:
             raise SizeError(
-                f"{path} is {picture.size[1]}x{picture.size[0]} but {folder / SHOWN_FILE} is "
-                f"{base.size[1]}x{base.size[0]}: give the template it was painted on"
+                path,
+                f" is {picture.size[1]}x{picture.size[0]} but {folder / SHOWN_FILE} is "
+                f"{base.size[1]}x{base.size[0]}: give the template it was painted on",
             )
         notes = (f"not compared with {folder / SHOWN_FILE}, which has another size",)
         # The painting has another template, and therefore another transform.
@@ -218,8 +220,11 @@ def _importance(reading: _Reading, mask: str | Path | None) -> tuple[Floats | No
         importance = read_mask(mask)
         if importance.shape != picture.size:
             raise SizeError(
-                f"mask {mask} is {importance.shape[1]}x{importance.shape[0]} but the target {path} "
-                f"is {picture.size[1]}x{picture.size[0]}: export both at one size"
+                "mask ",
+                mask,
+                f" is {importance.shape[1]}x{importance.shape[0]} but the target ",
+                path,
+                f" is {picture.size[1]}x{picture.size[0]}: export both at one size",
             )
         if picture.alpha is not None and picture.weight is None:
             importance = np.where(picture.alpha > 0, importance, np.float32(0))
@@ -231,8 +236,12 @@ def _importance(reading: _Reading, mask: str | Path | None) -> tuple[Floats | No
         # Without a template, the meaning of display values is unknown.
         view, stops = picture.transform.name, picture.transform.stops
         view += f" at {stops:+g} stops" if stops else ""
-        missing_text = "no template says what was painted (template=... names one)"
-        return None, [f"all of it counts, as {view} shows it: {missing_text}"]
+        note = Sentence(
+            f"all of it counts, as {view} shows it: no template says what was painted (",
+            Hint("template"),
+            " names one)",
+        )
+        return None, [note]
     if template is None or not is_opaque:
         return picture.alpha, []
     importance = painted_where(path, picture, template)
@@ -242,15 +251,18 @@ def _importance(reading: _Reading, mask: str | Path | None) -> tuple[Floats | No
         if path.resolve() in [
             (folder / name).resolve() for name in (LIGHT_FILE, SHOWN_FILE, CLEAN)
         ]:
-            raise TargetError(f"{path} is the template itself: give the painting made over it")
+            raise TargetError(path, " is the template itself: give the painting made over it")
         raise TargetError(
-            f"nothing in {path} differs from {reading.painted_on}: paint over it, or pass "
-            "find=False if all of it counts"
+            "nothing in ",
+            path,
+            f" differs from {reading.painted_on}: paint over it, or pass ",
+            Hint("find", False),
+            " if all of it counts",
         )
-    note = f"{spoken_share(share)} painted: what differs from {reading.painted_on}"
+    painted_text = f"{spoken_share(share)} painted: what differs from {reading.painted_on}"
     if share > NEARLY_ALL and (remark := _of_all(picture, template)):
-        note += f"; {remark}"
-    return importance, [note]
+        return importance, [Sentence(painted_text, "; ", remark)]
+    return importance, [painted_text]
 
 
 def _of_all(picture: Picture, template: Template) -> str:
@@ -268,15 +280,18 @@ def _lit(reading: _Reading, counted: Floats) -> tuple[Floats, Floats, list[str]]
     """
     if reading.template is None or reading.template.albedo is None:
         raise TargetError(
-            f"reading {reading.path} as light needs its template, which has the albedo of "
-            "surfaces: give the folder that lightpaint template wrote as template=..."
+            "reading ",
+            reading.path,
+            " as light needs its template, which has the albedo of "
+            "surfaces: give the folder that lightpaint template wrote as ",
+            Hint("template"),
         )
     albedo = reading.template.albedo
     # Metals, glass and the background reflect no diffuse light, so paint on them says nothing.
     blind = (largest(albedo) <= 0) & (counted > 0)
     counted_light = np.where(blind, 0, counted)
     if not counted_light.any():
-        raise TargetError(f"{reading.path}: no painted pixel shows a surface that reflects light")
+        raise TargetError(reading.path, ": no painted pixel shows a surface that reflects light")
     lost_count = int(blind.sum())
     note = (
         [f"{lost_count} painted pixels show no surface that reflects light"] if lost_count else []
@@ -304,8 +319,10 @@ def _beyond(reading: _Reading, counted: Floats) -> list[str]:
     share = float((is_beyond.any(axis=-1) & painted).sum() / painted.sum())
     if share <= FEW_SHARE:
         return []
-    return [
+    remark = Sentence(
         f"{100 * share:.0f} % of the paint needs a colour that the surface hardly reflects, and so "
-        f"more than {BEYOND_FACTOR:g} times the light of the template's brightest parts: "
-        'paint="light" paints the light instead'
-    ]
+        f"more than {BEYOND_FACTOR:g} times the light of the template's brightest parts: ",
+        Hint("paint", Word("light")),
+        " paints the light instead",
+    )
+    return [remark]

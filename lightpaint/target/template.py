@@ -5,6 +5,7 @@ import os
 import re
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
+from functools import partial
 from pathlib import Path
 from typing import Literal
 
@@ -18,6 +19,7 @@ from lightpaint.file_reading import read_text
 from lightpaint.files import one_line, write_bytes, write_text
 from lightpaint.images.formats.exr import ExrPart, read_parts, write_parts, write_rgb
 from lightpaint.images.formats.png import TRANSFORM_KEY, png_bytes, write_png_16
+from lightpaint.sentences import Datum
 from lightpaint.storage.json_records import fields_of, read_record, strict_json
 from lightpaint.storage.staging import is_below, staged
 
@@ -227,13 +229,28 @@ def read_template(folder: Path) -> Template:
             _read_picture(folder / name, record.size) if (folder / name).exists() else None
             for name in (ALBEDO, CLEAN)
         )
-    except (OSError, ValueError, MemoryError, LightpaintError) as error:
-        # Errors name its files relative to the folder.
-        message = (str(error) or type(error).__name__).replace(f"{folder}{os.sep}", "")
-        raise TargetError(
-            f"{folder} is not a template: {one_line(message)}; make one with lightpaint template"
-        ) from None
+    except LightpaintError as error:
+        reason = error.sentence.spelled(partial(_name_within, folder))
+        raise _not_a_template(folder, reason) from None
+    except OSError as error:
+        if error.filename is not None:
+            error.filename = os.path.relpath(error.filename, folder)
+        raise _not_a_template(folder, str(error)) from None
+    except (ValueError, MemoryError) as error:
+        raise _not_a_template(folder, str(error) or type(error).__name__) from None
     return Template(image, transform, record.scene, record.content, record.sensor, albedo, clean)
+
+
+def _not_a_template(folder: Path, reason: str) -> TargetError:
+    advice = "; make one with lightpaint template"
+    return TargetError(folder, " is not a template: ", one_line(reason), advice)
+
+
+def _name_within(folder: Path, datum: Datum) -> str | None:
+    """Return the name of a template's file relative to its folder; None for other data."""
+    if isinstance(datum, Path) and datum != folder and datum.is_relative_to(folder):
+        return str(datum.relative_to(folder))
+    return None
 
 
 def _read_about(folder: Path) -> _TemplateRecord:

@@ -23,7 +23,7 @@ from lightpaint.batch.engine import Processes
 from lightpaint.batch.gallery.gallery import contact_sheet, gallery_page
 from lightpaint.batch.gallery.summary import LightRow, SummaryRow, summary_csv
 from lightpaint.batch.manifest.folder_names import FILES, is_reserved
-from lightpaint.batch.manifest.keys import with_manifest_keys
+from lightpaint.batch.manifest.keys import as_key
 from lightpaint.batch.manifest.manifest import read_manifest
 from lightpaint.batch.plan.planner import plan
 from lightpaint.batch.run import _Run, run_batch
@@ -35,6 +35,7 @@ from lightpaint.errors import BatchError, OutputError
 from lightpaint.images.formats.exr import write_rgb
 from lightpaint.lighting.answer.lighting_file import read_lighting
 from lightpaint.progress import Interrupted, silent
+from lightpaint.sentences import Hint, Sentence, Word
 
 
 @pytest.fixture(scope="module")
@@ -232,18 +233,23 @@ def test_a_failure_names_keys_of_the_manifest(batch_folder: Path) -> None:
 
 
 @pytest.mark.parametrize(
-    ("text", "expected"),
+    ("hint", "expected"),
     [
-        ("pass find=False if all counts", "pass find_template = false if all counts"),
-        ("choose it with sensor='guest', or", 'choose it with sensor = "guest", or'),
-        ("give it by template=...", "give it by template = ..."),
-        ("use resolution=... or fewer lights", "use settings.resolution = ... or fewer lights"),
-        ("pass force=True", "pass force=True"),
-        ("no such file: a/spp=8.exr", "no such file: a/spp=8.exr"),
+        (Hint("find", False), "find_template = false"),
+        (Hint("sensor", "guest"), 'sensor = "guest"'),
+        (Hint("template"), "template = ..."),
+        (Hint("resolution"), "settings.resolution = ..."),
+        (Hint("emitters", Word("count")), 'settings.emitters = "count"'),
+        (Hint("refine", 1), "settings.refine = 1"),
+        (Hint("force", True), "force=True"),
+        (Hint("parameters", {"x": ...}), "parameters={'x': ...}"),
     ],
 )
-def test_arguments_are_spelled_as_keys(text: str, expected: str) -> None:
-    assert with_manifest_keys(text) == expected
+def test_arguments_are_spelled_as_keys(hint: Hint, expected: str) -> None:
+    sentence = Sentence("use ", hint, " or fewer").spelled(as_key)
+    assert sentence == f"use {expected} or fewer"
+    # Another face spells what has no key.
+    assert (hint in sentence.parts) == (expected == str(hint))
 
 
 def test_a_look_can_do_without_the_template_of_the_defaults(batch_folder: Path) -> None:

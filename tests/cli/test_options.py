@@ -153,7 +153,7 @@ def test_options_that_need_a_renderer_are_refused(arguments: str, option: str):
     painting = [] if "--target" in arguments else ["painting.exr"]
     with pytest.raises(BasisError) as refusal:
         _jobs("groups.exr", *painting, *arguments.split())
-    assert spoken(str(refusal.value)).startswith(f"{option} cannot be used with groups.exr")
+    assert spoken(refusal.value.sentence).startswith(f"{option} cannot be used with groups.exr")
 
 
 @pytest.mark.usefixtures("folder")

@@ -13,11 +13,12 @@ import lightpaint
 from lightpaint.batch.run_options import RunOptions
 from lightpaint.cli.options.parser import command_parser
 from lightpaint.cli.options.source_options import LOADING
-from lightpaint.cli.output.vocabulary import _ARGUMENT, OPTIONS, SPELLINGS, spoken
+from lightpaint.cli.output.vocabulary import BY_OPTION, OPTIONS, SPELLINGS, spoken
 from lightpaint.paint.launch import paint_in_browser
 from lightpaint.pipeline.job.settings import Settings
 from lightpaint.pipeline.job.sources import NOT_IN_GROUPS
 from lightpaint.relit.export_format import Source
+from lightpaint.sentences import Hint, Lead, Sentence, SourceKey, Word
 from lightpaint.target.target_reader import read_target
 
 PACKAGE = Path(lightpaint.__file__).parent
@@ -25,7 +26,7 @@ PACKAGE = Path(lightpaint.__file__).parent
 #: An option as a shell takes it; CSS has variables that look alike, with a colon behind.
 OPTION = re.compile(r"(?<![\w-])--[a-z][a-z-]+\b(?![:\w-])")
 
-#: What a message may name: `keyword=` with something behind.
+#: An argument that a text names instead of a `Hint`: `keyword=` with something behind.
 KEYWORD = re.compile(r"(?<![^\s(])([a-z_]+)=(?=\S)")
 
 
@@ -77,20 +78,29 @@ def test_the_library_names_no_option() -> None:
     assert with_options == []
 
 
-def test_every_argument_that_a_message_names_is_in_the_table() -> None:
-    unknown = []
+def test_no_text_names_an_argument_that_is_not_a_hint() -> None:
+    found = []
     for file in LIBRARY:
         docstrings = _docstrings(file)
         for line, text in texts(file):
             # Markup has attributes.
-            if text in docstrings or "<" in text or "\n" in text:
-                continue
-            for match in KEYWORD.finditer(text):
-                if any(text.startswith(spelling, match.start()) for spelling in SPELLINGS):
-                    continue
-                if match[1] not in OPTIONS or not _ARGUMENT.match(text, match.start()):
-                    unknown.append(f"{file}:{line}: {text}")
-    assert unknown == []
+            if text not in docstrings and "<" not in text and "\n" not in text:
+                found += [f"{file}:{line}: {text}"] * bool(KEYWORD.search(text))
+    assert found == []
+
+
+def hints(file: Path) -> Iterator[str]:
+    """The names of the arguments in the messages of a module."""
+    for node in ast.walk(ast.parse(file.read_text(encoding="utf-8"))):
+        if isinstance(node, ast.Call) and getattr(node.func, "id", "") == "Hint" and node.args:
+            yield from (x.value for x in node.args[:1] if isinstance(x, ast.Constant))
+
+
+def test_every_hint_is_in_the_table() -> None:
+    spelt = {spelling.partition("=")[0] for spelling in SPELLINGS}
+    unknown = {name for file in LIBRARY for name in hints(file)} - {*OPTIONS, *spelt}
+    # Calls of Python alone have these.
+    assert unknown <= {"time_s"}
 
 
 def test_the_test_itself_finds_what_it_looks_for(tmp_path: Path) -> None:
@@ -132,25 +142,68 @@ def test_every_word_of_the_table_is_an_argument_of_the_library() -> None:
 
 
 @pytest.mark.parametrize(
-    ("python", "shell"),
+    ("hint", "python", "shell"),
     [
-        ("export it at that size, or pass resize=True", "export it at that size, or pass --resize"),
-        ("by alpha or mask=... what was painted", "by alpha or --mask what was painted"),
-        ("pass find=False if all of it counts", "pass --no-template if all of it counts"),
-        ("weighed against it: use refine=0", "weighed against it: use --refine 0"),
-        ("use noise_correction=False, and", "use --no-correct-noise, and"),
-        ('space="display" fits', "--space display fits"),
-        ("like pattern='Light_{name}'; its", "like --pattern 'Light_{name}'; its"),
-        ("profile (transform=..., mask=...), or", "profile (--view, --mask), or"),
-        ("set it with parameters={'width': ...}", "set it with -D width=VALUE"),
-        ("(use_cache=False renders it again)", "(--no-cache renders it again)"),
-        ("spp=..., refine=... cannot", "--spp, --refine cannot"),
-        # Names of files and of other things stay as they are.
-        ("no such image file: runs/seed=3/a.exr", "no such image file: runs/seed=3/a.exr"),
-        ("no such image file: seed=3/a.exr", "no such image file: seed=3/a.exr"),
-        ("no such scene file: spp=64.exr", "no such scene file: spp=64.exr"),
-        ("count=3 lights", "count=3 lights"),
+        (Hint("resize", True), "resize=True", "--resize"),
+        (Hint("mask"), "mask=...", "--mask"),
+        (Hint("find", False), "find=False", "--no-template"),
+        (Hint("refine", 0), "refine=0", "--refine 0"),
+        (Hint("refine", 1), "refine=1", "--refine 1"),
+        (Hint("noise_correction", False), "noise_correction=False", "--no-correct-noise"),
+        (Hint("space", Word("display")), 'space="display"', "--space display"),
+        (Hint("pattern", "Light_{name}"), "pattern='Light_{name}'", "--pattern 'Light_{name}'"),
+        (Hint("transform"), "transform=...", "--view"),
+        (Hint("parameters", {"width": ...}), "parameters={'width': ...}", "-D width=VALUE"),
+        (Hint("split", {"a sky": "9x4"}), "split={'a sky': '9x4'}", "--split a sky=9x4"),
+        (Hint("use_cache", False), "use_cache=False", "--no-cache"),
+        (Hint("unheard", 3), "unheard=3", "unheard=3"),
     ],
 )
-def test_words_of_the_command_line(python: str, shell: str) -> None:
-    assert spoken(python) == shell
+def test_words_of_the_command_line(hint: Hint, python: str, shell: str) -> None:
+    sentence = Sentence("size differs: use ", hint, ", or leave it")
+    assert sentence == f"size differs: use {python}, or leave it"
+    assert spoken(sentence) == f"size differs: use {shell}, or leave it"
+
+
+OPTIONS_SOURCE = SourceKey(BY_OPTION)
+
+
+@pytest.mark.parametrize(
+    ("key", "start"),
+    [
+        (OPTIONS_SOURCE / "light" / "a.b lamp" / "lock", "--lock a.b lamp is"),
+        (OPTIONS_SOURCE / "light" / "key" / "limits" / "min", "--limit key is"),
+        (OPTIONS_SOURCE / "light" / "key" / "duv", "--kelvin key is"),
+        (OPTIONS_SOURCE / "light" / "key", "light.key is"),
+        (OPTIONS_SOURCE / "new" / 2 / "count", "--add 2: count is"),
+        (OPTIONS_SOURCE / "new", "--add: is"),
+        (OPTIONS_SOURCE / "tie", "tie is"),
+        (SourceKey("room.toml", "light", "key", "lock"), "room.toml: light.key.lock is"),
+    ],
+)
+def test_keys_of_options(key: SourceKey, start: str) -> None:
+    sentence = Sentence(key, " is 7: expected less")
+    assert sentence == f"{key} is 7: expected less"
+    assert spoken(sentence) == f"{start} 7: expected less"
+
+
+@pytest.mark.parametrize(
+    ("key", "lead"),
+    [
+        (OPTIONS_SOURCE / "light" / "kex", ""),
+        (OPTIONS_SOURCE / "light" / "kex" / "move", "--move kex: "),
+        (OPTIONS_SOURCE / "new" / 2 / "on", "--add 2: "),
+        (OPTIONS_SOURCE / "new", "--add: "),
+        (OPTIONS_SOURCE / "tie", "tie: "),
+        (SourceKey("room.toml", "light", "kex"), "room.toml: light.kex: "),
+    ],
+)
+def test_a_lead_may_be_left_out(key: SourceKey, lead: str) -> None:
+    assert spoken(Sentence(Lead(key), "no light 'kex'")) == f"{lead}no light 'kex'"
+
+
+@pytest.mark.parametrize(
+    "text", ["no such scene file: spp=64", "pass resize=True", "count=3 lights", "a --resize"]
+)
+def test_a_text_is_never_read(text: str) -> None:
+    assert spoken(text) == spoken(Sentence(text)) == text

@@ -14,7 +14,7 @@ from lightpaint.errors import SizeError, TargetError, ViewError
 from lightpaint.images.formats.exr import ExrPart, write_parts, write_rgb
 from lightpaint.images.formats.png import write_png_16
 from lightpaint.target.target_reader import read_target
-from lightpaint.target.template import Template, write_look, write_template
+from lightpaint.target.template import Template, read_template, write_look, write_template
 
 SIZE = (60, 80)
 
@@ -414,6 +414,20 @@ def test_blue_paint_on_a_red_wall_is_remarked(tmp_path: Path) -> None:
     painted[10:50, 50:70] = 0.05, 0.1, 0.9
     write_rgb(tmp_path / "grey.exr", painted)
     assert not any("hardly" in note for note in read_target(tmp_path / "grey.exr").notes)
+
+
+def test_an_error_names_a_template_and_its_file_within_it(tmp_path: Path) -> None:
+    folder = write(tmp_path / "template", template_of())
+    for content in (b"no picture", None):
+        (folder / "template.exr").unlink()
+        if content is not None:
+            (folder / "template.exr").write_bytes(content)
+        with pytest.raises(TargetError) as refusal:
+            read_template(folder)
+        text = str(refusal.value)
+        assert text.startswith(f"{folder} is not a template: ")
+        assert "template.exr" in text
+        assert str(folder / "template.exr") not in text
 
 
 def test_what_is_no_template_is_refused(tmp_path: Path) -> None:

@@ -32,6 +32,7 @@ from lightpaint.errors import BasisError, SceneError
 from lightpaint.images.pixel_blocks import whole_factor
 from lightpaint.progress import Progress, silent
 from lightpaint.scene.scene import Scene
+from lightpaint.sentences import Hint
 
 #: Smallest time budget of a render in seconds, which still renders one step.
 SHORTEST_S = 1e-3
@@ -83,7 +84,8 @@ def obtain_basis(
     Raises SceneError for exact_spp together with time_s, which gives no number of samples.
     """
     if exact_spp and time_s is not None:
-        raise SceneError("exact_spp=True goes with a number of samples, not with time_s=...")
+        exact, time = Hint("exact_spp", True), Hint("time_s")
+        raise SceneError(exact, " goes with a number of samples, not with ", time)
     goal_spp = None if time_s is not None else scene.spp if spp is None else spp
     options = dict[str, Any](time_s=time_s, seed=seed, progress=progress)
     if not use_cache:

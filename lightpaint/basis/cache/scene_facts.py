@@ -13,7 +13,7 @@ import hashlib
 import json
 import os
 import sys
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Collection, Iterator, Mapping
 from contextlib import suppress
 from dataclasses import asdict, dataclass
 from functools import cache
@@ -29,10 +29,11 @@ from lightpaint.files import write_text
 from lightpaint.scene.checks.tokens import attributes, markup
 from lightpaint.scene.lights.lights_file import SceneRequests
 from lightpaint.scene.scene import Scene
+from lightpaint.sentences import Sentence
 from lightpaint.storage.json_records import read_record, strict_json
 from lightpaint.version import __version__
 
-FORMAT = "lightpaint-known 2"
+FORMAT = "lightpaint-known 3"
 
 #: Seconds before the start of reading in which no file of the scene may have been written, since
 #: file times may be that coarse.
@@ -84,7 +85,8 @@ def recall_facts(key: str) -> SceneFacts | None:
             record = strict_json(file.read_text("utf-8"))
             if record["format"] == FORMAT and _is_unchanged(record["places"], record["texts"]):
                 facts = record["known"]
-                facts |= {name: tuple(facts[name]) for name in ("size", "remarks")}
+                facts["size"] = tuple(facts["size"])
+                facts["remarks"] = tuple(map(Sentence.of_record, facts["remarks"]))
                 lights = tuple(
                     read_record(BasisLight, light) for light in facts["lights"]["records"]
                 )
@@ -98,7 +100,7 @@ def remember_facts(
     scene: Scene,
     basis: Basis,
     *,
-    remarks: Iterable[str],
+    remarks: Collection[str],
     began_s: float,
 ) -> bool:
     """Store the facts of `scene` beside its cached `basis`. Returns whether that worked.
@@ -127,7 +129,7 @@ def remember_facts(
             "format": FORMAT,
             "places": places,
             "texts": {str(path): _digest(path) for path in sorted(texts)},
-            "known": asdict(facts),
+            "known": {**asdict(facts), "remarks": [Sentence(x).record for x in remarks]},
         }
         text = json.dumps(record, allow_nan=False)
         if strict_json(text)["known"]["lights"]["requests"] != asdict(scene.requests):

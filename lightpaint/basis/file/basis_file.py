@@ -223,7 +223,7 @@ def read_basis(path: str | Path) -> Basis:
         head = _head(p.attributes for p in parts)
         return replace(leave_indirect(_basis_of_parts(parts, head), path), source=str(path))
     except BasisError as error:
-        raise BasisError(f"{path} {error}") from error
+        raise BasisError(path, " ", error) from error
     except _HEADER_ERRORS as error:
         raise BasisError(f"{path} is a damaged basis: {one_line(str(error))}") from error
     except MemoryError:

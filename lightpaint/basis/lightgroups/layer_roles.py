@@ -29,6 +29,7 @@ from lightpaint.basis.lightgroups.naming_conventions import (
 from lightpaint.basis.lightgroups.render_layers import RenderLayer
 from lightpaint.display_text import some_names
 from lightpaint.errors import BasisError
+from lightpaint.sentences import Hint, Sentence
 
 #: Name for files that no convention matches, in place of a renderer.
 ONE_FILE_PER_LIGHT = "one file per light"
@@ -82,11 +83,15 @@ def choose_layers(
         counts = [f"{len(matches)} as of {convention.renderer}" for convention, matches in fitting]
         raise BasisError(
             f"{file_name} names its layers in several ways ({some_names(counts)}): say which are "
-            f"the lights, like pattern={_example_pattern(layers)!r}; {_layer_list(layers)}"
+            "the lights, like ",
+            Hint("pattern", _example_pattern(layers)),
+            f"; {_layer_list(layers)}",
         )
     raise BasisError(
         f"{file_name} has no layers named like the light groups of a known renderer: say which "
-        f"they are, like pattern={_example_pattern(layers)!r}; {_layer_list(layers)}"
+        "they are, like ",
+        Hint("pattern", _example_pattern(layers)),
+        f"; {_layer_list(layers)}",
     )
 
 
@@ -110,8 +115,11 @@ def _by_convention(
         other = next(m for m in matches if _view(m) == views[1])
         pattern = f"{other[0][: other.start('name')]}{NAME_FIELD}{other[0][other.end('name') :]}"
         remarks.append(
-            f"of the view layers {some_names(views)} the first is taken: pattern={pattern!r} takes "
-            f"{views[1]}"
+            Sentence(
+                f"of the view layers {some_names(views)} the first is taken: ",
+                Hint("pattern", pattern),
+                f" takes {views[1]}",
+            )
         )
     matches = [m for m in matches if _view(m) == view]
     _check_not_stereo([m[0] for m in matches], file_name)
@@ -168,8 +176,9 @@ def _light_names(convention: Convention, matches: list[re.Match[str]]) -> list[t
 def _by_pattern(layers: Mapping[str, Sequence[str]], pattern: str, file_name: str) -> LayerChoice:
     if pattern.count(NAME_FIELD) != 1:
         raise BasisError(
-            f"pattern={pattern!r} must have {NAME_FIELD} once, where the name of the light stands, "
-            "like 'Light_{name}'"
+            Hint("pattern", pattern),
+            f" must have {NAME_FIELD} once, where the name of the light stands, like "
+            "'Light_{name}'",
         )
     prefix, suffix = pattern.split(NAME_FIELD)
     name_pattern = re.compile(f"{re.escape(prefix)}(.+){re.escape(suffix)}", re.DOTALL)
@@ -181,7 +190,8 @@ def _by_pattern(layers: Mapping[str, Sequence[str]], pattern: str, file_name: st
         if match:
             matches.append((match[1], layer))
     if not matches:
-        raise BasisError(f"pattern={pattern!r} fits no layer of {file_name}: {_layer_list(layers)}")
+        listing = _layer_list(layers)
+        raise BasisError(Hint("pattern", pattern), f" fits no layer of {file_name}: {listing}")
     view = prefix.rpartition(".")[0]
     names = [layer for layer in layers if layer not in [matched for _, matched in matches]]
     first = {
@@ -216,7 +226,8 @@ def _check_not_stereo(names: Sequence[str], file_name: str) -> None:
         head = in_both[0].rpartition("_")[0]
         raise BasisError(
             f"{file_name} holds the views left and right, but a solve uses one view: say which, "
-            f"like pattern='{head}_{NAME_FIELD}.left'"
+            "like ",
+            Hint("pattern", f"{head}_{NAME_FIELD}.left"),
         )
 
 
@@ -226,7 +237,8 @@ def _unique_lights(pairs: Sequence[tuple[str, str]], file_name: str) -> dict[str
         if name in lights:
             raise BasisError(
                 f"{file_name} has the light {name!r} twice, in {lights[name]} and in {layer}: "
-                "say which are meant with pattern=..."
+                "say which are meant with ",
+                Hint("pattern"),
             )
         lights[name] = layer
     return lights

@@ -35,6 +35,7 @@ from lightpaint.colour.color import LUMINANCE
 from lightpaint.display_text import short_repr, some_names
 from lightpaint.errors import BasisError
 from lightpaint.keywords import keywords
+from lightpaint.sentences import Hint
 
 #: Name of the light that holds the missing part; underscores are added if a light has that name.
 REST_NAME = "rest"
@@ -155,7 +156,9 @@ def _check_light(
             )
             raise BasisError(
                 f"{path}: the light group {name!r} takes light away, {part}, which no light does: "
-                "render it again, or leave it out (pattern=...)"
+                "render it again, or leave it out (",
+                Hint("pattern"),
+                ")",
             )
 
 

@@ -214,7 +214,7 @@ def _primaries(path: Path, part: ExrPart) -> tuple[float, ...] | None:
     try:
         return primaries_of(part)
     except ImageError as error:
-        raise ImageError(f"{path} {error}") from None
+        raise ImageError(path, " ", error) from None
 
 
 def _rgb(path: Path, pixels: Mapping[str, Floats], channels: tuple[str, str, str]) -> Floats:

@@ -22,6 +22,7 @@ from lightpaint.basis.render.render_origin import ONE_PASS, method_of
 from lightpaint.errors import SceneError
 from lightpaint.scene.scene import Scene
 from lightpaint.scene.scene_render import SAMPLES_PER_PASS
+from lightpaint.sentences import Hint
 
 if TYPE_CHECKING:
     from lightpaint.basis.render.tracer.one_pass import Tracer
@@ -162,8 +163,9 @@ class FileSums:
             needed_bytes = 4 * int(np.prod(shape))
             raise SceneError(
                 f"rendering needs {needed_bytes / 1e9:.1f} GB in {tempfile.gettempdir()} "
-                f"({error.strerror or error}): set TMPDIR to a folder with more room, or use "
-                "resolution=... or fewer lights"
+                f"({error.strerror or error}): set TMPDIR to a folder with more room, or use ",
+                Hint("resolution"),
+                " or fewer lights",
             ) from error
 
     @property
@@ -289,7 +291,9 @@ def check_memory(scene: Scene, *, in_bands: bool = False) -> None:
         height, width = scene.size
         raise SceneError(
             f"{len(scene.lights)} lights at {width}x{height} need {needed_bytes / 1e9:.1f} GB, and "
-            f"{free_bytes / 1e9:.1f} GB are free: use resolution=... or fewer lights"
+            f"{free_bytes / 1e9:.1f} GB are free: use ",
+            Hint("resolution"),
+            " or fewer lights",
         )
 
 

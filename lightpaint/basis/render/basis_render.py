@@ -38,6 +38,7 @@ from lightpaint.scene.runtime.render_lock import MITSUBA, tracing
 from lightpaint.scene.scene import Scene
 from lightpaint.scene.scene_render import view_seed
 from lightpaint.scene.surfaces import render_first_hits
+from lightpaint.sentences import Hint
 
 if TYPE_CHECKING:
     from lightpaint.basis.render.tracer.one_pass import Tracer
@@ -129,7 +130,9 @@ def _check_size(scene: Scene) -> None:
     if len(scene.lights) * height * width * 3 >= 2**32:
         raise SceneError(
             f"{len(scene.lights)} lights at {width}x{height} are more than one basis can hold: "
-            "use resolution=... or fewer lights"
+            "use ",
+            Hint("resolution"),
+            " or fewer lights",
         )
 
 

@@ -12,6 +12,7 @@ from lightpaint.basis.render.separate_renders import (
 from lightpaint.display_text import some_names
 from lightpaint.errors import SceneError
 from lightpaint.scene.scene import Scene
+from lightpaint.sentences import Hint
 
 ONE_PASS = "one pass, several questions"
 
@@ -82,8 +83,9 @@ def method_of(scene: Scene) -> str:
     if reason is not None and scene.split:
         raise SceneError(
             f"{reason}, so that each light is rendered by itself, and {some_names(scene.split)} "
-            "cannot be split into texels: leave split out, or use integrator='path' and a variant "
-            "like llvm_ad_rgb"
+            "cannot be split into texels: leave split out, or use ",
+            Hint("integrator", "path"),
+            " and a variant like llvm_ad_rgb",
         )
     return ONE_PASS if reason is None else SEPARATE
 

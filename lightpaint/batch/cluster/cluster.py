@@ -140,7 +140,7 @@ class Cluster:
                     try:
                         self._submit(item, worker, common_files)
                     except LightpaintError as error:
-                        yield ItemResult(item.name, item.kind, str(error))
+                        yield ItemResult(item.name, item.kind, error.sentence)
 
     def _next_for(self, worker: str, queue: deque[WorkItem]) -> WorkItem | None:
         """Return the next item that the worker has not failed at, unless all workers have."""
@@ -301,5 +301,5 @@ def _unpack_result(item: WorkItem, result: ItemResult) -> ItemResult:
     try:
         unpack(item, result.files or {})
     except LightpaintError as error:
-        return ItemResult(result.look, result.kind, str(error), is_disk_full(error))
+        return ItemResult(result.look, result.kind, error.sentence, is_disk_full(error))
     return result

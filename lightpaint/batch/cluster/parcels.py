@@ -18,6 +18,7 @@ from lightpaint.display_text import some_names
 from lightpaint.errors import BatchError, OutputError
 from lightpaint.files import first_line
 from lightpaint.pipeline.results.result_folder import RECORD, ResultFolder
+from lightpaint.sentences import Hint, Sentence
 from lightpaint.storage.json_records import strict_json
 from lightpaint.storage.staging import is_below
 
@@ -120,8 +121,9 @@ class ParcelStore:
             except BatchError:
                 differs = True
             if differs:
-                failure = (
-                    f"{file} is another on a worker: is its disk shared? leave out shared_fs=True"
+                failure = Sentence(
+                    f"{file} is another on a worker: is its disk shared? leave out ",
+                    Hint("shared_fs", True),
                 )
                 return ItemResult(item.name, item.kind, failure)
         os.chdir(parcel.place)
@@ -148,11 +150,9 @@ class ParcelStore:
         os.chdir(start_folder)
         result = run_item(item.with_paths(self._path_map(parcel, root)))
         if target is None or result.failure:
+            failure = Sentence(result.failure).mapped(lambda text: text.replace(str(root), ""))
             # The full disk is this worker's own; another worker may have room.
-            failure, is_lost = (
-                result.failure.replace(str(root), ""),
-                result.is_lost or result.is_disk_full,
-            )
+            is_lost = result.is_lost or result.is_disk_full
             return replace(result, failure=failure, is_disk_full=False, is_lost=is_lost)
         files = (x for x in sorted(target.rglob("*")) if x.is_file())
         return replace(

@@ -143,7 +143,7 @@ def check_handover(mistakes: Mistakes, label: str, handover: Handover, entry: An
         try:
             check_usd()
         except LightpaintError as error:
-            mistakes.add(f"{label}, export", str(error))
+            mistakes.add(f"{label}, export", error.sentence)
 
 
 def check_sequence(mistakes: Mistakes, table: Table) -> None:
@@ -195,7 +195,7 @@ def constraints_of(manifest: Manifest, label: str, look: Mapping[str, Any]) -> C
                     _constraints(mistakes, f"{label}, constraints", source)
                 )
         except LightpaintError as error:
-            mistakes.add(f"{label}, constraints", str(error))
+            mistakes.add(f"{label}, constraints", error.sentence)
     return constraints
 
 
@@ -238,7 +238,7 @@ def _is_valid(mistakes: Mistakes, label: str, **arguments: Any) -> bool:
     try:
         Constraints.of(**arguments)
     except LightpaintError as error:
-        mistakes.add(label, str(error))
+        mistakes.add(label, error.sentence)
         return False
     return True
 

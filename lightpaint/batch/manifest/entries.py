@@ -220,7 +220,7 @@ def _table_looks(
                 _variation_entry(x, word) for word in look.get("variations", ()) for x in looks
             ]
     except LightpaintError as error:
-        mistakes.add(label, str(error))
+        mistakes.add(label, error.sentence)
     example = looks[0] if looks else _partial_entry(manifest, sources, table, entry)
     if "export" in entry.want and (example.scenes or example.basis):
         check_handover(mistakes, label, entry.handover, example)

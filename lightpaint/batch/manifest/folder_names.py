@@ -7,6 +7,7 @@ from pathlib import Path
 
 from lightpaint.errors import LightpaintError, OutputError
 from lightpaint.file_reading import read_text
+from lightpaint.sentences import Hint
 from lightpaint.storage.json_records import strict_json
 
 #: The summary for programs, and the format that it names.
@@ -54,8 +55,11 @@ def check_gallery(folder: Path, *, force: bool = False) -> None:
     existing_files = [folder / name for name in FILES if (folder / name).exists()]
     if existing_files and not force and not _is_summary(folder / SUMMARY):
         raise OutputError(
-            f"{existing_files[0]} is there, and of no batch: name another folder (folder=...), or "
-            "replace it (force=True)"
+            f"{existing_files[0]} is there, and of no batch: name another folder (",
+            Hint("folder"),
+            "), or replace it (",
+            Hint("force", True),
+            ")",
         )
 
 

@@ -5,7 +5,6 @@ The library's arguments are spelled as keys in errors: `find_template = false` f
 
 import difflib
 import json
-import re
 from collections.abc import Callable, Collection, Iterable, Mapping
 from dataclasses import dataclass, field, replace
 from pathlib import Path
@@ -18,6 +17,7 @@ from lightpaint.pipeline.job.settings import Settings
 from lightpaint.relit.formats import FORMS
 from lightpaint.scene.limits import MAX_SPP
 from lightpaint.scene.properties.film import check_resolution
+from lightpaint.sentences import Datum, Hint, Sentence
 from lightpaint.target.target_reader import Paint
 from lightpaint.validation import BRIGHTEST, MAX_LISTED, SWITCH, Check, a, checks_of, one_of, whole
 
@@ -38,14 +38,6 @@ MAX_FRAMES = 10_000
 
 #: Keys of arguments that a manifest calls by another name.
 OTHER_NAMES = {"find": "find_template", "transform": "view"}
-
-#: Values of TOML for values of Python.
-TOML_VALUES = {"True": "true", "False": "false"}
-
-#: `name=value` as the library writes it: a separate word, so that no path matches.
-_ARGUMENT = re.compile(
-    r"""(?<![^\s(])(\w+)=(\.\.\.|True|False|\d+|'[^']*'|"\w+")(?=[,;:.)]*(?:\s|$))"""
-)
 
 
 def _texts(value: Any) -> bool:
@@ -244,7 +236,8 @@ class Mistakes:
 
     def add(self, label: str, text: str) -> None:
         """Add an error. label: the look and the key; "" for the manifest as a whole."""
-        line = one_line(f"{self.source}: {label}{': ' if label else ''}{text}", limit=1000)
+        prefix = f"{self.source}: {label}{': ' if label else ''}"
+        line = one_line(Sentence(prefix, text), limit=1000)
         if line not in self.lines:
             self.lines.append(line)
 
@@ -284,7 +277,7 @@ class Mistakes:
         try:
             Settings(**values)
         except LightpaintError as error:
-            self.add(f"{label}, settings", str(error))
+            self.add(f"{label}, settings", error.sentence)
             return {}
         return values
 
@@ -296,7 +289,7 @@ class Mistakes:
             if "resolution" in values:
                 check_resolution(values["resolution"])
         except LightpaintError as error:
-            self.add(f"{label}, render", str(error))
+            self.add(f"{label}, render", error.sentence)
             return Final()
         return Final(**values)
 
@@ -315,17 +308,15 @@ def near_key(key: str, keys: Iterable[str]) -> str:
     return next(iter(difflib.get_close_matches(key, list(keys), 1)), "")
 
 
-def with_manifest_keys(text: str) -> str:
-    """Return an error of the library with the keys of a manifest for arguments that have one."""
-    return _ARGUMENT.sub(_as_key, text)
-
-
-def _as_key(match: re.Match[str]) -> str:
-    name, value = match.groups()
-    name = OTHER_NAMES.get(name, name)
-    if name in SETTINGS:
-        name = f"settings.{name}"
-    elif name not in DEFAULT_KEYS:
-        return match[0]
-    value = json.dumps(value[1:-1], ensure_ascii=False) if value[0] == "'" else value
-    return f"{name} = {TOML_VALUES.get(value, value)}"
+def as_key(datum: Datum) -> str | None:
+    """Return an argument as a key of a manifest, in TOML; None for what has no key there."""
+    if not isinstance(datum, Hint):
+        return None
+    name = OTHER_NAMES.get(datum.name, datum.name)
+    if name not in SETTINGS and name not in DEFAULT_KEYS:
+        return None
+    is_simple = isinstance(datum.value, bool | int | str)
+    if datum.value is not ... and not is_simple:
+        return None
+    value = json.dumps(datum.value, ensure_ascii=False) if is_simple else "..."
+    return f"{'settings.' if name in SETTINGS else ''}{name} = {value}"

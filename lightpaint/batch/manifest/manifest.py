@@ -18,6 +18,7 @@ from lightpaint.batch.manifest.keys import (
 from lightpaint.errors import BatchError, OutputError
 from lightpaint.file_reading import read_text
 from lightpaint.files import check_files, one_line, write_text
+from lightpaint.sentences import Hint
 from lightpaint.storage.json_records import strict_toml
 from lightpaint.validation import Check, a
 
@@ -212,7 +213,12 @@ def write_starter_manifest(
             raise BatchError(f"no such file: {file}")
     check_files([path], map(Path, (scene, *paintings)))
     if path.exists() and not force:
-        raise OutputError(f"{path} is there: choose another name with folder=..., or force=True")
+        raise OutputError(
+            f"{path} is there: choose another name with ",
+            Hint("folder"),
+            ", or ",
+            Hint("force", True),
+        )
     base = path.parent
     text = STARTER.format(name=path.name, scene=_quoted(scene, base))
     write_text(

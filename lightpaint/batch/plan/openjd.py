@@ -14,6 +14,7 @@ from typing import Any
 from lightpaint.batch.plan.plan import Plan, PlannedLook
 from lightpaint.errors import BatchError
 from lightpaint.files import check_writable, write_text
+from lightpaint.sentences import Hint
 
 #: Name of the template in the folder of the job.
 TEMPLATE = "template.json"
@@ -34,7 +35,7 @@ def write_openjd(folder: Path, plan: Plan, *, command: Sequence[str], force: boo
     check_writable(folder)
     path = folder / TEMPLATE
     if path.exists() and not force:
-        raise BatchError(f"{path} is there: name another folder, or pass force=True")
+        raise BatchError(f"{path} is there: name another folder, or pass ", Hint("force", True))
     text = json.dumps(template_of(plan, folder, command), indent=2, ensure_ascii=False)
     write_text(path, text + "\n")
     return path

@@ -14,7 +14,7 @@ from lightpaint.basis.render.integrators import why_not_one_pass
 from lightpaint.basis.render.render_origin import basis_lights
 from lightpaint.batch.manifest.entries import LookEntry, entries_of
 from lightpaint.batch.manifest.folder_names import check_gallery
-from lightpaint.batch.manifest.keys import Mistakes, with_manifest_keys
+from lightpaint.batch.manifest.keys import Mistakes, as_key
 from lightpaint.batch.manifest.manifest import Manifest, read_manifest
 from lightpaint.batch.manifest.variations import vary
 from lightpaint.batch.plan.journal import Fingerprints, Journal
@@ -72,7 +72,7 @@ def plan(
     for _, entry in entries.incomplete:
         planner.collect_errors(entry)
     if manifest_.mistakes.lines:
-        raise BatchError(*manifest_.mistakes.lines)
+        raise BatchError.of(manifest_.mistakes.lines)
     names = frozenset(look.entry.name for look in looks)
     planner.cache.keep_only(())
     cache, remarks = planner.cache, planner.journal.remarks
@@ -127,15 +127,15 @@ class _Planner:
 
     def _check_look(self, entry: LookEntry) -> "_CheckedLook":
         """Return one look with all defaults resolved."""
-        failure = ""
+        failure: str = ""
         remarks: tuple[str, ...] = ()
         source_files: tuple[Path, ...] = ()
         try:
             entry, source_files, remarks = self._resolve_entry(entry)
         except LOOK_ERRORS as error:
-            failure = with_manifest_keys(str(error))
+            failure = error.sentence.spelled(as_key)
         except LightpaintError as error:
-            failure = with_manifest_keys(str(error))
+            failure = error.sentence.spelled(as_key)
             self._mistakes.add(entry.label, failure)
             self.collect_errors(entry)
         if not failure and (failed_parts := self._failed_looks & set(entry.combined_looks)):
@@ -151,7 +151,7 @@ class _Planner:
         try:
             groups = group_entries(entries, self._looks_with_moves)
         except LightpaintError as error:
-            self._mistakes.add("", str(error))
+            self._mistakes.add("", error.sentence)
             return {}
         for group in groups:
             file = file_of_group(self._folder, group)
@@ -316,7 +316,7 @@ def _collect_errors(entry: LookEntry, cache: WorkerCache, mistakes: Mistakes) ->
         except LOOK_ERRORS:
             return None
         except LightpaintError as error:
-            mistakes.add(entry.label, with_manifest_keys(str(error)))
+            mistakes.add(entry.label, error.sentence.spelled(as_key))
             return None
 
     lights: Sequence[BasisLight] | None = None

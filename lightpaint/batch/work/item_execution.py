@@ -12,7 +12,7 @@ from lightpaint.basis.lightgroups.light_groups import LightGroups
 from lightpaint.basis.lights import Lights
 from lightpaint.basis.render.basis_render import train_guide
 from lightpaint.basis.render.one_pass_basis import basis_of_sums
-from lightpaint.batch.manifest.keys import Space, with_manifest_keys
+from lightpaint.batch.manifest.keys import Space, as_key
 from lightpaint.batch.manifest.sequence import interpolate
 from lightpaint.batch.manifest.variations import shift
 from lightpaint.batch.work.derived_looks import derived_folder, dimmer_lights, publish_derived
@@ -77,7 +77,7 @@ def attempt(item: WorkItem, work: Callable[[], Any]) -> ItemResult:
     try:
         value = work()
     except LightpaintError as error:
-        failure, disk_full = with_manifest_keys(str(error)), is_disk_full(error)
+        failure, disk_full = error.sentence.spelled(as_key), is_disk_full(error)
     except MemoryError:
         failure, is_lost = OUT_OF_MEMORY_TEXT, True
     except OSError as error:

@@ -22,6 +22,7 @@ from lightpaint.pipeline.job.settings import Settings
 from lightpaint.pipeline.results.results import Look
 from lightpaint.report.answer_pictures import spoken_view
 from lightpaint.report.diagnosis_sentences import (
+    ANY_COLOR,
     bound_sentences,
     compensation_sentences,
     error_sentences,
@@ -37,6 +38,7 @@ from lightpaint.report.diagnosis_sentences import (
 from lightpaint.report.measures import energy_shares
 from lightpaint.report.page.constraint_section import closer_choice
 from lightpaint.report.phrases import spoken_percent
+from lightpaint.sentences import Sentence, SourceKey
 
 Table = Literal["short", "full"]
 
@@ -93,7 +95,7 @@ def _sentences(look: Look, table: Table) -> list[str]:
     if table == "short":
         limits = [] if appearance.is_close else limits[:1]
         # One line offers other colours, the one that says which light turns.
-        if closer and any("--colors free" in sentence for sentence in map(spoken, limits)):
+        if closer and any(ANY_COLOR in Sentence(sentence).parts for sentence in limits):
             limits = []
         return [*limits, *down, *closer]
     sentences = [
@@ -124,7 +126,7 @@ def _spoken_cause(look: Look, reason: Reason) -> str:
         for key in keys
         if key in constraint
         and key != "duv"
-        and origin.startswith(BY_OPTION)
+        and SourceKey.of(origin).source == BY_OPTION
         and any(name == light or fnmatchcase(light, name) for light in reason.names)
     ]
     if not options:

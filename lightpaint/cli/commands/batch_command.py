@@ -22,6 +22,7 @@ from lightpaint.cli.output.output_mode import CommandOutcome
 from lightpaint.display_text import some_of, visible
 from lightpaint.errors import BatchError, OutputError
 from lightpaint.files import scene_name
+from lightpaint.sentences import Sentence
 
 #: Maximum number of looks that are listed at the end; of more only unfinished ones.
 MAX_LISTED = 40
@@ -134,7 +135,7 @@ def _outcome(plan_: Plan, outcome: BatchOutcome) -> CommandOutcome:
     _show(plan_, outcome.rows)
     folder = plan_.folder
     for name, reason in list(outcome.failed.items())[:MAX_LISTED]:
-        terminal.complain("batch", f"{name}: {reason}")
+        terminal.complain("batch", Sentence(f"{name}: ", reason))
     if len(outcome.failed) > MAX_LISTED:
         terminal.complain("batch", f"and {len(outcome.failed) - MAX_LISTED} more, in summary.csv")
     if outcome.skipped:

@@ -12,6 +12,7 @@ from lightpaint.cli.output import documents, terminal
 from lightpaint.cli.output.output_mode import CommandOutcome
 from lightpaint.errors import OutputError
 from lightpaint.files import check_files, check_writable, write_bytes
+from lightpaint.sentences import Hint
 
 #: Folder in the archive: the add-on's name in Blender before 4.2. The library is called otherwise.
 ADDON_NAME = "lightpaint_blender"
@@ -37,8 +38,10 @@ def blender(*, output: Path, force: bool) -> CommandOutcome:
     data = packed_addon(own_program())
     if output.exists() and not force and not is_addon(output):
         raise OutputError(
-            f"{output} exists and is not an add-on of lightpaint: name another file (output=...), "
-            "or pass force=True"
+            f"{output} exists and is not an add-on of lightpaint: name another file (",
+            Hint("output"),
+            "), or pass ",
+            Hint("force", True),
         )
     write_bytes(output, data)
     terminal.write(str(output))

@@ -13,6 +13,7 @@ from lightpaint.lighting.answer.lighting_file import read_lighting
 from lightpaint.pipeline.job.sources import GroupsFile, SceneFile, content
 from lightpaint.relit.export_format import Source
 from lightpaint.relit.formats import names_of_forms, write_content, writers_of
+from lightpaint.sentences import Hint
 from lightpaint.storage.staging import finish
 
 
@@ -42,7 +43,10 @@ def export(
     check_writable(folder)
     if not force and (existing_files := [file for file in file_writers if file.exists()]):
         raise OutputError(
-            f"{existing_files[0]} exists: name another folder (folder=...), or pass force=True"
+            f"{existing_files[0]} exists: name another folder (",
+            Hint("folder"),
+            "), or pass ",
+            Hint("force", True),
         )
     contents = {file: make() for file, make in file_writers.items()}
     for file, content_made in contents.items():

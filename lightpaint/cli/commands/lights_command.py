@@ -10,6 +10,7 @@ from lightpaint.pipeline.job.sources import SceneFile
 from lightpaint.pipeline.light_sheets import check_sheet, render_sheet
 from lightpaint.scene.runtime.variant import use_variant
 from lightpaint.scene.scene import Scene
+from lightpaint.sentences import Sentence
 
 
 def lights(
@@ -48,9 +49,9 @@ def _draw_sheet(scene: Scene, sheet: Path, *, is_named: bool, force: bool) -> bo
     except (OutputError, BackendError) as error:
         if is_named and isinstance(error, OutputError):
             raise
-        reason = str(error)
+        reason = error.sentence
     if reason:
-        terminal.say(f"no {sheet}: {reason}")
+        terminal.say(Sentence(f"no {sheet}: ", reason))
         return False
     terminal.note("lights drawn")
     terminal.write(f"{sheet}: each light alone")

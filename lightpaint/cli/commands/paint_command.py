@@ -113,7 +113,7 @@ def _serve(
             raise
         terminal.say(f"the painter has ended; the session is kept in {folder}")
     except OutputError as error:  # also after an interrupt
-        terminal.complain("paint", str(error))
+        terminal.complain("paint", error.sentence)
         return CommandOutcome(None, 2)
     return CommandOutcome(None)
 
@@ -139,7 +139,8 @@ def _announce(server: "Server", name: str, folder: Path, *, is_reachable: bool) 
 
 def _print_lines(text: str) -> None:
     """Print a message of the server; that of a bug has many lines."""
-    for line in text.rstrip().split("\n"):
+    lines_of_text = text.rstrip().split("\n")
+    for line in lines_of_text if len(lines_of_text) > 1 else [text]:
         terminal.say(line)
 
 

@@ -99,7 +99,7 @@ def jobs_of(
         except LOOK_ERRORS as error:
             if failures is None or not options.keep_going or len(paintings) == 1:
                 raise
-            failures[folder.name] = str(error)
+            failures[folder.name] = error.sentence
     if options.lights_file:
         for job in jobs:  # if no scene has read it
             check_files(job.results.files, [Path(options.lights_file)])

@@ -1,13 +1,13 @@
 """Translation of the library's arguments to options: `--resize` for `resize=True`."""
 
 import os
-import re
 import shlex
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 
 from lightpaint.batch.run_options import RunOptions
 from lightpaint.field_options import options_of
 from lightpaint.pipeline.job.settings import Settings
+from lightpaint.sentences import Datum, Hint, Lead, Sentence, SourceKey, Word
 
 #: The records whose fields have options.
 RECORDS = (Settings, RunOptions)
@@ -55,45 +55,53 @@ SPELLINGS = _OTHER_SPELLINGS | {
 BY_OPTION = "on the command line"
 OPTIONS_OF_KEYS = {"limits": "limit", "duv": "kelvin"}
 
-#: Beginnings of errors: in a light's constraint or place by option, for an unknown light, and for a
-#: new light.
-_LIGHT = re.compile(
-    BY_OPTION + r": light\.(.+?)\.(lock|off|limits|color|kelvin|duv|primaries|move|aim|cone|beam)"
-    r"(?:\.\w+)?(?=:? )"
-)
-_UNKNOWN = re.compile(BY_OPTION + r": light\.[^:]+: (?=no light )")
-_NEW = re.compile(BY_OPTION + r": new( \d+)?(?:\.(?:on(?=: )|(\w+)))?(:?) ")
-
-#: `name=value` as the library writes it: a separate word, so that no path matches.
-_ARGUMENT = re.compile(
-    r"""(?<![^\s(])(\w+)=(\.\.\.|True|False|\d+|'[^']*'|"\w+"|\{'\w+':\ (?:\.\.\.|'[^']*')\})"""
-    r"""(?=[,;:.)]*(?:\s|$))""",
-    re.VERBOSE,
-)
-
 
 def spoken(text: str) -> str:
     """Return `text` of the library with the options of the command line."""
-    text = _LIGHT.sub(lambda match: f"--{OPTIONS_OF_KEYS.get(match[2], match[2])} {match[1]}", text)
-    text = _NEW.sub(_spoken_new, _UNKNOWN.sub("", text)).replace(f"{BY_OPTION}: ", "")
-    return _ARGUMENT.sub(_spoken, text)
+    return text.spelled(_spell) if isinstance(text, Sentence) else text
 
 
-def _spoken_new(match: re.Match[str]) -> str:
-    """Return how an error of a new light begins: `--add 2: count is`."""
-    number, key, colon = match.groups()
-    return f"--add{number or ''}: {key}{colon} " if key else f"--add{number or ''}: "
+def _spell(datum: Datum) -> str | None:
+    if isinstance(datum, Hint):
+        return _option(datum)
+    if isinstance(datum, SourceKey) and datum.source == BY_OPTION:
+        return _option_of_key(datum) or datum.path
+    if isinstance(datum, Lead) and datum.key.source == BY_OPTION:
+        return _lead(datum.key)
+    return None
 
 
-def _spoken(match: re.Match[str]) -> str:
-    argument, (name, value) = match[0], match.groups()
-    if argument in SPELLINGS:
-        return SPELLINGS[argument]
-    if name not in OPTIONS:
-        return argument
-    if key := re.fullmatch(r"\{'(\w+)': (?:\.\.\.|'(.*)')\}", value):
-        return f"{OPTIONS[name]} {key[1]}={key[2] or 'VALUE'}"
-    return OPTIONS[name] if value in ("...", "True") else f"{OPTIONS[name]} {value.strip(chr(34))}"
+def _option(hint: Hint) -> str | None:
+    """Return the option of an argument, with its value; None if it has none."""
+    if str(hint) in SPELLINGS:
+        return SPELLINGS[str(hint)]
+    option = OPTIONS.get(hint.name)
+    if option is None or hint.value is ... or hint.value is True:
+        return option
+    if isinstance(hint.value, Mapping):
+        [(key, value)] = hint.value.items()
+        return f"{option} {key}={'VALUE' if value is ... else value}"
+    return f"{option} {hint.value if isinstance(hint.value, Word) else repr(hint.value)}"
+
+
+def _option_of_key(key: SourceKey) -> str | None:
+    """Return `--limit NAME`, or `--add 2: count` for a new light; None for other keys."""
+    match key.keys:
+        case ("light", name, setting, *_):
+            return f"--{OPTIONS_OF_KEYS.get(str(setting), setting)} {name}"
+        case ("new", int(number), *setting) if len(setting) < 2:
+            return " ".join((f"--add {number}:", *map(str, setting)))
+        case ("new", *setting) if len(setting) < 2:
+            return " ".join(("--add:", *map(str, setting)))
+    return None
+
+
+def _lead(key: SourceKey) -> str:
+    """Return how an error of a key begins; "" if the error names the light by itself."""
+    option = _option_of_key(key)
+    if option is None:
+        return "" if key.keys[0] == "light" else f"{key.path}: "
+    return f"{option.removesuffix(' on').removesuffix(':')}: "
 
 
 def from_any_folder(words: Sequence[str] | str) -> str:

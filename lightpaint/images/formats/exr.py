@@ -140,18 +140,19 @@ def read_parts(path: Path) -> list[ExrPart]:
     if kind_of(head) != "exr":
         name = name_of(head)
         description = f"is a {name} file" if name else "is not an OpenEXR file"
-        raise ImageError(f"{path} {description}: export it as linear OpenEXR")
+        raise ImageError(path, f" {description}: export it as linear OpenEXR")
     with silenced():
         declared = _declared(path)
         _check_headers(path, declared)
         try:
             parts = OpenEXR.File(str(path), separate_channels=True).parts
         except Exception as error:
-            raise ImageError(f"{path} is damaged: {first_line(error, path=path)}") from error
+            raise ImageError(path, f" is damaged: {first_line(error, path=path)}") from error
     if len(parts) != len(declared):
         raise ImageError(
-            f"{path} is cut off or damaged: only {len(parts)} of its {len(declared)} parts can be "
-            "read; export it again"
+            path,
+            f" is cut off or damaged: only {len(parts)} of its {len(declared)} parts can be "
+            "read; export it again",
         )
     return [_part(path, part) for part in parts]
 
@@ -163,20 +164,18 @@ def _declared(path: Path) -> list[tuple[str | None, dict[str, Any]]]:
         declared = [(part.name(), dict(part.header)) for part in header.parts]
         _windows(declared[0][1])
     except Exception as error:
-        raise ImageError(_why_unreadable(path, first_line(error, path=path))) from error
+        raise _unreadable(path, first_line(error, path=path)) from error
     return declared
 
 
-def _why_unreadable(path: Path, reason: str) -> str:
-    """Return the error message for a file with an unreadable header. reason: the library's
-    message.
-    """
+def _unreadable(path: Path, reason: str) -> ImageError:
+    """Return the error for a file with an unreadable header. reason: the library's message."""
     if kind_of(head_of(path, 16)) != "exr":
-        return f"{path} is not a readable OpenEXR file: {reason}"
+        return ImageError(path, f" is not a readable OpenEXR file: {reason}")
     # The library repeats the file's name, and gives no reason for a truncated file.
     detail = re.sub(r"(^Unable|\s*when attempting) to open .*", "", reason)
     suffix = f" ({detail})" if detail else ""
-    return f"{path} is cut off or damaged in its header{suffix}: export it again"
+    return ImageError(path, f" is cut off or damaged in its header{suffix}: export it again")
 
 
 def _texts(header: Mapping[str, Any]) -> dict[str, str]:
@@ -187,7 +186,7 @@ def _texts(header: Mapping[str, Any]) -> dict[str, str]:
 def _part(path: Path, part: Any) -> ExrPart:
     """Convert a part of the library to an `ExrPart`."""
     if not part.channels:
-        raise ImageError(f"{path} has a part without channels")
+        raise ImageError(path, " has a part without channels")
     (x0, y0), (x1, y1) = ((int(x), int(y)) for x, y in part.header["dataWindow"])
     size = y1 - y0 + 1, x1 - x0 + 1
     channels = {}
@@ -196,7 +195,7 @@ def _part(path: Path, part: Any) -> ExrPart:
         if (channel.ySampling, channel.xSampling) != (1, 1):
             pixels = _interpolated(pixels, size, (channel.ySampling, channel.xSampling))
         if pixels.shape != size:
-            raise ImageError(f"{path} is damaged: channel {name} has another size than the file")
+            raise ImageError(path, f" is damaged: channel {name} has another size than the file")
         channels[name] = pixels
     display, offset = _windows(part.header)
     views = part.header.get("multiView")
@@ -277,7 +276,7 @@ def write_parts(path: Path, parts: Sequence[ExrPart]) -> None:
             OpenEXR.File(exr_parts).write(str(temporary))
         except RuntimeError as error:  # raised if the disk is full, for example
             raise OutputError(
-                f"cannot write {path}: {first_line(error, path=temporary)}"
+                "cannot write ", path, f": {first_line(error, path=temporary)}"
             ) from error
 
 
@@ -326,18 +325,19 @@ def _check_headers(path: Path, declared: list[tuple[str | None, dict[str, Any]]]
         kind = header.get("type")
         if kind in (OpenEXR.deepscanline, OpenEXR.deeptile):
             raise ImageError(
-                f"{path} holds deep pixels (part {name or 0!r}): flatten it and export it again"
+                path, f" holds deep pixels (part {name or 0!r}): flatten it and export it again"
             )
         (x0, y0), (x1, y1) = header["dataWindow"]
         width, height = int(x1) - int(x0) + 1, int(y1) - int(y0) + 1
         if width < 1 or height < 1:
-            raise ImageError(f"{path} declares an empty image of {width}x{height} pixels")
+            raise ImageError(path, f" declares an empty image of {width}x{height} pixels")
         (height_shown, width_shown), _ = _windows(header)
         pixels = max(width * height, width_shown * height_shown)
         # Four bytes per number, since half floats are converted to float32 later.
         size += pixels * 4 * max(len(header.get("channels", ())), 1)
     if size > max(MAX_BYTES, MAX_COMPRESSION * path.stat().st_size):
         raise ImageError(
-            f"{path} declares {size:.2g} bytes of pixels, in a file of {path.stat().st_size:.2g}: "
-            "too many to read"
+            path,
+            f" declares {size:.2g} bytes of pixels, in a file of {path.stat().st_size:.2g}: "
+            "too many to read",
         )

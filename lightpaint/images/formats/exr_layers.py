@@ -19,6 +19,7 @@ from lightpaint.colour.primaries import (
 from lightpaint.display_text import some_names
 from lightpaint.errors import ImageError
 from lightpaint.images.formats.exr import ExrPart
+from lightpaint.sentences import Hint
 
 #: Attribute of EXR files with separate Krita layers, which have no merged picture.
 KRITA_LAYERS = "krita_layers_info"
@@ -144,13 +145,16 @@ def choose_layer(parts: Sequence[ExrPart], requested: str | None = None) -> ExrL
         if len(layers) > 1 and any(KRITA_LAYERS in part.attributes for part in parts):
             raise ImageError(
                 f"has {len(layers)} layers of Krita ({_names(layers)}) and no merged picture: "
-                "flatten the image and export it again, or name the painted one with layer=..."
+                "flatten the image and export it again, or name the painted one with ",
+                Hint("layer"),
             )
         plain = [layer for layer in layers if not layer.prefix] or layers
         if len(plain) > 1:
             raise ImageError(
                 f"has {len(plain)} layers ({_names(plain)}), and any of them could be meant: "
-                "name one with layer=..., or export a single image"
+                "name one with ",
+                Hint("layer"),
+                ", or export a single image",
             )
         return plain[0]
     for matches in (

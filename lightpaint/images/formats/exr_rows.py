@@ -188,7 +188,7 @@ class RowFile:
         return blocks
 
     def _damaged(self) -> ImageError:
-        return ImageError(f"{self.path} is cut off or damaged: make it again")
+        return ImageError(self.path, " is cut off or damaged: make it again")
 
 
 def _attributes(head: bytes, position: int) -> tuple[dict[str, tuple[str, bytes]], int]:

@@ -37,7 +37,7 @@ def head_of(path: Path, length: int) -> bytes:
         with path.open("rb") as file:
             return file.read(length)
     except OSError as error:
-        raise ImageError(f"cannot read {path}: {error.strerror}") from error
+        raise ImageError("cannot read ", path, f": {error.strerror}") from error
 
 
 def kind_of(head: bytes) -> str:

@@ -51,7 +51,7 @@ def layered_kind(path: Path, head: bytes) -> str:
         if media_type.startswith(mark):
             return kind
     raise ImageError(
-        f"{path} is a zip archive, but not one of OpenRaster or Krita: export it as PNG or OpenEXR"
+        path, " is a zip archive, but not one of OpenRaster or Krita: export it as PNG or OpenEXR"
     )
 
 

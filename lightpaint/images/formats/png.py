@@ -71,7 +71,7 @@ def write_png_16(
             np.ascontiguousarray(values)
         )
         if not (output.close() and is_written):
-            raise OutputError(f"cannot write {path}: {output.geterror() or 'no reason given'}")
+            raise OutputError("cannot write ", path, f": {output.geterror() or 'no reason given'}")
 
 
 def png_bytes(image_8_bit: npt.NDArray[Any], texts: Mapping[str, str] | None = None) -> bytes:

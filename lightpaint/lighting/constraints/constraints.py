@@ -29,6 +29,7 @@ from lightpaint.lighting.constraints.values import (
     parse_strength,
     parse_whites,
 )
+from lightpaint.sentences import Sentence, SourceKey
 from lightpaint.validation import MAX_LISTED
 
 #: Keys of the constraints on one light.
@@ -57,7 +58,7 @@ class LightConstraint:
     primaries: tuple[RGB, ...] | None = None
     whites: WhiteRange | None = None
     label: str = ""
-    where: str = ""
+    where: SourceKey = field(default_factory=SourceKey)
 
     @property
     def is_fixed(self) -> bool:
@@ -70,33 +71,36 @@ class LightConstraint:
 
         Raises ConstraintError for invalid values and for keys that contradict each other.
         """
-        check_keys(table, LIGHT_KEYS, where)
-        check_lengths(table, where)
+        key = SourceKey.of(where)
+        check_keys(table, LIGHT_KEYS, key)
+        check_lengths(table, key)
         table = {key: value for key, value in table.items() if value is not False}
-        _check_contradictions(table, where)
-        lock = parse_lock(table["lock"], f"{where}.lock") if "lock" in table else None
+        _check_contradictions(table, key)
+        lock = parse_lock(table["lock"], key / "lock") if "lock" in table else None
         if "off" in table and table["off"] is not True:
-            raise ConstraintError(f"{where}.off is {table['off']!r}: expected true or false")
+            raise ConstraintError(key / "off", f" is {table['off']!r}: expected true or false")
         least, most = (
-            parse_limits(table["limits"], f"{where}.limits") if "limits" in table else (None,) * 2
+            parse_limits(table["limits"], key / "limits") if "limits" in table else (None,) * 2
         )
-        primaries = parse_primaries(table, where)
-        whites = parse_whites(table, where)
+        primaries = parse_primaries(table, key)
+        whites = parse_whites(table, key)
         if lock is not None and primaries is not None:
             if lock.level is None or lock.color is not None or isinstance(lock.level.amount, tuple):
                 raise ConstraintError(
-                    f"{where} has a lock that holds its colour and "
+                    key,
+                    " has a lock that holds its colour and "
                     f"{_first_key(table, COLOR_KEYS)!r} that "
-                    "sets one: lock it at a number or at a percentage, or leave one out"
+                    "sets one: lock it at a number or at a percentage, or leave one out",
                 )
             if len(primaries) > 1:
                 raise ConstraintError(
-                    f"{where} has both lock and {_first_key(table, COLOR_KEYS)!r}, which leaves "
+                    key,
+                    f" has both lock and {_first_key(table, COLOR_KEYS)!r}, which leaves "
                     f"the mix "
-                    "of its colours open: lock it at a colour"
+                    "of its colours open: lock it at a colour",
                 )
             lock, primaries = Lock(lock.level, primaries[0]), None
-        return cls(lock, "off" in table, least, most, primaries, whites, _label(table), where)
+        return cls(lock, "off" in table, least, most, primaries, whites, _label(table), key)
 
 
 def _label(table: Mapping[str, Any]) -> str:
@@ -109,11 +113,11 @@ class Tie:
 
     lights: tuple[str, ...]
     color: RGB | None = None
-    where: str = "tie"
+    where: SourceKey = field(default_factory=lambda: SourceKey("", "tie"))
 
     def __post_init__(self) -> None:
         if not self.lights or not all(isinstance(x, str) and x for x in self.lights):
-            raise ConstraintError(f"{self.where}: expected names of at least two lights")
+            raise ConstraintError(self.where, ": expected names of at least two lights")
 
 
 @keywords()
@@ -142,7 +146,7 @@ class Constraints:
         Constraints(panel lock; bulb color 3200K; sparse 2)
     """
 
-    lights: tuple[tuple[str, Mapping[str, Any], str], ...] = ()
+    lights: tuple[tuple[str, Mapping[str, Any], SourceKey], ...] = ()
     ties: tuple[Tie, ...] = ()
     prefer_current: float = 0.0
     sparse: int | None = None
@@ -184,26 +188,27 @@ class Constraints:
 
         Raises ConstraintError, naming the light, the key and what is expected.
         """
-        lead = f"{where}: " if where else ""
+        source = SourceKey(where)
         if not isinstance(light, Mapping | None):
-            raise ConstraintError(f"{lead}light is {light!r}: expected tables [light.NAME]")
+            raise ConstraintError(source / "light", f" is {light!r}: expected tables [light.NAME]")
         if light is not None and len(light) > MAX_LISTED:
             raise ConstraintError(
-                f"{lead}light has {len(light)} names: at most {MAX_LISTED} are read"
+                source / "light", f" has {len(light)} names: at most {MAX_LISTED} are read"
             )
         lights = []
         for name, table in (light or {}).items():
             # Checked now, so that a mistake is reported even if the scene has no such light.
-            LightConstraint.of(table, where=f"{lead}light.{name}")
-            lights.append((name, dict(table), f"{lead}light.{name}"))
+            key = source / "light" / str(name)
+            LightConstraint.of(table, where=key)
+            lights.append((name, dict(table), key))
         lights.sort(key=lambda entry: not is_pattern(entry[0]))
         return cls(
             tuple(lights),
-            _parse_ties(tie, f"{lead}tie"),
-            parse_strength(prefer_current, f"{lead}prefer_current"),
-            parse_count(sparse, f"{lead}sparse"),
-            parse_start({} if start is None else start, f"{lead}start"),
-            parse_strength(near, f"{lead}near"),
+            _parse_ties(tie, source / "tie"),
+            parse_strength(prefer_current, source / "prefer_current"),
+            parse_count(sparse, source / "sparse"),
+            parse_start({} if start is None else start, source / "start"),
+            parse_strength(near, source / "near"),
         )
 
     @keywords()
@@ -248,7 +253,7 @@ _CONTRADICTS = {
 }
 
 
-def _check_contradictions(table: Mapping[str, Any], where: str) -> None:
+def _check_contradictions(table: Mapping[str, Any], where: SourceKey) -> None:
     for first in LIGHT_KEYS:
         for second in _CONTRADICTS.get(first, ()):
             # A fixed colour and a level to lock it at go together.
@@ -258,29 +263,32 @@ def _check_contradictions(table: Mapping[str, Any], where: str) -> None:
                 and not ("lock" in (first, second) and {first, second} & set(COLOR_KEYS))
             ):
                 raise ConstraintError(
-                    f"{where} has both {first!r} and {second!r}, which contradict each other: "
-                    "leave one out"
+                    where,
+                    f" has both {first!r} and {second!r}, which contradict each other: "
+                    "leave one out",
                 )
     if "duv" in table and not (
         "kelvin" in table or str(table.get("color", "")).upper().endswith("K")
     ):
-        raise ConstraintError(f"{where} has 'duv' without a 'kelvin' that it is the distance from")
+        raise ConstraintError(where, " has 'duv' without a 'kelvin' that it is the distance from")
 
 
-def _parse_ties(value: Any, where: str) -> tuple[Tie, ...]:
-    expected = f'{where} is {value!r}: expected lists of names, [["a", "b"]], or tables [[tie]]'
+def _parse_ties(value: Any, where: SourceKey) -> tuple[Tie, ...]:
+    expected = Sentence(
+        where, f' is {value!r}: expected lists of names, [["a", "b"]], or tables [[tie]]'
+    )
     if isinstance(value, str | Mapping) or not isinstance(value, Sequence):
         raise ConstraintError(expected)
     if value and all(isinstance(name, str) for name in value):
         value = [value]  # one tie
     if len(value) > MAX_LISTED:
-        raise ConstraintError(f"{where} lists {len(value)}: at most {MAX_LISTED} are read")
+        raise ConstraintError(where, f" lists {len(value)}: at most {MAX_LISTED} are read")
     ties = []
     for entry in value:
         if isinstance(entry, Mapping):
             check_keys(entry, ("lights", "color"), where)
             names = entry.get("lights")
-            color = parse_color(entry["color"], f"{where}.color") if "color" in entry else None
+            color = parse_color(entry["color"], where / "color") if "color" in entry else None
         else:
             names, color = entry, None
         if isinstance(names, str) or not isinstance(names, Sequence):

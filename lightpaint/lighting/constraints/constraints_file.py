@@ -10,6 +10,7 @@ from lightpaint.keywords import keywords
 from lightpaint.lighting.constraints.constraints import LIGHT_KEYS, Constraints
 from lightpaint.lighting.constraints.values import check_keys, parse_strength
 from lightpaint.scene.lights.lights_file import IMAGE_KEYS, MOVES, SceneRequests, read_keys
+from lightpaint.sentences import SourceKey
 
 #: Characters of an error, which names the file, the light and the key before it quotes.
 MAX_MESSAGE_LENGTH = 1000
@@ -50,7 +51,7 @@ def constraints_of(requests: SceneRequests) -> Constraints:
         )
     except ConstraintError as error:
         # A value in the file may be of any length.
-        raise ConstraintError(one_line(str(error), limit=MAX_MESSAGE_LENGTH)) from None
+        raise ConstraintError(one_line(error.sentence, limit=MAX_MESSAGE_LENGTH)) from None
 
 
 def _without_moves(light: Any, source: str) -> Any:
@@ -59,7 +60,7 @@ def _without_moves(light: Any, source: str) -> Any:
         return light
     tables = {}
     for name, table in light.items():
-        check_keys(table, (*LIGHT_KEYS, *MOVES, *IMAGE_KEYS), f"{source}: light.{name}")
+        check_keys(table, (*LIGHT_KEYS, *MOVES, *IMAGE_KEYS), SourceKey(source, "light", name))
         remaining = {key: value for key, value in table.items() if key not in (*MOVES, *IMAGE_KEYS)}
         if remaining or not table:
             tables[name] = remaining
@@ -77,8 +78,8 @@ def _pull_strength(keys: Mapping[str, Any], source: str) -> Any:
         raise ConstraintError(
             f"{source}: both prefer_current and prefer, which is its older name: leave prefer out"
         )
-    strength, place = keys["prefer"], f"{source}: prefer"
+    strength, place = keys["prefer"], SourceKey(source, "prefer")
     if isinstance(strength, Mapping):
         check_keys(strength, ("current",), place)
-        strength, place = strength.get("current", 0.0), f"{place}.current"
+        strength, place = strength.get("current", 0.0), place / "current"
     return parse_strength(strength, place)

@@ -15,6 +15,7 @@ from lightpaint.lighting.constraints.constraints import (
     merge_tables,
 )
 from lightpaint.scene.lights.texels.texel import coarse_name, image_of
+from lightpaint.sentences import Hint, Lead, SourceKey
 
 
 def constraints_by_light(
@@ -47,12 +48,13 @@ def tied_lights(
         members = sorted({k for name in tie.lights for k in _match_lights(name, lights, tie.where)})
         listed = some_names(tie.lights)
         if len(members) < 2:
-            raise ConstraintError(f"{tie.where}: {listed} is one light: a tie has at least two")
+            raise ConstraintError(tie.where, f": {listed} is one light: a tie has at least two")
         for k in members:
             if k in ties:
                 raise ConstraintError(
-                    f"{tie.where}: light {lights[k].name!r} is in two ties, "
-                    f"{some_names(ties[k][0].lights)} and {listed}: it has one dimmer"
+                    tie.where,
+                    f": light {lights[k].name!r} is in two ties, "
+                    f"{some_names(ties[k][0].lights)} and {listed}: it has one dimmer",
                 )
             ties[k] = (tie, members)
     return ties
@@ -87,18 +89,20 @@ def _match_lights(
             if only_keeps:
                 return []  # which a fixed light does anyway
             raise ConstraintError(
-                f"{where}: {name!r} is fixed, since it is not among the lights to adjust: choose "
-                "it with lights=..., or remove its constraint"
+                where,
+                f": {name!r} is fixed, since it is not among the lights to adjust: choose it with ",
+                Hint("lights"),
+                ", or remove its constraint",
             )
         if name not in names:
             raise ConstraintError(
-                f"{where}: {name!r} is part of the light {light.name!r}: constrain that light"
+                where, f": {name!r} is part of the light {light.name!r}: constrain that light"
             )
     matches = [k for k, x in enumerate(lights) if not x.is_fixed and _is_meant(x.name, name)]
     if not matches:
         adjustable = [light.name for light in lights if not light.is_fixed]
         hint = with_similar_name(f"there are {some_names(adjustable)}", name, adjustable)
-        raise ConstraintError(f"{where}: no light {name!r}; {hint}")
+        raise ConstraintError(Lead(SourceKey.of(where)), f"no light {name!r}; {hint}")
     return matches
 
 

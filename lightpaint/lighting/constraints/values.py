@@ -11,6 +11,7 @@ from lightpaint.colour.color import hex_to_rgb, kelvin_to_rgb, luminance
 from lightpaint.colour.white_range import WhiteRange, white_range
 from lightpaint.errors import ColorError, ConstraintError
 from lightpaint.files import one_line
+from lightpaint.sentences import SourceKey
 from lightpaint.validation import (
     BRIGHTEST,
     MAX_NAME,
@@ -42,17 +43,17 @@ class Lock:
     color: RGB | None = None
 
 
-def check_keys(table: Any, known: Iterable[str], where: str) -> None:
+def check_keys(table: Any, known: Iterable[str], where: SourceKey) -> None:
     """Raise ConstraintError unless it is a table of keys that are `known`."""
     if not isinstance(table, Mapping):
-        raise ConstraintError(f"{where} is {table!r}: expected keys like lock = true")
+        raise ConstraintError(where, f" is {table!r}: expected keys like lock = true")
     if unknown := [key for key in table if key not in known]:
         raise ConstraintError(
-            f"{where} has the key {one_line(repr(unknown[0]))}: known are {', '.join(known)}"
+            where, f" has the key {one_line(repr(unknown[0]))}: known are {', '.join(known)}"
         )
 
 
-def check_lengths(table: Mapping[str, Any], where: str) -> None:
+def check_lengths(table: Mapping[str, Any], where: SourceKey) -> None:
     """Raise ConstraintError for a value that is longer than any valid one."""
     for key, value in table.items():
         texts = [*value] if isinstance(value, list | tuple) else [value]
@@ -63,12 +64,13 @@ def check_lengths(table: Mapping[str, Any], where: str) -> None:
         for text in texts:
             if isinstance(text, str | list | tuple | Mapping) and len(text) > MAX_NAME:
                 raise ConstraintError(
-                    f"{where}.{key} has a value of {len(text)} characters or numbers: at most "
-                    f"{MAX_NAME} are read"
+                    where / key,
+                    f" has a value of {len(text)} characters or numbers: at most "
+                    f"{MAX_NAME} are read",
                 )
 
 
-def parse_lock(value: Any, where: str) -> Lock:
+def parse_lock(value: Any, where: SourceKey) -> Lock:
     """Return the lock that `true`, a level, or a colour and a level ask for."""
     if value is True:
         return Lock()
@@ -76,17 +78,17 @@ def parse_lock(value: Any, where: str) -> Lock:
     if isinstance(value, str):
         words = value.split()
         if len(words) not in (1, 2):
-            raise ConstraintError(f"{where} is {value!r}: {expected}, like '3200K 40%'")
+            raise ConstraintError(where, f" is {value!r}: {expected}, like '3200K 40%'")
         colors = [word for word in words if word.startswith("#") or word.upper().endswith("K")]
         levels = [word for word in words if word not in colors]
         if len(colors) > 1 or len(levels) > 1:
-            raise ConstraintError(f"{where} is {value!r}: {expected}, like '3200K 40%'")
+            raise ConstraintError(where, f" is {value!r}: {expected}, like '3200K 40%'")
         level = parse_level(levels[0], where, expected) if levels else None
         return Lock(level, parse_color(colors[0], where) if colors else None)
     return Lock(parse_level(value, where, expected))
 
 
-def parse_level(value: Any, where: str, expected: str = "") -> Level:
+def parse_level(value: Any, where: SourceKey, expected: str = "") -> Level:
     """Parse a level: `2.5`, `"40%"` or `[r, g, b]`."""
     expected = expected or "expected a luminance like 2.5, a share like 40%, or three numbers >= 0"
     if isinstance(value, str):
@@ -96,72 +98,73 @@ def parse_level(value: Any, where: str, expected: str = "") -> Level:
         except ValueError:
             number = -1.0
         if not is_amount(number):
-            raise ConstraintError(f"{where} is {value!r}: {expected}, of at most {BRIGHTEST:g}")
+            raise ConstraintError(where, f" is {value!r}: {expected}, of at most {BRIGHTEST:g}")
         return Level(number / 100, is_share=True) if text.endswith("%") else Level(number)
     if is_number(value) and is_amount(value):
         return Level(float(value))
     if is_emission(value):
         return Level(as_rgb(value))
-    raise ConstraintError(f"{where} is {value!r}: {expected}, of at most {BRIGHTEST:g}")
+    raise ConstraintError(where, f" is {value!r}: {expected}, of at most {BRIGHTEST:g}")
 
 
-def parse_limits(value: Any, where: str) -> tuple[Level | None, Level | None]:
+def parse_limits(value: Any, where: SourceKey) -> tuple[Level | None, Level | None]:
     """Parse least and most from a table of `min`, `max` or both."""
     check_keys(value, ("min", "max"), where)
     if not value:
-        raise ConstraintError(f"{where} is empty: expected min, max or both")
+        raise ConstraintError(where, " is empty: expected min, max or both")
     least, most = (
-        parse_level(value[key], f"{where}.{key}") if key in value else None
-        for key in ("min", "max")
+        parse_level(value[key], where / key) if key in value else None for key in ("min", "max")
     )
     if least and most and least.is_share == most.is_share:
         low, high = np.array(least.amount), np.array(most.amount)
         if low.ndim == high.ndim and (low > high).any():
-            raise ConstraintError(f"{where} has a min of {least} above its max of {most}")
+            raise ConstraintError(where, f" has a min of {least} above its max of {most}")
     return least, most
 
 
-def parse_primaries(table: Mapping[str, Any], where: str) -> tuple[RGB, ...] | None:
+def parse_primaries(table: Mapping[str, Any], where: SourceKey) -> tuple[RGB, ...] | None:
     """Return the colours that a light can mix, each of luminance 1; None if any colour will do."""
     if "color" in table:
-        return (parse_color(table["color"], f"{where}.color", duv=_parse_duv(table, where)),)
+        return (parse_color(table["color"], where / "color", duv=_parse_duv(table, where)),)
     if "kelvin" in table:
-        ends = _parse_kelvins(table["kelvin"], f"{where}.kelvin")
-        return tuple(_parse_kelvin(x, _parse_duv(table, where), f"{where}.kelvin") for x in ends)
+        ends = _parse_kelvins(table["kelvin"], where / "kelvin")
+        return tuple(_parse_kelvin(x, _parse_duv(table, where), where / "kelvin") for x in ends)
     if "primaries" not in table:
         return None
     listed = table["primaries"]
     if not isinstance(listed, Sequence) or isinstance(listed, str) or not listed:
         raise ConstraintError(
-            f"{where}.primaries is {one_line(repr(listed))}: expected a list of colours, "
-            '["#ff0000", "3000K"]'
+            where / "primaries",
+            f' is {one_line(repr(listed))}: expected a list of colours, ["#ff0000", "3000K"]',
         )
     if len(listed) > MAX_PRIMARIES:
         raise ConstraintError(
-            f"{where}.primaries lists {len(listed)} colours: at most {MAX_PRIMARIES} can be mixed"
+            where / "primaries",
+            f" lists {len(listed)} colours: at most {MAX_PRIMARIES} can be mixed",
         )
-    return tuple(parse_color(color, f"{where}.primaries") for color in listed)
+    return tuple(parse_color(color, where / "primaries") for color in listed)
 
 
-def parse_whites(table: Mapping[str, Any], where: str) -> WhiteRange | None:
+def parse_whites(table: Mapping[str, Any], where: SourceKey) -> WhiteRange | None:
     """Return the range of white that a light keeps to; None without one."""
-    ends = _parse_kelvins(table["kelvin"], f"{where}.kelvin") if "kelvin" in table else []
+    ends = _parse_kelvins(table["kelvin"], where / "kelvin") if "kelvin" in table else []
     return white_range(*ends, _parse_duv(table, where)) if len(ends) == 2 else None
 
 
-def _parse_kelvins(value: Any, where: str) -> list[float]:
+def _parse_kelvins(value: Any, where: SourceKey) -> list[float]:
     """Return one temperature, or both ends of a range."""
     ends = [value] if is_number(value) else value
     is_range = isinstance(ends, Sequence) and not isinstance(ends, str) and len(ends) in (1, 2)
     if not is_range or not all(map(is_number, ends)) or sorted(ends) != list(ends):
         raise ConstraintError(
-            f"{where} is {value!r}: expected a temperature, 3200, or a range from low to high, "
-            "[2700, 6500]"
+            where,
+            f" is {value!r}: expected a temperature, 3200, or a range from low to high, "
+            "[2700, 6500]",
         )
     return [float(kelvin) for kelvin in dict.fromkeys(ends)]
 
 
-def parse_color(value: Any, where: str, *, duv: float = 0.0) -> RGB:
+def parse_color(value: Any, where: SourceKey, *, duv: float = 0.0) -> RGB:
     """Parse a colour: `"#ffaa66"`, `"3200K"` or `[r, g, b]`; return it at luminance 1."""
     try:
         if isinstance(value, str) and value.strip().startswith("#"):
@@ -174,52 +177,52 @@ def parse_color(value: Any, where: str, *, duv: float = 0.0) -> RGB:
             raise ColorError(f"{value!r} is not a colour")
     except (ColorError, ValueError):
         raise ConstraintError(
-            f"{where} is {value!r}: expected a colour like #ffaa66, 3200K or three numbers >= 0"
+            where, f" is {value!r}: expected a colour like #ffaa66, 3200K or three numbers >= 0"
         ) from None
     if not rgb.any():
         raise ConstraintError(
-            f"{where} is {value!r}, black, which is not a colour of light: use off"
+            where, f" is {value!r}, black, which is not a colour of light: use off"
         )
     return as_rgb(rgb / luminance(rgb))
 
 
-def _parse_kelvin(kelvin: float, duv: float, where: str) -> RGB:
+def _parse_kelvin(kelvin: float, duv: float, where: SourceKey) -> RGB:
     try:
         return as_rgb(kelvin_to_rgb(kelvin, duv))
     except ColorError as error:
-        raise ConstraintError(f"{where}: {error}") from None
+        raise ConstraintError(where, ": ", error) from None
 
 
-def _parse_duv(table: Mapping[str, Any], where: str) -> float:
+def _parse_duv(table: Mapping[str, Any], where: SourceKey) -> float:
     duv = table.get("duv", 0.0)
     if not (is_number(duv) and is_amount(abs(duv))):
-        raise ConstraintError(f"{where}.duv is {duv!r}: expected a number like 0.003")
+        raise ConstraintError(where / "duv", f" is {duv!r}: expected a number like 0.003")
     return float(duv)
 
 
-def parse_strength(value: Any, where: str) -> float:
+def parse_strength(value: Any, where: SourceKey) -> float:
     """Return the strength of a pull."""
     if not (is_number(value) and is_amount(value)):
-        raise ConstraintError(f"{where} is {value!r}: expected a strength >= 0, like 0.1")
+        raise ConstraintError(where, f" is {value!r}: expected a strength >= 0, like 0.1")
     return float(value)
 
 
-def parse_start(start: Any, where: str) -> dict[str, RGB]:
+def parse_start(start: Any, where: SourceKey) -> dict[str, RGB]:
     """Return emissions, three numbers, by name of light. Raises ConstraintError."""
     if not isinstance(start, Mapping):
-        raise ConstraintError(f"{where} is {start!r}: expected emissions by name of light")
+        raise ConstraintError(where, f" is {start!r}: expected emissions by name of light")
     for name, emission in start.items():
         if not is_emission(emission):
             raise ConstraintError(
-                f"{where}.{name} is {emission!r}: expected an emission of three numbers >= 0"
+                where / str(name), f" is {emission!r}: expected an emission of three numbers >= 0"
             )
     return {str(name): as_rgb(emission) for name, emission in start.items()}
 
 
-def parse_count(value: Any, where: str) -> int | None:
+def parse_count(value: Any, where: SourceKey) -> int | None:
     """Return the largest number of lights; None for any number."""
     if value is not None and not (type(value) is int and value > 0):
-        raise ConstraintError(f"{where} is {value!r}: expected a whole number of lights > 0")
+        raise ConstraintError(where, f" is {value!r}: expected a whole number of lights > 0")
     return value
 
 

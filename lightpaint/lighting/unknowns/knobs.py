@@ -15,6 +15,7 @@ from lightpaint.colour.white_range import WhiteRange
 from lightpaint.errors import ConstraintError
 from lightpaint.lighting.constraints.constraints import LightConstraint, Tie
 from lightpaint.lighting.constraints.values import Level, Lock
+from lightpaint.sentences import SourceKey
 
 #: Share by which a lower limit may exceed an upper one before they contradict: round-off.
 ROUND_OFF = 1e-12
@@ -56,8 +57,9 @@ def _mix_limits(
             least, most = (value, most) if is_least else (least, value)
         elif constraint.primaries is not None:
             raise ConstraintError(
-                f"{constraint.where}.limits has {level} for a light that mixes primaries: give a "
-                "luminance like 2.5 or a share like 40%"
+                constraint.where / "limits",
+                f" has {level} for a light that mixes primaries: give a "
+                "luminance like 2.5 or a share like 40%",
             )
         elif is_least:
             lower = np.array(level.amount)
@@ -74,8 +76,9 @@ def _luminance(level: Level, light: BasisLight, constraint: LightConstraint) -> 
     now = float(luminance(np.array(light.emission)))
     if now == 0:
         raise ConstraintError(
-            f"{constraint.where}.limits has {level} of the current luminance, but "
-            f"{light.name!r} is currently off: give a number"
+            constraint.where / "limits",
+            f" has {level} of the current luminance, but "
+            f"{light.name!r} is currently off: give a number",
         )
     return level.amount * now
 
@@ -85,9 +88,8 @@ def _check_grey(constraint: LightConstraint, light: BasisLight) -> None:
     for level in (constraint.least, constraint.most):
         if light.is_scalar and level is not None and isinstance(level.amount, tuple):
             raise ConstraintError(
-                f"{constraint.where}.limits has {level}, and {light.name!r} can only be dimmed as "
-                f"a "
-                "whole: give one number"
+                constraint.where / "limits",
+                f" has {level}, and {light.name!r} can only be dimmed as a whole: give one number",
             )
 
 
@@ -95,9 +97,10 @@ def _check_room(constraint: LightConstraint, light: BasisLight, lower: Any, uppe
     """Refuse limits that leave nothing between them."""
     if (np.asarray(lower) > np.asarray(upper) * (1 + ROUND_OFF)).any() or np.isinf(lower).any():
         raise ConstraintError(
-            f"{constraint.where} asks {light.name!r} for {constraint.label}, which leaves it no "
+            constraint.where,
+            f" asks {light.name!r} for {constraint.label}, which leaves it no "
             f"emission "
-            "at all: widen the limits"
+            "at all: widen the limits",
         )
 
 
@@ -206,9 +209,10 @@ def dimmer_knob(k: int, light: BasisLight, constraint: LightConstraint) -> Knob:
     """Make the knob of a light of one colour, which dims."""
     if light.is_scalar and constraint.primaries is not None:
         raise ConstraintError(
-            f"{constraint.where} asks for a colour, and {light.name!r} can only be dimmed as a "
+            constraint.where,
+            f" asks for a colour, and {light.name!r} can only be dimmed as a "
             f"whole: "
-            "use lock, limits, tie or off"
+            "use lock, limits, tie or off",
         )
     direction = np.ones(3) if constraint.primaries is None else np.array(constraint.primaries[0])
     _check_grey(constraint, light)
@@ -237,9 +241,10 @@ def tied_knob(
         columns.append((k, direction))
     if lower > upper * (1 + ROUND_OFF):
         raise ConstraintError(
-            f"{tie.where}: {names} share a dimmer, but one needs at least {lower:.4g} times its "
+            tie.where,
+            f": {names} share a dimmer, but one needs at least {lower:.4g} times its "
             f"current luminance and another allows at most {upper:.4g}: change these limits, or "
-            "leave one out"
+            "leave one out",
         )
     return Knob(tuple(members), (Unknown(tuple(columns), min(lower, upper), upper),))
 
@@ -251,19 +256,21 @@ def _tied_direction(
     current = np.array(light.emission)
     if constraint.primaries and len(constraint.primaries) > 1:
         raise ConstraintError(
-            f"{constraint.where} asks for {constraint.label}, and {light.name!r} is on the "
-            f"dimmer of {names}: a tied light has one color; leave it out of the tie"
+            constraint.where,
+            f" asks for {constraint.label}, and {light.name!r} is on the "
+            f"dimmer of {names}: a tied light has one color; leave it out of the tie",
         )
     if not current.any():
         raise ConstraintError(
-            f"{tie.where}: {light.name!r} is currently off, so nothing says how bright it is "
-            f"beside the others of {names}: give it an emission, or leave it out"
+            tie.where,
+            f": {light.name!r} is currently off, so nothing says how bright it is "
+            f"beside the others of {names}: give it an emission, or leave it out",
         )
     color = tie.color or (constraint.primaries[0] if constraint.primaries else None)
     if color is not None and light.is_scalar:
         raise ConstraintError(
-            f"{constraint.where or tie.where} asks for a colour, and {light.name!r} can only be "
-            "dimmed as a whole"
+            constraint.where or tie.where,
+            f" asks for a colour, and {light.name!r} can only be dimmed as a whole",
         )
     direction = current if color is None else np.array(color) * float(luminance(current))
     _check_grey(constraint, light)
@@ -279,19 +286,19 @@ def _tied_direction(
     return direction, least, most
 
 
-def locked_emission(light: BasisLight, lock: Lock, where: str) -> Doubles:
+def locked_emission(light: BasisLight, lock: Lock, where: SourceKey) -> Doubles:
     """Return the emission (3,) that `lock` asks for."""
     current = np.array(light.emission)
     level = lock.level
     if light.is_scalar and lock.color is not None:
         raise ConstraintError(
-            f"{where}.lock asks for a colour, and {light.name!r} can only be dimmed as a whole"
+            where / "lock", f" asks for a colour, and {light.name!r} can only be dimmed as a whole"
         )
     if level is not None and isinstance(level.amount, tuple):
         if light.is_scalar and len(set(level.amount)) > 1:
             raise ConstraintError(
-                f"{where}.lock is {level}, and {light.name!r} can only be dimmed as a whole: "
-                "give one number"
+                where / "lock",
+                f" is {level}, and {light.name!r} can only be dimmed as a whole: give one number",
             )
         return np.array(level.amount)
     now = float(luminance(current))

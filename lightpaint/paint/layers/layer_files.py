@@ -204,9 +204,9 @@ def read_layers(path: Path, size: tuple[int, int], transform: ViewTransform) -> 
     try:
         layered = _of_exr(path, size) if is_exr else _of_openraster(path, size, transform)
     except OSError as error:
-        raise PaintError(f"cannot read {path}: {error.strerror or error}") from error
+        raise PaintError("cannot read ", path, f": {error.strerror or error}") from error
     if not layered.pixels:
-        raise PaintError(f"{path} has no layer with anything on it")
+        raise PaintError(path, " has no layer with anything on it")
     return layered
 
 
@@ -220,11 +220,12 @@ def check_kind(path: Path) -> bool:
     if kind == "zip" and layered_kind(path, head) == "ora":
         return False
     if kind != "exr":
-        raise PaintError(f"{path} has no layers to open: expected a .ora file, or layers.exr")
+        raise PaintError(path, " has no layers to open: expected a .ora file, or layers.exr")
     if not any(KEY in texts for texts in read_headers(path)[0]):
         raise PaintError(
-            f"{path} does not say what its layers mean, as an EXR saved again by another program: "
-            "open the painter's own file, or an .ora file"
+            path,
+            " does not say what its layers mean, as an EXR saved again by another program: "
+            "open the painter's own file, or an .ora file",
         )
     return True
 
@@ -241,7 +242,7 @@ def _of_exr(path: Path, size: tuple[int, int]) -> LayeredPaintings:
             if f"{names.get(layer.id)}.A" in channels:
                 found.add(layer.id, *_cropped(_exr_pixels(layer, names[layer.id], channels)))
     except (LookupError, TypeError, ValueError, AttributeError) as error:
-        raise PaintError(f"{path}: its layers are damaged: {ascii(error)[:200]}") from None
+        raise PaintError(path, f": its layers are damaged: {ascii(error)[:200]}") from None
     return LayeredPaintings(stack, found.pixels)
 
 
@@ -276,8 +277,9 @@ class _Found:
         self._count += pixels.importance.size
         if self._count > MAX_KEPT_PIXELS:
             raise PaintError(
-                f"{self._path} has layers that cover more than {MAX_KEPT_PIXELS / 1e6:.0f} million "
-                "pixels together: merge some"
+                self._path,
+                f" has layers that cover more than {MAX_KEPT_PIXELS / 1e6:.0f} million "
+                "pixels together: merge some",
             )
         self.pixels[0, number] = region, pixels
 
@@ -327,7 +329,7 @@ def _of_openraster(path: Path, size: tuple[int, int], transform: ViewTransform) 
                 elif k or item.name != LOOK_NAME:
                     add(item)
     except ImageError as error:
-        raise ImageError(f"{path} {error}") from error
+        raise ImageError(path, " ", error) from error
     return LayeredPaintings(LayerStack.of(layers), found.pixels)
 
 
@@ -378,6 +380,6 @@ def _check_size(path: Path, found: tuple[int, int], expected: tuple[int, int]) -
     if found != expected:
         (height, width), (rows, columns) = found, expected
         raise PaintError(
-            f"{path} has {width}x{height} pixels, and the view {columns}x{rows}: export its layers "
-            "again"
+            path,
+            f" has {width}x{height} pixels, and the view {columns}x{rows}: export its layers again",
         )

@@ -25,16 +25,17 @@ from lightpaint.paint.subject_factory import make_subjects
 from lightpaint.pipeline.job.settings import Settings
 from lightpaint.scene.scene import Scene
 from lightpaint.scene.scene_reader import load_scene
-from lightpaint.target.target import Target
+from lightpaint.sentences import Datum, Remedy
+from lightpaint.target.target import PASS_RESIZE, Target
 
 #: Types that can be painted.
 Paintable = Basis | Scene | LightGroups | str | Path
 
 #: Advice in errors for the notebook, by the advice for the library that it replaces.
-NOTEBOOK_ADVICE = {
+NOTEBOOK_ADVICE: dict[Remedy, str] = {
     START_AFRESH: "give another file as its store, or give that one another name",
     OTHER_FOLDER: "give another file as its store",
-    "pass resize=True": "give target.resized((height, width))",
+    PASS_RESIZE: "give target.resized((height, width))",
 }
 
 #: Arguments of `Studio.load`: paintings by view, requests, and the label of the step.
@@ -133,10 +134,11 @@ def notebook_advice() -> Iterator[None]:
     try:
         yield
     except LightpaintError as error:
-        text = str(error)
-        for text_of_library, text_of_notebook in NOTEBOOK_ADVICE.items():
-            text = text.replace(text_of_library, text_of_notebook)
-        raise type(error)(text) from None
+        raise type(error)(error.sentence.spelled(_advice)) from None
+
+
+def _advice(datum: Datum) -> str | None:
+    return NOTEBOOK_ADVICE.get(datum) if isinstance(datum, Remedy) else None
 
 
 def _pixels_to_load(session: Session, view: int, target: Target | None) -> Pixels:

@@ -22,7 +22,7 @@ from lightpaint.images.formats.bitmap import MAX_PIXELS, Bitmap
 from lightpaint.images.formats.bitmap_decoder import light_of_integers
 from lightpaint.images.formats.file_kinds import head_of
 from lightpaint.images.formats.library_output import silenced, without_pillow_warnings
-from lightpaint.images.picture import read_picture
+from lightpaint.images.picture import naming_file, read_picture
 from lightpaint.images.resampling import resampled
 from lightpaint.paint.store.compression import pack, unpack
 from lightpaint.paint.store.database import DAMAGE_ERRORS, REFERENCE_TABLE
@@ -49,19 +49,17 @@ def read_reference(path: Path, transform: ViewTransform) -> ReferencePixels:
     """
     head = head_of(path, 16)
     is_light = False
-    try:
-        if head.startswith(b"RIFF") and head[8:12] == b"WEBP":
+    if head.startswith(b"RIFF") and head[8:12] == b"WEBP":
+        with naming_file(path):
             light = light_of_integers(_webp(path), None, transform)
-        elif head.startswith(b"#?"):
+    elif head.startswith(b"#?"):
+        with naming_file(path):
             light, is_light = _radiance(path), True
-        else:
-            light, is_light = _light_of_painting(path, transform)
-    except ImageError as error:
-        text = str(error)
-        raise error if str(path) in text else ImageError(f"{path} {one_line(text)}") from None
+    else:
+        light, is_light = _light_of_painting(path, transform)
     light = np.clip(_reduced(np.nan_to_num(light, posinf=0, neginf=0)), 0, None)
     if not light.any():
-        raise ImageError(f"{path} is black: choose a picture with light in it")
+        raise ImageError(path, " is black: choose a picture with light in it")
     if not is_light:
         return np.asarray(np.round(255 * transform.encode(light)), np.uint8)
     exposed = light * 2.0 ** choose_exposure(light)

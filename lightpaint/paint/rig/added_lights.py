@@ -49,7 +49,7 @@ def new_emitter(name: str, values: Mapping[str, Any]) -> NewEmitter:
             values.get("emission", (1.0, 1.0, 1.0)),
         )
     except (SceneError, TypeError) as error:
-        raise PaintError(f"{name}: {error}") from None
+        raise PaintError(f"{name}: ", error) from None
 
 
 def values_of(emitter: NewEmitter) -> dict[str, Any]:

@@ -416,7 +416,7 @@ def _pose(name: str, values: Mapping[str, Any]) -> Pose:
     try:
         return Pose(**values)
     except SceneError as error:
-        raise PaintError(f"{name}: {error}") from None
+        raise PaintError(f"{name}: ", error) from None
 
 
 def _pose_key(name: str, values: Mapping[str, Any]) -> PoseKey:

@@ -37,6 +37,7 @@ from lightpaint.placement.search.search_time import SearchSize, usual_pace
 from lightpaint.progress import cancellable
 from lightpaint.scene.properties.pose import Pose, Site
 from lightpaint.scene.runtime.render_lock import MITSUBA
+from lightpaint.sentences import Sentence
 
 #: Freedom of lights without one in the lights file: largest distance, relative to the size of the
 #: room, and largest turn in degrees.
@@ -254,7 +255,7 @@ class LightPlacer:
         except _OutdatedError:
             return _outdated(request), ()
         except LightpaintError as error:
-            return f"No light was {_done(request)}: {error}", ()
+            return Sentence(f"No light was {_done(request)}: ", error), ()
         is_early = self._ended_request is request
         if not placed:
             early_text = "Stopped: nothing better was found until then."

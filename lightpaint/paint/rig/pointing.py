@@ -152,7 +152,7 @@ def _emitter_at_position(view: RigView, request: AddLight, name: str, extent: fl
     try:
         place = Pose(position=request.position).position  # type: ignore[arg-type]
     except SceneError as error:
-        raise PaintError(f"{name}: {error}") from None
+        raise PaintError(f"{name}: ", error) from None
     return hung_at(name, request.type, np.array(place), down, extent)
 
 

@@ -8,6 +8,7 @@ from dataclasses import dataclass
 from enum import Enum
 
 from lightpaint.errors import PaintError
+from lightpaint.sentences import Hint
 
 #: Default port, always the same so that the browser finds the page's stored settings again.
 DEFAULT_PORT = 8421
@@ -134,7 +135,9 @@ def _bind(host: str, family: socket.AddressFamily, number: str, port: int | None
             reason = os.strerror(error.errno) if error.errno else str(error)
             if error.errno in (errno.EADDRNOTAVAIL, errno.EAFNOSUPPORT, errno.EINVAL):
                 raise PaintError(f"cannot listen at {host}: {reason}; {ADVICE}") from None
-    raise PaintError(f"cannot listen at {host}:{tried}: {reason}; choose another with port=...")
+    raise PaintError(
+        f"cannot listen at {host}:{tried}: {reason}; choose another with ", Hint("port")
+    )
 
 
 def _outward_name(port: int) -> str | None:

@@ -21,6 +21,7 @@ from lightpaint.display_text import some_names
 from lightpaint.errors import LightpaintError, OutputError, PaintError
 from lightpaint.files import first_line, flush
 from lightpaint.paint.store.history_steps import Identity, ViewIdentity
+from lightpaint.sentences import Hint, Remedy, Sentence
 from lightpaint.storage.json_records import read_record, strict_json
 
 #: "lpnt", which marks a file as a session, and the version of its tables.
@@ -101,11 +102,12 @@ def _prepare(database: sqlite3.Connection, path: Path | None, identity: Identity
             database.execute(f"PRAGMA application_id = {APPLICATION}")
             database.execute(f"PRAGMA user_version = {VERSION}")
         elif application != APPLICATION:
-            raise PaintError(f"{path} is not a session of the painter: {START_AFRESH}")
+            raise PaintError(f"{path} is not a session of the painter: ", START_AFRESH)
         elif version != VERSION:
             raise PaintError(
                 f"{path} was written by another version of lightpaint (format {version}, not "
-                f"{VERSION}): {START_AFRESH}"
+                f"{VERSION}): ",
+                START_AFRESH,
             )
         if not has_answers:
             database.execute(ANSWER_TABLE)
@@ -130,10 +132,11 @@ def _store_identity(database: sqlite3.Connection, identity: str) -> None:
         database.execute("INSERT OR REPLACE INTO about VALUES ('identity', ?)", (identity,))
 
 
-#: Parts of errors: a session that another process has open, and the remedy.
-IN_USE = "is in use"
-OTHER_FOLDER = "choose another folder (folder=...)"
-START_AFRESH = f"{OTHER_FOLDER}, or start afresh, which keeps it under another name (new=True)"
+#: Remedies for a file that cannot be the session.
+OTHER_FOLDER = Remedy("choose another folder (", Hint("folder"), ")")
+START_AFRESH = Remedy(
+    OTHER_FOLDER, ", or start afresh, which keeps it under another name (", Hint("new", True), ")"
+)
 
 
 def _check_identity(database: sqlite3.Connection, path: Path | None, identity: Identity) -> None:
@@ -143,7 +146,8 @@ def _check_identity(database: sqlite3.Connection, path: Path | None, identity: I
         if len(stored.views) > len(identity.views):
             raise PaintError(
                 f"{path} is a session of {len(stored.views)} views, and this is of "
-                f"{len(identity.views)}: {START_AFRESH}"
+                f"{len(identity.views)}: ",
+                START_AFRESH,
             )
         # Views may have come after those that it has.
         for old, new in zip(stored.views, identity.views, strict=False):
@@ -152,7 +156,8 @@ def _check_identity(database: sqlite3.Connection, path: Path | None, identity: I
             old_names, names = map(joined_texels, (stored.lights, identity.lights))
             raise PaintError(
                 f"{path} is a session of the lights {some_names(old_names)}, and "
-                f"{identity.scene} has {some_names(names)}: {START_AFRESH}"
+                f"{identity.scene} has {some_names(names)}: ",
+                START_AFRESH,
             )
 
 
@@ -160,12 +165,14 @@ def _check_view(path: Path | None, scene: str, stored: ViewIdentity, current: Vi
     if stored.size != current.size:
         raise PaintError(
             f"{path} is a session of {stored.size[1]}x{stored.size[0]} pixels, and {scene} has "
-            f"{current.size[1]}x{current.size[0]}: {START_AFRESH}"
+            f"{current.size[1]}x{current.size[0]}: ",
+            START_AFRESH,
         )
     if stored.sensor and current.sensor and stored.sensor != current.sensor:
         raise PaintError(
             f"{path} is a session of the view through {stored.sensor}, and this is through "
-            f"{current.sensor}: {START_AFRESH}"
+            f"{current.sensor}: ",
+            START_AFRESH,
         )
 
 
@@ -199,16 +206,20 @@ class DamagedError(PaintError):
     """An error of a damaged session file."""
 
 
+class InUseError(PaintError):
+    """An error of a session file that another process has open."""
+
+
 def damaged_error(path: Path | None, error: Exception) -> DamagedError:
     """Return the error for a session that cannot be read."""
-    return DamagedError(f"{path} is damaged ({first_line(error)}): {START_AFRESH}")
+    return DamagedError(f"{path} is damaged ({first_line(error)}): ", START_AFRESH)
 
 
 def _sqlite_error(path: Path | None, error: sqlite3.Error) -> LightpaintError:
     code = getattr(error, "sqlite_errorcode", 0) & 0xFF
     if code in (sqlite3.SQLITE_BUSY, sqlite3.SQLITE_LOCKED):
-        return PaintError(
-            f"{path} {IN_USE}: another lightpaint paints there; end that one, or {OTHER_FOLDER}"
+        return InUseError(
+            f"{path} is in use: another lightpaint paints there; end that one, or ", OTHER_FOLDER
         )
     if code in _DAMAGED or not isinstance(error, sqlite3.OperationalError):
         return damaged_error(path, error)
@@ -271,9 +282,10 @@ def set_aside(path: Path) -> Path | None:
         return None
     try:
         open_database(path, None).close()  # merges the log that its last process left beside it
-    except PaintError as error:
-        if IN_USE in str(error):
-            raise
+    except InUseError:
+        raise
+    except PaintError:
+        pass  # a damaged one gets another name, too
     aside = free_name(path)
     try:
         for ending in ("-wal", "-journal", ""):  # of one that is damaged
@@ -321,7 +333,7 @@ class WriteQueue:
                     "INSERT OR REPLACE INTO about VALUES (?, ?)", ("position", position)
                 )
         except LightpaintError as error:
-            self.unsaved = f"what was done last is in memory only: {error}"
+            self.unsaved = Sentence("what was done last is in memory only: ", error)
             return self.unsaved
         except sqlite3.Error as error:
             self.unsaved = (

@@ -239,7 +239,7 @@ class SessionRequests:
         ties = {id(tie): (tie, entry) for tie, entry in tied_lights(constraints, lights).values()}
         for tie, _ in ties.values():
             if tie.color is not None:
-                raise PaintError(f"{tie.where}: ask for the colour of each light; ties have none")
+                raise PaintError(tie.where, ": ask for the colour of each light; ties have none")
         names = tuple(tuple(lights[k].name for k in entry) for _, entry in ties.values())
         fit_values = {key: value for key, value in values.items() if key in FIT_KEYS}
         joint = {key: getattr(constraints, key) for key in ALL_LIGHTS_KEYS}

@@ -135,7 +135,7 @@ class LayerImports:
                 size = session.views[message.view].size
                 layers = read_layers(path, size, session.transform)
             except LightpaintError as error:
-                text = str(error).replace(str(path), name)
+                text = error.sentence.spelled(lambda datum: name if datum == path else None)
                 self._publisher.publish(Notice(text=text, tone="warn"))
                 return
         layers = replace(layers, view=None if message.replaces else message.view)
@@ -193,7 +193,7 @@ class ReferenceImports:
             try:
                 pixels = read_reference(path, session.transform)
             except LightpaintError as error:
-                text = str(error).replace(str(path), name)
+                text = error.sentence.spelled(lambda datum: name if datum == path else None)
                 self._publisher.publish(Notice(text=text, tone="warn", task="reference"))
                 return
 

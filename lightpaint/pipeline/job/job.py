@@ -69,6 +69,7 @@ from lightpaint.placement.suggested_lights import check_suggestible
 from lightpaint.relit.export.nuke import spoken_unreadable
 from lightpaint.scene.quality_presets import on_film
 from lightpaint.scene.scene import Scene
+from lightpaint.sentences import Hint, Sentence
 from lightpaint.target.target import Target
 from lightpaint.threads import parallel_map
 
@@ -323,10 +324,13 @@ class Job:
         if self.groups is not None:
             remarks += spoken_unreadable(self.groups, self.folder)
         if len(self.painted_frames) > 1 and not self.settings.animate:
-            remarks.append(
-                f"one lighting for the frames {spoken_frames(self.painted_frames)}: animate=True "
-                "finds one for each, and lights that change between them"
+            frames = spoken_frames(self.painted_frames)
+            remark = Sentence(
+                f"one lighting for the frames {frames}: ",
+                Hint("animate", True),
+                " finds one for each, and lights that change between them",
             )
+            remarks.append(remark)
         rendered_scenes = [] if self.basis is not None else [x.scene for x in self.views if x.scene]
         if (first := self.views[0].scene) is not None:
             remarks += remarks_of_scene(first, is_rendered=bool(rendered_scenes))
@@ -421,5 +425,8 @@ def check_same_picture(target: Target, scene: Scene) -> None:
     if target.sensor not in ("", sensor):
         raise TargetError(
             f"{target.name} was painted on a template of the sensor {target.sensor}, not of "
-            f"{sensor}: choose it with sensor={target.sensor!r}, or pass find=False"
+            f"{sensor}: choose it with ",
+            Hint("sensor", target.sensor),
+            ", or pass ",
+            Hint("find", False),
         )

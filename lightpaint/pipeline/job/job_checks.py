@@ -23,6 +23,7 @@ from lightpaint.scene.lights.texels.image_domains import DOMAINS, Sky
 from lightpaint.scene.lights.texels.texel import mirrored_pairs, node_name
 from lightpaint.scene.lights.texels.texel_layout import CHILDREN
 from lightpaint.scene.scene import Scene
+from lightpaint.sentences import Hint, Sentence
 from lightpaint.target.target import Target
 
 #: Emitters that shine from all directions.
@@ -77,8 +78,9 @@ def check_places(placement: object, scenes: Sequence[object]) -> None:
     """Raise LightpaintError if lights are to hang elsewhere in a scene that is not given."""
     if placement is not None and not scenes:
         raise LightpaintError(
-            "lights can only hang elsewhere in their scene: give the scene, or leave "
-            "placement=... out"
+            "lights can only hang elsewhere in their scene: give the scene, or leave ",
+            Hint("placement"),
+            " out",
         )
 
 
@@ -105,13 +107,15 @@ def check_animation(settings: Settings, constraints: Constraints, views: int) ->
         return
     if views < 2:
         raise TargetError(
-            "animate=True needs paintings of two frames of a shot, like 'shot.####.exr': there is "
-            f"{views or 'none'}"
+            Hint("animate", True),
+            " needs paintings of two frames of a shot, like 'shot.####.exr': there is "
+            f"{views or 'none'}",
         )
     if constraints.sparse is not None:
         raise ConstraintError(
-            "sparse chooses the lights of one lighting, not of every frame apart: leave it or "
-            "animate=True out"
+            "sparse chooses the lights of one lighting, not of every frame apart: leave it or ",
+            Hint("animate", True),
+            " out",
         )
 
 
@@ -149,14 +153,16 @@ def sky_for_sun(scene: Scene, count: int) -> str:
     skies = [name for name, texel in names.items() if isinstance(texel.domain, Sky)]
     if not skies:
         raise SceneError(
-            f"sun={count!r} finds a sun in a sky that is split into texels, and {scene.path} has "
-            f"none: {_advice_without_sky(scene)}"
+            Hint("sun", count),
+            f" finds a sun in a sky that is split into texels, and {scene.path} has none: ",
+            _advice_without_sky(scene),
         )
     [image] = skies
     if count < CHILDREN - 1:
         raise SceneError(
-            f"sun={count!r}: a texel that is split again becomes {CHILDREN}, expected at least "
-            f"{CHILDREN - 1} more"
+            Hint("sun", count),
+            f": a texel that is split again becomes {CHILDREN}, expected at least "
+            f"{CHILDREN - 1} more",
         )
     layout = names[image].layout
     pairs = mirrored_pairs(image, layout) if image in scene.symmetric else {}
@@ -165,21 +171,26 @@ def sky_for_sun(scene: Scene, count: int) -> str:
     texels = [node_name(image, node) for node in layout.nodes]
     if not all(light_of.get(name, (name,)) in adjusted for name in texels):
         raise SceneError(
-            f"sun={count!r}: each texel of {image} must be a light of its own, and some are in a "
-            "group or not adjusted"
+            Hint("sun", count),
+            f": each texel of {image} must be a light of its own, and some are in a "
+            "group or not adjusted",
         )
     return image
 
 
-def _advice_without_sky(scene: Scene) -> str:
+def _advice_without_sky(scene: Scene) -> Sentence:
     """Return what to do about a sun in a scene that has no sky in texels."""
     texel = next((x.texel for x in scene.emitters if x.texel), None)
     if texel is None:
         skies = (x.name for x in scene.emitters if x.plugin in SKY_PLUGINS)
         sky = next(skies, "")
-        return f"split its sky with split={{'{sky}': ...}}" if sky else "leave sun=... out"
+        if sky:
+            return Sentence("split its sky with ", Hint("split", {sky: ...}))
+        return Sentence("leave ", Hint("sun"), " out")
     columns, rows = (2 * k for k in texel.layout.size)
-    return (
+    return Sentence(
         f"the texels of {texel.image} are not split again; split it more finely, such as "
-        f"{columns}x{rows}, and leave sun=... out"
+        f"{columns}x{rows}, and leave ",
+        Hint("sun"),
+        " out",
     )

@@ -9,6 +9,7 @@ from lightpaint.pipeline.job.settings import Settings
 from lightpaint.scene.quality_presets import PRESETS
 from lightpaint.scene.runtime.variant import use_variant
 from lightpaint.scene.scene import Scene
+from lightpaint.sentences import Hint, Sentence, Word
 from lightpaint.target.target import Target
 
 #: Bytes of memory above which a basis gets a remark.
@@ -17,12 +18,17 @@ MUCH_MEMORY = 2e9
 
 def remarks_of_scene(scene: Scene, *, is_rendered: bool = True) -> list[str]:
     """Return remarks on the lights of a scene and, if it is rendered, on how."""
-    remarks = []
+    remarks: list[str] = []
     if scene.lights_file is not None:
         remarks.append(f"lights and groups as in {scene.lights_file}")
     remarks += [
-        f"{len(x.members)} similar lamps without names form one light, {x.name}: group_alike=False "
-        "separates them, groups={'name': ...} makes a light of some"
+        Sentence(
+            f"{len(x.members)} similar lamps without names form one light, {x.name}: ",
+            Hint("group_alike", False),
+            " separates them, ",
+            Hint("groups", {"name": ...}),
+            " makes a light of some",
+        )
         for x in scene.lights
         if x.is_found
     ]
@@ -56,10 +62,13 @@ def remarks_of_film(scene: Scene, settings: Settings) -> list[str]:
     if settings.quality is not None and settings.resolution is None:
         max_pixels = PRESETS[settings.quality].pixels
     if max_pixels is not None and width * height > max_pixels:
-        remarks.append(
-            f'the film cannot be reduced as far as quality="{settings.quality}" asks: '
-            f"{width}x{height} pixels are rendered"
+        quality = Hint("quality", Word(settings.quality))
+        remark = Sentence(
+            "the film cannot be reduced as far as ",
+            quality,
+            f" asks: {width}x{height} pixels are rendered",
         )
+        remarks.append(remark)
     return remarks
 
 
@@ -118,11 +127,14 @@ def remarks_of_target(
         remarks.append(f"solved at {width}x{height} pixels, the size of its template")
     name = "srgb" if target.transform is None else target.transform.name
     if fit.space == "linear" and name not in ("srgb", "linear"):
-        remarks.append(
+        remark = Sentence(
             f"painted through {name}, whose highlights stand for very much light and dominate the "
-            'fit: space="display" fits what the eye sees'
+            "fit: ",
+            Hint("space", Word("display")),
+            " fits what the eye sees",
         )
+        remarks.append(remark)
     remarks += target.notes
     if target.not_finite:
         remarks.append(f"{target.not_finite} pixels hold NaN or Inf and are ignored")
-    return [f"{target.name}: {remark}" for remark in remarks]
+    return [Sentence(f"{target.name}: ", remark) for remark in remarks]

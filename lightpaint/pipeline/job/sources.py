@@ -20,6 +20,7 @@ from lightpaint.pipeline.job.settings import Settings
 from lightpaint.placement.placement import PlacementRecord, read_placement
 from lightpaint.scene.scene import Scene
 from lightpaint.scene.scene_reader import load_scene
+from lightpaint.sentences import Hint, Sentence
 from lightpaint.target.target import Target
 from lightpaint.target.target_reader import Paint, read_over_look, read_target
 
@@ -193,16 +194,19 @@ def check_needed(names: Iterable[str], basis: Any) -> None:
 
     basis: a saved one, or light groups.
     """
-    if not (unused := [f"{name}=..." for name in names]):
+    if not (unused := [Hint(name) for name in names]):
         return
+    subject = Sentence.joined(unused)
     if isinstance(basis, LightGroups | GroupsFile):
         raise BasisError(
-            f"{', '.join(unused)} cannot be used with {basis.path}: its light groups are rendered "
-            "already, and say nothing of samples, noise, units or emitters in view; leave it out"
+            subject,
+            f" cannot be used with {basis.path}: its light groups are rendered "
+            "already, and say nothing of samples, noise, units or emitters in view; leave it out",
         )
     raise BasisError(
-        f"{', '.join(unused)} cannot change a saved basis: leave "
-        f"{'it' if len(unused) == 1 else 'them'} out, or give the scene"
+        subject,
+        " cannot change a saved basis: leave "
+        f"{'it' if len(unused) == 1 else 'them'} out, or give the scene",
     )
 
 

@@ -13,6 +13,7 @@ from lightpaint.errors import LightpaintError, OutputError
 from lightpaint.file_reading import read_text
 from lightpaint.files import check_files, check_writable, one_line, write_text
 from lightpaint.pipeline.results.results import RESULTS
+from lightpaint.sentences import Hint, Sentence
 from lightpaint.storage.json_records import read_record, strict_json
 from lightpaint.storage.staging import finish, is_below, staged
 from lightpaint.version import __version__
@@ -26,7 +27,9 @@ RECORD = "result.json"
 IN_MEMORY = " (in memory)"
 
 #: Advice about a folder that holds something else.
-REMEDY = "name another folder (folder=...), or replace it (force=True)"
+REMEDY = Sentence(
+    "name another folder (", Hint("folder"), "), or replace it (", Hint("force", True), ")"
+)
 
 
 @dataclass(frozen=True)
@@ -79,14 +82,15 @@ class ResultFolder:
         if not self._is_own(record):
             raise OutputError(
                 f"{self.folder} holds the answer to {self._names_of(record.answers)}, not to "
-                f"{self._names_of(self._answers)}: {REMEDY}"
+                f"{self._names_of(self._answers)}: ",
+                REMEDY,
             )
         for file in existing_files:
             checksum = record.files.get(file.relative_to(self.folder).as_posix())
             if checksum is None:
-                raise OutputError(f"{file} exists and is not a result of lightpaint: {REMEDY}")
+                raise OutputError(f"{file} exists and is not a result of lightpaint: ", REMEDY)
             if checksum != _checksum(file):
-                raise OutputError(f"{file} was changed since lightpaint wrote it: {REMEDY}")
+                raise OutputError(f"{file} was changed since lightpaint wrote it: ", REMEDY)
 
     @contextmanager
     def filled(self) -> Iterator[Path]:
@@ -177,10 +181,11 @@ class ResultFolder:
         if self.folder / "lighting.json" in existing_files:
             return OutputError(
                 f"{self.folder} holds results of an older lightpaint, which do not name their "
-                f"painting: {REMEDY}"
+                "painting: ",
+                REMEDY,
             )
         return OutputError(
-            f"{existing_files[0]} exists and is not a result of lightpaint: {REMEDY}"
+            f"{existing_files[0]} exists and is not a result of lightpaint: ", REMEDY
         )
 
 

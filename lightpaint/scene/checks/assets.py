@@ -66,7 +66,7 @@ def check_assets(scene: Path, state: Any, resolver: Any) -> bool:
                 try:
                     check_asset(*asset)
                 except SceneError as error:
-                    raise SceneError(f"{scene}: {error}") from None
+                    raise SceneError(f"{scene}: ", error) from None
                 checked.add(asset)
     return any(path.suffix.lower() == ".exr" for path, _, _ in checked)
 

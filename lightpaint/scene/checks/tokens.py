@@ -14,6 +14,7 @@ from typing import Any
 
 from lightpaint.errors import SceneError
 from lightpaint.files import one_line
+from lightpaint.sentences import Hint
 
 _MARKS = {
     codecs.BOM_UTF8: "utf-8",
@@ -125,7 +126,8 @@ def tag(element: str, /, **attributes: str) -> str:
         if "$" in value:
             raise SceneError(
                 f"cannot write <{element} {key}={value!r}>: Mitsuba reads $ as the start of a "
-                "parameter; rename the folder or file, or choose other parameters=..."
+                "parameter; rename the folder or file, or choose other ",
+                Hint("parameters"),
             )
     attribute_text = "".join(f" {key}={quoteattr(value)}" for key, value in attributes.items())
     return f"<{element}{attribute_text}/>"

@@ -138,7 +138,7 @@ class _Walk:
             data = self._read(path)
         except SceneError as error:
             prefix = f"{chain[-2]}: " if len(chain) > 1 else ""
-            raise SceneError(f"{prefix}{error}") from None
+            raise SceneError(prefix, error) from None
         self.bytes += len(data)
         self.includes += 1
         if self.bytes > MAX_XML or self.includes > MAX_INCLUDES:
@@ -207,7 +207,7 @@ class _Walk:
                 try:
                     file_length(file, "file to read", SceneError)
                 except SceneError as error:
-                    raise ValueError(str(error)) from None
+                    raise ValueError(error.sentence) from None
             if tag == b"include":
                 self.file(file, resolver, depth, chain)
 

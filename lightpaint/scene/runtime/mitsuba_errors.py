@@ -15,6 +15,7 @@ from lightpaint.files import one_line, without_path
 from lightpaint.scene.checks.tokens import attributes, markup
 from lightpaint.scene.properties.integrator import IntegratorChoice
 from lightpaint.scene.runtime.plugins import UnknownPluginError
+from lightpaint.sentences import Hint, Sentence, Word
 
 #: Maximum length of quoted Mitsuba errors, whose cause may be at the end.
 MAX_QUOTED_ERROR = 2000
@@ -39,6 +40,13 @@ SUCCESSORS = {
 _REFUSED = re.compile(r"unexpected <(\w+)> element|has no \w+ plugin '(\w+)'")
 
 
+class RefusedSceneError(SceneError):
+    """A scene that Mitsuba rejects, and why. The remedy is "" if none is known."""
+
+    reason = ""
+    remedy = Sentence()
+
+
 @contextmanager
 def mitsuba_errors(path: Path, instead: IntegratorChoice | None = None) -> Iterator[None]:
     """Convert Mitsuba's exceptions to one line: its own words, without positions in its source.
@@ -48,20 +56,24 @@ def mitsuba_errors(path: Path, instead: IntegratorChoice | None = None) -> Itera
     try:
         yield
     except MemoryError:
-        raise SceneError(f"{path} needs more memory than there is") from None
+        raise SceneError(path, " needs more memory than there is") from None
     except UnicodeDecodeError as error:
         raise SceneError(
-            f"{path}, or a file that it refers to, has text that is not UTF-8: {error.reason}"
+            path, f", or a file that it refers to, has text that is not UTF-8: {error.reason}"
         ) from None
     except (RuntimeError, ValueError, TypeError, LookupError, OverflowError) as error:
         text = one_line(_without_places(str(error), path), limit=MAX_QUOTED_ERROR)
         undefined = re.search(r"undefined parameter: \$(\w+)", text)
-        hint = f"; set it with parameters={{'{undefined[1]}': ...}}" if undefined else ""
+        remedy = Sentence()
+        if undefined:
+            remedy = Sentence("set it with ", Hint("parameters", {undefined[1]: ...}))
         if "integrator plugin" in text:
-            hint = f"; the requested integrator is {instead}"
-            hint = hint if instead else '; integrator="path" renders it with another'
+            remedy = Sentence(Hint("integrator", Word("path")), " renders it with another")
+            remedy = Sentence(f"the requested integrator is {instead}") if instead else remedy
         prefix = "" if isinstance(error, UnknownPluginError) else "Mitsuba refuses "
-        raise SceneError(f"{prefix}{path}: {text}{hint}") from error
+        refusal = RefusedSceneError(prefix, path, f": {text}{'; ' * bool(remedy)}", remedy)
+        refusal.reason, refusal.remedy = text, remedy
+        raise refusal from error
 
 
 @contextmanager
@@ -81,7 +93,11 @@ def render_errors(path: Path) -> Iterator[None]:
             first = first.__cause__
         text = one_line(_without_places(str(first), path), limit=MAX_QUOTED_ERROR)
         raise SceneError(
-            f'Mitsuba cannot render {path}: {text}; integrator="path" renders most scenes'
+            "Mitsuba cannot render ",
+            path,
+            f": {text}; ",
+            Hint("integrator", Word("path")),
+            " renders most scenes",
         ) from error
 
 
@@ -111,26 +127,29 @@ def explain_old_scene(path: Path) -> Iterator[None]:
     """Explain the error if Mitsuba rejects the scene at `path` because it was written for 0.6."""
     try:
         yield
-    except SceneError as error:
-        # The cause is an exception from Mitsuba if Mitsuba rejected the scene.
-        sign = _sign_of_old_version(path) if error.__cause__ is not None else ""
-        raise (_old_scene_error(path, sign, str(error)) if sign else error) from error.__cause__
+    except RefusedSceneError as error:
+        sign = _sign_of_old_version(path)
+        raise (_old_scene_error(path, sign, error) if sign else error) from error.__cause__
 
 
-def _old_scene_error(path: Path, sign: str, message: str) -> SceneError:
-    reason = message.removeprefix("Mitsuba refuses ").removeprefix(f"{path}: ")
+def _old_scene_error(path: Path, sign: str, refusal: RefusedSceneError) -> SceneError:
+    reason, remedy = refusal.reason, refusal.remedy
     match = _REFUSED.search(reason)
     successor = SUCCESSORS.get(match[1] or match[2]) if match else None
-    hint = "write its equivalent of Mitsuba 3"
+    hint: str = "write its equivalent of Mitsuba 3"
     if successor is not None:
         hint = f"write {successor} there"
     elif not sign.startswith("version"):
         hint = 'write version="0.6.0" in <scene>, so that Mitsuba 3 renames its parameters'
     if match and "integrator plugin" in reason:
-        reason, _, hint = reason.partition("; ")
+        reason, *suggestion = reason.split("; ", 1)
+        hint, remedy = Sentence.joined([*suggestion, remedy], "; "), Sentence()
+    advice = Sentence.joined(filter(None, (reason, remedy, hint)), "; ")
     return SceneError(
         f"{path} is a scene of Mitsuba 0.6 ({sign}), which Mitsuba 3 reads only in part; it "
-        f"stops: {reason}; {hint}, or export the scene for Mitsuba 3"
+        "stops: ",
+        advice,
+        ", or export the scene for Mitsuba 3",
     )
 
 

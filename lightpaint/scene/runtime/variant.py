@@ -13,6 +13,7 @@ from lightpaint.errors import BackendError
 from lightpaint.keywords import keywords
 from lightpaint.scene.runtime.llvm import INSTALL_LLVM, OLDEST_LLVM, Llvm, prepare_llvm
 from lightpaint.scene.runtime.plugins import loaded_plugins
+from lightpaint.sentences import Sentence
 from lightpaint.signals import interruptible_between_pieces
 
 FAST_VARIANT = "llvm_ad_rgb"
@@ -129,11 +130,11 @@ def _choose(mi: Any, llvm: Llvm | None) -> Backend:
         try:
             return _set(mi, FAST_VARIANT, llvm)
         except BackendError as error:
-            problem = str(error)
+            problem = error.sentence
     else:
-        problem = f"no usable LLVM {OLDEST_LLVM} or newer"
+        problem = Sentence(f"no usable LLVM {OLDEST_LLVM} or newer")
     backend = _set(mi, PLAIN_VARIANT, None)
-    note = f"{problem}: rendering with {PLAIN_VARIANT}, many times slower; {INSTALL_LLVM}"
+    note = problem + f": rendering with {PLAIN_VARIANT}, many times slower; {INSTALL_LLVM}"
     return Backend(backend.variant, note=note)
 
 

@@ -8,6 +8,7 @@ from lightpaint.basis.light_images import light_images
 from lightpaint.basis.lights import BasisLight
 from lightpaint.lighting.constraints.constraints import COLOR_KEYS, Constraints
 from lightpaint.lighting.constraints.light_patterns import tables_by_light, tied_lights
+from lightpaint.sentences import SourceKey
 
 #: Kinds of constraints: of single lights, of those on one dimmer, and of all together.
 ConstraintKind = Literal[
@@ -95,7 +96,7 @@ class ConstraintsByLight:
             for k, table in enumerate(self.tables)
         ]
         remaining = tuple(
-            (light.name, table, f"light.{light.name}")
+            (light.name, table, SourceKey("", "light", light.name))
             for light, table in zip(self.lights, tables, strict=True)
             if table
         )

@@ -37,6 +37,7 @@ from lightpaint.lighting.joined_views import joint_basis
 from lightpaint.lighting.normal_equations import NormalEquations, block_diagonal
 from lightpaint.lighting.solution import Solution
 from lightpaint.lighting.solve import solve_again
+from lightpaint.sentences import Hint
 
 #: Fewest lights for which sums use averaged light: with a dozen, the basis itself is as good.
 MIN_LIGHTS = 64
@@ -154,8 +155,9 @@ def correct_noise(solution: Solution, *, share: float | None = None) -> Solution
     basis = solution.basis
     if not basis.knows_noise:
         raise BasisError(
-            f"the noise of {basis.origin.scene} is unknown, so it cannot be corrected: "
-            "use noise_correction=False, and denoise the layers or render them with more samples"
+            f"the noise of {basis.origin.scene} is unknown, so it cannot be corrected: use ",
+            Hint("noise_correction", False),
+            ", and denoise the layers or render them with more samples",
         )
     if solution.problem.block_side > 1:
         return solution

@@ -27,6 +27,7 @@ from lightpaint.lighting.normal_equations import NormalEquations
 from lightpaint.lighting.problem import Refinement
 from lightpaint.lighting.solution import Solution
 from lightpaint.lighting.solve import solve_again
+from lightpaint.sentences import Hint
 
 
 @keywords()
@@ -57,7 +58,8 @@ def refine(solution: Solution, mixed: Estimate) -> Solution:
     if not basis.knows_noise:
         raise BasisError(
             f"the noise of {basis.origin.scene} is unknown, so a render of the mix cannot be "
-            "weighed against it: use refine=0"
+            "weighed against it: use ",
+            Hint("refine", 0),
         )
     if mixed.size != basis.size:
         raise SizeError(
