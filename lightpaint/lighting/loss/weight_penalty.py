@@ -65,7 +65,7 @@ SEEN_SHARE = 1e-3
 
 @dataclass(frozen=True)
 class PaintTerms:
-    """What a painting lets one expect of the lights, and its terms of the loss in their weights.
+    """The lights that a painting lets one expect, and its terms of the loss in the weights.
 
     expected: None where colours are free. contrast: of its wishes; restraint: on what each light
     does to unpainted pixels; None without any.
