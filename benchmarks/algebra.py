@@ -17,9 +17,8 @@ from typing import Any
 import numpy as np
 from scipy.optimize import nnls
 
-from lightpaint.basis.basis import Basis
+from lightpaint.basis.basis import Basis, Origin
 from lightpaint.basis.lights import BasisLight
-from lightpaint.basis.origin import Origin
 from lightpaint.basis.planes import BLOCK_PIXELS
 from lightpaint.lighting.algebra.optimum import minimise
 from lightpaint.lighting.constraints.constraints import Constraints

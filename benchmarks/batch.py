@@ -24,13 +24,12 @@ from typing import Any
 
 import numpy as np
 
-from lightpaint.basis.basis import Basis
+from lightpaint.basis.basis import Basis, Origin
 from lightpaint.basis.file.basis_file import write_basis
 from lightpaint.basis.lights import BasisLight
-from lightpaint.basis.origin import Origin
 from lightpaint.batch.cluster.cluster import Cluster
-from lightpaint.batch.distribution.basis_parts import PartwiseRender
-from lightpaint.batch.distribution.engine import Engine, InProcess
+from lightpaint.batch.distributed_work import PartwiseRender
+from lightpaint.batch.engine import Engine, InProcess
 from lightpaint.batch.plan.planner import plan
 from lightpaint.batch.run import run_batch
 from lightpaint.batch.run_options import RunOptions

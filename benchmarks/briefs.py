@@ -37,8 +37,8 @@ import numpy as np
 from scipy.ndimage import gaussian_filter
 
 import lightpaint as lp
+from lightpaint.basis.basis import meter_exposure
 from lightpaint.basis.cache.cached_render import obtain_basis
-from lightpaint.basis.exposure_meter import meter_exposure
 from lightpaint.colour.color import kelvin_to_rgb, luminance
 from lightpaint.colour.color_difference import delta_e
 from lightpaint.errors import PaintError

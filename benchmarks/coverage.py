@@ -23,7 +23,7 @@ import numpy as np
 
 import lightpaint as lp
 from lightpaint.basis.basis import Basis
-from lightpaint.basis.render.guide_training import train
+from lightpaint.basis.render.basis_render import train_tracer
 from lightpaint.basis.render.one_pass_basis import basis_of_sums
 from lightpaint.scene.runtime.variant import use_variant
 from lightpaint.scene.scene import Scene
@@ -174,7 +174,7 @@ def rendered_bases(scene: Scene, seeds: int, spp: int, factor: int) -> Iterator[
     from lightpaint.basis.render.tracer.one_pass import Tracer
 
     tracer, rows, half_spp = Tracer(scene, 0), range(scene.size[0]), spp // 2
-    table = train(tracer, lambda: None)
+    table = train_tracer(tracer, lambda: None)
     total: list[np.ndarray] = []
     emitter_mask = np.zeros(scene.size, bool)
     for seed in range(seeds):

@@ -20,7 +20,7 @@ import numpy as np
 from hall import write_hall
 
 from lightpaint import load_scene, use_variant
-from lightpaint.basis.render.guide_training import train
+from lightpaint.basis.render.basis_render import train_tracer
 from lightpaint.scene.scene import Scene
 
 SCENES = Path(__file__).parent.parent / "scenes"
@@ -53,7 +53,7 @@ def measure(scene: Scene, pairs: list[tuple[int, ...]], spp: int, repeats: int) 
         for pair in pairs:
             tracer = Tracer(scene, repeat, emitter_samples=(pair[0], pair[1]))
             begun_s = time.process_time()
-            train(tracer, lambda: None)
+            train_tracer(tracer, lambda: None)
             trained_s = time.process_time()
             halves = [tracer.planes(rows) for _ in range(2)]
             for half, planes in enumerate(halves):

@@ -22,7 +22,7 @@ import numpy as np
 from emitter_samples import open_scene
 
 from lightpaint import use_variant
-from lightpaint.basis.render import guide_training
+from lightpaint.basis.render import basis_render
 from lightpaint.scene.scene import Scene
 
 #: More samples per pixel than the training passes have in any picture.
@@ -40,7 +40,7 @@ def main() -> None:
     options = parser.parse_args()
     with tempfile.TemporaryDirectory() as folder:
         scene = open_scene(options.scene, options.resolution, Path(folder))
-        default_spp = sum(guide_training.training_samples(scene)) / np.prod(scene.size)
+        default_spp = sum(basis_render.training_samples(scene)) / np.prod(scene.size)
         print(
             f"{options.scene}: {len(scene.lights)} lights, {options.resolution}, {options.spp} spp"
         )
@@ -53,9 +53,7 @@ def measure(scene: Scene, choices: list[int], spp: int, repeats: int) -> None:
     times, variances = defaultdict(list), defaultdict(list)
     for repeat in range(repeats + 1):
         for choice in choices:
-            with mock.patch.multiple(
-                guide_training, TRAINING_SPP=choice, TRAINING_SPP_PER_EMITTER=0
-            ):
+            with mock.patch.multiple(basis_render, TRAINING_SPP=choice, TRAINING_SPP_PER_EMITTER=0):
                 *seconds, variance = render(scene, repeat, spp)
             if repeat > 0:  # the kernel is compiled
                 times[choice].append(seconds)
@@ -80,7 +78,7 @@ def render(scene: Scene, seed: int, spp: int) -> tuple[float, float, np.ndarray]
 
     tracer, rows = Tracer(scene, seed), range(scene.size[0])
     begun_s = time.process_time()
-    guide_training.train(tracer, lambda: None)
+    basis_render.train_tracer(tracer, lambda: None)
     trained_s = time.process_time()
     halves = [tracer.planes(rows) for _ in range(2)]
     for half, planes in enumerate(halves):

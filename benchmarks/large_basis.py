@@ -24,10 +24,9 @@ import numpy as np
 from hall import write_hall
 
 import lightpaint as lp
-from lightpaint.basis.basis import Basis
+from lightpaint.basis.basis import Basis, Origin
 from lightpaint.basis.file.file_planes import RowPlanes
 from lightpaint.basis.lights import BasisLight, Lights
-from lightpaint.basis.origin import Origin
 from lightpaint.images.denoiser import Features
 from lightpaint.images.formats.png import png_bytes
 

@@ -16,9 +16,8 @@ import argparse
 import numpy as np
 
 import lightpaint as lp
-from lightpaint.basis.basis import Basis
+from lightpaint.basis.basis import Basis, Origin
 from lightpaint.basis.lights import BasisLight
-from lightpaint.basis.origin import Origin
 
 SIZE = (36, 64)
 

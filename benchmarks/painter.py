@@ -51,8 +51,8 @@ import numpy as np
 from playwright.sync_api import Page, sync_playwright
 
 import lightpaint as lp
+from lightpaint.basis.basis import Origin
 from lightpaint.basis.lights import BasisLight
-from lightpaint.basis.origin import Origin
 from lightpaint.lighting.fit import resolve_fit
 from lightpaint.lighting.live.live import LiveSolver
 from lightpaint.lighting.live.live_view import LiveView

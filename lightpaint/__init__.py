@@ -33,8 +33,8 @@ from lightpaint.version import __version__
 
 if TYPE_CHECKING:
     from lightpaint.basis.basis import Basis as Basis
+    from lightpaint.basis.file.basis_file import read_basis as read_basis
     from lightpaint.basis.file.basis_file import write_basis as write_basis
-    from lightpaint.basis.file.basis_reader import read_basis as read_basis
     from lightpaint.basis.lightgroups.frame_sequence import FrameSequence as FrameSequence
     from lightpaint.basis.lightgroups.frame_sequence import find_frames as find_frames
     from lightpaint.basis.lightgroups.light_groups import LightGroups as LightGroups
@@ -91,9 +91,9 @@ if TYPE_CHECKING:
     from lightpaint.placement.placement import AddedLight as AddedLight
     from lightpaint.placement.placement import Move as Move
     from lightpaint.placement.placement import Placement as Placement
-    from lightpaint.placement.rigging.rigging import Rigging as Rigging
-    from lightpaint.placement.suggestions.light_search import suggest_lights as suggest_lights
-    from lightpaint.placement.suggestions.suggestion import Suggestion as Suggestion
+    from lightpaint.placement.rigging import Rigging as Rigging
+    from lightpaint.placement.suggested_lights import suggest_lights as suggest_lights
+    from lightpaint.placement.suggestion import Suggestion as Suggestion
     from lightpaint.relit.export.exports import write_exports as write_exports
     from lightpaint.relit.relight import relight as relight
     from lightpaint.relit.verification import Verification as Verification
@@ -136,13 +136,13 @@ _HOMES = {
     "Placement": "placement.placement",
     "Pose": "scene.properties.pose",
     "Problem": "lighting.problem",
-    "Rigging": "placement.rigging.rigging",
+    "Rigging": "placement.rigging",
     "Scene": "scene.scene",
     "SceneFile": "pipeline.job.sources",
     "Appearance": "lighting.analysis.appearance.appearance",
     "Settings": "pipeline.job.settings",
     "Solution": "lighting.solution",
-    "Suggestion": "placement.suggestions.suggestion",
+    "Suggestion": "placement.suggestion",
     "Target": "target.target",
     "TransformChoice": "colour.display.view_transform",
     "Uncertainty": "lighting.analysis.noise.uncertainty",
@@ -158,7 +158,7 @@ _HOMES = {
     "load_scene": "scene.scene_reader",
     "paint_with_light": "pipeline.one_call",
     "place": "placement.place",
-    "read_basis": "basis.file.basis_reader",
+    "read_basis": "basis.file.basis_file",
     "read_constraints": "lighting.constraints.constraints_file",
     "read_light_groups": "basis.lightgroups.light_groups",
     "read_lighting": "lighting.answer.lighting_file",
@@ -171,7 +171,7 @@ _HOMES = {
     "template_of_basis": "pipeline.templates",
     "run": "pipeline.pipeline",
     "solve": "lighting.solve",
-    "suggest_lights": "placement.suggestions.light_search",
+    "suggest_lights": "placement.suggested_lights",
     "use_variant": "scene.runtime.variant",
     "verdict": "report.verdict",
     "verify": "relit.verification_render",

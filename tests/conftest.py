@@ -19,9 +19,8 @@ from patience import PATIENCE_MS
 from renderer import write_room
 from threadpoolctl import threadpool_limits
 
-from lightpaint.basis.basis import Basis
+from lightpaint.basis.basis import Basis, Origin
 from lightpaint.basis.lights import BasisLight
-from lightpaint.basis.origin import Origin
 from lightpaint.basis.render.basis_render import render_basis
 from lightpaint.scene.runtime import kernel_threads
 from lightpaint.scene.scene import Scene

@@ -49,7 +49,7 @@ class Reader:
             template = read_template(path.parent)
             return template.transform, template.scene, template.content, template.sensor
         if self.kind == "basis":
-            from lightpaint.basis.file.basis_reader import read_basis, read_origin
+            from lightpaint.basis.file.basis_file import read_basis, read_origin
 
             basis = read_basis(path)
             assert read_origin(path) == (

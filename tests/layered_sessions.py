@@ -10,8 +10,8 @@ import numpy as np
 import numpy.typing as npt
 
 import lightpaint as lp
+from lightpaint.basis.basis import Origin
 from lightpaint.basis.lights import BasisLight
-from lightpaint.basis.origin import Origin
 from lightpaint.images.denoiser import Features
 from lightpaint.paint import protocol
 from lightpaint.paint.layers.layer_stack import Gradient, Layer, LayerKind

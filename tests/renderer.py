@@ -141,7 +141,7 @@ def one_pass(scene: Scene, *, seed: int, spp: int, plain: bool = True) -> np.nda
 
 def render_in_parts(scene: Scene, *, spp: int, seed: int = 0, start: Basis | None = None) -> Basis:
     """Render all parts of a basis one after the other, as processes of a batch share them."""
-    from lightpaint.basis.render.guide_training import train_guide
+    from lightpaint.basis.render.basis_render import train_guide
     from lightpaint.basis.render.render_parts import PartRenderer, PartSums, plan_parts
 
     guide_table = None if start is None else start.guide_table

@@ -9,7 +9,7 @@ import time
 from pathlib import Path
 from typing import Any
 
-from lightpaint.basis.render import guide_training
+from lightpaint.basis.render import basis_render
 from lightpaint.batch.work import item_execution
 
 #: Of a lesson, here and in the tests: what is learned does not matter to them.
@@ -31,4 +31,4 @@ def _slowly(item: Any, *others: Any) -> Any:
 
 
 item_execution._run = _slowly
-guide_training.TRAINING_SAMPLES = LESSON
+basis_render.TRAINING_SAMPLES = LESSON

@@ -8,7 +8,7 @@ import pytest
 from renderer import LIGHTS, write_room
 from test_views import CLOSE
 
-from lightpaint.basis.render import guide_training
+from lightpaint.basis.render import basis_render
 from lightpaint.basis.render.basis_render import render_basis
 from lightpaint.errors import LightpaintError
 from lightpaint.lighting.analysis.noise.uncertainty import error_bars
@@ -43,7 +43,7 @@ class Heard:
 
 @pytest.fixture(autouse=True)
 def short_training(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(guide_training, "TRAINING_SAMPLES", (2**12,))
+    monkeypatch.setattr(basis_render, "TRAINING_SAMPLES", (2**12,))
 
 
 @pytest.fixture

@@ -10,7 +10,7 @@ from typing import Any
 import pytest
 
 import lightpaint as lp
-from lightpaint.batch.manifest.key_spelling import as_key
+from lightpaint.batch.manifest.keys import as_key
 from lightpaint.cli.output.vocabulary import spoken
 from lightpaint.errors import AccessError, BatchError, ColorError, LightpaintError, SizeError
 from lightpaint.files import one_line

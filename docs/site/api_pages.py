@@ -125,7 +125,7 @@ PARTS: dict[str, tuple[str, ...]] = {
     "scene.properties.site": ("Site", "EmitterPlace"),
     "basis.lights": ("Lights", "BasisLight"),
     "basis.planes": ("Planes", "IndirectLight"),
-    "basis.origin": ("Origin",),
+    "basis.basis": ("Origin",),
     "basis.lightgroups.render_layers": ("RenderLayer",),
     "lighting.constraints.constraints": ("Tie",),
     "lighting.loss.expected_lights": ("ExpectedLights",),
@@ -144,7 +144,7 @@ PARTS: dict[str, tuple[str, ...]] = {
     "lighting.analysis.appearance.limiting_reasons": ("Reason", "Loosening"),
     "lighting.analysis.appearance.unpainted_change": ("UnpaintedChange",),
     "lighting.analysis.diagnosis": ("Place",),
-    "placement.suggestions.suggestion": ("MoveSuggestion",),
+    "placement.suggestion": ("MoveSuggestion",),
     "placement.new_lights": ("Mirror",),
     "progress": ("Progress",),
 }

@@ -7,14 +7,14 @@ from typing import Any, get_type_hints
 
 from dataclass_schemas import Schema, list_of, schema_of, value_schema
 
-from lightpaint.basis.origin import Origin
+from lightpaint.basis.basis import Origin
 from lightpaint.lighting.analysis.appearance.color_choices import ColorChoice
 from lightpaint.lighting.analysis.appearance.delivery import Delivery
 from lightpaint.lighting.analysis.appearance.limiting_reasons import Reason
 from lightpaint.lighting.analysis.appearance.unpainted_change import UnpaintedChange
 from lightpaint.lighting.analysis.diagnosis import Place
 from lightpaint.lighting.fit import Fit
-from lightpaint.placement.suggestions.suggestion import MoveSuggestion, Suggestion
+from lightpaint.placement.suggestion import MoveSuggestion, Suggestion
 from lightpaint.report.report_json import FORMAT
 
 _TEXT: Schema = {"type": "string"}

@@ -10,8 +10,8 @@ from field_pages import described, field_page
 from manifest_schema import manifest_schema
 from report_schema import report_schema
 
+from lightpaint.basis.basis import Origin
 from lightpaint.basis.lights import BasisLight
-from lightpaint.basis.origin import Origin
 from lightpaint.batch.gallery.summary import SummaryRow
 from lightpaint.batch.manifest.folder_names import SUMMARY_FORMAT
 from lightpaint.lighting.answer.certificate import Certificate
@@ -19,7 +19,7 @@ from lightpaint.lighting.answer.lighting import EmitterPlace, Lighting, LightSet
 from lightpaint.lighting.answer.lighting_file import FORMAT
 from lightpaint.paint.protocol import Event, Request
 from lightpaint.pipeline.results.result_folder import _Record
-from lightpaint.placement.placement_record import PlacementRecord
+from lightpaint.placement.placement import PlacementRecord
 from lightpaint.relit.export import fixtures
 
 DIALECT = "https://json-schema.org/draft/2020-12/schema"

@@ -1,30 +1,34 @@
 """A run of a plan: each basis with the looks that share it, then final renders and exports."""
 
+import fcntl
+import os
 import time
 from collections.abc import Callable, Iterator, Sequence
-from contextlib import ExitStack, suppress
-from dataclasses import replace
+from contextlib import ExitStack, contextmanager, suppress
+from dataclasses import dataclass, field, replace
 from functools import partial
+from pathlib import Path
 from typing import Any
 
 from lightpaint.basis.basis import Basis
-from lightpaint.batch.batch_outcome import BatchOutcome
 from lightpaint.batch.cluster.cluster import Cluster
-from lightpaint.batch.distribution.distributed_render import distributed_renderer
-from lightpaint.batch.distribution.distributed_sums import solve_by_sums
-from lightpaint.batch.distribution.engine import Engine, InProcess
-from lightpaint.batch.distribution.processes import Processes
-from lightpaint.batch.folder_lock import lock_folder
+from lightpaint.batch.distributed_work import distributed_renderer, solve_by_sums
+from lightpaint.batch.engine import Engine, InProcess, Processes
 from lightpaint.batch.gallery.gallery import write_gallery
-from lightpaint.batch.gallery.small_planes import write_task_planes
+from lightpaint.batch.gallery.gallery_mixers import write_task_planes
+from lightpaint.batch.gallery.summary import SummaryRow
 from lightpaint.batch.manifest.folder_names import THUMBNAILS
-from lightpaint.batch.manifest.key_spelling import as_key
-from lightpaint.batch.placed_bases import obtain_placed_bases
-from lightpaint.batch.plan.cost_estimate import look_seconds
+from lightpaint.batch.manifest.keys import as_key
 from lightpaint.batch.plan.journal import Journal, JournalLine
-from lightpaint.batch.plan.plan import Plan, PlannedLook, PlanStep, by_bases, waves
+from lightpaint.batch.plan.plan import Plan, PlannedLook, PlanStep, by_bases, look_seconds, waves
 from lightpaint.batch.run_options import RunOptions
-from lightpaint.batch.task_bases import has_basis, obtain_bases, save_bases, save_former_looks
+from lightpaint.batch.task_bases import (
+    has_basis,
+    obtain_bases,
+    obtain_placed_bases,
+    save_bases,
+    save_former_looks,
+)
 from lightpaint.batch.work.item_execution import (
     OUT_OF_MEMORY_TEXT,
     attempt,
@@ -37,7 +41,21 @@ from lightpaint.batch.work.work_items import ItemResult
 from lightpaint.errors import BatchError, LightpaintError, OutputError
 from lightpaint.files import sweep
 from lightpaint.progress import Interrupted, Listener, Progress, listener, silent
-from lightpaint.sentences import Sentence
+from lightpaint.sentences import Hint, Sentence
+
+
+@dataclass
+class BatchOutcome:
+    """Outcome of a run. done, failed: names of looks, and reasons. skipped: done earlier.
+
+    waiting: not started. rows: of all looks, as in the summary.
+    """
+
+    done: list[str] = field(default_factory=list)
+    failed: dict[str, str] = field(default_factory=dict)
+    skipped: list[str] = field(default_factory=list)
+    waiting: list[str] = field(default_factory=list)
+    rows: list[SummaryRow] = field(default_factory=list)
 
 
 def run_batch(
@@ -312,3 +330,32 @@ def _close_after(results: Iterator[ItemResult]) -> Iterator[ItemResult]:
     finally:
         if hasattr(results, "close"):
             results.close()
+
+
+@contextmanager
+def lock_folder(folder: Path, *, shared: bool) -> Iterator[None]:
+    """Lock `folder`. Raises OutputError if another batch works in it.
+
+    shared: whether other batches with a shared lock may work there at the same time.
+    """
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+        descriptor = os.open(folder, os.O_RDONLY | os.O_DIRECTORY)
+    except OSError as error:
+        raise OutputError(f"cannot write into {folder}: {error.strerror or error}") from error
+    try:
+        with suppress(PermissionError):
+            try:
+                kind = fcntl.LOCK_SH if shared else fcntl.LOCK_EX
+                fcntl.flock(descriptor, kind | fcntl.LOCK_NB)
+            except BlockingIOError:
+                raise OutputError(
+                    f"another batch is at work in {folder}: wait for it, or name another folder (",
+                    Hint("folder"),
+                    ")",
+                ) from None
+            except OSError:
+                pass  # the file system has no locks
+        yield
+    finally:
+        os.close(descriptor)

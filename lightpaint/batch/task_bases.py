@@ -1,7 +1,9 @@
-"""Bases of a batch's tasks: saved or cached, or rendered for all looks that share them."""
+"""Bases of a batch's tasks: saved or cached, or rendered for all looks that share them, maybe with
+lights at places that these looks share, too.
+"""
 
 import tempfile
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from contextlib import ExitStack
 from dataclasses import replace
 from pathlib import Path
@@ -9,20 +11,31 @@ from pathlib import Path
 from lightpaint.basis.basis import Basis
 from lightpaint.basis.cache import cache
 from lightpaint.basis.file.basis_file import write_basis
-from lightpaint.batch.distribution.basis_parts import PartwiseRender
-from lightpaint.batch.distribution.engine import Engine
-from lightpaint.batch.work.item_execution import job_fields
-from lightpaint.batch.work.task import Task
+from lightpaint.batch.distributed_work import PartwiseRender
+from lightpaint.batch.engine import Engine
+from lightpaint.batch.plan.place_groups import PlaceGroup
+from lightpaint.batch.work.item_execution import SharedPlacing, job_fields
+from lightpaint.batch.work.task import Task, key_of_scene
 from lightpaint.batch.work.work_items import SceneFilm
 from lightpaint.batch.work.worker_cache import WorkerCache
+from lightpaint.display_text import some_names
+from lightpaint.errors import SceneError
+from lightpaint.files import write_bytes, write_text
 from lightpaint.images.estimate import write_estimate
+from lightpaint.images.formats.png import png_bytes
 from lightpaint.pipeline.job.settings import Settings
 from lightpaint.pipeline.job.sources import SceneFile
 from lightpaint.pipeline.job_bases import obtain
-from lightpaint.pipeline.placed_lights import moved_basis
-from lightpaint.placement.placement_record import PlacementRecord
+from lightpaint.pipeline.placed_lights import moved_basis, say_changes
+from lightpaint.placement.placement import PlacementRecord, read_placement
 from lightpaint.progress import Listener
+from lightpaint.report.rig.hung_lights import HungLight
+from lightpaint.report.rig.rig_drawing import rig_drawing
 from lightpaint.scene.quality_presets import on_film
+from lightpaint.scene.scene import Scene
+
+#: Rough seconds of a search on one thread, to detect hung workers.
+SEARCH_S = 300.0
 
 
 def has_basis(task: Task, worker_cache: WorkerCache) -> bool:
@@ -52,12 +65,12 @@ def obtain_bases(
         return []
     settings: Settings = fields["settings"]
     return [
-        obtain_scene_basis(key, scene, settings, engine, worker_cache, listen)
+        _obtain_scene_basis(key, scene, settings, engine, worker_cache, listen)
         for key, scene in zip(task.bases, fields["scenes"], strict=True)
     ]
 
 
-def obtain_scene_basis(
+def _obtain_scene_basis(
     key: str,
     scene: SceneFile,
     settings: Settings,
@@ -76,7 +89,7 @@ def obtain_scene_basis(
     return basis
 
 
-def obtain_moved_basis(
+def _obtain_moved_basis(
     scene: SceneFile,
     unmoved_basis: Basis,
     record: PlacementRecord,
@@ -125,3 +138,78 @@ def save_former_looks(bases: Sequence[Basis], stack: ExitStack) -> tuple[str, ..
 def _scene_files(scene: SceneFile) -> tuple[str, ...]:
     """Return all files of a scene."""
     return tuple(map(str, scene.content.read_files))
+
+
+def obtain_placed_bases(
+    task: Task, group: PlaceGroup, engine: Engine, cache: WorkerCache, listen: Listener
+) -> list[Basis]:
+    """Return the bases of a task with the lights at the places of its group.
+
+    Places and planes that are missing are computed, once for all looks of the group.
+    """
+    record = group.read_record()
+    views = {} if record is not None else _views_of_group(group, cache)
+    fields = job_fields(task, cache)
+    keys = [key_of_scene(scene, fields["settings"]) for scene in fields["scenes"]]
+    views |= dict(zip(keys, fields["scenes"], strict=True))
+    settings: Settings = fields["settings"]
+    unmoved_bases = {
+        key: _obtain_scene_basis(key, scene, settings, engine, cache, listen)
+        for key, scene in views.items()
+    }
+    if record is None:
+        deciding = {key: unmoved_bases[key] for key in _views_of_group(group, cache)}
+        record = _find_places(group, deciding, engine, listen)
+        first = next(iter(deciding))
+        _draw_room(group, record, views[first].content, deciding[first])
+    bases = []
+    for key, old_key, scene in zip(task.bases, keys, fields["scenes"], strict=True):
+        basis = _obtain_moved_basis(
+            scene, unmoved_bases[old_key], record, str(group.file), settings, engine, listen
+        )
+        cache.put(key, basis)
+        bases.append(basis)
+    cache.keep_only(task.bases)
+    return bases
+
+
+def _views_of_group(group: PlaceGroup, cache: WorkerCache) -> dict[str, SceneFile]:
+    """Return the scene files of all views of a group, by the keys of their bases."""
+    views = {}
+    for task in group.tasks:
+        fields = job_fields(task, cache)
+        for scene in fields["scenes"]:
+            views[key_of_scene(scene, fields["settings"])] = scene
+    return views
+
+
+def _draw_room(group: PlaceGroup, record: PlacementRecord, scene: Scene, basis: Basis) -> None:
+    """Draw plan and elevation of the room with its lights, before and after."""
+    [placed_scene] = record.hung_in([scene]).scenes
+    emissions = {member.name: member.emission for member in placed_scene.emitters}
+    lights = [HungLight(place, emissions[place.name]) for place in placed_scene.emitter_places]
+    drawing = rig_drawing(basis.features, lights, up=placed_scene.up)
+    if drawing is not None:
+        write_bytes(group.picture, png_bytes(drawing))
+
+
+def _find_places(
+    group: PlaceGroup, bases: Mapping[str, Basis], engine: Engine, listen: Listener
+) -> PlacementRecord:
+    """Search for the places of a group, write their record, and return it."""
+    label = some_names(group.looks)
+    with ExitStack() as stack:
+        files = ("",) * len(bases)
+        if engine.is_apart:
+            files = save_bases(list(bases.values()), stack)
+        item = SharedPlacing(
+            f"places of {label}", group.tasks, tuple(bases), files, group.fingerprint, SEARCH_S
+        )
+        [result] = engine.run([item])
+    if result.failure:
+        raise SceneError("no places were found: ", result.failure)
+    group.file.parent.mkdir(parents=True, exist_ok=True)
+    write_text(group.file, result.value)
+    record = read_placement(group.file)
+    say_changes(record, listen)
+    return record

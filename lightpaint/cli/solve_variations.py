@@ -6,8 +6,7 @@ from pathlib import Path
 from typing import Any
 
 from lightpaint.basis.basis import Basis
-from lightpaint.batch.gallery.gallery import counts_text
-from lightpaint.batch.gallery.solve_gallery import entry_of, write_solve_gallery
+from lightpaint.batch.gallery.gallery import counts_text, entry_of, write_solve_gallery
 from lightpaint.batch.manifest.entries import LookEntry
 from lightpaint.batch.manifest.folder_names import FILES, check_gallery, is_reserved
 from lightpaint.batch.work.derived_looks import (

@@ -9,10 +9,9 @@ from typing import Any
 
 import numpy as np
 
-from lightpaint.basis.basis import Basis
+from lightpaint.basis.basis import Basis, meter_exposure
 from lightpaint.basis.cache import cache, scene_facts
 from lightpaint.basis.cache.scene_facts import SceneFacts
-from lightpaint.basis.exposure_meter import meter_exposure
 from lightpaint.basis.lightgroups.light_groups import LightGroups
 from lightpaint.colour.display.view_transform import TransformChoice, ViewTransform
 from lightpaint.errors import PaintError
@@ -21,7 +20,7 @@ from lightpaint.lighting.constraints.constraints import Constraints
 from lightpaint.paint.store.session_requests import SessionRequests
 from lightpaint.pipeline.job.settings import Settings
 from lightpaint.pipeline.job.sources import SceneFile, vars_of
-from lightpaint.placement.rigging.rigging import rigging_of
+from lightpaint.placement.rigging import rigging_of
 from lightpaint.progress import Progress, silent
 from lightpaint.scene.quality_presets import samples
 from lightpaint.scene.scene import Scene

@@ -6,7 +6,7 @@ from dataclasses import replace
 
 from lightpaint.basis.basis import Basis
 from lightpaint.basis.cache import cache
-from lightpaint.basis.cache.cache_folder import folder
+from lightpaint.basis.cache.cache import folder
 from lightpaint.basis.cache.cached_render import Render, obtain_basis
 from lightpaint.basis.render.basis_render import render_basis
 from lightpaint.basis.render.render_origin import samples_for

@@ -31,8 +31,8 @@ from lightpaint.pipeline.results.answer_folder import (
 from lightpaint.pipeline.results.results import Look, write_predicted, write_report
 from lightpaint.pipeline.sun_search import find_suns
 from lightpaint.placement.placement import Placement
-from lightpaint.placement.suggestions.light_search import suggest_lights
-from lightpaint.placement.suggestions.suggestion import MoveSuggestion, Suggestion
+from lightpaint.placement.suggested_lights import suggest_lights
+from lightpaint.placement.suggestion import MoveSuggestion, Suggestion
 from lightpaint.progress import Listener, Progress, listener, silent
 from lightpaint.relit.detection_power import LightShares, with_light_tests
 from lightpaint.relit.render_rounds import refine_by_rendering

@@ -25,12 +25,11 @@ from lightpaint.pipeline.job_bases import obtain, problem_of, view_listener, wit
 from lightpaint.pipeline.results.placement_changes import all_changes, spoken_change
 from lightpaint.placement.freedom import Freedom
 from lightpaint.placement.lights_to_place import free_light
+from lightpaint.placement.look_goals import on_small_film
 from lightpaint.placement.place import place
-from lightpaint.placement.placement import Move, Placement
-from lightpaint.placement.placement_record import PlacementRecord
-from lightpaint.placement.rigging.rigged_lights import rigged_lights
-from lightpaint.placement.search_views import on_small_film
-from lightpaint.placement.suggestions.suggestion import MoveSuggestion
+from lightpaint.placement.placement import Move, Placement, PlacementRecord
+from lightpaint.placement.rigged_lights import rigged_lights
+from lightpaint.placement.suggestion import MoveSuggestion
 from lightpaint.progress import Listener
 from lightpaint.scene.scene import Scene
 

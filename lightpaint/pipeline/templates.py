@@ -7,10 +7,9 @@ from pathlib import Path
 import numpy as np
 
 from lightpaint.arrays import Floats
-from lightpaint.basis.basis import Basis
+from lightpaint.basis.basis import Basis, meter_exposure
 from lightpaint.basis.cache import cache
 from lightpaint.basis.denoised_mixes import denoise_current_look, denoise_mix, denoise_plane
-from lightpaint.basis.exposure_meter import meter_exposure
 from lightpaint.basis.light_images import light_images
 from lightpaint.basis.render.basis_render import render_basis
 from lightpaint.basis.render.integrators import why_not_one_pass

@@ -1,4 +1,6 @@
-"""Lights that a search moves or adds, with their freedoms resolved against the loaded scene."""
+"""Lights that a search moves or adds: with their freedoms resolved against the loaded scene, and in
+their current poses.
+"""
 
 import math
 from collections.abc import Mapping, Sequence
@@ -6,20 +8,17 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from lightpaint.arrays import Position
+from lightpaint.arrays import Floats, Position
 from lightpaint.basis.lights import BasisLight
 from lightpaint.display_text import some_names, with_similar_name
 from lightpaint.errors import NoPlaceError, SceneError
-from lightpaint.placement.free_light import FreeLight, places_of
-from lightpaint.placement.freedom import Freedom
-from lightpaint.placement.movable import Movable
-from lightpaint.placement.movable_panels import is_panel, panel_site
-from lightpaint.placement.new_lights import NEW_CONE, MirroredPair, NewLights
-from lightpaint.placement.paths.panel_site import PanelSite
+from lightpaint.placement.free_space import as_position
+from lightpaint.placement.freedom import Freedom, FreeLight, places_of
+from lightpaint.placement.new_lights import NEW_CONE, Mirror, MirroredPair, NewLights
+from lightpaint.placement.paths.panel_lights import PanelSite, is_panel, panel_site
 from lightpaint.placement.paths.view_paths import SearchPaths
-from lightpaint.placement.space.free_space import as_position
-from lightpaint.placement.space.permitted_places import BoxOfPlaces, Places
-from lightpaint.placement.space.surface_places import places_on
+from lightpaint.placement.permitted_places import BoxOfPlaces, Places, places_on
+from lightpaint.placement.placement_fit import Fitted
 from lightpaint.scene.lights.emitters import Emitter
 from lightpaint.scene.lights.light import Light, free_names
 from lightpaint.scene.lights.new_emitter import PLUGIN_OF, NewKind
@@ -38,6 +37,69 @@ FIRST_BEAM = 0.7
 
 #: Number of random places of a freedom that are tested for free space.
 TESTED = 200
+
+
+@dataclass(frozen=True)
+class Movable:
+    """A light, or a mirrored pair of lights, which move as one.
+
+    columns: their indices among the columns of the fit. mirror: of the second; None for one light.
+    group: group of new lights; None for an existing light.
+    """
+
+    light: FreeLight
+    columns: tuple[int, ...]
+    mirror: Mirror | None = None
+    group: NewLights | None = None
+
+    def sites(self, site: Site) -> list[Site]:
+        """Return the place of each of its lights. site: of the first."""
+        return [site] if self.mirror is None else [site, self.mirror.site(site)]
+
+
+@dataclass(frozen=True)
+class Arrangement:
+    """Movables with their poses, and the best lighting for these."""
+
+    movables: tuple[Movable, ...]
+    sites: tuple[Site, ...]
+    fitted: Fitted
+
+    @property
+    def missed(self) -> float:
+        """The loss of the best lighting, with the pull of the constraints."""
+        return self.fitted.missed
+
+    def with_site(self, k: int, site: Site, fitted: Fitted) -> "Arrangement":
+        """Return the arrangement with another pose of movable `k`."""
+        return replace(self, sites=(*self.sites[:k], site, *self.sites[k + 1 :]), fitted=fitted)
+
+    def with_movable(self, movable: Movable, site: Site, fitted: Fitted) -> "Arrangement":
+        """Return the arrangement with another movable at the end."""
+        return Arrangement((*self.movables, movable), (*self.sites, site), fitted)
+
+    def without(self, k: int, fitted: Fitted) -> "Arrangement":
+        """Return the arrangement without movable `k`."""
+        return Arrangement(
+            (*self.movables[:k], *self.movables[k + 1 :]),
+            (*self.sites[:k], *self.sites[k + 1 :]),
+            fitted,
+        )
+
+
+def all_sites(movables: Sequence[Movable], sites: Sequence[Site]) -> list[Site]:
+    """Return the places of all lights of movables, in their order."""
+    return [
+        site
+        for movable, site_of_movable in zip(movables, sites, strict=True)
+        for site in movable.sites(site_of_movable)
+    ]
+
+
+def by_column(movables: Sequence[Movable], columns: Floats) -> Mapping[int, Floats]:
+    """Return columns of all lights of movables, in their order, by their indices in the fit."""
+    numbers = [k for movable in movables for k in movable.columns]
+    return dict(zip(numbers, columns, strict=True))
 
 
 @dataclass(frozen=True)

@@ -11,8 +11,8 @@ from lightpaint.arrays import Doubles, Position
 from lightpaint.display_text import brief
 from lightpaint.errors import SceneError
 from lightpaint.keywords import keywords
+from lightpaint.placement.free_space import as_position
 from lightpaint.placement.freedom import Freedom
-from lightpaint.placement.space.free_space import as_position
 from lightpaint.scene.lights.new_emitter import NewKind
 from lightpaint.scene.properties.pose import FARTHEST, Site
 from lightpaint.validation import MAX_NAME, parse_number

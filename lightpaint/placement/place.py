@@ -13,18 +13,20 @@ from lightpaint.errors import NoPlaceError
 from lightpaint.keywords import keywords
 from lightpaint.lighting.constraints.constraints import Constraints
 from lightpaint.lighting.solution import Solution
+from lightpaint.placement.free_space import as_position, pixels_of
 from lightpaint.placement.freedom import Freedom
 from lightpaint.placement.lights_to_place import (
+    Arrangement,
+    Movable,
     NewLight,
     free_light,
     movables_of,
     new_lights_of,
     new_movables_of,
 )
-from lightpaint.placement.movable import Arrangement, Movable
-from lightpaint.placement.movable_panels import without_panels
+from lightpaint.placement.look_goals import check_looks, check_views, films_of
 from lightpaint.placement.new_lights import MirroredPair, NewLights
-from lightpaint.placement.paths.panel_site import PanelSite
+from lightpaint.placement.paths.panel_lights import PanelSite, without_panels
 from lightpaint.placement.paths.view_paths import SearchPaths
 from lightpaint.placement.placement import AddedLight, Move, Placement, hung
 from lightpaint.placement.placement_fit import fit_of
@@ -36,10 +38,7 @@ from lightpaint.placement.search.judgement import (
     PoseError,
 )
 from lightpaint.placement.search.new_light_search import STARTS, NewLightSearch
-from lightpaint.placement.search.pose_rules import PoseRules
-from lightpaint.placement.search.pose_search import TURNS, PoseSearch
-from lightpaint.placement.search_views import check_looks, check_views, films_of
-from lightpaint.placement.space.free_space import as_position, pixels_of
+from lightpaint.placement.search.pose_search import TURNS, PoseRules, PoseSearch
 from lightpaint.progress import Progress, silent
 from lightpaint.scene.lights.new_emitter import NewEmitter
 from lightpaint.scene.properties.pose import Pose, Site

@@ -3,6 +3,10 @@
 The search is over places only: for each choice of places, the usual solve gives the best weights
 under the constraints. So a search has few unknowns, and no bad starts in weights.
 
+Columns are the images of all lights at unit emission, (n, q, 3). A new panel is a thing in the
+room: it hides what is behind it, whichever side the camera sees. So if there are panels, columns
+have a fourth channel, the share of each pixel that their panel hides; it is 0 for other lights.
+
 Noise of columns adds to the error, more at some places than at others, and would draw lights to
 places with clean columns. So columns come with half the differences of two independent halves,
 whose squares are the variance of the columns, and the loss subtracts this noise.
@@ -26,7 +30,6 @@ from lightpaint.lighting.constraints.constraints import Constraints
 from lightpaint.lighting.normal_equations import NormalEquations
 from lightpaint.lighting.solution import Solution
 from lightpaint.lighting.unknowns.reduced_problem import reduced_problems
-from lightpaint.placement.light_columns import picture_slopes, seen_columns, with_columns
 from lightpaint.placement.look_goals import LookGoal, balanced, goal_of
 
 #: Share of a column that others cannot replace, below which it counts as none.
@@ -329,3 +332,50 @@ def _on_films(planes: Sequence[Planes], sizes: Sequence[tuple[int, int]]) -> Ite
             [block_mean(plane, view_planes.size[0] // size[0]) for plane in view_planes]
         )
         yield small.reshape(len(small), -1, 3)
+
+
+def with_columns(columns: Floats, changed: Mapping[int, Floats]) -> Floats:
+    """Return columns, some of them replaced: by (q, 4), or by (q, 3), which hide nothing."""
+    replaced = columns.copy()
+    for k, column in changed.items():
+        replaced[k, :, 3:] = 0
+        replaced[k, :, : column.shape[1]] = column
+    return replaced
+
+
+def seen_columns(columns: Floats) -> Floats:
+    """Return columns (n, q, 3) without what panels among them hide of the others."""
+    if columns.shape[2] == 3:
+        return columns
+    return np.asarray(columns[:, :, :3] * _shown_shares(columns)[:, :, None])
+
+
+def picture_slopes(
+    columns: Floats, weights: Doubles, slopes: Floats, owners: Sequence[int], c: int
+) -> Doubles:
+    """Return slopes of the picture in channel c, (s, q), by slopes of columns.
+
+    A panel that moves changes its own light, and hides other parts of what is behind it. weights:
+    (n, c); slopes: (s, q, 3 or 4); owners: of each slope, the index of its column.
+    """
+    owned = np.array(owners)
+    rows = slopes[:, :, c % 3] * weights[owned, c][:, None]
+    if columns.shape[2] == 3:
+        return np.asarray(rows)
+    rows *= _shown_shares(columns)[owned]
+    if slopes.shape[2] > 3:
+        for k in {*owners}:
+            others = with_columns(columns, {k: np.zeros(columns.shape[1:], np.float32)})
+            behind = weights[:, c] @ seen_columns(others)[:, :, c % 3]
+            rows[owned == k] -= slopes[owned == k, :, 3] * behind
+    return np.asarray(rows)
+
+
+def _shown_shares(columns: Floats) -> Floats:
+    """Return the share of each pixel of a column that the panels of others leave, (n, q)."""
+    shown = np.ones(columns.shape[:2], np.float32)
+    for k in np.flatnonzero(columns[:, :, 3].any(axis=1)):
+        rest = 1 - columns[k, :, 3]
+        shown[:k] *= rest
+        shown[k + 1 :] *= rest
+    return shown

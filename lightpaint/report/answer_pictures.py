@@ -14,8 +14,7 @@ import numpy as np
 import numpy.typing as npt
 
 from lightpaint.arrays import Floats, Indices, largest
-from lightpaint.basis.basis import Basis
-from lightpaint.basis.exposure_meter import meter_exposure
+from lightpaint.basis.basis import Basis, meter_exposure
 from lightpaint.colour.color import luminance
 from lightpaint.colour.display.view_transform import ViewTransform
 from lightpaint.images.bands import by_bands

@@ -16,11 +16,11 @@ from lightpaint.basis.file.basis_file import (
     ORIGIN_KEY,
     as_stored,
     is_basis_file,
+    read_basis,
+    read_origin,
     write_basis,
 )
-from lightpaint.basis.file.basis_reader import read_basis, read_origin
-from lightpaint.basis.file.checksums import CHECKSUMS_KEY
-from lightpaint.basis.file.file_parts import LIGHT_KEY, NAMES_KEY, OBJECTS_KEY
+from lightpaint.basis.file.file_parts import CHECKSUMS_KEY, LIGHT_KEY, NAMES_KEY, OBJECTS_KEY
 from lightpaint.errors import BasisError, ImageError, SizeError
 from lightpaint.images.estimate import HALF_DIFFERENCE
 from lightpaint.images.formats.exr import ExrPart, read_parts, write_parts, write_rgb

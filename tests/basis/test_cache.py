@@ -17,12 +17,11 @@ from nightly import nightly
 from renderer import LIGHTS, assert_equal_bits, same_basis, write_room
 
 from lightpaint.basis.basis import Basis
-from lightpaint.basis.cache import cache, cache_folder
-from lightpaint.basis.cache.cache_folder import SUFFIX, SUMS_SUFFIX, TAG
+from lightpaint.basis.cache import cache
+from lightpaint.basis.cache.cache import SUFFIX, SUMS_SUFFIX, TAG
 from lightpaint.basis.cache.cached_render import obtain_basis
 from lightpaint.basis.file import basis_file
-from lightpaint.basis.file.basis_file import write_basis
-from lightpaint.basis.file.basis_reader import read_basis
+from lightpaint.basis.file.basis_file import read_basis, write_basis
 from lightpaint.basis.file.file_planes import FilePlanes
 from lightpaint.basis.render.basis_render import render_basis
 from lightpaint.basis.render.render_origin import is_on_the_way
@@ -180,7 +179,7 @@ def test_the_first_samples_of_what_is_asked_for_are_gone_on_with(
 
 
 def sums_files() -> list[Path]:
-    return list(cache_folder.folder().glob(f"*{SUMS_SUFFIX}"))
+    return list(cache.folder().glob(f"*{SUMS_SUFFIX}"))
 
 
 def _render_and_kill(scene: Scene, spp: int, after: int) -> None:
@@ -462,7 +461,7 @@ def test_what_somebody_else_has_put_there_is_not_believed(
     assert cache.find(*request) is not None
     [path] = empty_cache.glob("*.basis.exr")
     owner = path.stat().st_uid
-    monkeypatch.setattr(cache_folder, "is_trusted_owner", lambda status: status.st_uid != owner)
+    monkeypatch.setattr(cache, "is_trusted_owner", lambda status: status.st_uid != owner)
     assert cache.find(*request) is None
     assert cache.entries() == []
     assert cache.cached_spp(*request) == 0
@@ -473,10 +472,7 @@ def test_who_is_believed() -> None:
     """Who runs the program, and who runs the machine."""
     me = os.geteuid()
     for owner, believed in ((me, True), (0, True), (me + 1, False)):
-        assert (
-            cache_folder.is_trusted_owner(os.stat_result((0o644, 1, 1, 1, owner, *5 * [0])))
-            == believed
-        )
+        assert cache.is_trusted_owner(os.stat_result((0o644, 1, 1, 1, owner, *5 * [0]))) == believed
 
 
 @pytest.mark.parametrize("jump_s", [-10 * 365 * 86400.0, 10 * 365 * 86400.0])

@@ -14,12 +14,16 @@ from nightly import FIFTHS, fifth_of
 
 from lightpaint.basis.basis import Basis
 from lightpaint.basis.cache import cache
-from lightpaint.basis.file.basis_file import ORIGIN_KEY, as_stored, write_basis
-from lightpaint.basis.file.basis_reader import read_basis, read_origin
-from lightpaint.basis.file.checksums import CHECKSUMS_KEY
-from lightpaint.basis.file.file_parts import LIGHT_KEY
-from lightpaint.basis.lightgroups.folder_files import MAX_FILES, is_light_groups
+from lightpaint.basis.file.basis_file import (
+    ORIGIN_KEY,
+    as_stored,
+    read_basis,
+    read_origin,
+    write_basis,
+)
+from lightpaint.basis.file.file_parts import CHECKSUMS_KEY, LIGHT_KEY
 from lightpaint.basis.lightgroups.light_groups import read_light_groups
+from lightpaint.basis.lightgroups.render_layers import MAX_FILES, is_light_groups
 from lightpaint.errors import BasisError, ImageError
 from lightpaint.images.formats.exr import ExrPart, read_parts, write_parts, write_rgb
 

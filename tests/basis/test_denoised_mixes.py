@@ -7,13 +7,11 @@ from typing import Any
 import numpy as np
 import pytest
 
-from lightpaint.basis.basis import Basis
+from lightpaint.basis.basis import Basis, Origin
 from lightpaint.basis.cache.denoised_planes import RoughPlanes
 from lightpaint.basis.denoised_mixes import blend_by_noise, denoise_mix, denoise_plane
-from lightpaint.basis.file.basis_file import as_stored, write_basis
-from lightpaint.basis.file.basis_reader import read_basis
+from lightpaint.basis.file.basis_file import as_stored, read_basis, write_basis
 from lightpaint.basis.lights import BasisLight
-from lightpaint.basis.origin import Origin
 from lightpaint.basis.planes import IndirectLight, as_planes
 from lightpaint.errors import BasisError
 from lightpaint.images import denoiser

@@ -11,8 +11,7 @@ import pytest
 import lightpaint as lp
 from lightpaint.arrays import round_to_halves
 from lightpaint.basis.file import basis_file, file_parts, half_floats
-from lightpaint.basis.file.basis_file import FORMAT_KEY, as_stored, write_basis
-from lightpaint.basis.file.basis_reader import read_basis
+from lightpaint.basis.file.basis_file import FORMAT_KEY, as_stored, read_basis, write_basis
 from lightpaint.basis.file.file_parts import SCALE_KEY
 from lightpaint.basis.file.file_planes import FilePlanes, RowPlanes
 from lightpaint.basis.file.half_floats import (

@@ -16,9 +16,8 @@ import lightpaint
 import lightpaint as lp
 from lightpaint.basis.derived_planes import BlockPlanes, JoinedRow, block_means, in_one_row
 from lightpaint.basis.file import basis_file, file_planes
-from lightpaint.basis.file.file_planes import FilePlanes
+from lightpaint.basis.file.file_planes import FilePlanes, SpooledPlanes, spooled
 from lightpaint.basis.file.half_floats import EncodedPlanes
-from lightpaint.basis.file.spooled_planes import SpooledPlanes, spooled
 from lightpaint.basis.planes import MemoryPlanes, Planes, as_planes, joined_planes
 from lightpaint.errors import BasisError, ImageError
 from lightpaint.images.formats import exr_rows

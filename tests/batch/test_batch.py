@@ -18,12 +18,12 @@ from batches import LOOKS, NAMES, contents, kill_batch, run_whole_batch, small_b
 from command import run, succeed
 from nightly import nightly
 
-from lightpaint.batch.distribution import engine
-from lightpaint.batch.distribution.processes import Processes
+from lightpaint.batch import engine
+from lightpaint.batch.engine import Processes
 from lightpaint.batch.gallery.gallery import contact_sheet, gallery_page
 from lightpaint.batch.gallery.summary import LightRow, SummaryRow, summary_csv
 from lightpaint.batch.manifest.folder_names import FILES, is_reserved
-from lightpaint.batch.manifest.key_spelling import as_key
+from lightpaint.batch.manifest.keys import as_key
 from lightpaint.batch.manifest.manifest import read_manifest
 from lightpaint.batch.plan.planner import plan
 from lightpaint.batch.run import _Run, run_batch

@@ -21,12 +21,11 @@ from batches import contents
 from command import run
 from renderer import write_room
 
-from lightpaint.basis.render import guide_training
+from lightpaint.basis.render import basis_render
 from lightpaint.basis.render import render_parts as parts_module
-from lightpaint.batch.batch_outcome import BatchOutcome
 from lightpaint.batch.cluster.cluster import Cluster
 from lightpaint.batch.plan.planner import plan
-from lightpaint.batch.run import run_batch
+from lightpaint.batch.run import BatchOutcome, run_batch
 from lightpaint.batch.run_options import RunOptions
 from lightpaint.images.formats.exr import write_rgb
 from lightpaint.scene import scene_render
@@ -157,7 +156,7 @@ def reference_batch(tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, dic
 
 def render_small_parts(patch: pytest.MonkeyPatch, cache: Path) -> None:
     patch.setattr(parts_module, "PART_SAMPLES", 2**10)
-    patch.setattr(guide_training, "TRAINING_SAMPLES", (2**12,))
+    patch.setattr(basis_render, "TRAINING_SAMPLES", (2**12,))
     patch.setattr(scene_render, "SAMPLES_PER_RANGE", 1)
     patch.setenv("LIGHTPAINT_CACHE", str(cache))
 

@@ -12,7 +12,7 @@ from light_groups import interleaved, pictures
 from renderer import LIGHTS, write_room
 
 from lightpaint.basis.basis import Basis
-from lightpaint.basis.render import guide_training, render_parts
+from lightpaint.basis.render import basis_render, render_parts
 from lightpaint.batch.plan.planner import plan
 from lightpaint.batch.run import run_batch
 from lightpaint.errors import BatchError, TargetError
@@ -133,7 +133,7 @@ def _one_thread() -> Iterator[None]:
 @pytest.mark.usefixtures("_one_thread")
 def test_a_batch_of_lightings(batch_folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(render_parts, "PART_SAMPLES", 2**10)
-    monkeypatch.setattr(guide_training, "TRAINING_SAMPLES", (2**12,))
+    monkeypatch.setattr(basis_render, "TRAINING_SAMPLES", (2**12,))
     monkeypatch.setenv("LIGHTPAINT_CACHE", str(batch_folder / "cache"))
     lightings = {}
     for step in ("lights", "solve"):

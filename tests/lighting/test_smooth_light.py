@@ -6,9 +6,8 @@ from typing import Any
 import numpy as np
 import pytest
 
-from lightpaint.basis.basis import Basis
+from lightpaint.basis.basis import Basis, Origin
 from lightpaint.basis.lights import BasisLight
-from lightpaint.basis.origin import Origin
 from lightpaint.basis.planes import IndirectLight, as_planes
 from lightpaint.images.denoiser import Features
 from lightpaint.lighting.analysis.noise import noise_correction

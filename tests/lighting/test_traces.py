@@ -6,9 +6,8 @@ import numpy as np
 import pytest
 from light_groups import pictures
 
-from lightpaint.basis.basis import Basis
+from lightpaint.basis.basis import Basis, Origin
 from lightpaint.basis.lights import BasisLight
-from lightpaint.basis.origin import Origin
 from lightpaint.lighting.constraints.constraints import Constraints
 from lightpaint.lighting.problem import remove_traces
 from lightpaint.lighting.solve import solve

@@ -11,8 +11,8 @@ from hypothesis import strategies as st
 from nightly import examples
 
 import lightpaint as lp
+from lightpaint.basis.basis import Origin
 from lightpaint.basis.lights import BasisLight
-from lightpaint.basis.origin import Origin
 from lightpaint.images.formats.exr import ExrPart, write_parts
 from lightpaint.paint import protocol
 from lightpaint.paint.notebook import widget_arguments

@@ -12,7 +12,7 @@ from patience import PATIENCE_S
 from renderer import LIGHTS, write_room
 
 from lightpaint.basis.cache.denoised_planes import read_denoised_planes
-from lightpaint.basis.render import guide_training
+from lightpaint.basis.render import basis_render
 from lightpaint.paint import protocol
 from lightpaint.paint.background_threads import LatestWork
 from lightpaint.paint.store.store import MemoryStore
@@ -28,7 +28,7 @@ from lightpaint.scene.scene_reader import load_scene
 @pytest.fixture
 def subject(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Subject:
     """A room of two lights, whose paint is to be answered to 3 %."""
-    monkeypatch.setattr(guide_training, "TRAINING_SAMPLES", (2**12,))
+    monkeypatch.setattr(basis_render, "TRAINING_SAMPLES", (2**12,))
     monkeypatch.setenv("LIGHTPAINT_CACHE", str(tmp_path / "cache"))
     room = write_room(tmp_path, lights=LIGHTS["panel"] + LIGHTS["sun"])
     settings = Settings(error=0.03)

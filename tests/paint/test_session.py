@@ -14,8 +14,8 @@ from nightly import examples
 from renderer import REPOSITORY
 
 import lightpaint as lp
+from lightpaint.basis.basis import Origin
 from lightpaint.basis.lights import BasisLight
-from lightpaint.basis.origin import Origin
 from lightpaint.cli.commands.paint_command import options_of
 from lightpaint.colour.color import LUMINANCE, kelvin_to_rgb
 from lightpaint.lighting.answer.combination import dimmed

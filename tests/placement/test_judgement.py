@@ -10,9 +10,9 @@ import lightpaint as lp
 from lightpaint.arrays import Floats
 from lightpaint.lighting.unknowns.knobs import Knob
 from lightpaint.lighting.unknowns.reduction import Reduction
-from lightpaint.placement.free_light import FreeLight
+from lightpaint.placement.freedom import FreeLight
+from lightpaint.placement.lights_to_place import Arrangement, Movable
 from lightpaint.placement.look_goals import LookGoal
-from lightpaint.placement.movable import Arrangement, Movable
 from lightpaint.placement.placement_fit import PlacementFit
 from lightpaint.placement.search.judgement import FEW_FITS, NOTHING, WORTH, PlacementJudge
 from lightpaint.placement.search.pose_steps import PoseSteps

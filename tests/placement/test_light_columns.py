@@ -9,12 +9,16 @@ from renderer import write_room
 import lightpaint as lp
 from lightpaint.lighting.unknowns.knobs import Knob
 from lightpaint.lighting.unknowns.reduction import Reduction
-from lightpaint.placement.light_columns import picture_slopes, seen_columns, with_columns
 from lightpaint.placement.look_goals import LookGoal
 from lightpaint.placement.paths.frozen_paths import FrozenPaths
-from lightpaint.placement.paths.panel_site import PanelSite
+from lightpaint.placement.paths.panel_lights import PanelSite
 from lightpaint.placement.paths.view_paths import ViewPaths
-from lightpaint.placement.placement_fit import PlacementFit
+from lightpaint.placement.placement_fit import (
+    PlacementFit,
+    picture_slopes,
+    seen_columns,
+    with_columns,
+)
 from lightpaint.scene.lights.new_emitter import NewEmitter
 from lightpaint.scene.scene_reader import load_scene
 

@@ -6,8 +6,13 @@ import numpy as np
 import pytest
 from renderer import write_room
 
-from lightpaint.placement.movable_panels import is_panel, panel_site, without_panels
-from lightpaint.placement.paths.panel_site import Outline, PanelSite
+from lightpaint.placement.paths.panel_lights import (
+    Outline,
+    PanelSite,
+    is_panel,
+    panel_site,
+    without_panels,
+)
 from lightpaint.scene.properties.pose import Pose
 from lightpaint.scene.properties.site import rotation_between
 from lightpaint.scene.scene_reader import load_scene

@@ -10,9 +10,9 @@ import pytest
 import lightpaint as lp
 from lightpaint.lighting.unknowns.knobs import Knob
 from lightpaint.lighting.unknowns.reduction import Reduction
-from lightpaint.placement.free_light import FreeLight
+from lightpaint.placement.freedom import FreeLight
+from lightpaint.placement.lights_to_place import Arrangement, Movable
 from lightpaint.placement.look_goals import LookGoal
-from lightpaint.placement.movable import Arrangement, Movable
 from lightpaint.placement.placement_fit import PlacementFit
 from lightpaint.placement.search.new_light_search import NewLightSearch
 from lightpaint.scene.properties.site import Site

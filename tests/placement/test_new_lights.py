@@ -12,8 +12,8 @@ from renderer import write_room
 import lightpaint as lp
 from lightpaint.errors import SceneError
 from lightpaint.pipeline.results.placement_changes import spoken_change
+from lightpaint.placement.free_space import seen_by_camera
 from lightpaint.placement.new_lights import Mirror
-from lightpaint.placement.space.free_space import seen_by_camera
 from lightpaint.scene.lights.new_emitter import NewEmitter
 from lightpaint.scene.scene import Scene
 from lightpaint.scene.scene_reader import load_scene

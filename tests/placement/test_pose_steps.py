@@ -11,13 +11,12 @@ from renderer import write_room
 import lightpaint as lp
 from lightpaint.lighting.unknowns.knobs import Knob
 from lightpaint.lighting.unknowns.reduction import Reduction
-from lightpaint.placement.free_light import FreeLight
-from lightpaint.placement.light_columns import seen_columns
+from lightpaint.placement.freedom import FreeLight
+from lightpaint.placement.lights_to_place import Arrangement, Movable
 from lightpaint.placement.look_goals import LookGoal
-from lightpaint.placement.movable import Arrangement, Movable
-from lightpaint.placement.paths.panel_site import PanelSite
+from lightpaint.placement.paths.panel_lights import PanelSite
 from lightpaint.placement.paths.view_paths import SearchPaths
-from lightpaint.placement.placement_fit import PlacementFit
+from lightpaint.placement.placement_fit import PlacementFit, seen_columns
 from lightpaint.placement.search.pose_steps import PoseSteps
 from lightpaint.scene.properties.site import Site, unit
 from lightpaint.scene.scene_reader import load_scene

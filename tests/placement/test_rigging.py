@@ -10,8 +10,8 @@ from renderer import write_room
 import lightpaint as lp
 from lightpaint.errors import ConstraintError, LightpaintError
 from lightpaint.lighting.constraints.constraints_file import constraints_of
-from lightpaint.placement.rigging.rigged_lights import freedoms_of
-from lightpaint.placement.rigging.rigging import rigging_of
+from lightpaint.placement.rigged_lights import freedoms_of
+from lightpaint.placement.rigging import rigging_of
 from lightpaint.scene.lights.lights_file import read_lights_file
 from lightpaint.scene.scene import Scene
 from lightpaint.scene.scene_reader import load_scene

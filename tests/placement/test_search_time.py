@@ -6,9 +6,9 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from lightpaint.placement.look_goals import PIXELS
 from lightpaint.placement.search import search_time
 from lightpaint.placement.search.search_time import SearchSize, usual_pace
-from lightpaint.placement.search_views import PIXELS
 
 SIZES = st.builds(SearchSize.of, st.integers(0, 60), st.integers(0, 4), st.integers(1, 2**22))
 

@@ -19,15 +19,15 @@ from lightpaint.errors import SceneError
 from lightpaint.lighting.constraints.constraints import Constraints
 from lightpaint.lighting.solution import Solution
 from lightpaint.lighting.solve import solve
+from lightpaint.placement import suggested_lights
 from lightpaint.placement.place import place
 from lightpaint.placement.placement import Placement
-from lightpaint.placement.suggestions import light_search
-from lightpaint.placement.suggestions.light_search import (
+from lightpaint.placement.suggested_lights import (
     check_suggestible,
     emitter_xml,
     suggest_lights,
 )
-from lightpaint.placement.suggestions.suggestion import Suggestion
+from lightpaint.placement.suggestion import Suggestion
 from lightpaint.report.page.placement_section import spoken_suggestions, suggestion_section
 from lightpaint.scene.scene import Scene
 from lightpaint.scene.scene_reader import load_scene
@@ -136,7 +136,7 @@ def test_gains_of_a_display_fit_are_shares_of_its_last_linear_problem(
         placements.append(place(*arguments, **options))
         return placements[-1]
 
-    monkeypatch.setattr(light_search, "place", recorded)
+    monkeypatch.setattr(suggested_lights, "place", recorded)
     [first] = suggest_lights(scene, basis, solution, count=1)
     [light] = placements[0].additions
     # The search's film is that of the basis here: nothing is missed that it does not see but noise.

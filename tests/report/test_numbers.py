@@ -23,7 +23,7 @@ from lightpaint.lighting.constraints.constraints import Constraints
 from lightpaint.lighting.solve import solve
 from lightpaint.lighting.unknowns import reduced_problem
 from lightpaint.pipeline.results.results import Look, write_report
-from lightpaint.placement.suggestions.suggestion import Suggestion
+from lightpaint.placement.suggestion import Suggestion
 from lightpaint.relit.verification import compare
 from lightpaint.target.target import Target
 

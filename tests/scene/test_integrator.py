@@ -12,7 +12,7 @@ from command import run, run_refused, succeed
 from renderer import LIGHTS, write_room
 
 import lightpaint as lp
-from lightpaint.basis.file.basis_reader import read_origin
+from lightpaint.basis.file.basis_file import read_origin
 from lightpaint.errors import SceneError
 from lightpaint.images.formats.exr import write_rgb
 from lightpaint.lighting.answer.lighting import Lighting

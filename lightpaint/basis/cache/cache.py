@@ -1,40 +1,35 @@
 """The cache of bases, so that a second painting of a scene starts at once.
 
 There is one file per scene content, sensor, size and seed; further samples are added to it. Data
-derived from a basis lie beside it under the same name with another suffix. The folder
-(`cache_folder.py`) may be deleted at any time.
+derived from a basis lie beside it under the same name with another suffix. The folder may be
+deleted at any time.
+
+A file there is listed, read or deleted only if its name follows our patterns, it contains the mark
+of our formats, and its owner is trusted. So nobody loses files by naming a work folder as the
+cache.
 """
 
 import hashlib
+import os
+import re
 import shutil
 import time
 import zipfile
-from collections.abc import Iterable
+from collections.abc import Iterable, Iterator
 from contextlib import suppress
 from dataclasses import dataclass
 from fnmatch import fnmatchcase
 from pathlib import Path
 
 import numpy as np
+from platformdirs import user_cache_path
 
 from lightpaint.arrays import Floats
-from lightpaint.basis.basis import Basis
-from lightpaint.basis.cache.cache_folder import (
-    BASIS_NAME,
-    LEFTOVER_NAME,
-    SUFFIX,
-    SUMS_SUFFIX,
-    companions_of,
-    delete_orphans,
-    folder,
-    is_own,
-    mark_folder,
-)
-from lightpaint.basis.file.basis_file import FORMAT, write_basis
-from lightpaint.basis.file.basis_reader import read_basis, read_origin
-from lightpaint.basis.origin import Origin
+from lightpaint.basis.basis import Basis, Origin
+from lightpaint.basis.file.basis_file import FORMAT, read_basis, read_origin, write_basis
+from lightpaint.display_text import some_names
 from lightpaint.errors import BasisError, LightpaintError, OutputError
-from lightpaint.files import replacing
+from lightpaint.files import replacing, write_text
 
 #: Size of the cache in bytes above which the least recently used bases are deleted.
 MAX_BYTES = 8 * 2**30
@@ -44,6 +39,42 @@ _DAMAGES = (OSError, ValueError, KeyError, EOFError, zipfile.BadZipFile)
 LEFTOVER_S = 3600.0
 #: Age in seconds after which data derived from a basis that is not in the cache are deleted.
 UNUSED_S = 30 * 86400.0
+
+#: Environment variable that overrides the default folder in the user's cache.
+VARIABLE = "LIGHTPAINT_CACHE"
+
+#: Suffixes of a basis and of the files beside it: its denoised planes, facts about its scene, and
+#: the exact sums of a basis to which samples are still to be added.
+SUFFIX, DENOISED_SUFFIX, FACTS_SUFFIX = ".basis.exr", ".clean.npz", ".known.json"
+SUMS_SUFFIX = ".sums.npz"
+#: Folder for parts of bases that are being rendered.
+PARTS = "parts"
+
+BASIS_NAME = re.compile(r"[0-9a-f]{32}\.basis\.exr")
+COMPANION_NAME = re.compile(
+    r"([0-9a-f]{32})(?:\.clean\.npz|\.[0-9a-f]{32}\.known\.json|\.[0-9a-f]{32}\.sums\.npz)"
+)
+#: Pattern of the temporary folders that `files.replacing` creates.
+LEFTOVER_NAME = re.compile(r"\.([0-9a-f]{32}\.(?:[0-9a-f.]+\.)?[a-z]+\.[a-z]+)\.[a-z0-9_]{8}")
+
+#: Marks a cache folder, by a convention that backup programs know: https://bford.info/cachedir
+TAG = "CACHEDIR.TAG"
+TAG_TEXT = """Signature: 8a477f597d28d172789f06886806bc55
+# This file is a cache directory tag created by lightpaint, which keeps rendered bases here.
+# All of this folder may be deleted at any time.
+"""
+
+#: Mark at or near the beginning of each kind of file, and the bytes within which it must appear.
+MARKS = {
+    SUFFIX: b"lightpaint-basis",
+    DENOISED_SUFFIX: b"made_of.npy",
+    FACTS_SUFFIX: b'"lightpaint-known',
+    SUMS_SUFFIX: b"sums_a.npy",
+}
+MARK_WITHIN = {SUFFIX: 2**20, DENOISED_SUFFIX: 2**8, FACTS_SUFFIX: 2**8, SUMS_SUFFIX: 2**8}
+
+#: Number of foreign files that an error message names, and number of files that are inspected.
+NAMES_SHOWN, NAMES_READ = 3, 100_000
 
 
 @dataclass(frozen=True)
@@ -122,10 +153,10 @@ def keep(basis: Basis) -> bool:
     """
     try:
         path = _path_of(basis)
-        mark_folder()
+        _mark_folder()
         _write_sums(basis)
         write_basis(path, basis)
-        for other in companions_of(path):
+        for other in _companions_of(path):
             is_old = basis.sums is None or other != _sums_path(basis)
             if other.name.endswith(SUMS_SUFFIX) and is_old:
                 other.unlink()
@@ -215,7 +246,7 @@ def _prune(path: Path) -> None:
             continue
         remaining_bytes -= entry.size
         if remaining_bytes < 0:
-            for file in (*companions_of(entry.path), entry.path):
+            for file in (*_companions_of(entry.path), entry.path):
                 file.unlink(missing_ok=True)
 
 
@@ -247,7 +278,7 @@ def delete_entries(entries: Iterable[Entry]) -> int:
     freed_bytes = 0
     for entry in entries:
         try:
-            for file in (*companions_of(entry.path), entry.path):
+            for file in (*_companions_of(entry.path), entry.path):
                 file.unlink(missing_ok=True)
         except OSError as error:
             raise OutputError(f"cannot delete {entry.path}: {error.strerror or error}") from error
@@ -274,10 +305,109 @@ def _path_of(basis: Basis) -> Path:
 
 
 def _entry(path: Path) -> Entry:
-    size = sum(file.stat().st_size for file in (path, *companions_of(path)))
+    size = sum(file.stat().st_size for file in (path, *_companions_of(path)))
     try:
         origin, image_size, identities = read_origin(path)
     except LightpaintError:
         return Entry(path, size, None)
     known_identities = frozenset(identities) - {""}
     return Entry(path, size, origin, image_size, len(identities), known_identities)
+
+
+def folder() -> Path:
+    """Return the folder in which bases are cached.
+
+    Raises OutputError if LIGHTPAINT_CACHE names a folder that contains other files and was not
+    created by this program.
+    """
+    named_folder = os.environ.get(VARIABLE)
+    if not named_folder:
+        return user_cache_path("lightpaint") / "bases"
+    path = Path(named_folder)
+    if foreign := _foreign_names(path):
+        raise OutputError(
+            f"{VARIABLE} names {path}, which has other files in it ({some_names(foreign)}): name a "
+            "folder that is new or empty, where bases may be kept and deleted"
+        )
+    return path
+
+
+def _mark_folder() -> None:
+    """Mark the folder as ours, unless it is marked already. Raises OutputError."""
+    tag = folder() / TAG
+    if not tag.exists():
+        write_text(tag, TAG_TEXT)
+
+
+def is_own(path: Path) -> bool:
+    """Return whether the file at `path` was written by this program and has a trusted owner."""
+    ending = next((end for end in MARKS if path.name.endswith(end)), None)
+    if ending is None:
+        return False
+    try:
+        # Another user's file may be a link, or a pipe that never ends.
+        with open(path, "rb", opener=lambda name, flags: os.open(name, flags | os.O_NONBLOCK)) as f:
+            status = os.fstat(f.fileno())
+            return is_trusted_owner(status) and MARKS[ending] in f.read(MARK_WITHIN[ending])
+    except OSError:
+        return False
+
+
+def is_trusted_owner(status: os.stat_result) -> bool:
+    """Return whether a file or folder belongs to the current user or to root."""
+    return not hasattr(os, "geteuid") or status.st_uid in (os.geteuid(), 0)
+
+
+def _companions_of(path: Path) -> list[Path]:
+    """Return the files derived from the basis at `path`."""
+    name = path.name.removesuffix(SUFFIX)
+    return [companion for companion, stem in _companions() if stem == name]
+
+
+def delete_orphans(unused_s: float = 0.0) -> int:
+    """Delete derived files whose basis is gone and which were not used for `unused_s` seconds.
+    Returns the number of bytes freed.
+    """
+    freed_bytes = 0
+    for path, name in _companions():
+        with suppress(OSError):
+            status = path.stat()
+            is_alone = not path.with_name(name + SUFFIX).exists()
+            if is_alone and time.time() - status.st_mtime >= unused_s:
+                path.unlink()
+                freed_bytes += status.st_size
+    return freed_bytes
+
+
+def _companions() -> list[tuple[Path, str]]:
+    """Return the files derived from bases, each with the stem of its basis."""
+    matches = ((path, COMPANION_NAME.fullmatch(path.name)) for path in folder().glob("*"))
+    return [(path, match[1]) for path, match in matches if match is not None and is_own(path)]
+
+
+def _foreign_names(path: Path) -> list[str]:
+    """Return some foreign names in the folder; none if it is ours or new, or contains only hidden
+    files.
+    """
+    with suppress(OSError):
+        if "created by lightpaint" in (path / TAG).read_text("utf-8", "replace")[:1000]:
+            return []
+    names: list[str] = []
+    with suppress(OSError):
+        for name in _names_in(path):
+            if not (name.startswith(".") or _is_own_name(name)):
+                names.append(name)
+            if len(names) == NAMES_SHOWN:
+                break
+    return names
+
+
+def _is_own_name(name: str) -> bool:
+    kinds = (BASIS_NAME, COMPANION_NAME)
+    return name in (PARTS, TAG) or any(kind.fullmatch(name) for kind in kinds)
+
+
+def _names_in(path: Path) -> Iterator[str]:
+    with os.scandir(path) as entries:
+        for entry, _ in zip(entries, range(NAMES_READ), strict=False):
+            yield entry.name

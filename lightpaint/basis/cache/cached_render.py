@@ -17,8 +17,7 @@ from lightpaint.basis.cache.plane_reuse import (
     merge,
     restrict,
 )
-from lightpaint.basis.file.basis_file import as_stored, is_large
-from lightpaint.basis.file.basis_reader import leave_indirect
+from lightpaint.basis.file.basis_file import as_stored, is_large, leave_indirect
 from lightpaint.basis.render.basis_render import render_basis
 from lightpaint.basis.render.pixel_top_up import KeptTracer, top_up
 from lightpaint.basis.render.render_origin import (

@@ -20,7 +20,6 @@ import numpy.typing as npt
 from lightpaint.arrays import Doubles, Floats
 from lightpaint.basis.basis import Basis
 from lightpaint.basis.cache import cache
-from lightpaint.basis.cache.cache_folder import DENOISED_SUFFIX, is_own
 from lightpaint.basis.denoised_mixes import denoise_current_look, denoise_plane, share_of_clean
 from lightpaint.basis.planes import mix
 from lightpaint.errors import LightpaintError
@@ -223,8 +222,8 @@ def read_denoised_planes(basis: Basis, *, factor: int = 1) -> DenoisedPlanes | N
 
 def _read(basis: Basis, keys: list[str], factor: int) -> DenoisedPlanes | None:
     with suppress(*_READ_ERRORS, LightpaintError):
-        path = cache.companion_path(basis, DENOISED_SUFFIX)
-        if not is_own(path):
+        path = cache.companion_path(basis, cache.DENOISED_SUFFIX)
+        if not cache.is_own(path):
             return None
         with path.open("rb") as file, np.load(file, allow_pickle=False) as file_arrays:
             if file_arrays["made_of"].tolist() != keys:
@@ -248,7 +247,7 @@ def _read_shared(basis: Basis, keys: list[str], factor: int) -> dict[int, tuple[
     """
     missing = {key: k for k, key in enumerate(keys[:-1])}
     found: dict[int, tuple[Halves, float]] = {}
-    for path in cache.companions_with(DENOISED_SUFFIX):
+    for path in cache.companions_with(cache.DENOISED_SUFFIX):
         with suppress(*_READ_ERRORS), path.open("rb") as file, np.load(file) as file_arrays:
             made_of = file_arrays["made_of"].tolist()[:-1]
             numbers = {key: number for number, key in enumerate(made_of) if key in missing}
@@ -270,7 +269,7 @@ def cache_denoised_planes(basis: Basis, planes: DenoisedPlanes) -> bool:
 
 def _write(basis: Basis, keys: list[str], planes: DenoisedPlanes) -> bool:
     try:
-        path = cache.companion_path(basis, DENOISED_SUFFIX)
+        path = cache.companion_path(basis, cache.DENOISED_SUFFIX)
         with replacing(path) as place, place.open("wb") as file:
             made_of = np.array(keys)
             arrays = (planes.halves, planes.scales, planes.current)

@@ -23,7 +23,6 @@ from typing import Any
 
 from lightpaint.basis.basis import Basis
 from lightpaint.basis.cache import cache as bases
-from lightpaint.basis.cache.cache_folder import FACTS_SUFFIX, folder, is_own
 from lightpaint.basis.lights import BasisLight, Lights
 from lightpaint.errors import LightpaintError
 from lightpaint.files import write_text
@@ -80,8 +79,8 @@ def recall_facts(key: str) -> SceneFacts | None:
     if "mitsuba" in sys.modules:  # other code may have changed its file resolver
         return None
     with suppress(OSError, LightpaintError, LookupError, TypeError, ValueError):
-        for file in folder().glob(f"*.{key}{FACTS_SUFFIX}"):
-            if not is_own(file):
+        for file in bases.folder().glob(f"*.{key}{bases.FACTS_SUFFIX}"):
+            if not bases.is_own(file):
                 continue
             record = strict_json(file.read_text("utf-8"))
             if record["format"] == FORMAT and _is_unchanged(record["places"], record["texts"]):
@@ -135,7 +134,7 @@ def remember_facts(
         text = json.dumps(record, allow_nan=False)
         if strict_json(text)["known"]["lights"]["requests"] != asdict(scene.requests):
             return False  # TOML has values that JSON lacks
-        write_text(bases.companion_path(basis, f".{key}{FACTS_SUFFIX}"), text)
+        write_text(bases.companion_path(basis, f".{key}{bases.FACTS_SUFFIX}"), text)
     except (OSError, LightpaintError, TypeError, ValueError):
         return False
     return True

@@ -1,35 +1,51 @@
-"""Writes a basis as a multi-part OpenEXR file that other programs can open.
+"""The file of a basis: a multi-part OpenEXR file that other programs can open.
 
-Part k is named after light k and holds its image as R, G, B; docs/formats.md has the details.
+Part k is named after light k and holds its image as R, G, B; docs/formats.md has the details. A
+file is read completely into memory or, if it is large, row by row on request.
 """
 
 import json
-from collections.abc import Callable, Iterator, Sequence
-from dataclasses import replace
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from dataclasses import dataclass, replace
+from functools import partial
 from pathlib import Path
 
-from lightpaint.basis.basis import Basis
-from lightpaint.basis.file.checksums import CHECKSUMS_KEY, Checksums, checksum
+import numpy as np
+
+from lightpaint.basis.basis import Basis, Origin
 from lightpaint.basis.file.file_parts import (
+    CHECKSUMS_KEY,
+    INDIRECT_CHANNELS,
     LARGEST_SCALE,
     LIGHT_CHANNELS,
+    LIGHT_KEY,
     PLANE_CHANNELS,
+    Checksums,
+    check,
     checked_text,
+    checksum,
     encoded_planes_of,
+    fields_of_others,
     light_channels,
     light_texts,
     other_parts,
     plane_sets,
+    scales_of,
+    stack_channels,
+    stored_channels,
 )
-from lightpaint.basis.file.half_floats import EncodedPlanes, PlaneEncoding
-from lightpaint.basis.planes import IndirectLight
-from lightpaint.images.formats.exr import (
-    Channels,
-    ExrPart,
-)
+from lightpaint.basis.file.file_planes import FilePlanes
+from lightpaint.basis.file.half_floats import EncodedPlanes, PlaneEncoding, encoded_plane
+from lightpaint.basis.lights import BasisLight, Lights
+from lightpaint.basis.planes import IndirectLight, Planes, as_planes
+from lightpaint.errors import BasisError, ImageError
+from lightpaint.file_reading import file_length
+from lightpaint.files import one_line
+from lightpaint.images.formats.exr import Channels, ExrPart, read_headers, read_parts
+from lightpaint.images.formats.exr_rows import PartLayout, RowFile, RowsUnsupportedError
 from lightpaint.images.formats.exr_streams import PartHead, room_for, write_streamed
 from lightpaint.keywords import keywords
-from lightpaint.storage.json_records import fields_of
+from lightpaint.storage.json_records import fields_of, read_record, strict_json
 
 #: The written format, and an older one that is still read, in which all planes are float32.
 FORMAT, OLD_FORMAT = "lightpaint-basis 2", "lightpaint-basis 1"
@@ -42,6 +58,12 @@ SINGLES_MAX_BYTES = 2**27
 
 #: Size of all planes in float32, in bytes, above which they stay in their file.
 IN_MEMORY_MAX_BYTES = 2**31
+
+#: Maximum size in bytes of a basis file that is read.
+MAX_BYTES = 2**36
+
+#: Exceptions raised by a header with unexpected content.
+_HEADER_ERRORS = (AttributeError, LookupError, OverflowError, TypeError, ValueError)
 
 
 @keywords()
@@ -105,7 +127,7 @@ def as_stored(basis: Basis, keep: Callable[[Basis], object] = lambda basis: None
     """
     stored_basis = _encoded(basis)
     keep(stored_basis)
-    if is_encoded(len(basis.lights), basis.size):
+    if _is_encoded(len(basis.lights), basis.size):
         return stored_basis
     for planes, stored_planes in zip(plane_sets(basis), plane_sets(stored_basis), strict=True):
         if planes is not stored_planes:
@@ -114,7 +136,7 @@ def as_stored(basis: Basis, keep: Callable[[Basis], object] = lambda basis: None
     return basis.without_cached_values()
 
 
-def is_encoded(lights: int, size: tuple[int, int]) -> bool:
+def _is_encoded(lights: int, size: tuple[int, int]) -> bool:
     """Return whether planes of this number of lights are held in memory in their file's
     encoding.
     """
@@ -137,3 +159,235 @@ def is_large(lights: int, size: tuple[int, int]) -> bool:
 def is_basis_file(path: Path) -> bool:
     """Return True if `path` has the suffix of a basis file (EXR) rather than of a scene (XML)."""
     return path.suffix.lower() == ".exr"
+
+
+@dataclass(frozen=True)
+class _Parts:
+    """The parts of a basis file, whether its pixels are in memory or not.
+
+    head: attributes of the first part. texts: attributes of each light's part. channel_readers:
+    functions that read the channels of each light's part. others: parts of no light.
+    planes: function of an order of the parts and an index into `PLANE_CHANNELS` that returns those
+    planes. has_indirect: whether the parts have planes of indirect light.
+    """
+
+    head: Mapping[str, str]
+    texts: Sequence[Mapping[str, str]]
+    channel_readers: Sequence[Callable[[], Channels]]
+    others: Sequence[ExrPart]
+    planes: Callable[[Sequence[int], int], Planes]
+    has_indirect: bool
+
+    def read_records(self) -> tuple[list[BasisLight], Origin, Checksums | None]:
+        """Read lights, origin and checksums. Raises BasisError or one of _HEADER_ERRORS."""
+        lights = [
+            read_record(BasisLight, strict_json(attributes[LIGHT_KEY])) for attributes in self.texts
+        ]
+        origin = read_record(Origin, strict_json(self.head[ORIGIN_KEY]))
+        text = self.head.get(CHECKSUMS_KEY)
+        return lights, origin, None if text is None else Checksums.of_text(text)
+
+    def check_pixels(self, lights: Sequence[BasisLight], checksums: Checksums | None) -> None:
+        """Raise BasisError if a light's pixels are not finite or do not match their checksum."""
+        names = LIGHT_CHANNELS | INDIRECT_CHANNELS if self.has_indirect else LIGHT_CHANNELS
+        for light, texts, read in zip(lights, self.texts, self.channel_readers, strict=True):
+            channels = read()  # one light at a time, since together they may exceed memory
+            if not all(np.isfinite(channels[name]).all() for name in names):
+                raise BasisError("holds values that are not finite: make it again")
+            if checksums is not None:
+                its_text = checked_text(texts)
+                check(checksums.lights[light.name], f"light {light.name!r}", its_text, channels)
+
+
+@keywords()
+def read_basis(path: str | Path) -> Basis:
+    """Read a basis file, even if another program has reordered its parts.
+
+    Args:
+        path: A file written by `write_basis` or the command line.
+
+    Raises:
+        ImageError: If the file is damaged.
+        BasisError: If it is not a basis, or was changed after it was written.
+
+    Examples:
+        >>> lp.read_basis("room.basis.exr")
+        Basis(2 lights, 16x16, 4 spp, of room.xml: panel, bulb)
+    """
+    path = Path(path)
+    file_length(path, "image file", ImageError, limit=MAX_BYTES)
+    try:
+        if (large_basis := _read_large(path)) is not None:
+            return replace(large_basis, source=str(path))
+        parts = read_parts(path)
+        head = _head(p.attributes for p in parts)
+        return replace(leave_indirect(_basis_of_parts(parts, head), path), source=str(path))
+    except BasisError as error:
+        raise BasisError(path, " ", error) from error
+    except _HEADER_ERRORS as error:
+        raise BasisError(f"{path} is a damaged basis: {one_line(str(error))}") from error
+    except MemoryError:
+        raise ImageError(f"{path} needs more memory than there is") from None
+
+
+def leave_indirect(basis: Basis, path: Path) -> Basis:
+    """Return `basis` with indirect planes that are read on demand from `path`, if it has many
+    lights.
+
+    Only denoised pictures need them, so they take no memory otherwise. path: the file that holds
+    exactly this basis; if it does not, or has another layout, `basis` is returned unchanged.
+    """
+    if basis.indirect is None or not _is_encoded(len(basis.lights), basis.size):
+        return basis
+    try:
+        file = RowFile(path)
+        light_parts = {
+            strict_json(p.texts[LIGHT_KEY])["name"]: p for p in file.parts if LIGHT_KEY in p.texts
+        }
+        parts = [light_parts[name] for name in basis.names]
+        origin = read_record(Origin, strict_json(_head(p.texts for p in file.parts)[ORIGIN_KEY]))
+    except (RowsUnsupportedError, OSError, BasisError, *_HEADER_ERRORS):
+        return basis
+    if origin != basis.origin or any({p.size, p.display} != {basis.size} for p in parts):
+        return basis
+    scales = [scales_of(p.texts) for p in parts]
+    images, noise = (
+        FilePlanes(file, parts, PLANE_CHANNELS[k], [light_scales[k] for light_scales in scales])
+        for k in (2, 3)
+    )
+    return replace(basis, indirect=IndirectLight(images, noise))
+
+
+def _read_large(path: Path) -> Basis | None:
+    """Return a basis whose rows are read on demand.
+
+    Returns None if the basis fits in memory or the file does not support reading rows.
+    """
+    try:
+        file = RowFile(path)
+    except (RowsUnsupportedError, OSError):
+        return None
+    light_parts = [p for p in file.parts if LIGHT_KEY in p.texts]
+    if not light_parts or not is_large(len(light_parts), light_parts[0].size):
+        return None
+    return _basis_of_rows(file, _head(p.texts for p in file.parts))
+
+
+def _head(texts: Iterable[Mapping[str, str]]) -> Mapping[str, str]:
+    """Return the attributes of the first part. Raises BasisError for another format."""
+    head: Mapping[str, str] = next((part for part in texts if FORMAT_KEY in part), {})
+    if head.get(FORMAT_KEY) not in (FORMAT, OLD_FORMAT):
+        mark = one_line(repr(head.get(FORMAT_KEY, "no such mark")))
+        raise BasisError(
+            f"is not a basis this version can read: expected {FORMAT!r}, found {mark}; "
+            "make one with lightpaint basis"
+        )
+    return head
+
+
+def _basis_of_parts(parts: Sequence[ExrPart], head: Mapping[str, str]) -> Basis:
+    """Return the basis of EXR parts. Raises BasisError or one of _HEADER_ERRORS."""
+    light_parts = [p.in_display_window() for p in parts if LIGHT_KEY in p.attributes]
+    others = [p for p in parts if LIGHT_KEY not in p.attributes]
+    scales = [scales_of(p.attributes) for p in light_parts]
+
+    def planes(order: Sequence[int], number: int) -> Planes:
+        channels = [(light_parts[k], scales[k][number]) for k in order]
+        if _is_encoded(len(light_parts), light_parts[0].size):
+            channel_readers = stored_channels(channels, PLANE_CHANNELS[number])
+            return EncodedPlanes(
+                [
+                    encoded_plane(*x)
+                    for x in zip(channel_readers, (s for _, s in channels), strict=True)
+                ]
+            )
+        return as_planes(stack_channels(channels, PLANE_CHANNELS[number]))
+
+    channel_readers = [partial(getattr, part, "channels") for part in light_parts]
+    has_indirect = all(p.channels.keys() >= INDIRECT_CHANNELS for p in light_parts)
+    texts = [p.attributes for p in light_parts]
+    return _checked_basis(
+        _Parts(head, texts, channel_readers, others, planes, has_indirect=has_indirect)
+    )
+
+
+def _basis_of_rows(file: RowFile, head: Mapping[str, str]) -> Basis | None:
+    """Return a basis whose planes stay in the file; None if its parts differ in layout.
+
+    Raises the errors of `_basis_of_parts`.
+    """
+    light_parts = [p for p in file.parts if LIGHT_KEY in p.texts]
+    if any(
+        p.size != p.display or p.size != light_parts[0].size or not {*p.channels} >= LIGHT_CHANNELS
+        for p in light_parts
+    ):
+        return None
+    scales = [scales_of(p.texts) for p in light_parts]
+
+    def part(layout: PartLayout) -> ExrPart:
+        return ExrPart("", file.channels(layout), layout.texts, layout.display)
+
+    def planes(order: Sequence[int], number: int) -> Planes:
+        plane_scales = [scales[k][number] for k in order]
+        return FilePlanes(
+            file, [light_parts[k] for k in order], PLANE_CHANNELS[number], plane_scales
+        )
+
+    channel_readers = [partial(file.channels, p) for p in light_parts]
+    others = [part(p) for p in file.parts if LIGHT_KEY not in p.texts]
+    has_indirect = all({*p.channels} >= INDIRECT_CHANNELS for p in light_parts)
+    texts = [p.texts for p in light_parts]
+    return _checked_basis(
+        _Parts(head, texts, channel_readers, others, planes, has_indirect=has_indirect)
+    )
+
+
+def _checked_basis(parts: _Parts) -> Basis:
+    """Return the basis of a file after checking it."""
+    masks = [p.in_display_window().channels["Y"] for p in parts.others if "Y" in p.channels]
+    if not parts.texts or not masks:
+        raise BasisError("has lost parts of its basis: make it again with lightpaint basis")
+    try:
+        lights, origin, checksums = parts.read_records()
+    except (BasisError, ImageError) as error:
+        raise BasisError(f"is a damaged basis: {one_line(str(error))}") from error
+    order = list(range(len(lights)))
+    if checksums is not None:
+        order = checksums.in_order([light.name for light in lights])
+        check(checksums.origin, "origin", parts.head[ORIGIN_KEY], {})
+    planes = parts.planes
+    try:
+        images, noise = planes(order, 0), planes(order, 1)
+        basis = Basis(
+            lights=Lights(tuple(lights[k] for k in order)),
+            planes=images,
+            noise=noise,
+            emitters_seen=masks[0] > 0,
+            origin=origin,
+            indirect=IndirectLight(planes(order, 2), planes(order, 3))
+            if parts.has_indirect
+            else None,
+            **fields_of_others(parts.others, checksums, images.size),
+        )
+    except (BasisError, ImageError) as error:
+        raise BasisError(f"is a damaged basis: {one_line(str(error))}") from error
+    parts.check_pixels(lights, checksums)
+    if checksums is not None:
+        check(checksums.seen, "mask of seen emitters", "", {"Y": masks[0]})
+    return basis
+
+
+def read_origin(path: Path) -> tuple[Origin, tuple[int, int], tuple[str, ...]]:
+    """Return origin, (height, width) and light identities of the basis at `path`, without reading
+    pixels.
+    """
+    file_length(path, "basis", BasisError, limit=MAX_BYTES)
+    try:
+        headers, size = read_headers(path)
+        light_parts = [strict_json(header[LIGHT_KEY]) for header in headers if LIGHT_KEY in header]
+        identities = tuple(str(light.get("identity", "")) for light in light_parts)
+        text = next(header[ORIGIN_KEY] for header in headers if ORIGIN_KEY in header)
+        return read_record(Origin, strict_json(text)), size, identities
+    except (*_HEADER_ERRORS, BasisError, StopIteration) as error:
+        reason = one_line(str(error)) or "it does not say where it comes from"
+        raise BasisError(f"{path} is not a basis this version can read: {reason}") from error

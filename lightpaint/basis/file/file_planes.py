@@ -1,9 +1,15 @@
-"""Planes of a basis file whose rows are read on demand, so that they may exceed memory."""
+"""Planes whose rows are read on demand, so that they may exceed memory.
 
+The rows come from a basis file, from other planes, or from a temporary file.
+"""
+
+import mmap
 import os
+import tempfile
 from collections import OrderedDict
 from collections.abc import Callable, Mapping, Sequence
 from concurrent.futures import Future
+from contextlib import suppress
 from functools import cached_property
 from threading import Lock
 
@@ -259,3 +265,72 @@ class ReplacedPlanes(RowPlanes):
         for k, plane in self._planes.items():
             block[k] = plane[top:bottom]
         return block
+
+
+def spooled(planes: Planes) -> Planes:
+    """Return planes in memory unchanged, and others copied to a temporary file.
+
+    If the file does not fit on the disk, planes are returned unchanged and computed on each
+    request.
+    """
+    if isinstance(planes, RowPlanes):
+        with suppress(OSError):
+            return SpooledPlanes(planes)
+    return planes
+
+
+class SpooledPlanes(RowPlanes):
+    """A copy of planes in a temporary file. Raises OSError if the disk is full."""
+
+    def __init__(self, planes: RowPlanes) -> None:
+        height, width = planes.size
+        # Channels first, which is how they are summed.
+        self._file = TemporaryArray((planes.count, 3, height, width))
+        step = planes.strip_rows
+        for top in range(0, height, step):
+            rows = planes.rows(top, min(top + step, height))
+            self._file.array[:, :, top : top + step] = rows.transpose(0, 3, 1, 2)
+            self._file.release()
+
+    @property
+    def count(self) -> int:
+        """Number of lights."""
+        return int(self._file.array.shape[0])
+
+    @property
+    def size(self) -> tuple[int, int]:
+        """(height, width) in pixels."""
+        height, width = self._file.array.shape[2:]
+        return height, width
+
+    def plane(self, i: int) -> Floats:
+        """Return the plane of light i, (h, w, 3)."""
+        image = np.ascontiguousarray(self._file.array[i].transpose(1, 2, 0))
+        self._file.release()
+        return image
+
+    def rows(self, top: int, bottom: int) -> Floats:
+        """Return rows `top` to `bottom` of all planes, (n, bottom - top, w, 3)."""
+        block = np.array(self._file.array[:, :, max(top, 0) : max(bottom, 0)])
+        self._file.release()
+        return block.transpose(0, 2, 3, 1)
+
+
+class TemporaryArray:
+    """A float32 array, initially zero, in a temporary file that is deleted with it.
+
+    Raises OSError if the temporary folder is full.
+    """
+
+    def __init__(self, shape: tuple[int, ...]) -> None:
+        with tempfile.TemporaryFile() as file:
+            if hasattr(os, "posix_fallocate"):  # or a full disk would kill the process later
+                os.posix_fallocate(file.fileno(), 0, 4 * int(np.prod(shape)))
+            self.array = np.memmap(file, np.float32, "r+", shape=shape)  # keeps the file open
+
+    def release(self) -> None:
+        """Release the memory of the parts that were read or written; the file keeps their
+        content.
+        """
+        if hasattr(mmap, "MADV_DONTNEED"):
+            self.array._mmap.madvise(mmap.MADV_DONTNEED)  # type: ignore[attr-defined]

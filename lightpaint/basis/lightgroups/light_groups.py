@@ -2,37 +2,46 @@
 
 Weights multiply the rendered light, so 1, 1, 1 is the light as rendered. The part of the beauty
 that no group contains becomes one more light, `rest`, which is not adjusted.
+
+The frames of a shot have the same lights in all. `rest` may be negligible in one frame and not in
+the next: a frame without one gets a black one.
 """
 
 import hashlib
 from collections.abc import Collection, Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
+from typing import Literal
 
 import numpy as np
 import numpy.typing as npt
 
 from lightpaint.arrays import Floats
-from lightpaint.basis.basis import Basis
+from lightpaint.basis.basis import LIGHT_GROUPS, Basis, Origin
+from lightpaint.basis.lightgroups.beauty_comparison import (
+    NEGLIGIBLE_SHARE,
+    describe_sum,
+    missing_and_exceeding,
+    share_text,
+)
 from lightpaint.basis.lightgroups.denoising_passes import DenoisingPasses, split_passes
 from lightpaint.basis.lightgroups.frame_sequence import FrameSequence
-from lightpaint.basis.lightgroups.group_remarks import (
-    REST_NAME,
-    missing_light,
-    remarks_on_black,
-    remarks_on_passes,
-    without_holes,
-)
-from lightpaint.basis.lightgroups.layer_roles import Roles, roles_of
+from lightpaint.basis.lightgroups.layer_roles import ONE_FILE_PER_LIGHT, Roles, roles_of
+from lightpaint.basis.lightgroups.naming_conventions import convention_of
 from lightpaint.basis.lightgroups.render_layers import RenderFile, RenderLayer, read_render
 from lightpaint.basis.lights import BasisLight, Lights, free_name
-from lightpaint.basis.origin import LIGHT_GROUPS, Origin
-from lightpaint.basis.planes import IndirectLight, as_planes
+from lightpaint.basis.planes import IndirectLight, Planes, as_planes
 from lightpaint.colour.color import LUMINANCE
 from lightpaint.display_text import short_repr, some_names
 from lightpaint.errors import BasisError
 from lightpaint.keywords import keywords
 from lightpaint.sentences import Hint
+
+#: Name of the light that holds the missing part; underscores are added if a light has that name.
+REST_NAME = "rest"
+
+#: Share of the beauty in no group from which the user is told how to put lights into groups.
+MIN_MISSING_SHARE = 1e-3
 
 #: The unit of weights.
 AS_RENDERED = "× as rendered"
@@ -170,7 +179,7 @@ def _light_groups(
     if beauty is not None:
         remark += f"; the whole picture: {beauty.name or 'R, G, B'}"
     remarks = [*render.remarks, remark, *roles.remarks, missing.remark]
-    remarks += remarks_on_black(roles.lights, missing.share)
+    remarks += _remarks_on_black(roles.lights, missing.share)
     if lights[0].primaries is not None:
         remarks.append(
             "the file has other primaries than Rec.709: multipliers are for linear Rec.709, so a "
@@ -180,7 +189,7 @@ def _light_groups(
         remarks.append(f"{int(holes.sum())} pixels hold NaN or Inf in a layer and count nothing")
     basis = _basis(path, roles, passes, missing.rest, holes)
     basis = replace(basis, objects=render.objects)
-    remarks += remarks_on_passes(basis)
+    remarks += _remarks_on_passes(basis)
     without_pixels = np.empty((0, 0, 3))
     layers = [replace(x, image=without_pixels.astype(x.image.dtype)) for x in lights]
     return LightGroups(
@@ -210,9 +219,9 @@ def _basis(
     images = np.empty((len(lights) + (rest is not None), height, width, 3), np.float32)
     first = next(iter(lights.values()))
     for image, layer in zip(images, lights.values(), strict=False):
-        image[:] = layer.in_rec709(without_holes(layer.image, holes))
+        image[:] = layer.in_rec709(_without_holes(layer.image, holes))
     if rest is not None:
-        basis_lights.append(rest_light(lights))
+        basis_lights.append(_rest_light(lights))
         images[-1] = first.in_rec709(rest)
     unknown_noise = as_planes(np.zeros_like(images))
     indirect = _indirect_planes(roles, passes, images, holes)
@@ -239,11 +248,11 @@ def _indirect_planes(
     indirect = images.copy()
     for plane, part, layer in zip(indirect, parts, roles.lights.values(), strict=False):
         if part is not None:
-            plane[:] = layer.in_rec709(without_holes(part, holes))
+            plane[:] = layer.in_rec709(_without_holes(part, holes))
     return indirect
 
 
-def rest_light(names: Collection[str]) -> BasisLight:
+def _rest_light(names: Collection[str]) -> BasisLight:
     """Return the light that holds what the lights of these names lack of the beauty."""
     name = free_name(REST_NAME, names)
     return _light(name, "beauty less the groups", "rest", is_fixed=True)
@@ -268,3 +277,166 @@ def _origin(path: Path, roles: Roles, images: Floats, names: Sequence[str]) -> O
         halves=(0, 0),
         passes=(0, 0),
     )
+
+
+@dataclass(frozen=True)
+class MissingLight:
+    """The difference between the groups and the beauty.
+
+    rest: (h, w, 3), None if it is within rounding. share, exceeding: shares of the beauty, None
+    without one. remark: the difference in words.
+    """
+
+    rest: Floats | None
+    share: float | None
+    exceeding: float | None
+    remark: str
+
+
+def missing_light(roles: Roles, holes: npt.NDArray[np.bool_]) -> MissingLight:
+    """Return what the groups lack of the beauty. holes: (h, w), pixels that count nothing."""
+    lights, beauty = list(roles.lights.values()), roles.beauty
+    if beauty is None:
+        text = "no beauty among the layers, so it is unknown whether the groups add up to all of it"
+        if roles.renderer == ONE_FILE_PER_LIGHT:
+            text += ", and whether each of them is a light"
+        elif setting := _setting(roles, "beauty"):
+            text += f": render it with them ({setting})"
+        return MissingLight(None, None, None, text)
+    whole = _without_holes(beauty.image, holes).astype(np.float64)
+    rest = whole - sum(_without_holes(layer.image, holes).astype(np.float64) for layer in lights)
+    missing, exceeding = missing_and_exceeding(rest, whole)
+    name = free_name(REST_NAME, roles.lights)
+    if roles.noisy is not None:
+        text = (
+            f"the groups add up to {roles.noisy.name}; what denoising changed in {beauty.name}, "
+            f"{share_text(max(missing, exceeding))} of its light, becomes the fixed light {name}"
+        )
+        return MissingLight(rest, missing, exceeding, text)
+    text, is_missing = describe_sum(rest, whole, [*lights, beauty], missing, exceeding, name)
+    setting = _setting(roles, "group")
+    if is_missing and setting and missing > MIN_MISSING_SHARE and missing > exceeding:
+        text += f"; a light in no group gets one by {setting}"
+        if ungrouped := _setting(roles, "ungrouped"):
+            text += f", but {ungrouped} is in none"
+    return MissingLight(rest if is_missing else None, missing, exceeding, text)
+
+
+def _setting(roles: Roles, of: Literal["group", "beauty", "ungrouped"]) -> str:
+    """Return where the renderer is told the group of a light, or to write the beauty, or which
+    light it writes into no group; "" if it is not known.
+    """
+    convention = convention_of(roles.renderer)
+    if convention is None:
+        return ""
+    settings = {
+        "group": convention.group_setting,
+        "beauty": convention.beauty_setting,
+        "ungrouped": convention.ungrouped,
+    }
+    return settings[of]
+
+
+def _without_holes(image: Floats, holes: npt.NDArray[np.bool_]) -> npt.NDArray[np.float32]:
+    """Return a picture (h, w, 3) that is black in the holes (h, w)."""
+    return np.where(holes[..., None], np.float32(0), image.astype(np.float32))
+
+
+def _remarks_on_black(lights: Mapping[str, RenderLayer], missing: float | None) -> list[str]:
+    """Return a sentence on lights that are black in the file, with the likely reason."""
+    black = [name for name, layer in lights.items() if not layer.image.any()]
+    if not black:
+        return []
+    text = f"the file holds nothing of {some_names(black)}: black in every pixel, so fixed"
+    if missing is None or missing <= NEGLIGIBLE_SHARE:
+        return [f"{text}; is the light off, or the group renamed?"]
+    return [
+        f"{text}; {share_text(missing)} of the light of the beauty is in no group: was the group "
+        "renamed after its lights were given it?"
+    ]
+
+
+def _remarks_on_passes(basis: Basis) -> list[str]:
+    """Return a sentence on the passes used for denoising, if the file has any."""
+    known_parts = ["albedo and normals"] if basis.features is not None else []
+    known_parts += ["direct and indirect light"] if basis.indirect is not None else []
+    return (
+        [f"pictures are denoised by {' and by '.join(known_parts)} of the file"]
+        if known_parts
+        else []
+    )
+
+
+def with_equal_lights(frames: Sequence[LightGroups]) -> list[LightGroups]:
+    """Return the groups of each frame with the same lights.
+
+    Raises BasisError if frames differ in groups, in their order, or in size.
+    """
+    first = frames[0]
+    names, size = group_names(first), first.basis.size
+    for frame in frames[1:]:
+        if group_names(frame) != names:
+            raise BasisError(_difference(first, frame))
+        if frame.basis.size != size:
+            raise BasisError(
+                f"{frame.path} is {_size(frame)} but {first.path} is {_size(first)}: the frames of "
+                "a shot must have the same size"
+            )
+    if not any(frame.has_rest for frame in frames):
+        return list(frames)
+    return [frame if frame.has_rest else _with_black_rest(frame) for frame in frames]
+
+
+def first_frame(
+    sequence: FrameSequence, pattern: str | None = None, *, has_rest: bool
+) -> LightGroups:
+    """Return the light groups of the first frame of a shot, for exports of all of it.
+
+    pattern: as of `read_light_groups`. has_rest: whether the answer has a `rest`, which this frame
+    may lack.
+    """
+    groups = read_light_groups(sequence.path(sequence.frames[0]), pattern=pattern)
+    groups = replace(groups, sequence=sequence)
+    return _with_black_rest(groups) if has_rest and not groups.has_rest else groups
+
+
+def group_names(groups: LightGroups) -> tuple[str, ...]:
+    """Return the names of the groups, in their order, without `rest`."""
+    return groups.basis.names[: len(groups.layers)]
+
+
+def _with_black_rest(groups: LightGroups) -> LightGroups:
+    """Return groups that add up to the whole picture with a `rest` that is black."""
+    basis, indirect = groups.basis, groups.basis.indirect
+    noise = as_planes(np.zeros((len(basis.lights) + 1, *basis.size, 3), np.float32))
+    with_rest = replace(
+        basis,
+        lights=Lights((*basis.lights, _rest_light(basis.names))),
+        planes=_with_black(basis.planes),
+        noise=noise,
+        indirect=None if indirect is None else IndirectLight(_with_black(indirect.planes), noise),
+    )
+    return replace(groups, basis=with_rest)
+
+
+def _with_black(planes: Planes) -> Planes:
+    """Return planes with a black one at the end."""
+    images = planes.array()
+    return as_planes(np.concatenate([images, np.zeros_like(images[:1])]))
+
+
+def _difference(first: LightGroups, other: LightGroups) -> str:
+    """Return which groups one frame has and another lacks, as an error."""
+    for lacking, whole in ((other, first), (first, other)):
+        names = sorted(set(group_names(whole)) - set(group_names(lacking)))
+        if names:
+            return (
+                f"{lacking.path} lacks the light groups {some_names(names)}, which {whole.path} "
+                "has: render all frames with the same groups"
+            )
+    return f"{first.path} and {other.path} have their light groups in another order"
+
+
+def _size(groups: LightGroups) -> str:
+    height, width = groups.basis.size
+    return f"{width}x{height}"

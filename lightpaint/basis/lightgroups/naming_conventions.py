@@ -1,7 +1,7 @@
 """Naming conventions of renderers for light groups and the beauty that they add up to."""
 
 import re
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 
 #: Placeholder for the name of the light in a pattern.
@@ -183,3 +183,39 @@ def beauty_name(names: Iterable[str], *, first: str = "", view: str = "") -> str
         return before != view, BEAUTY_NAMES.index(last.casefold())
 
     return min(candidates, key=rank, default=None)
+
+
+def short_names(stems: Sequence[str]) -> dict[str, str]:
+    """Return names without their common start and end, cut at a separator or before a number:
+    `shot_key_v1` → `key`, `key0001` → `key`.
+    """
+    if len(stems) < 2:
+        return {stem: stem for stem in stems}
+    head = _shared_head(stems)
+    head = head[: max((head.rfind(joint) + 1 for joint in SEPARATORS), default=0)]
+    trimmed_names = [stem[len(head) :] for stem in stems]
+    tail = _shared_head([name[::-1] for name in trimmed_names])[::-1]
+    starts = [k for joint in SEPARATORS if (k := tail.find(joint)) >= 0]
+    if not starts:
+        number = re.search(r"\d*$", tail)
+        starts = (
+            [number.start()] if number and not _is_part_of_number(trimmed_names, number) else []
+        )
+    tail = tail[min(starts) :] if starts else ""
+    trimmed_names = [name.removesuffix(tail) for name in trimmed_names]
+    return dict(zip(stems, trimmed_names if all(trimmed_names) else stems, strict=True))
+
+
+def _is_part_of_number(names: Sequence[str], end: re.Match[str]) -> bool:
+    """Return True if a digit stands before the end that all names share in one of them."""
+    length = len(end[0])
+    return any(name[: len(name) - length][-1:].isdigit() for name in names)
+
+
+def _shared_head(names: Sequence[str]) -> str:
+    """Return the common start of all names."""
+    low, high = min(names), max(names)
+    common_length = next(
+        (k for k, (a, b) in enumerate(zip(low, high, strict=False)) if a != b), len(low)
+    )
+    return low[:common_length]

@@ -1,17 +1,26 @@
-"""Renders a basis: all lights in one pass if possible, else one by one."""
+"""Renders a basis: all lights in one pass if possible, else one by one.
+
+Before one pass, the emitter guide is trained: which emitters matter where. Training depends on the
+scene, its film and the seed alone, not on the number of samples, the budget or the machine. So all
+machines choose emitters in the same way, and none has to wait for another.
+"""
 
 import gc
 from collections.abc import Callable
 from dataclasses import replace
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
+from lightpaint.arrays import Floats
 from lightpaint.basis.basis import Basis
 from lightpaint.basis.planes import as_planes
-from lightpaint.basis.render.banded_film import BandedFilm, WholeFilm
-from lightpaint.basis.render.guide_training import train
+from lightpaint.basis.render.banded_film import (
+    BandedFilm,
+    WholeFilm,
+    check_memory,
+    renders_in_bands,
+)
 from lightpaint.basis.render.one_pass_basis import basis_of_planes, basis_of_sums
 from lightpaint.basis.render.render_budget import Budget, Keeper, check_samples, steps
-from lightpaint.basis.render.render_memory import check_memory, renders_in_bands
 from lightpaint.basis.render.render_origin import (
     ONE_PASS,
     SEPARATE,
@@ -20,11 +29,7 @@ from lightpaint.basis.render.render_origin import (
     method_of,
     origin_of,
 )
-from lightpaint.basis.render.separate_renders import (
-    LightSums,
-    emitters_seen,
-    render_separately,
-)
+from lightpaint.basis.render.separate_renders import LightSums, emitters_seen, render_separately
 from lightpaint.errors import BasisError, SceneError
 from lightpaint.keywords import keywords
 from lightpaint.progress import Interrupted, Progress, silent
@@ -34,6 +39,17 @@ from lightpaint.scene.scene import Scene
 from lightpaint.scene.scene_render import view_seed
 from lightpaint.scene.surfaces import render_first_hits
 from lightpaint.sentences import Hint
+
+if TYPE_CHECKING:
+    from lightpaint.basis.render.tracer.one_pass import Tracer
+
+
+#: Maximum numbers of camera samples in the training passes. Each pass uses what earlier ones
+#: learned.
+TRAINING_SAMPLES = (2**16, 2**17, 2**17)
+#: Maximum number of them per pixel, since training for a small picture would take longer than its
+#: samples; and, where many emitters are to choose from, that number for each emitter.
+TRAINING_SPP, TRAINING_SPP_PER_EMITTER = 16, 0.5
 
 
 @keywords()
@@ -212,7 +228,7 @@ class _OnePassRender:
             pixels, done = self._film.band_pixels, self.done
             for spp in steps(pixels, budget, done, progress, self._is_clean):
                 if not self.tracer.is_trained:
-                    train(self.tracer, let_others_through)
+                    train_tracer(self.tracer, let_others_through)
                 self._film.add(self.done, spp, let_others_through)
                 self.done += spp
                 keeper.now_and_then(self.basis)
@@ -275,3 +291,43 @@ def _render_one_by_one(
         scene, budget, seed=numbers, sums=sums, basis=basis, keeper=keeper, progress=progress
     )
     return basis(is_finished=is_final)
+
+
+def training_samples(scene: Scene) -> tuple[int, ...]:
+    """Return the numbers of camera samples in the training passes for `scene`."""
+    height, width = scene.size
+    spp = max(TRAINING_SPP, TRAINING_SPP_PER_EMITTER * len({x.node for x in scene.emitters}))
+    share = min(1.0, spp * height * width / sum(TRAINING_SAMPLES))
+    return tuple(max(1, round(share * samples)) for samples in TRAINING_SAMPLES)
+
+
+@MITSUBA.acquired()
+def train_guide(scene: Scene, seed: int) -> Floats:
+    """Train an emitter guide for `scene`, and return its `Basis.guide_table`."""
+    from lightpaint.basis.render.tracer.one_pass import Tracer
+
+    tracer = Tracer(scene, view_seed(seed, scene.sensor))
+    try:
+        with tracing() as let_others_through:
+            return train_tracer(tracer, let_others_through)
+    finally:
+        tracer.close()
+        gc.collect()
+
+
+def train_tracer(tracer: "Tracer", let_others_through: Callable[[], None]) -> Floats:
+    """Train the guide of `tracer`, unless it has no choice, and return its table.
+
+    let_others_through: called before each pass.
+    """
+    (height, width), done = tracer.scene.size, 0
+    passes = training_samples(tracer.scene) if tracer.guide.has_choice else ()
+    for k, samples in enumerate(passes):
+        let_others_through()
+        # In a large picture a subset of the rows suffices, a different one in each pass.
+        step = min(-(-height * width // samples), height)
+        rows = range(k * step // len(passes), height, step)
+        spp = max(1, samples // (len(rows) * width))
+        tracer.learn(rows, done, spp)
+        done += spp
+    return tracer.end_training()

@@ -17,12 +17,12 @@ import numpy as np
 from lightpaint.arrays import Floats, Indices
 from lightpaint.basis.basis import Basis
 from lightpaint.basis.planes import IndirectLight, Planes, as_planes
-from lightpaint.basis.render.guide_training import train
+from lightpaint.basis.render.basis_render import train_tracer
 from lightpaint.basis.render.integrators import has_indirect_planes, plane_count
+from lightpaint.basis.render.one_pass_basis import add_halves, mean_and_half_difference
 from lightpaint.basis.render.render_budget import PASS_DIVISOR
 from lightpaint.basis.render.render_origin import ONE_PASS, is_of
 from lightpaint.basis.render.render_parts import PART_MAX_BYTES
-from lightpaint.basis.render.sample_halves import add_halves, mean_and_half_difference
 from lightpaint.errors import BasisError
 from lightpaint.progress import Interrupted, Progress, silent
 from lightpaint.scene.runtime.mitsuba_errors import render_errors
@@ -119,7 +119,7 @@ def top_up(
             with tracing() as let_others_through:
                 tracer = kept_tracers.of(scene, basis)
                 if batches and not tracer.is_trained:
-                    train(tracer, let_others_through)
+                    train_tracer(tracer, let_others_through)
                 sums.guide_table = tracer.guide_table
                 progress("top-up", 0, len(batches))
                 for k, pixels in enumerate(batches):

@@ -2,9 +2,8 @@
 
 from dataclasses import replace
 
-from lightpaint.basis.basis import Basis
+from lightpaint.basis.basis import Basis, Origin
 from lightpaint.basis.lights import BasisLight, Lights
-from lightpaint.basis.origin import Origin
 from lightpaint.basis.render.integrators import why_not_one_pass
 from lightpaint.basis.render.render_budget import half_of
 from lightpaint.basis.render.separate_renders import (

@@ -240,7 +240,7 @@ def emitters_seen(scene: Scene) -> Bools:
 def _seen_through_glass(scene: Scene, loaded: Any) -> Bools:
     """Return the pixels in which a ray reaches an emitter through clear surfaces only, (h, w)."""
     from lightpaint.basis.render.tracer.one_pass import view_of
-    from lightpaint.basis.render.tracer.seen_emitters import (
+    from lightpaint.basis.render.tracer.path_tracer import (
         emitters_seen_through,
         has_clear_surfaces,
     )

@@ -1,9 +1,15 @@
-"""The workers of a Dask cluster: their addresses, their files and their events."""
+"""The workers of a Dask cluster: their addresses, their files and their events.
+
+Before Dask connects, this machine and a scheduler at a `tls://` address check that they trust each
+other, since a refused Dask client reports that late, or waits for half a minute. Dask finds
+certificates by its own configuration (`distributed.comm.tls`), as its schedulers and workers do.
+"""
 
 import asyncio
 import logging
 import os
 import socket
+import ssl
 import time
 from collections import deque
 from collections.abc import Callable, Collection
@@ -14,7 +20,6 @@ from typing import Any, TypeVar
 
 from lightpaint.batch.cluster import worker as cluster_worker
 from lightpaint.batch.cluster.parcels import Parcel, files_to_send, pieces
-from lightpaint.batch.cluster.tls import check_trust
 from lightpaint.batch.cluster.worker import versions as own_versions
 from lightpaint.errors import BatchError, LightpaintError
 from lightpaint.file_reading import call_with_timeout
@@ -40,6 +45,12 @@ SILENCED_LOGGERS = (
 _Result = TypeVar("_Result")
 
 INSTALL = "pip install 'lightpaint[cluster]'"
+
+#: Advice on configuring certificates.
+CONFIGURE_HINT = (
+    "DASK_DISTRIBUTED__COMM__TLS__CA_FILE and DASK_DISTRIBUTED__COMM__TLS__CLIENT__CERT name them "
+    "(and ...__CLIENT__KEY, where the key is in a file of its own)"
+)
 
 
 class ClusterWorkers:
@@ -196,7 +207,7 @@ def _connect(address: str) -> Any:
         # Dask's client is slow to report that nobody listens or that it is refused, and logs more.
         place = get_address_host_port(address, strict=True)
         with socket.create_connection(place, timeout=ANSWER_S) as connection:
-            check_trust(address, connection)
+            _check_trust(address, connection)
         # Dask would wait for ever for a server that accepts the connection and stays silent.
         make = partial(Client, address, timeout=ANSWER_S, set_as_default=False)
         return call_with_timeout(make, ANSWER_S + GONE_S)
@@ -207,3 +218,66 @@ def _connect(address: str) -> Any:
             f"no scheduler answers at {address}: {_reason(error) or 'none is there'}; give its "
             "address, like tcp://host:8786 or tls://host:8786 (dask scheduler tells it)"
         ) from error
+
+
+def _check_trust(address: str, connection: socket.socket) -> None:
+    """Raise BatchError, with advice, unless Dask's configuration can connect to `address`.
+
+    connection: a new connection to the scheduler there; a TLS handshake uses it up. Raises OSError
+    if it breaks off.
+    """
+    security = _security(address)
+    if not address.startswith("tls://"):
+        if security.require_encryption:
+            raise BatchError(
+                f"Dask's configuration wants encryption here, and {address} has none: give a "
+                "scheduler's tls:// address, or turn distributed.comm.require-encryption off"
+            )
+        return
+    context = _context(address, security)
+    try:
+        with context.wrap_socket(connection) as secure:
+            # The scheduler reports a refused certificate in its first message after the handshake.
+            secure.recv(1)
+    except ssl.SSLCertVerificationError as error:
+        reason = error.verify_message
+    except ssl.SSLError as error:
+        if error.reason in ("WRONG_VERSION_NUMBER", "RECORD_LAYER_FAILURE", "HTTP_REQUEST"):
+            raise BatchError(
+                f"no TLS is spoken at {address}: a scheduler that was started without certificates "
+                f"is at {address.replace('tls://', 'tcp://', 1)}"
+            ) from None
+        reason = (error.reason or first_line(error)).replace("_", " ").lower()
+    else:
+        return
+    raise BatchError(
+        f"the scheduler at {address} and this machine do not trust each other's certificates "
+        f"({reason}): both have to be signed by an authority that the other one names; "
+        f"{CONFIGURE_HINT}"
+    )
+
+
+def _security(address: str) -> Any:
+    from distributed.security import Security
+
+    try:
+        return Security()
+    except (ImportError, TypeError, ValueError) as error:
+        raise BatchError(f"Dask's configuration for {address}: {first_line(error)}") from None
+
+
+def _context(address: str, security: Any) -> ssl.SSLContext:
+    try:
+        context = security.get_connection_args("client")["ssl_context"]
+    except (OSError, ValueError) as error:
+        # Python does not say which of the files it is.
+        files = security.get_tls_config_for_role("client")
+        names = ", ".join(str(files[x])[:200] for x in ("ca_file", "cert", "key") if files[x])
+        reason = error.strerror if isinstance(error, FileNotFoundError) else first_line(error)
+        raise BatchError(
+            f"the certificates for {address} cannot be used: {reason} ({names}); each is a PEM "
+            "file, and a certificate needs its key"
+        ) from None
+    if not isinstance(context, ssl.SSLContext):
+        raise BatchError(f"{address} needs certificates: {CONFIGURE_HINT}")
+    return context

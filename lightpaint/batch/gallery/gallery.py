@@ -1,6 +1,11 @@
-"""The gallery: index.html, a self-contained page of all looks, and contact.png, a contact sheet."""
+"""The gallery: index.html, a self-contained page of all looks, and contact.png, a contact sheet.
+
+It shows the looks of a batch, or those of one `solve` command without a manifest.
+"""
 
 import base64
+import hashlib
+import json
 from collections.abc import Mapping, Sequence
 from dataclasses import asdict, dataclass
 from pathlib import Path
@@ -11,8 +16,15 @@ import numpy as np
 from markupsafe import Markup
 from PIL import Image, ImageDraw, ImageFont
 
-from lightpaint.batch.gallery.gallery_mixers import mixers_html, script_json, transforms_of
-from lightpaint.batch.gallery.small_planes import drop_planes, planes_name
+from lightpaint.basis.basis import Basis
+from lightpaint.batch.gallery.gallery_mixers import (
+    drop_planes,
+    mixers_html,
+    planes_name,
+    script_json,
+    transforms_of,
+    write_planes,
+)
 from lightpaint.batch.gallery.summary import (
     SummaryRow,
     drop_pictures,
@@ -21,16 +33,19 @@ from lightpaint.batch.gallery.summary import (
     summary_json,
     view_folders,
 )
+from lightpaint.batch.manifest.entries import LookEntry
 from lightpaint.batch.manifest.folder_names import SUMMARY
 from lightpaint.batch.plan.journal import JournalLine
 from lightpaint.batch.plan.place_groups import PlaceGroup
-from lightpaint.batch.plan.plan import Plan
-from lightpaint.batch.work.task import Kind
+from lightpaint.batch.plan.plan import Plan, PlannedLook, PlanStep
+from lightpaint.batch.work.task import Kind, Task
 from lightpaint.display_text import visible
 from lightpaint.files import write_bytes, write_text
 from lightpaint.images.formats.png import png_bytes
+from lightpaint.pipeline.job.job import Job
+from lightpaint.pipeline.job.sources import BasisFile, GroupsFile, SceneFile
 from lightpaint.pipeline.results.placement_changes import hung_of
-from lightpaint.placement.placement_record import PlacementRecord
+from lightpaint.placement.placement import PlacementRecord
 from lightpaint.report.comparison import shorten_to_width
 from lightpaint.report.page.html import html
 from lightpaint.report.rig.hung_lights import LightChange
@@ -207,3 +222,50 @@ def _draw(
     room = width - round(font.getlength(text)) - 8
     name = row.look if row.folder == row.look else f"{row.look} {row.sensor}"
     draw.text((x, baseline), shorten_to_width(visible(name), font, room), TEXT, font, anchor="ls")
+
+
+def entry_of(job: Job, folder: Path | None = None, variation: str = "") -> LookEntry:
+    """Return a gallery's entry for a look.
+
+    `job` solved the look or, if `folder` is given, the look was derived from the job's answer.
+    variation: its word.
+    """
+    scenes = tuple(scene for scene in job.scenes if isinstance(scene, SceneFile))
+    basis = job.basis if isinstance(job.basis, BasisFile | GroupsFile) else None
+    return LookEntry(
+        (folder or job.folder).name,
+        "",
+        scenes,
+        basis,
+        by_sensor=job.by_sensor,
+        variation=variation,
+        combined_looks=() if folder is None else (job.folder.name,),
+    )
+
+
+def write_solve_gallery(
+    folder: Path, entries: Sequence[LookEntry], failures: Mapping[str, str], bases: Sequence[Basis]
+) -> list[SummaryRow]:
+    """Write the gallery of the looks in `folder`, by the names of their folders there.
+
+    failures: reasons by name. bases: one for each view, shared by all looks.
+    """
+    looks, lines = [], {}
+    keys = tuple(json.dumps({"view": k}) for k in range(len(bases)))
+    for key, basis in zip(keys, bases, strict=True):
+        write_planes(folder, key, basis)
+    for entry in entries:
+        name = entry.name
+        fingerprint = "" if name in failures else _content_hash(folder / name / "lighting.json")
+        step = PlanStep(Task(name, "answer", "", bases=keys), fingerprint, True)
+        looks.append(PlannedLook(entry, folder / name, (step,)))
+        line_key: tuple[str, Kind] = (name, "answer")
+        state = "failed" if name in failures else "done"
+        lines[line_key] = JournalLine(name, "answer", state, fingerprint, failures.get(name, ""))  # type: ignore[arg-type]
+    names = frozenset(entry.name for entry in entries)
+    plan = Plan(Path(folder.resolve().name), folder, tuple(looks), {}, names)
+    return write_gallery(folder, plan, lines)
+
+
+def _content_hash(path: Path) -> str:
+    return hashlib.sha256(path.read_bytes()).hexdigest() if path.is_file() else ""

@@ -1,6 +1,10 @@
-"""The keys of a manifest, and the values that each takes."""
+"""The keys of a manifest, and the values that each takes.
+
+The library's arguments are spelled as keys in errors: `find_template = false` for `find=False`.
+"""
 
 import difflib
+import json
 from collections.abc import Callable, Collection, Iterable, Mapping
 from dataclasses import dataclass, field, replace
 from pathlib import Path
@@ -13,7 +17,7 @@ from lightpaint.pipeline.job.settings import Settings
 from lightpaint.relit.formats import FORMS
 from lightpaint.scene.limits import MAX_SPP
 from lightpaint.scene.properties.film import check_resolution
-from lightpaint.sentences import Sentence
+from lightpaint.sentences import Datum, Hint, Sentence
 from lightpaint.target.target_reader import Paint
 from lightpaint.validation import BRIGHTEST, MAX_LISTED, SWITCH, Check, a, checks_of, one_of, whole
 
@@ -31,6 +35,9 @@ Space = Literal["log", "oklab"]
 
 #: Maximum number of frames of one sequence.
 MAX_FRAMES = 10_000
+
+#: Keys of arguments that a manifest calls by another name.
+OTHER_NAMES = {"find": "find_template", "transform": "view"}
 
 
 def _texts(value: Any) -> bool:
@@ -80,11 +87,19 @@ def _is_text(value: Any) -> bool:
 
 
 _TEXT_SCHEMA = {"type": "string", "minLength": 1}
+
+
 _TEXTS_SCHEMA = {"type": "array", "items": _TEXT_SCHEMA, "minItems": 1, "maxItems": MAX_LISTED}
 
+
 TEXT = Check(_is_text, "a text", _TEXT_SCHEMA)
+
+
 TEXTS = Check(_texts, f'a list of texts, ["a", "b"], {MAX_LISTED} at most', _TEXTS_SCHEMA)
+
+
 TABLE = a(dict, "a table")
+
 
 #: Keys for loading a scene or its replacement.
 SOURCE_KEYS: dict[str, Check] = {
@@ -123,6 +138,7 @@ SOURCE_KEYS: dict[str, Check] = {
     "map_size": TEXT,
 }
 
+
 #: Keys for reading a painting.
 PAINTING_KEYS: dict[str, Check] = {
     "mask": TEXT,
@@ -133,6 +149,7 @@ PAINTING_KEYS: dict[str, Check] = {
     "exposure": Check(_is_number, "a number of stops", {"type": "number"}),
     "paint": one_of(Paint),
 }
+
 
 #: Keys for constraints, settings and steps.
 REQUEST_KEYS: dict[str, Check] = {
@@ -147,6 +164,7 @@ REQUEST_KEYS: dict[str, Check] = {
     "share": Check(lambda v: v in get_args(Share), '"places"', {"enum": [*get_args(Share)]}),
 }
 
+
 #: Keys of which a look has exactly one.
 SUBJECT_KEYS: dict[str, Check] = {
     "painting": TEXT,
@@ -156,8 +174,13 @@ SUBJECT_KEYS: dict[str, Check] = {
     "lightings": TEXTS,
 }
 
+
 DEFAULT_KEYS: dict[str, Check] = {**SOURCE_KEYS, **PAINTING_KEYS, **REQUEST_KEYS}
+
+
 LOOK_KEYS: dict[str, Check] = {"name": TEXT, **SUBJECT_KEYS, **DEFAULT_KEYS}
+
+
 SEQUENCE_KEYS: dict[str, Check] = {
     "name": TEXT,
     "through": Check(_texts, "a list of names of looks", _TEXTS_SCHEMA),
@@ -168,6 +191,7 @@ SEQUENCE_KEYS: dict[str, Check] = {
     "render": TABLE,
     "export": TABLE,
 }
+
 
 #: Fields of `Settings` that have no other place in a manifest or on the command line, with their
 #: checks.
@@ -282,3 +306,17 @@ class Mistakes:
 def near_key(key: str, keys: Iterable[str]) -> str:
     """Return the known key that a misspelt one probably stands for; "" where none is near."""
     return next(iter(difflib.get_close_matches(key, list(keys), 1)), "")
+
+
+def as_key(datum: Datum) -> str | None:
+    """Return an argument as a key of a manifest, in TOML; None for what has no key there."""
+    if not isinstance(datum, Hint):
+        return None
+    name = OTHER_NAMES.get(datum.name, datum.name)
+    if name not in SETTINGS and name not in DEFAULT_KEYS:
+        return None
+    is_simple = isinstance(datum.value, bool | int | str)
+    if datum.value is not ... and not is_simple:
+        return None
+    value = json.dumps(datum.value, ensure_ascii=False) if is_simple else "..."
+    return f"{'settings.' if name in SETTINGS else ''}{name} = {value}"

@@ -1,6 +1,8 @@
-"""A manifest, `looks.toml`: its tables, with known keys and valid values."""
+"""A manifest, `looks.toml`: its tables, with known keys and valid values; and a starter of one."""
 
-from collections.abc import Mapping
+import json
+import os
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
@@ -13,9 +15,10 @@ from lightpaint.batch.manifest.keys import (
     SUBJECT_KEYS,
     Mistakes,
 )
-from lightpaint.errors import BatchError
+from lightpaint.errors import BatchError, OutputError
 from lightpaint.file_reading import read_text
-from lightpaint.files import one_line
+from lightpaint.files import check_files, one_line, write_text
+from lightpaint.sentences import Hint
 from lightpaint.storage.json_records import strict_toml
 from lightpaint.validation import Check, a
 
@@ -37,6 +40,19 @@ REPLACED_GROUPS = (
     ("sensor", "sensors"),
     ("template", "find_template"),
 )
+
+STARTER = """\
+# Looks to be found in one go:  lightpaint batch {name} -o looks/
+# docs/batch.md has all keys. Paths are relative to this file.
+
+[defaults]
+scene = {scene}
+want = ["solve", "predict", "verify", "report"]  # "render": a final render; "export": for others
+
+[defaults.settings]
+quality = "preview"
+
+"""
 
 
 @dataclass(frozen=True)
@@ -180,3 +196,36 @@ def _as_list(values: Mapping[str, Any]) -> dict[str, Any]:
 def subject_keys(look: Mapping[str, Any]) -> list[str]:
     """Return which of SUBJECT_KEYS a look has."""
     return [key for key in SUBJECT_KEYS if key in look]
+
+
+def write_starter_manifest(
+    path: Path, scene: str, paintings: Sequence[str], *, force: bool = False
+) -> None:
+    """Write a manifest to `path` with a look for each painting of one scene.
+
+    Raises BatchError if there is no painting, or a file does not exist, and OutputError if the
+    manifest exists already.
+    """
+    if not paintings:
+        raise BatchError("no painting to begin with: give the scene, then paintings")
+    for file in (scene, *paintings):
+        if not Path(file).is_file():
+            raise BatchError(f"no such file: {file}")
+    check_files([path], map(Path, (scene, *paintings)))
+    if path.exists() and not force:
+        raise OutputError(
+            f"{path} is there: choose another name with ",
+            Hint("folder"),
+            ", or ",
+            Hint("force", True),
+        )
+    base = path.parent
+    text = STARTER.format(name=path.name, scene=_quoted(scene, base))
+    write_text(
+        path, text + "\n".join(f"[[look]]\npainting = {_quoted(x, base)}\n" for x in paintings)
+    )
+
+
+def _quoted(file: str, base: Path) -> str:
+    """Return a path relative to `base` as TOML writes it, which is how JSON does."""
+    return json.dumps(os.path.relpath(file, base), ensure_ascii=False).replace("\x7f", "\\u007f")

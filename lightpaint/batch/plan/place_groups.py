@@ -12,7 +12,7 @@ from lightpaint.batch.manifest.folder_names import PLACES
 from lightpaint.batch.work.task import Task, render_settings
 from lightpaint.display_text import some_names
 from lightpaint.errors import BatchError, LightpaintError
-from lightpaint.placement.placement_record import PlacementRecord, read_placement
+from lightpaint.placement.placement import PlacementRecord, read_placement
 
 
 @dataclass(frozen=True)

@@ -2,27 +2,27 @@
 
 import errno
 import time
-from collections.abc import Callable, Iterator
-from dataclasses import replace
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import Any
+from typing import Any, Literal
 
 from lightpaint.basis.basis import Basis
 from lightpaint.basis.lightgroups.light_groups import LightGroups
-from lightpaint.basis.render.guide_training import train_guide
-from lightpaint.batch.manifest.key_spelling import as_key
-from lightpaint.batch.manifest.keys import Space
+from lightpaint.basis.lights import Lights
+from lightpaint.basis.render.basis_render import train_guide
+from lightpaint.basis.render.one_pass_basis import basis_of_sums
+from lightpaint.batch.manifest.keys import Space, as_key
 from lightpaint.batch.manifest.sequence import interpolate
 from lightpaint.batch.manifest.variations import shift
 from lightpaint.batch.work.derived_looks import derived_folder, dimmer_lights, publish_derived
-from lightpaint.batch.work.shared_places import SharedPlacing, find_shared_places
-from lightpaint.batch.work.sums_answer import answer_by_sums, sums_of_rows
 from lightpaint.batch.work.task import EXPORT, Task
 from lightpaint.batch.work.work_items import (
     GuideTraining,
     ItemResult,
     PartOfBasis,
     Passes,
+    PathMap,
     SumsOfRows,
     WorkItem,
 )
@@ -32,14 +32,22 @@ from lightpaint.files import first_line, one_line
 from lightpaint.images.estimate import Estimate
 from lightpaint.lighting.answer.lighting import Lighting
 from lightpaint.lighting.answer.lighting_file import read_lighting
+from lightpaint.lighting.fit import Fit
+from lightpaint.lighting.linear_problem import Sums, sum_rows, summed_problem
+from lightpaint.lighting.linear_solve import solve_linear
+from lightpaint.lighting.problem import Problem
+from lightpaint.lighting.solve import solution_of
 from lightpaint.pipeline.job.job import Job
 from lightpaint.pipeline.job.job_record import decode_job
 from lightpaint.pipeline.job.settings import Settings
 from lightpaint.pipeline.job.sources import BasisFile, GroupsFile, content
 from lightpaint.pipeline.pipeline import run
+from lightpaint.pipeline.placed_lights import find_places
 from lightpaint.pipeline.relit_renders import relight_look, relit_folder
+from lightpaint.pipeline.results.answer_folder import new_answer
 from lightpaint.pipeline.results.result_folder import ResultFolder
 from lightpaint.pipeline.results.results import view_names
+from lightpaint.placement.placement import record_of
 from lightpaint.progress import Listener
 from lightpaint.relit.export_format import Source
 from lightpaint.relit.formats import names_of_forms, write_content, writers_of
@@ -89,10 +97,10 @@ def _run(item: WorkItem, cache: WorkerCache, listen: Listener) -> Any:
     if isinstance(item, PartOfBasis):
         return cache.renderer(item).render(item.part)
     if isinstance(item, SumsOfRows):
-        return sums_of_rows(item, cache)
+        return _sums_of_rows(item, cache)
     if isinstance(item, SharedPlacing):
         cache.release_renderer()
-        return find_shared_places(item, cache, listen)
+        return _find_shared_places(item, cache, listen)
     if isinstance(item, Passes):
         return cache.frame(item).sum(range(item.first, item.last))
     cache.release_renderer()
@@ -135,7 +143,7 @@ def _answer(task: Task, cache: WorkerCache, listen: Listener) -> None:
     if job.basis is None:
         bases = [basis for key in task.bases if (basis := cache.basis(key)) is not None]
     if task.is_by_sums:
-        answer_by_sums(job, job.views[0].basis or (bases or [])[0])
+        _answer_by_sums(job, job.views[0].basis or (bases or [])[0])
         return
     run(job, listen, bases=bases)
 
@@ -222,3 +230,114 @@ def _export(task: Task, cache: WorkerCache, listen: Listener) -> None:
     with results.filled() as stage:
         for name, make in writers.items():
             write_content(stage / name, make())
+
+
+def _sums_of_rows(item: SumsOfRows, cache: WorkerCache) -> list[Sums]:
+    """Return the sums with each painting over some rows.
+
+    The images are those that a whole basis has in these rows, to the last bit.
+    """
+    renderer, scene = cache.renderer(item), cache.film(item.film)
+    part = item.part
+    halves, is_hit = renderer.render(part)
+    is_hit = is_hit.sum(axis=0) > 0
+    basis = basis_of_sums(scene, item.seed, list(halves), is_hit, part.spp, None, start=None)
+    rows = slice(part.top, part.bottom)
+    return [
+        sum_rows(basis, cache.target(request, scene.size), rows, Fit(emitters=request.emitters))
+        for request in item.paintings
+    ]
+
+
+def _answer_by_sums(job: Job, basis: Basis) -> None:
+    """Solve with the sums of a basis in memory, and write the lighting."""
+    [view] = job.views
+    basis = basis if view.scene is None else basis.with_requests(view.scene.requests)
+    if not basis.knows_noise:
+        # Only pixels show which differences are rounding alone (see lighting/problem.py).
+        problem = Problem.of(basis, view.target, constraints=job.all_constraints, fit=job.fit)
+        _publish_lighting_only(job, solution_of(problem).lighting)
+        return
+    sums = sum_rows(basis, view.target, slice(None), job.fit)
+    origin = basis.origin
+    publish_solved_lights(
+        job, basis.lights, sums, scene_identity=origin.scene_identity, spp=origin.spp
+    )
+
+
+def publish_solved_lights(
+    job: Job, lights: Lights, sums: Sums, *, scene_identity: str, spp: int
+) -> None:
+    """Solve, and write the lighting. The other parameters are those of `summed_problem`."""
+    problem = summed_problem(
+        lights,
+        job.views[0].target.name,
+        sums,
+        constraints=job.all_constraints,
+        fit=job.fit,
+        scene_identity=scene_identity,
+        spp=spp,
+    )
+    _publish_lighting_only(job, solve_linear(problem, problem.start).lighting)
+
+
+def _publish_lighting_only(job: Job, lighting: Lighting) -> None:
+    """Write the lighting and the relit scene."""
+    [view] = job.views
+    lighting = replace(lighting, cd_per_unit=job.settings.cd_per_unit)
+    with new_answer(job.results, lighting, scene=view.scene):
+        pass  # there are no pictures
+
+
+@dataclass(frozen=True)
+class SharedPlacing:
+    """An item that searches for places; its value is the record as text.
+
+    tasks: answers of the looks whose paintings decide. bases: keys of the bases of all their views;
+    files: where these are saved, "" if they are in memory. fingerprint: of the group.
+    """
+
+    name: str
+    tasks: tuple[Task, ...]
+    bases: tuple[str, ...]
+    files: tuple[str, ...]
+    fingerprint: str
+    expected_s: float
+    kind: Literal["places"] = "places"
+    output_folder: str = ""
+
+    @property
+    def input_files(self) -> tuple[str, ...]:
+        """Files of the scene and of the paintings."""
+        return tuple(dict.fromkeys(file for task in self.tasks for file in task.source_files))
+
+    @property
+    def local_files(self) -> tuple[str, ...]:
+        """Saved bases."""
+        return tuple(file for file in self.files if file)
+
+    def with_paths(self, move: PathMap) -> "SharedPlacing":
+        """Return the same item with other paths."""
+        return replace(
+            self,
+            tasks=tuple(task.with_paths(move) for task in self.tasks),
+            files=tuple(file and move(file) for file in self.files),
+        )
+
+
+def _find_shared_places(item: SharedPlacing, cache: WorkerCache, listen: Listener) -> str:
+    """Return the record of the places that all looks of an item want."""
+    for key, file in zip(item.bases, item.files, strict=True):
+        cache.load(key, file)
+    bases = [basis for key in item.bases if (basis := cache.basis(key)) is not None]
+    jobs = [Job(**_unplaced_fields(task, cache)) for task in item.tasks]
+    placement = find_places(jobs, bases, listen)
+    looks: Sequence[str] = [task.look for task in item.tasks]
+    looks = looks if len(looks) > 1 else ()
+    return record_of(placement, looks=looks, made_of=item.fingerprint).to_json()
+
+
+def _unplaced_fields(task: Task, cache: WorkerCache) -> dict[str, Any]:
+    """Return the fields of a look's job, whose lights are where the scene has them."""
+    fields = decode_job(task.job)
+    return fields | {"scenes": tuple(map(cache.scene, fields["scenes"])), "placement": None}

@@ -15,7 +15,7 @@ import numpy as np
 
 from lightpaint.arrays import Floats
 from lightpaint.basis.basis import Basis
-from lightpaint.basis.cache.cache_folder import PARTS, folder, is_trusted_owner
+from lightpaint.basis.cache.cache import PARTS, folder, is_trusted_owner
 from lightpaint.basis.render.render_parts import Part
 from lightpaint.errors import BasisError, OutputError
 from lightpaint.files import first_line

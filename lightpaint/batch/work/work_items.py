@@ -17,6 +17,9 @@ from lightpaint.scene.quality_presets import Quality
 #: Map from a path to that on another machine.
 PathMap = Callable[[str], str]
 
+#: Seconds of a sample of one pixel for all lights together, and in addition for each light.
+SAMPLE_S, LIGHT_SAMPLE_S = 9.6e-7, 1e-8
+
 
 class WorkItem(Protocol):
     """A piece of work."""
@@ -254,3 +257,8 @@ def scene_with_paths(scene: SceneFile, move: PathMap) -> SceneFile:
     return replace(
         scene, path=move(scene.path), lights_file=None if lights_file is None else move(lights_file)
     )
+
+
+def render_seconds(samples: int, lights: int) -> float:
+    """Return the seconds for that many samples of a basis."""
+    return samples * (SAMPLE_S + LIGHT_SAMPLE_S * lights)

@@ -8,7 +8,7 @@ from typing import Any
 
 from lightpaint.arrays import Doubles
 from lightpaint.basis.basis import Basis
-from lightpaint.basis.file.basis_reader import read_basis
+from lightpaint.basis.file.basis_file import read_basis
 from lightpaint.basis.render.render_parts import PartRenderer
 from lightpaint.batch.manifest.keys import Final
 from lightpaint.batch.work.spool import read_guide_table
@@ -22,7 +22,7 @@ from lightpaint.batch.work.work_items import (
 )
 from lightpaint.images.estimate import read_estimate
 from lightpaint.pipeline.job.sources import BasisFile, GroupsFile, SceneFile
-from lightpaint.placement.placement_record import read_placement
+from lightpaint.placement.placement import read_placement
 from lightpaint.scene.quality_presets import on_film
 from lightpaint.scene.runtime.render_lock import tracing
 from lightpaint.scene.scene import Scene

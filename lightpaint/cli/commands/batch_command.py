@@ -7,16 +7,14 @@ from datetime import UTC, datetime
 from pathlib import Path
 from typing import Any
 
-from lightpaint.batch.batch_outcome import BatchOutcome
 from lightpaint.batch.gallery.gallery import counts_text
 from lightpaint.batch.gallery.summary import SummaryRow, summary_document
 from lightpaint.batch.manifest.folder_names import FILES
-from lightpaint.batch.manifest.starter_manifest import write_starter_manifest
-from lightpaint.batch.plan.cost_estimate import estimate
+from lightpaint.batch.manifest.manifest import write_starter_manifest
 from lightpaint.batch.plan.openjd import LOOK_PARAMETER, write_openjd
-from lightpaint.batch.plan.plan import Plan, PlannedLook
+from lightpaint.batch.plan.plan import Plan, PlannedLook, estimate
 from lightpaint.batch.plan.planner import plan
-from lightpaint.batch.run import run_batch
+from lightpaint.batch.run import BatchOutcome, run_batch
 from lightpaint.batch.run_options import RunOptions
 from lightpaint.batch.work.work_items import ItemResult
 from lightpaint.cli.output import documents, terminal

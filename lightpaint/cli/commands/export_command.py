@@ -3,8 +3,8 @@
 from collections.abc import Sequence
 from pathlib import Path
 
-from lightpaint.basis.lightgroups.frame_groups import first_frame
 from lightpaint.basis.lightgroups.frame_sequence import find_frames, is_pattern
+from lightpaint.basis.lightgroups.light_groups import first_frame
 from lightpaint.cli.output import documents, terminal
 from lightpaint.cli.output.output_mode import CommandOutcome
 from lightpaint.errors import OutputError

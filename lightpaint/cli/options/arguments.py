@@ -168,7 +168,7 @@ def new_light(text: str) -> dict[str, Any]:
         raise argparse.ArgumentTypeError(
             f"{text!r} is not KIND, KIND:2 or KIND:2@WHERE, like spot:2@ceiling"
         )
-    from lightpaint.placement.rigging.rigging_values import KINDS
+    from lightpaint.placement.rigging import KINDS
 
     table: dict[str, Any] = {"kind" if kind in KINDS else "like": kind.strip()}
     table |= {"count": parse_whole_number(count)} if colon else {}

@@ -24,7 +24,7 @@ from lightpaint.lighting.constraints.constraints import LIGHT_KEYS, Constraints
 from lightpaint.lighting.constraints.constraints_file import read_constraints
 from lightpaint.pipeline.job.settings import Settings
 from lightpaint.pipeline.job.sources import Painting, PlacementFile, SceneFile
-from lightpaint.placement.rigging.rigging import Rigging
+from lightpaint.placement.rigging import Rigging
 from lightpaint.scene.lights.lights_file import MOVES
 
 if TYPE_CHECKING:

@@ -10,8 +10,8 @@ from pathlib import Path
 from typing import Any
 
 from lightpaint.basis.file.basis_file import is_basis_file
-from lightpaint.basis.lightgroups.folder_files import is_exr, is_light_groups, is_own_basis
 from lightpaint.basis.lightgroups.frame_sequence import find_frames, is_pattern, spoken_frames
+from lightpaint.basis.lightgroups.render_layers import is_exr, is_light_groups, is_own_basis
 from lightpaint.errors import BasisError
 from lightpaint.pipeline.job.sources import BasisFile, GroupsFile, SceneFile, check_needed
 

@@ -16,7 +16,7 @@ import numpy as np
 from lightpaint.arrays import Bools, Doubles, Floats
 from lightpaint.basis.basis import Basis
 from lightpaint.basis.derived_planes import block_means, in_one_row
-from lightpaint.basis.file.spooled_planes import spooled
+from lightpaint.basis.file.file_planes import spooled
 from lightpaint.basis.planes import BLOCK_PIXELS, Planes, as_planes
 from lightpaint.colour.display.view_transform import ViewTransform
 from lightpaint.images.estimate import Estimate

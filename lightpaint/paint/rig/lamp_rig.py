@@ -30,9 +30,9 @@ from lightpaint.paint.session.moved_lights import Placed, added_names
 from lightpaint.paint.subject import Subject
 from lightpaint.placement.freedom import Freedom
 from lightpaint.placement.lights_to_place import why_not_searched
-from lightpaint.placement.movable_panels import is_panel, panel_site
-from lightpaint.placement.rigging.rigged_lights import freedoms_of, surfaces_of
-from lightpaint.placement.rigging.rigging import Rigging, rigging_of
+from lightpaint.placement.paths.panel_lights import is_panel, panel_site
+from lightpaint.placement.rigged_lights import freedoms_of, surfaces_of
+from lightpaint.placement.rigging import Rigging, rigging_of
 from lightpaint.scene.properties.pose import Pose, Site, motion_of
 from lightpaint.scene.runtime.render_lock import MITSUBA
 from lightpaint.scene.scene import Scene

@@ -32,7 +32,7 @@ from lightpaint.placement.freedom import Freedom
 from lightpaint.placement.new_lights import NewLights
 from lightpaint.placement.place import place
 from lightpaint.placement.placement import Move, Placement
-from lightpaint.placement.rigging.rigged_lights import freedom_on
+from lightpaint.placement.rigged_lights import freedom_on
 from lightpaint.placement.search.search_time import SearchSize, usual_pace
 from lightpaint.progress import cancellable
 from lightpaint.scene.properties.pose import Pose, Site

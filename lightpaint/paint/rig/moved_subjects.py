@@ -12,9 +12,8 @@ from lightpaint.paint.rig.lamp_rig import LampRig
 from lightpaint.paint.session.moved_lights import Placed, added_names
 from lightpaint.paint.session.snapshot import SessionSnapshot
 from lightpaint.paint.subject import Subject, places_path
-from lightpaint.placement.movable_panels import is_panel
-from lightpaint.placement.placement import AddedLight, Move
-from lightpaint.placement.placement_record import PlacementRecord
+from lightpaint.placement.paths.panel_lights import is_panel
+from lightpaint.placement.placement import AddedLight, Move, PlacementRecord
 from lightpaint.scene.properties.pose import Site
 from lightpaint.scene.scene import Scene
 

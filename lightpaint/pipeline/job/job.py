@@ -63,9 +63,9 @@ from lightpaint.pipeline.results.results import (
     checked_names,
     view_names,
 )
-from lightpaint.placement.placement_record import PlacementRecord
-from lightpaint.placement.rigging.rigging import Rigging
-from lightpaint.placement.suggestions.light_search import check_suggestible
+from lightpaint.placement.placement import PlacementRecord
+from lightpaint.placement.rigging import Rigging
+from lightpaint.placement.suggested_lights import check_suggestible
 from lightpaint.relit.export.nuke import spoken_unreadable
 from lightpaint.scene.quality_presets import on_film
 from lightpaint.scene.scene import Scene

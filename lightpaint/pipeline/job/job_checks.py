@@ -5,8 +5,7 @@ from pathlib import Path
 from typing import Any
 
 from lightpaint.basis.basis import Basis
-from lightpaint.basis.lightgroups.frame_groups import with_equal_lights
-from lightpaint.basis.lightgroups.light_groups import LightGroups
+from lightpaint.basis.lightgroups.light_groups import LightGroups, with_equal_lights
 from lightpaint.errors import (
     BasisError,
     ConstraintError,
@@ -18,8 +17,8 @@ from lightpaint.lighting.constraints.constraints import Constraints
 from lightpaint.lighting.joined_views import check_same_lights
 from lightpaint.pipeline.job.settings import Settings
 from lightpaint.pipeline.job.sources import Painting, content
-from lightpaint.placement.rigging.rigged_lights import check_names, rigged_lights
-from lightpaint.placement.rigging.rigging import Rigging, rigging_of
+from lightpaint.placement.rigged_lights import check_names, rigged_lights
+from lightpaint.placement.rigging import Rigging, rigging_of
 from lightpaint.scene.lights.texels.image_domains import DOMAINS, Sky
 from lightpaint.scene.lights.texels.texel import mirrored_pairs, node_name
 from lightpaint.scene.lights.texels.texel_layout import CHILDREN

@@ -1,7 +1,7 @@
 """Remarks for the user before a job runs, in plain text."""
 
+from lightpaint.basis.render.banded_film import memory_needed, renders_in_bands
 from lightpaint.basis.render.integrators import remark_on_separate_renders
-from lightpaint.basis.render.render_memory import memory_needed, renders_in_bands
 from lightpaint.display_text import some_names
 from lightpaint.images.denoiser import MISSING_REMARK, oidn_is_installed
 from lightpaint.images.pixel_blocks import Size, left_over, whole_factor

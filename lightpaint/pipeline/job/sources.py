@@ -11,13 +11,13 @@ from typing import Any, Self
 
 from lightpaint.arrays import Floats
 from lightpaint.basis.basis import Basis
-from lightpaint.basis.file.basis_reader import read_basis
+from lightpaint.basis.file.basis_file import read_basis
 from lightpaint.basis.lightgroups.light_groups import LightGroups, read_light_groups
 from lightpaint.colour.display.view_transform import TransformChoice
 from lightpaint.errors import BasisError
 from lightpaint.keywords import keywords
 from lightpaint.pipeline.job.settings import Settings
-from lightpaint.placement.placement_record import PlacementRecord, read_placement
+from lightpaint.placement.placement import PlacementRecord, read_placement
 from lightpaint.scene.scene import Scene
 from lightpaint.scene.scene_reader import load_scene
 from lightpaint.sentences import Hint, Sentence

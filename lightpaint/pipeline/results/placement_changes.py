@@ -10,8 +10,8 @@ from lightpaint.placement.placement import (
     AddedLight,
     Move,
     Placement,
+    PlacementRecord,
 )
-from lightpaint.placement.placement_record import PlacementRecord
 from lightpaint.report.rig.hung_lights import HungLights, LightChange, hung_lights, spoken_fraction
 
 #: Least errors of a turn, in degrees, and of a way, as a share of it, that are worth a number.

@@ -15,8 +15,8 @@ import numpy.typing as npt
 from lightpaint.arrays import Floats, aligned
 from lightpaint.placement.paths.camera_paths import Vertices
 from lightpaint.placement.paths.frozen_paths import FrozenPaths
-from lightpaint.placement.paths.light_origin import ORIGIN_VALUES, LightOrigin, added_light
-from lightpaint.placement.paths.panel_site import PanelSite
+from lightpaint.placement.paths.panel_lights import PanelSite
+from lightpaint.placement.paths.vertex_light import ORIGIN_VALUES, LightOrigin, added_light
 from lightpaint.scene.properties.site import Site
 from lightpaint.scene.runtime.render_lock import tracing
 

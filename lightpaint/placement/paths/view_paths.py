@@ -11,16 +11,15 @@ import numpy as np
 
 from lightpaint.arrays import Bools, Doubles, Floats, Indices
 from lightpaint.images.denoiser import Features
-from lightpaint.placement.paths.frozen_paths import FrozenPaths
-from lightpaint.placement.paths.panel_site import PanelSite
-from lightpaint.placement.paths.panels_in_view import SightLines
-from lightpaint.placement.space.free_space import (
+from lightpaint.placement.free_space import (
     CLEARANCE,
     FreeSpace,
     free_space,
     is_clear,
     seen_by_camera,
 )
+from lightpaint.placement.paths.frozen_paths import FrozenPaths
+from lightpaint.placement.paths.panel_lights import PanelSite, SightLines
 from lightpaint.scene.properties.pose import Site
 from lightpaint.scene.runtime.render_lock import tracing
 from lightpaint.scene.scene import Scene

@@ -12,7 +12,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from lightpaint.arrays import Bools, Doubles, Floats
-from lightpaint.placement.movable import Arrangement, all_sites, by_column
+from lightpaint.placement.lights_to_place import Arrangement, all_sites, by_column
 from lightpaint.placement.paths.view_paths import SearchPaths, ViewPaths
 from lightpaint.placement.placement_fit import Fitted, PlacementFit
 from lightpaint.placement.search.pose_steps import PoseSteps

@@ -11,7 +11,7 @@ from dataclasses import replace
 import numpy as np
 
 from lightpaint.arrays import Floats
-from lightpaint.placement.movable import Arrangement, Movable
+from lightpaint.placement.lights_to_place import Arrangement, Movable
 from lightpaint.placement.search.judgement import NOTHING, PlacementJudge
 from lightpaint.placement.search.pose_search import SHORT_STEPS, PoseSearch
 from lightpaint.scene.properties.pose import Site

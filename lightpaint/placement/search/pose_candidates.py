@@ -12,12 +12,12 @@ from functools import partial
 import numpy as np
 
 from lightpaint.arrays import Doubles, Floats, Indices
-from lightpaint.placement.free_light import FreeLight
-from lightpaint.placement.paths.panel_site import PanelSite
-from lightpaint.placement.paths.spot_cones import away_from
+from lightpaint.placement.free_space import as_position
+from lightpaint.placement.freedom import FreeLight
+from lightpaint.placement.paths.panel_lights import PanelSite
+from lightpaint.placement.paths.vertex_light import away_from
 from lightpaint.placement.paths.view_paths import ViewPaths
 from lightpaint.placement.placement_fit import Ranking
-from lightpaint.placement.space.free_space import as_position
 from lightpaint.scene.properties.pose import Site
 from lightpaint.threads import one_thread
 

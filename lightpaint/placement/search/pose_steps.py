@@ -7,13 +7,12 @@ from dataclasses import replace
 import numpy as np
 
 from lightpaint.arrays import Doubles
-from lightpaint.placement.free_light import FreeLight
-from lightpaint.placement.light_columns import with_columns
-from lightpaint.placement.movable import Arrangement, Movable, all_sites, by_column
-from lightpaint.placement.paths.panel_site import PanelSite
+from lightpaint.placement.free_space import as_position
+from lightpaint.placement.freedom import FreeLight
+from lightpaint.placement.lights_to_place import Arrangement, Movable, all_sites, by_column
+from lightpaint.placement.paths.panel_lights import PanelSite
 from lightpaint.placement.paths.view_paths import ViewPaths
-from lightpaint.placement.placement_fit import Fitted, PlacementFit, Slopes
-from lightpaint.placement.space.free_space import as_position
+from lightpaint.placement.placement_fit import Fitted, PlacementFit, Slopes, with_columns
 from lightpaint.scene.properties.pose import Site
 
 #: Largest step of a number, relative to its finite difference.

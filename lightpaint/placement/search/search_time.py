@@ -8,9 +8,9 @@ import math
 import os
 from dataclasses import dataclass
 
+from lightpaint.placement.look_goals import PIXELS
 from lightpaint.placement.search.new_light_search import STARTS
 from lightpaint.placement.search.pose_search import TURNS
-from lightpaint.placement.search_views import PIXELS
 
 #: Seconds at the usual pace, that of two idle processors, on a film of PIXELS: for one light and
 #: round; for a new light and start; for the last steps and the judgement of one light.

@@ -13,7 +13,7 @@ from lightpaint.colour.display.view_transform import ViewTransform
 from lightpaint.colour.srgb import to_8_bit
 from lightpaint.display_text import visible
 from lightpaint.images.denoiser import Features, denoised
-from lightpaint.placement.suggestions.suggestion import MoveSuggestion, Suggestion
+from lightpaint.placement.suggestion import MoveSuggestion, Suggestion
 from lightpaint.report.page.figures import data_uri
 from lightpaint.report.page.html import html
 from lightpaint.report.phrases import spoken_percent

@@ -1,7 +1,7 @@
 """The lights file: a TOML file beside the scene that says which lights to adjust and to group.
 
 For `hall.xml` it is `hall.lights.toml`; docs/formats.md has the details. Constraints and permitted
-moves are stored unparsed; lighting/constraints/constraints_file.py and placement/rigging/ read
+moves are stored unparsed; lighting/constraints/constraints_file.py and placement/rigging.py read
 them.
 """
 

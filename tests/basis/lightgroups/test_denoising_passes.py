@@ -9,8 +9,7 @@ import pytest
 from light_groups import SIZE, channels, interleaved, pictures, write
 
 from lightpaint.basis.denoised_mixes import blend_by_grain, denoise_plane
-from lightpaint.basis.file.basis_file import write_basis
-from lightpaint.basis.file.basis_reader import read_basis
+from lightpaint.basis.file.basis_file import read_basis, write_basis
 from lightpaint.basis.lightgroups.light_groups import read_light_groups
 from lightpaint.errors import BasisError
 from lightpaint.images.denoiser import denoised, oidn_is_installed

@@ -6,13 +6,13 @@ import pytest
 from light_groups import interleaved, pictures
 
 import lightpaint as lp
-from lightpaint.basis.lightgroups.frame_groups import with_equal_lights
 from lightpaint.basis.lightgroups.frame_sequence import (
     find_frames,
     is_pattern,
     parse_frames,
     spoken_frames,
 )
+from lightpaint.basis.lightgroups.light_groups import with_equal_lights
 from lightpaint.errors import BasisError
 
 

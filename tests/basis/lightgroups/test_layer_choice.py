@@ -6,12 +6,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from lightpaint.basis.lightgroups.layer_choice import (
-    LayerChoice,
-    choose_files,
-    choose_layers,
-    short_names,
-)
+from lightpaint.basis.lightgroups.layer_roles import LayerChoice, choose_files, choose_layers
+from lightpaint.basis.lightgroups.naming_conventions import short_names
 from lightpaint.errors import BasisError
 
 

@@ -9,10 +9,9 @@ import numpy as np
 import pytest
 from light_groups import SIZE, channels, interleaved, multi_part, pictures, write
 
-from lightpaint.basis.file.basis_file import write_basis
-from lightpaint.basis.file.basis_reader import read_basis
-from lightpaint.basis.lightgroups.folder_files import is_light_groups
+from lightpaint.basis.file.basis_file import read_basis, write_basis
 from lightpaint.basis.lightgroups.light_groups import LightGroups, read_light_groups
+from lightpaint.basis.lightgroups.render_layers import is_light_groups
 from lightpaint.colour.primaries import to_rec709
 from lightpaint.errors import BasisError, ImageError
 from lightpaint.lighting.analysis.noise.noise_correction import correct_noise

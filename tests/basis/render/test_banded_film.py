@@ -14,14 +14,13 @@ import lightpaint.scene.scene_render
 from lightpaint.basis.basis import Basis
 from lightpaint.basis.cache import cache
 from lightpaint.basis.cache.cached_render import obtain_basis
-from lightpaint.basis.file import basis_file, basis_reader
+from lightpaint.basis.file import basis_file
 from lightpaint.basis.file.file_planes import FilePlanes
 from lightpaint.basis.file.half_floats import EncodedPlanes
 from lightpaint.basis.planes import MemoryPlanes
-from lightpaint.basis.render import banded_film, guide_training
-from lightpaint.basis.render.banded_film import FileSums, SumPlanes
+from lightpaint.basis.render import banded_film, basis_render
+from lightpaint.basis.render.banded_film import FileSums, SumPlanes, memory_needed, renders_in_bands
 from lightpaint.basis.render.basis_render import render_basis
-from lightpaint.basis.render.render_memory import memory_needed, renders_in_bands
 from lightpaint.errors import SceneError
 from lightpaint.progress import Interrupted
 from lightpaint.scene.scene import Scene
@@ -34,7 +33,7 @@ ROWS = 6
 def small_steps(monkeypatch: pytest.MonkeyPatch) -> None:
     """Steps of four samples of a pixel of a band in each half."""
     monkeypatch.setattr(lightpaint.scene.scene_render, "SAMPLES_PER_PASS", 4 * 4 * 24 * ROWS)
-    monkeypatch.setattr(guide_training, "TRAINING_SAMPLES", (2**12,))
+    monkeypatch.setattr(basis_render, "TRAINING_SAMPLES", (2**12,))
 
 
 @pytest.fixture
@@ -142,7 +141,7 @@ def test_indirect_planes_of_many_lights_stay_in_their_file(
     path = tmp_path / "a.basis.exr"
     basis_file.write_basis(path, whole_basis)
     rendered, cached = (obtain_basis(small_room, spp=20, seed=3) for _ in range(2))
-    for basis in (rendered, cached, basis_reader.read_basis(path)):
+    for basis in (rendered, cached, basis_file.read_basis(path)):
         assert isinstance(basis.planes, EncodedPlanes)
         assert basis.indirect is not None
         assert isinstance(basis.indirect.planes, FilePlanes)
@@ -157,8 +156,8 @@ def test_indirect_planes_of_another_file_are_not_taken(
     monkeypatch.setattr(basis_file, "SINGLES_MAX_BYTES", 0)
     path = tmp_path / "a.basis.exr"
     basis_file.write_basis(path, render_basis(small_room, spp=4, seed=3))
-    assert basis_reader.leave_indirect(whole_basis, path) is whole_basis
-    assert basis_reader.leave_indirect(whole_basis, tmp_path / "none.exr") is whole_basis
+    assert basis_file.leave_indirect(whole_basis, path) is whole_basis
+    assert basis_file.leave_indirect(whole_basis, tmp_path / "none.exr") is whole_basis
 
 
 def test_memory_is_that_of_half_floats_and_some_bands(

@@ -9,9 +9,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 from renderer import REPOSITORY, assert_equal_bits, write_room
 
-from lightpaint.basis.file.basis_file import write_basis
-from lightpaint.basis.file.basis_reader import read_basis
-from lightpaint.basis.render import guide_training
+from lightpaint.basis.file.basis_file import read_basis, write_basis
+from lightpaint.basis.render import basis_render
 from lightpaint.basis.render.basis_render import _render_one_by_one, render_basis
 from lightpaint.basis.render.render_budget import Budget, Keeper
 from lightpaint.progress import silent
@@ -76,8 +75,8 @@ def test_guided_planes_are_those_of_separate_renders_within_noise(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, samples: tuple[int, ...]
 ) -> None:
     """However short or long the training."""
-    monkeypatch.setattr(guide_training, "TRAINING_SAMPLES", samples)
-    monkeypatch.setattr(guide_training, "TRAINING_SPP", 2**20)
+    monkeypatch.setattr(basis_render, "TRAINING_SAMPLES", samples)
+    monkeypatch.setattr(basis_render, "TRAINING_SPP", 2**20)
     from renderer import LIGHTS
 
     lights = SPOTS + BEHIND + LIGHTS["panel"] + LIGHTS["sky"]
@@ -108,17 +107,17 @@ def test_lights_that_reach_little_get_their_samples_there(tmp_path: Path) -> Non
 
 def test_a_small_picture_trains_with_as_many_samples_as_suit_it() -> None:
     scene = load_scene(REPOSITORY / "scenes" / "gallery" / "scene.xml")
-    whole, small = guide_training.training_samples(scene), scene.reduced("64x36")
-    assert whole == guide_training.TRAINING_SAMPLES
-    few = guide_training.training_samples(small)
-    assert abs(sum(few) - guide_training.TRAINING_SPP * 64 * 36) <= len(few)
+    whole, small = basis_render.training_samples(scene), scene.reduced("64x36")
+    assert whole == basis_render.TRAINING_SAMPLES
+    few = basis_render.training_samples(small)
+    assert abs(sum(few) - basis_render.TRAINING_SPP * 64 * 36) <= len(few)
     assert few[1] == few[2] == pytest.approx(2 * few[0], abs=1)
     # Where many emitters are to choose from, each wants some.
     nodes = range(10 * len(small.emitters))
     crowd = replace(small, emitters=tuple(replace(small.emitters[0], node=k) for k in nodes))
-    expected = guide_training.TRAINING_SPP_PER_EMITTER * len(crowd.emitters) * 64 * 36
-    assert abs(sum(guide_training.training_samples(crowd)) - expected) <= 3
-    assert guide_training.training_samples(replace(crowd, film=scene.film)) == whole
+    expected = basis_render.TRAINING_SPP_PER_EMITTER * len(crowd.emitters) * 64 * 36
+    assert abs(sum(basis_render.training_samples(crowd)) - expected) <= 3
+    assert basis_render.training_samples(replace(crowd, film=scene.film)) == whole
 
 
 def test_a_guide_without_a_choice_is_not_trained(

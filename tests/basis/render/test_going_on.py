@@ -11,9 +11,8 @@ from renderer import LIGHTS, assert_equal_bits, same_basis, write_room
 
 import lightpaint.scene.scene_render
 from lightpaint.basis.basis import Basis
-from lightpaint.basis.file.basis_file import write_basis
-from lightpaint.basis.file.basis_reader import read_basis
-from lightpaint.basis.render import guide_training
+from lightpaint.basis.file.basis_file import read_basis, write_basis
+from lightpaint.basis.render import basis_render
 from lightpaint.basis.render.basis_render import render_basis
 from lightpaint.errors import BasisError
 from lightpaint.progress import Interrupted
@@ -27,7 +26,7 @@ from lightpaint.scene.scene_render import plan_passes
 def small_passes(monkeypatch: pytest.MonkeyPatch) -> None:
     """Steps of four samples per pixel of the test room in each half."""
     monkeypatch.setattr(lightpaint.scene.scene_render, "SAMPLES_PER_PASS", 4 * 4 * 24 * 20)
-    monkeypatch.setattr(guide_training, "TRAINING_SAMPLES", (2**12,))
+    monkeypatch.setattr(basis_render, "TRAINING_SAMPLES", (2**12,))
 
 
 def test_what_is_left_to_do_goes_on_with_whole_passes() -> None:

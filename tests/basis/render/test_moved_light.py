@@ -17,12 +17,11 @@ from lightpaint.basis.cache import cached_render as obtain_module
 from lightpaint.basis.cache.cached_render import obtain_basis
 from lightpaint.basis.cache.plane_reuse import mean_variance
 from lightpaint.basis.file import basis_file
-from lightpaint.basis.file.basis_file import write_basis
-from lightpaint.basis.file.basis_reader import read_basis
+from lightpaint.basis.file.basis_file import read_basis, write_basis
 from lightpaint.basis.file.file_planes import FilePlanes
 from lightpaint.basis.render.basis_render import render_basis
 from lightpaint.basis.render.render_budget import Budget, steps
-from lightpaint.batch.distribution.basis_parts import PartwiseRender
+from lightpaint.batch.distributed_work import PartwiseRender
 from lightpaint.batch.work.item_execution import run_item
 from lightpaint.batch.work.work_items import ItemResult, SceneFilm
 from lightpaint.batch.work.worker_cache import WorkerCache

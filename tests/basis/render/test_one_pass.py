@@ -17,10 +17,10 @@ from renderer import (
     write_room,
 )
 
+from lightpaint.basis.render.banded_film import memory_needed
 from lightpaint.basis.render.basis_render import _render_one_by_one, render_basis
 from lightpaint.basis.render.integrators import needs_a_bounce, why_not_one_pass
 from lightpaint.basis.render.render_budget import Budget, Keeper
-from lightpaint.basis.render.render_memory import memory_needed
 from lightpaint.basis.render.render_origin import ONE_PASS, SEPARATE
 from lightpaint.basis.render.separate_renders import BLACK, WHITE
 from lightpaint.errors import SceneError
@@ -659,7 +659,7 @@ def test_passes_make_up_two_equal_halves_of_the_samples(pixels: int, spp: int) -
 def test_what_does_not_fit_is_refused_before_it_is_tried(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    free_memory = "lightpaint.basis.render.render_memory._free_memory"
+    free_memory = "lightpaint.basis.render.banded_film._free_memory"
     monkeypatch.setattr(free_memory, lambda: 2**33)
     path = write_room(tmp_path)
     huge = load_scene(path, parameters={"width": 10_000_000})

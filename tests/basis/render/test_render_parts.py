@@ -12,7 +12,7 @@ import pytest
 from renderer import LIGHTS, write_room
 
 from lightpaint.basis.basis import Basis
-from lightpaint.basis.render import guide_training, render_budget
+from lightpaint.basis.render import basis_render, render_budget
 from lightpaint.basis.render import render_parts as parts_module
 from lightpaint.basis.render.basis_render import render_basis
 from lightpaint.basis.render.render_parts import Part, PartRenderer, PartSums, plan_parts
@@ -26,7 +26,7 @@ SPP = 32
 
 @pytest.fixture(autouse=True)
 def _short_training(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(guide_training, "TRAINING_SAMPLES", (2**12, 2**13))
+    monkeypatch.setattr(basis_render, "TRAINING_SAMPLES", (2**12, 2**13))
 
 
 @pytest.fixture
@@ -37,7 +37,7 @@ def _all_threads() -> Iterator[None]:
 
 @pytest.fixture
 def guide_table(small_room: Scene) -> np.ndarray:
-    return guide_training.train_guide(small_room, 0)
+    return basis_render.train_guide(small_room, 0)
 
 
 def render_in_order(
@@ -119,7 +119,7 @@ def test_any_budget_that_comes_to_the_same_samples_makes_the_same(
     assert basis.origin.spp % 6 == 0
     assert basis.origin.spp > 6
     monkeypatch.undo()
-    monkeypatch.setattr(guide_training, "TRAINING_SAMPLES", (2**12, 2**13))
+    monkeypatch.setattr(basis_render, "TRAINING_SAMPLES", (2**12, 2**13))
     single_render = render_basis(small_room, spp=basis.origin.spp)
     assert is_same(basis, single_render)
     assert basis.origin == single_render.origin
@@ -139,10 +139,10 @@ def test_what_is_there_counts(small_room: Scene) -> None:
 
 
 def test_the_training_depends_on_the_seed_alone(small_room: Scene, guide_table: np.ndarray) -> None:
-    np.testing.assert_array_equal(guide_training.train_guide(small_room, 0), guide_table)
+    np.testing.assert_array_equal(basis_render.train_guide(small_room, 0), guide_table)
     for spp in (2, 64):
         np.testing.assert_array_equal(render_basis(small_room, spp=spp).guide_table, guide_table)
-    assert (guide_training.train_guide(small_room, 1) != guide_table).any()
+    assert (basis_render.train_guide(small_room, 1) != guide_table).any()
 
 
 @pytest.mark.nightly

@@ -16,8 +16,7 @@ from renderer import (
 
 from lightpaint.basis.basis import Basis
 from lightpaint.basis.cache.cached_render import obtain_basis
-from lightpaint.basis.file.basis_file import write_basis
-from lightpaint.basis.file.basis_reader import read_basis
+from lightpaint.basis.file.basis_file import read_basis, write_basis
 from lightpaint.basis.render.basis_render import render_basis
 from lightpaint.basis.render.render_origin import SEPARATE, is_of
 from lightpaint.basis.render.separate_renders import BLACK, WHITE

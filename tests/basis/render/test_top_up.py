@@ -15,9 +15,8 @@ import lightpaint.scene.scene_render
 from lightpaint.basis.basis import Basis
 from lightpaint.basis.cache import cache
 from lightpaint.basis.cache.cached_render import obtain_basis, top_up_basis
-from lightpaint.basis.file.basis_file import write_basis
-from lightpaint.basis.file.basis_reader import read_basis
-from lightpaint.basis.render import guide_training, pixel_top_up
+from lightpaint.basis.file.basis_file import read_basis, write_basis
+from lightpaint.basis.render import basis_render, pixel_top_up
 from lightpaint.basis.render.basis_render import render_basis
 from lightpaint.basis.render.render_origin import is_on_the_way
 from lightpaint.errors import BasisError
@@ -34,7 +33,7 @@ SECOND_SENSOR = """<sensor type="perspective" id="second"><transform name="to_wo
 @pytest.fixture(autouse=True)
 def short_training(monkeypatch: pytest.MonkeyPatch) -> None:
     """A short training, and passes of some hundred samples of a pixel's half."""
-    monkeypatch.setattr(guide_training, "TRAINING_SAMPLES", (2**12,))
+    monkeypatch.setattr(basis_render, "TRAINING_SAMPLES", (2**12,))
     monkeypatch.setattr(lightpaint.scene.scene_render, "SAMPLES_PER_PASS", 4 * 4 * 24 * 20)
 
 

@@ -11,7 +11,7 @@ from scipy import stats
 
 from lightpaint.arrays import Doubles
 from lightpaint.basis.basis import Basis
-from lightpaint.basis.render import guide_training
+from lightpaint.basis.render import basis_render
 from lightpaint.basis.render.basis_render import render_basis
 from lightpaint.basis.render.render_origin import ONE_PASS
 from lightpaint.basis.render.separate_renders import BLACK, WHITE
@@ -82,7 +82,7 @@ ROOMS: dict[str, dict[str, str]] = {
 
 @pytest.fixture(autouse=True)
 def short_training(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(guide_training, "TRAINING_SAMPLES", (2**13,))
+    monkeypatch.setattr(basis_render, "TRAINING_SAMPLES", (2**13,))
 
 
 def room(folder: Path, **options: str) -> Scene:

@@ -4,9 +4,8 @@ from typing import Any
 
 import numpy as np
 
-from lightpaint.basis.basis import Basis
+from lightpaint.basis.basis import Basis, Origin
 from lightpaint.basis.lights import BasisLight
-from lightpaint.basis.origin import Origin
 from lightpaint.lighting.analysis.ambiguity import ambiguities, indistinguishable
 from lightpaint.lighting.solve import solve
 from lightpaint.target.target import Target

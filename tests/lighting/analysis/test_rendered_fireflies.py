@@ -8,7 +8,7 @@ from renderer import LIGHTS, write_room
 
 import lightpaint as lp
 from lightpaint.basis.basis import Basis
-from lightpaint.basis.render import guide_training
+from lightpaint.basis.render import basis_render
 from lightpaint.basis.render.basis_render import render_basis
 from lightpaint.lighting.analysis.noise import uncertainty
 from lightpaint.target.target import Target
@@ -32,7 +32,7 @@ def bases(tmp_path_factory: pytest.TempPathFactory) -> list[Basis]:
     lights = LIGHTS["panel"] + LIGHTS["beam"] + BULB_IN_GLASS
     scene = lp.load_scene(write_room(tmp_path_factory.mktemp("room"), lights=lights))
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(guide_training, "TRAINING_SAMPLES", (2**12,))
+        patch.setattr(basis_render, "TRAINING_SAMPLES", (2**12,))
         short_bases = [render_basis(scene, spp=SPP, seed=seed) for seed in range(SEEDS)]
         return [*short_bases, render_basis(scene, spp=LONG_SPP, seed=SEEDS)]
 

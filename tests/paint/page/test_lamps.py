@@ -18,7 +18,7 @@ from lightpaint.paint.store.store import Store
 from lightpaint.paint.studio.studio import Studio
 from lightpaint.paint.subject import Subject
 from lightpaint.pipeline.job.settings import Settings
-from lightpaint.placement.space.free_space import pixels_of
+from lightpaint.placement.free_space import pixels_of
 from lightpaint.scene.scene_reader import load_scene
 
 PAINTER = "document.getElementById('lightpaint').painter"

@@ -13,9 +13,8 @@ from blender import found_in_blender
 from light_groups import interleaved, pictures
 
 import lightpaint as lp
-from lightpaint.basis.lightgroups.frame_groups import first_frame
 from lightpaint.basis.lightgroups.frame_sequence import find_frames
-from lightpaint.basis.lightgroups.light_groups import LightGroups
+from lightpaint.basis.lightgroups.light_groups import LightGroups, first_frame
 from lightpaint.lighting.answer.lighting import Lighting
 from lightpaint.lighting.answer.lighting_keys import LightingKey
 from lightpaint.relit.export.exports import blender_script, lights_table, render_identity

@@ -8,7 +8,7 @@ and one pass serves all lights.
 
 That is its plain mode, `trace_plainly`, which tests compare with Mitsuba. For a basis it does two
 things better, at the same cost: it uses a low-discrepancy sequence instead of random numbers (see
-sobol.py), and a trained guide chooses the emitters (guide_training.py).
+sobol.py), and a trained guide chooses the emitters (basis_render.py).
 
 Import this module after setting a Dr.Jit variant, since its array types do not exist before.
 """

@@ -17,7 +17,9 @@ from typing import Any, NamedTuple
 
 import drjit as dr
 import mitsuba as mi
+import numpy as np
 
+from lightpaint.arrays import Bools
 from lightpaint.basis.render.tracer.emitter_guide import BELOW_1
 from lightpaint.basis.render.tracer.sobol import APERTURE, FILM, TIME
 
@@ -67,7 +69,7 @@ class View(NamedTuple):
     height: int
 
 
-def camera_rays(view, sampler, numbers, pixel, term):
+def _camera_rays(view, sampler, numbers, pixel, term):
     """Return one ray per sample, with random numbers drawn in the order of Mitsuba's
     SamplingIntegrator.
     """
@@ -122,7 +124,7 @@ def trace_paths(view, sampler, numbers, guide, planes, rules, pixel, place, term
     term: number of the sample. The other parameters are those of `trace_samples`.
     """
     scene = view.scene
-    ray, weight = camera_rays(view, sampler, numbers, pixel, term)
+    ray, weight = _camera_rays(view, sampler, numbers, pixel, term)
     # fmt: off
     throughput = mi.Spectrum(1)                 # Fraction of radiance that reaches the camera
     eta = mi.Float(1)                           # Product of relative indices of refraction
@@ -192,13 +194,13 @@ def trace_paths(view, sampler, numbers, guide, planes, rules, pixel, place, term
         previous_pdf = sample.pdf
         previous_delta = mi.has_flag(sample.sampled_type, mi.BSDFFlags.Delta)
         previous_cell = mi.UInt32(cell)
-        looks_through &= passes_clearly(sample)
+        looks_through &= _passes_clearly(sample)
         depth[si.is_valid()] += 1
         active = _roulette(throughput, eta, depth >= rules.rr_depth, fate, active_next)
         pi = scene.ray_intersect_preliminary(ray, False, active)
 
 
-def passes_clearly(sample):
+def _passes_clearly(sample):
     """Return whether a BSDF sample passes straight through, as in clear glass or a hole."""
     flags = mi.BSDFFlags
     return mi.has_flag(sample.sampled_type, flags.DeltaTransmission) | mi.has_flag(
@@ -306,3 +308,48 @@ def _mis(pdf_a, pdf_b):
     a, b = dr.square(pdf_a), dr.square(pdf_b)
     w = a / (a + b)
     return dr.select(dr.isfinite(w), w, 0)
+
+
+def has_clear_surfaces(loaded: Any) -> bool:
+    """Return whether a loaded scene has clear glass or other surfaces that let rays pass straight
+    through.
+    """
+    surfaces = [shape.bsdf().flags() for shape in loaded.shapes() if shape.bsdf() is not None]
+    clear = mi.BSDFFlags.DeltaTransmission, mi.BSDFFlags.Null
+    return any(mi.has_flag(flags, kind) for flags in surfaces for kind in clear)
+
+
+def emitters_seen_through(view: View, max_depth: int, *, samples: int, seed: int) -> Bools:
+    """Return the pixels of a view, (h, w), in which some sample sees an emitter."""
+    count = view.width * view.height
+    seen = np.zeros(count, bool)
+    sampler = mi.load_dict({"type": "independent"})
+    for k in range(samples):
+        sampler.seed(seed + k, count)
+        pixel = dr.arange(mi.UInt32, count)
+        seen |= np.array(_sees_emitter(view, sampler, pixel, mi.UInt32(max_depth)))
+    return seen.reshape(view.height, view.width)
+
+
+@dr.syntax
+def _sees_emitter(view, sampler, pixel, max_depth):
+    """Trace a ray of each pixel through clear surfaces, and return whether it reaches an
+    emitter.
+    """
+    scene = view.scene
+    ray, _ = _camera_rays(view, sampler, None, pixel, None)
+    # fmt: off
+    depth = mi.UInt32(0)      # Number of surfaces passed
+    seen = mi.Bool(False)     # Rays that reached an emitter
+    active = max_depth > 0    # Rays that continue
+    # fmt: on
+    while active:
+        si = scene.ray_intersect(ray, active)
+        seen |= active & (si.emitter(scene) != None)  # noqa: E711 (compares arrays)
+        active &= ~seen & si.is_valid() & (depth + 1 < max_depth)
+        lobe, direction = sampler.next_1d(), sampler.next_2d()
+        sample, _ = si.bsdf(ray).sample(mi.BSDFContext(), si, lobe, direction, active)
+        active &= _passes_clearly(sample)
+        ray = si.spawn_ray(si.to_world(sample.wo))
+        depth += 1
+    return seen

@@ -11,12 +11,11 @@ from lightpaint.arrays import Position
 from lightpaint.display_text import some_names, with_similar_name
 from lightpaint.errors import ConstraintError, SceneError
 from lightpaint.lighting.constraints.constraints import Constraints, is_pattern
+from lightpaint.placement.free_space import as_position
 from lightpaint.placement.freedom import Freedom
 from lightpaint.placement.lights_to_place import followers_of, free_light, new_lights_of
 from lightpaint.placement.new_lights import MirroredPair, NewLights
-from lightpaint.placement.rigging.rigging import Rigging
-from lightpaint.placement.rigging.rigging_values import constraint_of, names_of
-from lightpaint.placement.space.free_space import as_position
+from lightpaint.placement.rigging import Rigging, constraint_of, names_of
 from lightpaint.scene.lights.light import Light
 from lightpaint.scene.scene import Scene
 from lightpaint.sentences import Lead, SourceKey

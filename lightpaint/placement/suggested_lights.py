@@ -8,11 +8,11 @@ from lightpaint.basis.render.integrators import why_not_one_pass
 from lightpaint.errors import NoPlaceError, SceneError
 from lightpaint.keywords import keywords
 from lightpaint.lighting.solution import Solution
+from lightpaint.placement.free_space import as_position
 from lightpaint.placement.new_lights import NewLights
 from lightpaint.placement.place import place
 from lightpaint.placement.placement import Placement
-from lightpaint.placement.space.free_space import as_position
-from lightpaint.placement.suggestions.suggestion import Suggestion
+from lightpaint.placement.suggestion import Suggestion
 from lightpaint.progress import Progress, silent
 from lightpaint.scene.checks.tokens import tag
 from lightpaint.scene.lights.light import free_names

@@ -1,1 +1,0 @@
-"""Engines that run work items, and the division of bases, sums and renders into items."""

@@ -1,1 +1,0 @@
-"""Rigging: lights that may move and lights to add, by a lights file and options."""

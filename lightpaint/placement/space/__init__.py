@@ -1,1 +1,0 @@
-"""Space that lights may hang in: free of shapes, on rails, on surfaces."""

@@ -1,1 +1,0 @@
-"""Suggestions of additional lights where they would help most."""
