@@ -5,6 +5,7 @@ import inspect
 import re
 import sys
 from collections.abc import Iterator
+from contextlib import suppress
 from importlib import import_module
 from importlib.util import module_from_spec, spec_from_file_location
 from pathlib import Path
@@ -16,6 +17,7 @@ from renderer import REPOSITORY
 
 import lightpaint as lp
 from lightpaint.cli.options.parser import command_parser
+from lightpaint.sentences import Hint, Word
 
 sys.path.insert(0, str(REPOSITORY / "docs" / "site"))
 
@@ -42,7 +44,8 @@ def test_every_public_name_has_one_place_in_the_reference() -> None:
 INTERNAL = {
     *("Backend", "Emitter", "Features", "Film", "Integrator", "IntegratorChoice", "ParsedScene"),
     *("BasisFile", "GroupsFile", "PaintedView", "PlacementFile", "PlacementRecord", "ResultFolder"),
-    *("Loss", "Reduction", "SceneRequests", "Software", "Squares", "Stream", "SurfaceFilter"),
+    *("Loss", "Reduction", "SceneRequests", "Sentence", "Software", "SourceKey"),
+    *("Squares", "Stream", "SurfaceFilter"),
     *("TexelLayout", "Views"),
 }
 
@@ -180,14 +183,26 @@ def _literals() -> Iterator[str]:
     """Yield the texts of the package: its own literals, with … for each expression in them."""
     for path in (REPOSITORY / "lightpaint").rglob("*.py"):
         for node in ast.walk(ast.parse(path.read_text("utf-8"))):
-            if isinstance(node, ast.JoinedStr):
-                yield "".join(
-                    str(x.value) if isinstance(x, ast.Constant) else "…" for x in node.values
-                )
+            if isinstance(node, ast.Call) and len(node.args) > 1:
+                yield "".join(_text_of(x) for x in node.args)  # a sentence of several parts
+            elif isinstance(node, ast.JoinedStr):
+                yield _text_of(node)
             elif isinstance(node, ast.Constant) and isinstance(node.value, str):
                 yield node.value
     for text in all_sentences().values():
         yield from [text] if isinstance(text, str) else text.values()
+
+
+def _text_of(node: ast.expr) -> str:
+    """The text of an expression as far as the code has it, with … for the rest."""
+    if isinstance(node, ast.JoinedStr):
+        return "".join(_text_of(x) for x in node.values)
+    if isinstance(node, ast.Constant):
+        return str(node.value)
+    if isinstance(node, ast.Call) and isinstance(node.func, ast.Name) and node.func.id == "Hint":
+        with suppress(NameError):  # of an argument that the code computes
+            return str(eval(ast.unparse(node), {"Hint": Hint, "Word": Word}))
+    return "…"
 
 
 def test_the_version_is_the_same_everywhere() -> None:
