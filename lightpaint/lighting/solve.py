@@ -179,7 +179,7 @@ def _descend(
     the same while the loss falls, and are chosen anew at its minimum.
     """
     solution = _descend_once(problem, start, reached, blocks, is_near=is_near)
-    if not (problem.reduction.white_knobs or problem.reduction.gamut_knobs):
+    if not problem.reduction.has_choices:
         return solution
     count, value = solution.certificate.rounds, loss_with_pull(solution)
     for _ in range(MAX_WHITE_STEPS):

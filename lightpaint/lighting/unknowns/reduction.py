@@ -80,22 +80,30 @@ class Reduction:
         return tuple(k for k, knob in enumerate(self.knobs) if knob.gamut is not None)
 
     @cached_property
+    def has_sides(self) -> bool:
+        """Whether knobs are kept within triangles of their gamuts."""
+        return any(knob.side is not None for knob in self.knobs)
+
+    @cached_property
     def gamut_knobs(self) -> tuple[int, ...]:
         """Places of the knobs that have a gamut, and still take any colour."""
         if self.gamuts is None:
             return ()
         return tuple(k for k, knob in enumerate(self.knobs) if _has_any_colour(knob))
 
+    @property
+    def has_choices(self) -> bool:
+        """Whether lights choose their whites, whether they keep to their gamuts, or how."""
+        return bool(self.white_knobs or self.gamut_knobs) or self.has_sides
+
     def with_gamuts(self, gamuts: Gamuts) -> "Reduction":
         """Return the reduction with lights of any colour keeping to `gamuts`."""
         return replace(self, gamuts=gamuts)
 
-    def confined(self, places: Collection[int]) -> "Reduction":
-        """Return the reduction with these knobs, by their places, confined to their gamuts."""
-        return self.confined_to_sides(dict.fromkeys(places))
-
     def confined_to_sides(self, sides: Mapping[int, int | None]) -> "Reduction":
-        """Return the reduction with knobs, by their places, confined to a side of their gamuts."""
+        """Return the reduction with knobs, by their places, confined to a side of their gamuts; to
+        the whole gamut where the side is None.
+        """
         if not sides:
             return self
         knobs = [*self.knobs]

@@ -8,9 +8,11 @@ better with a white elsewhere in their range. Wide windows over many whites, whi
 lead near the end quickly. No step between neighbours raises the objective, and in the end none
 lowers it.
 
-A gamut is a polygon of many corners, and many mixes of them give the same colour. Exact answers use
-all corners. Under the moving brush each light mixes the corners of one triangle, made of the centre
-and one side, and moves to the next triangle when it reaches the edge.
+A gamut is a polygon of many corners, and many mixes of them give the same colour. Exact answers of
+few lights use all corners. Under the moving brush, and with many lights, each light mixes the
+corners of one triangle, made of the centre and one side, and moves to the next triangle when it
+reaches the edge. The end is the same; a thousand lights have three thousand unknowns instead of
+twice as many, which are determined.
 """
 
 from collections.abc import Collection, Mapping, Sequence
@@ -36,6 +38,9 @@ MAX_STEPS = 200
 
 #: Share of the largest slope, and of the objective, that is round-off.
 ROUND_OFF = 1e-9
+
+#: Number of lights kept within their gamuts beyond which each mixes the corners of a triangle.
+MANY_CONFINED = 64
 
 #: Ends of windows, by the places of their knobs.
 Windows = Mapping[int, tuple[int, int]]
@@ -104,11 +109,11 @@ def next_whites(
     groups = _groups(reduction, only)
     optimum = solve_reduced(equations, reduction, _snap(groups, start), **options)
     for _ in range(steps):
-        beyond = _knobs_outside_gamuts(reduction, optimum.weights)
-        windows = {} if beyond else _better_windows(equations, reduction, groups, optimum)
-        if not (windows or beyond):
+        sides = _next_gamut_parts(equations, reduction, optimum)
+        windows = {} if sides else _better_windows(equations, reduction, groups, optimum)
+        if not (windows or sides):
             break
-        reduction = reduction.with_windows(windows).confined(beyond)
+        reduction = reduction.with_windows(windows).confined_to_sides(sides)
         optimum = solve_reduced(equations, reduction, _snap(groups, optimum.weights), **options)
     return reduction, optimum
 
@@ -141,6 +146,23 @@ def _knobs_outside_gamuts(reduction: Reduction, weights: Doubles) -> list[int]:
     lights = [reduction.knobs[k].lights[0] for k in free_knobs]
     beyond = reduction.gamuts.lights_outside(weights, np.array(lights))
     return [k for k, light in zip(free_knobs, lights, strict=True) if light in beyond]
+
+
+def _next_gamut_parts(
+    equations: NormalEquations, reduction: Reduction, optimum: ReducedOptimum
+) -> dict[int, int | None]:
+    """Return places of the knobs to keep within their gamuts, or within another triangle of them,
+    by its side; None for a whole gamut.
+    """
+    beyond = _knobs_outside_gamuts(reduction, optimum.weights)
+    if not reduction.has_sides and len(beyond) + len(reduction.confined_knobs) <= MANY_CONFINED:
+        return dict.fromkeys(beyond)
+    sides: dict[int, int | None] = {**_sides_outside(reduction, optimum.weights)}
+    for k in reduction.confined_knobs:
+        knob = reduction.knobs[k]
+        if knob.side is None and knob.gamut is not None:
+            sides[k] = knob.gamut.side_towards(optimum.weights[knob.lights[0]])
+    return sides or {**_next_sides(equations, reduction, optimum)}
 
 
 def clip_to_gamuts(reduction: Reduction, weights: Doubles) -> Doubles:

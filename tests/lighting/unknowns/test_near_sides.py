@@ -60,6 +60,23 @@ def test_sides_lead_to_the_optimum_over_whole_gamuts(
     np.testing.assert_allclose(second_weights, weights, rtol=1e-9, atol=1e-9)
 
 
+@pytest.mark.parametrize("seed", range(6))
+def test_exact_answers_of_many_lights_keep_to_triangles(
+    make_basis: Any, monkeypatch: pytest.MonkeyPatch, seed: int
+) -> None:
+    """With the optimum of mixes of all corners, from fewer unknowns."""
+    equations, reduction, current = _problem(make_basis, seed)
+    over_gamuts, best = next_whites(equations, reduction, current)
+    monkeypatch.setattr(white_mixes, "MANY_CONFINED", 0)
+    in_triangles, optimum = next_whites(equations, reduction, current)
+    assert in_triangles.has_sides
+    assert not over_gamuts.has_sides
+    assert len(optimum.x) < len(best.x)
+    assert optimum.converged
+    value, least = (equations.objective(x.weights).sum() for x in (optimum, best))
+    assert value == pytest.approx(least, abs=1e-9 * equations.target_norm2.sum())  # round-off
+
+
 def test_gamuts_of_another_painting_are_heeded(make_basis: Any) -> None:
     equations, reduction, current = _problem(make_basis, 1)
     gamuts = reduction.gamuts

@@ -158,8 +158,7 @@ def _solver(solution: Solution) -> Callable[[Problem], Doubles]:
     def best(problem: Problem) -> Doubles:
         problem, begin = squares(problem)
         descent = descend(problem, begin)
-        is_bounded = problem.reduction.white_knobs or problem.reduction.gamut_knobs
-        for _ in range(MAX_WHITE_STEPS if is_bounded else 0):
+        for _ in range(MAX_WHITE_STEPS if problem.reduction.has_choices else 0):
             equations = problem.with_pull(descent.equations)
             reduction, optimum = next_whites(equations, problem.reduction, descent.weights)
             if relative_change(descent.equations, descent.weights, optimum.weights) <= LAST_STEP:
