@@ -3,7 +3,8 @@
 import copy
 import json
 import pickle
-from multiprocessing import get_context
+import subprocess
+import sys
 from pathlib import Path
 from typing import Any
 
@@ -54,13 +55,19 @@ def test_copies_keep_the_data(value: LightpaintError, copied: Any) -> None:
 
 
 def test_an_error_comes_from_another_process_with_its_data() -> None:
-    with get_context("spawn").Pool(1) as pool, pytest.raises(SizeError) as refusal:
-        pool.apply(_refuse)
-    assert refusal.value.sentence.parts == RESIZE.parts
-
-
-def _refuse() -> None:
-    raise SizeError(RESIZE)
+    refusing = """
+import pickle, sys
+from lightpaint.errors import SizeError
+from lightpaint.sentences import Hint
+try:
+    raise SizeError("or pass ", Hint("resize", True))
+except SizeError as error:
+    sys.stdout.buffer.write(pickle.dumps(error))
+"""
+    child = subprocess.run([sys.executable, "-c", refusing], capture_output=True, check=True)
+    refusal = pickle.loads(child.stdout)
+    assert isinstance(refusal, SizeError)
+    assert refusal.sentence.parts == ("or pass ", Hint("resize", True))
 
 
 def test_nested_errors_keep_the_data() -> None:
