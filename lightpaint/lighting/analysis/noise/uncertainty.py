@@ -87,6 +87,8 @@ def weakest_matrix(
                 MIN_LEFT * float(M[c, k, k]),
             )
             less = doubts[k, c] * max(alone - least, 0)
+            if not less:
+                continue
             weakest[c, k, k] -= less
             # Sherman and Morrison: the part alone is less by as much.
             column = inverse[c][:, k].copy()
