@@ -81,7 +81,7 @@ class Reduction:
 
     @cached_property
     def has_sides(self) -> bool:
-        """Whether knobs are kept within triangles of their gamuts."""
+        """True if knobs are kept within triangles of their gamuts."""
         return any(knob.side is not None for knob in self.knobs)
 
     @cached_property
@@ -93,7 +93,7 @@ class Reduction:
 
     @property
     def has_choices(self) -> bool:
-        """Whether lights choose their whites, whether they keep to their gamuts, or how."""
+        """True if lights choose their whites, whether they keep to their gamuts, or how."""
         return bool(self.white_knobs or self.gamut_knobs) or self.has_sides
 
     def with_gamuts(self, gamuts: Gamuts) -> "Reduction":
