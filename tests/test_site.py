@@ -4,7 +4,7 @@ import ast
 import inspect
 import re
 import sys
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from contextlib import suppress
 from importlib import import_module
 from importlib.util import module_from_spec, spec_from_file_location
@@ -168,7 +168,7 @@ def test_messages_that_are_explained_are_those_of_the_code() -> None:
     """`…` stands for what differs; each piece between has to stand in one literal."""
     page = (REPOSITORY / "docs" / "troubleshooting.md").read_text("utf-8")
     messages = [" ".join(x.split()) for x in re.findall(r"\*\*`([^`]+)`\*\*", page)]
-    assert len(messages) > 50
+    assert len(messages) > 80
     literals = "\n".join(_literals())
     missing = [
         piece
@@ -181,27 +181,45 @@ def test_messages_that_are_explained_are_those_of_the_code() -> None:
 
 def _literals() -> Iterator[str]:
     """Yield the texts of the package: its own literals, with … for each expression in them."""
-    for path in (REPOSITORY / "lightpaint").rglob("*.py"):
-        for node in ast.walk(ast.parse(path.read_text("utf-8"))):
+    trees = [
+        ast.parse(path.read_text("utf-8")) for path in (REPOSITORY / "lightpaint").rglob("*.py")
+    ]
+    constants = {
+        x.targets[0].id: x.value
+        for tree in trees
+        for x in tree.body
+        if isinstance(x, ast.Assign) and isinstance(x.targets[0], ast.Name)
+    }
+    for tree in trees:
+        for node in ast.walk(tree):
             if isinstance(node, ast.Call) and len(node.args) > 1:
-                yield "".join(_text_of(x) for x in node.args)  # a sentence of several parts
+                # A sentence of several parts.
+                yield "".join(_text_of(x, constants) for x in node.args)
             elif isinstance(node, ast.JoinedStr):
-                yield _text_of(node)
+                yield _text_of(node, constants)
             elif isinstance(node, ast.Constant) and isinstance(node.value, str):
                 yield node.value
     for text in all_sentences().values():
         yield from [text] if isinstance(text, str) else text.values()
 
 
-def _text_of(node: ast.expr) -> str:
-    """The text of an expression as far as the code has it, with … for the rest."""
-    if isinstance(node, ast.JoinedStr):
-        return "".join(_text_of(x) for x in node.values)
-    if isinstance(node, ast.Constant):
-        return str(node.value)
-    if isinstance(node, ast.Call) and isinstance(node.func, ast.Name) and node.func.id == "Hint":
-        with suppress(NameError):  # of an argument that the code computes
-            return str(eval(ast.unparse(node), {"Hint": Hint, "Word": Word}))
+def _text_of(node: ast.expr, constants: Mapping[str, ast.expr]) -> str:
+    """The text of an expression as far as the code has it, with … for the rest.
+
+    constants: what the names of all modules stand for.
+    """
+    match node:
+        case ast.JoinedStr():
+            return "".join(_text_of(x, constants) for x in node.values)
+        case ast.Constant():
+            return str(node.value)
+        case ast.Call(func=ast.Name("Hint")):
+            with suppress(NameError):  # of an argument that the code computes
+                return str(eval(ast.unparse(node), {"Hint": Hint, "Word": Word}))
+        case ast.Call(func=ast.Name("Sentence" | "Remedy")):
+            return "".join(_text_of(x, constants) for x in node.args)
+        case ast.Name() if isinstance(constants.get(node.id), ast.Call):
+            return _text_of(constants[node.id], {})
     return "…"
 
 

@@ -32,6 +32,7 @@ from lightpaint.report.page.mixer import (
     kelvin_colors,
     light_data,
     lighting_data,
+    packed_gels,
     planes_for_page,
     transform_data,
 )
@@ -92,6 +93,7 @@ def _mixer(
             {**image, "levels": {"answer": 1.0, "present": 1.0}} for image in record["images"]
         ],
         "kelvins": kelvin_colors(),
+        "gels": packed_gels(),
         "transform": transform_data(ViewTransform()),
         "painting": None,
         "lighting": lighting_data(lighting),

@@ -7,8 +7,11 @@ mix them, so that a page sent by mail is a mixer in any browser, offline.
 
 import base64
 import json
+import re
+import zlib
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from functools import cache
 from typing import Any, TypedDict, Unpack
 
 import numpy as np
@@ -34,7 +37,7 @@ from lightpaint.report.page.figures import CLEAN_REDUCTION, data_uri
 from lightpaint.report.page.html import html
 from lightpaint.report.page.lights_table import most_visible_lights
 from lightpaint.threads import parallel_map
-from lightpaint.viewer.bundle import bundled, compact_script, styles
+from lightpaint.viewer.bundle import bundled, compact_script, source, styles
 
 #: Colour temperatures of the sliders, in kelvin, evenly in mireds; and the distance from Planck's
 #: locus up to which a colour is one.
@@ -131,6 +134,7 @@ def mixer_html(
         "lights": [_light(basis, lighting, k) for k in shown],
         "joint": [lights.data(basis, lighting) for lights in joint],
         "kelvins": kelvin_colors(),
+        "gels": packed_gels(),
         "transform": transform_data(transform),
         "painting": None if painting is None else _painting(painting, factor),
         "lighting": lighting_data(lighting),
@@ -244,6 +248,13 @@ def kelvin_colors() -> dict[str, Any]:
     mireds = np.linspace(1e6 / COOLEST, 1e6 / WARMEST, STEPS)
     colors = [[round(float(x), 5) for x in kelvin_to_rgb(float(1e6 / m))] for m in mireds]
     return {"coolest": COOLEST, "warmest": WARMEST, "colors": colors}
+
+
+@cache
+def packed_gels() -> str:
+    """Return the table of colour filters that the painter has, deflated, for the page."""
+    [rows] = re.findall(r"`\n([^`]*)`", source("viewer/gels/gel_table.js"))
+    return "data:;base64," + base64.b64encode(zlib.compress(rows.encode(), 9)).decode("ascii")
 
 
 def transform_data(transform: ViewTransform) -> dict[str, Any]:

@@ -25,7 +25,7 @@ const [THUMBNAIL_WIDTH, WHITE_SHARE] = [88, 0.98];
 class Mixer {
   /** @param {HTMLElement} root @param {import("./mixer_data.js").Unpacked} unpacked
    * @param {import("../drawing/view_transform.js").Lut} lut */
-  constructor(root, [data, planes], lut) {
+  constructor(root, [data, planes, gels], lut) {
     this.data = data;
     this.planes = planes.map((halves, k) => ({ halves, scale: data.planes[k].scale }));
     this.encoder = new Encoder(lut, data.transform.stops);
@@ -53,7 +53,7 @@ class Mixer {
       this.rows.push(row);
     });
     this.selection = new Selection(this.rows, redraw);
-    addGels(this.selection);
+    addGels(this.selection, gels);
     const view = this.createStage();
     view.append(this.selection.element, ...this.createButtons());
     const list = createElement('div', 'mixer-lights');
@@ -285,9 +285,9 @@ export async function begin(root, look, isWanted = () => true) {
 
 /** @param {HTMLElement} body @param {HTMLElement} root @param {Look} [look] */
 async function buildMixer(body, root, look) {
-  let [data, planes] = await unpackMixer(root);
+  let [data, planes, gels] = await unpackMixer(root);
   if (look) data = look.start(data);
-  return new Mixer(body, [data, planes], await lutOf(data.transform));
+  return new Mixer(body, [data, planes, gels], await lutOf(data.transform));
 }
 
 /** @param {unknown} error */

@@ -1,7 +1,8 @@
 /** The data of a mixer, from JSON in the page, and their unpacked planes. */
 import { toFloats } from '../drawing/half_floats.js';
 import { SRGB } from '../drawing/view_transform.js';
-import { unpack } from './packed_picture.js';
+import { gelsOf } from '../gels/gels.js';
+import { inflate, unpack } from './packed_picture.js';
 
 /** @typedef {import("./packed_picture.js").Compact} Compact */
 /** @typedef {import("./mixer_light.js").Light} Light */
@@ -17,18 +18,18 @@ import { unpack } from './packed_picture.js';
  *   answer: Record<string, RGB>, present: Record<string, RGB>, members?: number[]}} Joint */
 
 /** lights: those with their own plane, in the order of the planes. shown: indices of those with
- * sliders; the others stay as in the look. joint: lights that share a row.
- * lighting: the answer's file.
+ * sliders; the others stay as in the look. joint: lights that share a row. gels: the table of filters, packed. lighting: the
+ * answer's file.
  * @typedef {{size: [number, number], planes: Compact[], lights: Light[], shown?: number[],
  *   joint: Joint[],
- *   kelvins: {coolest: number, warmest: number, colors: RGB[]},
+ *   kelvins: {coolest: number, warmest: number, colors: RGB[]}, gels: string,
  *   transform: {stops: number, low: number, high: number,
  *   curve: number[] | null, lattice: Compact | null}, painting: string | null,
  *   lighting: {target?: string, lights: Record<string, {emission: RGB, weight: RGB}>},
  *   command: string | null}} Data */
 
-/** The data of a mixer, and its planes once unpacked.
- * @typedef {[Data, Uint16Array[]]} Unpacked */
+/** The data of a mixer, its planes and its filters, once unpacked.
+ * @typedef {[Data, Uint16Array[], import("../gels/gels.js").Gel[]]} Unpacked */
 /** @type {WeakMap<HTMLElement, Promise<Unpacked>>} */
 const unpackedMixers = new WeakMap();
 
@@ -39,8 +40,9 @@ export function unpackMixer(root) {
   const text = root.querySelector('script[type="application/json"]')?.textContent ?? '';
   /** @type {Data} */
   const data = JSON.parse(text);
-  const promise = Promise.all(data.planes.map(unpack)).then(
-    (planes) => /** @type {Unpacked} */ ([data, planes]),
+  const promise = Promise.all([Promise.all(data.planes.map(unpack)), inflate(data.gels)]).then(
+    ([planes, gels]) =>
+      /** @type {Unpacked} */ ([data, planes, gelsOf(new TextDecoder().decode(gels))]),
   );
   unpackedMixers.set(root, promise);
   return promise;

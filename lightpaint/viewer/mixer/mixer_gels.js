@@ -1,8 +1,7 @@
 /** Colour filters for the selected lights of a mixer. */
 
 import { luminance } from '../drawing/chromaticity.js';
-import { GELS, gelsNamed } from '../gels/gel_list.js';
-import { filtered, gelName, lossInStops } from '../gels/gels.js';
+import { filtered, findGels, gelName, lossInStops } from '../gels/gels.js';
 import { createElement } from './page_elements.js';
 
 /** @typedef {import("../drawing/chromaticity.js").RGB} RGB */
@@ -16,8 +15,8 @@ const filters = new WeakMap();
 let count = 0;
 
 /** Add a field for the filter of the selected lights.
- * @param {import("./mixer_selection.js").Selection} selection */
-export function addGels(selection) {
+ * @param {import("./mixer_selection.js").Selection} selection @param {Gel[]} gels */
+export function addGels(selection, gels) {
   const field = createElement('input');
   Object.assign(field, { type: 'search', placeholder: 'Gel: 201, R80, amber' });
   field.ariaLabel = 'Gel of the selected lights: a number or a name; empty for none';
@@ -25,11 +24,11 @@ export function addGels(selection) {
   const list = createElement('datalist');
   list.id = `gels-${(count += 1)}`;
   field.setAttribute('list', list.id);
-  list.append(...GELS.map(({ code, name, percent }) => new Option(`${name}, ${percent} %`, code)));
+  list.append(...gels.map(({ code, name, percent }) => new Option(`${name}, ${percent} %`, code)));
   const output = createElement('span');
   output.setAttribute('role', 'status');
   field.addEventListener('change', () => {
-    const gel = field.value.trim() ? gelsNamed(field.value)[0] : null;
+    const gel = field.value.trim() ? findGels(gels, field.value)[0] : null;
     output.textContent = gel === undefined ? 'no such gel' : '';
     if (gel === undefined) return;
     const rows = selection.selected.filter(({ light }) => !light.isScalar);

@@ -43,7 +43,7 @@ function unpackPlane(bytes, first, numberCount, height, width) {
 
 /** Return the bytes that an address `data:` has, deflated. @param {string} data
  * @returns {Promise<Uint8Array>} */
-async function inflate(data) {
+export async function inflate(data) {
   const text = data.slice(data.indexOf(',') + 1);
   const deflated = Uint8Array.from(atob(text), (letter) => letter.charCodeAt(0));
   const stream = new Blob([deflated]).stream().pipeThrough(new DecompressionStream('deflate'));
