@@ -99,8 +99,7 @@ def hints(file: Path) -> Iterator[str]:
 def test_every_hint_is_in_the_table() -> None:
     spelt = {spelling.partition("=")[0] for spelling in SPELLINGS}
     unknown = {name for file in LIBRARY for name in hints(file)} - {*OPTIONS, *spelt}
-    # Calls of Python alone have these.
-    assert unknown <= {"time_s"}
+    assert unknown == set()
 
 
 def test_the_test_itself_finds_what_it_looks_for(tmp_path: Path) -> None:
