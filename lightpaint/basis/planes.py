@@ -8,7 +8,7 @@ from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import nullcontext
 from dataclasses import dataclass
 from itertools import pairwise
-from typing import Protocol
+from typing import Any, Protocol
 
 import numpy as np
 import numpy.typing as npt
@@ -63,6 +63,9 @@ class Planes(Protocol):
     def mix(self, weights: Doubles) -> npt.NDArray[np.float32]:
         """Return Σ w_i Φ_i, (h, w, 3). weights: (n, 3), one per light and channel."""
 
+    def mixes(self, weights: Doubles) -> npt.NDArray[np.float32]:
+        """Return several such sums, (k, h, w, 3), in one walk. weights: (k, n, 3)."""
+
     def sums(self, weight: Floats, image: Floats) -> tuple[Doubles, Doubles, Doubles]:
         """Return M (3, n, n), b (3, n) and ‖Ψ‖² (3,) over all pixels, in one walk.
 
@@ -116,6 +119,14 @@ class PlanesBase:
     def __iter__(self) -> Iterator[Floats]:
         return (self.plane(k) for k in range(self.count))
 
+    def mix(self, weights: Doubles) -> npt.NDArray[np.float32]:
+        """Return Σ w_i Φ_i, (h, w, 3)."""
+        return np.asarray(self.mixes(np.asarray(weights)[None])[0])
+
+    def mixes(self, weights: Doubles) -> npt.NDArray[np.float32]:
+        """Return several such sums, (k, h, w, 3), in one walk. weights: (k, n, 3)."""
+        raise NotImplementedError
+
     def squares(self) -> Doubles:
         """Return Σ Φ² over all pixels and channels, (n,)."""
         totals, pixels = np.zeros(self.count), self.size[0] * self.size[1]
@@ -140,19 +151,20 @@ class PlanesBase:
         """Return M (3, n, n), b (3, n) and ‖Ψ‖² (3,) of squares computed one block at a time."""
         n = self.count
         gram = np.zeros((3, n + 1, n + 1))
-        room = np.empty((n + 1, min(BLOCK_PIXELS, counted.size)))
+        step, kind = block_of(n)
+        room = np.empty((n + 1, min(step, counted.size)), kind)
         with one_thread() if n <= FEW_LIGHTS else nullcontext():
-            for start in range(0, counted.size, BLOCK_PIXELS):
-                where = as_slice(counted[start : start + BLOCK_PIXELS])
+            for start in range(0, counted.size, step):
+                where = as_slice(counted[start : start + step])
                 values = self.pixels(where)
                 weights, painted = squares(where, values)
-                root, is_per_channel = np.sqrt(weights.astype(np.float64)), weights.shape[1] == 3
+                root, is_per_channel = np.sqrt(weights, dtype=kind), weights.shape[1] == 3
                 # (n + 1, block): the target goes along as one more row.
                 block = room[:, : len(painted)]
                 for c in range(3):
                     channel_root = root[:, c * is_per_channel]
                     np.multiply(values[..., c], channel_root, out=block[:n])
-                    np.multiply(painted[:, c], channel_root, out=block[n])
+                    np.multiply(painted[:, c], channel_root, out=block[n], casting="same_kind")
                     gram[c] += block @ block.T
         return gram[:, :n, :n], gram[:, :n, n], gram[:, n, n]
 
@@ -189,9 +201,9 @@ class MemoryPlanes(PlanesBase):
         """Return these pixels as planes with a single row."""
         return MemoryPlanes(self.pixels(where)[:, None])
 
-    def mix(self, weights: Doubles) -> npt.NDArray[np.float32]:
-        """Return Σ w_i Φ_i, (h, w, 3)."""
-        return mix(self._images, weights)
+    def mixes(self, weights: Doubles) -> npt.NDArray[np.float32]:
+        """Return several sums Σ w_i Φ_i, (k, h, w, 3)."""
+        return np.stack([mix(self._images, one) for one in weights])
 
     def replaced(self, planes: Mapping[int, Floats]) -> "MemoryPlanes":
         """Return planes in which some lights have other planes, (h, w, 3) each."""
@@ -237,16 +249,29 @@ def power_and_totals(planes: Planes, mask: Bools) -> tuple[Doubles, Doubles]:
     mask: (h, w).
     """
     power, totals = np.zeros((2, planes.count, 3))
-    counted_f64 = mask.ravel().astype(np.float64)
-    # NumPy sums over such short axes slowly, but multiplies matrices fast; in float64 and by blocks
-    # a product is as exact as a sum, and needs no copy of the basis.
-    for start in range(0, counted_f64.size, BLOCK_PIXELS):
-        weights = counted_f64[start : start + BLOCK_PIXELS]
-        block = planes.pixels(slice(start, start + BLOCK_PIXELS)).astype(np.float64)
-        totals += np.ones(weights.size) @ block
-        block *= block
-        power += weights @ block
+    counted = mask.ravel()
+    # NumPy sums over such short axes slowly, but multiplies matrices fast; by blocks, which need no
+    # copy of the basis, a product is as exact as a sum.
+    step, kind = block_of(planes.count)
+    for start in range(0, len(counted), step):
+        weights = counted[start : start + step].astype(kind)
+        block = planes.pixels(slice(start, start + step))
+        for c in range(3):
+            lit = np.ascontiguousarray(block[..., c], kind)
+            totals[:, c] += lit @ np.ones_like(weights)
+            power[:, c] += np.square(lit) @ weights
     return power, totals
+
+
+def block_of(n: int) -> tuple[int, Any]:
+    """Return the number of pixels of n lights that are multiplied at a time, and the type of their
+    products.
+
+    Products of many lights take most of a solve, and half as long in float32. Its round-off, 10⁻⁷
+    to 10⁻⁶ of M, is far below the noise of so many lights; sums over blocks are float64 all the
+    same.
+    """
+    return (BLOCK_PIXELS, np.float64) if n <= FEW_LIGHTS else (BLOCK_PIXELS // 2, np.float32)
 
 
 def as_slice(pixels: Indices) -> slice | Indices:

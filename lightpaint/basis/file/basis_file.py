@@ -36,6 +36,7 @@ from lightpaint.basis.file.file_parts import (
 )
 from lightpaint.basis.file.file_planes import FilePlanes
 from lightpaint.basis.file.half_floats import EncodedPlanes, PlaneEncoding, encoded_plane
+from lightpaint.basis.file.lit_planes import MIN_LIGHTS, LitCollector, LitPlane, LitPlanes
 from lightpaint.basis.lights import BasisLight, Lights
 from lightpaint.basis.planes import IndirectLight, Planes, as_planes
 from lightpaint.errors import BasisError, ImageError
@@ -259,9 +260,9 @@ def leave_indirect(basis: Basis, path: Path) -> Basis:
 
 
 def _read_large(path: Path) -> Basis | None:
-    """Return a basis whose rows are read on demand.
+    """Return a basis whose rows are read on demand, or of which lit pixels are in memory.
 
-    Returns None if the basis fits in memory or the file does not support reading rows.
+    Returns None if all pixels fit in memory or the file does not support reading rows.
     """
     try:
         file = RowFile(path)
@@ -292,15 +293,15 @@ def _basis_of_parts(parts: Sequence[ExrPart], head: Mapping[str, str]) -> Basis:
     scales = [scales_of(p.attributes) for p in light_parts]
 
     def planes(order: Sequence[int], number: int) -> Planes:
-        channels = [(light_parts[k], scales[k][number]) for k in order]
+        plane_scales = [scales[k][number] for k in order]
+        channels = list(zip((light_parts[k] for k in order), plane_scales, strict=True))
         if _is_encoded(len(light_parts), light_parts[0].size):
-            channel_readers = stored_channels(channels, PLANE_CHANNELS[number])
-            return EncodedPlanes(
-                [
-                    encoded_plane(*x)
-                    for x in zip(channel_readers, (s for _, s in channels), strict=True)
-                ]
+            stored = zip(
+                stored_channels(channels, PLANE_CHANNELS[number]), plane_scales, strict=True
             )
+            if len(light_parts) >= MIN_LIGHTS and number < 2:
+                return LitPlanes([LitPlane.of(*x) for x in stored], light_parts[0].size)
+            return EncodedPlanes([encoded_plane(*x) for x in stored])
         return as_planes(stack_channels(channels, PLANE_CHANNELS[number]))
 
     channel_readers = [partial(getattr, part, "channels") for part in light_parts]
@@ -333,13 +334,25 @@ def _basis_of_rows(file: RowFile, head: Mapping[str, str]) -> Basis | None:
             file, [light_parts[k] for k in order], PLANE_CHANNELS[number], plane_scales
         )
 
-    channel_readers = [partial(file.channels, p) for p in light_parts]
+    collector = LitCollector(light_parts[0].size) if len(light_parts) >= MIN_LIGHTS else None
+
+    def collected(layout: PartLayout, scale: tuple[float, ...]) -> Channels:
+        channels = file.channels(layout)
+        if collector is not None:
+            name = strict_json(layout.texts[LIGHT_KEY])["name"]
+            sets = zip(PLANE_CHANNELS[:2], scale, strict=False)
+            collector.add(name, [LitPlane.of([channels[c] for c in x], y) for x, y in sets])
+        return channels
+
+    channel_readers = [partial(collected, *x) for x in zip(light_parts, scales, strict=True)]
     others = [part(p) for p in file.parts if LIGHT_KEY not in p.texts]
     has_indirect = all({*p.channels} >= INDIRECT_CHANNELS for p in light_parts)
     texts = [p.texts for p in light_parts]
-    return _checked_basis(
+    basis = _checked_basis(
         _Parts(head, texts, channel_readers, others, planes, has_indirect=has_indirect)
     )
+    lit = None if collector is None else collector.planes(basis.names)
+    return basis if lit is None else replace(basis, planes=lit[0], noise=lit[1])
 
 
 def _checked_basis(parts: _Parts) -> Basis:
