@@ -14,7 +14,7 @@ import numpy as np
 import numpy.typing as npt
 
 from lightpaint.arrays import Bools, Doubles, Floats, Indices
-from lightpaint.threads import one_thread
+from lightpaint.threads import one_thread, parallel_map
 
 #: Number of pixels multiplied at a time, whose float64 copies stay in the processor's cache.
 BLOCK_PIXELS = 2**13
@@ -45,6 +45,10 @@ class Planes(Protocol):
     def size(self) -> tuple[int, int]:
         """(height, width) in pixels."""
 
+    @property
+    def is_noisy(self) -> bool:
+        """True if most planes are stored in half floats, whose rounding their noise hides."""
+
     def __iter__(self) -> Iterator[Floats]:
         """Yield the planes, (h, w, 3) each."""
 
@@ -65,6 +69,9 @@ class Planes(Protocol):
 
     def mixes(self, weights: Doubles) -> npt.NDArray[np.float32]:
         """Return several such sums, (k, h, w, 3), in one walk. weights: (k, n, 3)."""
+
+    def exact_mix(self, weights: Doubles) -> Doubles:
+        """Return Σ w_i Φ_i channel by channel, (3, p), summed in float64. weights: (n, 3)."""
 
     def sums(self, weight: Floats, image: Floats) -> tuple[Doubles, Doubles, Doubles]:
         """Return M (3, n, n), b (3, n) and ‖Ψ‖² (3,) over all pixels, in one walk.
@@ -108,6 +115,11 @@ class PlanesBase:
         """Return the plane of light i, (h, w, 3)."""
         raise NotImplementedError
 
+    @property
+    def is_noisy(self) -> bool:
+        """True if most planes are stored in half floats, whose rounding their noise hides."""
+        return False
+
     def pixels(self, where: slice | Indices) -> Floats:
         """Return some pixels of all planes, (n, p, 3)."""
         raise NotImplementedError
@@ -126,6 +138,18 @@ class PlanesBase:
     def mixes(self, weights: Doubles) -> npt.NDArray[np.float32]:
         """Return several such sums, (k, h, w, 3), in one walk. weights: (k, n, 3)."""
         raise NotImplementedError
+
+    def exact_mix(self, weights: Doubles) -> Doubles:
+        """Return Σ w_i Φ_i channel by channel, (3, p), summed in float64. weights: (n, 3)."""
+        pixels = self.size[0] * self.size[1]
+        mixed = np.empty((3, pixels))
+
+        def fill(start: int) -> None:
+            block = slice(start, min(start + BLOCK_PIXELS, pixels))
+            mixed[:, block] = mix_channels(self.pixels(block), weights)
+
+        parallel_map(fill, range(0, pixels, BLOCK_PIXELS))
+        return mixed
 
     def squares(self) -> Doubles:
         """Return Σ Φ² over all pixels and channels, (n,)."""
@@ -151,11 +175,13 @@ class PlanesBase:
         """Return M (3, n, n), b (3, n) and ‖Ψ‖² (3,) of squares computed one block at a time."""
         n = self.count
         gram = np.zeros((3, n + 1, n + 1))
-        step, kind = block_of(n)
-        room = np.empty((n + 1, min(step, counted.size)), kind)
+        step, kind = block_of(self)
+        # Pixels without weight in between cost less than gathering the others.
+        spare = 0 if n <= FEW_LIGHTS else step // 8
+        room = np.empty((n + 1, min(step, counted.size) + spare), kind)
         with one_thread() if n <= FEW_LIGHTS else nullcontext():
             for start in range(0, counted.size, step):
-                where = as_slice(counted[start : start + step])
+                where = as_slice(counted[start : start + step], spare=spare)
                 values = self.pixels(where)
                 weights, painted = squares(where, values)
                 root, is_per_channel = np.sqrt(weights, dtype=kind), weights.shape[1] == 3
@@ -252,7 +278,7 @@ def power_and_totals(planes: Planes, mask: Bools) -> tuple[Doubles, Doubles]:
     counted = mask.ravel()
     # NumPy sums over such short axes slowly, but multiplies matrices fast; by blocks, which need no
     # copy of the basis, a product is as exact as a sum.
-    step, kind = block_of(planes.count)
+    step, kind = block_of(planes)
     for start in range(0, len(counted), step):
         weights = counted[start : start + step].astype(kind)
         block = planes.pixels(slice(start, start + step))
@@ -263,21 +289,29 @@ def power_and_totals(planes: Planes, mask: Bools) -> tuple[Doubles, Doubles]:
     return power, totals
 
 
-def block_of(n: int) -> tuple[int, Any]:
-    """Return the number of pixels of n lights that are multiplied at a time, and the type of their
-    products.
+def block_of(planes: "Planes | PlanesBase") -> tuple[int, Any]:
+    """Return the number of pixels whose light is multiplied at a time, and the type of products.
 
-    Products of many lights take most of a solve, and half as long in float32. Its round-off, 10⁻⁷
-    to 10⁻⁶ of M, is far below the noise of so many lights; sums over blocks are float64 all the
-    same.
+    Products of many lights take most of a solve, and half as long in float32. Their round-off, 10⁻⁷
+    to 10⁻⁶ of M, is far below that of half floats; sums over blocks are float64 all the same.
     """
-    return (BLOCK_PIXELS, np.float64) if n <= FEW_LIGHTS else (BLOCK_PIXELS // 2, np.float32)
+    if planes.count <= FEW_LIGHTS or not planes.is_noisy:
+        return BLOCK_PIXELS, np.float64
+    return BLOCK_PIXELS // 2, np.float32
 
 
-def as_slice(pixels: Indices) -> slice | Indices:
-    """Return contiguous pixels as a slice, which avoids a copy, and others unchanged."""
+def as_slice(pixels: Indices, *, spare: int = 0) -> slice | Indices:
+    """Return contiguous pixels as a slice, which avoids a copy, and others unchanged.
+
+    spare: number of further pixels that the slice may have.
+    """
     first, last = int(pixels[0]), int(pixels[-1])
-    return slice(first, last + 1) if last - first + 1 == pixels.size else pixels
+    return slice(first, last + 1) if last - first + 1 <= pixels.size + spare else pixels
+
+
+def mix_channels(lit: Floats, weights: Doubles) -> Doubles:
+    """Return Σ w_i Φ_i of pixels (n, p, 3), channel by channel, (3, p) float64. weights: (n, 3)."""
+    return np.stack([weights[:, c] @ lit[..., c].astype(np.float64) for c in range(3)])
 
 
 def mix(images: Floats, weights: Doubles) -> npt.NDArray[np.float32]:

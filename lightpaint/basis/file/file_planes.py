@@ -174,6 +174,12 @@ class FilePlanes(RowPlanes):
         return self._parts[0].size
 
     @property
+    def is_noisy(self) -> bool:
+        """True if most planes are stored in half floats, whose rounding their noise hides."""
+        halves = [part.channels[self._names[0]].itemsize == 2 for part in self._parts]
+        return 2 * sum(halves) > len(halves)
+
+    @property
     def chunk_rows(self) -> int:
         """Number of rows that the file stores as one chunk, which can only be read together."""
         return max(part.lines for part in self._parts)
@@ -217,6 +223,11 @@ class PickedPlanes(RowPlanes):
         """(1, pixels)."""
         return 1, len(self._where)
 
+    @property
+    def is_noisy(self) -> bool:
+        """True if most planes are stored in half floats, whose rounding their noise hides."""
+        return self._whole.is_noisy
+
     def plane(self, i: int) -> Floats:
         """Return the plane of light i, (1, p, 3)."""
         return self._whole.plane(i).reshape(-1, 3)[self._where][None]
@@ -235,6 +246,10 @@ class PickedPlanes(RowPlanes):
         """Return several sums Σ w_i Φ_i, (k, 1, p, 3)."""
         whole = self._whole.mixes(weights)
         return whole.reshape(len(whole), -1, 3)[:, None, self._where]
+
+    def exact_mix(self, weights: Doubles) -> Doubles:
+        """Return Σ w_i Φ_i channel by channel, (3, p), summed in float64."""
+        return self._whole.exact_mix(weights)[:, self._where]
 
 
 class ReplacedPlanes(RowPlanes):

@@ -6,15 +6,16 @@ memory of float32.
 """
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from itertools import pairwise
 from typing import Any
 
 import numpy as np
 import numpy.typing as npt
 
-from lightpaint.arrays import Floats, Indices, copy_as_singles
+from lightpaint.arrays import Doubles, Floats, Indices, copy_as_singles
 from lightpaint.basis.file.file_planes import RowPlanes
+from lightpaint.threads import parallel_map
 
 #: Number of lights from which planes may be kept by their lit pixels.
 MIN_LIGHTS = 128
@@ -49,44 +50,81 @@ class LitPlane:
         """Bytes of memory that it takes."""
         return self.pixels.nbytes + self.numbers.nbytes
 
+    def in_kind(self, kind: npt.DTypeLike) -> "LitPlane":
+        """Return this plane with numbers of this kind."""
+        return replace(self, numbers=self.numbers.astype(kind, copy=False))
+
+    def dense(self, pixels: int) -> npt.NDArray[np.float32]:
+        """Return all pixels, (3, pixels), not yet multiplied by the scale."""
+        plane = np.zeros((3, pixels), np.float32)
+        plane[:, self.pixels] = self.numbers
+        return plane
+
 
 @dataclass(frozen=True)
 class _Strip:
-    """The lit pixels of all planes in some rows.
+    """The lit pixels of all planes in some rows, plane by plane.
 
-    places: (m,) uint32, in an array (n, 3, pixels), of the red channel. numbers: (3, m). begins:
-    (n + 1,), where those of each plane begin.
+    lit: (m,) uint16 or uint32, their indices in the strip. numbers: (3, m). begins: (n + 1,), where
+    those of each plane begin. size: number of pixels of the strip.
     """
 
-    places: npt.NDArray[np.uint32]
+    lit: npt.NDArray[Any]
     numbers: npt.NDArray[Any]
     begins: Indices
+    size: int
 
-    def decoded(self, n: int, pixels: int) -> npt.NDArray[np.float32]:
+    @classmethod
+    def of(cls, planes: Sequence[LitPlane], parts: Sequence[slice], pixels: slice) -> "_Strip":
+        """Return a strip of planes. parts: slices of their lit pixels. pixels: of the picture."""
+        size = pixels.stop - pixels.start
+        kind = np.uint16 if size <= 2**16 else np.uint32
+        numbers = np.concatenate([x.numbers[:, y] for x, y in zip(planes, parts, strict=True)], 1)
+        lit = np.concatenate([x.pixels[y] for x, y in zip(planes, parts, strict=True)])
+        begins = np.cumsum([0, *(part.stop - part.start for part in parts)])
+        return cls((lit - np.uint32(pixels.start)).astype(kind), numbers, begins, size)
+
+    @property
+    def nbytes(self) -> int:
+        """Bytes of memory that it takes."""
+        return self.lit.nbytes + self.numbers.nbytes
+
+    def of_planes(self, values: npt.NDArray[Any]) -> npt.NDArray[Any]:
+        """Return a value of each plane, (n,), for each of its lit pixels, (m,)."""
+        return np.repeat(values, np.diff(self.begins))
+
+    def decoded(self) -> npt.NDArray[np.float32]:
         """Return the planes, (n, 3, pixels), not yet multiplied by their scales."""
-        block = np.zeros(3 * n * pixels, np.float32)
-        _scatter(self.places, self.numbers, block, pixels)
-        return block.reshape(n, 3, pixels)
+        n = len(self.begins) - 1
+        places = self.of_planes(3 * self.size * np.arange(n))
+        places += self.lit
+        block = np.zeros(3 * n * self.size, np.float32)
+        for c, channel in enumerate(self.numbers):
+            block[c * self.size :][places] = _singles(channel)
+        return block.reshape(n, 3, self.size)
 
-    def plane(self, i: int, pixels: int) -> npt.NDArray[np.float32]:
+    def plane(self, i: int) -> npt.NDArray[np.float32]:
         """Return plane i, (3, pixels), not yet multiplied by its scale."""
         part = slice(self.begins[i], self.begins[i + 1])
-        block = np.zeros(3 * pixels, np.float32)
-        own_places = self.places[part] - np.uint32(3 * i * pixels)
-        _scatter(own_places, self.numbers[:, part], block, pixels)
-        return block.reshape(3, pixels)
+        block = np.zeros((3, self.size), np.float32)
+        for channel, numbers in zip(block, self.numbers[:, part], strict=True):
+            channel[self.lit[part]] = _singles(numbers)
+        return block
+
+    def mix(self, weights: Doubles) -> Doubles:
+        """Return Σ w_i of the planes, (3, pixels) float64. weights: (n, 3), with the scales."""
+        return np.stack(
+            [
+                np.bincount(self.lit, self.of_planes(weights[:, c]) * _singles(channel), self.size)
+                for c, channel in enumerate(self.numbers)
+            ]
+        )
 
 
-def _scatter(
-    places: npt.NDArray[Any], numbers: npt.NDArray[Any], block: Floats, pixels: int
-) -> None:
-    """Write numbers, (3, m), to the places of the red channel and to those of the other two, which
-    follow it at a distance of `pixels`.
-    """
-    indices, singles = places.astype(np.intp), np.empty(numbers.shape[1], np.float32)
-    for c, channel in enumerate(numbers):
-        copy_as_singles(channel, singles)
-        block[c * pixels :][indices] = singles
+def _singles(numbers: npt.NDArray[Any]) -> npt.NDArray[np.float32]:
+    singles = np.empty(numbers.shape, np.float32)
+    copy_as_singles(numbers, singles)
+    return singles
 
 
 class LitPlanes(RowPlanes):
@@ -97,27 +135,24 @@ class LitPlanes(RowPlanes):
     def __init__(self, planes: Sequence[LitPlane], size: tuple[int, int]) -> None:
         self._count, self._size = len(planes), size
         self._scales = np.array([plane.scale for plane in planes], np.float32)
-        self._has_scales = bool((self._scales != 1).any())
         (height, width), step = size, self.strip_rows
-        edges = [*range(0, height, step), height]
-        kind = np.result_type(*{plane.numbers.dtype for plane in planes})
-        cuts = [np.searchsorted(plane.pixels, width * np.array(edges)) for plane in planes]
-        self._lit = []
-        for k, (top, bottom) in enumerate(pairwise(edges)):
-            pixels = (bottom - top) * width
-            shift = [3 * i * pixels - top * width for i in range(len(planes))]
-            parts = [slice(cut[k], cut[k + 1]) for cut in cuts]
-            places = [
-                plane.pixels[part].astype(np.int64) + by
-                for plane, part, by in zip(planes, parts, shift, strict=True)
-            ]
-            numbers = [
-                plane.numbers[:, part].astype(kind, copy=False)
-                for plane, part in zip(planes, parts, strict=True)
-            ]
-            begins = np.cumsum([0, *(len(of_plane) for of_plane in places)])
-            strip = np.concatenate(places).astype(np.uint32), np.concatenate(numbers, axis=1)
-            self._lit.append(_Strip(*strip, begins))
+        edges = [width * row for row in [*range(0, height, step), height]]
+        is_half = [plane.numbers.dtype == np.float16 for plane in planes]
+        self._is_noisy = 2 * sum(is_half) > len(planes)
+        # A few clean ones are kept whole, in float32.
+        self._clean = {
+            i: plane.dense(height * width)
+            for i, plane in enumerate(planes)
+            if self._is_noisy and not is_half[i]
+        }
+        kind = np.float16 if self._is_noisy else np.float32
+        nothing = LitPlane(np.zeros(0, np.uint32), np.zeros((3, 0), kind), 1.0)
+        same = [nothing if i in self._clean else x.in_kind(kind) for i, x in enumerate(planes)]
+        cuts = [np.searchsorted(plane.pixels, np.array(edges, np.uint32)) for plane in same]
+        self._lit = [
+            _Strip.of(same, [slice(*cut[k : k + 2]) for cut in cuts], slice(*ends))
+            for k, ends in enumerate(pairwise(edges))
+        ]
 
     @property
     def count(self) -> int:
@@ -132,16 +167,19 @@ class LitPlanes(RowPlanes):
     @property
     def nbytes(self) -> int:
         """Bytes of memory that the planes take."""
-        return sum(strip.places.nbytes + strip.numbers.nbytes for strip in self._lit)
+        return sum(strip.nbytes for strip in self._lit)
 
-    def _pixels_of(self, k: int) -> int:
-        """Return the number of pixels in strip k."""
-        return (min((k + 1) * self.strip_rows, self._size[0]) - k * self.strip_rows) * self._size[1]
+    @property
+    def is_noisy(self) -> bool:
+        """True if most planes are stored in half floats, whose rounding their noise hides."""
+        return self._is_noisy
 
     def plane(self, i: int) -> Floats:
         """Return the plane of light i, (h, w, 3)."""
-        parts = [strip.plane(i, self._pixels_of(k)) for k, strip in enumerate(self._lit)]
-        plane = np.concatenate(parts, axis=1)
+        if i in self._clean:
+            plane = self._clean[i].copy()
+        else:
+            plane = np.concatenate([strip.plane(i) for strip in self._lit], axis=1)
         if self._scales[i] != 1:
             plane *= self._scales[i]
         return np.ascontiguousarray(plane.T).reshape(*self._size, 3)
@@ -160,10 +198,26 @@ class LitPlanes(RowPlanes):
 
     def _read_strip(self, k: int) -> Floats:
         """Return a strip, (n, rows, w, 3)."""
-        block = self._lit[k].decoded(self._count, self._pixels_of(k))
-        if self._has_scales:
+        block, begin = self._lit[k].decoded(), k * self.strip_rows * self._size[1]
+        for i, plane in self._clean.items():
+            block[i] = plane[:, begin : begin + block.shape[2]]
+        if (self._scales != 1).any():
             block *= self._scales[:, None, None]
         return block.reshape(self._count, 3, -1, self._size[1]).transpose(0, 2, 3, 1)
+
+    def mixes(self, weights: Doubles) -> npt.NDArray[np.float32]:
+        """Return several sums Σ w_i Φ_i, (k, h, w, 3), in one walk. weights: (k, n, 3)."""
+        mixed = np.stack([self.exact_mix(one).T for one in weights]).astype(np.float32)
+        return mixed.reshape(len(weights), *self._size, 3)
+
+    def exact_mix(self, weights: Doubles) -> Doubles:
+        """Return Σ w_i Φ_i channel by channel, (3, p), summed in float64."""
+        scaled = weights * self._scales[:, None]
+        strips = parallel_map(lambda strip: strip.mix(scaled), self._lit)
+        mixed = np.concatenate(strips, axis=1)
+        for i, plane in self._clean.items():
+            mixed += scaled[i][:, None] * plane
+        return np.asarray(mixed)
 
 
 class LitCollector:

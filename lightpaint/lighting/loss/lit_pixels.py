@@ -7,7 +7,7 @@ import numpy as np
 
 from lightpaint.arrays import Doubles, Floats, Indices
 from lightpaint.basis.basis import Basis
-from lightpaint.basis.planes import Planes
+from lightpaint.basis.planes import Planes, mix_channels
 from lightpaint.lighting.loss.loss import (
     Loss,
     PixelLoss,
@@ -58,21 +58,13 @@ class LitPixels:
 
     def predicted(self, weights: Doubles) -> Doubles:
         """Return Σ w_i Φ_i, (3, p), in float64: a float32's round-off would hide the last steps."""
-        picture = np.empty((3, len(self.pixels)))
-
-        def fill(strip: slice, _: PixelLoss) -> None:
-            mix_channels(self.planes.pixels(strip), weights, picture[:, strip])
-
-        self.pixels.map_strips(fill)
-        return picture
+        return self.planes.exact_mix(weights)
 
     def objective(self, weights: Doubles) -> Doubles:
         """Return the loss of weights, (n, 3), per channel, (3,)."""
-
-        def strip_objective(strip: slice, pixels: PixelLoss) -> Doubles:
-            return pixels.objective(mix_channels(self.planes.pixels(strip), weights))
-
-        return np.asarray(sum(self.pixels.map_strips(strip_objective)))
+        picture = self.predicted(weights)
+        parts = self.pixels.map_strips(lambda strip, pixels: pixels.objective(picture[:, strip]))
+        return np.asarray(sum(parts))
 
     def objective_and_gradient(self, weights: Doubles) -> tuple[float, Doubles]:
         """Return the loss of weights, (n, 3), and half its gradient, (n, 3)."""
@@ -193,14 +185,3 @@ class DeferredSquares(Squares):
         """Forget the arrays, which are made again when somebody asks for them."""
         for name in ("_arrays", "importance", "pixels"):
             self.__dict__.pop(name, None)
-
-
-def mix_channels(lit: Floats, weights: Doubles, into: Doubles | None = None) -> Doubles:
-    """Return Σ w_i Φ_i of pixels (n, p, 3), channel by channel, (3, p) float64.
-
-    weights: (n, 3). into: where to write it.
-    """
-    picture = np.empty((3, lit.shape[1])) if into is None else into
-    for c in range(3):
-        picture[c] = weights[:, c] @ lit[..., c].astype(np.float64)
-    return picture
