@@ -60,6 +60,9 @@ SINGLES_MAX_BYTES = 2**27
 #: Size of all planes in float32, in bytes, above which they stay in their file.
 IN_MEMORY_MAX_BYTES = 2**31
 
+#: Maximum size in bytes of indirect light, images and noise in half floats, that stays in memory.
+INDIRECT_MAX_BYTES = 2**28
+
 #: Maximum size in bytes of a basis file that is read.
 MAX_BYTES = 2**36
 
@@ -147,9 +150,11 @@ def _is_encoded(lights: int, size: tuple[int, int]) -> bool:
 def _encoded(basis: Basis) -> Basis:
     """Return `basis` with planes in the encoding of its file."""
     of_lights = [encoded_planes_of(basis, k) for k in range(len(basis.lights))]
-    images, noise, *indirect = map(EncodedPlanes, zip(*of_lights, strict=True))
-    parts = IndirectLight(*indirect) if indirect else None
-    return replace(basis, planes=images, noise=noise, indirect=parts)
+    images, noise, *indirect = zip(*of_lights, strict=True)
+    parts = None
+    if indirect:
+        parts = IndirectLight(*(EncodedPlanes(x, is_decoded_once=False) for x in indirect))
+    return replace(basis, planes=EncodedPlanes(images), noise=EncodedPlanes(noise), indirect=parts)
 
 
 def is_large(lights: int, size: tuple[int, int]) -> bool:
@@ -232,13 +237,15 @@ def read_basis(path: str | Path) -> Basis:
 
 
 def leave_indirect(basis: Basis, path: Path) -> Basis:
-    """Return `basis` with indirect planes that are read on demand from `path`, if it has many
-    lights.
+    """Return `basis` with indirect planes that are read on demand from `path`, if they take much
+    memory: only denoised pictures need them.
 
-    Only denoised pictures need them, so they take no memory otherwise. path: the file that holds
-    exactly this basis; if it does not, or has another layout, `basis` is returned unchanged.
+    path: the file that holds exactly this basis; if it does not, or has another layout, `basis` is
+    returned unchanged.
     """
-    if basis.indirect is None or not _is_encoded(len(basis.lights), basis.size):
+    count, (height, width) = len(basis.lights), basis.size
+    is_small = 12 * count * height * width <= INDIRECT_MAX_BYTES
+    if basis.indirect is None or is_small or not _is_encoded(count, basis.size):
         return basis
     try:
         file = RowFile(path)
@@ -299,9 +306,10 @@ def _basis_of_parts(parts: Sequence[ExrPart], head: Mapping[str, str]) -> Basis:
             stored = zip(
                 stored_channels(channels, PLANE_CHANNELS[number]), plane_scales, strict=True
             )
-            if len(light_parts) >= MIN_LIGHTS and number < 2:
+            is_direct = number < 2
+            if len(light_parts) >= MIN_LIGHTS and is_direct:
                 return LitPlanes([LitPlane.of(*x) for x in stored], light_parts[0].size)
-            return EncodedPlanes([encoded_plane(*x) for x in stored])
+            return EncodedPlanes([encoded_plane(*x) for x in stored], is_decoded_once=is_direct)
         return as_planes(stack_channels(channels, PLANE_CHANNELS[number]))
 
     channel_readers = [partial(getattr, part, "channels") for part in light_parts]

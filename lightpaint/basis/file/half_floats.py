@@ -86,11 +86,12 @@ class EncodedPlanes(RowPlanes):
     """Planes held in memory in their stored encoding: in half floats where rounding stays
     invisible.
 
-    planes: one for each light.
+    planes: one for each light. is_decoded_once: whether walks share what the first has decoded, if
+    that takes little memory.
     """
 
-    def __init__(self, planes: Sequence[EncodedPlane]) -> None:
-        self._encoded = tuple(planes)
+    def __init__(self, planes: Sequence[EncodedPlane], *, is_decoded_once: bool = True) -> None:
+        self._encoded, self._is_decoded_once = tuple(planes), is_decoded_once
         self._lock = Lock()
         self._decoded: npt.NDArray[np.float32] | None = None
 
@@ -127,7 +128,7 @@ class EncodedPlanes(RowPlanes):
         memory.
         """
         pixels = self.size[0] * self.size[1]
-        if 12 * self.count * pixels > DECODED_MAX_BYTES:
+        if not self._is_decoded_once or 12 * self.count * pixels > DECODED_MAX_BYTES:
             return None
         with self._lock:
             if self._decoded is None:
