@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 from least_squares import solve_free
 
+from lightpaint.lighting.algebra import clipped_newton as clipped_newton_module
 from lightpaint.lighting.algebra.clipped_newton import MAX_STEPS, clipped_newton, solve_ridged
 from lightpaint.lighting.algebra.optimum import MAX_BATCHED_UNKNOWNS, minimise
 from lightpaint.lighting.algebra.quadratic import kkt_residual, scaled
@@ -136,3 +137,18 @@ def test_a_matrix_that_is_singular_to_the_last_bit_is_solved():
     with_sum = np.array([[1, 1, 1], [1, 1, 1], [1, 1, 0.0]])
     x = solve_ridged(with_sum, np.array([1, 1, 0.25]), 2)
     assert x[:2].sum() == pytest.approx(0.25, rel=1e-3)  # ridge
+
+
+def test_large_steps_by_cholesky_are_those_of_numpy(monkeypatch: pytest.MonkeyPatch) -> None:
+    rng = np.random.default_rng(11)
+    A = rng.random((40, 24))
+    definite, right = A.T @ A + np.eye(24), rng.random(24)
+    # Lights that are alike to the last bit, and caps, leave no Cholesky factor.
+    singular, indefinite = np.ones((24, 24)), definite - 8 * np.eye(24)
+    monkeypatch.setattr(clipped_newton_module, "MANY_UNKNOWNS", 8)
+    for matrix in (definite, indefinite):
+        expected = np.linalg.solve(matrix, right)
+        np.testing.assert_allclose(solve_ridged(matrix, right, 24), expected, rtol=1e-9)
+        several = solve_ridged(matrix[None], right[None, :, None], 24)
+        np.testing.assert_allclose(several[0, :, 0], expected, rtol=1e-9)
+    assert np.isfinite(solve_ridged(singular, right, 24)).all()
