@@ -863,6 +863,7 @@ def test_planes_of_many_lights_reach_a_page_reduced(
 ) -> None:
     """And so do denoised ones, while the answer is that of all pixels."""
     monkeypatch.setattr(page_planes, "MAX_PAGE_VALUES", 3 * SIZE[0] * SIZE[1] // 4)
+    monkeypatch.setattr(page_planes, "MAX_OPENING_VALUES", 0)
     client = StudioClient(tmp_path, basis)
     try:
         state = client.wait(lambda m: m.kind == "state")
@@ -893,3 +894,24 @@ def test_the_scales_of_planes_are_found_once(
     monkeypatch.setattr(page_planes, "scale_of", lambda plane: found.append(1) or 2.0)
     assert [page_planes.plane_scale(basis, k) for k in (0, 1, 2, 3, 0)] == [2, 2, 2, 1, 2]
     assert len(found) == len(basis.lights)
+
+
+def test_a_page_of_very_many_planes_opens_before_kept_ones_are_looked_for(
+    basis: lp.Basis, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setenv("LIGHTPAINT_CACHE", str(tmp_path / "cache"))
+    monkeypatch.setattr(page_planes, "MAX_OPENING_VALUES", 0)
+    clean = DenoisedPlanes(
+        (2 * basis.images).astype(np.float16), np.ones(len(basis.lights)), basis.current_look
+    )
+    assert cache_denoised_planes(basis, clean)
+    client = StudioClient(tmp_path, basis)
+    try:
+        first = client.wait(lambda m: m.kind == "state").fields["resources"]
+        assert "plane/0" in first
+        assert "clean/0" not in first
+        client.wait(lambda m: m.kind == "renewed" and "clean/2" in m.fields["resources"])
+        for k in range(len(basis.lights)):
+            np.testing.assert_array_equal(client.studio.resource(f"clean/{k}"), clean.halves[k])
+    finally:
+        client.studio.close()

@@ -11,6 +11,10 @@ from lightpaint.report.basis_memo import make_once
 #: Maximum number of values, lights times pixels, that a page has: 400 MB as half floats.
 MAX_PAGE_VALUES = 2**26
 
+#: Number of values beyond which a session opens without smoothed or kept planes: these take a walk
+#: over all planes, and the page can be used meanwhile.
+MAX_OPENING_VALUES = 2**25
+
 
 def page_factor(basis: Basis) -> int:
     """Return the side in pixels of the blocks whose means a page has; 1 for whole planes.
@@ -21,6 +25,14 @@ def page_factor(basis: Basis) -> int:
     while count * (height // factor) * (width // factor) > MAX_PAGE_VALUES:
         factor += 1
     return fitting_factor(basis.size, factor)
+
+
+def opens_plain(basis: Basis) -> bool:
+    """Return whether planes come as they are until denoised ones are there.
+
+    basis: as in `page_factor`.
+    """
+    return len(basis.lights) * basis.size[0] * basis.size[1] > MAX_OPENING_VALUES
 
 
 def plane_size(basis: Basis) -> tuple[int, int]:

@@ -32,8 +32,8 @@ from lightpaint.paint.references.reference_table import Reference, ReferenceTabl
 from lightpaint.paint.session import picture_table
 from lightpaint.paint.session.look_library import LookLibrary
 from lightpaint.paint.session.page_planes import (
+    opens_plain,
     page_emitters,
-    page_factor,
     page_plane,
     plane_scale,
     plane_size,
@@ -67,20 +67,20 @@ def offer_view(
     """Offer the pictures of a view; rough planes replace denoised ones until these are made.
 
     basis: of the view, with every light at its place in the scene. clean: of the size that the page
-    has. small: planes of pixel blocks, which improve the rough ones. Reduced planes have little
-    noise, and come as they are until they are denoised.
+    has. small: planes of pixel blocks, which improve the rough ones. Very many come as they are
+    until they are denoised.
     """
 
     def offer(name: str, make: Any) -> None:
         table.offer(name_in_view(name, view.view), make)
 
     rough = RoughPlanes(basis, view.current, small)
-    is_whole = page_factor(basis) == 1
-    is_lit = is_whole and bool(view.current.any())
+    is_plain = opens_plain(basis)
+    is_lit = not is_plain and bool(view.current.any())
     for k in range(len(basis.lights)):
         # A page fetches all of them, once.
         name = name_in_view(f"plane/{k}", view.view)
-        table.offer(name, partial(_plane, basis, k), is_kept=is_whole)
+        table.offer(name, partial(_plane, basis, k), is_kept=not is_plain)
         name = name_in_view(f"clean/{k}", view.view)
         if clean is not None:
             table.put(name, clean.halves[k])

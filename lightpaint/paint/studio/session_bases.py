@@ -22,7 +22,12 @@ from lightpaint.paint.protocol import ProgressReport, Tone
 from lightpaint.paint.publisher import Publisher
 from lightpaint.paint.rig.light_mover import LightMover
 from lightpaint.paint.session.look_library import LookLibrary
-from lightpaint.paint.session.page_planes import page_emitters, page_factor, plane_size
+from lightpaint.paint.session.page_planes import (
+    opens_plain,
+    page_emitters,
+    page_factor,
+    plane_size,
+)
 from lightpaint.paint.session.picture_table import Picture, plane_thumbnail
 from lightpaint.paint.session.session import Session
 from lightpaint.paint.session.session_state import (
@@ -89,7 +94,7 @@ class PlaneDenoiser:
         for k, basis in enumerate(bases):
             factor = page_reduction(basis, len(basis.lights))
             # Those of many lights are looked for while the page can be used already.
-            is_looked_for = self._use_cache and page_factor(basis) == 1
+            is_looked_for = self._use_cache and not opens_plain(basis)
             cached = read_denoised_planes(basis, factor=factor) if is_looked_for else None
             if cached is None:
                 current_looks.append(denoise_current_look(basis))
@@ -140,7 +145,7 @@ class PlaneDenoiser:
         planes = DenoisedPlanes(
             np.empty((n, *plane_size(basis), 3), np.float16), np.ones(n), view.current
         )
-        if factor > 1 and self._use_cache:
+        if opens_plain(basis) and self._use_cache:
             cached = read_denoised_planes(basis, factor=factor)
             if cached is not None and cached.halves.shape == planes.halves.shape:
                 planes, is_cached = cached, True
