@@ -126,12 +126,12 @@ class LiveSolver:
 
     @property
     def _are_many(self) -> bool:
-        """Whether a round moves only some of the lights."""
+        """True if a round moves only some of the lights."""
         return len(self._basis.lights) > MANY_LIGHTS
 
     @property
     def _has_tiles(self) -> bool:
-        """Whether sums over tiles follow the brush; of many lights they would be too large."""
+        """True if sums over tiles follow the brush; of many lights they would be too large."""
         return self.mode == "linear" and not self._are_many
 
     @one_thread()

@@ -41,13 +41,11 @@ Solve = Callable[[NormalEquations, Reduction, Doubles], tuple[Reduction, Doubles
 
 
 class ManyLights:
-    """The order in which many lights are moved. count: n.
-
-    settled: (n, 3), half the gradient of the loss when each light was last moved: nothing is gained
-    by it as long as its gradient stays the same, at a bound or not.
-    """
+    """The order in which many lights are moved. count: n."""
 
     def __init__(self, count: int) -> None:
+        # Half the gradient of the loss when each light was last moved: nothing is gained by a light
+        # as long as its gradient stays the same, at a bound or not.
         self._settled = np.zeros((count, 3))
         self._has_moved = np.zeros(count, bool)
 

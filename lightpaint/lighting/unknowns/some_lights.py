@@ -15,7 +15,7 @@ from lightpaint.lighting.unknowns.reduction import Reduction
 
 @dataclass(frozen=True)
 class SomeLights:
-    """Some knobs of a reduction, and the lights that they move.
+    """A choice of knobs of a reduction, and the lights that they move.
 
     whole: the reduction of all lights. places: those of the knobs, in ascending order.
     """
