@@ -5,6 +5,7 @@
     python benchmarks/painter.py --start scenes/gallery/scene.xml [--times N]
     python benchmarks/painter.py --layers 20 [--cases 12x960x540] [--strokes N]
     python benchmarks/painter.py --answers
+    python benchmarks/painter.py --many 64 256 1000
     python benchmarks/painter.py --moves scenes/gallery/scene.xml
 
 A basis of soft lights that is made up, the painter's own server, and headless Chromium that
@@ -21,6 +22,9 @@ pointer until its picture is drawn: its plane along frozen paths, the lights sol
 
 With --layers, the same for the brush on the topmost of N layers, in turns with that on one, and
 what layers cost at the start of a session; with --session, its part of a stroke alone.
+
+With --many, Python's part of a stroke with so many lights at 320x180, in seconds of the clock and
+of the processor.
 
 With --answers, how long a small answer over a connection that is kept takes, beside what it takes
 where the system may wait for more before it sends (Nagle).
@@ -114,6 +118,7 @@ def main() -> None:
     parser.add_argument("--layers", type=int, metavar="N")
     parser.add_argument("--session", action="store_true", help="with --layers: without pages")
     parser.add_argument("--answers", action="store_true")
+    parser.add_argument("--many", nargs="+", type=int, metavar="N")
     parser.add_argument("--moves", metavar="SCENE")
     options = parser.parse_args()
     if options.answers:
@@ -121,6 +126,9 @@ def main() -> None:
         return
     if options.moves:
         print_moves(options.moves)
+        return
+    if options.many:
+        print_many(options.many)
         return
     if options.start:
         print_starts(options.start, options.times)
@@ -233,6 +241,30 @@ def stroke_ms(
         weights = live.answer(weights, while_painting=True)
         times.append(1e3 * (time.perf_counter() - begin))
     return float(np.median(times))
+
+
+def print_many(counts: Sequence[int]) -> None:
+    """Print Python's part of a stroke of 32 x 32 pixels for each number of lights."""
+    print("Python's part of a stroke at 320x180, the median of twenty answers")
+    print(f"{'lights':>6s} {'ms':>8s} {'ms of the processor':>20s}")
+    for n in counts:
+        basis = made_up(n, 180, 320)
+        image, importance = basis.current_look.copy(), np.zeros(basis.size, np.float32)
+        view = LiveView(basis, image, importance)
+        fit = resolve_fit(Settings(), over_look=True, through_view=True)
+        live = LiveSolver([view], fit=fit, constraints=lp.Constraints(), is_sketch=True)
+        live.prepare()
+        weights, times = live.answer(basis.current_weights), []
+        for k in range(24):
+            region = slice(40 + 2 * k, 72 + 2 * k), slice(80 + 4 * k, 112 + 4 * k)
+            image[region] *= BRIGHTER
+            importance[region] = 1
+            begin = time.perf_counter(), time.process_time()
+            view.update(region)
+            weights = live.answer(weights, while_painting=True)
+            times.append((time.perf_counter() - begin[0], time.process_time() - begin[1]))
+        clock, processor = 1e3 * np.median(times[4:], axis=0)
+        print(f"{n:6d} {clock:8.0f} {processor:20.0f}", flush=True)
 
 
 def serve(case: str, constraints: str, space: str, path: str = "") -> None:

@@ -44,7 +44,7 @@ def fake_state(resources: dict[str, int], **fields: Any) -> SessionState:
         "objects": (),
         "lights": (),
         "images": (),
-        "views": (ViewInfo("", (2, 3), (), ()),),
+        "views": (ViewInfo("", (2, 3), (), (), (2, 3)),),
         "transforms": ("srgb",),
         "transform": TransformInfo("srgb", 0.0),
         "lut": TableInfo(2, 0.0, 1.0),

@@ -27,7 +27,7 @@ from lightpaint.paint import protocol, subject
 from lightpaint.paint.background_threads import SOLVE_DELAY_S
 from lightpaint.paint.protocol import Message
 from lightpaint.paint.publisher import Publisher
-from lightpaint.paint.session import picture_table
+from lightpaint.paint.session import page_planes, picture_table
 from lightpaint.paint.session.session import Session
 from lightpaint.paint.session.snapshot import SessionSnapshot
 from lightpaint.paint.store import database
@@ -855,3 +855,63 @@ def test_a_render_that_comes_after_another_stroke_is_of_an_earlier_answer(
     assert client.wait(lambda m: m.kind == "verified").fields["is_old"] is True
     [verification] = client.studio.state().fields["verifications"]
     assert verification["is_old"] is True
+
+
+@pytest.mark.usefixtures("without_reasons")
+def test_planes_of_many_lights_reach_a_page_reduced(
+    basis: lp.Basis, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """And so do denoised ones, while the answer is that of all pixels."""
+    monkeypatch.setattr(page_planes, "MAX_PAGE_VALUES", 3 * SIZE[0] * SIZE[1] // 4)
+    monkeypatch.setattr(page_planes, "MAX_OPENING_VALUES", 0)
+    client = StudioClient(tmp_path, basis)
+    try:
+        state = client.wait(lambda m: m.kind == "state")
+        [view] = state.fields["views"]
+        assert tuple(view["plane_size"]) == (SIZE[0] // 2, SIZE[1] // 2)
+        assert tuple(view["size"]) == SIZE
+        for k, scale in enumerate(view["scales"]):
+            plane = client.studio.resource(f"plane/{k}").astype(np.float32) * scale
+            blocks = basis.planes.plane(k).reshape(SIZE[0] // 2, 2, SIZE[1] // 2, 2, 3)
+            # Halves have eleven bits.
+            np.testing.assert_allclose(plane, blocks.mean(axis=(1, 3)), rtol=2.0**-11, atol=1e-7)
+        client.wait(lambda m: m.kind == "renewed" and "clean/2" in m.fields["resources"])
+        assert client.studio.resource("clean/2").shape == (SIZE[0] // 2, SIZE[1] // 2, 3)
+        assert client.studio.resource("present").shape == (*SIZE, 3)
+        client.paint(1, 0.8)
+        client.exact()
+        expected = client.studio.session.snapshot().solution().weights
+        np.testing.assert_array_equal(client.studio.session.weights, expected)
+    finally:
+        client.studio.close()
+
+
+def test_the_scales_of_planes_are_found_once(
+    basis: lp.Basis, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Every state has them, of all lights."""
+    found = []
+    monkeypatch.setattr(page_planes, "scale_of", lambda plane: found.append(1) or 2.0)
+    assert [page_planes.plane_scale(basis, k) for k in (0, 1, 2, 3, 0)] == [2, 2, 2, 1, 2]
+    assert len(found) == len(basis.lights)
+
+
+def test_a_page_of_very_many_planes_opens_before_kept_ones_are_looked_for(
+    basis: lp.Basis, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setenv("LIGHTPAINT_CACHE", str(tmp_path / "cache"))
+    monkeypatch.setattr(page_planes, "MAX_OPENING_VALUES", 0)
+    clean = DenoisedPlanes(
+        (2 * basis.images).astype(np.float16), np.ones(len(basis.lights)), basis.current_look
+    )
+    assert cache_denoised_planes(basis, clean)
+    client = StudioClient(tmp_path, basis)
+    try:
+        first = client.wait(lambda m: m.kind == "state").fields["resources"]
+        assert "plane/0" in first
+        assert "clean/0" not in first
+        client.wait(lambda m: m.kind == "renewed" and "clean/2" in m.fields["resources"])
+        for k in range(len(basis.lights)):
+            np.testing.assert_array_equal(client.studio.resource(f"clean/{k}"), clean.halves[k])
+    finally:
+        client.studio.close()

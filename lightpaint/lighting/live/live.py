@@ -7,7 +7,8 @@ of their sums.
 
 In display space every answer changes the weight of every pixel. There the picture is averaged to
 a few thousand pixels, and one round from the last answer follows the brush; the answer of all
-pixels comes when the brush is lifted.
+pixels comes when the brush is lifted. Of more than `MANY_LIGHTS` a round moves some at a time
+(many_lights.py), in linear light, too.
 
 Only painted views count. Each has its own sums, so that a stroke costs no more than with a single
 view.
@@ -27,6 +28,7 @@ from lightpaint.lighting.fit import Fit, Space
 from lightpaint.lighting.linear_problem import reduce_lights
 from lightpaint.lighting.live.live_sums import MAX_FILM_PIXELS, Films, SmallFilm
 from lightpaint.lighting.live.live_view import LiveView
+from lightpaint.lighting.live.many_lights import MANY_LIGHTS, MAX_FILM_VALUES, ManyLights
 from lightpaint.lighting.loss.expected_lights import ExpectedLights, Wash
 from lightpaint.lighting.loss.painting import unpainted_weight
 from lightpaint.lighting.loss.pixel_bins import block_side
@@ -87,6 +89,7 @@ class LiveSolver:
         self._within, self._gamuts_of = reduction, tuple[LiveView, ...]()
         self._answers_left = 0
         self._is_kept_to = False  # whether the last answer kept to the constraints
+        self._many = ManyLights(len(self._basis.lights))
         self._films = None if self._start != constraints.start else self._films
         self._start = constraints.start
         for view in self._views:
@@ -100,6 +103,7 @@ class LiveSolver:
         """
         self._basis = self._views[0].basis
         self._untouched, self._gamuts_of, self._answers_left = None, (), 0
+        self._many = ManyLights(len(self._basis.lights))
         if self._start:  # whose look has these planes, too
             self._films = None
         if self._films is not None:
@@ -109,16 +113,26 @@ class LiveSolver:
     def prepare(self) -> None:
         """Compute now all sums that the first answer needs."""
         for view in self._views:
-            if self.mode == "linear":
+            if self._has_tiles:
                 view.tiles()
             reads_wash = self._fit.reads_wishes(is_sketch=self._is_sketch)
-            if self.mode != "linear" or reads_wash or self._fit.colors == "white":
+            if not self._has_tiles or reads_wash or self._fit.colors == "white":
                 self._film(view)
 
     @property
     def mode(self) -> Space:
         """The space of the answers."""
         return self._fit.space or "linear"
+
+    @property
+    def _are_many(self) -> bool:
+        """True if a round moves only some of the lights."""
+        return len(self._basis.lights) > MANY_LIGHTS
+
+    @property
+    def _has_tiles(self) -> bool:
+        """True if sums over tiles follow the brush; of many lights they would be too large."""
+        return self.mode == "linear" and not self._are_many
 
     @one_thread()
     def answer(
@@ -149,15 +163,19 @@ class LiveSolver:
         def best(equations: NormalEquations, begin: Doubles) -> Doubles:
             return self._best(equations if pull is None else equations + pull, begin)
 
-        def allowed(weights: Doubles) -> Doubles:
-            return clip_to_gamuts(reduction, snap_to_whites(reduction, weights))
+        allowed = partial(_allowed, reduction)
 
-        if self.mode == "linear" and not while_moving:
+        if self._has_tiles and not while_moving:
             return best(reduce(add, (x.tiles().equations(unpainted) for x in views)), start)
         films = self._joint_films(views)
         pixels = films.pixels(unpainted, self._fit.transform)
         # After a change of the painting the last answer may be worse than the current lighting.
         starts = allowed(start), self._unpainted_answer()
+        if self._are_many:
+            self._within, weights = self._many.improve(
+                films.rows, pixels, starts, reduction, self._solve, pull, _allowed
+            )
+            return weights
         return films.improve(pixels, starts, best, pull, allowed)
 
     def _unpainted_answer(self) -> Doubles:
@@ -224,10 +242,13 @@ class LiveSolver:
 
     def _best(self, equations: NormalEquations, start: Doubles) -> Doubles:
         """Return the best weights (n, 3) under the constraints, from those to begin with."""
-        self._within, weights = solve_under_brush(
-            equations, self._within, start, method=self._fit.method
-        )
+        self._within, weights = self._solve(equations, self._within, start)
         return weights
+
+    def _solve(
+        self, equations: NormalEquations, reduction: Reduction, start: Doubles
+    ) -> tuple[Reduction, Doubles]:
+        return solve_under_brush(equations, reduction, start, method=self._fit.method)
 
     def _weight_pull(self, views: tuple[LiveView, ...], unpainted: float) -> NormalEquations | None:
         """Return the pull on the weights, as `Problem.pull`."""
@@ -257,11 +278,19 @@ class LiveSolver:
 
     def _film(self, view: LiveView) -> SmallFilm:
         """Return the film of a view; all films together have the pixels of one, or fewer with less
-        noise.
+        noise or for many lights.
         """
+        if view.has_film:  # the noise of a picture takes a walk over all planes
+            return view.film(self._fit.transform)
         side = block_side([view_of_all.basis for view_of_all in self._views], self._fit.transform)
-        most = min(MAX_FILM_PIXELS // len(self._views), view.pixels // side**2)
+        most = min(MAX_FILM_PIXELS, MAX_FILM_VALUES // len(self._basis.lights))
+        most = min(most // len(self._views), view.pixels // side**2)
         return view.film(self._fit.transform, max(1, most))
+
+
+def _allowed(reduction: Reduction, weights: Doubles) -> Doubles:
+    """Return weights (n, 3) between allowed ones, with the colours that lights may have."""
+    return clip_to_gamuts(reduction, snap_to_whites(reduction, weights))
 
 
 def _power(views: Sequence[LiveView]) -> Doubles:

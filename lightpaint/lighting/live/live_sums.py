@@ -239,6 +239,11 @@ class Films:
         self._rows = rows[0] if len(rows) == 1 else np.concatenate(rows, axis=2)
 
     @property
+    def rows(self) -> Floats:
+        """The light of each pixel of all films, (3, n, p)."""
+        return self._rows
+
+    @property
     def albedo(self) -> Floats:
         """The albedo of all blocks, (3, p)."""
         return np.concatenate([film.albedo for film in self._films], axis=1)

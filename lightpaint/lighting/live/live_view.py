@@ -100,6 +100,11 @@ class LiveView:
             self._light = PaintedTiles(self.basis, self._image, self._counted)
         return self._light
 
+    @property
+    def has_film(self) -> bool:
+        """True once `film` has averaged the picture."""
+        return self._display is not None
+
     def film(self, transform: ViewTransform | None, max_pixels: int = MAX_FILM_PIXELS) -> SmallFilm:
         """Return the picture in display space, of `max_pixels` at most."""
         if self._display is None:

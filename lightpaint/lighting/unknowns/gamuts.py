@@ -158,6 +158,9 @@ class Gamuts:
         self._gamuts: dict[int, ColorHull] = {}
         self._former_gamuts: dict[int, ColorHull] = {}
 
+    def __len__(self) -> int:
+        return len(self._current)
+
     def __getitem__(self, light: int) -> ColorHull:
         if light not in self._gamuts:
             if self._needed is None:
@@ -199,6 +202,29 @@ class Gamuts:
         is_inside = (room >= -ROUND_OFF * colors.sum(axis=1, keepdims=True)).all(axis=1)
         is_inside |= self._exempt[lights]
         return [k for k in lights[~is_inside].tolist() if not self[k].has(weights[k])]
+
+
+class GamutsOfSome(Gamuts):
+    """The gamuts of some lights, numbered among themselves. lights: (m,), their numbers."""
+
+    def __init__(self, gamuts: Gamuts, lights: Indices) -> None:
+        self._whole, self._lights = gamuts, lights
+
+    def __getitem__(self, light: int) -> ColorHull:
+        return self._whole[int(self._lights[light])]
+
+    def refresh(self) -> None:
+        """Discard the gamuts of all lights."""
+        self._whole.refresh()
+
+    def lights_outside(self, weights: Doubles, lights: Indices) -> list[int]:
+        """Return those of some lights, (k,), whose colours in weights (m, 3) are outside their
+        gamuts.
+        """
+        in_whole = np.zeros((len(self._whole), 3))
+        in_whole[self._lights] = weights
+        outside = self._whole.lights_outside(in_whole, self._lights[lights])
+        return [int(k) for k in np.searchsorted(self._lights, outside)]
 
 
 @dataclass(frozen=True)

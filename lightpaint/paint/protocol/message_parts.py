@@ -118,13 +118,15 @@ class ViewInfo:
     """A view that is painted.
 
     size: height and width in pixels. objects: names, in the order of the picture `objects`. scales:
-    factor of the stored plane of each light.
+    factor of the stored plane of each light. plane_size: height and width of these planes, whose
+    pixels are means over blocks of the view's if they are fewer, as of many lights.
     """
 
     name: str
     size: tuple[int, int]
     objects: tuple[str, ...]
     scales: tuple[float, ...]
+    plane_size: tuple[int, int]
 
 
 #: Records of layers, which messages have as they are.

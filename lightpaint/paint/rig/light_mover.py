@@ -32,9 +32,14 @@ from lightpaint.paint.rig.added_lights import free_name, values_of, with_level
 from lightpaint.paint.rig.lamp_rig import LampRig
 from lightpaint.paint.rig.pointing import emitter_at_place, pose_change
 from lightpaint.paint.session.moved_lights import Placed, added_names
+from lightpaint.paint.session.page_planes import (
+    page_emitters,
+    page_factor,
+    page_plane,
+    plane_scale,
+)
 from lightpaint.paint.session.picture_table import Picture, plane_thumbnail
 from lightpaint.paint.session.session import Session
-from lightpaint.paint.session.session_state import plane_scale
 from lightpaint.paint.session_access import SessionAccess
 from lightpaint.paint.store.history_steps import name_in_view
 
@@ -221,7 +226,7 @@ class LightMover:
                 k = view.basis.names.index(name)
                 scale = plane_scale(unmoved, k)
                 is_moved = name in session.requests.placed
-                plane = view.basis.planes.plane(k)
+                plane = page_plane(view.basis.planes.plane(k), unmoved)
                 make: Callable[[], Picture] = partial(as_halves, plane, scale)
                 clean_planes = clean[view.view] if clean is not None else None
                 if not is_moved and clean_planes is not None:
@@ -232,7 +237,7 @@ class LightMover:
                 }
                 if not is_dragged:
                     shown = plane if is_moved or clean_planes is None else clean_planes.plane(k)
-                    makers[f"thumb/{k}"] = partial(plane_thumbnail, shown, view.basis.emitters_seen)
+                    makers[f"thumb/{k}"] = partial(plane_thumbnail, shown, page_emitters(unmoved))
                 for plain, maker in makers.items():
                     full = name_in_view(plain, view.view)
                     pictures.offer(full, maker)
@@ -250,8 +255,9 @@ class LightMover:
                 picture = pictures[names[0]]
                 pictures.keep(names[1], picture)
             else:  # the whole picture is made only if it is fetched
-                plane = basis.planes.plane(k)[::step, ::step]
-                picture = as_halves(plane, plane_scale(session.bases[number], k))
+                unmoved = session.bases[number]
+                plane = page_plane(basis.planes.plane(k), unmoved)[::step, ::step]
+                picture = as_halves(plane, plane_scale(unmoved, k))
             resources = {name: pictures.generations[name] for name in names}
             messages.append(
                 DraggedPlane(light=k, view=number, step=step, resources=resources, data=picture)
@@ -268,18 +274,19 @@ class LightMover:
                 return
             k = basis.names.index(name)
             scale = plane_scale(unmoved, k)
-            halves, own = denoise_to_halves(basis, k)
+            halves, own = denoise_to_halves(basis, k, page_factor(unmoved))
             picture = as_halves(halves.astype("float32") * own, scale)
-            self._publisher.publish_made(partial(self._put_denoised, view, basis, k, picture))
+            thumbnail = plane_thumbnail(picture.astype("float32"), page_emitters(unmoved))
+            put = partial(self._put_denoised, view, basis, k, picture, thumbnail)
+            self._publisher.publish_made(put)
 
     def _put_denoised(
-        self, view: Canvas, basis: Basis, k: int, picture: Picture
+        self, view: Canvas, basis: Basis, k: int, picture: Picture, thumbnail: Picture
     ) -> PictureUpdate | None:
         """Put the denoised picture of a plane of `basis`, unless the view has other planes now."""
         if view.basis.planes is not basis.planes:
             return None
         table, resources = self._publisher.pictures, {}
-        thumbnail = plane_thumbnail(picture.astype("float32"), basis.emitters_seen)
         for name, new_picture in ((f"clean/{k}", picture), (f"thumb/{k}", thumbnail)):
             full = name_in_view(name, view.view)
             table.put(full, new_picture)

@@ -14,6 +14,7 @@ from lightpaint.paint.protocol import CompareLooks, Message, Notice, PictureUpda
 from lightpaint.paint.publisher import Publisher
 from lightpaint.paint.rig.light_mover import LightMover
 from lightpaint.paint.session.look_library import LookLighting
+from lightpaint.paint.session.page_planes import page_plane
 from lightpaint.paint.session.picture_table import Picture
 from lightpaint.paint.session_access import SessionAccess
 from lightpaint.paint.store.history_steps import name_in_view
@@ -96,7 +97,7 @@ class LookComparison:
         for view, basis in enumerate(self._mover.rig.bases(unmoved, look.placed)):
             pictures = {
                 name_in_view(f"{prefix}{number}", view): picture
-                for prefix, picture in _pictures(basis, look).items()
+                for prefix, picture in _pictures(basis, look, unmoved[view]).items()
             }
             self._publisher.publish_made(partial(self._put, looks, pictures))
 
@@ -113,9 +114,13 @@ class LookComparison:
         return PictureUpdate(resources={name: table.generations[name] for name in pictures})
 
 
-def _pictures(basis: Basis, look: LookLighting) -> dict[str, Picture]:
-    """Return the picture of a look, raw and denoised. basis: has all its lights in their places."""
+def _pictures(basis: Basis, look: LookLighting, unmoved: Basis) -> dict[str, Picture]:
+    """Return the picture of a look, raw and denoised, as large as planes of `unmoved` in pages.
+
+    basis: has all its lights in their places.
+    """
     dark = np.zeros(3)
     weights = np.array([look.emissions.get(name, dark) for name in basis.names])
     mixed = basis.mix(weights)
-    return {PLAIN: as_halves(mixed), CLEAN: as_halves(denoise_mix(basis, weights, mixed=mixed))}
+    clean = denoise_mix(basis, weights, mixed=mixed)
+    return {name: as_halves(page_plane(x, unmoved)) for name, x in ((PLAIN, mixed), (CLEAN, clean))}

@@ -35,6 +35,7 @@ class PictureTable:
         self._counts: dict[str, int] = {}  # includes withdrawn ones, so that no generation repeats
         self._made: dict[str, Picture] = {}
         self._makers: dict[str, Callable[[], Picture]] = {}
+        self._unkept = set[str]()
         self._families: dict[str, Callable[[str], Picture]] = {}
 
     def offer_family(self, prefix: str, make: Callable[[str], Picture]) -> None:
@@ -44,8 +45,12 @@ class PictureTable:
         """
         self._families[prefix] = make
 
-    def offer(self, name: str, make: Callable[[], Picture]) -> None:
-        """Add a picture that `make` makes, replacing an earlier one of that name."""
+    def offer(self, name: str, make: Callable[[], Picture], *, is_kept: bool = True) -> None:
+        """Add a picture that `make` makes, replacing an earlier one of that name.
+
+        is_kept: whether it is kept once it is made, for whoever fetches it again.
+        """
+        (self._unkept.discard if is_kept else self._unkept.add)(name)
         self.generations[name] = self._counts[name] = self._counts.get(name, 0) + 1
         self._makers[name] = make
         self._made.pop(name, None)
@@ -72,7 +77,7 @@ class PictureTable:
         make = self._makers.get(name)
         if make is None:
             raise PaintError(f"there is no picture {name[:40]!r}")
-        if changes_under_brush(name):
+        if changes_under_brush(name) or name in self._unkept:
             return make()
         if name not in self._made:
             self._made[name] = make()

@@ -8,7 +8,7 @@ import numpy as np
 import numpy.typing as npt
 
 from lightpaint.basis.basis import Basis
-from lightpaint.basis.cache.denoised_planes import DenoisedPlanes, RoughPlanes, as_halves, scale_of
+from lightpaint.basis.cache.denoised_planes import DenoisedPlanes, RoughPlanes, as_halves
 from lightpaint.basis.light_images import LightImage, light_images
 from lightpaint.colour.display.view_transform import ViewTransform
 from lightpaint.errors import PaintError
@@ -31,6 +31,13 @@ from lightpaint.paint.protocol import (
 from lightpaint.paint.references.reference_table import Reference, ReferenceTable
 from lightpaint.paint.session import picture_table
 from lightpaint.paint.session.look_library import LookLibrary
+from lightpaint.paint.session.page_planes import (
+    opens_plain,
+    page_emitters,
+    page_plane,
+    plane_scale,
+    plane_size,
+)
 from lightpaint.paint.session.picture_table import Picture, PictureTable
 from lightpaint.paint.session.session import Session
 from lightpaint.paint.session.session_messages import light_info
@@ -59,17 +66,21 @@ def offer_view(
 ) -> None:
     """Offer the pictures of a view; rough planes replace denoised ones until these are made.
 
-    basis: of the view, with every light at its place in the scene. small: planes of pixel blocks,
-    which improve the rough ones.
+    basis: of the view, with every light at its place in the scene. clean: of the size that the page
+    has. small: planes of pixel blocks, which improve the rough ones. Very many come as they are
+    until they are denoised.
     """
 
     def offer(name: str, make: Any) -> None:
         table.offer(name_in_view(name, view.view), make)
 
     rough = RoughPlanes(basis, view.current, small)
-    is_lit = bool(view.current.any())
+    is_plain = opens_plain(basis)
+    is_lit = not is_plain and bool(view.current.any())
     for k in range(len(basis.lights)):
-        offer(f"plane/{k}", partial(_plane, basis, k))
+        # A page fetches all of them, once.
+        name = name_in_view(f"plane/{k}", view.view)
+        table.offer(name, partial(_plane, basis, k), is_kept=not is_plain)
         name = name_in_view(f"clean/{k}", view.view)
         if clean is not None:
             table.put(name, clean.halves[k])
@@ -178,17 +189,16 @@ def _selection(views: Canvases, view: str) -> Picture:
 
 
 def _plane(basis: Basis, k: int) -> Picture:
-    plane = basis.planes.plane(k)
-    return as_halves(plane, scale_of(plane))
+    return as_halves(page_plane(basis.planes.plane(k), basis), plane_scale(basis, k))
 
 
 def _thumbnail(table: PictureTable, name: str, basis: Basis) -> Picture:
     """Return a thumbnail of the plane of that name, as the page shows it."""
-    return picture_table.plane_thumbnail(table[name].astype(np.float32), basis.emitters_seen)
+    return picture_table.plane_thumbnail(table[name].astype(np.float32), page_emitters(basis))
 
 
 def _rough_plane(planes: RoughPlanes, k: int) -> Picture:
-    return as_halves(planes.plane(k), scale_of(planes.basis.planes.plane(k)))
+    return as_halves(planes.plane(k), plane_scale(planes.basis, k))
 
 
 def _view_info(view: Canvas, basis: Basis) -> ViewInfo:
@@ -203,12 +213,8 @@ def _view_info(view: Canvas, basis: Basis) -> ViewInfo:
         size=(height, width),
         objects=() if objects is None else tuple(objects.names),
         scales=tuple(plane_scale(basis, k) for k in range(len(view.basis.lights))),
+        plane_size=plane_size(basis),
     )
-
-
-def plane_scale(basis: Basis, k: int) -> float:
-    """Return the divisor of light k's plane for sending. basis: as in `_view_info`."""
-    return scale_of(basis.planes.plane(k)) if k < len(basis.lights) else 1.0
 
 
 def state_fields(

@@ -22,6 +22,12 @@ from lightpaint.paint.protocol import ProgressReport, Tone
 from lightpaint.paint.publisher import Publisher
 from lightpaint.paint.rig.light_mover import LightMover
 from lightpaint.paint.session.look_library import LookLibrary
+from lightpaint.paint.session.page_planes import (
+    opens_plain,
+    page_emitters,
+    page_factor,
+    plane_size,
+)
 from lightpaint.paint.session.picture_table import Picture, plane_thumbnail
 from lightpaint.paint.session.session import Session
 from lightpaint.paint.session.session_state import (
@@ -87,7 +93,9 @@ class PlaneDenoiser:
         current_looks = []
         for k, basis in enumerate(bases):
             factor = page_reduction(basis, len(basis.lights))
-            cached = read_denoised_planes(basis, factor=factor) if self._use_cache else None
+            # Those of many lights are looked for while the page can be used already.
+            is_looked_for = self._use_cache and not opens_plain(basis)
+            cached = read_denoised_planes(basis, factor=factor) if is_looked_for else None
             if cached is None:
                 current_looks.append(denoise_current_look(basis))
             else:
@@ -104,13 +112,14 @@ class PlaneDenoiser:
         ]
 
     def clean_planes(self, bases: Sequence[Basis]) -> Sequence[DenoisedPlanes | None]:
-        """Return the denoised planes of these bases; None for each that has none yet.
+        """Return the denoised planes of these bases; None for each that has none yet, or reduced
+        ones.
 
         Bases with moved lights have none.
         """
         if any(basis.former is not None for basis in bases):
             return [None] * len(bases)
-        return self.planes_for(bases)
+        return [x if x is not None and x.is_whole else None for x in self.planes_for(bases)]
 
     def small_planes_for(self, bases: Sequence[Basis]) -> list[DenoisedPlanes | None]:
         """Return each view's denoised planes of blocks of pixels, which a result has left."""
@@ -131,20 +140,25 @@ class PlaneDenoiser:
                 self._denoise_view(session, view, basis)
 
     def _denoise_view(self, session: Session, view: Canvas, basis: Basis) -> None:
-        halves, scales = (
-            np.empty((len(basis.lights), *basis.size, 3), np.float16),
-            np.ones(len(basis.lights)),
+        n, factor, emitters = len(basis.lights), page_factor(basis), page_emitters(basis)
+        is_cached = False
+        planes = DenoisedPlanes(
+            np.empty((n, *plane_size(basis), 3), np.float16), np.ones(n), view.current
         )
-        planes = DenoisedPlanes(halves, scales, view.current)
-        for k in range(len(basis.lights)):
+        if opens_plain(basis) and self._use_cache:
+            cached = read_denoised_planes(basis, factor=factor)
+            if cached is not None and cached.halves.shape == planes.halves.shape:
+                planes, is_cached = cached, True
+        for k in range(n):
             if not self._is_needed() or session.bases[view.view] is not basis:
                 return
-            planes.halves[k], planes.scales[k] = denoise_to_halves(basis, k)
+            if not is_cached:
+                planes.halves[k], planes.scales[k] = denoise_to_halves(basis, k, factor)
             if basis.names[k] not in session.requests.placed:
                 self._publish(name_in_view(f"clean/{k}", view.view), planes.halves[k])
-                thumbnail = plane_thumbnail(planes.plane(k), basis.emitters_seen)
+                thumbnail = plane_thumbnail(planes.plane(k), emitters)
                 self._publish(name_in_view(f"thumb/{k}", view.view), thumbnail)
-        self._by_view[view.view] = _ViewPlanes(basis, planes)
+        self._by_view[view.view] = _ViewPlanes(basis, planes, is_cached)
 
     def write_cache(self) -> None:
         """Cache the planes of the final basis for the next session."""

@@ -9,6 +9,8 @@ import { GlView } from './gl.js';
 import { DEFAULTS } from './view.js';
 
 /** @typedef {import("./view.js").PictureView} PictureView */
+/** planeSize: height and width of planes, by default those of the picture; onRestored: all is to be
+ * set again. @typedef {{planeSize?: [number, number], onRestored?: () => void}} ViewOptions */
 
 /** Frame time in milliseconds below which no comparison is needed. */
 const QUICK_FRAME_MS = 12;
@@ -20,8 +22,7 @@ const SLOW_FRAME_MS = 100;
  * Create a view in an element, on a canvas of its own.
  * @param {HTMLElement} element @param {[height: number, width: number]} size
  * @param {number} count of lights
- * @param {{view?: 'gl' | 'cpu' | null, onRestored?: () => void}} [options] view: which one, whatever is
- * faster; onRestored: all is to be set again
+ * @param {ViewOptions & {view?: 'gl' | 'cpu' | null}} [options] view: which one, whatever is faster
  * @returns {PictureView}
  */
 export function chooseView(element, size, count, options = {}) {
@@ -29,10 +30,11 @@ export function chooseView(element, size, count, options = {}) {
   const isGl =
     gl &&
     (options.view === 'gl' ||
-      frameTime(gl, count) <= Math.max(QUICK_FRAME_MS, cpuTime(size, count)));
+      frameTime(gl, count) <=
+        Math.max(QUICK_FRAME_MS, cpuTime(options.planeSize ?? size, count)));
   if (gl && !isGl) gl.close();
   if (options.view === 'gl' && !gl) throw new Error('no WebGL2 that can show the planes');
-  const view = gl && isGl ? gl : new CpuView(createCanvas(), size);
+  const view = gl && isGl ? gl : new CpuView(createCanvas(), size, options.planeSize);
   view.setCount(count);
   element.append(view.canvas);
   return view;
@@ -45,10 +47,10 @@ function createCanvas() {
 }
 
 /** @param {[number, number]} size @param {number} count
- * @param {{view?: 'gl' | 'cpu' | null, onRestored?: () => void}} options */
-function glView(size, count, { view, onRestored }) {
+ * @param {ViewOptions & {view?: 'gl' | 'cpu' | null}} options */
+function glView(size, count, { view, ...options }) {
   try {
-    const glView = new GlView(createCanvas(), size, { isSlowRefused: view !== 'gl', onRestored });
+    const glView = new GlView(createCanvas(), size, { isSlowRefused: view !== 'gl', ...options });
     glView.setCount(count);
     return glView;
   } catch {

@@ -23,18 +23,20 @@ const BUDGET_VALUES = 3e6;
 
 /** @implements {PictureView} @typedef {import("./view.js").PictureView} PictureView */
 export class CpuView {
-  /** @param {HTMLCanvasElement} canvas @param {[height: number, width: number]} size */
-  constructor(canvas, size) {
+  /** @param {HTMLCanvasElement} canvas @param {[height: number, width: number]} size
+   * @param {[height: number, width: number]} [planeSize] of planes, which are stretched to `size` */
+  constructor(canvas, size, planeSize = size) {
     this.name = /** @type {const} */ ('cpu');
     this.canvas = canvas;
     this.size = size;
+    this.planeSize = planeSize;
     // Pixels come from the CPU, so a canvas on the GPU, real or in software, would be slower.
     const context = canvas.getContext('2d', { alpha: false, willReadFrequently: true });
     if (!context) throw new Error('no canvas to draw on');
     this.context = context;
     /** @type {import("./mix.js").Plane[]} */
     this.planes = [];
-    this.mixes = { solution: new Mix(size), other: new Mix(size) };
+    this.mixes = { solution: new Mix(planeSize), other: new Mix(planeSize) };
     /** @type {Map<string, Layer>} */
     this.layers = new Map();
     /** @type {import("./view_transform.js").Lut} */
@@ -62,9 +64,9 @@ export class CpuView {
 
   /** @param {number} light @param {Uint16Array} halves @param {number} scale */
   setPlane(light, halves, scale) {
-    if (halves.length !== this.size[0] * this.size[1] * 3)
+    if (halves.length !== this.planeSize[0] * this.planeSize[1] * 3)
       throw new Error(
-        `a plane of ${halves.length} numbers on a picture of ${this.size.join(' × ')}`,
+        `a plane of ${halves.length} numbers on a picture of ${this.planeSize.join(' × ')}`,
       );
     this.planes[light] = { halves: replaceNonFinite(halves), scale };
     for (const mix of Object.values(this.mixes)) mix.invalidate();
@@ -116,19 +118,26 @@ export class CpuView {
       context.beginPath();
       context.rect(pane.x, pane.y, pane.width, pane.height);
       context.clip();
-      const isSharp = layer.step === 1;
+      const isSharp = layer.step === 1 && layer.width === this.size[1];
       context.imageSmoothingEnabled = !(isSharp && (pane.scale >= SQUARES || pane.scale === 1));
       context.imageSmoothingQuality = pane.scale < 0.75 && !params.live ? 'medium' : 'low';
-      const scale = pane.scale * layer.step;
-      const [height, width] = [layer.height * scale, layer.width * scale];
+      const [rows, columns] = this.stretch(pane.kind).map((x) => x * pane.scale * layer.step);
+      const [height, width] = [layer.height * rows, layer.width * columns];
       context.drawImage(layer.canvas, pane.left, pane.top, width, height);
       context.restore();
     }
   }
 
+  /** Return the pixels of the picture along the sides of a pixel of one of its kinds.
+   * @param {Kind} kind */
+  stretch(kind) {
+    const isMix = kind === 'solution' || kind === 'other';
+    return isMix ? this.size.map((n, i) => n / this.planeSize[i]) : [1, 1];
+  }
+
   /** Return the step between the rows and columns that are mixed while the brush is down. */
   liveStep() {
-    const work = (this.planes.length * this.size[0] * this.size[1]) / BUDGET_VALUES;
+    const work = (this.planes.length * this.planeSize[0] * this.planeSize[1]) / BUDGET_VALUES;
     const frames = Math.max(work, this.mixMs / FRAME_BUDGET_MS);
     return frames <= 1 ? 1 : frames <= 5 ? 2 : frames <= 9 ? 3 : 4;
   }
@@ -168,7 +177,7 @@ export class CpuView {
     const painting = overlay === 'missed' ? this.codesOfPainting(params) : null;
     const { beyond } = this;
     layer.show(this.lut, params.stops, overlay === 'importance' ? null : overlay, (rgba) => {
-      const grid = this.grid(this.step);
+      const grid = { ...this.grid(this.step), shown: [layer.height, layer.width] };
       if (overlay === 'falsecolor') drawFalseColour(rgba, layer.light, 2 ** params.stops);
       else if (overlay === 'beyond' && beyond)
         drawInk(rgba, (p) => beyond[p] / 255, INKS.beyond, grid);
@@ -194,7 +203,9 @@ export class CpuView {
     const name = `${kind}/${step}`;
     const key = step === 1 ? kind : name;
     let layer = this.layers.get(key);
-    if (!layer) this.layers.set(key, (layer = new Layer(this.size, step)));
+    const isMix = kind === 'solution' || kind === 'other';
+    const size = isMix ? this.planeSize : this.size;
+    if (!layer) this.layers.set(key, (layer = new Layer(size, step)));
     return layer;
   }
 
@@ -206,7 +217,8 @@ export class CpuView {
   /** @param {number} x @param {number} y */
   planesAt(x, y) {
     const values = new Float32Array(3 * this.planes.length);
-    const start = 3 * (y * this.size[1] + x);
+    const [row, column] = [y, x].map((at, i) => Math.floor((at * this.planeSize[i]) / this.size[i]));
+    const start = 3 * (row * this.planeSize[1] + column);
     this.planes.forEach(({ halves, scale }, k) => {
       for (let c = 0; halves && c < 3; c++) values[3 * k + c] = VALUES[halves[start + c]] * scale;
     });

@@ -6,6 +6,7 @@
  */
 import { mixPlanes } from './cpu.js';
 import { Planes } from './gpu.js';
+import { Textures } from './textures.js';
 import { SRGB } from './view_transform.js';
 import { maxImportance } from './overlay.js';
 import { GROUND, SQUARES, panes } from './view.js';
@@ -33,12 +34,13 @@ function isSoftware(gl) {
 export class GlView {
   /** Throws if WebGL2 cannot render to halves.
    * @param {HTMLCanvasElement} canvas @param {[height: number, width: number]} size
-   * @param {{isSlowRefused?: boolean, onRestored?: () => void}} [options] isSlowRefused: whether
-   * a context without a GPU is none */
+   * @param {import("./choose_renderer.js").ViewOptions & {isSlowRefused?: boolean}} [options]
+   * isSlowRefused: whether a context without a GPU is none */
   constructor(canvas, size, options = {}) {
     this.name = /** @type {const} */ ('gl');
     this.canvas = canvas;
     this.size = size;
+    this.planeSize = options.planeSize ?? size;
     const gl = canvas.getContext('webgl2', {
       alpha: false,
       antialias: false,
@@ -59,11 +61,13 @@ export class GlView {
     });
     canvas.addEventListener('webglcontextrestored', () => {
       this.isLost = false;
-      this.planes = new Planes(gl, size);
+      this.planes = new Planes(gl, this.planeSize);
+      this.textures = this.pictureTextures();
       this.forget();
       options.onRestored?.();
     });
-    this.planes = new Planes(gl, size);
+    this.planes = new Planes(gl, this.planeSize);
+    this.textures = this.pictureTextures();
     /** @type {import("./view_transform.js").Lut} */
     this.lut = SRGB;
     /** @type {WebGLTexture | null} */
@@ -88,8 +92,14 @@ export class GlView {
     this.pictures.clear();
   }
 
-  get textures() {
-    return this.planes.textures;
+  /** Whether planes have fewer pixels than the picture. */
+  get isReduced() {
+    return String(this.planeSize) !== String(this.size);
+  }
+
+  /** Return the textures of pictures: those of the planes, if these are as large. */
+  pictureTextures() {
+    return this.isReduced ? new Textures(this.gl, this.size) : this.planes.textures;
   }
 
   /** @param {number} count */
@@ -109,7 +119,8 @@ export class GlView {
 
   /** @param {number} x @param {number} y */
   planesAt(x, y) {
-    return this.planes.probe(x, y);
+    const [row, column] = [y, x].map((at, i) => Math.floor((at * this.planeSize[i]) / this.size[i]));
+    return this.planes.probe(column, row);
   }
 
   /** @param {Region} region @param {Float32Array} image @param {Float32Array} importance */
@@ -177,7 +188,8 @@ export class GlView {
     const picture = this.texture(pane.kind);
     if (!picture) return;
     const { uniform } = this.planes.showProgram.use();
-    const isSharp = pane.scale >= SQUARES || pane.scale === 1;
+    const isStretched = this.isReduced && (pane.kind === 'solution' || pane.kind === 'other');
+    const isSharp = !isStretched && (pane.scale >= SQUARES || pane.scale === 1);
     const { blank } = textures;
     const units = [picture, this.pictures.get('painting') ?? blank, this.beyond ?? blank];
     units.forEach((texture, i) => textures.bind(i, gl.TEXTURE_2D, texture));
@@ -239,7 +251,7 @@ export class GlView {
   mixedLight() {
     if (this.hasLostContext()) return null;
     this.planes.mix('solution');
-    const [height, width] = this.size;
+    const [height, width] = this.planeSize;
     const { texture } = this.planes.mixes.solution;
     if (!texture) return null;
     this.planes.bindTarget(texture, width, height);
@@ -253,7 +265,8 @@ export class GlView {
   }
 
   memory() {
-    return this.textures.memory() + 4 * this.canvas.width * this.canvas.height;
+    const ofPlanes = this.isReduced ? this.planes.textures.memory() : 0;
+    return this.textures.memory() + ofPlanes + 4 * this.canvas.width * this.canvas.height;
   }
 
   close() {

@@ -64,13 +64,23 @@ export function blendInk(rgba, index, ink, amount) {
   for (let c = 0; c < 3; c++) rgba[index + c] = grey + (ink[c] - grey) * amount;
 }
 
-/** Pixels of a picture that are shown: every `step`th of every `step`th row.
- * @typedef {{height: number, width: number, step: number}} Grid */
+/** Pixels of a picture that are shown: every `step`th of every `step`th row; or, if these are not the
+ * rows and columns that are `shown`, those at the middle of each of them.
+ * @typedef {{height: number, width: number, step: number, shown?: number[]}} Grid */
 
 /** Visit each pixel shown: its index in RGBA, and its column, row and index in the whole picture.
  * @param {Grid} grid @param {(at: number, x: number, y: number, p: number) => void} visit */
-function visitPixels({ height, width, step }, visit) {
+function visitPixels({ height, width, step, shown: [rows, columns] = [] }, visit) {
   let index = 0;
+  if (rows && (rows !== Math.ceil(height / step) || columns !== Math.ceil(width / step))) {
+    for (let row = 0; row < rows; row++)
+      for (let column = 0; column < columns; column++, index += 4) {
+        const y = Math.floor(((row + 0.5) * height) / rows);
+        const x = Math.floor(((column + 0.5) * width) / columns);
+        visit(index, x, y, y * width + x);
+      }
+    return;
+  }
   for (let y = 0; y < height; y += step)
     for (let x = 0; x < width; x += step, index += 4) visit(index, x, y, y * width + x);
 }

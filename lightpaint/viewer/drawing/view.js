@@ -3,6 +3,7 @@
  *
  * There are two views, gl.js and cpu.js, which agree to one display code; choose_renderer.js chooses one for
  * a page. A view holds one plane per light, denoised or raw, as set last.
+ * Planes of many lights have fewer pixels than the picture, and are stretched over it.
  */
 
 /** Rows and columns of the picture, ends not included.

@@ -14,9 +14,10 @@ export async function array(name) {
 }
 
 /** A view with all there is on the site, its canvas as large as asked. */
-export async function viewOf(which, { count, scales, width, height, lut }) {
+export async function viewOf(which, { count, scales, width, height, lut, planeSize }) {
   const painting = await array("painting");
-  const view = chooseView(document.body, painting.shape.slice(0, 2), count, { view: which });
+  const options = { view: which, planeSize: planeSize ?? undefined };
+  const view = chooseView(document.body, painting.shape.slice(0, 2), count, options);
   [view.canvas.width, view.canvas.height] = [width, height];
   const [rows, columns] = painting.shape;
   view.setCanvas([0, rows, 0, columns], painting.data, (await array("importance")).data);

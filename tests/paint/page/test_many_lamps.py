@@ -355,3 +355,73 @@ def test_a_lasso_selects_the_marks_that_it_encloses(new_painter: Any) -> None:
     page.keyboard.press("Escape")
     assert painter.ui("isLassoing") is False
     assert selection(painter) == ["window left"]
+
+
+def rows_that_exist(painter: Painter) -> list[int]:
+    """Return the places, from 1, of the rows of the list that exist."""
+    painter.still()
+    places: list[int] = painter.page.locator(".light-rows > [role=listitem]").evaluate_all(
+        "(items) => items.map((item) => Number(item.getAttribute('aria-posinset')))"
+    )
+    return places
+
+
+def test_of_a_thousand_lights_groups_come_first_and_rows_in_view_exist(
+    new_painter: Any, axe: str
+) -> None:
+    painter = new_painter("lights=1000&size=32x18", axe=axe)
+    page = painter.page
+    group = page.locator(".group-name", has_text="Row H")
+    assert group.get_attribute("aria-expanded") == "false"
+    assert not [place for place in rows_that_exist(painter) if place > 8]
+    group.click()
+    of_group = page.get_by_role("list", name="Row H")
+    items = of_group.get_by_role("listitem")
+    assert 5 < items.count() < 60
+    assert items.first.get_attribute("aria-setsize") == "936"
+    assert items.last.get_attribute("aria-posinset") == "936"
+    heights = items.evaluate_all("(all) => all.map((x) => x.getBoundingClientRect().height)")
+    whole = of_group.bounding_box()["height"]  # that of all rows, as estimated
+    assert whole == pytest.approx(936 * np.mean(heights), rel=0.05)
+    assert violations(page, ".lights") == []
+    # The wheel brings the rows below, and the search those that it finds.
+    items.first.hover()
+    page.mouse.wheel(0, 20_000)
+    page.wait_for_function(
+        "() => [...document.querySelectorAll('.light-rows > [aria-posinset]')]"
+        ".filter((x) => x.ariaPosInSet > 200 && x.ariaPosInSet < 400).length > 5"
+    )
+    assert len(rows_that_exist(painter)) < 80
+    page.get_by_label("Search lights").fill("row 99?")
+    painter.still()
+    assert page.locator(".light-rows .light").count() == 10
+
+
+def test_the_keyboard_reaches_all_rows_of_a_long_list(new_painter: Any) -> None:
+    painter = new_painter("lights=300&size=32x18")
+    page = painter.page
+    page.locator(".group-name", has_text="Row H").click()
+    page.get_by_role("button", name="row 64", exact=True).focus()
+    seen: list[str] = []
+    for _ in range(120):
+        name = page.evaluate("() => document.activeElement.closest('[data-light]').dataset.light")
+        if name not in seen:
+            seen.append(name)
+        page.keyboard.press("Tab")
+    assert len(seen) > 20
+    assert seen == [f"row {k}" for k in range(64, 64 + len(seen))]
+    # The row with the focus stays, wherever the list is scrolled to.
+    focused = page.evaluate("() => document.activeElement.closest('[data-light]').dataset.light")
+    page.locator(".light-rows > :last-child").last.scroll_into_view_if_needed()
+    painter.still()
+    assert page.locator(f'[data-light="{focused}"]').count() == 1
+    assert page.locator('[data-light="row 140"]').count() == 0
+
+
+def test_a_light_of_a_long_list_is_unfolded_though_its_row_was_not_there(new_painter: Any) -> None:
+    painter = new_painter("lights=300&size=32x18")
+    page = painter.page
+    assert page.locator('[data-light="row 250"]').count() == 0
+    page.evaluate("() => window.painter.store.set({ openLights: [250] })")
+    painter.still()
+    assert page.get_by_role("group", name="Constraints on row 250").count() == 1

@@ -37,11 +37,19 @@ def pictures(site: Any) -> dict[str, np.ndarray]:
 
 
 def draw_panes(
-    page: Any, kind: str, pictures: dict[str, Any], params: Any = None, lut: Any = None
+    page: Any,
+    kind: str,
+    pictures: dict[str, Any],
+    params: Any = None,
+    lut: Any = None,
+    planes: list[int] | None = None,
 ) -> np.ndarray:
-    """Codes of the left and the right picture, pixel by pixel, (2, H, W, 3)."""
+    """Codes of the left and the right picture, pixel by pixel, (2, H, W, 3).
+
+    planes: height and width of the planes, where these are others.
+    """
     parameters = {"count": N, "scales": pictures["scales"].tolist(), "lut": lut}
-    parameters |= {"width": 2 * W + GAP, "height": H}
+    parameters |= {"width": 2 * W + GAP, "height": H, "planeSize": planes}
     drawn = page.evaluate("([which, asked]) => bench.viewOf(which, asked)", [kind, parameters])
     assert drawn == kind
     rgba = page.evaluate("(params) => bench.shown(params)", params or {})
@@ -291,3 +299,32 @@ def test_memory_for_each_pixel_and_light_is_bounded(page: Any, pictures: Any, ki
     rows = 8 * 2**18 if kind == "gl" else 0  # on their way to the GPU
     # Mix and two canvases of codes, or their textures; painting and codes; nothing by the light.
     assert 0 < overhead <= 40 * H * W + rows + 8 * (2 * W + GAP) * H
+
+
+@pytest.mark.parametrize("kind", ["cpu", "gl"])
+def test_planes_of_fewer_pixels_are_stretched_over_the_picture(
+    page: Any, pictures: Any, site: Any, kind: str
+):
+    """Light that changes slowly looks as it does in whole planes, at each place."""
+    rows, columns = 9, 10  # a third of H, a quarter of W
+    y, x = np.mgrid[:H, :W] / W
+    whole = 0.2 + 0.05 * np.stack([x + k * y / N for k in range(N)])[..., None] * [1, 0.9, 0.8]
+    blocks = whole.reshape(N, rows, 3, columns, 4, 3).mean(axis=(2, 4)).astype(np.float16)
+    scaled = blocks.astype(np.float64) * pictures["scales"][:, None, None, None]
+    site.arrays |= {f"plane/{k}": plane for k, plane in enumerate(blocks)}
+    light = np.einsum("khwc,kc->hwc", whole, pictures["scales"][:, None] * pictures["weights"])
+    stops = float(np.log2(0.5 / light.mean()))
+
+    def drawn(**params: Any) -> np.ndarray:
+        return draw_panes(page, kind, pictures, {"stops": stops, **params}, planes=[rows, columns])
+
+    left, right = drawn()
+    assert np.abs(left - codes(pictures["painting"], stops=stops)).max() <= 1
+    assert np.abs(right - codes(light, stops=stops)).max() <= CODES + 1  # and half a block of slope
+    probed = page.evaluate("() => [...window.view.planesAt(39, 26)]")
+    np.testing.assert_allclose(np.reshape(probed, (N, 3)), scaled[:, -1, -1], rtol=2.0**-11)
+    lit = page.evaluate("() => window.view.lightAt('solution', 4, 3)")
+    expected = np.einsum("kc,kc->c", scaled[:, 1, 1], pictures["weights"])
+    np.testing.assert_allclose(lit, expected, rtol=N * 2.0**-11)
+    for overlay in ("missed", "falsecolor", "beyond"):
+        assert (drawn(overlay=overlay)[1] != right).any()

@@ -16,7 +16,7 @@ export class LightDrafts {
   /** Keep a draft until its answer. The message about all new pictures comes before that: nothing
    * is fetched that is here.
    * @param {import("./messages.js").Events["dragged"]} draft
-   * @param {[height: number, width: number]} size of its view */
+   * @param {[height: number, width: number]} size of the planes */
   add({ light, step, resources, arrays }, size) {
     const slot = `plane ${light}`;
     const name = this.loader.notePicture(slot, resources);

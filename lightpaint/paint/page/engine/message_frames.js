@@ -57,7 +57,7 @@ export function nameInView(name, view) {
   return view ? `${name}@${view}` : name;
 }
 
-/** Return the state of one view: its size, its objects and the scales of its planes.
+/** Return the state of one view: its size, its objects, and size and scales of its planes.
  * @param {Message} state @param {number} view @returns {Message} */
 export function stateOfView(state, view) {
   const viewState = state.views?.[view];
@@ -66,7 +66,8 @@ export function stateOfView(state, view) {
     ...light,
     scale: viewState.scales[k],
   }));
-  return { ...state, lights, size: viewState.size, objects: viewState.objects };
+  const { size, objects, plane_size: planeSize } = viewState;
+  return { ...state, lights, size, objects, planeSize };
 }
 
 /** @type {Record<string, {new (buffer: ArrayBuffer, at: number, length: number): Data,

@@ -149,13 +149,15 @@ export interface Camera {
  * A view that is painted.
  *
  * size: height and width in pixels. objects: names, in the order of the picture `objects`. scales:
- * factor of the stored plane of each light.
+ * factor of the stored plane of each light. plane_size: height and width of these planes, whose
+ * pixels are means over blocks of the view's if they are fewer, as of many lights.
  */
 export interface ViewInfo {
   name: string;
   size: [number, number];
   objects: string[];
   scales: number[];
+  plane_size: [number, number];
 }
 
 /**

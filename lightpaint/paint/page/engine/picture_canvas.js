@@ -27,6 +27,8 @@ export class Screen {
     this.view = null;
     /** @type {[number, number]} */
     this.size = [1, 1];
+    /** Height and width of the planes. @type {[number, number]} */
+    this.planeSize = [1, 1];
     this.count = 0;
     /** @type {Params} */
     this.params = { ...DEFAULTS };
@@ -53,15 +55,16 @@ export class Screen {
 
   /** Start a view for pictures of a size and a number of lights.
    * @param {[height: number, width: number]} size @param {number} count
-   * @param {'gl' | 'cpu' | null} [viewName] */
-  begin(size, count, viewName = this.options.view ?? null) {
+   * @param {'gl' | 'cpu' | null} [viewName] @param {[number, number]} [planeSize] */
+  begin(size, count, viewName = this.options.view ?? null, planeSize = size) {
     clearTimeout(this.recoveryTimer);
     this.view?.close();
     this.view?.canvas.remove();
     this.size = size;
+    this.planeSize = planeSize;
     this.count = count;
     const onRestored = () => this.handleRestore(view);
-    const view = chooseView(this.element, size, count, { view: viewName, onRestored });
+    const view = chooseView(this.element, size, count, { view: viewName, planeSize, onRestored });
     view.canvas.addEventListener('webglcontextlost', () => this.handleLoss(view));
     this.view = view;
     this.fit();
@@ -80,7 +83,7 @@ export class Screen {
     if (view !== this.view) return;
     clearTimeout(this.recoveryTimer);
     this.recoveryTimer = setTimeout(() => {
-      this.begin(this.size, this.count, 'cpu');
+      this.begin(this.size, this.count, 'cpu', this.planeSize);
       this.options.refill();
     }, this.recoveryMs);
   }

@@ -70,7 +70,7 @@ export class SessionMirror extends PictureState {
     });
     host.on('dragged', (draft) => {
       const isShown = draft.view === this.view && this.loader.wantedNames.has(`plane ${draft.light}`);
-      if (isShown) this.drafts.add(draft, this.screen.size);
+      if (isShown) this.drafts.add(draft, this.screen.planeSize);
       else this.loader.addResources(draft.resources);
     });
     host.on('verified', ({ view = 0 }) => this.loader.renew(nameInView('verified', view)));
@@ -116,7 +116,8 @@ export class SessionMirror extends PictureState {
       return;
     }
     const [height, width] = /** @type {[number, number]} */ (state.size);
-    this.screen.begin([height, width], this.planeCount, this.screen.view?.name);
+    const planeSize = /** @type {[number, number]} */ (state.planeSize ?? state.size);
+    this.screen.begin([height, width], this.planeCount, this.screen.view?.name, planeSize);
     this.canvas = new PaintCanvas([height, width], new Uint16Array(3 * height * width));
     if (hasOtherSizes || !this.strokes) {
       const requestState = () => {

@@ -10,11 +10,13 @@ import {
   groupKey,
   groupLights,
   isGroupOpen,
+  isLongList,
   searchLights,
   sortLights,
 } from './lamps/listed_lights.js';
 import { MasterDimmer } from './lamps/master_dimmer.js';
 import { StartLamps } from './lamps/start_lamps.js';
+import { VirtualRows } from './lamps/virtual_rows.js';
 import { GroupDimmer, SelectionPanel, levelsText } from './lamps/selection_panel.js';
 import { constraintsOf, lockedLights, findTie } from './tied_lights.js';
 import { lightCountText, percentText } from './format.js';
@@ -64,11 +66,11 @@ export function LightList({ ui, app }) {
     }
     <${SelectionPanel} ui=${ui} app=${app} />
     ${ui.ready && !indices.length && html`<p class="faint">${t('No light has this name.')}</p>`}
-    ${groups.map(({ name, members, image }) =>
+    ${joinRows(groups).map(({ name, members, image }) =>
       image
         ? html`<${ImageRow} key=${`image ${image.name}`} image=${image} ui=${ui} app=${app} />`
         : name === null
-        ? members.map((k) => renderRow(ui, app, k, isMany))
+        ? renderRows(ui, app, members, isMany)
         : html`<${Group} key=${`group ${name}`} name=${name} ui=${ui} app=${app}
           members=${members} isMany=${isMany} />`,
     )}
@@ -114,6 +116,32 @@ export function LightListActions({ ui, app }) {
     act=${() => app.store.set({ solo: [], mute: [] })} />`;
 }
 
+/** Return groups with rows that follow each other, and belong to none, as one.
+ * @param {import("./lamps/listed_lights.js").ListedGroup[]} groups */
+function joinRows(groups) {
+  /** @type {typeof groups} */
+  const joined = [];
+  for (const group of groups) {
+    const last = joined[joined.length - 1];
+    const isRow = group.name === null && !group.image;
+    if (isRow && last && last.name === null && !last.image)
+      joined[joined.length - 1] = { ...last, members: [...last.members, ...group.members] };
+    else joined.push(group);
+  }
+  return joined;
+}
+
+/** Render rows; of a long list those in view.
+ * @param {Ui} ui @param {App} app @param {number[]} rows @param {boolean} isMany
+ * @param {string} [label] of the group */
+function renderRows(ui, app, rows, isMany, label = t('Lights')) {
+  const render = (/** @type {number} */ k) => renderRow(ui, app, k, isMany);
+  if (!isLongList(ui)) return rows.map(render);
+  return html`<${VirtualRows} rows=${rows} render=${render} label=${label}
+    nameOf=${(/** @type {number} */ k) => ui.lights[k].name}
+    isOpen=${(/** @type {number} */ k) => ui.openLights.includes(k)} />`;
+}
+
 /** @param {Ui} ui @param {App} app @param {number} k @param {boolean} isMany */
 function renderRow(ui, app, k, isMany) {
   const light = ui.lights[k];
@@ -129,7 +157,7 @@ function renderRow(ui, app, k, isMany) {
 /** @param {{name: string, ui: Ui, app: App, members: number[], isMany: boolean}} props */
 function Group({ name, ui, app, members, isMany }) {
   const { store } = app;
-  const open = isGroupOpen(ui, name);
+  const open = isGroupOpen(ui, name, members);
   const areSelected = members.every((k) => ui.selectedLights.includes(k));
   const share = members.reduce((sum, k) => sum + (ui.lightAnswers[k]?.share ?? 0), 0);
   const isSolo = members.every((k) => ui.solo.includes(k));
@@ -149,6 +177,6 @@ function Group({ name, ui, app, members, isMany }) {
       <${GroupDimmer} app=${app} lights=${members} label=${t('{name}, dim', { name })} isPlain />
       <span class="stops">${levelsText(ui, members)}</span>
     </div>
-    ${open && members.map((k) => renderRow(ui, app, k, isMany))}
+    ${open && renderRows(ui, app, members, isMany, name)}
   </div>`;
 }

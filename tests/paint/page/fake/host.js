@@ -114,7 +114,7 @@ export class FakeHost {
         scale: 1,
         is_fixed: false,
         is_scalar: false,
-        group: room.n > 12 && k >= 8 ? `Row ${'ABCDEFG'[Math.floor((k - 8) / 8)]}` : null,
+        group: room.n > 12 && k >= 8 ? `Row ${'ABCDEFG'[Math.floor((k - 8) / 8)] ?? 'H'}` : null,
       })),
       images: [],
       objects: room.objects,

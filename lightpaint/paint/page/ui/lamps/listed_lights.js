@@ -14,6 +14,9 @@ import { t } from '../../language/language.js';
  * slider. */
 export const MAX_ROWS_WITH_SLIDERS = 16;
 
+/** Number of rows above which groups are folded at first, and only rows in view exist. */
+export const MAX_EXISTING_ROWS = 96;
+
 /** Return the lights that the search finds: by words in their names, or by patterns as in a lights
  * file (`spot_*`). A comma separates alternatives. @param {Ui} ui @returns {number[]} */
 export function searchLights({ search, lights }) {
@@ -58,12 +61,20 @@ function patternOf(pattern) {
 /** Return the lights in the order of the list, without those in folded groups. @param {Ui} ui */
 export function listedLights(ui) {
   return groupLights(ui, sortLights(ui, searchLights(ui))).flatMap(({ name, members }) =>
-    name === null || isGroupOpen(ui, name) ? members : [],
+    name === null || isGroupOpen(ui, name, members) ? members : [],
   );
 }
 
-/** @param {Ui} ui @param {string} name */
-export const isGroupOpen = (ui, name) => ui.open[groupKey(name)] ?? true;
+/** Return whether a group is unfolded. In a long list groups come first, and each is folded until
+ * somebody unfolds it or one of its lights, or searches.
+ * @param {Ui} ui @param {string} name @param {number[]} members */
+export function isGroupOpen(ui, name, members) {
+  const isWanted = () => ui.search.trim() !== '' || members.some((k) => ui.openLights.includes(k));
+  return ui.open[groupKey(name)] ?? (!isLongList(ui) || isWanted());
+}
+
+/** Return whether a list has too many rows for all of them to exist. @param {Ui} ui */
+export const isLongList = (ui) => countRows(ui) > MAX_EXISTING_ROWS;
 
 /** Key of a group among what is unfolded. @param {string} name */
 export const groupKey = (name) => `group ${name}`;

@@ -1,0 +1,172 @@
+"""Rounds of the answer under the brush for many lights, each of which moves some of them.
+
+The sums of n lights take n² products for each pixel, and their solve n³: no frame of a display has
+the time for a thousand. So a round moves the lights whose gradients have changed most since they
+were last moved, and the others keep their weights. Each round lowers the loss or keeps it, and the
+rounds of a stroke come to the answer of all lights: block coordinate descent (Bertsekas 2016,
+Nonlinear Programming, 3.7), with the blocks chosen greedily.
+"""
+
+from collections.abc import Callable, Sequence
+
+import numpy as np
+
+from lightpaint.arrays import Doubles, Floats, Indices
+from lightpaint.lighting.loss.painting_loss import PaintedPixels
+from lightpaint.lighting.loss.reweighting import interpolate
+from lightpaint.lighting.normal_equations import NormalEquations
+from lightpaint.lighting.unknowns.reduction import Reduction
+from lightpaint.lighting.unknowns.some_lights import SomeLights, equations_about
+from lightpaint.threads import one_thread, parallel_map
+
+#: Number of lights beyond which a round moves some of them. The sums of fewer fit into a frame.
+MANY_LIGHTS = 160
+
+#: Number of lights that a round moves.
+MOVED_LIGHTS = 48
+
+#: Values of the films, lights times pixels, beyond which films of many lights have fewer pixels:
+#: each round reads them thrice.
+MAX_FILM_VALUES = 2**22
+
+#: Pixels whose squares are summed for the curvature of each light: one run of several.
+CURVATURE_RUN, CURVATURE_STEP = 16, 8
+
+#: Shares of a step to try. A round is one step from the last answer.
+STEP_SHARES = (1.0, 0.5, 0.25)
+
+#: Solves equations of the lights of a reduction from weights (m, 3); returns the reduction with
+#: which to go on, and the weights.
+Solve = Callable[[NormalEquations, Reduction, Doubles], tuple[Reduction, Doubles]]
+
+
+class ManyLights:
+    """The order in which many lights are moved. count: n."""
+
+    def __init__(self, count: int) -> None:
+        # Half the gradient of the loss when each light was last moved: nothing is gained by a light
+        # as long as its gradient stays the same, at a bound or not.
+        self._settled = np.zeros((count, 3))
+        self._has_moved = np.zeros(count, bool)
+
+    def order(self, weights: Doubles, gradient: Doubles, curvature: Doubles) -> Indices:
+        """Return the lights, those first that promise the largest decrease of the loss.
+
+        All arrays are (n, 3).
+        """
+        change = gradient - self._settled
+        # A light that is off cannot become darker.
+        is_stuck = ~self._has_moved[:, None] & (weights <= 0) & (gradient > 0)
+        gains = np.where(is_stuck, 0, np.square(change) / np.maximum(curvature, 1e-300))
+        return np.argsort(-gains.sum(axis=1), kind="stable")
+
+    def settle(self, lights: Indices, gradient: Doubles) -> None:
+        """Note that some lights have been moved. gradient: theirs since then, (m, 3)."""
+        self._settled[lights], self._has_moved[lights] = gradient, True
+
+    @one_thread()
+    def improve(
+        self,
+        rows: Floats,
+        pixels: PaintedPixels,
+        starts: Sequence[Doubles],
+        reduction: Reduction,
+        solve: Solve,
+        pull: NormalEquations | None,
+        project: Callable[[Reduction, Doubles], Doubles],
+    ) -> tuple[Reduction, Doubles]:
+        """Improve weights (n, 3) by a round of reweighting for some lights, from the best start.
+
+        rows: (3, n, p) float32, the light of each pixel. project: moves weights of the lights of a
+        reduction onto its constraints. The other arguments are those of `Films.improve`. Returns
+        the reduction with which to go on, and the weights, whose loss is that of the best start, or
+        less.
+        """
+        start, picture, value, pull_gradient = _best_start(rows, pixels, starts, pull)
+        image, weight = pixels.squares(picture, from_clipping=False)
+        missed, weights_f32 = (weight * (picture - image)).astype(np.float32), _f32(weight)
+        gradient = _per_channel(lambda c: rows[c] @ missed[c]).T + pull_gradient
+        curvature = _curvature(rows, weights_f32)
+        if pull is not None:
+            curvature += np.einsum("cii->ic", pull.M)
+        order = self.order(start, gradient, curvature)
+        some = SomeLights.of(reduction, order.tolist(), MOVED_LIGHTS)
+        if not some.places:
+            return reduction, start
+        lights, own = some.lights, rows[:, some.lights]
+        M = _per_channel(lambda c: (own[c] * weights_f32[c]) @ own[c].T)
+        squares = NormalEquations(M, np.zeros((3, len(lights))), np.zeros(3))
+        part_of_pull = None if pull is None else some.part_of(pull)
+        if part_of_pull is not None:
+            squares = squares + part_of_pull
+        equations = equations_about(squares, start[lights], gradient[lights])
+        part, best = solve(equations, some.reduction, start[lights])
+        self.settle(lights, equations.gradient(best))
+
+        def loss_at(step: Doubles) -> float:  # beyond the pull on the start
+            change = (step - start)[lights]
+            lit = np.einsum("cip,ic->cp", own, _f32(change))
+            total = float(pixels.objective(picture + lit).sum())
+            if part_of_pull is None:
+                return total
+            about = equations_about(part_of_pull, np.zeros_like(change), pull_gradient[lights])
+            return total + float((change * (about.gradient(change) - about.b.T)).sum())
+
+        nearest = start
+        for share in STEP_SHARES:
+            step = start.copy()
+            step[lights] = interpolate(start[lights], best, share)
+            step[lights] = project(part, step[lights])
+            reached = loss_at(step)
+            if reached > value and nearest is not start:
+                break
+            if reached <= value:
+                nearest, value = step, reached
+        return some.put_back(part), nearest
+
+
+def _best_start(
+    rows: Floats, pixels: PaintedPixels, starts: Sequence[Doubles], pull: NormalEquations | None
+) -> tuple[Doubles, Doubles, float, Doubles]:
+    """Return the start (n, 3) with the least loss, its picture (3, p), the loss of that picture
+    without the pull, and half the gradient of the pull there, (n, 3).
+    """
+    found = []
+    for start in starts:
+        picture = _picture(rows, start)
+        value, gradient, pulled = float(pixels.objective(picture).sum()), np.zeros_like(start), 0.0
+        if pull is not None:
+            gradient = pull.gradient(start)
+            # wᵀMw − 2 bᵀw, of which the gradient Mw − b has the first half.
+            pulled = float((start * (gradient - pull.b.T)).sum())
+        found.append((value + pulled, start, picture, value, gradient))
+    _, start, picture, value, gradient = min(found, key=lambda x: x[0])
+    return start, picture, value, gradient
+
+
+def _picture(rows: Floats, weights: Doubles) -> Doubles:
+    """Return the picture of these weights, (3, p)."""
+    w = _f32(weights)
+    return _per_channel(lambda c: w[:, c] @ rows[c])
+
+
+def _curvature(rows: Floats, weight: Floats) -> Doubles:
+    """Return Σ weight Φ² of each light over some of the pixels, for all of them, (n, 3)."""
+    _, n, p = rows.shape
+    runs = p // CURVATURE_RUN
+    if runs < CURVATURE_STEP:
+        return np.asarray(np.einsum("cnp,cnp,cp->nc", rows, rows, weight), np.float64)
+    size = runs * CURVATURE_RUN
+    some = rows[:, :, :size].reshape(3, n, runs, CURVATURE_RUN)[:, :, ::CURVATURE_STEP]
+    of_some = weight[:, :size].reshape(3, runs, CURVATURE_RUN)[:, ::CURVATURE_STEP]
+    sums = np.einsum("cnrk,cnrk,crk->nc", some, some, of_some)
+    return np.asarray(sums * CURVATURE_STEP, np.float64)
+
+
+def _per_channel(of_channel: Callable[[int], Floats]) -> Doubles:
+    """Return what is computed for each channel, (3, …), in float64."""
+    return np.stack(parallel_map(of_channel, range(3))).astype(np.float64)
+
+
+def _f32(values: Doubles) -> Floats:
+    return np.asarray(values, np.float32)

@@ -1,0 +1,100 @@
+"""The unknowns of some lights, while the others keep their weights."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from functools import cached_property
+
+import numpy as np
+
+from lightpaint.arrays import Doubles, Indices
+from lightpaint.lighting.normal_equations import NormalEquations
+from lightpaint.lighting.unknowns.gamuts import GamutsOfSome
+from lightpaint.lighting.unknowns.knobs import Knob
+from lightpaint.lighting.unknowns.reduction import Reduction
+
+
+@dataclass(frozen=True)
+class SomeLights:
+    """A choice of knobs of a reduction, and the lights that they move.
+
+    whole: the reduction of all lights. places: those of the knobs, in ascending order.
+    """
+
+    whole: Reduction
+    places: tuple[int, ...]
+
+    @classmethod
+    def of(cls, whole: Reduction, order: Sequence[int], count: int) -> "SomeLights":
+        """Return the knobs of the first of some lights, until they move `count` lights.
+
+        order: lights, by number; locked ones, which have no knob, are skipped.
+        """
+        knob_of = {light: k for k, knob in enumerate(whole.knobs) for light in knob.lights}
+        places, moved = dict[int, None](), 0
+        for light in order:
+            k = knob_of.get(int(light))
+            if k is not None and k not in places:
+                places[k] = None
+                moved += len(whole.knobs[k].lights)
+            if moved >= count:
+                break
+        return cls(whole, tuple(sorted(places)))
+
+    @cached_property
+    def lights(self) -> Indices:
+        """(m,), the lights by number, in ascending order."""
+        return np.array(sorted(x for k in self.places for x in self.whole.knobs[k].lights), np.intp)
+
+    @cached_property
+    def reduction(self) -> Reduction:
+        """The reduction of these lights alone, numbered by their places in `lights`."""
+        number = {int(light): k for k, light in enumerate(self.lights)}
+        gamuts = self.whole.gamuts
+        return Reduction(
+            np.zeros((len(self.lights), 3)),
+            tuple(self.whole.labels[light] for light in self.lights),
+            tuple(_renumbered(self.whole.knobs[k], number) for k in self.places),
+            self.whole.is_joined,
+            None if gamuts is None else GamutsOfSome(gamuts, self.lights),
+        )
+
+    def put_back(self, part: Reduction) -> Reduction:
+        """Return the reduction of all lights with the knobs of `part`, one of these lights."""
+        if all(a is b for a, b in zip(part.knobs, self.reduction.knobs, strict=True)):
+            return self.whole
+        number = dict(enumerate(self.lights.tolist()))
+        knobs = [*self.whole.knobs]
+        for k, knob in zip(self.places, part.knobs, strict=True):
+            knobs[k] = _renumbered(knob, number)
+        return replace(self.whole, knobs=tuple(knobs))
+
+    def part_of(self, equations: NormalEquations) -> NormalEquations:
+        """Return the terms of `equations`, of all lights, in the squares of these lights: without
+        those of the other lights, and those of one of each.
+        """
+        lights, coupling = self.lights, equations.coupling
+        return NormalEquations(
+            equations.M[:, lights[:, None], lights],
+            equations.b[:, lights],
+            equations.target_norm2,
+            None if coupling is None else coupling[lights],
+        )
+
+
+def equations_about(
+    squares: NormalEquations, weights: Doubles, gradient: Doubles
+) -> NormalEquations:
+    """Return equations with the same squares whose half gradient (n, 3) at `weights`, (n, 3), is
+    given; their objective is known but for a constant.
+    """
+    b = squares.b + (squares.gradient(weights) - gradient).T
+    return replace(squares, b=b, target_norm2=np.zeros(3))
+
+
+def _renumbered(knob: Knob, number: dict[int, int]) -> Knob:
+    """Return a knob whose lights have other numbers."""
+    unknowns = tuple(
+        replace(x, columns=tuple((number[light], rgb) for light, rgb in x.columns))
+        for x in knob.unknowns
+    )
+    return replace(knob, lights=tuple(number[light] for light in knob.lights), unknowns=unknowns)

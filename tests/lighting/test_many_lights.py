@@ -1,0 +1,113 @@
+"""Rounds that move some of many lights come to the answer that all of them have."""
+
+from typing import Any
+
+import numpy as np
+import pytest
+
+from lightpaint.lighting.constraints.constraints import Constraints
+from lightpaint.lighting.fit import Fit, resolve_for_targets
+from lightpaint.lighting.live import live as live_module
+from lightpaint.lighting.live import many_lights
+from lightpaint.lighting.live.live import LiveSolver
+from lightpaint.lighting.live.live_view import LiveView
+from lightpaint.lighting.problem import Problem
+from lightpaint.lighting.solve import solution_of
+from lightpaint.lighting.unknowns.reduction import reduce_to
+from lightpaint.lighting.unknowns.some_lights import SomeLights
+from lightpaint.target.target import Target
+
+LIGHTS, SIZE = 24, (30, 40)
+
+
+@pytest.fixture
+def moves_some(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Take eight lights for many, and move five of them in a round."""
+    monkeypatch.setattr(live_module, "MANY_LIGHTS", 8)
+    monkeypatch.setattr(many_lights, "MOVED_LIGHTS", 5)
+
+
+def _basis(make_basis: Any) -> Any:
+    """Return lights that each light a place, and a little of everything."""
+    rng = np.random.default_rng(4)
+    y, x = np.mgrid[: SIZE[0], : SIZE[1]]
+    centers = rng.random((LIGHTS, 2)) * SIZE
+    spread = [np.exp(-((y - b) ** 2 + (x - a) ** 2) / 60) for b, a in centers]
+    planes = (np.array(spread)[..., None] + 0.02) * rng.uniform(0.5, 1, (LIGHTS, 1, 1, 3))
+    return make_basis(images=planes, emission=rng.uniform(0.2, 1, (LIGHTS, 3)))
+
+
+def _painted(make_basis: Any, fit: Fit, **constraints: Any) -> tuple[LiveSolver, Target, Any]:
+    """Return a live solver of a painting that makes some places brighter and others darker."""
+    basis = _basis(make_basis)
+    image, importance = basis.current_look.copy(), np.zeros(SIZE, np.float32)
+    for rows, columns, factor in (((5, 18), (4, 20), 2.0), ((12, 28), (22, 38), 0.3)):
+        region = slice(*rows), slice(*columns)
+        image[region] *= factor
+        importance[region] = 1
+    view = LiveView(basis, image, importance)
+    target = Target("t", image, importance, False, through_view=True, over_look=True)
+    resolved = resolve_for_targets(fit, [target])
+    live = LiveSolver([view], fit=resolved, constraints=Constraints.of(**constraints))
+    problem = Problem.of(basis, target, constraints=Constraints.of(**constraints), fit=resolved)
+    return live, target, problem
+
+
+@pytest.mark.usefixtures("moves_some")
+@pytest.mark.parametrize("colors", ["free", "own"])
+@pytest.mark.parametrize("space", ["display", "linear"])
+@pytest.mark.parametrize(
+    "constraints",
+    [
+        {},
+        {"light": {"light 1": {"lock": True}, "light 2": {"limits": {"max": "40%"}}}},
+        {"tie": [{"lights": ["light 3", "light 4", "light 5"]}]},
+    ],
+)
+def test_rounds_of_some_lights_come_to_the_answer_of_all(
+    make_basis: Any, space: Any, colors: Any, constraints: Any
+) -> None:
+    fit = Fit(space=space, colors=colors, hold=1.0)
+    live, _, problem = _painted(make_basis, fit, **constraints)
+    answer = problem.basis.current_weights
+    losses = []
+    for _ in range(60):
+        answer = live.answer(answer)
+        losses.append(float(problem.objective(answer).sum()))
+    exact = float(problem.objective(solution_of(problem).weights).sum())
+    assert losses[-1] <= 1.002 * exact
+    # The first round takes those that help most, and none makes it worse; its films are in float32.
+    assert losses[0] > 1.01 * exact
+    assert np.all(np.diff(losses) <= 1e-4 * losses[0])
+    if "light" in constraints:
+        np.testing.assert_allclose(answer[1], problem.basis.current_weights[1], rtol=1e-12)
+
+
+@pytest.mark.usefixtures("moves_some")
+def test_a_round_moves_only_some_lights_and_other_rounds_the_others(make_basis: Any) -> None:
+    live, _, problem = _painted(make_basis, Fit(space="display", hold=1.0))
+    answer, moved = problem.basis.current_weights, set()
+    for _ in range(12):
+        following = live.answer(answer)
+        changed = np.flatnonzero(~np.isclose(following, answer, rtol=1e-9).all(axis=1))
+        assert len(changed) <= 5
+        moved |= set(changed.tolist())
+        answer = following
+    assert len(moved) > 15
+
+
+def test_the_unknowns_of_some_lights_are_those_that_they_have_among_all(make_basis: Any) -> None:
+    basis = _basis(make_basis)
+    constraints = Constraints.of(
+        light={"light 2": {"limits": {"max": "40%"}}, "light 7": {"lock": True}},
+        tie=[{"lights": ["light 3", "light 9"]}],
+    )
+    whole = reduce_to(constraints, basis.lights)
+    some = SomeLights.of(whole, [9, 7, 2, 0], 4)
+    assert some.lights.tolist() == [0, 2, 3, 9]  # the tie comes together, the locked one never
+    assert some.put_back(some.reduction) is whole
+    x = np.arange(len(some.reduction.unknowns)) / 10
+    whole_x = np.zeros(len(whole.unknowns))
+    whole_x[[i for k in some.places for i in whole.places[k]]] = x
+    expected = whole.weights(whole_x)
+    np.testing.assert_array_equal(some.reduction.weights(x), expected[some.lights])
