@@ -414,6 +414,17 @@ def darkened(parsed: ParsedScene, dark: Mapping[int, EmitterSetting]) -> ParsedS
     return copied
 
 
+def with_sampling(parsed: ParsedScene, weights: Mapping[int, float]) -> ParsedScene:
+    """Return a copy of a scene with other sampling weights. weights: by emitter node."""
+    import mitsuba as mi
+
+    copied = copy(parsed)
+    copied.state = mi.parser.ParserState(parsed.state)
+    for node, weight in weights.items():
+        copied.state.nodes[node].props["sampling_weight"] = weight
+    return copied
+
+
 def without_emitters(parsed: ParsedScene, emitters: Collection[int]) -> ParsedScene:
     """Return a copy of a scene without the emitters of these nodes, and the shapes of theirs."""
     import mitsuba as mi
