@@ -28,7 +28,7 @@ from lightpaint.scene.properties.integrator import (
     replace_integrator,
 )
 from lightpaint.scene.properties.pose import Motion, moved_parameters
-from lightpaint.scene.runtime.kernel_threads import kernels
+from lightpaint.scene.runtime.kernel_threads import kernels, kernels_for_all_sizes
 from lightpaint.scene.runtime.mitsuba_errors import mitsuba_errors
 from lightpaint.scene.runtime.plugins import check_plugins
 
@@ -209,9 +209,10 @@ class ParsedScene:
                     del props[key]
             props["film"] = film.load()
         take_materials(state)
-        with self._resolving(), mitsuba_errors(self.path, self.integrator_choice):
-            scene = mi.parser.instantiate(self.config, state)
-        make_normals_reproducible(scene)
+        with kernels_for_all_sizes():
+            with self._resolving(), mitsuba_errors(self.path, self.integrator_choice):
+                scene = mi.parser.instantiate(self.config, state)
+            make_normals_reproducible(scene)
         return scene
 
     def keep_materials(self, loaded: Any) -> None:
