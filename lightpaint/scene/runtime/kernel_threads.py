@@ -52,7 +52,7 @@ def kernels_for_all_sizes() -> Iterator[None]:
     """Compile kernels that add into arrays once for arrays of all sizes within the block.
 
     By default each thread adds into its own copy of a small array, whose size is part of the
-    kernel: so loading would compile one for each mesh without normals, which takes longer than
+    kernel. So loading would compile one for each mesh without normals, which takes longer than
     running it.
     """
     import drjit as dr
