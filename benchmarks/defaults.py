@@ -1,10 +1,13 @@
 """Measure the time and the errors of the defaults, against an earlier version.
 
-    python benchmarks/defaults.py --before CHECKOUT [--parts demo second first weights]
+    python benchmarks/defaults.py --before CHECKOUT [--parts demo again unverified second ...]
 
 Seconds of the processor of whole processes, in turns with those of CHECKOUT, an earlier version.
 
 - demo: `lightpaint demo` with nothing kept and no kernel compiled.
+- again: the same with the kernels of the first demo kept, the least of `--repeats`.
+- unverified: `lightpaint solve --no-verify` of a painting with the basis kept that the demo
+  rendered, the least of `--repeats`.
 - second: `lightpaint solve` of each painting of the gallery with the basis kept that the demo
   rendered, verification included; and how much of the light the verification checked: the share of
   lights in which it would probably have seen an error of 5 %.
@@ -19,10 +22,11 @@ Seconds of the processor of whole processes, in turns with those of CHECKOUT, an
 import argparse
 import json
 import os
+import shutil
 import subprocess
 import sys
 import tempfile
-from collections.abc import Sequence
+from collections.abc import Callable, Iterable, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -38,7 +42,10 @@ PAINTINGS = {
     "overcast": ["overcast.png"],
     "last-sun": ["last-sun.png"],
 }
-PARTS = ("demo", "second", "first", "weights")
+PARTS = ("demo", "again", "unverified", "second", "first", "weights")
+
+#: Parts that use what the demo leaves.
+AFTER_DEMO = ("again", "unverified", "second")
 
 #: Most mean ΔE of a first picture.
 CLOSE = 3.0
@@ -121,12 +128,17 @@ def main() -> None:
     parser.add_argument("--parts", nargs="+", default=list(PARTS), choices=PARTS)
     parser.add_argument("--long-spp", type=int, default=512)
     parser.add_argument("--seeds", type=int, default=8)
+    parser.add_argument("--repeats", type=int, default=3)
     options = parser.parse_args()
     checkouts = {"before": options.before.absolute(), "now": ROOT}
     with tempfile.TemporaryDirectory() as folder:
         place = Path(folder)
-        if {"demo", "second"} & set(options.parts):
+        if {"demo", *AFTER_DEMO} & set(options.parts):
             demo(checkouts, place)
+        if "again" in options.parts:
+            again(checkouts, place, options.repeats)
+        if "unverified" in options.parts:
+            unverified(checkouts, place, options.repeats)
         if "second" in options.parts:
             second(checkouts, place)
         if "first" in options.parts:
@@ -176,6 +188,38 @@ def demo(checkouts: dict[str, Path], place: Path) -> None:
         for version, checkout in checkouts.items()
     }
     print_row("demo, cold", durations)
+
+
+def again(checkouts: dict[str, Path], place: Path, repeats: int) -> None:
+    """Measure the demo with its kernels kept and no basis, in turns."""
+
+    def run(version: str) -> float:
+        for left in ("lightpaint-demo", "cache"):
+            shutil.rmtree(place / version / left)
+        return seconds_of(command("demo", "-q"), checkouts[version], place / version)
+
+    print_row("demo, kernels kept", least_in_turns(run, checkouts, repeats))
+
+
+def unverified(checkouts: dict[str, Path], place: Path, repeats: int) -> None:
+    """Measure another painting of a kept scene without its verification, in turns."""
+    name = list(PAINTINGS)[-1]
+
+    def run(version: str) -> float:
+        painting = str(checkouts[version] / "targets/gallery" / PAINTINGS[name][0])
+        scene = str(place / version / "lightpaint-demo/gallery/scene.xml")
+        arguments = command("solve", scene, painting, "--no-verify", "-o", name, "-q")
+        return seconds_of(arguments, checkouts[version], place / version)
+
+    print_row(f"not verified, {name}", least_in_turns(run, checkouts, repeats))
+
+
+def least_in_turns(
+    run: Callable[[str], float], versions: Iterable[str], repeats: int
+) -> dict[str, float]:
+    """Return the least seconds of several runs of each version, which take turns."""
+    runs = [{version: run(version) for version in versions} for _ in range(repeats)]
+    return {version: min(durations[version] for durations in runs) for version in runs[0]}
 
 
 def second(checkouts: dict[str, Path], place: Path) -> None:

@@ -74,11 +74,22 @@ def block_sums(image: npt.NDArray[Any], factor: int) -> Doubles:
 
     Remainders at the right and at the bottom form smaller blocks here.
     """
-    values = np.asarray(image, np.float64)
+    values = np.asarray(image)
     if factor == 1:
-        return values
-    rows, columns = (np.arange(0, length, factor) for length in values.shape[:2])
-    return np.asarray(np.add.reduceat(np.add.reduceat(values, rows, axis=0), columns, axis=1))
+        return values.astype(np.float64)
+    # Slices are added one after the other, several times as fast as NumPy's reduceat.
+    strips = _sums_of_rows(values, factor)
+    return np.asarray(_sums_of_rows(strips.swapaxes(0, 1), factor).swapaxes(0, 1), order="C")
+
+
+def _sums_of_rows(values: npt.NDArray[Any], count: int) -> Doubles:
+    """Return sums of `count` rows of `values`, (n, …), in float64; the last may have fewer."""
+    full, remainder = divmod(len(values), count)
+    sums = np.zeros((full + (remainder > 0), *values.shape[1:]))
+    for k in range(count):
+        rows = values[k::count]
+        sums[: len(rows)] += rows
+    return sums
 
 
 def block_pixels(image: Floats, factor: int) -> Floats:

@@ -16,8 +16,8 @@ from lightpaint.colour.color_difference import delta_e
 from lightpaint.colour.display.exposure import choose_exposure
 from lightpaint.display_text import Shown
 from lightpaint.errors import SizeError
+from lightpaint.images import pixel_blocks
 from lightpaint.images.estimate import Estimate, box_mean
-from lightpaint.images.pixel_blocks import whole_factor
 from lightpaint.keywords import keywords
 
 #: Side of the blocks of pixels over which differences are summed before the tests.
@@ -166,7 +166,7 @@ def compare(predicted: Estimate, verified: Estimate) -> Verification:
     verified: of the size of `predicted`, or with a block of pixels for each of its pixels. Raises
     SizeError otherwise.
     """
-    factor = whole_factor(verified.size, predicted.size)
+    factor = pixel_blocks.whole_factor(verified.size, predicted.size)
     if factor is None:
         raise SizeError(f"sizes of {predicted.size} and {verified.size} cannot be compared")
     judged = _judge(predicted, verified.reduced(factor))
@@ -268,7 +268,12 @@ def block_sums(image: Floats) -> Doubles:
     """Return sums over blocks of BLOCK × BLOCK pixels in float64; remainders join the last
     blocks.
     """
-    rows = np.arange(0, max(image.shape[0] - BLOCK + 1, 1), BLOCK)
-    columns = np.arange(0, max(image.shape[1] - BLOCK + 1, 1), BLOCK)
-    strips = np.add.reduceat(image, rows, axis=0, dtype=np.float64)
-    return np.asarray(np.add.reduceat(strips, columns, axis=1))
+    sums = pixel_blocks.block_sums(image, BLOCK)
+    height, width = image.shape[:2]
+    if height % BLOCK and height > BLOCK:
+        sums[-2] += sums[-1]
+        sums = sums[:-1]
+    if width % BLOCK and width > BLOCK:
+        sums[:, -2] += sums[:, -1]
+        sums = sums[:, :-1]
+    return sums

@@ -5,13 +5,15 @@ as it is conclusive. It is a group-sequential test: it examines the render after
 again each time their number has grown by a third to a half. It continues while an error in a large
 part of the light would probably not be detected and more samples would help. That depends on the
 noise, but not on how well prediction and render agree, so the difference in standard errors has the
-same distribution at every look. Only a difference beyond the limit stops it at once.
+same distribution at every look. Only a difference beyond the limit stops it at once. Emitters are
+sampled by their share of the predicted light, which changes noise and not the picture.
 
 The probability of a false alarm is divided among the looks: the limit of each is raised so that all
 looks together pass correct renders as often as a single look does at `LIMIT`, whenever the test
 stops.
 """
 
+from collections.abc import Mapping
 from dataclasses import dataclass, replace
 
 from lightpaint.basis.basis import Basis
@@ -37,8 +39,9 @@ from lightpaint.relit.verification import (
     largest_difference,
     limit_of_tests,
 )
+from lightpaint.scene.lights.texels.texel import image_of
 from lightpaint.scene.scene import Scene
-from lightpaint.scene.scene_render import Stream, render, render_in_stages
+from lightpaint.scene.scene_render import Stream, render, render_in_stages, sampled_by
 
 #: Numbers of parts, out of ALL_PARTS, of the samples after which the render is examined.
 LOOKS, ALL_PARTS = (2, 3, 4, 6, 8, 12, 16, 24, 32, 48, 64), 64
@@ -121,6 +124,7 @@ def verify_in_stages(
     """
     lights, stages = LightShares.of(basis, lighting), stages_of(spp, relit.film.block_pixels)
     limit = limit_of_tests(len(stages))
+    relit = sampled_by(relit, shares_of_emitters(relit, lighting, lights.luminance()))
 
     def is_enough(estimate: Estimate, done: int) -> bool:
         verified = estimate.reduced(whole_factor(estimate.size, predicted.size) or 1)
@@ -137,6 +141,23 @@ def verify_in_stages(
     )
     judged = replace(compare(predicted, verified), limit=limit, spp=done)
     return with_light_tests(judged, predicted, lights)
+
+
+def shares_of_emitters(
+    relit: Scene, lighting: Lighting, shares: Mapping[str, float]
+) -> dict[str, float]:
+    """Return the share of each emitter of `relit` in the light. shares: by name of the light.
+
+    The emitters of a light have equal parts of it; texels are one emitter, the image.
+    """
+    names = {emitter.name for emitter in relit.emitters}
+    of_emitters: dict[str, float] = {}
+    for light in lighting.lights:
+        for member in light.members if light.name in shares else ():
+            name = member if member in names else image_of(member)
+            part = shares[light.name] / len(light.members)
+            of_emitters[name] = of_emitters.get(name, 0.0) + part
+    return of_emitters
 
 
 def stages_of(spp: int, block_pixels: int = 1) -> list[int]:

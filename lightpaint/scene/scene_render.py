@@ -1,6 +1,7 @@
 """Ordinary Mitsuba renders of a scene, in passes, as an `Estimate` with its noise."""
 
 from collections.abc import Callable, Mapping, Sequence
+from dataclasses import replace
 from enum import IntEnum
 from itertools import zip_longest
 from typing import Any
@@ -15,6 +16,7 @@ from lightpaint.progress import Progress, silent
 from lightpaint.scene.runtime.kernel_threads import kernels
 from lightpaint.scene.runtime.render_lock import tracing
 from lightpaint.scene.scene import Scene
+from lightpaint.scene.scene_tree import with_sampling
 
 #: Number of camera samples in one pass. Passes are short, since a running kernel cannot be
 #: interrupted and needs memory for its whole pass.
@@ -22,6 +24,9 @@ SAMPLES_PER_PASS = 2**21
 
 #: Number of camera samples in a range of passes that is summed separately.
 SAMPLES_PER_RANGE = 2**22
+
+#: Share of the samples that all emitters get alike where the others go to those that matter.
+EVEN_SHARE = 0.25
 
 
 class Stream(IntEnum):
@@ -176,6 +181,26 @@ def render_in_stages(
         return estimate, spp
 
     return scene.while_loaded(rendered)
+
+
+def sampled_by(scene: Scene, shares: Mapping[str, float]) -> Scene:
+    """Return `scene` with emitters sampled more often the more of the light is theirs.
+
+    Its picture is the same, and has less noise if the shares are about right. If they are wrong, an
+    emitter is still sampled EVEN_SHARE as often as among equals. Emitters that are never sampled
+    stay so.
+
+    scene: without texels. shares: by name of the emitter, >= 0, relative to each other. An emitter
+    that has none is sampled as one among equals.
+    """
+    sampled = [emitter for emitter in scene.emitters if emitter.sampling_weight]
+    known = {x.name: shares[x.name] for x in sampled if x.name in shares}
+    if not (total := sum(known.values())):
+        return scene
+    factor = (1 - EVEN_SHARE) * len(known) / total
+    weights = {x.node: 1.0 for x in sampled}
+    weights |= {x.node: EVEN_SHARE + factor * known[x.name] for x in sampled if x.name in known}
+    return replace(scene, parsed=with_sampling(scene.parsed, weights))
 
 
 def passes_of(scene: Scene, spp: int | None) -> list[tuple[int, int]]:

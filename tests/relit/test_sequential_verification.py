@@ -21,6 +21,7 @@ from lightpaint.relit.verification_render import (
     FIRST_LOOK,
     LOOKS,
     can_tell,
+    shares_of_emitters,
     stages_of,
     verify_in_stages,
 )
@@ -129,3 +130,14 @@ def test_it_stops_early_and_still_finds_what_is_wrong(tmp_path: Path):
     verification = verify_in_stages(wrong_estimate, relit, basis, lighting, spp=1024)
     assert not verification.agrees
     assert verification.spp == stages_of(1024)[0]
+
+
+def test_members_share_the_light_of_a_group_and_an_image_has_that_of_its_texels(tmp_path: Path):
+    room = write_room(tmp_path, lights="".join(LIGHTS[x] for x in ("panel", "bulb", "sky")))
+    scene = load_scene(room, groups={"pair": ["panel", "bulb"]}, split={"sky": (2, 3)})
+    basis = render_basis(scene, spp=2, seed=0)
+    lighting = Lighting.of_weights(basis, basis.current_weights)
+    relit = relight(scene, lighting, tmp_path / "relit.xml")
+    shares = {name: 0.5 if name == "pair" else 0.1 for name in basis.names if name != "sky.x1.y2"}
+    expected = {"panel": 0.25, "bulb": 0.25, "sky": 0.5}
+    assert shares_of_emitters(relit, lighting, shares) == pytest.approx(expected, rel=1e-12)

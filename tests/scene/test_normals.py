@@ -5,12 +5,13 @@ from collections.abc import Iterator
 import numpy as np
 import pytest
 
-from lightpaint.scene.runtime.kernel_threads import limit_threads
+from lightpaint.scene.runtime.kernel_threads import kernels_for_all_sizes, limit_threads
 from lightpaint.scene.runtime.variant import use_variant
 from lightpaint.scene.scene_tree import make_normals_reproducible
 
 use_variant()
 
+import drjit as dr  # noqa: E402
 import mitsuba as mi  # noqa: E402
 
 
@@ -21,9 +22,9 @@ def _threads(request: pytest.FixtureRequest) -> Iterator[None]:
     limit_threads(None)
 
 
-def ball(*, offset: float = 0.0, factor: float = 1.0) -> object:
+def ball(*, offset: float = 0.0, factor: float = 1.0, rows: int = 12) -> object:
     """A scene of a smooth mesh: its own normals times `factor`, and so far off."""
-    rows, columns = 12, 24
+    columns = 24
     up, round_ = np.mgrid[0.1 : np.pi - 0.1 : rows * 1j, 0 : 2 * np.pi : columns * 1j]
     points = np.stack([np.sin(up) * np.cos(round_), np.sin(up) * np.sin(round_), np.cos(up)], -1)
     corner = np.arange(rows * columns, dtype=np.uint32).reshape(rows, columns)
@@ -61,3 +62,15 @@ def test_those_of_a_file_stay() -> None:
     before = normals(scene)
     make_normals_reproducible(scene)
     np.testing.assert_array_equal(normals(scene), before)
+
+
+def test_meshes_of_all_sizes_share_kernels() -> None:
+    def kernels_of(rows: int) -> set[str]:
+        dr.kernel_history_clear()
+        with kernels_for_all_sizes(), dr.scoped_set_flag(dr.JitFlag.KernelHistory, True):
+            ball(rows=rows)
+            history = dr.kernel_history([dr.KernelType.JIT])
+        return {kernel["hash"] for kernel in history if kernel["operation_count"] > 100}
+
+    assert len(kernels_of(12) | kernels_of(40)) == 1
+    assert dr.expand_threshold() > 0

@@ -45,3 +45,21 @@ def kernels(threads: int | None = None) -> Iterator[None]:
         dr.sync_thread()
     finally:
         dr.set_thread_count(count_before)
+
+
+@contextmanager
+def kernels_for_all_sizes() -> Iterator[None]:
+    """Compile kernels that add into arrays once for arrays of all sizes within the block.
+
+    By default each thread adds into its own copy of a small array, whose size is part of the
+    kernel. So loading would compile one for each mesh without normals, which takes longer than
+    running it.
+    """
+    import drjit as dr
+
+    threshold_before = dr.expand_threshold()
+    dr.set_expand_threshold(0)
+    try:
+        yield
+    finally:
+        dr.set_expand_threshold(threshold_before)
