@@ -18,7 +18,7 @@ from lightpaint.cli.output.vocabulary import BY_OPTION, OPTIONS, SPELLINGS, spok
 from lightpaint.paint.launch import paint_in_browser
 from lightpaint.pipeline.job.settings import Settings
 from lightpaint.pipeline.job.sources import NOT_IN_GROUPS
-from lightpaint.relit.export_format import Source
+from lightpaint.relit.exported_answer import Source
 from lightpaint.sentences import Hint, Lead, Sentence, SourceKey, Word
 from lightpaint.target.target_reader import read_target
 
