@@ -1,4 +1,4 @@
-"""The storage of a process that works on a batch: parts of bases on the disk, the rest in memory."""
+"""The storage of a process that works on a batch: parts of bases on disk, the rest in memory."""
 
 import gc
 import hashlib
