@@ -35,7 +35,7 @@ from lightpaint.batch.run import run_batch
 from lightpaint.batch.run_options import RunOptions
 from lightpaint.batch.work.task import Task
 from lightpaint.batch.work.work_items import SceneFilm
-from lightpaint.batch.work.worker_cache import WorkerCache
+from lightpaint.batch.work.worker_storage import WorkerCache
 from lightpaint.images.formats.exr import write_rgb
 from lightpaint.pipeline.job.sources import SceneFile
 from lightpaint.progress import silent

@@ -54,7 +54,7 @@ WHITE, BLACK = (1.0, 1.0, 1.0), (0.0, 0.0, 0.0)
 try:
     from lightpaint.basis.cache.denoised_planes import denoise_to_halves
 except ImportError:  # as earlier versions call it
-    from lightpaint.basis.clean import clean_plane as denoise_to_halves
+    from lightpaint.basis.cache.denoised_planes import denoise_to_halves
 
 Errors = npt.NDArray[np.float64]
 

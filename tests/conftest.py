@@ -22,6 +22,8 @@ from threadpoolctl import threadpool_limits
 from lightpaint.basis.basis import Basis, Origin
 from lightpaint.basis.lights import BasisLight
 from lightpaint.basis.render.basis_render import render_basis
+from lightpaint.placement.paths import view_paths
+from lightpaint.placement.search import new_light_search, pose_search
 from lightpaint.scene.runtime import kernel_threads
 from lightpaint.scene.scene import Scene
 from lightpaint.scene.scene_reader import load_scene
@@ -158,6 +160,21 @@ def small_room(tmp_path_factory: pytest.TempPathFactory) -> Scene:
 def small_room_basis(small_room: Scene) -> BasisFactory:
     """A function that renders its basis: the same one for the same samples and seed."""
     return cache(partial(render_basis, small_room))
+
+
+@pytest.fixture
+def short_search(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Search for places of lights with few trials and steps, along few paths.
+
+    For tests of what a search is asked and what is said of it, not of what it finds: it takes most
+    of their time.
+    """
+    monkeypatch.setattr(pose_search, "COMPARED", 10)
+    monkeypatch.setattr(pose_search, "REFINED", 2)
+    monkeypatch.setattr(new_light_search, "STARTS", 1)
+    monkeypatch.setattr(new_light_search, "STEPS", 2)
+    monkeypatch.setattr(view_paths, "FINE_SIDES", (1, 2))
+    monkeypatch.setattr(view_paths, "NOISY_SIDE", 4)
 
 
 @pytest.fixture(scope="session", autouse=True)

@@ -3,7 +3,7 @@
 from pathlib import Path
 
 from lightpaint.lighting.answer.lighting import Lighting
-from lightpaint.relit.export_format import Source
+from lightpaint.relit.exported_answer import Source
 from lightpaint.relit.formats import write_content, writers_of
 
 

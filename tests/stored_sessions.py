@@ -5,8 +5,14 @@ from typing import Any
 
 import numpy as np
 
-from lightpaint.paint.store.canvas_pixels import Pixels
-from lightpaint.paint.store.history_steps import Identity, Patch, Step, StoredLook, ViewIdentity
+from lightpaint.paint.store.history_steps import (
+    Identity,
+    Patch,
+    Pixels,
+    Step,
+    StoredLook,
+    ViewIdentity,
+)
 from lightpaint.paint.store.store import Store
 
 SIZE = (12, 10)

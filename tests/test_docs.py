@@ -25,8 +25,6 @@ from lightpaint.paint.server.address import DEFAULT_PORT
 from lightpaint.paint.server.client import MAX_QUEUED, MAX_QUEUED_BYTES
 from lightpaint.paint.server.http_server import MAX_UNAUTHENTICATED
 from lightpaint.paint.server.session_clients import MAX_PAGES
-from lightpaint.placement.paths import view_paths
-from lightpaint.placement.search import pose_search
 from lightpaint.scene.lights.light_choice import MAX_SEPARATE
 from lightpaint.scene.quality_presets import PRESETS
 from lightpaint.scene.scene_reader import load_scene
@@ -99,6 +97,7 @@ def test_public_names_and_options_that_are_named_are_there(document: Path):
 
 
 @pytest.mark.long
+@pytest.mark.usefixtures("short_search")
 def test_snippets_of_python_run_one_after_the_other(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ):
@@ -115,11 +114,6 @@ def test_snippets_of_python_run_one_after_the_other(
         return replace(load_scene(path).reduced("1/10"), spp=2)
 
     monkeypatch.setattr(lp, "load_scene", small)
-    # Searches for places take most of the time: with few trials, along few paths.
-    monkeypatch.setattr(pose_search, "COMPARED", 10)
-    monkeypatch.setattr(pose_search, "REFINED", 2)
-    monkeypatch.setattr(view_paths, "FINE_SIDES", (1, 2))
-    monkeypatch.setattr(view_paths, "NOISY_SIDE", 4)
     names: dict[str, Any] = {}
     try:
         for snippet in snippets:

@@ -5,6 +5,8 @@ import re
 from collections.abc import Iterator
 from pathlib import Path
 
+from package_source import statements, tree_of
+
 import lightpaint
 
 PACKAGE = Path(lightpaint.__file__).parent
@@ -39,8 +41,7 @@ ARTICLES = frozenset(["The", "A", "An", "All", "Its", "It", "This", "These"])
 
 def docstrings(file: Path) -> Iterator[tuple[str, str, bool]]:
     """Yield name, first word and whether it is that of a function, for each docstring."""
-    tree = ast.parse(file.read_text(encoding="utf-8"))
-    for node in ast.walk(tree):
+    for node in statements(tree_of(file)):
         if not isinstance(node, ast.Module | ast.ClassDef | ast.FunctionDef):
             continue
         if text := ast.get_docstring(node):
@@ -112,12 +113,12 @@ def names_in(node: ast.ClassDef | ast.FunctionDef) -> set[str]:
 
 def stale_parameters(file: Path) -> list[tuple[str, str]]:
     """Return functions and classes with parameters that only their docstrings have."""
-    nodes = ast.walk(ast.parse(file.read_text(encoding="utf-8")))
     return [
         (node.name, name)
-        for node in nodes
+        for node in statements(tree_of(file))
         if isinstance(node, ast.ClassDef | ast.FunctionDef) and node.name not in DESCRIBE_OTHERS
-        for name in sorted(described(node) - names_in(node))
+        if (described_names := described(node))
+        for name in sorted(described_names - names_in(node))
         if not {(node.name, name), (file.stem, name)} & NO_PARAMETERS
     ]
 

@@ -4,6 +4,8 @@ import ast
 from collections.abc import Iterator
 from pathlib import Path
 
+from package_source import statements, tree_of
+
 import lightpaint
 from lightpaint import errors
 
@@ -26,9 +28,9 @@ def _is_ours(handler: ast.ExceptHandler) -> bool:
 
 def readings(file: Path) -> Iterator[str]:
     """Places where a module searches, cuts or copies the text of an error of ours."""
-    tree = ast.parse(file.read_text(encoding="utf-8"))
-    parents = parents_in(tree)
-    for handler in (x for x in ast.walk(tree) if isinstance(x, ast.ExceptHandler) and _is_ours(x)):
+    handlers = (x for x in statements(tree_of(file)) if isinstance(x, ast.ExceptHandler))
+    for handler in filter(_is_ours, handlers):
+        parents = parents_in(handler)
         for node in ast.walk(handler):
             if not (isinstance(node, ast.Name) and node.id == handler.name):
                 continue

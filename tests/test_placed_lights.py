@@ -118,6 +118,7 @@ def test_no_move_leaves_all_where_it_is(room: Scene, painted: lp.Target, tmp_pat
     assert look.placement is None
 
 
+@pytest.mark.usefixtures("short_search")
 @pytest.mark.parametrize(
     ("rigging", "count", "words"),
     [

@@ -19,7 +19,7 @@ sys.path.insert(0, str(TESTS))
 
 from blender_window import run_in_window  # noqa: E402
 
-from lightpaint.cli.commands.blender_command import packed_addon  # noqa: E402
+from lightpaint.cli.commands.program_commands import packed_addon  # noqa: E402
 
 #: Seconds in which all pictures of a walk are there on a busy machine.
 PATIENCE_S = 1200.0

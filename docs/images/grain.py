@@ -109,7 +109,7 @@ def crops_of_few_samples() -> dict[str, np.ndarray]:
     try:
         from lightpaint.basis.cache.denoised_planes import denoise_to_halves
     except ImportError:  # as earlier versions call it
-        from lightpaint.basis.clean import clean_plane as denoise_to_halves
+        from lightpaint.basis.cache.denoised_planes import denoise_to_halves
     made = {}
     for scene, crops in scenes():
         for spp in SAMPLES:

@@ -4,7 +4,7 @@ import argparse
 import re
 from pathlib import Path
 
-from lightpaint.cli.options.option_themes import by_theme
+from lightpaint.cli.options.option_groups import by_theme
 from lightpaint.cli.options.parser import EXIT_CODES, command_parser
 
 #: Pages on what a command is for.

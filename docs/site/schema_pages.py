@@ -13,7 +13,7 @@ from report_schema import report_schema
 from lightpaint.basis.basis import Origin
 from lightpaint.basis.lights import BasisLight
 from lightpaint.batch.gallery.summary import SummaryRow
-from lightpaint.batch.manifest.folder_names import SUMMARY_FORMAT
+from lightpaint.batch.manifest.file_names import SUMMARY_FORMAT
 from lightpaint.lighting.answer.certificate import Certificate
 from lightpaint.lighting.answer.lighting import EmitterPlace, Lighting, LightSetting
 from lightpaint.lighting.answer.lighting_file import FORMAT

@@ -18,7 +18,6 @@ from lightpaint.basis.render.render_origin import ONE_PASS, basis_lights, method
 from lightpaint.basis.render.render_parts import Part, PartSums, plan_parts
 from lightpaint.batch.engine import Engine
 from lightpaint.batch.work.item_execution import attempt, job_fields, publish_solved_lights
-from lightpaint.batch.work.spool import Spool
 from lightpaint.batch.work.task import Task
 from lightpaint.batch.work.work_items import (
     SAMPLE_S,
@@ -31,7 +30,7 @@ from lightpaint.batch.work.work_items import (
     SumsOfRows,
     render_seconds,
 )
-from lightpaint.batch.work.worker_cache import WorkerCache
+from lightpaint.batch.work.worker_storage import Spool, WorkerCache
 from lightpaint.errors import BasisError, SceneError
 from lightpaint.images.estimate import Estimate
 from lightpaint.lighting.linear_problem import Sums

@@ -18,7 +18,7 @@ from threadpoolctl import threadpool_limits
 
 from lightpaint.batch.work.item_execution import run_item
 from lightpaint.batch.work.work_items import ItemResult, WorkItem, item_label
-from lightpaint.batch.work.worker_cache import WorkerCache
+from lightpaint.batch.work.worker_storage import WorkerCache
 from lightpaint.progress import Listener, silent
 from lightpaint.scene.runtime.kernel_threads import limit_threads
 

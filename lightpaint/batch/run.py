@@ -17,7 +17,7 @@ from lightpaint.batch.engine import Engine, InProcess, Processes
 from lightpaint.batch.gallery.gallery import write_gallery
 from lightpaint.batch.gallery.gallery_mixers import write_task_planes
 from lightpaint.batch.gallery.summary import SummaryRow
-from lightpaint.batch.manifest.folder_names import THUMBNAILS
+from lightpaint.batch.manifest.file_names import THUMBNAILS
 from lightpaint.batch.manifest.keys import as_key
 from lightpaint.batch.plan.journal import Journal, JournalLine
 from lightpaint.batch.plan.plan import Plan, PlannedLook, PlanStep, by_bases, look_seconds, waves

@@ -13,11 +13,11 @@ from lightpaint.basis.cache import cache
 from lightpaint.basis.file.basis_file import write_basis
 from lightpaint.batch.distributed_work import PartwiseRender
 from lightpaint.batch.engine import Engine
-from lightpaint.batch.plan.place_groups import PlaceGroup
+from lightpaint.batch.plan.plan import PlaceGroup
 from lightpaint.batch.work.item_execution import SharedPlacing, job_fields
 from lightpaint.batch.work.task import Task, key_of_scene
 from lightpaint.batch.work.work_items import SceneFilm
-from lightpaint.batch.work.worker_cache import WorkerCache
+from lightpaint.batch.work.worker_storage import WorkerCache
 from lightpaint.display_text import some_names
 from lightpaint.errors import SceneError
 from lightpaint.files import write_bytes, write_text

@@ -1,4 +1,4 @@
-"""Runs one command, from its arguments to its exit code."""
+"""Runs one command, from its arguments to its exit code; or completes its words for a shell."""
 
 import argparse
 import gc
@@ -13,18 +13,17 @@ from importlib import import_module
 from lightpaint.cli.crash_report import report_fault
 from lightpaint.cli.options.parser import command_parser
 from lightpaint.cli.output import lines
-from lightpaint.cli.output.output_mode import CommandOutcome, OutputMode, using_output_mode
+from lightpaint.cli.output.lines import CommandOutcome, OutputMode, using_output_mode
 from lightpaint.cli.output.vocabulary import spoken
 from lightpaint.errors import BatchError, LightpaintError, refusal_of
 
 #: Modules of the commands that are not in `render_commands`.
 _MODULES = {
     "batch": "batch_command",
-    "blender": "blender_command",
+    "blender": "program_commands",
     "cache": "maintenance",
     "doctor": "maintenance",
-    "export": "export_command",
-    "lights": "lights_command",
+    "export": "program_commands",
     "paint": "paint_command",
     "solve": "solve_command",
 }
@@ -50,7 +49,7 @@ def run_command(arguments: Sequence[str] | None, received: Sequence[int]) -> int
         parser.print_help()
         return 0
     if "_ARGCOMPLETE" in os.environ:  # a shell asks for completions
-        from lightpaint.cli.options.completion import complete
+        from lightpaint.cli.dispatcher import complete
 
         complete(parser)
     options = parser.parse_args(words)
@@ -128,3 +127,36 @@ def _report(command: str, error: Exception, words: Sequence[str]) -> int:
         lines.complain(command, OUT_OF_MEMORY_TEXT)
         return 2
     return report_fault(command, error, words)
+
+
+#: Suffixes of files by the destination of an argument; other arguments take any file.
+ENDINGS = {
+    "scene": (".xml",),
+    "source": (".xml", ".exr"),
+    "targets": (".exr", ".png", ".tif", ".tiff", ".jpg", ".jpeg"),
+    "masks": (".exr", ".png", ".tif", ".tiff", ".jpg", ".jpeg"),
+    "lightings": (".json",),
+    "lights_file": (".toml",),
+}
+
+
+def complete(parser: argparse.ArgumentParser) -> None:
+    """Answer the shell's request for completions, and exit; without argcomplete answer nothing."""
+    try:
+        import argcomplete
+    except ImportError:
+        raise SystemExit(1) from None
+    for action in _actions(parser):
+        if action.dest in ENDINGS:
+            files = argcomplete.completers.FilesCompleter(ENDINGS[action.dest])
+            action.completer = files  # type: ignore[attr-defined]
+    argcomplete.autocomplete(parser, default_completer=argcomplete.completers.FilesCompleter())
+
+
+def _actions(parser: argparse.ArgumentParser) -> Iterator[argparse.Action]:
+    """Yield the arguments of all commands."""
+    for action in parser._actions:
+        yield action
+        if isinstance(action, argparse._SubParsersAction):
+            for command in action.choices.values():
+                yield from _actions(command)

@@ -8,7 +8,7 @@ from typing import Any
 from lightpaint.basis.basis import Basis
 from lightpaint.batch.gallery.gallery import counts_text, entry_of, write_solve_gallery
 from lightpaint.batch.manifest.entries import LookEntry
-from lightpaint.batch.manifest.folder_names import FILES, check_gallery, is_reserved
+from lightpaint.batch.manifest.file_names import FILES, check_gallery, is_reserved
 from lightpaint.batch.work.derived_looks import (
     publish_shifted,
     shifted_folders,

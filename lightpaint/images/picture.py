@@ -12,10 +12,11 @@ from lightpaint.arrays import Floats
 from lightpaint.colour.display.view_transform import TransformChoice, ViewTransform
 from lightpaint.errors import ImageError
 from lightpaint.files import one_line
-from lightpaint.images.formats.bitmap import Bitmap, read_bitmap
-from lightpaint.images.formats.bitmap_decoder import (
+from lightpaint.images.formats.bitmap import (
+    Bitmap,
     light_of_floats,
     light_of_integers,
+    read_bitmap,
     transform_of,
     unpremultiply,
 )

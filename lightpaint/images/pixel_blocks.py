@@ -1,4 +1,4 @@
-"""Images at two sizes, where a pixel of the smaller one is a block of pixels of the larger.
+"""Images at other sizes: resampled to any, or with a block of pixels for each.
 
 Blocks are squares, starting at the top left corner. A remainder at the right and at the bottom,
 which is narrower than a block, belongs to none. So the two sizes alone determine the blocks.
@@ -10,6 +10,26 @@ import numpy as np
 import numpy.typing as npt
 
 from lightpaint.arrays import Doubles, Floats
+
+
+def resampled(planes: Floats, size: tuple[int, int]) -> Floats:
+    """Return (h, w, n) float32 at `size`: averaged where it shrinks, interpolated where it grows.
+
+    size: (height, width).
+    """
+    from PIL import Image
+
+    height, width = size
+    shrinks = width <= planes.shape[1]
+    kernel = Image.Resampling.BOX if shrinks else Image.Resampling.BILINEAR
+    resized = [
+        Image.fromarray(np.ascontiguousarray(plane, dtype=np.float32)).resize(
+            (width, height), kernel
+        )
+        for plane in np.moveaxis(planes, -1, 0)
+    ]
+    return np.dstack([np.asarray(plane) for plane in resized])
+
 
 Size = tuple[int, int]
 

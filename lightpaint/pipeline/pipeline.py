@@ -35,10 +35,10 @@ from lightpaint.placement.suggested_lights import suggest_lights
 from lightpaint.placement.suggestion import MoveSuggestion, Suggestion
 from lightpaint.progress import Listener, Progress, listener, silent
 from lightpaint.relit.detection_power import LightShares, with_light_tests
-from lightpaint.relit.render_rounds import refine_by_rendering
 from lightpaint.relit.verification import Verification
 from lightpaint.relit.verification_render import (
     VerificationBudget,
+    refine_by_rendering,
     verification_budget,
     verify,
     verify_in_stages,

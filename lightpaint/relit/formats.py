@@ -17,23 +17,20 @@ from lightpaint.files import write_text
 from lightpaint.images.formats.exr import write_rgb
 from lightpaint.lighting.answer.lighting import Lighting, LightSetting
 from lightpaint.progress import Listener
-from lightpaint.relit.export.exports import blender_script
+from lightpaint.relit.export.exports import blender_script, scene_script
 from lightpaint.relit.export.fixtures import fixtures_csv, fixtures_json
 from lightpaint.relit.export.nuke import needs_copy, nuke_lights, nuke_script, spoken_unreadable
 from lightpaint.relit.export.program_axes import SkyMap
-from lightpaint.relit.export.scene_script import scene_script
 from lightpaint.relit.export.usd import check_usd, usd_overrides
 from lightpaint.relit.export.usd_groups import usd_multipliers
-from lightpaint.relit.export_format import (
+from lightpaint.relit.exported_answer import (
     AnyMap,
     ExportContext,
     ExportFormat,
-    Source,
-    Writer,
-)
-from lightpaint.relit.exported_lights import (
     SlideImage,
+    Source,
     WallImage,
+    Writer,
     emitters_of,
     rig_lights,
     sky_maps_of,

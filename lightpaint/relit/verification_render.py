@@ -13,8 +13,10 @@ looks together pass correct renders as often as a single look does at `LIMIT`, w
 stops.
 """
 
-from collections.abc import Mapping
+import tempfile
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
+from pathlib import Path
 
 from lightpaint.basis.basis import Basis
 from lightpaint.basis.render.render_budget import check_samples
@@ -22,7 +24,10 @@ from lightpaint.errors import SizeError
 from lightpaint.images.estimate import Estimate
 from lightpaint.images.pixel_blocks import Size, whole_factor
 from lightpaint.keywords import keywords
+from lightpaint.lighting.analysis.noise.refinement import refine
 from lightpaint.lighting.answer.lighting import Lighting
+from lightpaint.lighting.joined_views import joint_estimate
+from lightpaint.lighting.solution import Solution
 from lightpaint.progress import Progress, silent
 from lightpaint.relit.detection_power import (
     LightShares,
@@ -30,6 +35,7 @@ from lightpaint.relit.detection_power import (
     light_tests,
     with_light_tests,
 )
+from lightpaint.relit.relight import relight
 from lightpaint.relit.verification import (
     LIMIT,
     LOW_POWER,
@@ -41,7 +47,14 @@ from lightpaint.relit.verification import (
 )
 from lightpaint.scene.lights.texels.texel import image_of
 from lightpaint.scene.scene import Scene
-from lightpaint.scene.scene_render import Stream, render, render_in_stages, sampled_by
+from lightpaint.scene.scene_render import (
+    Stream,
+    pass_seed,
+    render,
+    render_in_stages,
+    sampled_by,
+    view_seed,
+)
 
 #: Numbers of parts, out of ALL_PARTS, of the samples after which the render is examined.
 LOOKS, ALL_PARTS = (2, 3, 4, 6, 8, 12, 16, 24, 32, 48, 64), 64
@@ -253,3 +266,49 @@ def verification_budget(
             spp = max(spp, 2 * scene.film.block_pixels)
             return VerificationBudget(scene, spp, spp * pixels / samples)
     raise AssertionError("the last factor is always taken")
+
+
+def refine_by_rendering(
+    views: Sequence[tuple[Scene, Basis]],
+    solution: Solution,
+    *,
+    rounds: int,
+    seed: int = 0,
+    progress: Progress = silent,
+) -> Solution:
+    """Render the scene under the solution's lighting and take a Newton step, `rounds` times.
+
+    views: scene and basis of each view in the solution; each render has the film and the samples of
+    that basis. Every round uses random numbers that neither the other rounds, the basis nor a
+    verification uses.
+    """
+    for k in range(rounds):
+        mixed_bases = []
+        for scene, basis in views:
+            its_seed = pass_seed(view_seed(seed, scene.sensor), Stream.REFINEMENT, k)
+            label = f"refinement {k + 1}"
+            mixed_bases.append(_mixed(scene, basis, solution, its_seed, label, progress))
+        solution = refine(solution, joint_estimate(mixed_bases))
+    return solution
+
+
+def _mixed(
+    scene: Scene,
+    basis: Basis,
+    solution: Solution,
+    seed: int,
+    label: str,
+    progress: Progress,
+) -> Estimate:
+    """Render one view of the solved scene at the size and the samples of its basis."""
+    height, width = basis.size
+    with tempfile.TemporaryDirectory(prefix="lightpaint-") as folder:
+        relit = relight(scene, solution.lighting, Path(folder) / "relit.xml")
+        return render(
+            relit.reduced(f"{width}x{height}"),
+            spp=max(2, basis.origin.spp),
+            seed=seed,
+            stream=Stream.REFINEMENT,
+            label=label,
+            progress=progress,
+        )

@@ -15,7 +15,7 @@ from lightpaint.errors import SizeError, TargetError
 from lightpaint.images.pixel_blocks import whole_factor
 from lightpaint.keywords import keywords
 from lightpaint.sentences import Hint, Remedy
-from lightpaint.target.target_pixels import TargetPixels
+from lightpaint.target.painted_pixels import TargetPixels
 from lightpaint.target.wish import Wish
 
 #: Negative luminance that resampling leaves beside bright edges, as a share of the brightest.

@@ -15,8 +15,7 @@ from lightpaint.images.estimate import box_mean
 from lightpaint.images.picture import Picture, read_mask, read_picture
 from lightpaint.keywords import keywords
 from lightpaint.sentences import Hint, Sentence, Word
-from lightpaint.target.look_match import view_of_look
-from lightpaint.target.lost_template import explain_mismatch
+from lightpaint.target.look_match import explain_mismatch, view_of_look
 from lightpaint.target.painted_pixels import SHARP_RADIUS, painted_where
 from lightpaint.target.painting_file import painted_of
 from lightpaint.target.target import Target, describe_negative, share_of, spoken_share

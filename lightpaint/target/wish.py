@@ -7,8 +7,7 @@ import numpy as np
 
 from lightpaint.arrays import Floats
 from lightpaint.errors import SizeError
-from lightpaint.images.pixel_blocks import block_mean
-from lightpaint.images.resampling import resampled
+from lightpaint.images.pixel_blocks import block_mean, resampled
 
 
 @dataclass(frozen=True, eq=False)

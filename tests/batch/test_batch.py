@@ -22,7 +22,7 @@ from lightpaint.batch import engine
 from lightpaint.batch.engine import Processes
 from lightpaint.batch.gallery.gallery import contact_sheet, gallery_page
 from lightpaint.batch.gallery.summary import LightRow, SummaryRow, summary_csv
-from lightpaint.batch.manifest.folder_names import FILES, is_reserved
+from lightpaint.batch.manifest.file_names import FILES, is_reserved
 from lightpaint.batch.manifest.keys import as_key
 from lightpaint.batch.manifest.manifest import read_manifest
 from lightpaint.batch.plan.planner import plan

@@ -6,7 +6,7 @@ from pathlib import Path
 from hypothesis import given
 from hypothesis import strategies as st
 
-from lightpaint.batch.manifest.folder_names import JOURNAL
+from lightpaint.batch.manifest.file_names import JOURNAL
 from lightpaint.batch.plan.journal import Journal, JournalLine
 
 LINES = [

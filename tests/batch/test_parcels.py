@@ -14,7 +14,7 @@ from lightpaint.batch.run import run_batch
 from lightpaint.batch.work.item_execution import run_item
 from lightpaint.batch.work.task import Task
 from lightpaint.batch.work.work_items import ItemResult, WorkItem
-from lightpaint.batch.work.worker_cache import WorkerCache
+from lightpaint.batch.work.worker_storage import WorkerCache
 from lightpaint.errors import BatchError, OutputError
 from lightpaint.progress import silent
 

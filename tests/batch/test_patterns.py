@@ -8,7 +8,7 @@ from pathlib import Path
 import pytest
 
 from lightpaint.batch.manifest import entries
-from lightpaint.batch.manifest.file_patterns import files_matching
+from lightpaint.batch.manifest.file_names import files_matching
 from lightpaint.batch.manifest.manifest import read_manifest
 from lightpaint.batch.plan.planner import plan
 from lightpaint.errors import BatchError

@@ -10,7 +10,7 @@ import pytest
 from blender import blender_command
 from renderer import REPOSITORY
 
-from lightpaint.cli.commands.blender_command import packed_addon
+from lightpaint.cli.commands.program_commands import packed_addon
 
 
 @pytest.fixture(scope="module")

@@ -14,7 +14,7 @@ from command import run, run_refused
 
 import lightpaint
 from lightpaint.blender_addon.painter.program import WRITER_FILE
-from lightpaint.cli.commands.blender_command import ADDON_NAME, own_program, packed_addon
+from lightpaint.cli.commands.program_commands import ADDON_NAME, own_program, packed_addon
 
 FOLDER = Path(lightpaint.__file__).parent / "blender_addon"
 MODULES = sorted(FOLDER.rglob("*.py"))

@@ -200,7 +200,7 @@ sys.exit(main())
     ("module", "number"),
     [
         ("lightpaint.cli.options.parser", signal.SIGINT),
-        ("lightpaint.cli.commands.lights_command", signal.SIGTERM),
+        ("lightpaint.cli.commands.render_commands", signal.SIGTERM),
         ("numpy", signal.SIGINT),
         ("mitsuba", signal.SIGINT),
     ],

@@ -7,7 +7,7 @@ import pytest
 from batches import write_batch
 from command import run, run_refused, succeed
 
-from lightpaint.cli.options.solve_options import VARIATIONS
+from lightpaint.cli.options.answer_options import VARIATIONS
 from lightpaint.lighting.answer.lighting_file import read_lighting
 
 

@@ -13,7 +13,7 @@ from renderer import LIGHTS, write_room
 import lightpaint as lp
 from lightpaint.basis.file.basis_file import write_basis
 from lightpaint.cli.commands import paint_command
-from lightpaint.cli.output.output_mode import CommandOutcome
+from lightpaint.cli.output.lines import CommandOutcome
 from lightpaint.files import write_bytes, write_text
 from lightpaint.images.formats.exr import write_rgb
 from lightpaint.paint.store.session_requests import SessionRequests

@@ -8,6 +8,7 @@ from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
+from package_source import statements, tree_of
 
 import lightpaint
 from lightpaint.batch.run_options import RunOptions
@@ -17,7 +18,7 @@ from lightpaint.cli.output.vocabulary import BY_OPTION, OPTIONS, SPELLINGS, spok
 from lightpaint.paint.launch import paint_in_browser
 from lightpaint.pipeline.job.settings import Settings
 from lightpaint.pipeline.job.sources import NOT_IN_GROUPS
-from lightpaint.relit.export_format import Source
+from lightpaint.relit.exported_answer import Source
 from lightpaint.sentences import Hint, Lead, Sentence, SourceKey, Word
 from lightpaint.target.target_reader import read_target
 
@@ -30,9 +31,8 @@ OPTION = re.compile(r"(?<![\w-])--[a-z][a-z-]+\b(?![:\w-])")
 KEYWORD = re.compile(r"(?<![^\s(])([a-z_]+)=(?=\S)")
 
 
-def texts(file: Path) -> Iterator[tuple[int, str]]:
+def texts(tree: ast.Module) -> Iterator[tuple[int, str]]:
     """Line and text of every string, those of several parts whole, with V for their values."""
-    tree = ast.parse(file.read_text(encoding="utf-8"))
     parts = set()
     for node in ast.walk(tree):
         if isinstance(node, ast.JoinedStr):
@@ -53,10 +53,10 @@ def _value(node: ast.expr) -> str:
     return "'V'" if is_quoted else "V"
 
 
-def _docstrings(file: Path) -> set[str]:
-    tree = ast.parse(file.read_text(encoding="utf-8"))
+def _docstrings(tree: ast.Module) -> set[str]:
     kinds = ast.Module | ast.ClassDef | ast.FunctionDef
-    docstrings = (ast.get_docstring(x, clean=False) for x in ast.walk(tree) if isinstance(x, kinds))
+    nodes = (x for x in statements(tree) if isinstance(x, kinds))
+    docstrings = (ast.get_docstring(x, clean=False) for x in nodes)
     return {text for text in docstrings if text}
 
 
@@ -73,7 +73,10 @@ LIBRARY = [
 @pytest.mark.nightly
 def test_the_library_names_no_option() -> None:
     with_options = [
-        (file, line, text) for file in LIBRARY for line, text in texts(file) if OPTION.search(text)
+        (file, line, text)
+        for file in LIBRARY
+        for line, text in texts(tree_of(file))
+        if OPTION.search(text)
     ]
     assert with_options == []
 
@@ -81,8 +84,9 @@ def test_the_library_names_no_option() -> None:
 def test_no_text_names_an_argument_that_is_not_a_hint() -> None:
     found = []
     for file in LIBRARY:
-        docstrings = _docstrings(file)
-        for line, text in texts(file):
+        tree = tree_of(file)
+        docstrings = _docstrings(tree)
+        for line, text in texts(tree):
             # Markup has attributes.
             if text not in docstrings and "<" not in text and "\n" not in text:
                 found += [f"{file}:{line}: {text}"] * bool(KEYWORD.search(text))
@@ -91,7 +95,9 @@ def test_no_text_names_an_argument_that_is_not_a_hint() -> None:
 
 def hints(file: Path) -> Iterator[str]:
     """The names of the arguments in the messages of a module."""
-    for node in ast.walk(ast.parse(file.read_text(encoding="utf-8"))):
+    if "Hint(" not in file.read_text(encoding="utf-8"):
+        return
+    for node in ast.walk(tree_of(file)):
         if isinstance(node, ast.Call) and getattr(node.func, "id", "") == "Hint" and node.args:
             yield from (x.value for x in node.args[:1] if isinstance(x, ast.Constant))
 
@@ -105,7 +111,7 @@ def test_every_hint_is_in_the_table() -> None:
 def test_the_test_itself_finds_what_it_looks_for(tmp_path: Path) -> None:
     file = tmp_path / "bad.py"
     file.write_text('raise E(f"{x} is small: " "pass --resize or resized=True")', encoding="utf-8")
-    [(_, text)] = texts(file)
+    [(_, text)] = texts(tree_of(file))
     assert OPTION.search(text)
     assert [match[1] for match in KEYWORD.finditer(text)] == ["resized"]
     assert not OPTION.search('style="--aspect: 1.5"')

@@ -3,13 +3,13 @@
 import io
 from typing import Any
 
-import colour
 import numpy as np
 import pytest
 from picture_files import ADOBE, P3, SRGB, SRGB_CURVE, curv, icc, para
 from PIL import Image, ImageCms
 
 from lightpaint.colour.icc import gamma_profile, read_icc
+from lightpaint.colour.primaries import colour_science
 from lightpaint.colour.srgb import decode_display, encode_display
 from lightpaint.errors import ImageError
 
@@ -75,8 +75,10 @@ def test_srgb_is_known():
 
 def test_p3_by_its_primaries():
     matrix = read_icc(icc(curv(), P3)).matrix
-    spaces = colour.RGB_COLOURSPACES
-    expected = colour.matrix_RGB_to_RGB(spaces["Display P3"], spaces["ITU-R BT.709"], None)
+    spaces = colour_science().RGB_COLOURSPACES
+    expected = colour_science().matrix_RGB_to_RGB(
+        spaces["Display P3"], spaces["ITU-R BT.709"], None
+    )
     # Profiles hold colours with sixteen bits behind the point.
     np.testing.assert_allclose(matrix, expected, rtol=0, atol=1e-3)
 

@@ -9,7 +9,6 @@ import zlib
 from pathlib import Path
 from typing import Any
 
-import colour
 import numpy as np
 import pytest
 import tifffile
@@ -17,6 +16,7 @@ from picture_files import ADOBE, P3, SRGB, SRGB_CURVE, curv, icc, layered, para,
 from PIL import Image, ImageCms
 
 from lightpaint.colour.display.view_transform import ViewTransform
+from lightpaint.colour.primaries import colour_science
 from lightpaint.colour.srgb import decode_display
 from lightpaint.errors import ImageError
 from lightpaint.images.formats import openraster
@@ -142,9 +142,14 @@ def test_profiles_are_converted(tmp_path: Path, dtype: Any, curve: Any, columns:
     pixels = _pixels(dtype)
     profile = icc(curve, columns)
     content = png(pixels, (b"iCCP", b"x\0\0" + zlib.compress(profile)))
-    other, rec709 = colour.RGB_COLOURSPACES[space], colour.RGB_COLOURSPACES["ITU-R BT.709"]
+    other, rec709 = (
+        colour_science().RGB_COLOURSPACES[space],
+        colour_science().RGB_COLOURSPACES["ITU-R BT.709"],
+    )
     light = other.cctf_decoding(pixels / np.iinfo(dtype).max)
-    expected = colour.RGB_to_RGB(light, other, rec709, chromatic_adaptation_transform=None)
+    expected = colour_science().RGB_to_RGB(
+        light, other, rec709, chromatic_adaptation_transform=None
+    )
     picture = _read(tmp_path, content)
     # Profiles hold colours with sixteen bits behind the point, and colour-science rounds others.
     np.testing.assert_allclose(picture.image, expected, rtol=0, atol=1e-3)
@@ -176,12 +181,16 @@ def test_gamma_and_primaries_of_a_png(tmp_path: Path):
     pixels = _pixels(np.uint16)
     p3 = struct.pack(">8I", 31270, 32900, 68000, 32000, 26500, 69000, 15000, 6000)
     picture = _read(tmp_path, png(pixels, (b"gAMA", struct.pack(">I", 100_000)), (b"cHRM", p3)))
-    spaces = colour.RGB_COLOURSPACES
-    expected = colour.RGB_to_RGB(pixels / 65535, spaces["Display P3"], spaces["ITU-R BT.709"], None)
+    spaces = colour_science().RGB_COLOURSPACES
+    expected = colour_science().RGB_to_RGB(
+        pixels / 65535, spaces["Display P3"], spaces["ITU-R BT.709"], None
+    )
     np.testing.assert_allclose(picture.image, expected, rtol=0, atol=2e-5)
     by_code = _read(tmp_path, png(pixels, (b"cICP", b"\x0c\x0d\0\1")))
     light = decode_display(pixels / 65535)
-    expected = colour.RGB_to_RGB(light, spaces["Display P3"], spaces["ITU-R BT.709"], None)
+    expected = colour_science().RGB_to_RGB(
+        light, spaces["Display P3"], spaces["ITU-R BT.709"], None
+    )
     np.testing.assert_allclose(by_code.image, expected, rtol=0, atol=2e-5)
     with pytest.raises(ImageError, match=r"colours 09 10 \(cICP\)"):
         _read(tmp_path, png(pixels, (b"cICP", b"\x09\x10\0\1")))

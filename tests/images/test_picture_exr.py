@@ -3,13 +3,13 @@
 from pathlib import Path
 from typing import Any
 
-import colour
 import numpy as np
 import OpenEXR
 import OpenImageIO
 import pytest
 from picture_files import luminance_chroma
 
+from lightpaint.colour.primaries import colour_science
 from lightpaint.errors import ImageError
 from lightpaint.images.picture import Picture, read_picture
 
@@ -145,14 +145,14 @@ def test_luminance_and_chroma(tmp_path: Path):
     # Chroma is rounded to half, and the luminance of green to four digits.
     np.testing.assert_allclose(picture.image, y[..., None] * hue, rtol=2e-3, atol=1e-6)
     # Its means are those of the primaries that are declared.
-    acescg = colour.RGB_COLOURSPACES["ACEScg"]
+    acescg = colour_science().RGB_COLOURSPACES["ACEScg"]
     hue = np.array([0.9, 0.4, 0.2])
     hue /= hue @ acescg.matrix_RGB_to_XYZ[1]
     planes = [np.full((4, 5), hue[k] - 1) for k in (0, 2)]
     primaries = (*acescg.primaries.ravel(), *acescg.whitepoint)
     picture = _chroma(tmp_path, y, *planes, primaries)
-    rec709 = colour.RGB_COLOURSPACES["ITU-R BT.709"]
-    expected = y[..., None] * colour.RGB_to_RGB(hue, acescg, rec709, "Bradford")
+    rec709 = colour_science().RGB_COLOURSPACES["ITU-R BT.709"]
+    expected = y[..., None] * colour_science().RGB_to_RGB(hue, acescg, rec709, "Bradford")
     np.testing.assert_allclose(picture.image, expected, rtol=4e-3, atol=1e-5)
 
 
@@ -179,8 +179,8 @@ def test_the_librarys_own_reader_agrees_on_chroma():
 def test_xyz_is_not_adapted(tmp_path: Path):
     xyz = (1.0, 0.0, 0.0, 1.0, 0.0, 0.0, 1 / 3, 1 / 3)
     path = _exr(tmp_path / "a.exr", _name_channels(_rgb()), chromaticities=xyz)
-    expected = colour.algebra.vecmul(
-        np.linalg.inv(colour.RGB_COLOURSPACES["ITU-R BT.709"].matrix_RGB_to_XYZ), _rgb()
+    expected = colour_science().algebra.vecmul(
+        np.linalg.inv(colour_science().RGB_COLOURSPACES["ITU-R BT.709"].matrix_RGB_to_XYZ), _rgb()
     )
     # The matrix of the standard has four digits.
     np.testing.assert_allclose(read_picture(path).image, expected, rtol=0, atol=1e-3)
@@ -200,8 +200,10 @@ def test_xyz_is_not_adapted(tmp_path: Path):
 def test_a_colour_space_by_name_is_converted(tmp_path: Path, name: str, space: str):
     """As Blender declares it, without chromaticities."""
     path = _exr(tmp_path / "a.exr", _name_channels(_rgb()), colorInteropID=name)
-    spaces = colour.RGB_COLOURSPACES
-    expected = colour.RGB_to_RGB(_rgb(), spaces[space], spaces["ITU-R BT.709"], "Bradford")
+    spaces = colour_science().RGB_COLOURSPACES
+    expected = colour_science().RGB_to_RGB(
+        _rgb(), spaces[space], spaces["ITU-R BT.709"], "Bradford"
+    )
     # colour-science has whites of five decimals.
     np.testing.assert_allclose(read_picture(path).image, expected, rtol=0, atol=2e-5)
     # Numbers go before names.

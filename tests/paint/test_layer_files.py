@@ -23,9 +23,9 @@ from PIL import Image
 
 import lightpaint as lp
 from lightpaint.errors import ImageError, PaintError
-from lightpaint.images.formats import openraster_stack
+from lightpaint.images.formats import openraster
 from lightpaint.images.formats.exr import ExrPart, read_parts, write_parts
-from lightpaint.images.formats.openraster_stack import RasterGroup, opened_openraster
+from lightpaint.images.formats.openraster import RasterGroup, opened_openraster
 from lightpaint.paint import protocol
 from lightpaint.paint.layers import layer_files
 from lightpaint.paint.layers.canvases import LayeredPaintings
@@ -42,7 +42,7 @@ from lightpaint.paint.layers.layer_stack import Layer, LayerStack
 from lightpaint.paint.layers.view_layers import ViewLayers
 from lightpaint.paint.protocol import Message
 from lightpaint.paint.session.session import Session
-from lightpaint.paint.store.canvas_pixels import Pixels
+from lightpaint.paint.store.history_steps import Pixels
 from lightpaint.paint.store.store import MemoryStore
 from lightpaint.paint.studio.file_imports import begin_with_layers
 from lightpaint.paint.studio.studio import Studio
@@ -350,8 +350,8 @@ def test_a_short_file_with_many_layers_is_refused_before_any_is_decoded(
     path.write_bytes(openraster_of(names, groups=groups))
     assert len(read_layers(path, SIZE, TRANSFORM).pixels) == len(names)
     for name, limit in limits.items():
-        monkeypatch.setattr(openraster_stack, name, limit)
-    monkeypatch.setattr(openraster_stack, "read_bitmap", None)
+        monkeypatch.setattr(openraster, name, limit)
+    monkeypatch.setattr(openraster, "read_bitmap", None)
     with pytest.raises(ImageError, match=expected):
         read_layers(path, SIZE, TRANSFORM)
 
@@ -361,7 +361,7 @@ def test_the_size_of_a_file_is_compared_before_its_pixels_are_read(
 ) -> None:
     write_layers_exr(tmp_path / "layers.exr", layered((Layer(1, "paint"), 0.5, 0.5)), "eye")
     (tmp_path / "layers.ora").write_bytes(openraster_of(["a.png"]))
-    monkeypatch.setattr(openraster_stack, "read_bitmap", None)
+    monkeypatch.setattr(openraster, "read_bitmap", None)
     monkeypatch.setattr(layer_files, "read_parts", None)
     for name in ("layers.exr", "layers.ora"):
         with pytest.raises(PaintError, match="70x12 pixels, and the view 8x9"):

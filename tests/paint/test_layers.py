@@ -26,7 +26,7 @@ from lightpaint.paint.layers.layer_pixels import LayerPixels
 from lightpaint.paint.layers.layer_stack import PAINTING, Gradient, Layer, LayerStack, stack_after
 from lightpaint.paint.session.look_library import LookLibrary
 from lightpaint.paint.session.picture_table import PictureTable
-from lightpaint.paint.store.canvas_pixels import Pixels
+from lightpaint.paint.store.history_steps import Pixels
 from lightpaint.paint.store.store import Store
 
 SIZE = SIZES[0]

@@ -10,7 +10,7 @@ from hypothesis import strategies as st
 from lightpaint.paint.layers import canvas
 from lightpaint.paint.layers.canvas import OpenStroke
 from lightpaint.paint.layers.layer_pixels import LayerPixels
-from lightpaint.paint.store.canvas_pixels import Pixels, Region
+from lightpaint.paint.store.history_steps import Pixels, Region
 
 HEIGHT, WIDTH = 21, 34
 

@@ -10,8 +10,7 @@ import pytest
 from lightpaint.errors import PaintError
 from lightpaint.paint.background_threads import StoppedError
 from lightpaint.paint.protocol import Message, Notice
-from lightpaint.paint.publisher import Publisher
-from lightpaint.paint.session_access import SessionAccess
+from lightpaint.paint.session_access import Publisher, SessionAccess
 
 
 @pytest.fixture

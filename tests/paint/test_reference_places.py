@@ -17,9 +17,9 @@ from lightpaint.paint.references.light_match import (
     contrast_of_light,
     light_distance,
 )
+from lightpaint.paint.references.likeness import find_part
 from lightpaint.paint.references.reference_light import distance_of
 from lightpaint.paint.references.tones import LightTones, Tones
-from lightpaint.paint.references.view_part import find_part
 from lightpaint.paint.session.session import Session
 from lightpaint.paint.store.history_steps import Identity
 from lightpaint.paint.store.store import MemoryStore

@@ -9,7 +9,7 @@ from hypothesis import strategies as st
 
 import lightpaint as lp
 from lightpaint.images.formats.exr import write_rgb
-from lightpaint.paint.rig.room_plan import (
+from lightpaint.paint.rig.page_geometry import (
     mesh_parts,
     outline,
     plan_objects,

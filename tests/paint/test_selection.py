@@ -12,7 +12,7 @@ from lightpaint.paint import protocol
 from lightpaint.paint.layers.selection import selection_mask
 from lightpaint.paint.session.picture_table import PictureTable
 from lightpaint.paint.session.session_state import offer_layers
-from lightpaint.paint.store.canvas_pixels import Region
+from lightpaint.paint.store.history_steps import Region
 
 H, W = SIZES[0]
 

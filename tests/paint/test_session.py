@@ -25,8 +25,7 @@ from lightpaint.paint import protocol
 from lightpaint.paint.session.look_library import LookLibrary
 from lightpaint.paint.session.picture_table import PictureTable
 from lightpaint.paint.session.session import Session
-from lightpaint.paint.store.canvas_pixels import Pixels
-from lightpaint.paint.store.history_steps import Identity, Step
+from lightpaint.paint.store.history_steps import Identity, Pixels, Step
 from lightpaint.paint.store.session_requests import (
     ALL_LIGHTS_KEYS,
     FIT_KEYS,

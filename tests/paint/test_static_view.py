@@ -10,7 +10,7 @@ import pytest
 from mixer_canvas import mixer_pixels
 
 import lightpaint as lp
-from lightpaint.paint.notebook.cell_output import static_view
+from lightpaint.paint.notebook.cell_views import static_view
 
 pytest.importorskip("anywidget", reason="anywidget")
 
@@ -26,7 +26,7 @@ MAX_LENGTH = 400_000
 def painter(make_basis: Any, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[Any]:
     """Of three lights whose images are smooth enough to be told apart."""
     # No kernel runs, nor a loop, as Playwright leaves one.
-    monkeypatch.setattr("lightpaint.paint.notebook.widget_views._running_loop", lambda: None)
+    monkeypatch.setattr("lightpaint.paint.notebook.cell_views._running_loop", lambda: None)
     y, x = np.mgrid[:54, :96] / 54
     images = [np.exp(-8 * np.hypot(y - 0.5, x - at))[..., None] * [1, 1, 1] for at in (0, 0.9, 1.7)]
     basis = make_basis(images=images, names=(NAUGHTY, "fill", "back"))
@@ -153,7 +153,7 @@ def test_a_saved_view_follows_what_is_painted(
     monkeypatch: pytest.MonkeyPatch, outputs: dict[str, list[Any]], painter: Any
 ) -> None:
     """It does so once the brush rests, and its widget stays as it is."""
-    monkeypatch.setattr("lightpaint.paint.notebook.cell_output.Timer", Rest)
+    monkeypatch.setattr("lightpaint.paint.notebook.cell_views.Timer", Rest)
     monkeypatch.setattr(Rest, "waiting", [])
     painter.lighting = relit(painter, 0.2)
     assert Rest.waiting == []  # no cell shows it yet

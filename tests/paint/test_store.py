@@ -26,12 +26,12 @@ from lightpaint.paint.session.look_library import LookLibrary
 from lightpaint.paint.session.picture_table import PictureTable
 from lightpaint.paint.session.session import Session
 from lightpaint.paint.store import database
-from lightpaint.paint.store.canvas_pixels import Pixels
 from lightpaint.paint.store.compression import pack, unpack
 from lightpaint.paint.store.database import set_aside
 from lightpaint.paint.store.history_steps import (
     Identity,
     Patch,
+    Pixels,
     Step,
     StoredLook,
     ViewIdentity,

@@ -19,9 +19,8 @@ from lightpaint.paint.layers.composed_layers import accent
 from lightpaint.paint.layers.composition import compose_layer
 from lightpaint.paint.layers.layer_stack import Layer
 from lightpaint.paint.session.session import Session
-from lightpaint.paint.store.canvas_pixels import Pixels
 from lightpaint.paint.store.compression import ZEROS_LENGTH, pack, pack_patches, unpack_patches
-from lightpaint.paint.store.history_steps import Patch
+from lightpaint.paint.store.history_steps import Patch, Pixels
 from lightpaint.paint.store.store import COMPOSITION_VERSION, Store, StoredComposition, _digest
 
 

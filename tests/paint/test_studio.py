@@ -26,10 +26,10 @@ from lightpaint.lighting.analysis.noise.noise_correction import correct_noise
 from lightpaint.paint import protocol, subject
 from lightpaint.paint.background_threads import SOLVE_DELAY_S
 from lightpaint.paint.protocol import Message
-from lightpaint.paint.publisher import Publisher
 from lightpaint.paint.session import page_planes, picture_table
 from lightpaint.paint.session.session import Session
 from lightpaint.paint.session.snapshot import SessionSnapshot
+from lightpaint.paint.session_access import Publisher
 from lightpaint.paint.store import database
 from lightpaint.paint.store.store import Store
 from lightpaint.paint.studio import session_bases, session_exports

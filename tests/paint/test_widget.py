@@ -29,8 +29,7 @@ from lightpaint.errors import ConstraintError, OutputError, PaintError
 from lightpaint.paint import background_threads, protocol
 from lightpaint.paint.notebook import widget, widget_arguments
 from lightpaint.paint.store import database
-from lightpaint.paint.store.canvas_pixels import Pixels
-from lightpaint.paint.store.history_steps import Identity
+from lightpaint.paint.store.history_steps import Identity, Pixels
 from lightpaint.paint.store.store import Store
 from lightpaint.paint.studio import session_bases
 from lightpaint.paint.studio.studio import Studio
@@ -68,7 +67,7 @@ class RecordingComm(comm.base_comm.BaseComm):  # type: ignore[misc,name-defined]
 @pytest.fixture(autouse=True)
 def page_line(monkeypatch: pytest.MonkeyPatch) -> None:
     """Widgets have such a line, where no kernel runs; nor any loop, as Playwright leaves one."""
-    monkeypatch.setattr("lightpaint.paint.notebook.widget_views._running_loop", lambda: None)
+    monkeypatch.setattr("lightpaint.paint.notebook.cell_views._running_loop", lambda: None)
     noted = type("Line", (RecordingComm,), {"messages": [], "synced": {}})
     monkeypatch.setattr(comm, "create_comm", lambda *_, **options: noted(**options))
 
@@ -713,7 +712,7 @@ def test_callbacks_come_in_the_thread_of_the_kernel(
 
     async def cell() -> None:
         loop = asyncio.get_running_loop()
-        monkeypatch.setattr("lightpaint.paint.notebook.widget_views._running_loop", lambda: loop)
+        monkeypatch.setattr("lightpaint.paint.notebook.cell_views._running_loop", lambda: loop)
         painter = open_painter()
         page = Page(painter)
         page.say("hello", version=protocol.VERSION)

@@ -7,8 +7,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from lightpaint.placement.look_goals import PIXELS
-from lightpaint.placement.search import search_time
-from lightpaint.placement.search.search_time import SearchSize, usual_pace
+from lightpaint.placement.search import new_light_search
+from lightpaint.placement.search.new_light_search import SearchSize, usual_pace
 
 SIZES = st.builds(SearchSize.of, st.integers(0, 60), st.integers(0, 4), st.integers(1, 2**22))
 
@@ -22,7 +22,7 @@ def test_a_search_that_took_the_mean_of_its_bounds_has_the_usual_pace(size: Sear
 
 
 def test_it_grows_with_lights_and_pixels_up_to_those_of_the_small_film() -> None:
-    begin = search_time.BEGIN_S
+    begin = new_light_search.BEGIN_S
     assert SearchSize.of(0, 0, 100).seconds() == (begin, begin)
     low, high = (x - begin for x in SearchSize.of(3, 0, PIXELS).seconds())
     assert (low, high) == (3 * (3.5 + 4), 3 * (2 * 3.5 + 4))

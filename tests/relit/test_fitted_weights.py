@@ -7,9 +7,9 @@ from functools import cache
 
 import numpy as np
 import pytest
+import scipy
 from conftest import BasisFactory
 from nightly import nightly
-from scipy.stats import kstest
 
 from lightpaint.images.estimate import Estimate
 from lightpaint.lighting.analysis.noise.noise_correction import correct_noise
@@ -77,7 +77,7 @@ def test_z_is_standard_normal_where_the_prediction_is_true(
     # rather wider. Kolmogorov and Smirnov would be so far off once in a thousand times.
     assert abs(z.mean()) < 4 / np.sqrt(SEEDS)
     assert z.std() == pytest.approx(1, abs=4 / np.sqrt(2 * SEEDS))
-    assert kstest(z, "norm").pvalue > 1e-3
+    assert scipy.stats.kstest(z, "norm").pvalue > 1e-3
 
 
 @pytest.mark.nightly

@@ -18,7 +18,7 @@ from lightpaint.lighting.answer.lighting_file import read_lighting, write_lighti
 from lightpaint.pipeline.results.answer_folder import with_places
 from lightpaint.progress import silent
 from lightpaint.relit.export.fixtures import fixtures_csv, pan_and_tilt
-from lightpaint.relit.export_format import Source
+from lightpaint.relit.exported_answer import Source
 from lightpaint.relit.formats import names_of_forms, writers_of
 from lightpaint.relit.relight import scene_patch
 from lightpaint.scene.lights.new_emitter import NewEmitter

@@ -12,7 +12,7 @@ import lightpaint as lp
 from lightpaint.lighting.analysis.noise.noise_correction import correct_noise
 from lightpaint.lighting.analysis.noise.uncertainty import error_bars
 from lightpaint.lighting.solve import solve
-from lightpaint.relit.render_rounds import refine_by_rendering
+from lightpaint.relit.verification_render import refine_by_rendering
 from lightpaint.scene.scene_render import Stream, pass_seed
 
 #: Seeds; of so many the first are refined, too, which renders the scene once more.

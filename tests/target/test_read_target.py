@@ -3,11 +3,11 @@
 from pathlib import Path
 from typing import Any
 
-import colour
 import numpy as np
 import OpenEXR
 import pytest
 
+from lightpaint.colour.primaries import colour_science
 from lightpaint.errors import ImageError, SizeError, TargetError
 from lightpaint.images.formats.exr import ExrPart, rgb_channels, write_parts
 from lightpaint.target.target_reader import read_target
@@ -202,8 +202,10 @@ ACESCG = (0.713, 0.293, 0.165, 0.83, 0.128, 0.044, 0.32168, 0.33767)
 @pytest.mark.parametrize(("space", "primaries"), [("ITU-R BT.2020", REC2020), ("ACEScg", ACESCG)])
 def test_other_primaries_are_converted(tmp_path: Path, image: Any, space: str, primaries: Any):
     path = _write_declared(tmp_path / "wide.exr", image, primaries)
-    rec709, other = (colour.RGB_COLOURSPACES[n] for n in ("ITU-R BT.709", space))
-    expected = colour.RGB_to_RGB(image, other, rec709, chromatic_adaptation_transform="Bradford")
+    rec709, other = (colour_science().RGB_COLOURSPACES[n] for n in ("ITU-R BT.709", space))
+    expected = colour_science().RGB_to_RGB(
+        image, other, rec709, chromatic_adaptation_transform="Bradford"
+    )
     # The primaries are stored in float32, and colour-science has whites of five decimals.
     np.testing.assert_allclose(read_target(path).image, expected, rtol=0, atol=2e-5)
 

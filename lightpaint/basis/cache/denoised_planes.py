@@ -25,8 +25,7 @@ from lightpaint.basis.planes import mix
 from lightpaint.errors import LightpaintError
 from lightpaint.files import replacing
 from lightpaint.images.denoiser import denoiser_text, oidn_is_installed
-from lightpaint.images.pixel_blocks import block_mean, blocks_in
-from lightpaint.images.resampling import resampled
+from lightpaint.images.pixel_blocks import block_mean, blocks_in, resampled
 from lightpaint.threads import parallel_map
 
 FORMAT, ARRAY_NAMES = "lightpaint-clean 4", ("halves", "scales", "present")

@@ -14,7 +14,7 @@ from threadpoolctl import threadpool_limits
 from lightpaint.batch.cluster.parcels import Parcel, ParcelStore
 from lightpaint.batch.work.item_execution import run_item
 from lightpaint.batch.work.work_items import ItemResult, item_label
-from lightpaint.batch.work.worker_cache import WorkerCache
+from lightpaint.batch.work.worker_storage import WorkerCache
 from lightpaint.progress import silent
 from lightpaint.scene.runtime.kernel_threads import limit_threads
 from lightpaint.version import __version__

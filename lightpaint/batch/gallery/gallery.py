@@ -34,10 +34,9 @@ from lightpaint.batch.gallery.summary import (
     view_folders,
 )
 from lightpaint.batch.manifest.entries import LookEntry
-from lightpaint.batch.manifest.folder_names import SUMMARY
+from lightpaint.batch.manifest.file_names import SUMMARY
 from lightpaint.batch.plan.journal import JournalLine
-from lightpaint.batch.plan.place_groups import PlaceGroup
-from lightpaint.batch.plan.plan import Plan, PlannedLook, PlanStep
+from lightpaint.batch.plan.plan import PlaceGroup, Plan, PlannedLook, PlanStep
 from lightpaint.batch.work.task import Kind, Task
 from lightpaint.display_text import visible
 from lightpaint.files import write_bytes, write_text

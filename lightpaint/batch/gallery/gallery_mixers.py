@@ -18,10 +18,10 @@ from lightpaint.basis.basis import Basis
 from lightpaint.basis.light_images import light_images
 from lightpaint.basis.lightgroups.light_groups import LightGroups
 from lightpaint.batch.gallery.summary import SummaryRow
-from lightpaint.batch.manifest.folder_names import THUMBNAILS
+from lightpaint.batch.manifest.file_names import THUMBNAILS
 from lightpaint.batch.work.item_execution import job_fields
 from lightpaint.batch.work.task import Task
-from lightpaint.batch.work.worker_cache import WorkerCache
+from lightpaint.batch.work.worker_storage import WorkerCache
 from lightpaint.colour.display.view_transform import ViewTransform
 from lightpaint.errors import LightpaintError
 from lightpaint.file_reading import read_text

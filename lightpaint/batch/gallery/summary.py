@@ -15,7 +15,7 @@ from PIL import Image
 
 from lightpaint.arrays import RGB
 from lightpaint.basis.light_images import light_images
-from lightpaint.batch.manifest.folder_names import SUMMARY_FORMAT, THUMBNAILS
+from lightpaint.batch.manifest.file_names import SUMMARY_FORMAT, THUMBNAILS
 from lightpaint.batch.plan.journal import JournalLine
 from lightpaint.batch.plan.plan import Plan, PlannedLook
 from lightpaint.batch.work.task import EXPORT, Kind

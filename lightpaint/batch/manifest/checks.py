@@ -7,7 +7,7 @@ from glob import has_magic
 from pathlib import Path
 from typing import Any
 
-from lightpaint.batch.manifest.file_patterns import files_matching
+from lightpaint.batch.manifest.file_names import files_matching
 from lightpaint.batch.manifest.keys import SOURCE_KEYS, SUBJECT_KEYS, Handover, Mistakes, near_key
 from lightpaint.batch.manifest.manifest import Manifest, Table, subject_keys
 from lightpaint.batch.manifest.variations import SOLVED_WORDS

@@ -20,7 +20,7 @@ from lightpaint.batch.manifest.checks import (
     files_named,
     settings_of,
 )
-from lightpaint.batch.manifest.folder_names import is_reserved, name_clashes
+from lightpaint.batch.manifest.file_names import is_reserved, name_clashes
 from lightpaint.batch.manifest.keys import (
     LIGHTING_STEPS,
     MAX_FRAMES,

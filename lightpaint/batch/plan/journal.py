@@ -17,7 +17,7 @@ from pathlib import Path
 from typing import Any, Literal
 
 from lightpaint.batch.manifest.entries import LookEntry
-from lightpaint.batch.manifest.folder_names import JOURNAL, JOURNAL_PART
+from lightpaint.batch.manifest.file_names import JOURNAL, JOURNAL_PART
 from lightpaint.batch.manifest.keys import Final, Handover
 from lightpaint.batch.work.task import Kind
 from lightpaint.errors import BatchError, LightpaintError, OutputError

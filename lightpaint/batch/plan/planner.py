@@ -13,22 +13,25 @@ from lightpaint.basis.render.banded_film import memory_needed
 from lightpaint.basis.render.integrators import why_not_one_pass
 from lightpaint.basis.render.render_origin import basis_lights
 from lightpaint.batch.manifest.entries import LookEntry, entries_of
-from lightpaint.batch.manifest.folder_names import check_gallery
+from lightpaint.batch.manifest.file_names import check_gallery
 from lightpaint.batch.manifest.keys import Mistakes, as_key
 from lightpaint.batch.manifest.manifest import Manifest, read_manifest
 from lightpaint.batch.manifest.variations import vary
 from lightpaint.batch.plan.journal import Fingerprints, Journal
-from lightpaint.batch.plan.place_groups import (
+from lightpaint.batch.plan.plan import (
+    Cost,
     PlaceGroup,
+    Plan,
+    PlannedLook,
+    PlanStep,
     deciding_looks,
     file_of_group,
     group_entries,
     places_of,
 )
-from lightpaint.batch.plan.plan import Cost, Plan, PlannedLook, PlanStep
 from lightpaint.batch.work.derived_looks import adjusted_light_count, derived_folder
 from lightpaint.batch.work.task import EXPORT, Task, answer_task, bases_of, export_task, render_task
-from lightpaint.batch.work.worker_cache import WorkerCache
+from lightpaint.batch.work.worker_storage import WorkerCache
 from lightpaint.display_text import some_names
 from lightpaint.errors import LOOK_ERRORS, BatchError, LightpaintError
 from lightpaint.files import check_writable

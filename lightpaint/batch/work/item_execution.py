@@ -26,7 +26,7 @@ from lightpaint.batch.work.work_items import (
     SumsOfRows,
     WorkItem,
 )
-from lightpaint.batch.work.worker_cache import WorkerCache
+from lightpaint.batch.work.worker_storage import WorkerCache
 from lightpaint.errors import LightpaintError
 from lightpaint.files import first_line, one_line
 from lightpaint.images.estimate import Estimate
@@ -49,7 +49,7 @@ from lightpaint.pipeline.results.result_folder import ResultFolder
 from lightpaint.pipeline.results.results import view_names
 from lightpaint.placement.placement import record_of
 from lightpaint.progress import Listener
-from lightpaint.relit.export_format import Source
+from lightpaint.relit.exported_answer import Source
 from lightpaint.relit.formats import names_of_forms, write_content, writers_of
 from lightpaint.scene.scene import Scene
 

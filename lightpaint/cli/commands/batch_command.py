@@ -9,7 +9,7 @@ from typing import Any
 
 from lightpaint.batch.gallery.gallery import counts_text
 from lightpaint.batch.gallery.summary import SummaryRow, summary_document
-from lightpaint.batch.manifest.folder_names import FILES
+from lightpaint.batch.manifest.file_names import FILES
 from lightpaint.batch.manifest.manifest import write_starter_manifest
 from lightpaint.batch.plan.openjd import LOOK_PARAMETER, write_openjd
 from lightpaint.batch.plan.plan import Plan, PlannedLook, estimate
@@ -18,7 +18,7 @@ from lightpaint.batch.run import BatchOutcome, run_batch
 from lightpaint.batch.run_options import RunOptions
 from lightpaint.batch.work.work_items import ItemResult
 from lightpaint.cli.output import documents, terminal
-from lightpaint.cli.output.output_mode import CommandOutcome
+from lightpaint.cli.output.lines import CommandOutcome
 from lightpaint.display_text import some_of, visible
 from lightpaint.errors import BatchError, OutputError
 from lightpaint.files import scene_name

@@ -7,7 +7,7 @@ from lightpaint.basis.cache import cache as bases
 from lightpaint.basis.cache.cache import delete_orphans, folder
 from lightpaint.cli.doctor import examine
 from lightpaint.cli.output import documents, tables, terminal
-from lightpaint.cli.output.output_mode import CommandOutcome
+from lightpaint.cli.output.lines import CommandOutcome
 from lightpaint.display_text import some_names
 from lightpaint.errors import BasisError
 

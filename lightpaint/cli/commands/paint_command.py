@@ -11,7 +11,7 @@ from threading import Thread
 from typing import TYPE_CHECKING, Any
 
 from lightpaint.cli.output import lines, terminal
-from lightpaint.cli.output.output_mode import CommandOutcome, output_mode
+from lightpaint.cli.output.lines import CommandOutcome, output_mode
 from lightpaint.colour.display.view_transform import TransformChoice
 from lightpaint.errors import OutputError
 from lightpaint.lighting.constraints.constraints import Constraints

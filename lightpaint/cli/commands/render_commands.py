@@ -1,4 +1,4 @@
-"""The sub-commands that render: basis, template, demo, relight and verify."""
+"""The sub-commands that render: lights, basis, template, demo, relight and verify."""
 
 import shlex
 from collections.abc import Sequence
@@ -8,15 +8,14 @@ from typing import Any
 
 from lightpaint.basis.basis import Basis
 from lightpaint.basis.file.basis_file import write_basis
-from lightpaint.cli.commands.lights_command import note_scene
 from lightpaint.cli.commands.solve_command import solve
 from lightpaint.cli.options.job_options import folders_of, is_folder
 from lightpaint.cli.output import documents, tables, terminal
-from lightpaint.cli.output.output_mode import CommandOutcome
+from lightpaint.cli.output.lines import CommandOutcome
 from lightpaint.cli.output.vocabulary import from_any_folder
 from lightpaint.colour.display.view_transform import ViewTransform
 from lightpaint.demo import write_demo
-from lightpaint.errors import OutputError
+from lightpaint.errors import BackendError, OutputError
 from lightpaint.files import check_files, check_name, check_writable
 from lightpaint.lighting.answer.lighting_file import read_lighting
 from lightpaint.pipeline.job.job import Job
@@ -30,6 +29,7 @@ from lightpaint.pipeline.job.sources import (
     check_nothing_unused,
 )
 from lightpaint.pipeline.job_bases import obtain
+from lightpaint.pipeline.light_sheets import check_sheet, render_sheet
 from lightpaint.pipeline.relit_renders import relight_look, relit_folder
 from lightpaint.pipeline.results.result_folder import ResultFolder
 from lightpaint.pipeline.results.results import result_folders, verify_result
@@ -43,6 +43,7 @@ from lightpaint.relit.relight import scene_of
 from lightpaint.scene.quality_presets import on_film, samples
 from lightpaint.scene.runtime.variant import use_variant
 from lightpaint.scene.scene import Scene
+from lightpaint.sentences import Sentence
 from lightpaint.storage.staging import finish
 from lightpaint.target.template import (
     CLEAN,
@@ -52,6 +53,61 @@ from lightpaint.target.template import (
     SHOWN_FILE,
     files_in_the_way,
 )
+
+
+def lights(
+    *,
+    scene: SceneFile,
+    cd_per_unit: float | None,
+    sheet: Path | None,
+    is_named: bool = True,
+    force: bool = False,
+) -> CommandOutcome:
+    """Run `lightpaint lights SCENE`.
+
+    sheet: file of the light sheet; None for none. is_named: True if the user named it; otherwise a
+    sheet that cannot be written is not an error.
+    """
+    content = scene.content
+    if sheet is not None and is_named:
+        check_sheet(content, sheet, force=force)
+    note_scene(content)
+    for remark in remarks_of_scene(content):
+        terminal.say(remark)
+    tables.show_lights(content, cd_per_unit)
+    is_drawn = sheet is not None and _draw_sheet(content, sheet, is_named=is_named, force=force)
+    sheet_fields = {"sheet": str(sheet)} if is_drawn else {}
+    return CommandOutcome(
+        lambda: {**documents.lights_document(content, cd_per_unit), **sheet_fields}
+    )
+
+
+def _draw_sheet(scene: Scene, sheet: Path, *, is_named: bool, force: bool) -> bool:
+    """Write the light sheet; print the reason and return False if it cannot be written."""
+    try:
+        check_sheet(scene, sheet, force=force)
+        with terminal.TerminalListener() as listen:
+            reason = render_sheet(scene, sheet, listen)
+    except (OutputError, BackendError) as error:
+        if is_named and isinstance(error, OutputError):
+            raise
+        reason = error.sentence
+    if reason:
+        terminal.say(Sentence(f"no {sheet}: ", reason))
+        return False
+    terminal.note("lights drawn")
+    terminal.write(f"{sheet}: each light alone")
+    return True
+
+
+def note_scene(scene: Scene) -> None:
+    """Print details of a loaded scene, in verbose mode."""
+    height, width = scene.size
+    terminal.note(
+        f"{scene.path} read: {len(scene.emitters)} emitters, {len(scene.lights)} lights, "
+        f"{width}x{height} pixels through {scene.sensor_names[scene.sensor]}, "
+        f"{use_variant().variant}"
+    )
 
 
 def basis(*, scene: SceneFile, output: Path, settings: Settings) -> CommandOutcome:

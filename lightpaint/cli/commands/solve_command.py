@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 from lightpaint.basis.basis import Basis
 from lightpaint.cli.commands.answer_text import Table, show_look, spoken_settings
 from lightpaint.cli.output import documents, tables, terminal
-from lightpaint.cli.output.output_mode import CommandOutcome
+from lightpaint.cli.output.lines import CommandOutcome
 from lightpaint.cli.tolerances import Tolerances
 from lightpaint.display_text import some_of
 from lightpaint.errors import LOOK_ERRORS

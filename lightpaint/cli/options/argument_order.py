@@ -12,7 +12,7 @@ import shlex
 from collections.abc import Iterator, Sequence
 from typing import Any, NoReturn
 
-from lightpaint.cli.options.option_themes import themed_help
+from lightpaint.cli.options.option_groups import themed_help
 from lightpaint.cli.output import lines
 
 _NUMBER = re.compile(r"[-+]?([0-9]+\.?[0-9]*|\.[0-9]+)([eE][-+]?[0-9]+)?")

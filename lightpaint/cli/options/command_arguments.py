@@ -7,7 +7,6 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from lightpaint.cli.options.argument_order import options_but
-from lightpaint.cli.options.frame_options import is_of_frames
 from lightpaint.cli.options.job_options import (
     constraints_of,
     folders_of,
@@ -16,6 +15,7 @@ from lightpaint.cli.options.job_options import (
     transform_of,
 )
 from lightpaint.cli.options.source_options import (
+    is_of_frames,
     painted_of,
     scene_of,
     scene_to_export,

@@ -7,14 +7,15 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from lightpaint.basis.lightgroups.frame_sequence import FrameSequence
-from lightpaint.cli.options.frame_options import (
+from lightpaint.cli.options.source_options import (
+    basis_of,
     groups_of_frames,
     masks_by_frame,
     name_without_frame,
     paintings_by_frame,
+    scene_of,
     sequence_of,
 )
-from lightpaint.cli.options.source_options import basis_of, scene_of
 from lightpaint.cli.output.vocabulary import BY_OPTION, from_any_folder
 from lightpaint.colour.display.view_transform import TransformChoice
 from lightpaint.display_text import some_names

@@ -4,9 +4,21 @@ import argparse
 from collections.abc import Callable
 
 from lightpaint.cli.options import arguments
+from lightpaint.cli.options.answer_options import (
+    add_batch,
+    add_constraints,
+    add_fit,
+    add_frames,
+    add_method,
+    add_paintings,
+    add_pattern,
+    add_rigging,
+    add_several,
+    add_tolerances,
+    add_variations,
+    add_verification,
+)
 from lightpaint.cli.options.argument_order import CommandParser, Parser
-from lightpaint.cli.options.batch_options import add_batch
-from lightpaint.cli.options.constraint_options import add_constraints, add_rigging
 from lightpaint.cli.options.option_groups import (
     add_budget,
     add_cache,
@@ -22,17 +34,6 @@ from lightpaint.cli.options.option_groups import (
     add_variant,
     add_view,
     add_view_transform,
-)
-from lightpaint.cli.options.solve_options import (
-    add_fit,
-    add_frames,
-    add_method,
-    add_paintings,
-    add_pattern,
-    add_several,
-    add_tolerances,
-    add_variations,
-    add_verification,
 )
 from lightpaint.pipeline.job.settings import Settings
 from lightpaint.version import __version__

@@ -23,7 +23,7 @@ from rich.table import Table
 from rich.text import Text
 
 from lightpaint.cli.output import lines
-from lightpaint.cli.output.output_mode import output_mode
+from lightpaint.cli.output.lines import output_mode
 from lightpaint.cli.output.vocabulary import spoken
 from lightpaint.display_text import visible
 

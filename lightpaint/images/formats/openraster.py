@@ -1,22 +1,36 @@
-"""Layered OpenRaster and Krita files: zip archives that contain a merged picture as PNG."""
+"""Layered OpenRaster and Krita files: zip archives that contain a merged picture as PNG.
+
+An OpenRaster archive (version 0.0.5 of the format) has its media type first, uncompressed;
+`stack.xml`, which lists layers and groups with the topmost first; a PNG for each layer, with its
+corner in the picture; the merged picture and a thumbnail of it.
+"""
 
 import errno
 import lzma
+import math
 import struct
 import tempfile
 import zipfile
 import zlib
-from collections.abc import Iterator
-from contextlib import contextmanager
-from dataclasses import replace
+from collections import Counter
+from collections.abc import Iterable, Iterator
+from contextlib import ExitStack, contextmanager
+from dataclasses import dataclass, replace
+from itertools import count
 from pathlib import Path
 from typing import IO
 from xml.etree import ElementTree
 
+import numpy as np
+from PIL import Image, ImageCms
+
+from lightpaint.arrays import Floats
+from lightpaint.colour.srgb import to_8_bit
 from lightpaint.errors import ImageError
-from lightpaint.images.formats.bitmap import Bitmap, read_bitmap
+from lightpaint.files import replacing
+from lightpaint.images.formats.bitmap import MAX_PIXELS, Bitmap, read_bitmap
 from lightpaint.images.formats.file_kinds import kind_of
-from lightpaint.images.formats.png import PNG_HEAD, longest_png
+from lightpaint.images.formats.png import PNG_HEAD, longest_png, png_bytes, png_size, write_png_16
 
 #: Media types of layered zip archives, and the name of their merged picture.
 LAYERED = {b"image/openraster": "ora", b"application/x-krita": "kra"}
@@ -112,3 +126,249 @@ def _copy(source: IO[bytes], target: IO[bytes], length: int, kind: str) -> None:
         if copied_bytes > length:
             raise ImageError(f"is damaged: a {kind} is longer than declared")
         target.write(chunk)
+
+
+#: Names and content that the format prescribes.
+MEDIA_TYPE, STACK, THUMBNAIL = "image/openraster", "stack.xml", "Thumbnails/thumbnail.png"
+VERSION, OVER = "0.0.5", "svg:src-over"
+
+#: Largest size of the list of layers in bytes, and largest number in it.
+MAX_STACK, MAX_NUMBER = 2**22, 1e6
+
+#: Most layers, most pixels of all layers together, and most groups within each other that are read.
+#: Reading so many pixels takes about two minutes.
+MAX_LAYERS, MAX_LAYER_PIXELS, MAX_DEPTH = 1000, 2**29, 100
+
+#: Largest side of the thumbnail, in pixels.
+THUMBNAIL_SIDE = 256
+
+
+@dataclass(frozen=True, eq=False)
+class RasterLayer:
+    """A layer of an OpenRaster file.
+
+    display: (rows, columns, 4), display values and alpha from 0 to 1, colour not multiplied by
+    alpha. corner: (y, x) of its first pixel in the picture.
+    """
+
+    name: str
+    display: Floats
+    corner: tuple[int, int] = (0, 0)
+    opacity: float = 1.0
+    is_visible: bool = True
+
+
+@dataclass(frozen=True, eq=False)
+class RasterGroup:
+    """Layers, the lowest first, with a name and an eye of their own. They are written in one go."""
+
+    name: str
+    layers: Iterable[RasterLayer]
+    is_visible: bool = True
+
+
+def write_openraster(
+    path: Path, layers: Iterable[RasterLayer | RasterGroup], merged: Floats, texts: dict[str, str]
+) -> None:
+    """Write layers, the lowest first, as an OpenRaster file, atomically.
+
+    layers: one is in memory at a time, if they are made as they are asked for. merged: (h, w, 3),
+    display values of what they come to. texts: to store in its PNG.
+    """
+    height, width = merged.shape[:2]
+    image = ElementTree.Element("image", version=VERSION, w=str(width), h=str(height))
+    root, numbers = ElementTree.SubElement(image, "stack"), count()
+    # Without a profile, Krita asks for one at each layer of 16 bits.
+    profile = ImageCms.ImageCmsProfile(ImageCms.createProfile("sRGB")).tobytes()
+    with replacing(path) as temporary, tempfile.TemporaryDirectory() as folder:
+        picture = Path(folder) / "picture.png"
+        with zipfile.ZipFile(temporary, "w", zipfile.ZIP_STORED) as archive:
+            archive.writestr("mimetype", MEDIA_TYPE)
+            for parent, layer in _placed(root, layers):
+                source = f"data/layer{next(numbers)}.png"
+                parent.insert(0, _element(layer, source))
+                write_png_16(picture, layer.display, profile=profile)
+                archive.write(picture, source)
+            write_png_16(picture, merged, texts=texts)
+            archive.write(picture, MERGED_PICTURE)
+            archive.writestr(THUMBNAIL, _thumbnail(merged))
+            text = ElementTree.tostring(image, encoding="utf-8", xml_declaration=True)
+            archive.writestr(STACK, text, zipfile.ZIP_DEFLATED)
+
+
+@contextmanager
+def opened_openraster(
+    path: Path,
+) -> Iterator[tuple[tuple[int, int], Iterator[RasterLayer | RasterGroup]]]:
+    """Open an OpenRaster file: yield its (height, width) and its layers, the lowest first.
+
+    A layer is decoded when the iterator comes to it, so that one is in memory at a time. Groups
+    within groups become one. Raises ImageError, without naming the file; for too many layers or
+    pixels before any is decoded.
+    """
+    with ExitStack() as open_things:
+        with naming_damage():
+            archive = open_things.enter_context(zipfile.ZipFile(path))
+            image = _parsed_stack(archive)
+            size = int(image.attrib["h"]), int(image.attrib["w"])
+            _check_size(*size)
+            root = image.find("stack")
+            if root is None:
+                raise ImageError("is damaged: it has no stack of layers")
+            _check_layers(root, archive)
+        folder = open_things.enter_context(tempfile.TemporaryDirectory())
+        yield size, _read_items(root, archive, Path(folder) / "layer.png")
+
+
+def _parsed_stack(archive: zipfile.ZipFile) -> ElementTree.Element:
+    if archive.getinfo(STACK).file_size > MAX_STACK:
+        raise ImageError("declares a list of layers that is too long")
+    text = archive.read(STACK)
+    if b"<!DOCTYPE" in text or b"<!ENTITY" in text:
+        raise ImageError("has a list of layers with declarations of its own: save it again")
+    return ElementTree.fromstring(text)
+
+
+def _check_layers(root: ElementTree.Element, archive: zipfile.ZipFile) -> None:
+    """Raise ImageError for more layers or pixels than are read.
+
+    Several layers may name one picture, and each is decoded: a short file can be long to read.
+    """
+    if _depth(root) > MAX_DEPTH:
+        raise ImageError(f"has groups in groups, more than {MAX_DEPTH} deep: merge some")
+    uses = Counter(element.attrib["src"] for element in root.iter("layer"))
+    if uses.total() > MAX_LAYERS:
+        raise ImageError(f"has {uses.total()} layers: expected at most {MAX_LAYERS}; merge some")
+    pixels = 0
+    for source, number in uses.items():
+        with archive.open(source) as packed:
+            head = packed.read(PNG_HEAD)
+        if kind_of(head) != "png":
+            raise ImageError("has a layer that is not a PNG: save it again")
+        pixels += number * math.prod(png_size(head))
+    if pixels > MAX_LAYER_PIXELS:
+        raise ImageError(
+            f"has layers of {pixels / 1e6:.0f} million pixels together: expected at most "
+            f"{MAX_LAYER_PIXELS / 1e6:.0f} million; merge some"
+        )
+
+
+def _depth(root: ElementTree.Element) -> int:
+    """Return how many groups of `root` lie in each other at most."""
+    depth, groups = 0, root.findall("stack")
+    while groups and depth <= MAX_DEPTH:
+        depth, groups = depth + 1, [inner for group in groups for inner in group.findall("stack")]
+    return depth
+
+
+def _read_items(
+    stack: ElementTree.Element, archive: zipfile.ZipFile, place: Path
+) -> Iterator[RasterLayer | RasterGroup]:
+    """Yield what a stack holds, the lowest first. place: where to unpack a picture."""
+    for element in reversed(stack):
+        if element.tag == "layer":
+            yield _read_layer(element, archive, place)
+        elif element.tag == "stack":
+            layers = _read_group(element, archive, place)
+            yield RasterGroup(element.get("name", ""), layers, _is_visible(element))
+
+
+def _read_group(
+    stack: ElementTree.Element, archive: zipfile.ZipFile, place: Path
+) -> Iterator[RasterLayer]:
+    """Yield the layers of a group and of the groups in it, the lowest first, as it shows them."""
+    share = _number(stack, "opacity", 1.0)
+    for item in _read_items(stack, archive, place):
+        if isinstance(item, RasterLayer):
+            yield replace(item, opacity=item.opacity * share)
+            continue
+        for inner in item.layers:
+            is_visible = inner.is_visible and item.is_visible
+            yield replace(inner, is_visible=is_visible, opacity=inner.opacity * share)
+
+
+def _is_visible(element: ElementTree.Element) -> bool:
+    return element.get("visibility") != "hidden"
+
+
+@naming_damage()
+def _read_layer(element: ElementTree.Element, archive: zipfile.ZipFile, place: Path) -> RasterLayer:
+    unpack_png(archive, element.attrib["src"], place, "layer")
+    bitmap = read_bitmap(place, "png")
+    if bitmap.profile is not None and not bitmap.profile.is_srgb:
+        raise ImageError(
+            f"has a layer in the colour space {bitmap.profile.name!r}: convert the image to sRGB"
+        )
+    codes = float(bitmap.codes or 1)
+    height, width = bitmap.values.shape[:2]
+    display = np.ones((height, width, 4), np.float32)
+    display[..., :3] = bitmap.values / codes
+    if bitmap.alpha is not None:
+        display[..., 3] = bitmap.alpha / codes
+    return RasterLayer(
+        element.get("name", ""),
+        display,
+        corner=(round(_number(element, "y", 0.0)), round(_number(element, "x", 0.0))),
+        opacity=_number(element, "opacity", 1.0),
+        is_visible=_is_visible(element),
+    )
+
+
+@naming_damage()
+def _number(element: ElementTree.Element, key: str, default: float) -> float:
+    value = float(element.get(key, default))
+    if not abs(value) < MAX_NUMBER:
+        raise ImageError(f"is damaged: {key} of a layer is {value:g}")
+    return value
+
+
+def _check_size(height: int, width: int) -> None:
+    if min(height, width) < 1 or height * width > MAX_PIXELS:
+        raise ImageError(f"declares {width}x{height} pixels")
+
+
+def _placed(
+    root: ElementTree.Element, layers: Iterable[RasterLayer | RasterGroup]
+) -> Iterator[tuple[ElementTree.Element, RasterLayer]]:
+    """Yield each layer with the element that holds it, the lowest first."""
+    for item in layers:
+        if isinstance(item, RasterLayer):
+            yield root, item
+            continue
+        inner = ElementTree.Element(
+            "stack", name=_xml_text(item.name), opacity="1.0", visibility=_eye(item)
+        )
+        inner.set("composite-op", OVER)
+        root.insert(0, inner)
+        for layer in item.layers:
+            yield inner, layer
+
+
+def _element(layer: RasterLayer, source: str) -> ElementTree.Element:
+    y, x = layer.corner
+    element = ElementTree.Element(
+        "layer",
+        name=_xml_text(layer.name),
+        src=source,
+        x=str(x),
+        y=str(y),
+        opacity=f"{layer.opacity:.6g}",
+        visibility=_eye(layer),
+    )
+    element.set("composite-op", OVER)
+    return element
+
+
+def _eye(item: RasterLayer | RasterGroup) -> str:
+    return "visible" if item.is_visible else "hidden"
+
+
+def _xml_text(name: str) -> str:
+    """Return a name without characters that XML cannot hold."""
+    return "".join(c if c >= " " and not 0xFFFE <= ord(c) <= 0xFFFF else " " for c in name)
+
+
+def _thumbnail(merged: Floats) -> bytes:
+    small = Image.fromarray(to_8_bit(merged))
+    small.thumbnail((THUMBNAIL_SIDE, THUMBNAIL_SIDE))
+    return png_bytes(np.asarray(small))

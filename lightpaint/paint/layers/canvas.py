@@ -24,8 +24,7 @@ from lightpaint.paint.layers.layer_pixels import (
 )
 from lightpaint.paint.layers.layer_stack import Layer, LayerStack
 from lightpaint.paint.layers.selection import SELECTION_ID
-from lightpaint.paint.store.canvas_pixels import Pixels, Region, slices
-from lightpaint.paint.store.history_steps import Patch, Step
+from lightpaint.paint.store.history_steps import Patch, Pixels, Region, Step, slices
 from lightpaint.paint.store.store import StoredComposition
 from lightpaint.target.target import Target
 

@@ -23,8 +23,7 @@ from lightpaint.paint.layers.layer_stack import (
     stack_after,
 )
 from lightpaint.paint.layers.selection import SELECTION_ID, put_selection
-from lightpaint.paint.store.canvas_pixels import Pixels, Region
-from lightpaint.paint.store.history_steps import Patch, Step, name_in_view
+from lightpaint.paint.store.history_steps import Patch, Pixels, Region, Step, name_in_view
 from lightpaint.paint.store.store import StoredComposition
 
 

@@ -24,7 +24,7 @@ from lightpaint.paint.layers.layer_pixels import (
     shared,
 )
 from lightpaint.paint.layers.layer_stack import Gradient, Layer, LayerKind
-from lightpaint.paint.store.canvas_pixels import Pixels, Region, slices
+from lightpaint.paint.store.history_steps import Pixels, Region, slices
 
 #: Lower and upper bound of importance under repeated weighing.
 MIN_WEIGHED, MAX_WEIGHED = 0.01, 1000.0

@@ -20,10 +20,10 @@ from lightpaint.errors import ImageError, PaintError
 from lightpaint.images.formats.exr import read_headers, read_parts
 from lightpaint.images.formats.exr_streams import PartHead, write_streamed
 from lightpaint.images.formats.file_kinds import head_of, kind_of
-from lightpaint.images.formats.openraster import layered_kind
-from lightpaint.images.formats.openraster_stack import (
+from lightpaint.images.formats.openraster import (
     RasterGroup,
     RasterLayer,
+    layered_kind,
     opened_openraster,
     write_openraster,
 )
@@ -33,7 +33,7 @@ from lightpaint.paint.layers.canvases import LayeredPaintings
 from lightpaint.paint.layers.layer_pixels import is_empty, relative
 from lightpaint.paint.layers.layer_stack import MAX_NAME_LENGTH, Layer, LayerStack
 from lightpaint.paint.layers.view_layers import LayerPicture, ViewLayers
-from lightpaint.paint.store.canvas_pixels import Pixels, Region, slices
+from lightpaint.paint.store.history_steps import Pixels, Region, slices
 from lightpaint.storage.json_records import read_record, strict_json
 
 #: Text attribute of the EXR, and its format.

@@ -7,8 +7,7 @@ import numpy as np
 import numpy.typing as npt
 
 from lightpaint.arrays import Bools
-from lightpaint.paint.store.canvas_pixels import Pixels, Region
-from lightpaint.paint.store.history_steps import Patch, replay
+from lightpaint.paint.store.history_steps import Patch, Pixels, Region, replay
 
 #: Side of a tile, in pixels.
 TILE_SIDE = 64

@@ -13,8 +13,7 @@ import numpy.typing as npt
 
 from lightpaint.errors import PaintError
 from lightpaint.paint.layers.layer_pixels import LayerPixels, enclosing, is_empty
-from lightpaint.paint.store.canvas_pixels import Pixels, Region
-from lightpaint.paint.store.history_steps import Patch
+from lightpaint.paint.store.history_steps import Patch, Pixels, Region
 
 #: The id under which steps hold the masks; layers of a stack have ids from 0.
 SELECTION_ID = -1

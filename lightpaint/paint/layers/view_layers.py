@@ -17,7 +17,7 @@ from lightpaint.paint.layers.composition import (
 )
 from lightpaint.paint.layers.layer_pixels import LayerPixels, is_empty, relative, shared
 from lightpaint.paint.layers.layer_stack import MAX_STRENGTH, Layer, LayerStack
-from lightpaint.paint.store.canvas_pixels import Pixels, Region, slices
+from lightpaint.paint.store.history_steps import Pixels, Region, slices
 
 _Array = npt.NDArray[np.float32]
 

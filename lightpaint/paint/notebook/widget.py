@@ -22,9 +22,8 @@ from lightpaint.lighting.answer.lighting_file import write_lighting
 from lightpaint.lighting.constraints.constraints import Constraints
 from lightpaint.lighting.solution import Solution
 from lightpaint.paint.notebook import widget_arguments
-from lightpaint.paint.notebook.cell_output import CellOutput, static_view
+from lightpaint.paint.notebook.cell_views import CellOutput, KernelThread, WidgetViews, static_view
 from lightpaint.paint.notebook.widget_arguments import notebook_advice
-from lightpaint.paint.notebook.widget_views import KernelThread, WidgetViews
 from lightpaint.paint.protocol import AnswerUpdate, Message, Notice, SessionState
 from lightpaint.paint.session.snapshot import SessionSnapshot
 from lightpaint.paint.store.history_steps import Identity

@@ -17,8 +17,8 @@ from lightpaint.lighting.answer.lighting import Lighting
 from lightpaint.lighting.constraints.constraints import Constraints
 from lightpaint.lighting.loss.painting import resolve_importance
 from lightpaint.paint.session.session import Session
-from lightpaint.paint.store.canvas_pixels import Pixels
 from lightpaint.paint.store.database import OTHER_FOLDER, START_AFRESH
+from lightpaint.paint.store.history_steps import Pixels
 from lightpaint.paint.store.session_requests import SessionRequests
 from lightpaint.paint.subject import Subject
 from lightpaint.paint.subject_factory import make_subjects

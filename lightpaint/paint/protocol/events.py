@@ -35,7 +35,7 @@ from lightpaint.paint.protocol.message_parts import (
     ViewInfo,
 )
 from lightpaint.paint.protocol.task_events import ProgressReport, VerificationResult
-from lightpaint.paint.store.canvas_pixels import Region
+from lightpaint.paint.store.history_steps import Region
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)

@@ -7,7 +7,7 @@ from typing import Any, Literal
 from lightpaint.arrays import RGB
 from lightpaint.paint.layers.layer_stack import Gradient, Layer
 from lightpaint.paint.protocol.base import OPTIONAL
-from lightpaint.paint.store.canvas_pixels import Region
+from lightpaint.paint.store.history_steps import Region
 
 
 @dataclass(frozen=True)

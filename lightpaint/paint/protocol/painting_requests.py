@@ -8,7 +8,7 @@ from lightpaint.arrays import RGB
 from lightpaint.paint.layers.layer_stack import PAINTING_ID, Layer
 from lightpaint.paint.protocol.base import Request
 from lightpaint.paint.protocol.message_parts import PlacePair
-from lightpaint.paint.store.canvas_pixels import Region
+from lightpaint.paint.store.history_steps import Region
 
 #: Maximum number of steps in one list.
 MAX_LISTED_STEPS = 10_000

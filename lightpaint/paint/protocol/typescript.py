@@ -17,7 +17,7 @@ import numpy as np
 from lightpaint.arrays import RGB
 from lightpaint.paint.layers.layer_stack import Layer
 from lightpaint.paint.protocol import Event, Request, answer_parts, message_parts
-from lightpaint.paint.store.canvas_pixels import Region
+from lightpaint.paint.store.history_steps import Region
 
 #: The file of types, beside the scripts that use them.
 FILE = Path(__file__).parents[1] / "page" / "engine" / "messages.d.ts"

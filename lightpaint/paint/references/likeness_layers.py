@@ -28,8 +28,10 @@ from lightpaint.paint.references.likeness import (
     WHOLE_AREA,
     AreaChange,
     LightArea,
+    ViewPart,
     changed_light,
     find_changes,
+    find_part,
     of_another_place,
     part_areas,
     spot_area,
@@ -42,8 +44,7 @@ from lightpaint.paint.references.reference_light import (
 )
 from lightpaint.paint.references.reference_table import ReferenceTable
 from lightpaint.paint.references.tones import Tones
-from lightpaint.paint.references.view_part import ViewPart, find_part
-from lightpaint.paint.store.canvas_pixels import Region
+from lightpaint.paint.store.history_steps import Region
 
 #: Correlation of the edges of a reference and of a part of a view from which on they show one
 #: place: parts of the shipped scenes under other lightings have .5 to .9, other places .47 at most.

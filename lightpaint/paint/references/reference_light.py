@@ -13,8 +13,13 @@ from lightpaint.paint.layers.canvas import Canvas
 from lightpaint.paint.layers.composition import compose_layer
 from lightpaint.paint.layers.layer_stack import Layer
 from lightpaint.paint.presets.lamp_roles import LampRoles
-from lightpaint.paint.presets.light_layers import LampGroup, is_divided, layers_of, masks_of
-from lightpaint.paint.presets.preset_masks import reduction
+from lightpaint.paint.presets.preset_masks import (
+    LampGroup,
+    is_divided,
+    layers_of,
+    masks_of,
+    reduction,
+)
 from lightpaint.paint.presets.view_areas import MIN_ALBEDO, Mask, ViewAreas
 from lightpaint.paint.presets.view_light import find_roles, light_share
 from lightpaint.paint.references.light_match import (
@@ -30,7 +35,7 @@ from lightpaint.paint.references.light_match import (
     stops_darker,
 )
 from lightpaint.paint.references.tones import LightTones, Tones
-from lightpaint.paint.store.canvas_pixels import Pixels
+from lightpaint.paint.store.history_steps import Pixels
 
 #: Approximate pixels of the longer side of the picture in which changes are found.
 FINDING_SIDE = 160

@@ -22,10 +22,16 @@ from lightpaint.paint.rig.added_lights import (
     new_emitter,
     site_of_new,
 )
-from lightpaint.paint.rig.cameras import camera_of, free_length, in_this_thread, up_axis
 from lightpaint.paint.rig.moved_bases import one_light_basis, with_planes_of
+from lightpaint.paint.rig.page_geometry import (
+    camera_of,
+    free_length,
+    in_this_thread,
+    plan_objects,
+    sky_axes,
+    up_axis,
+)
 from lightpaint.paint.rig.quick_planes import QuickPlanes
-from lightpaint.paint.rig.room_plan import plan_objects, sky_axes
 from lightpaint.paint.session.moved_lights import Placed, added_names
 from lightpaint.paint.subject import Subject
 from lightpaint.placement.freedom import Freedom

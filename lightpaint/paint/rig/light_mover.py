@@ -27,7 +27,6 @@ from lightpaint.paint.protocol import (
     PointLight,
     TaskStarted,
 )
-from lightpaint.paint.publisher import Publisher
 from lightpaint.paint.rig.added_lights import free_name, values_of, with_level
 from lightpaint.paint.rig.lamp_rig import LampRig
 from lightpaint.paint.rig.pointing import emitter_at_place, pose_change
@@ -40,7 +39,7 @@ from lightpaint.paint.session.page_planes import (
 )
 from lightpaint.paint.session.picture_table import Picture, plane_thumbnail
 from lightpaint.paint.session.session import Session
-from lightpaint.paint.session_access import SessionAccess
+from lightpaint.paint.session_access import Publisher, SessionAccess
 from lightpaint.paint.store.history_steps import name_in_view
 
 #: Luminance of a spot that is aimed well, relative to that of a lamp without a cone at its place.

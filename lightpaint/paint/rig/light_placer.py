@@ -19,13 +19,12 @@ from lightpaint.paint.protocol import (
     TaskStarted,
     TrialPlaces,
 )
-from lightpaint.paint.publisher import Publisher
 from lightpaint.paint.rig.added_lights import free_name, values_of
 from lightpaint.paint.rig.lamp_rig import LampRig
-from lightpaint.paint.rig.moved_subjects import of_moved_scenes
+from lightpaint.paint.rig.moved_looks import of_moved_scenes
 from lightpaint.paint.session.moved_lights import Placed
 from lightpaint.paint.session.snapshot import SessionSnapshot
-from lightpaint.paint.session_access import SessionAccess
+from lightpaint.paint.session_access import Publisher, SessionAccess
 from lightpaint.paint.store.session_requests import HOLD_KEYS
 from lightpaint.paint.store.store import Store, StoredRecords
 from lightpaint.placement.freedom import Freedom
@@ -33,7 +32,7 @@ from lightpaint.placement.new_lights import NewLights
 from lightpaint.placement.place import place
 from lightpaint.placement.placement import Move, Placement
 from lightpaint.placement.rigged_lights import freedom_on
-from lightpaint.placement.search.search_time import SearchSize, usual_pace
+from lightpaint.placement.search.new_light_search import SearchSize, usual_pace
 from lightpaint.progress import cancellable
 from lightpaint.scene.properties.pose import Pose, Site
 from lightpaint.scene.runtime.render_lock import MITSUBA

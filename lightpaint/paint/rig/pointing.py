@@ -13,7 +13,8 @@ from lightpaint.arrays import Doubles
 from lightpaint.errors import PaintError, SceneError
 from lightpaint.paint.protocol import AddLight, PointLight
 from lightpaint.paint.rig.added_lights import hung_at, hung_before
-from lightpaint.paint.rig.cameras import (
+from lightpaint.paint.rig.lamp_rig import LampRig, RigView
+from lightpaint.paint.rig.page_geometry import (
     FirstHit,
     FreeLength,
     camera_of,
@@ -22,7 +23,6 @@ from lightpaint.paint.rig.cameras import (
     in_this_thread,
     up_axis,
 )
-from lightpaint.paint.rig.lamp_rig import LampRig, RigView
 from lightpaint.scene.lights.new_emitter import NewEmitter
 from lightpaint.scene.properties.pose import Pose, Site
 

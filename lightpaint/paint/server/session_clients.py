@@ -41,7 +41,7 @@ from lightpaint.paint.protocol import (
     SessionState,
 )
 from lightpaint.paint.server.client import Client, IncomingMessage
-from lightpaint.paint.session_owner import SessionOwner
+from lightpaint.paint.session_access import SessionOwner
 from lightpaint.paint.store.store import Store
 from lightpaint.progress import cancellable
 

@@ -19,9 +19,8 @@ from lightpaint.paint.layers.selection import put_selection
 from lightpaint.paint.protocol import HistoryInfo, StepInfo, StepList
 from lightpaint.paint.session.live_answer import LiveAnswer
 from lightpaint.paint.session.picture_table import display_thumbnail
-from lightpaint.paint.store.canvas_pixels import Region
 from lightpaint.paint.store.database import DamagedError
-from lightpaint.paint.store.history_steps import Patch, Step
+from lightpaint.paint.store.history_steps import Patch, Region, Step
 from lightpaint.paint.store.session_requests import SessionRequests
 from lightpaint.paint.store.store import Store
 from lightpaint.paint.store.stored_arrays import StepAnswer

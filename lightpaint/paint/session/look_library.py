@@ -30,8 +30,7 @@ from lightpaint.paint.protocol import (
 from lightpaint.paint.session.moved_lights import Placed
 from lightpaint.paint.session.picture_table import PictureTable, display_thumbnail
 from lightpaint.paint.session.session import Session
-from lightpaint.paint.store.canvas_pixels import Pixels, mix_pixels
-from lightpaint.paint.store.history_steps import StoredLook, name_in_view
+from lightpaint.paint.store.history_steps import Pixels, StoredLook, mix_pixels, name_in_view
 from lightpaint.paint.store.session_requests import SessionRequests
 
 #: Maximum length of a look's name.

@@ -35,7 +35,7 @@ from lightpaint.paint.protocol import (
 )
 from lightpaint.paint.session.history import History
 from lightpaint.paint.session.live_answer import LiveAnswer
-from lightpaint.paint.store.canvas_pixels import Region
+from lightpaint.paint.store.history_steps import Region
 from lightpaint.paint.store.session_requests import HOLD_KEYS
 from lightpaint.report.delivery_sentences import (
     ALONE_ADVICE,

@@ -14,8 +14,7 @@ import numpy as np
 import numpy.typing as npt
 
 from lightpaint.errors import PaintError
-from lightpaint.paint.store.canvas_pixels import Pixels, Region
-from lightpaint.paint.store.history_steps import Patch
+from lightpaint.paint.store.history_steps import Patch, Pixels, Region
 
 #: The fastest level, since strokes must not wait.
 ZLIB_LEVEL = 1

@@ -26,7 +26,6 @@ import numpy as np
 
 from lightpaint.arrays import Floats
 from lightpaint.errors import LightpaintError, OutputError, PaintError
-from lightpaint.paint.store.canvas_pixels import Pixels, Region
 from lightpaint.paint.store.compression import pack_patches, pack_pixels, unpack_pixels
 from lightpaint.paint.store.database import (
     DAMAGE_ERRORS,
@@ -38,7 +37,7 @@ from lightpaint.paint.store.database import (
     identify,
     transaction,
 )
-from lightpaint.paint.store.history_steps import Identity, Step, StoredLook
+from lightpaint.paint.store.history_steps import Identity, Pixels, Region, Step, StoredLook
 from lightpaint.paint.store.recovery import recover_or_raise
 from lightpaint.paint.store.stored_arrays import (
     LookArrays,

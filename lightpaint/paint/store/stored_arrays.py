@@ -19,10 +19,9 @@ import numpy.typing as npt
 from lightpaint.arrays import Doubles
 from lightpaint.errors import PaintError
 from lightpaint.files import first_line
-from lightpaint.paint.store.canvas_pixels import Pixels, Region
 from lightpaint.paint.store.compression import is_marked, pack, unpack, unpack_patches
 from lightpaint.paint.store.database import DAMAGE_ERRORS, damaged_error
-from lightpaint.paint.store.history_steps import Patch
+from lightpaint.paint.store.history_steps import Patch, Pixels, Region
 from lightpaint.storage.json_records import strict_json
 
 #: A stored step: id, kind, label, fields and places, the last two as JSON.

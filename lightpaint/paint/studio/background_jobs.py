@@ -25,11 +25,10 @@ from lightpaint.paint.protocol import (
     TaskStopped,
     VerificationResult,
 )
-from lightpaint.paint.publisher import Publisher
 from lightpaint.paint.rig.light_mover import LightMover
-from lightpaint.paint.rig.moved_subjects import of_moved_scenes, shadow_remark, write_places
+from lightpaint.paint.rig.moved_looks import of_moved_scenes, shadow_remark, write_places
 from lightpaint.paint.session.snapshot import SessionSnapshot
-from lightpaint.paint.session_access import SessionAccess
+from lightpaint.paint.session_access import Publisher, SessionAccess
 from lightpaint.paint.store.history_steps import name_in_view
 from lightpaint.paint.store.session_requests import SessionRequests
 from lightpaint.paint.studio.export_folders import EXPORTS, folder_name, new_folder

@@ -29,12 +29,11 @@ from lightpaint.paint.protocol import (
     AnswerUpdate,
     Findings,
 )
-from lightpaint.paint.publisher import Publisher
 from lightpaint.paint.session.picture_table import Picture, display_thumbnail
 from lightpaint.paint.session.session import Session
 from lightpaint.paint.session.session_messages import judge, wish_delivery
 from lightpaint.paint.session.snapshot import SessionSnapshot
-from lightpaint.paint.session_access import SessionAccess
+from lightpaint.paint.session_access import Publisher, SessionAccess
 from lightpaint.paint.store.history_steps import name_in_view
 from lightpaint.progress import cancellable
 

@@ -26,10 +26,9 @@ from lightpaint.paint.protocol import (
     ReferenceList,
     TaskStarted,
 )
-from lightpaint.paint.publisher import Publisher
 from lightpaint.paint.references.reference_table import read_reference
 from lightpaint.paint.session.session import Session
-from lightpaint.paint.session_access import SessionAccess
+from lightpaint.paint.session_access import Publisher, SessionAccess
 
 #: Largest file that a page may send, in bytes.
 MAX_LAYERS_BYTES = 2**29

@@ -15,10 +15,9 @@ from lightpaint.lighting.answer.lighting import Lighting
 from lightpaint.paint import protocol
 from lightpaint.paint.background_threads import BackgroundThreads, StoppedError, error_text
 from lightpaint.paint.protocol import Message, RenderInfo, RenderList
-from lightpaint.paint.publisher import Publisher
 from lightpaint.paint.session.picture_table import Picture, display_thumbnail
 from lightpaint.paint.session.snapshot import SessionSnapshot
-from lightpaint.paint.session_access import SessionAccess
+from lightpaint.paint.session_access import Publisher, SessionAccess
 from lightpaint.paint.store.store import StoredRecords
 from lightpaint.paint.studio.export_folders import RENDERS, folder_name, new_folder
 from lightpaint.paint.subject import Subject

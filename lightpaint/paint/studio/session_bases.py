@@ -19,7 +19,6 @@ from lightpaint.lighting.solution import Solution
 from lightpaint.paint.background_threads import LatestWork, StoppedError
 from lightpaint.paint.layers.canvas import Canvas
 from lightpaint.paint.protocol import ProgressReport, Tone
-from lightpaint.paint.publisher import Publisher
 from lightpaint.paint.rig.light_mover import LightMover
 from lightpaint.paint.session.look_library import LookLibrary
 from lightpaint.paint.session.page_planes import (
@@ -40,7 +39,7 @@ from lightpaint.paint.session.session_state import (
     offered_transforms,
 )
 from lightpaint.paint.session.snapshot import SessionSnapshot
-from lightpaint.paint.session_access import SessionAccess
+from lightpaint.paint.session_access import Publisher, SessionAccess
 from lightpaint.paint.store.history_steps import Identity, name_in_view
 from lightpaint.paint.store.store import Store
 from lightpaint.paint.studio.file_imports import begin_with_layers

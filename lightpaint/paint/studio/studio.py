@@ -31,18 +31,16 @@ from lightpaint.paint.protocol import (
     SessionState,
     Tone,
 )
-from lightpaint.paint.publisher import Publisher
 from lightpaint.paint.rig.lamp_rig import LampRig
 from lightpaint.paint.rig.light_mover import LightMover
 from lightpaint.paint.rig.light_placer import LightPlacer
-from lightpaint.paint.rig.look_comparison import LookComparison
+from lightpaint.paint.rig.moved_looks import LookComparison
 from lightpaint.paint.session.moved_lights import Placed
 from lightpaint.paint.session.session import Session
 from lightpaint.paint.session.session_state import offer_ground, state_fields
 from lightpaint.paint.session.snapshot import SessionSnapshot
-from lightpaint.paint.session_access import SessionAccess
-from lightpaint.paint.store.canvas_pixels import Pixels
-from lightpaint.paint.store.history_steps import Identity
+from lightpaint.paint.session_access import Publisher, SessionAccess
+from lightpaint.paint.store.history_steps import Identity, Pixels
 from lightpaint.paint.store.session_requests import SessionRequests
 from lightpaint.paint.store.store import Store
 from lightpaint.paint.studio.background_jobs import BackgroundJobs

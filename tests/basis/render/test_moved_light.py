@@ -24,7 +24,7 @@ from lightpaint.basis.render.render_budget import Budget, steps
 from lightpaint.batch.distributed_work import PartwiseRender
 from lightpaint.batch.work.item_execution import run_item
 from lightpaint.batch.work.work_items import ItemResult, SceneFilm
-from lightpaint.batch.work.worker_cache import WorkerCache
+from lightpaint.batch.work.worker_storage import WorkerCache
 from lightpaint.errors import BasisError
 from lightpaint.pipeline.job.settings import Settings
 from lightpaint.pipeline.job.sources import SceneFile

@@ -5,9 +5,9 @@ from typing import Any
 
 import numpy as np
 import pytest
+import scipy
 from nightly import nightly
 from renderer import LIGHTS, PLASTIC, write_room
-from scipy import stats
 
 from lightpaint.arrays import Doubles
 from lightpaint.basis.basis import Basis
@@ -119,8 +119,8 @@ def deviations(image: np.ndarray, half_difference: np.ndarray, truth: Estimate) 
     lit_blocks = variance > 1e-12 * block_sums(truth.image) ** 2
     gap = (block_sums(image) - block_sums(truth.image))[lit_blocks]
     freedom = 3 * variance[lit_blocks] ** 2 / fourth[lit_blocks]
-    tail = stats.t.sf(np.abs(gap) / np.sqrt(variance[lit_blocks]), freedom)
-    return np.asarray(np.sign(gap) * stats.norm.isf(tail))
+    tail = scipy.stats.t.sf(np.abs(gap) / np.sqrt(variance[lit_blocks]), freedom)
+    return np.asarray(np.sign(gap) * scipy.stats.norm.isf(tail))
 
 
 def check_means(z: Doubles) -> None:

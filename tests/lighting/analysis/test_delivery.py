@@ -3,11 +3,11 @@
 from dataclasses import replace
 from typing import Any
 
-import colour
 import numpy as np
 import pytest
 
 from lightpaint.colour.display.view_transform import ViewTransform
+from lightpaint.colour.primaries import colour_science
 from lightpaint.images.object_map import Objects
 from lightpaint.lighting.analysis.appearance.appearance import compare_appearance
 from lightpaint.lighting.analysis.appearance.delivery import (
@@ -70,7 +70,7 @@ def test_brightness_that_came_is_a_share_of_the_asked_lightness(make_basis: Any,
     assert delivery.color is None
     assert delivery.is_met == (share >= 0.75)
     assert delivery.asked_brightness == pytest.approx(
-        colour.delta_E([40, 0, 0], [60, 0, 0], method="CIE 2000"), rel=1e-3
+        colour_science().delta_E([40, 0, 0], [60, 0, 0], method="CIE 2000"), rel=1e-3
     )
 
 
@@ -105,9 +105,9 @@ def test_colour_is_a_projection_in_lab(make_basis: Any):
 
 def _rgb(*lab: float) -> np.ndarray:
     """Linear Rec.709 of L*a*b*, by colour-science."""
-    white = colour.CCS_ILLUMINANTS["CIE 1931 2 Degree Standard Observer"]["D65"]
-    xyz = colour.Lab_to_XYZ(np.array(lab), white)
-    return np.asarray(colour.XYZ_to_RGB(xyz, "sRGB", white, None))
+    white = colour_science().CCS_ILLUMINANTS["CIE 1931 2 Degree Standard Observer"]["D65"]
+    xyz = colour_science().Lab_to_XYZ(np.array(lab), white)
+    return np.asarray(colour_science().XYZ_to_RGB(xyz, "sRGB", white, None))
 
 
 def test_a_subject_that_stands_out_as_asked_came_in_any_light(make_basis: Any):
@@ -150,7 +150,7 @@ def test_the_dark_half_of_a_picture_says_nothing(make_basis: Any):
     """Its lit half is far off, and the mean over all of it is half of that."""
     now, asked = (_picture((LEFT, _grey(x))) for x in (40, 60))
     report = _measure(make_basis, now, asked, now, Wish("Day", WHOLE))
-    difference = colour.delta_E([40, 0, 0], [60, 0, 0], method="CIE 2000")
+    difference = colour_science().delta_E([40, 0, 0], [60, 0, 0], method="CIE 2000")
     # But for the blur of its edge.
     assert report.lit_delta_e == pytest.approx(difference, rel=0.06)
     assert report.deliveries[0].lit_pixels == pytest.approx(LEFT.sum(), rel=0.1)

@@ -7,9 +7,8 @@ from typing import Any
 
 import numpy as np
 import pytest
+import scipy
 from nightly import nightly
-from scipy.stats import t as student
-from scipy.stats import truncnorm
 
 from lightpaint.basis.basis import Basis
 from lightpaint.basis.planes import MemoryPlanes
@@ -180,7 +179,9 @@ def test_intervals_are_those_of_student_where_few_pixels_have_noise(make_basis: 
         coverages.append((low <= clean) & (clean <= high))
         normal_coverages.append(np.abs(bars.weights - clean) <= NORMAL_95 * bars.standard_error)
     # The channels of 200 seeds are 600 cases, of whose share 0.009 is a standard error.
-    assert np.mean(normal_coverages) == pytest.approx(2 * student.cdf(1.96, 3) - 1, abs=4 * 0.015)
+    assert np.mean(normal_coverages) == pytest.approx(
+        2 * scipy.stats.t.cdf(1.96, 3) - 1, abs=4 * 0.015
+    )
     assert 0.95 - 3 * 0.009 <= np.mean(coverages) <= 0.985
 
 
@@ -520,7 +521,7 @@ def test_what_to_believe_is_decided_among_what_may_move(make_basis: Any, name: s
 def test_an_interval_at_a_bound_is_that_of_a_cut_off_normal(u: float):
     """P(X > U) = 0.05 P(X > 0) for X ~ N(-u s, s²), with s = 2."""
     end = _one_sided(2 * u, 2.0)
-    cut_off = truncnorm(u, np.inf, loc=-2 * u, scale=2)
+    cut_off = scipy.stats.truncnorm(u, np.inf, loc=-2 * u, scale=2)
     # Far out SciPy's own loses itself; there its tail is exponential.
     expected = cut_off.isf(0.05) if u <= 30 else 2 * np.log(20) / u
     assert end == pytest.approx(expected, rel=2e-3)
@@ -540,7 +541,7 @@ def test_a_light_that_is_off_by_more_than_noise_may_be_on_by_little(make_basis: 
     M, b = (np.einsum("hwc,hwc->c", image[0], x) for x in (image[0], painted))
     u, s = -b / M, np.sqrt(np.square(half[0] * painted).sum((0, 1))) / M
     assert (u > 3 * s).all()
-    expected = truncnorm.isf(0.05, u / s, np.inf, loc=-u, scale=s)
+    expected = scipy.stats.truncnorm.isf(0.05, u / s, np.inf, loc=-u, scale=s)
     low, high = bars.interval
     np.testing.assert_array_equal(low, 0)
     np.testing.assert_allclose(high[0], expected, rtol=1e-3)

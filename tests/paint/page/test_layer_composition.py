@@ -12,7 +12,7 @@ from lightpaint.paint.layers.composed_layers import accents
 from lightpaint.paint.layers.composition import ShownLayer, compose, with_effect
 from lightpaint.paint.layers.layer_pixels import LayerPixels
 from lightpaint.paint.layers.layer_stack import Layer, LayerKind, LayerStack
-from lightpaint.paint.store.canvas_pixels import Pixels
+from lightpaint.paint.store.history_steps import Pixels
 
 #: More than one tile in both directions.
 H, W = 70, 90

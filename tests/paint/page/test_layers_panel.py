@@ -25,7 +25,7 @@ from lightpaint.paint.layers.layer_pixels import LayerPixels
 from lightpaint.paint.layers.layer_stack import Layer, LayerStack
 from lightpaint.paint.layers.view_layers import ViewLayers
 from lightpaint.paint.server.server import Server
-from lightpaint.paint.store.canvas_pixels import Pixels
+from lightpaint.paint.store.history_steps import Pixels
 from lightpaint.paint.store.store import Store
 from lightpaint.paint.studio.studio import Studio
 from lightpaint.paint.subject_factory import make_subject

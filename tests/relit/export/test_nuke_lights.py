@@ -18,7 +18,7 @@ import lightpaint as lp
 from lightpaint.lighting.answer.lighting_file import write_lighting
 from lightpaint.pipeline.results.answer_folder import with_places
 from lightpaint.relit.export.nuke import STRAIGHT, rotate_of
-from lightpaint.relit.export_format import Source
+from lightpaint.relit.exported_answer import Source
 from lightpaint.relit.formats import names_of_forms
 from lightpaint.relit.relight import scene_of
 from lightpaint.scene.lights.new_emitter import NewEmitter

@@ -11,7 +11,7 @@ from blender import in_blender
 from exported_places import DOWN, OLD, PLACES, RGB, WAY, z_up
 from fake_blender import FakeMatrix, fake_blender, run_in
 
-from lightpaint.relit.export.scene_script import scene_script
+from lightpaint.relit.export.exports import scene_script
 from lightpaint.scene.properties.site import EmitterPlace
 
 #: Blender's matrices and cones are float32.

@@ -9,7 +9,7 @@ import pytest
 from blender import has_working_spaces, in_blender
 
 from lightpaint.colour.primaries import ACESCG, REC709, REC2020, from_rec709
-from lightpaint.relit.export.scene_script import scene_script
+from lightpaint.relit.export.exports import scene_script
 
 #: Standard errors of 256 samples of a small lamp from afar, and its size over its distance.
 NOISE = 0.01

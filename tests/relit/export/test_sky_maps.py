@@ -14,7 +14,7 @@ from lightpaint.images.formats.exr import write_rgb
 from lightpaint.lighting.answer.lighting import Lighting
 from lightpaint.progress import listener, silent
 from lightpaint.relit.export.program_axes import blender_axes, lat_long, map_axes
-from lightpaint.relit.export_format import Source
+from lightpaint.relit.exported_answer import Source
 from lightpaint.relit.formats import write_content, writers_of
 from lightpaint.scene.scene import Scene
 

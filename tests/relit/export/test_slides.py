@@ -17,8 +17,7 @@ from lightpaint.colour.color import luminance
 from lightpaint.images.formats.exr import write_rgb
 from lightpaint.lighting.answer.lighting import Lighting
 from lightpaint.relit.export.fixtures import fixtures_of
-from lightpaint.relit.export_format import Source
-from lightpaint.relit.exported_lights import emitters_of, half_slide, slide_images_of
+from lightpaint.relit.exported_answer import Source, emitters_of, half_slide, slide_images_of
 from lightpaint.scene.runtime.variant import use_variant
 from lightpaint.scene.scene import Scene
 

@@ -14,7 +14,7 @@ from renderer import write_room
 import lightpaint as lp
 from lightpaint.images.formats.exr import write_rgb
 from lightpaint.lighting.answer.lighting import Lighting
-from lightpaint.relit.export_format import Source
+from lightpaint.relit.exported_answer import Source
 from lightpaint.scene.scene import Scene
 
 COLUMNS, ROWS = 6, 4
