@@ -2,7 +2,7 @@
 
 import os
 from collections.abc import Callable, Iterable, Iterator
-from concurrent.futures import ThreadPoolExecutor
+from concurrent.futures import ThreadPoolExecutor, wait
 from contextlib import contextmanager
 from contextvars import copy_context
 from functools import cache
@@ -14,7 +14,7 @@ from typing import Any, TypeVar
 import numpy as np  # noqa: F401
 from threadpoolctl import ThreadpoolController
 
-from lightpaint.progress import cancellable, cancellation_check
+from lightpaint.progress import cancellable, cancellation_check, counting
 
 Job = TypeVar("Job")
 Result = TypeVar("Result")
@@ -68,12 +68,14 @@ class _CancelledError(Exception):
     """The end of jobs that are cancelled because another one failed or was interrupted."""
 
 
-def parallel_map(work: Callable[[Job], Result], jobs: Iterable[Job]) -> list[Result]:
+def parallel_map(
+    work: Callable[[Job], Result], jobs: Iterable[Job], *, unit: str | None = None
+) -> list[Result]:
     """Return `work(job)` for each job, several at a time with BLAS on one thread; results in order.
 
     Results are equal, bit for bit, to those of one job after the other. Of several errors that of
     the first job is raised. A job may call this function itself. Cancelled work ends before the
-    next job.
+    next job. unit: the plural of jobs that take equally long, whose number is reported as progress.
     """
     remaining_jobs = list(jobs)
     results: list[Any] = [None] * len(remaining_jobs)
@@ -92,24 +94,24 @@ def parallel_map(work: Callable[[Job], Result], jobs: Iterable[Job]) -> list[Res
                 with cancellable(check_both):
                     check_both()
                     results[k] = work(remaining_jobs[k])
+                    advance()
             except Exception as error:
                 errors[k] = error
 
-    with one_thread():
+    with one_thread(), counting(len(remaining_jobs), unit) as advance:
         # One thread more than processors, so that three channels share two of them evenly.
         max_helpers = (os.cpu_count() or 1) if _limit is None else _limit - 1
         helper_count = min(max_helpers, len(remaining_jobs) - 1)
         helpers = [_pool().submit(copy_context().run, take_turns) for _ in range(helper_count)]
+        # A helper that has not begun by then has nothing to do, and others may need its thread.
         try:
             take_turns()
+            wait([helper for helper in helpers if not helper.cancel()])
         except BaseException:
-            has_ended.set()  # an interrupt waits for no job that has not begun yet
+            # An interrupt waits for no job that has not begun yet, and those that have are cancelled.
+            has_ended.set()
+            wait([helper for helper in helpers if not helper.cancel()])
             raise
-        finally:
-            # A helper that has not begun by now has nothing to do, and others may need its thread.
-            for helper in helpers:
-                if not helper.cancel():
-                    helper.result()
     if errors:
         raise errors[min(errors)]
     return results

@@ -14,6 +14,7 @@ import numpy as np
 import numpy.typing as npt
 
 from lightpaint.arrays import Bools, Doubles, Floats, Indices
+from lightpaint.progress import with_progress
 from lightpaint.threads import one_thread
 
 #: Number of pixels multiplied at a time, whose float64 copies stay in the processor's cache.
@@ -114,12 +115,12 @@ class PlanesBase:
         return f"{type(self).__name__}({self.count} of {width}x{height})"
 
     def __iter__(self) -> Iterator[Floats]:
-        return (self.plane(k) for k in range(self.count))
+        return (self.plane(k) for k in with_progress(range(self.count), "lights"))
 
     def squares(self) -> Doubles:
         """Return Σ Φ² over all pixels and channels, (n,)."""
         totals, pixels = np.zeros(self.count), self.size[0] * self.size[1]
-        for start in range(0, pixels, BLOCK_PIXELS):
+        for start in with_progress(range(0, pixels, BLOCK_PIXELS)):
             block = self.pixels(slice(start, start + BLOCK_PIXELS)).astype(np.float64)
             totals += np.einsum("npc,npc->n", block, block)
         return totals
@@ -142,7 +143,7 @@ class PlanesBase:
         gram = np.zeros((3, n + 1, n + 1))
         room = np.empty((n + 1, min(BLOCK_PIXELS, counted.size)))
         with one_thread() if n <= FEW_LIGHTS else nullcontext():
-            for start in range(0, counted.size, BLOCK_PIXELS):
+            for start in with_progress(range(0, counted.size, BLOCK_PIXELS)):
                 where = as_slice(counted[start : start + BLOCK_PIXELS])
                 values = self.pixels(where)
                 weights, painted = squares(where, values)
@@ -240,7 +241,7 @@ def power_and_totals(planes: Planes, mask: Bools) -> tuple[Doubles, Doubles]:
     counted_f64 = mask.ravel().astype(np.float64)
     # NumPy sums over such short axes slowly, but multiplies matrices fast; in float64 and by blocks
     # a product is as exact as a sum, and needs no copy of the basis.
-    for start in range(0, counted_f64.size, BLOCK_PIXELS):
+    for start in with_progress(range(0, counted_f64.size, BLOCK_PIXELS)):
         weights = counted_f64[start : start + BLOCK_PIXELS]
         block = planes.pixels(slice(start, start + BLOCK_PIXELS)).astype(np.float64)
         totals += np.ones(weights.size) @ block

@@ -70,13 +70,16 @@ def _run_parsed(options: argparse.Namespace, words: Sequence[str], received: Seq
         with _without_garbage(), interruptible_between_pieces():
             from lightpaint.cli.options.command_arguments import values_of
             from lightpaint.cli.output import terminal
+            from lightpaint.progress import stage
             from lightpaint.scene.runtime.variant import SlowBackendWarning
 
             command = _command(options.command)
 
         # The commands report this in their own words.
         warnings.simplefilter("ignore", SlowBackendWarning)
-        outcome = command(**values_of(options, words))
+        with terminal.TerminalListener() as listen, stage("reading the files", listen):
+            values = values_of(options, words)
+        outcome = command(**values)
         if options.as_json and outcome.document is not None:
             terminal.write_json(outcome.document())
         terminal.note("done")

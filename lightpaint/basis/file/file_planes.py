@@ -102,7 +102,7 @@ class RowPlanes(PlanesBase):
         def fill(top: int) -> None:
             mixed[top : top + step] = mix(self.rows(top, min(top + step, height)), weights)
 
-        parallel_map(fill, range(0, height, step))
+        parallel_map(fill, range(0, height, step), unit="strips")
         return mixed
 
     def replaced(self, planes: Mapping[int, Floats]) -> Planes:

@@ -32,6 +32,7 @@ from lightpaint.images.packed_picture import PackedPicture, pack_picture
 from lightpaint.images.pixel_blocks import block_mean
 from lightpaint.lighting.answer.lighting import ALL_REACHED, Lighting
 from lightpaint.lighting.answer.lighting_file import lighting_fields
+from lightpaint.progress import with_progress
 from lightpaint.report.basis_memo import MAX_PIXELS, cached_clean_planes, make_once, page_reduction
 from lightpaint.report.page.figures import CLEAN_REDUCTION, data_uri
 from lightpaint.report.page.html import html
@@ -206,9 +207,9 @@ def _compact_planes(
 
     # A denoiser uses all processors itself.
     pictures = (
-        [small(k) for k in range(count)]
+        [small(k) for k in with_progress(range(count), "planes")]
         if must_denoise
-        else in_turns(small, range(count), basis.size)
+        else in_turns(small, range(count), basis.size, unit="planes")
     )
     return list(pictures[0].shape[:2]), parallel_map(plane_data, pictures)
 

@@ -25,6 +25,7 @@ from lightpaint.lighting.analysis.noise.residuals import Residuals, channel_grai
 from lightpaint.lighting.normal_equations import NormalEquations
 from lightpaint.lighting.problem import Problem
 from lightpaint.lighting.solution import Solution
+from lightpaint.progress import with_progress
 from lightpaint.threads import one_thread, parallel_map
 
 #: Half differences by which the pixel beside may differ. Beyond, it shows something else: an edge,
@@ -148,12 +149,12 @@ def noise_sums(solution: Solution, *, removed: float | None = None) -> Noise:
     length = BLOCK_PIXELS * max(1, -(-counted.size // (BLOCK_PIXELS * PARTS)))
     parts = [counted[k : k + length] for k in range(0, counted.size, length)]
     sums = [_Sums.zeros(len(weights))] + (
-        parallel_map(lambda part: pixels.sums(part, is_coupled=is_coupled), parts)
+        parallel_map(lambda x: pixels.sums(x, is_coupled=is_coupled), parts, unit="parts")
         if len(weights) <= FEW_LIGHTS
-        else [pixels.sums(part, is_coupled=is_coupled) for part in parts]
+        else [pixels.sums(x, is_coupled=is_coupled) for x in with_progress(parts, "parts")]
     )
     error, noise = np.zeros((2, 3))
-    for start in range(0, len(weight), BLOCK_PIXELS):
+    for start in with_progress(range(0, len(weight), BLOCK_PIXELS)):
         part = slice(start, start + BLOCK_PIXELS)
         mixed = residuals.noise(part)
         error += np.square(weight[part] * residuals.residual(part) * mixed).sum(axis=0)
@@ -201,7 +202,7 @@ def painting_covariance(solution: Solution) -> Doubles | None:
     if np.square(roots).sum() <= MIN_PAINTING_NOISE * (pixels.weight * np.square(mixed)).sum():
         return None
     covariance = np.zeros((3, n, 3, n))
-    for start in range(0, pixels.counted.size, BLOCK_PIXELS):
+    for start in with_progress(range(0, pixels.counted.size, BLOCK_PIXELS)):
         part = as_slice(pixels.counted[start : start + BLOCK_PIXELS])
         rows = pixels.planes.pixels(part) * roots[part]
         for c, d in [(k, k) for k in range(3)] + [(0, 1), (0, 2), (1, 2)] * is_coupled:
@@ -286,7 +287,7 @@ class NoisyPixels:
     def sums(self, counted: Indices, *, is_coupled: bool) -> _Sums:
         """Sum over some pixels."""
         sums = _Sums.zeros(len(self.weights))
-        for start in range(0, counted.size, BLOCK_PIXELS):
+        for start in with_progress(range(0, counted.size, BLOCK_PIXELS)):
             pixels = as_slice(counted[start : start + BLOCK_PIXELS])
             arrays = self.noise.pixels(pixels), self.planes.pixels(pixels)
             missed = self.residuals.residual(pixels)
