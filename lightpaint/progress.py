@@ -18,6 +18,9 @@ from typing import Protocol, TypeVar
 
 from lightpaint.sentences import Sentence
 
+#: For stages that cannot be shortened.
+NO_ADVICE = Sentence()
+
 Step = TypeVar("Step")
 
 #: Seconds that a stage lasts before it reports: a shorter one needs no progress.
@@ -198,7 +201,7 @@ _STAGE: ContextVar[_Stage | None] = ContextVar("stage", default=None)
 
 @contextmanager
 def stage(
-    label: str, progress: Progress | None = None, advice: Sentence = Sentence()
+    label: str, progress: Progress | None = None, advice: Sentence = NO_ADVICE
 ) -> Iterator[None]:
     """Report the loops of the work within as those of the stage `label`, if it lasts a second.
 

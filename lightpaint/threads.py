@@ -2,12 +2,12 @@
 
 import os
 from collections.abc import Callable, Iterable, Iterator
-from concurrent.futures import ThreadPoolExecutor, wait
+from concurrent.futures import Future, ThreadPoolExecutor, wait
 from contextlib import contextmanager
 from contextvars import copy_context
 from functools import cache
 from itertools import count
-from threading import Event, local
+from threading import Event, Thread, local
 from typing import Any, TypeVar
 
 # The controller finds the libraries that are loaded, and NumPy must be among them.
@@ -15,6 +15,9 @@ import numpy as np  # noqa: F401
 from threadpoolctl import ThreadpoolController
 
 from lightpaint.progress import cancellable, cancellation_check, counting
+
+#: Seconds between two checks whether work was cancelled while a call runs apart.
+CHECK_S = 0.1
 
 Job = TypeVar("Job")
 Result = TypeVar("Result")
@@ -108,13 +111,33 @@ def parallel_map(
             take_turns()
             wait([helper for helper in helpers if not helper.cancel()])
         except BaseException:
-            # An interrupt waits for no job that has not begun yet, and those that have are cancelled.
+            # Jobs that have begun are cancelled; an interrupt waits for no others.
             has_ended.set()
             wait([helper for helper in helpers if not helper.cancel()])
             raise
     if errors:
         raise errors[min(errors)]
     return results
+
+
+def run_apart(work: Callable[..., Result], *arguments: Any) -> Result:
+    """Return `work(*arguments)`, a call of seconds that nothing can interrupt, as of LAPACK.
+
+    It runs in a thread of its own. If the calling thread is interrupted, or its work cancelled, the
+    call is left to itself, and its result is dropped.
+    """
+    check, outcome = cancellation_check(), Future[Result]()
+
+    def run() -> None:
+        try:
+            outcome.set_result(work(*arguments))
+        except BaseException as error:
+            outcome.set_exception(error)
+
+    Thread(target=copy_context().run, args=(run,), name="lightpaint-apart", daemon=True).start()
+    while not wait([outcome], CHECK_S).done:
+        check()
+    return outcome.result()
 
 
 def limit_jobs(count: int | None) -> None:

@@ -19,6 +19,7 @@ import numpy as np
 
 from lightpaint.arrays import Bools, Doubles, Floats, Indices
 from lightpaint.basis.planes import BLOCK_PIXELS, FEW_LIGHTS, Planes, as_slice
+from lightpaint.lighting.algebra.eigenvectors import eigenvectors
 from lightpaint.lighting.analysis.noise.dominant_pixels import Peaks, t_ratios
 from lightpaint.lighting.analysis.noise.pixel_gradients import PixelGradients
 from lightpaint.lighting.analysis.noise.residuals import Residuals, channel_grain
@@ -376,8 +377,7 @@ def denoised_matrix(equations: NormalEquations, power: Doubles) -> Doubles:
 def eigh(M: Doubles) -> tuple[Doubles, Doubles]:
     """Return eigenvalues and vectors; small matrices on one thread, which is faster."""
     with one_thread() if len(M) <= SMALL_MATRIX else nullcontext():
-        values, vectors = np.linalg.eigh(M)
-    return values, vectors
+        return eigenvectors(M)
 
 
 def pseudo_inverse(M: Doubles) -> Doubles:
