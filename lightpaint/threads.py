@@ -3,7 +3,7 @@
 import os
 from collections.abc import Callable, Iterable, Iterator
 from concurrent.futures import Future, ThreadPoolExecutor, wait
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from contextvars import copy_context
 from functools import cache
 from itertools import count
@@ -138,6 +138,35 @@ def run_apart(work: Callable[..., Result], *arguments: Any) -> Result:
     while not wait([outcome], CHECK_S).done:
         check()
     return outcome.result()
+
+
+def start_in_background(work: Callable[[], None], *, name: str) -> None:
+    """Start `work` in a thread of this name; `end_background_work` cancels it."""
+    has_ended = Event()
+
+    def check() -> None:
+        if has_ended.is_set():
+            raise _CancelledError
+
+    def run() -> None:
+        try:
+            with cancellable(check), suppress(_CancelledError):
+                work()
+        finally:
+            _background.discard(has_ended)
+
+    _background.add(has_ended)
+    Thread(target=run, name=name).start()
+
+
+def end_background_work() -> None:
+    """Cancel what runs in the background, since the program waits for it when it exits."""
+    for has_ended in list(_background):
+        has_ended.set()
+
+
+#: The events that end the work in the background.
+_background: set[Event] = set()
 
 
 def limit_jobs(count: int | None) -> None:

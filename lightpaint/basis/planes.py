@@ -150,7 +150,7 @@ class PlanesBase:
                 root, is_per_channel = np.sqrt(weights.astype(np.float64)), weights.shape[1] == 3
                 # (n + 1, block): the target goes along as one more row.
                 block = room[:, : len(painted)]
-                for c in range(3):
+                for c in with_progress(range(3)):
                     channel_root = root[:, c * is_per_channel]
                     np.multiply(values[..., c], channel_root, out=block[:n])
                     np.multiply(painted[:, c], channel_root, out=block[n])

@@ -85,6 +85,9 @@ def _run_parsed(options: argparse.Namespace, words: Sequence[str], received: Seq
         terminal.note("done")
         return outcome.code
     except KeyboardInterrupt as interrupt:
+        from lightpaint.threads import end_background_work
+
+        end_background_work()
         hint = f": {interrupt}" if str(interrupt) else ""
     except Exception as error:
         # An interrupt inside a library often surfaces as an error of its own.

@@ -6,7 +6,7 @@ Many looks share a basis, and cores are idle now and then while one of them is s
 import weakref
 from collections.abc import Callable, Hashable
 from concurrent.futures import Future
-from threading import Lock, Thread, main_thread
+from threading import Lock
 from typing import Any, TypeVar
 
 from lightpaint.basis.basis import Basis
@@ -16,7 +16,7 @@ from lightpaint.basis.cache.denoised_planes import (
     read_denoised_planes,
 )
 from lightpaint.images.pixel_blocks import fitting_factor
-from lightpaint.progress import cancellable
+from lightpaint.threads import start_in_background
 
 Result = TypeVar("Result")
 
@@ -83,16 +83,10 @@ def cached_clean_planes(basis: Basis) -> DenoisedPlanes | None:
 def make_ahead(basis: Basis, make: Callable[[Basis], object]) -> None:
     """Start `make(basis)` in a thread of its own, so that a later call finds its results."""
 
-    def check() -> None:
-        # Python waits for this thread before it exits, so it stops where nobody needs the results.
-        if not main_thread().is_alive():
-            raise SystemExit
-
     def run() -> None:
         try:
-            with cancellable(check):
-                make(basis)
+            make(basis)
         except Exception:  # a later call raises it again
             return
 
-    Thread(target=run, name="lightpaint-ahead").start()
+    start_in_background(run, name="lightpaint-ahead")

@@ -292,14 +292,14 @@ class NoisyPixels:
             pixels = as_slice(counted[start : start + BLOCK_PIXELS])
             arrays = self.noise.pixels(pixels), self.planes.pixels(pixels)
             missed = self.residuals.residual(pixels)
-            rows = [self._rows(sums, pixels, arrays, missed, c) for c in range(3)]
-            for c in range(3):
+            rows = [self._rows(sums, pixels, arrays, missed, c) for c in with_progress(range(3))]
+            for c in with_progress(range(3)):
                 sums.gradient[c, :, c] += rows[c] @ rows[c].T
                 squares = np.square(rows[c])
                 sums.fourth[c] += np.einsum("ip,ip->i", squares, squares)
             if is_coupled:
                 # One path carries all three channels, so their noise goes together.
-                for c, d in ((0, 1), (0, 2), (1, 2)):
+                for c, d in with_progress(((0, 1), (0, 2), (1, 2))):
                     product = rows[c] @ rows[d].T
                     sums.gradient[c, :, d] += product
                     sums.gradient[d, :, c] += product.T
