@@ -193,7 +193,19 @@ class _Stage:
                 self._is_announced = True
                 takes = f"{self.label} takes {spoken_duration(spent_s + left_s)} or more"
                 self.listen.say(Sentence(takes, self.advice))
-            self.listen(self.label, done, total, unit)
+            token = _PACE.set(pace)
+            try:
+                self.listen(self.label, done, total, unit)
+            finally:
+                _PACE.reset(token)
+
+
+_PACE: ContextVar[Pace | None] = ContextVar("pace", default=None)
+
+
+def pace_of_report() -> Pace | None:
+    """Return the pace of the loop that is reported to the listener that asks, if it is known."""
+    return _PACE.get()
 
 
 _STAGE: ContextVar[_Stage | None] = ContextVar("stage", default=None)

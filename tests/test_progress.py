@@ -150,16 +150,16 @@ def test_a_log_says_now_and_then_how_much_is_left(
     for done in range(1, 41):
         clock.now_s += 3
         listen("basis", done, 40)
-    for done in (3, 4, 5):  # a loop that is heard of late
-        clock.now_s += 1
-        listen("report", done, 20, "planes")
+    with stage("report", listen):  # heard of after a second, with the pace since it began
+        for _ in with_progress(range(20), "planes"):
+            clock.now_s += 0.4
     lines = capfd.readouterr().err.splitlines()
     assert lines[:3] == [
         "basis: 40 passes",
         "basis: 4 of 40 passes, 108 s left",
         "basis: 8 of 40 passes, 96 s left",
     ]
-    assert lines[-1] == "report: 4 of 20 planes, 16 s left"
+    assert lines[-1] == "report: 3 of 20 planes, 7 s left"
     assert len(lines) == 11
     with using_output_mode(OutputMode(json_progress=True)):
         listen("basis", 1, 3)

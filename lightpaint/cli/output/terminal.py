@@ -28,7 +28,7 @@ from lightpaint.cli.output import lines
 from lightpaint.cli.output.output_mode import output_mode
 from lightpaint.cli.output.vocabulary import spoken
 from lightpaint.display_text import visible
-from lightpaint.progress import Pace, spoken_duration
+from lightpaint.progress import Pace, pace_of_report, spoken_duration
 
 
 def numbers(rgb: tuple[float, float, float]) -> str:
@@ -206,7 +206,7 @@ class TerminalListener:
         work = self._works.get(label)
         if work is None or done < work.done or total != work.total:  # it begins, or begins again
             line_s = None if work is None or done == 0 else work.line_s
-            work = self._works[label] = _Work(Pace(done), done, total, line_s)
+            work = self._works[label] = _Work(pace_of_report() or Pace(done), done, total, line_s)
         work.done = done
         left_s = work.pace.left_s(done, total)
         if output_mode().json_progress:
