@@ -1,8 +1,8 @@
 """Progress of stages, the time that is left, and work that ends when it is cancelled."""
 
+import signal
 import threading
 import time
-from _thread import interrupt_main
 from types import SimpleNamespace
 from typing import Any
 
@@ -48,7 +48,8 @@ def reports(monkeypatch: pytest.MonkeyPatch) -> Reports:
 
 @pytest.fixture
 def clock(monkeypatch: pytest.MonkeyPatch) -> SimpleNamespace:
-    """A clock that the test sets."""
+    """A clock that the test sets. A second is long for a stage."""
+    monkeypatch.setattr(progress, "QUIET_S", 1.0)
     hands = SimpleNamespace(now_s=0.0)
     monkeypatch.setattr(time, "monotonic", lambda: hands.now_s)
     return hands
@@ -187,6 +188,13 @@ def test_loops_end_before_the_next_step_when_they_are_cancelled():
     assert steps == [0, 1, 2]
 
 
+def press_ctrl_c() -> None:
+    """Interrupt the main thread, also where it waits."""
+    ident = threading.main_thread().ident
+    assert ident is not None
+    signal.pthread_kill(ident, signal.SIGINT)
+
+
 #: Steps of a millisecond: as long as tests wait.
 ENDLESS = range(int(1000 * PATIENCE_S))
 
@@ -197,7 +205,7 @@ def test_an_interrupt_cancels_jobs_of_other_threads_that_have_begun():
     def work(is_long: bool) -> None:
         if not is_long:
             begun.wait(PATIENCE_S)
-            threading.Timer(0.1, interrupt_main).start()
+            threading.Timer(0.1, press_ctrl_c).start()
             return
         try:
             for k in with_progress(ENDLESS):
@@ -222,7 +230,7 @@ def test_a_call_that_runs_apart_is_left_to_itself():
     try:
         with pytest.raises(StoppedError), cancellable(stop):
             run_apart(may_end.wait, PATIENCE_S)
-        threading.Timer(0.1, interrupt_main).start()
+        threading.Timer(0.1, press_ctrl_c).start()
         with pytest.raises(KeyboardInterrupt):
             run_apart(may_end.wait, PATIENCE_S)
         assert not may_end.is_set()
