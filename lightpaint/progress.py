@@ -161,6 +161,24 @@ def spoken_duration(seconds: float) -> str:
     return f"{math.ceil(seconds / 60)} min" if seconds < 7200 else f"{math.ceil(seconds / 3600)} h"
 
 
+class Announcement:
+    """The remark on work of more than a minute, made once, when a share of its steps is done.
+
+    advice: how to skip or shorten it, like ` (report=False skips it)`.
+    """
+
+    def __init__(self, label: str, advice: Sentence) -> None:
+        self._label, self._advice, self._is_made = label, advice, False
+
+    def remark(self, spent_s: float, left_s: float | None, share: float) -> Sentence | None:
+        """Return the remark if it is to be made now. share: of the steps that are done."""
+        if self._is_made or left_s is None or share < ESTIMATE_SHARE or spent_s + left_s <= LONG_S:
+            return None
+        self._is_made = True
+        duration = spoken_duration(spent_s + left_s)
+        return Sentence(f"{self._label} takes {duration} or more", self._advice)
+
+
 class _Stage:
     """A stage of a longer work, which reports the loops within it.
 
@@ -173,7 +191,7 @@ class _Stage:
         self.label, self.listen, self.advice = label, listen, advice
         #: Held while the listener is called, which need not know about threads.
         self.voice = Lock() if voice is None else voice
-        self._begin_s, self._is_announced = time.monotonic(), False
+        self._begin_s, self._announcement = time.monotonic(), Announcement(label, advice)
         #: Held by the loop that is reported.
         self.turn = Lock()
 
@@ -183,16 +201,9 @@ class _Stage:
         if spent_s < QUIET_S:
             return
         with self.voice:
-            left_s = pace.left_s(done, total)
-            if (
-                left_s is not None
-                and done >= ESTIMATE_SHARE * total
-                and spent_s + left_s > LONG_S
-                and not self._is_announced
-            ):
-                self._is_announced = True
-                takes = f"{self.label} takes {spoken_duration(spent_s + left_s)} or more"
-                self.listen.say(Sentence(takes, self.advice))
+            remark = self._announcement.remark(spent_s, pace.left_s(done, total), done / total)
+            if remark is not None:
+                self.listen.say(remark)
             token = _PACE.set(pace)
             try:
                 self.listen(self.label, done, total, unit)
