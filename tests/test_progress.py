@@ -13,6 +13,7 @@ from lightpaint import progress
 from lightpaint.cli.output import terminal
 from lightpaint.cli.output.output_mode import OutputMode, using_output_mode
 from lightpaint.cli.output.terminal import TerminalListener
+from lightpaint.pipeline.job_bases import _RenderWatch
 from lightpaint.progress import Pace, cancellable, spoken_duration, stage, with_progress
 from lightpaint.sentences import Hint, Sentence
 from lightpaint.threads import (
@@ -125,6 +126,24 @@ def test_a_stage_of_more_than_a_minute_says_so_first_and_what_skips_it(clock: Si
         for _ in with_progress(range(100)):
             clock.now_s += 0.5
     assert reports.remarks == []
+
+
+def test_a_render_of_more_than_a_minute_says_so_first_and_what_shortens_it(clock: SimpleNamespace):
+    reports = Reports()
+    watch = _RenderWatch(reports, has_moved=False, names_cache=True)
+    for done in range(21):
+        watch.report("basis", done, 20)
+        assert len(reports.remarks) == (done >= 1)
+        clock.now_s += 9
+    [remark] = reports.remarks
+    assert remark.startswith("rendering takes 3 min or more: fewer samples or pixels take less")
+    assert "spp=..." in remark
+    assert len(reports.counts) == 21
+    watch = _RenderWatch(reports, has_moved=False, names_cache=False)
+    for done in range(21):  # of a budget of seconds
+        watch.report("basis", 10 * done, 200, "seconds")
+        clock.now_s += 10
+    assert reports.remarks == [remark]
 
 
 def test_the_time_left_follows_from_the_steps_that_were_counted(clock: SimpleNamespace):
