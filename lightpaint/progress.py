@@ -32,7 +32,10 @@ LONG_S, ESTIMATE_SHARE = 60.0, 0.05
 
 
 class Progress(Protocol):
-    """A callable that is called after each finished piece of work."""
+    """A callable that is called after each finished piece of work.
+
+    Calls may come from any thread, one at a time.
+    """
 
     def __call__(self, label: str, done: int, total: int, unit: str = "passes") -> None:
         """Report that `done` of `total` pieces of the work named `label` are finished.

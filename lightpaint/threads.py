@@ -109,7 +109,9 @@ def parallel_map(
         # A helper that has not begun by then has nothing to do, and others may need its thread.
         try:
             take_turns()
-            wait([helper for helper in helpers if not helper.cancel()])
+            for helper in helpers:
+                if not helper.cancel():
+                    helper.result()
         except BaseException:
             # Jobs that have begun are cancelled; an interrupt waits for no others.
             has_ended.set()
