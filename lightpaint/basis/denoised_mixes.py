@@ -47,11 +47,30 @@ def denoise_mix(
     weights: (n, 3). mixed: the sum, if it is already computed. factor: side of the blocks of pixels
     that are averaged to one.
     """
-    total = basis.mix(weights) if mixed is None else mixed
-    pictures = [total]
+    known = None if mixed is None else [mixed]
+    [mix] = denoise_mixes(basis, [weights], mixed=known, factor=factor, quality=quality)
+    return mix
+
+
+def denoise_mixes(
+    basis: Basis,
+    weights: Sequence[Doubles],
+    *,
+    mixed: Sequence[Floats] | None = None,
+    factor: int = 1,
+    quality: Quality = "fast",
+) -> list[Floats]:
+    """Return several mixes denoised, in one walk over each set of planes.
+
+    weights: (n, 3) each. For the others see `denoise_mix`.
+    """
+    together = np.array(weights)
+    sets = [basis.planes.mixes(together) if mixed is None else mixed]
     if (parts := basis.indirect) is not None:
-        pictures += [planes.mix(weights) for planes in (basis.noise, parts.planes, parts.noise)]
-    return _denoise_pictures(basis, pictures, factor, quality)
+        sets += [x.mixes(together) for x in (basis.noise, parts.planes, parts.noise)]
+    return [
+        _denoise_pictures(basis, pictures, factor, quality) for pictures in zip(*sets, strict=True)
+    ]
 
 
 def denoise_current_look(basis: Basis, *, quality: Quality = "fast") -> Floats:

@@ -230,6 +230,7 @@ class JoinedRow(RowPlanes):
             values[:, in_part] = self._parts[int(k)].pixels(where[in_part] - self._ends[k])
         return values
 
-    def mix(self, weights: Doubles) -> npt.NDArray[np.float32]:
-        """Return Σ w_i Φ_i, (1, p, 3)."""
-        return np.concatenate([part.mix(weights).reshape(-1, 3) for part in self._parts])[None]
+    def mixes(self, weights: Doubles) -> npt.NDArray[np.float32]:
+        """Return several sums Σ w_i Φ_i, (k, 1, p, 3)."""
+        parts = (part.mixes(weights).reshape(len(weights), -1, 3) for part in self._parts)
+        return np.concatenate(list(parts), axis=1)[:, None]

@@ -8,14 +8,14 @@ from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import nullcontext
 from dataclasses import dataclass
 from itertools import pairwise
-from typing import Protocol
+from typing import Any, Protocol
 
 import numpy as np
 import numpy.typing as npt
 
 from lightpaint.arrays import Bools, Doubles, Floats, Indices
 from lightpaint.progress import with_progress
-from lightpaint.threads import one_thread
+from lightpaint.threads import one_thread, parallel_map
 
 #: Number of pixels multiplied at a time, whose float64 copies stay in the processor's cache.
 BLOCK_PIXELS = 2**13
@@ -46,6 +46,10 @@ class Planes(Protocol):
     def size(self) -> tuple[int, int]:
         """(height, width) in pixels."""
 
+    @property
+    def is_noisy(self) -> bool:
+        """True if most planes are stored in half floats, whose rounding their noise hides."""
+
     def __iter__(self) -> Iterator[Floats]:
         """Yield the planes, (h, w, 3) each."""
 
@@ -63,6 +67,12 @@ class Planes(Protocol):
 
     def mix(self, weights: Doubles) -> npt.NDArray[np.float32]:
         """Return Σ w_i Φ_i, (h, w, 3). weights: (n, 3), one per light and channel."""
+
+    def mixes(self, weights: Doubles) -> npt.NDArray[np.float32]:
+        """Return several such sums, (k, h, w, 3), in one walk. weights: (k, n, 3)."""
+
+    def exact_mix(self, weights: Doubles) -> Doubles:
+        """Return Σ w_i Φ_i channel by channel, (3, p), summed in float64. weights: (n, 3)."""
 
     def sums(self, weight: Floats, image: Floats) -> tuple[Doubles, Doubles, Doubles]:
         """Return M (3, n, n), b (3, n) and ‖Ψ‖² (3,) over all pixels, in one walk.
@@ -106,6 +116,11 @@ class PlanesBase:
         """Return the plane of light i, (h, w, 3)."""
         raise NotImplementedError
 
+    @property
+    def is_noisy(self) -> bool:
+        """True if most planes are stored in half floats, whose rounding their noise hides."""
+        return False
+
     def pixels(self, where: slice | Indices) -> Floats:
         """Return some pixels of all planes, (n, p, 3)."""
         raise NotImplementedError
@@ -116,6 +131,26 @@ class PlanesBase:
 
     def __iter__(self) -> Iterator[Floats]:
         return (self.plane(k) for k in with_progress(range(self.count), "lights"))
+
+    def mix(self, weights: Doubles) -> npt.NDArray[np.float32]:
+        """Return Σ w_i Φ_i, (h, w, 3)."""
+        return np.asarray(self.mixes(np.asarray(weights)[None])[0])
+
+    def mixes(self, weights: Doubles) -> npt.NDArray[np.float32]:
+        """Return several such sums, (k, h, w, 3), in one walk. weights: (k, n, 3)."""
+        raise NotImplementedError
+
+    def exact_mix(self, weights: Doubles) -> Doubles:
+        """Return Σ w_i Φ_i channel by channel, (3, p), summed in float64. weights: (n, 3)."""
+        pixels = self.size[0] * self.size[1]
+        mixed = np.empty((3, pixels))
+
+        def fill(start: int) -> None:
+            block = slice(start, min(start + BLOCK_PIXELS, pixels))
+            mixed[:, block] = mix_channels(self.pixels(block), weights)
+
+        parallel_map(fill, range(0, pixels, BLOCK_PIXELS), unit="blocks")
+        return mixed
 
     def squares(self) -> Doubles:
         """Return Σ Φ² over all pixels and channels, (n,)."""
@@ -141,19 +176,22 @@ class PlanesBase:
         """Return M (3, n, n), b (3, n) and ‖Ψ‖² (3,) of squares computed one block at a time."""
         n = self.count
         gram = np.zeros((3, n + 1, n + 1))
-        room = np.empty((n + 1, min(BLOCK_PIXELS, counted.size)))
+        step, kind = block_of(self)
+        # Pixels without weight in between cost less than gathering the others.
+        spare = 0 if n <= FEW_LIGHTS else step // 8
+        room = np.empty((n + 1, min(step, counted.size) + spare), kind)
         with one_thread() if n <= FEW_LIGHTS else nullcontext():
-            for start in with_progress(range(0, counted.size, BLOCK_PIXELS)):
-                where = as_slice(counted[start : start + BLOCK_PIXELS])
+            for start in with_progress(range(0, counted.size, step)):
+                where = as_slice(counted[start : start + step], spare=spare)
                 values = self.pixels(where)
                 weights, painted = squares(where, values)
-                root, is_per_channel = np.sqrt(weights.astype(np.float64)), weights.shape[1] == 3
+                root, is_per_channel = np.sqrt(weights, dtype=kind), weights.shape[1] == 3
                 # (n + 1, block): the target goes along as one more row.
                 block = room[:, : len(painted)]
                 for c in with_progress(range(3)):
                     channel_root = root[:, c * is_per_channel]
                     np.multiply(values[..., c], channel_root, out=block[:n])
-                    np.multiply(painted[:, c], channel_root, out=block[n])
+                    np.multiply(painted[:, c], channel_root, out=block[n], casting="same_kind")
                     gram[c] += block @ block.T
         return gram[:, :n, :n], gram[:, :n, n], gram[:, n, n]
 
@@ -190,9 +228,9 @@ class MemoryPlanes(PlanesBase):
         """Return these pixels as planes with a single row."""
         return MemoryPlanes(self.pixels(where)[:, None])
 
-    def mix(self, weights: Doubles) -> npt.NDArray[np.float32]:
-        """Return Σ w_i Φ_i, (h, w, 3)."""
-        return mix(self._images, weights)
+    def mixes(self, weights: Doubles) -> npt.NDArray[np.float32]:
+        """Return several sums Σ w_i Φ_i, (k, h, w, 3)."""
+        return np.stack([mix(self._images, one) for one in weights])
 
     def replaced(self, planes: Mapping[int, Floats]) -> "MemoryPlanes":
         """Return planes in which some lights have other planes, (h, w, 3) each."""
@@ -238,22 +276,43 @@ def power_and_totals(planes: Planes, mask: Bools) -> tuple[Doubles, Doubles]:
     mask: (h, w).
     """
     power, totals = np.zeros((2, planes.count, 3))
-    counted_f64 = mask.ravel().astype(np.float64)
-    # NumPy sums over such short axes slowly, but multiplies matrices fast; in float64 and by blocks
-    # a product is as exact as a sum, and needs no copy of the basis.
-    for start in with_progress(range(0, counted_f64.size, BLOCK_PIXELS)):
-        weights = counted_f64[start : start + BLOCK_PIXELS]
-        block = planes.pixels(slice(start, start + BLOCK_PIXELS)).astype(np.float64)
-        totals += np.ones(weights.size) @ block
-        block *= block
-        power += weights @ block
+    counted = mask.ravel()
+    # NumPy sums over such short axes slowly, but multiplies matrices fast; by blocks, which need no
+    # copy of the basis, a product is as exact as a sum.
+    step, kind = block_of(planes)
+    for start in with_progress(range(0, len(counted), step)):
+        weights = counted[start : start + step].astype(kind)
+        block = planes.pixels(slice(start, start + step))
+        for c in range(3):
+            lit = np.ascontiguousarray(block[..., c], kind)
+            totals[:, c] += lit @ np.ones_like(weights)
+            power[:, c] += np.square(lit) @ weights
     return power, totals
 
 
-def as_slice(pixels: Indices) -> slice | Indices:
-    """Return contiguous pixels as a slice, which avoids a copy, and others unchanged."""
+def block_of(planes: "Planes | PlanesBase") -> tuple[int, Any]:
+    """Return the number of pixels whose light is multiplied at a time, and the type of products.
+
+    Products of many lights take most of a solve, and half as long in float32. Their round-off, 10⁻⁷
+    to 10⁻⁶ of M, is far below that of half floats; sums over blocks are float64 all the same.
+    """
+    if planes.count <= FEW_LIGHTS or not planes.is_noisy:
+        return BLOCK_PIXELS, np.float64
+    return BLOCK_PIXELS // 2, np.float32
+
+
+def as_slice(pixels: Indices, *, spare: int = 0) -> slice | Indices:
+    """Return contiguous pixels as a slice, which avoids a copy, and others unchanged.
+
+    spare: number of further pixels that the slice may have.
+    """
     first, last = int(pixels[0]), int(pixels[-1])
-    return slice(first, last + 1) if last - first + 1 == pixels.size else pixels
+    return slice(first, last + 1) if last - first + 1 <= pixels.size + spare else pixels
+
+
+def mix_channels(lit: Floats, weights: Doubles) -> Doubles:
+    """Return Σ w_i Φ_i of pixels (n, p, 3), channel by channel, (3, p) float64. weights: (n, 3)."""
+    return np.stack([weights[:, c] @ lit[..., c].astype(np.float64) for c in range(3)])
 
 
 def mix(images: Floats, weights: Doubles) -> npt.NDArray[np.float32]:

@@ -255,7 +255,15 @@ def _least_loss(
         begin, from_clipping = (
             (begin, not is_near) if near_optimum is None else (near_optimum, False)
         )
-        return descend(basis, loss, begin, weights_of, pull=pull, from_clipping=from_clipping)
+        return descend(
+            basis,
+            loss,
+            begin,
+            weights_of,
+            pull=pull,
+            from_clipping=from_clipping,
+            known=(problem.squares, equations) if loss.pixels.has_pieces else None,
+        )
 
     descent = descend_from(start)
     current, lit = nearest_to_current(problem), LitPixels.of(basis, loss)

@@ -6,7 +6,11 @@ import numpy as np
 
 from lightpaint.arrays import Doubles, Floats
 from lightpaint.basis.basis import Basis
-from lightpaint.basis.denoised_mixes import denoise_current_look, denoise_mix
+from lightpaint.basis.denoised_mixes import (
+    denoise_current_look,
+    denoise_mix,
+    denoise_mixes,
+)
 from lightpaint.colour.display.view_transform import ViewTransform
 from lightpaint.images.bands import LARGE_PICTURE, by_bands
 from lightpaint.images.denoiser import DENOISED_KEY, Features, denoised, denoiser_text
@@ -77,6 +81,10 @@ class CleanLooks:
         raw = "predicted.exr" + ("" if verified is None else ", verified.exr")
         texts = denoiser_text(features, raw=raw)
         planes = cached_clean_planes(basis)
+        if planes is None and basis.former is None:
+            looks = [basis.current_look, predicted]
+            now, answer = denoise_mixes(basis, [basis.current_weights, weights], mixed=looks)
+            return cls(now, answer, verified, texts)
         if planes is None or basis.former is not None:
             now = denoise_current_look(basis)
         else:

@@ -171,6 +171,7 @@ def test_memory_holds_many_planes_in_two_bytes_a_number(
     target = lp.Target.of(source.mix(np.full((3, 3), 0.7)))
     write_basis(tmp_path / "a.basis.exr", source)
     monkeypatch.setattr(basis_file, "SINGLES_MAX_BYTES", 0)
+    monkeypatch.setattr(basis_file, "INDIRECT_MAX_BYTES", 0)
     rendered, reread = as_stored(source), read_basis(tmp_path / "a.basis.exr")
     monkeypatch.setattr(basis_file, "SINGLES_MAX_BYTES", 2**27)
     singles = as_stored(source)

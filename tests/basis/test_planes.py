@@ -5,6 +5,7 @@ import errno
 import gc
 import os
 import weakref
+from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -15,9 +16,10 @@ import pytest
 import lightpaint
 import lightpaint as lp
 from lightpaint.basis.derived_planes import BlockPlanes, JoinedRow, block_means, in_one_row
-from lightpaint.basis.file import basis_file, file_planes
+from lightpaint.basis.file import basis_file, file_planes, lit_planes
 from lightpaint.basis.file.file_planes import FilePlanes, SpooledPlanes, spooled
 from lightpaint.basis.file.half_floats import EncodedPlanes
+from lightpaint.basis.file.lit_planes import LitPlanes
 from lightpaint.basis.planes import MemoryPlanes, Planes, as_planes, joined_planes
 from lightpaint.errors import BasisError, ImageError
 from lightpaint.images.formats import exr_rows
@@ -68,6 +70,11 @@ def check_alike(planes: Planes, images: np.ndarray, tolerance: float = 0.0) -> N
             planes.picked(pixels).array(), flat[:, None, pixels], **tolerances
         )
     w = rng.random((n, 3))
+    np.testing.assert_allclose(
+        planes.exact_mix(w),
+        np.einsum("nhwc,nc->chw", images.astype(float), w).reshape(3, -1),
+        rtol=1e-12 + tolerance,
+    )
     expected = np.einsum("nhwc,nc->hwc", images, w)
     np.testing.assert_allclose(planes.mix(w), expected, rtol=1e-5 + tolerance)  # float32 sums
     psi, weight = rng.random((height, width, 3)), rng.random((height, width))
@@ -154,6 +161,74 @@ def test_planes_of_a_file_are_those_in_memory(
     other = reread.planes.replaced({0: np.zeros((*size, 3), np.float32)})
     assert not other.rows(3, 5)[0].any()
     assert other.rows(3, 5)[1].any()
+
+
+@pytest.mark.parametrize("room", [1, 2**27])
+@pytest.mark.parametrize("largest", [0, 2**31], ids=["by rows", "whole"])
+@pytest.mark.parametrize("clean", [(), (2,), range(N)], ids=["none", "one", "all"])
+def test_lit_pixels_of_many_lights_are_those_of_their_planes(
+    tmp_path: Path,
+    make_basis: Any,
+    monkeypatch: pytest.MonkeyPatch,
+    clean: Sequence[int],
+    largest: int,
+    room: int,
+) -> None:
+    # Bright lights have a scale; one is black, one reaches everything, and single channels are 0.
+    rng, size = np.random.default_rng(8), (67, 90)
+    images = rng.random((N, *size, 3), np.float32) * (rng.random((N, *size, 1)) < 0.1)
+    images[0, ..., 1] = 0
+    images[1] = 0
+    images[2] = 1e6 * rng.random((*size, 3))
+    halves = -images / 8
+    halves[list(clean)] = 0  # stored in float32
+    path = tmp_path / "it.basis.exr"
+    basis = basis_file.as_stored(make_basis(images=images, half_differences=halves))
+    lp.write_basis(path, basis)
+    monkeypatch.setattr(basis_file, "SINGLES_MAX_BYTES", 0)
+    monkeypatch.setattr(basis_file, "IN_MEMORY_MAX_BYTES", largest)
+    monkeypatch.setattr(basis_file, "MIN_LIGHTS", N)
+    monkeypatch.setattr(file_planes, "STRIP_CACHE_BYTES", room)
+    reread = lp.read_basis(path)
+    assert isinstance(reread.planes, LitPlanes)
+    assert isinstance(reread.noise, LitPlanes)
+    assert reread.planes.is_noisy == (len(clean) < 2)
+    check_alike(reread.planes, basis.images)
+    check_alike(reread.noise, basis.half_differences)
+    if not largest:  # no room for them either
+        monkeypatch.setattr(lit_planes, "MAX_BYTES", 0)
+        assert isinstance(lp.read_basis(path).planes, FilePlanes)
+
+
+def test_several_mixes_are_those_made_one_by_one(images: np.ndarray) -> None:
+    weights = np.random.default_rng(9).random((4, N, 3))
+    all_planes: list[Planes] = [MemoryPlanes(images), CountedPlanes(images)]
+    all_planes += [all_planes[1].picked(np.array([1, 4, 30])), JoinedRow(all_planes)]
+    for planes in all_planes:
+        mixes = planes.mixes(weights)
+        np.testing.assert_array_equal(mixes, [planes.mix(one) for one in weights])
+        np.testing.assert_allclose(
+            mixes, np.einsum("nhwc,knc->khwc", planes.array(), weights), rtol=1e-6
+        )
+
+
+class RoundedPlanes(MemoryPlanes):
+    """Planes that come from half floats."""
+
+    is_noisy = True
+
+
+def test_sums_of_many_lights_have_the_round_off_of_singles(monkeypatch: pytest.MonkeyPatch) -> None:
+    rng = np.random.default_rng(10)
+    planes = RoundedPlanes(rng.random((N, 120, 90, 3), np.float32))
+    squares = rng.random((120, 90)), rng.random((120, 90, 3))
+    exact = planes.sums(*squares)
+    monkeypatch.setattr("lightpaint.basis.planes.FEW_LIGHTS", N - 1)
+    for found, expected in zip(planes.sums(*squares), exact, strict=True):
+        assert found.dtype == np.float64
+        # A product of 4096 numbers in float32, whose errors add up at random.
+        np.testing.assert_allclose(found, expected, rtol=64 * 2**-24)
+        assert not np.array_equal(found, expected)
 
 
 class CountedPlanes(file_planes.RowPlanes):

@@ -20,7 +20,8 @@ from lightpaint.lighting.answer.combination import combine
 from lightpaint.lighting.answer.lighting import Lighting
 from lightpaint.lighting.constraints.constraints import Constraints
 from lightpaint.lighting.fit import Fit
-from lightpaint.lighting.loss import reweighting
+from lightpaint.lighting.loss import lit_pixels, reweighting
+from lightpaint.lighting.loss.lit_pixels import LitPixels
 from lightpaint.lighting.loss.loss import image_of, planes_of
 from lightpaint.lighting.loss.painting_loss import PaintingLoss
 from lightpaint.lighting.normal_equations import inner_products
@@ -144,6 +145,29 @@ def test_the_objective_never_rises(
         values.append(sum(solution.certificate.objective))
         assert solution.certificate.converged or transform is not None or rounds < 6
     assert (np.diff(values) <= 1e-12 * values[0]).all()
+
+
+def test_equations_of_few_changed_pixels_are_updated(
+    make_basis: Any, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    # Schoeneman et al. 1993, Eq 7-9.
+    basis, image, importance = _random_problem(make_basis, 5)
+    problem = Problem.of(basis, _target(image / image.max(), importance, top=0.6))
+    lit = LitPixels.of(basis, problem.loss)
+    known = lit.summed(problem.squares, problem.equations)
+    dim, bright = (lit.predicted(np.full((4, 3), level)) for level in (0.05, 2.0))
+    counts = []
+    for x in (dim, bright):
+        squares = lit.pixels.squares(x, from_clipping=False)
+        anew = lit.equations(*squares)
+        monkeypatch.setattr(lit_pixels, "MAX_UPDATED_SHARE", 1)
+        updated = lit.equations(*squares, known)
+        for name in ("M", "b", "target_norm2"):
+            np.testing.assert_allclose(getattr(updated, name), getattr(anew, name), rtol=1e-12)
+        pairs = zip(squares, (known.image, known.weight), strict=True)
+        counts.append(np.count_nonzero(np.any([a != b for a, b in pairs], axis=(0, 1))))
+    # Nothing exceeds the paint in the dark; where it does, its pixels ask for nothing.
+    assert counts[0] == 0 < counts[1] < len(lit.pixels)
 
 
 @pytest.mark.parametrize("seed", [2, 9, 11])

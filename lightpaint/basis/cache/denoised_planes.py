@@ -218,6 +218,9 @@ def read_denoised_planes(basis: Basis, *, factor: int = 1) -> DenoisedPlanes | N
 
     factor: side of blocks; planes of such blocks are accepted as well as whole planes.
     """
+    with suppress(OSError, LightpaintError):
+        if not cache.companion_path(basis, cache.DENOISED_SUFFIX).exists():
+            return None  # before all planes are read for their keys
     return _read(basis, _content_keys(basis), factor)
 
 

@@ -36,6 +36,7 @@ from lightpaint.basis.file.file_parts import (
 )
 from lightpaint.basis.file.file_planes import FilePlanes
 from lightpaint.basis.file.half_floats import EncodedPlanes, PlaneEncoding, encoded_plane
+from lightpaint.basis.file.lit_planes import MIN_LIGHTS, LitCollector, LitPlane, LitPlanes
 from lightpaint.basis.lights import BasisLight, Lights
 from lightpaint.basis.planes import IndirectLight, Planes, as_planes
 from lightpaint.errors import BasisError, ImageError
@@ -63,6 +64,9 @@ IN_MEMORY_MAX_BYTES = 2**31
 
 #: Maximum size in bytes of a basis file that the library reads in less than two seconds.
 QUICK_MAX_BYTES = 2**26
+
+#: Maximum size in bytes of indirect light, images and noise in half floats, that stays in memory.
+INDIRECT_MAX_BYTES = 2**28
 
 #: Maximum size in bytes of a basis file that is read.
 MAX_BYTES = 2**36
@@ -152,9 +156,11 @@ def _encoded(basis: Basis) -> Basis:
     """Return `basis` with planes in the encoding of its file."""
     numbers = with_progress(range(len(basis.lights)), "lights")
     of_lights = [encoded_planes_of(basis, k) for k in numbers]
-    images, noise, *indirect = map(EncodedPlanes, zip(*of_lights, strict=True))
-    parts = IndirectLight(*indirect) if indirect else None
-    return replace(basis, planes=images, noise=noise, indirect=parts)
+    images, noise, *indirect = zip(*of_lights, strict=True)
+    parts = None
+    if indirect:
+        parts = IndirectLight(*(EncodedPlanes(x, is_decoded_once=False) for x in indirect))
+    return replace(basis, planes=EncodedPlanes(images), noise=EncodedPlanes(noise), indirect=parts)
 
 
 def is_large(lights: int, size: tuple[int, int]) -> bool:
@@ -238,13 +244,15 @@ def read_basis(path: str | Path) -> Basis:
 
 
 def leave_indirect(basis: Basis, path: Path) -> Basis:
-    """Return `basis` with indirect planes that are read on demand from `path`, if it has many
-    lights.
+    """Return `basis` with indirect planes that are read on demand from `path`, if they take much
+    memory: only denoised pictures need them.
 
-    Only denoised pictures need them, so they take no memory otherwise. path: the file that holds
-    exactly this basis; if it does not, or has another layout, `basis` is returned unchanged.
+    path: the file that holds exactly this basis; if it does not, or has another layout, `basis` is
+    returned unchanged.
     """
-    if basis.indirect is None or not _is_encoded(len(basis.lights), basis.size):
+    count, (height, width) = len(basis.lights), basis.size
+    is_small = 12 * count * height * width <= INDIRECT_MAX_BYTES
+    if basis.indirect is None or is_small or not _is_encoded(count, basis.size):
         return basis
     try:
         file = RowFile(path)
@@ -266,9 +274,9 @@ def leave_indirect(basis: Basis, path: Path) -> Basis:
 
 
 def _read_large(path: Path) -> Basis | None:
-    """Return a basis whose rows are read on demand.
+    """Return a basis whose rows are read on demand, or of which lit pixels are in memory.
 
-    Returns None if the basis fits in memory or the file does not support reading rows.
+    Returns None if all pixels fit in memory or the file does not support reading rows.
     """
     try:
         file = RowFile(path)
@@ -317,15 +325,16 @@ def _basis_of_parts(parts: Sequence[ExrPart], head: Mapping[str, str]) -> Basis:
     scales = [scales_of(p.attributes) for p in light_parts]
 
     def planes(order: Sequence[int], number: int) -> Planes:
-        channels = [(light_parts[k], scales[k][number]) for k in order]
+        plane_scales = [scales[k][number] for k in order]
+        channels = list(zip((light_parts[k] for k in order), plane_scales, strict=True))
         if _is_encoded(len(light_parts), light_parts[0].size):
-            channel_readers = stored_channels(channels, PLANE_CHANNELS[number])
-            return EncodedPlanes(
-                [
-                    encoded_plane(*x)
-                    for x in zip(channel_readers, (s for _, s in channels), strict=True)
-                ]
+            stored = zip(
+                stored_channels(channels, PLANE_CHANNELS[number]), plane_scales, strict=True
             )
+            is_direct = number < 2
+            if len(light_parts) >= MIN_LIGHTS and is_direct:
+                return LitPlanes([LitPlane.of(*x) for x in stored], light_parts[0].size)
+            return EncodedPlanes([encoded_plane(*x) for x in stored], is_decoded_once=is_direct)
         return as_planes(stack_channels(channels, PLANE_CHANNELS[number]))
 
     channel_readers = [partial(getattr, part, "channels") for part in light_parts]
@@ -358,13 +367,25 @@ def _basis_of_rows(file: RowFile, head: Mapping[str, str]) -> Basis | None:
             file, [light_parts[k] for k in order], PLANE_CHANNELS[number], plane_scales
         )
 
-    channel_readers = [partial(file.channels, p) for p in light_parts]
+    collector = LitCollector(light_parts[0].size) if len(light_parts) >= MIN_LIGHTS else None
+
+    def collected(layout: PartLayout, scale: tuple[float, ...]) -> Channels:
+        channels = file.channels(layout)
+        if collector is not None:
+            name = strict_json(layout.texts[LIGHT_KEY])["name"]
+            sets = zip(PLANE_CHANNELS[:2], scale, strict=False)
+            collector.add(name, [LitPlane.of([channels[c] for c in x], y) for x, y in sets])
+        return channels
+
+    channel_readers = [partial(collected, *x) for x in zip(light_parts, scales, strict=True)]
     others = [part(p) for p in file.parts if LIGHT_KEY not in p.texts]
     has_indirect = all({*p.channels} >= INDIRECT_CHANNELS for p in light_parts)
     texts = [p.texts for p in light_parts]
-    return _checked_basis(
+    basis = _checked_basis(
         _Parts(head, texts, channel_readers, others, planes, has_indirect=has_indirect)
     )
+    lit = None if collector is None else collector.planes(basis.names)
+    return basis if lit is None else replace(basis, planes=lit[0], noise=lit[1])
 
 
 def _checked_basis(parts: _Parts) -> Basis:

@@ -67,8 +67,8 @@ class RowPlanes(PlanesBase):
                 self._strip(k)[:, max(start - k * length, 0) : stop - k * length]
                 for k in range(start // length, max(-(-stop // length), start // length + 1))
             ]
-            return parts[0] if len(parts) == 1 else np.concatenate(parts, axis=1)
-        picked = np.empty((3, self.count, len(where)), np.float32).transpose(1, 2, 0)
+            return parts[0] if len(parts) == 1 else joined_pixels(parts)
+        picked = np.empty((self.count, 3, len(where)), np.float32).transpose(0, 2, 1)
         of_strip = where // length
         for k in np.unique(of_strip):
             in_strip = np.flatnonzero(of_strip == k)
@@ -94,13 +94,15 @@ class RowPlanes(PlanesBase):
             return MemoryPlanes(np.ascontiguousarray(self.pixels(where)[:, None]))
         return PickedPlanes(self, where)
 
-    def mix(self, weights: Doubles) -> npt.NDArray[np.float32]:
-        """Return Σ w_i Φ_i, (h, w, 3)."""
+    def mixes(self, weights: Doubles) -> npt.NDArray[np.float32]:
+        """Return several sums Σ w_i Φ_i, (k, h, w, 3), in one walk. weights: (k, n, 3)."""
         (height, width), step = self.size, self.strip_rows
-        mixed = np.empty((height, width, 3), np.float32)
+        mixed = np.empty((len(weights), height, width, 3), np.float32)
 
         def fill(top: int) -> None:
-            mixed[top : top + step] = mix(self.rows(top, min(top + step, height)), weights)
+            rows = self.rows(top, min(top + step, height))
+            for into, one in zip(mixed, weights, strict=True):
+                into[top : top + step] = mix(rows, one)
 
         parallel_map(fill, range(0, height, step), unit="strips")
         return mixed
@@ -172,6 +174,12 @@ class FilePlanes(RowPlanes):
         return self._parts[0].size
 
     @property
+    def is_noisy(self) -> bool:
+        """True if most planes are stored in half floats, whose rounding their noise hides."""
+        halves = [part.channels[self._names[0]].itemsize == 2 for part in self._parts]
+        return 2 * sum(halves) > len(halves)
+
+    @property
     def chunk_rows(self) -> int:
         """Number of rows that the file stores as one chunk, which can only be read together."""
         return max(part.lines for part in self._parts)
@@ -215,6 +223,11 @@ class PickedPlanes(RowPlanes):
         """(1, pixels)."""
         return 1, len(self._where)
 
+    @property
+    def is_noisy(self) -> bool:
+        """True if most planes are stored in half floats, whose rounding their noise hides."""
+        return self._whole.is_noisy
+
     def plane(self, i: int) -> Floats:
         """Return the plane of light i, (1, p, 3)."""
         return self._whole.plane(i).reshape(-1, 3)[self._where][None]
@@ -229,9 +242,14 @@ class PickedPlanes(RowPlanes):
         """Return some pixels of all planes, (n, p, 3)."""
         return self._whole.pixels(self._where[where])
 
-    def mix(self, weights: Doubles) -> npt.NDArray[np.float32]:
-        """Return Σ w_i Φ_i, (1, p, 3)."""
-        return self._whole.mix(weights).reshape(-1, 3)[self._where][None]
+    def mixes(self, weights: Doubles) -> npt.NDArray[np.float32]:
+        """Return several sums Σ w_i Φ_i, (k, 1, p, 3)."""
+        whole = self._whole.mixes(weights)
+        return whole.reshape(len(whole), -1, 3)[:, None, self._where]
+
+    def exact_mix(self, weights: Doubles) -> Doubles:
+        """Return Σ w_i Φ_i channel by channel, (3, p), summed in float64."""
+        return self._whole.exact_mix(weights)[:, self._where]
 
 
 class ReplacedPlanes(RowPlanes):
@@ -265,6 +283,16 @@ class ReplacedPlanes(RowPlanes):
         for k, plane in self._planes.items():
             block[k] = plane[top:bottom]
         return block
+
+
+def joined_pixels(parts: Sequence[Floats]) -> Floats:
+    """Return pixels of the same planes, (n, p, 3) each, one after the other.
+
+    Channels come first in memory, which is how they are stored and summed.
+    """
+    joined = np.empty((len(parts[0]), 3, sum(x.shape[1] for x in parts)), np.float32)
+    np.concatenate([x.transpose(0, 2, 1) for x in parts], axis=2, out=joined)
+    return joined.transpose(0, 2, 1)
 
 
 def spooled(planes: Planes) -> Planes:

@@ -10,12 +10,21 @@ a power of two.
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from threading import Lock
 from typing import Any
 
 import numpy as np
 import numpy.typing as npt
 
-from lightpaint.arrays import Bools, Doubles, Floats, Indices, copy_as_singles, round_to_halves
+from lightpaint.arrays import (
+    Bools,
+    Doubles,
+    Floats,
+    Indices,
+    copy_as_singles,
+    read_only,
+    round_to_halves,
+)
 from lightpaint.basis.file.file_planes import RowPlanes
 
 HALF, FLOAT = np.dtype(np.float16), np.dtype(np.float32)
@@ -27,6 +36,9 @@ HIDDEN_SHARE, TILE = 1 / 16, 8
 #: Relative noise below which a pixel counts as clean when all neighbours within a radius do, which
 #: are those whose noise a verification pools; rounding must then be as small.
 CLEAN, CLEAN_RADIUS = 1e-5, 2
+
+#: Maximum size in bytes of planes that are decoded once, in float32, rather than on each walk.
+DECODED_MAX_BYTES = 2**28
 
 #: Exponent to which the brightest value is scaled; half floats reach 15.
 BRIGHTEST = 14
@@ -74,11 +86,14 @@ class EncodedPlanes(RowPlanes):
     """Planes held in memory in their stored encoding: in half floats where rounding stays
     invisible.
 
-    planes: one for each light.
+    planes: one for each light. is_decoded_once: whether walks share what the first has decoded, if
+    that takes little memory.
     """
 
-    def __init__(self, planes: Sequence[EncodedPlane]) -> None:
-        self._encoded = tuple(planes)
+    def __init__(self, planes: Sequence[EncodedPlane], *, is_decoded_once: bool = True) -> None:
+        self._encoded, self._is_decoded_once = tuple(planes), is_decoded_once
+        self._lock = Lock()
+        self._decoded: npt.NDArray[np.float32] | None = None
 
     @property
     def count(self) -> int:
@@ -101,9 +116,27 @@ class EncodedPlanes(RowPlanes):
 
     def plane(self, i: int) -> Floats:
         """Return the plane of light i, (h, w, 3)."""
+        if self._singles is not None:
+            return np.ascontiguousarray(self._singles[i].T).reshape(*self.size, 3)
         image = np.empty((*self.size, 3), np.float32)
         self._decode(i, slice(None), image.reshape(-1, 3).T)
         return image
+
+    @property
+    def _singles(self) -> npt.NDArray[np.float32] | None:
+        """All planes decoded, (n, 3, pixels), once for all walks; None if that takes much
+        memory.
+        """
+        pixels = self.size[0] * self.size[1]
+        if not self._is_decoded_once or 12 * self.count * pixels > DECODED_MAX_BYTES:
+            return None
+        with self._lock:
+            if self._decoded is None:
+                decoded = np.empty((self.count, 3, pixels), np.float32)
+                for i, channels in enumerate(decoded):
+                    self._decode(i, slice(None), channels)
+                self._decoded = read_only(decoded)
+            return self._decoded
 
     def rows(self, top: int, bottom: int) -> Floats:
         """Return rows `top` to `bottom` of all planes, (n, bottom - top, w, 3)."""
@@ -114,6 +147,8 @@ class EncodedPlanes(RowPlanes):
 
     def pixels(self, where: slice | Indices) -> Floats:
         """Return some pixels of all planes, (n, p, 3)."""
+        if self._singles is not None:
+            return self._singles[:, :, where].transpose(0, 2, 1)
         length = self._encoded[0].numbers[0].reshape(-1)[where].size
         # Channels first, which is how they are stored and summed.
         block = np.empty((self.count, 3, length), np.float32)

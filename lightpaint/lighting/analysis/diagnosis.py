@@ -281,10 +281,12 @@ def unbounded_weights(solution: Solution) -> Doubles:
     equations, weights = solution.equations, solution.weights
     whole = equations.full_matrix
     for columns in all_columns(solution):
+        moved = np.flatnonzero(columns.any(axis=1))
+        to = columns[moved]
         gradient = np.einsum("cij,jc->ci", equations.M, weights) - equations.b
-        step = (
-            columns @ pseudo_inverse(columns.T @ whole @ columns) @ (columns.T @ gradient.ravel())
-        )
+        step = np.zeros(len(columns))
+        curvature = to.T @ whole[np.ix_(moved, moved)] @ to
+        step[moved] = to @ pseudo_inverse(curvature) @ (to.T @ gradient.ravel()[moved])
         weights = weights - step.reshape(3, -1).T
     return weights
 

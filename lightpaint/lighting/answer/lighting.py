@@ -213,17 +213,17 @@ class Lighting(Shown, Mapping[str, LightSetting]):
     def _by_name(self) -> dict[str, LightSetting]:
         return {light.name: light for light in self.lights}
 
-    @property
+    @cached_property
     def members(self) -> Mapping[str, tuple[str, ...]]:
         """Names of the emitters of each light, by its name."""
         return {light.name: light.members for light in self.lights}
 
-    @property
+    @cached_property
     def fixed(self) -> frozenset[str]:
         """Names of the fixed lights."""
         return frozenset(light.name for light in self.lights if light.is_fixed)
 
-    @property
+    @cached_property
     def emission(self) -> Mapping[str, RGB]:
         """RGB emission by name of light."""
         return {light.name: light.emission for light in self.lights}

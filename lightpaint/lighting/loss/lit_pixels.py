@@ -7,9 +7,18 @@ import numpy as np
 
 from lightpaint.arrays import Doubles, Floats, Indices
 from lightpaint.basis.basis import Basis
-from lightpaint.basis.planes import Planes
-from lightpaint.lighting.loss.loss import Loss, PixelLoss, Squares, image_in_place
+from lightpaint.basis.planes import Planes, mix_channels
+from lightpaint.lighting.loss.loss import (
+    Loss,
+    PixelLoss,
+    SquaredPixels,
+    Squares,
+    image_in_place,
+)
 from lightpaint.lighting.normal_equations import NormalEquations
+
+#: Share of pixels with other squares up to which a problem is updated rather than summed anew.
+MAX_UPDATED_SHARE = 0.25
 
 #: Share of pixels without importance from which a copy of the others is worth its time.
 MIN_SKIPPED_SHARE = 0.1
@@ -40,23 +49,22 @@ class LitPixels:
             return whole
         return cls(basis.planes.picked(counted), whole.pixels.subset(counted), counted)
 
+    def summed(self, squares: Squares, equations: NormalEquations) -> "SummedSquares":
+        """Return squares of the whole picture, whose problem is known, for these pixels."""
+        pixels = squares.pixels
+        assert isinstance(pixels, SquaredPixels)
+        which = slice(None) if self.which is None else self.which
+        return SummedSquares(pixels.image[:, which], pixels.weight[:, which], equations)
+
     def predicted(self, weights: Doubles) -> Doubles:
         """Return Σ w_i Φ_i, (3, p), in float64: a float32's round-off would hide the last steps."""
-        picture = np.empty((3, len(self.pixels)))
-
-        def fill(strip: slice, _: PixelLoss) -> None:
-            mix_channels(self.planes.pixels(strip), weights, picture[:, strip])
-
-        self.pixels.map_strips(fill)
-        return picture
+        return self.planes.exact_mix(weights)
 
     def objective(self, weights: Doubles) -> Doubles:
         """Return the loss of weights, (n, 3), per channel, (3,)."""
-
-        def strip_objective(strip: slice, pixels: PixelLoss) -> Doubles:
-            return pixels.objective(mix_channels(self.planes.pixels(strip), weights))
-
-        return np.asarray(sum(self.pixels.map_strips(strip_objective)))
+        picture = self.predicted(weights)
+        parts = self.pixels.map_strips(lambda strip, pixels: pixels.objective(picture[:, strip]))
+        return np.asarray(sum(parts))
 
     def objective_and_gradient(self, weights: Doubles) -> tuple[float, Doubles]:
         """Return the loss of weights, (n, 3), and half its gradient, (n, 3)."""
@@ -82,8 +90,19 @@ class LitPixels:
 
         return sum(self.pixels.map_strips(strip_slope))
 
-    def equations(self, image: Doubles, weight: Doubles) -> NormalEquations:
-        """Return the linear problem of squares, (3, p) each."""
+    def equations(
+        self, image: Doubles, weight: Doubles, known: "SummedSquares | None" = None
+    ) -> NormalEquations:
+        """Return the linear problem of squares, (3, p) each.
+
+        known: squares with their problem, which is updated where few pixels have others (Schoeneman
+        et al. 1993, Eq 7-9).
+        """
+        if known is not None:
+            is_other = (image != known.image) | (weight != known.weight)
+            changed = np.flatnonzero(is_other.any(axis=0))
+            if changed.size <= MAX_UPDATED_SHARE * len(self.pixels):
+                return known.updated(self.planes, changed, image, weight)
         shape = (*self.planes.size, 3)
         picture, weights = image.T.reshape(shape), weight.T.reshape(shape)
         return NormalEquations(*self.planes.sums(weights, picture))
@@ -101,6 +120,28 @@ class LitPixels:
 
         counted = np.flatnonzero(self.pixels.importance)
         return NormalEquations(*self.planes.sums_of(counted, squares))
+
+
+@dataclass(frozen=True)
+class SummedSquares:
+    """Squares of all pixels with their linear problem. image, weight: (3, p)."""
+
+    image: Doubles
+    weight: Doubles
+    equations: NormalEquations
+
+    def updated(
+        self, planes: Planes, changed: Indices, image: Doubles, weight: Doubles
+    ) -> NormalEquations:
+        """Return the problem of other squares, (3, p) each, which differ in these pixels alone."""
+        equations = self.equations
+        if not changed.size:
+            return equations
+        lit = planes.picked(changed)
+        for sign, squares in ((-1, (self.image, self.weight)), (1, (image, weight))):
+            picture, weights = (x[:, changed].T[None] for x in squares)
+            equations = equations + NormalEquations(*lit.sums(weights, picture)).scaled(sign)
+        return equations
 
 
 class DeferredSquares(Squares):
@@ -144,14 +185,3 @@ class DeferredSquares(Squares):
         """Forget the arrays, which are made again when somebody asks for them."""
         for name in ("_arrays", "importance", "pixels"):
             self.__dict__.pop(name, None)
-
-
-def mix_channels(lit: Floats, weights: Doubles, into: Doubles | None = None) -> Doubles:
-    """Return Σ w_i Φ_i of pixels (n, p, 3), channel by channel, (3, p) float64.
-
-    weights: (n, 3). into: where to write it.
-    """
-    picture = np.empty((3, lit.shape[1])) if into is None else into
-    for c in range(3):
-        picture[c] = weights[:, c] @ lit[..., c].astype(np.float64)
-    return picture

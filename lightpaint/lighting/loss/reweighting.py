@@ -14,7 +14,7 @@ import numpy as np
 
 from lightpaint.arrays import Doubles
 from lightpaint.basis.basis import Basis
-from lightpaint.lighting.loss.lit_pixels import LitPixels
+from lightpaint.lighting.loss.lit_pixels import LitPixels, SummedSquares
 from lightpaint.lighting.loss.loss import Loss, PixelLoss, Squares, image_in_place
 from lightpaint.lighting.normal_equations import NormalEquations
 
@@ -129,14 +129,22 @@ def descend(
     *,
     pull: NormalEquations | None = None,
     from_clipping: bool = True,
+    known: tuple[Squares, NormalEquations] | None = None,
 ) -> Descent:
     """Minimise `loss` over the weights that `solve` may return, from `start`, (n, 3).
 
     pull: of the weights, added to the loss; `solve` adds it by itself. from_clipping: see
-    `run_rounds`.
+    `run_rounds`. known: squares whose problem is known.
     """
     lit = LitPixels.of(basis, loss)
-    result = run_rounds(lit, WeightTerms(pull), start, solve, from_clipping=from_clipping)
+    result = run_rounds(
+        lit,
+        WeightTerms(pull),
+        start,
+        solve,
+        from_clipping=from_clipping,
+        known=None if known is None else lit.summed(*known),
+    )
     x, image, weight = result.x, result.image, result.weight
     if lit.which is not None:
         x = LitPixels.whole(basis, loss).predicted(result.at)
@@ -155,11 +163,13 @@ def run_rounds(
     *,
     from_clipping: bool,
     until: float = MIN_STEP,
+    known: SummedSquares | None = None,
 ) -> RoundsResult:
     """Minimise the loss of some pixels and the terms in the weights, from weights (n, 3).
 
     from_clipping: whether rounds first draw clipped values back, before they use the loss's own
-    slope. until: the change of a light's picture at which they end.
+    slope. until: the change of a light's picture at which they end. known: squares of these pixels
+    whose problem is known.
     """
     pixels = lit.pixels
     from_clipping = from_clipping and pixels.has_clipping
@@ -167,7 +177,9 @@ def run_rounds(
     value = total_loss(pixels, terms, w, x)
     count = 0
     while True:
-        round_ = _Round.of(lit, terms, w, x, solve, from_clipping=from_clipping)
+        round_ = _Round.of(lit, terms, w, x, solve, from_clipping=from_clipping, known=known)
+        if pixels.has_pieces:  # other squares change all pixels in each round
+            known = SummedSquares(round_.image, round_.weight, round_.equations)
         count += 1
         done = round_.has_converged(pixels, x, value, until)
         part, reached = 1.0, total_loss(pixels, terms, round_.best, round_.ahead)
@@ -217,10 +229,11 @@ class _Round:
         solve: Solver,
         *,
         from_clipping: bool,
+        known: SummedSquares | None,
     ) -> "_Round":
         """Make the squares, and solve for their optimum."""
         image, weight = lit.pixels.squares(x, from_clipping=from_clipping)
-        equations = lit.equations(image, weight)
+        equations = lit.equations(image, weight, known)
         best = solve(terms.tilted(equations), w)
         ahead = lit.predicted(best)
         step = relative_change(equations, w, best)

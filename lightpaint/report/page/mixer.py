@@ -19,7 +19,7 @@ from markupsafe import Markup
 
 from lightpaint.arrays import Doubles, Floats, Indices
 from lightpaint.basis.basis import Basis
-from lightpaint.basis.denoised_mixes import denoise_mix, denoise_plane
+from lightpaint.basis.denoised_mixes import denoise_mixes, denoise_plane
 from lightpaint.basis.light_images import LightImage, light_images
 from lightpaint.basis.lights import BasisLight
 from lightpaint.colour.color import kelvin_to_rgb, luminance
@@ -193,24 +193,24 @@ def _compact_planes(
     # The mean of many pixels has hardly any noise left to remove.
     must_denoise = is_clean and planes is None and factor < CLEAN_REDUCTION
 
-    def small(k: int) -> Floats:
-        if must_denoise and k < len(lights):
-            return denoise_plane(basis, int(lights[k]), factor=factor)
-        if must_denoise:
-            return denoise_mix(basis, mixes[k - len(lights)], factor=factor)
-        if k < len(lights):
-            plane = planes.plane(lights[k]) if planes else basis.planes.plane(lights[k])
-        else:
-            plane = (planes or basis).mix(mixes[k - len(lights)])
+    def small(picture: Floats) -> Floats:
         is_small = planes is not None and not planes.is_whole
-        return np.asarray(plane if is_small else block_mean(plane, factor), np.float32)
+        return np.asarray(picture if is_small else block_mean(picture, factor), np.float32)
 
-    # A denoiser uses all processors itself.
-    pictures = (
-        [small(k) for k in with_progress(range(count), "planes")]
-        if must_denoise
-        else in_turns(small, range(count), basis.size, unit="planes")
-    )
+    def plane(k: int) -> Floats:
+        return small((planes or basis.planes).plane(int(lights[k])))
+
+    if must_denoise:  # by a denoiser that uses all processors itself
+        pictures = [
+            denoise_plane(basis, k, factor=factor) for k in with_progress(lights.tolist(), "planes")
+        ]
+        pictures += denoise_mixes(basis, mixes, factor=factor) if mixes else []
+    else:
+        pictures = in_turns(plane, range(len(lights)), basis.size, unit="planes")
+        if planes is not None:
+            pictures += [small(planes.mix(mix)) for mix in mixes]
+        elif mixes:
+            pictures += [small(mix) for mix in basis.planes.mixes(np.array(mixes))]
     return list(pictures[0].shape[:2]), parallel_map(plane_data, pictures)
 
 

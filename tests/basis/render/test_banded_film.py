@@ -158,6 +158,7 @@ def test_indirect_planes_of_many_lights_stay_in_their_file(
     expected = basis_file.as_stored(render_basis(small_room, spp=20, seed=3))
     assert isinstance(expected.indirect.planes, MemoryPlanes)  # type: ignore[union-attr]
     monkeypatch.setattr(basis_file, "SINGLES_MAX_BYTES", 0)
+    monkeypatch.setattr(basis_file, "INDIRECT_MAX_BYTES", 0)
     path = tmp_path / "a.basis.exr"
     basis_file.write_basis(path, whole_basis)
     rendered, cached = (obtain_basis(small_room, spp=20, seed=3) for _ in range(2))

@@ -18,7 +18,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from lightpaint.arrays import Bools, Doubles, Floats, Indices
-from lightpaint.basis.planes import BLOCK_PIXELS, FEW_LIGHTS, Planes, as_slice
+from lightpaint.basis.planes import BLOCK_PIXELS, FEW_LIGHTS, Planes, as_slice, block_of
 from lightpaint.lighting.algebra.eigenvectors import eigenvectors
 from lightpaint.lighting.analysis.noise.dominant_pixels import Peaks, t_ratios
 from lightpaint.lighting.analysis.noise.pixel_gradients import PixelGradients
@@ -52,6 +52,10 @@ SMALL_MATRIX = 256
 #: Eigenvalues of M, scaled to a unit diagonal, below which a direction changes no pixel.
 NULL_EIGENVALUE = 1e-12
 
+#: Least eigenvalue of M, scaled so, with which an inverse needs no eigenvectors: its error is then
+#: 10⁻⁶ at most.
+REGULAR_EIGENVALUE = 1e-7
+
 
 def own_share(problem: Problem, removed: float | None) -> float:
     """Return the share of a pixel's own value in the factors of a problem, 0 to UNCORRECTED.
@@ -72,7 +76,14 @@ def factor(values: Doubles, halves: Doubles, own_share: float) -> Doubles:
     """
     if own_share == 1:
         return values
-    beside = values[..., pixels_beside(values.shape[-1])]
+    beside = np.empty_like(values)
+    pairs = slice(0, values.shape[-1] // 2 * 2)
+    beside[..., pairs][..., ::2], beside[..., pairs][..., 1::2] = (
+        values[..., pairs][..., 1::2],
+        values[..., pairs][..., ::2],
+    )
+    if values.shape[-1] % 2:
+        beside[..., -1] = values[..., max(values.shape[-1] - 2, 0)]
     is_alike = np.abs(beside - values) <= MAX_HALVES_APART * np.abs(halves)
     return np.where(is_alike, own_share * values + (1 - own_share) * beside, values)
 
@@ -203,12 +214,14 @@ def painting_covariance(solution: Solution) -> Doubles | None:
     if np.square(roots).sum() <= MIN_PAINTING_NOISE * (pixels.weight * np.square(mixed)).sum():
         return None
     covariance = np.zeros((3, n, 3, n))
-    for start in with_progress(range(0, pixels.counted.size, BLOCK_PIXELS)):
-        part = as_slice(pixels.counted[start : start + BLOCK_PIXELS])
-        rows = pixels.planes.pixels(part) * roots[part]
+    step, kind = block_of(pixels.planes)
+    for start in with_progress(range(0, pixels.counted.size, step)):
+        part = as_slice(pixels.counted[start : start + step])
+        lit = pixels.planes.pixels(part)
+        rows = [lit[..., c] * roots[part, c].astype(kind) for c in range(3)]
         for c, d in [(k, k) for k in range(3)] + [(0, 1), (0, 2), (1, 2)] * is_coupled:
             # Its noise, too, is that of paths, which carry all channels.
-            product = rows[..., c] @ rows[..., d].T
+            product = rows[c] @ rows[d].T
             covariance[c, :, d] += product
             if c != d:
                 covariance[d, :, c] += product.T
@@ -288,8 +301,9 @@ class NoisyPixels:
     def sums(self, counted: Indices, *, is_coupled: bool) -> _Sums:
         """Sum over some pixels."""
         sums = _Sums.zeros(len(self.weights))
-        for start in with_progress(range(0, counted.size, BLOCK_PIXELS)):
-            pixels = as_slice(counted[start : start + BLOCK_PIXELS])
+        step, _ = block_of(self.planes)
+        for start in with_progress(range(0, counted.size, step)):
+            pixels = as_slice(counted[start : start + step])
             arrays = self.noise.pixels(pixels), self.planes.pixels(pixels)
             missed = self.residuals.residual(pixels)
             rows = [self._rows(sums, pixels, arrays, missed, c) for c in with_progress(range(3))]
@@ -317,30 +331,33 @@ class NoisyPixels:
 
         arrays: (n, pixels, 3), noise and planes there. missed: (pixels, 3), the residual.
         """
-        D = self.weight[pixels, c % self.weight.shape[1]].astype(np.float64)
-        h, lit = (x[..., c].astype(np.float64) for x in arrays)
+        _, kind = block_of(self.planes)
+        D = self.weight[pixels, c % self.weight.shape[1]].astype(kind)
+        h, lit = (x[..., c].astype(kind, copy=False) for x in arrays)
         of_pixels = self.gradients
-        mean, half = (x[pixels, c] for x in (of_pixels.mean, of_pixels.half))
+        mean, half = (x[pixels, c].astype(kind) for x in (of_pixels.mean, of_pixels.half))
         # One by one, pixels show their own noise; in sums none is multiplied by itself.
         own = 1.0 if sums is None else self.own_share
         rows = h * factor(mean, half, own) + factor(lit, h, own) * half
         if sums is not None:
-            size = np.abs(missed[:, c]) + self.weights[:, c, None] * lit
+            size = np.abs(missed[:, c].astype(kind)) + self.weights[:, c, None].astype(kind) * lit
             sums.peaks[c].add(D * lit * size, rows)
         if self.pulled.any():
             # The noise correction leaves the pull as it is.
             power = factor(lit, h, max(own, UNCORRECTED)) * h
-            rows += self.pulled[:, c, None] * np.where(self.unseen[pixels], power, 0)
+            rows += self.pulled[:, c, None].astype(kind) * np.where(self.unseen[pixels], power, 0)
         if sums is None:
             return np.asarray(rows)
-        sums.power[c] += (D * h) @ h.T
+        weighted = np.sqrt(D) * h
+        sums.power[c] += weighted @ weighted.T
         if of_pixels.bend is not None and of_pixels.doubt is not None:
-            mixed = self.residuals.half[pixels, c].astype(np.float64)
-            sums.target_noise[c] += h @ (D * mixed + half) + lit @ of_pixels.bend[pixels, c]
-            sums.doubt[c] += lit @ of_pixels.doubt[pixels, c]
+            mixed = self.residuals.half[pixels, c].astype(kind)
+            bend, doubt = (x[pixels, c].astype(kind) for x in (of_pixels.bend, of_pixels.doubt))
+            sums.target_noise[c] += h @ (D * mixed + half) + lit @ bend
+            sums.doubt[c] += lit @ doubt
         elif self.residuals.current is not None:
             shared = D * self.share[pixels, c % self.share.shape[1]]
-            sums.target_noise[c] += h @ (shared * self.residuals.current[pixels, c])
+            sums.target_noise[c] += h @ (shared * self.residuals.current[pixels, c]).astype(kind)
         return np.asarray(rows)
 
 
@@ -384,8 +401,25 @@ def pseudo_inverse(M: Doubles) -> Doubles:
     """Return the pseudo-inverse of a positive semidefinite matrix, whatever the scales of its
     unknowns.
     """
+    if len(M) > SMALL_MATRIX and (regular_inverse := _inverse(M)) is not None:
+        return regular_inverse
     _, inverse = _roots(M)
     return np.asarray(inverse.T @ inverse)
+
+
+def _inverse(M: Doubles) -> Doubles | None:
+    """Return the inverse of a matrix that is well regular, in a third of the time; else None."""
+    diagonal = np.diag(M)
+    if not (diagonal > 0).all():
+        return None
+    scale = np.sqrt(diagonal)
+    scaled = M / scale[:, None] / scale
+    try:
+        np.linalg.cholesky(scaled - REGULAR_EIGENVALUE * np.eye(len(M)))
+    except np.linalg.LinAlgError:
+        return None
+    inverse = np.linalg.inv(scaled) / scale[:, None] / scale
+    return np.asarray((inverse + inverse.T) / 2)
 
 
 def _roots(M: Doubles) -> tuple[Doubles, Doubles]:

@@ -266,22 +266,27 @@ def weight_spread(
     free, below, above, excess = (np.zeros(gradient.size) for _ in range(4))
     levels, is_far = _levels(solution), np.zeros(gradient.size, bool)
     for room in block_freedoms(solution, pulled):
-        columns, active = room.columns, room.active
+        # Unknowns of one channel move a third of the weights.
+        moved = np.flatnonzero(room.emitted.any(axis=1))
+        columns, emitted, active = room.columns[moved], room.emitted[moved], room.active
+        of_moved = np.ix_(moved, moved)
         steps, covariance = _propagate(
-            columns.T @ M @ columns, columns.T @ C @ columns, room, columns.T @ gradient
+            columns.T @ M[of_moved] @ columns,
+            columns.T @ C[of_moved] @ columns,
+            room,
+            columns.T @ gradient[moved],
         )
-        sizes = np.abs(room.emitted / levels[:, None]).max(axis=0)
+        sizes = np.abs(emitted / levels[moved, None]).max(axis=0, initial=0)
         covariance, own = limit_deviations(covariance, np.where(sizes > 0, sizes, 1))
-        excess += np.einsum("pq,qp->p", missed, columns @ covariance @ columns.T)
+        excess[moved] += np.einsum("pq,qp->p", missed[of_moved], columns @ covariance @ columns.T)
         limited, whole = (
-            ((room.emitted @ active.constrained(x)) * room.emitted).sum(axis=1)
-            for x in (covariance, own)
+            ((emitted @ active.constrained(x)) * emitted).sum(axis=1) for x in (covariance, own)
         )
-        free += np.maximum(limited, whole)
-        is_far |= whole > 0
-        own_steps = room.emitted @ (active.own_exits * steps)
-        below += np.square(np.minimum(own_steps, 0)).sum(axis=1)
-        above += np.square(np.maximum(own_steps, 0)).sum(axis=1)
+        free[moved] += np.maximum(limited, whole)
+        is_far[moved] |= whole > 0
+        own_steps = emitted @ (active.own_exits * steps)
+        below[moved] += np.square(np.minimum(own_steps, 0)).sum(axis=1)
+        above[moved] += np.square(np.maximum(own_steps, 0)).sum(axis=1)
     inside, down, up = (np.sqrt(np.maximum(x, 0)).reshape(3, -1).T for x in (free, below, above))
     lights_far = np.asarray(is_far.reshape(3, -1).any(axis=0))
     return WeightSpread(inside, (down, up), excess, lights_far)

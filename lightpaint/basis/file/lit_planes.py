@@ -1,0 +1,244 @@
+"""Planes of many lights in memory, of which only the lit pixels are kept.
+
+A light of a thousand reaches little of a picture, and few samples find even that: five of six
+pixels are black. Each walk over the planes then takes a quarter of the time, and a tenth of the
+memory of float32.
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from itertools import pairwise
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+
+from lightpaint.arrays import Doubles, Floats, Indices, copy_as_singles
+from lightpaint.basis.file.file_planes import RowPlanes
+from lightpaint.threads import parallel_map
+
+#: Number of lights from which planes may be kept by their lit pixels.
+MIN_LIGHTS = 128
+
+#: Maximum size in bytes of both sets of planes, images and noise, that are kept so.
+MAX_BYTES = 2**30
+
+
+@dataclass(frozen=True)
+class LitPlane:
+    """The lit pixels of one plane: their indices, (m,) uint32, in row-major order, and numbers.
+
+    numbers: (3, m), as stored: light divided by `scale`.
+    """
+
+    pixels: npt.NDArray[np.uint32]
+    numbers: npt.NDArray[Any]
+    scale: float
+
+    @classmethod
+    def of(cls, channels: Sequence[npt.NDArray[Any]], scale: float) -> "LitPlane":
+        """Return the plane that has these stored channels, (h, w) each."""
+        flat = [np.ascontiguousarray(channel).ravel() for channel in channels]
+        # Bits rather than numbers, of which halves are slow; all but that of the sign.
+        bits = [channel.view(f"u{channel.itemsize}") for channel in flat]
+        pixels = np.flatnonzero((bits[0] | bits[1] | bits[2]) << 1)
+        numbers = np.stack([channel[pixels] for channel in flat])
+        return cls(pixels.astype(np.uint32), numbers, scale)
+
+    @property
+    def nbytes(self) -> int:
+        """Bytes of memory that it takes."""
+        return self.pixels.nbytes + self.numbers.nbytes
+
+    def in_kind(self, kind: npt.DTypeLike) -> "LitPlane":
+        """Return this plane with numbers of this kind."""
+        return replace(self, numbers=self.numbers.astype(kind, copy=False))
+
+    def dense(self, pixels: int) -> npt.NDArray[np.float32]:
+        """Return all pixels, (3, pixels), not yet multiplied by the scale."""
+        plane = np.zeros((3, pixels), np.float32)
+        plane[:, self.pixels] = self.numbers
+        return plane
+
+
+@dataclass(frozen=True)
+class _Strip:
+    """The lit pixels of all planes in some rows, plane by plane.
+
+    lit: (m,) uint16 or uint32, their indices in the strip. numbers: (3, m). begins: (n + 1,), where
+    those of each plane begin. size: number of pixels of the strip.
+    """
+
+    lit: npt.NDArray[Any]
+    numbers: npt.NDArray[Any]
+    begins: Indices
+    size: int
+
+    @classmethod
+    def of(cls, planes: Sequence[LitPlane], parts: Sequence[slice], pixels: slice) -> "_Strip":
+        """Return a strip of planes. parts: slices of their lit pixels. pixels: of the picture."""
+        size = pixels.stop - pixels.start
+        kind = np.uint16 if size <= 2**16 else np.uint32
+        numbers = np.concatenate([x.numbers[:, y] for x, y in zip(planes, parts, strict=True)], 1)
+        lit = np.concatenate([x.pixels[y] for x, y in zip(planes, parts, strict=True)])
+        begins = np.cumsum([0, *(part.stop - part.start for part in parts)])
+        return cls((lit - np.uint32(pixels.start)).astype(kind), numbers, begins, size)
+
+    @property
+    def nbytes(self) -> int:
+        """Bytes of memory that it takes."""
+        return self.lit.nbytes + self.numbers.nbytes
+
+    def of_planes(self, values: npt.NDArray[Any]) -> npt.NDArray[Any]:
+        """Return a value of each plane, (n,), for each of its lit pixels, (m,)."""
+        return np.repeat(values, np.diff(self.begins))
+
+    def decoded(self) -> npt.NDArray[np.float32]:
+        """Return the planes, (n, 3, pixels), not yet multiplied by their scales."""
+        n = len(self.begins) - 1
+        places = self.of_planes(3 * self.size * np.arange(n))
+        places += self.lit
+        block = np.zeros(3 * n * self.size, np.float32)
+        for c, channel in enumerate(self.numbers):
+            block[c * self.size :][places] = _singles(channel)
+        return block.reshape(n, 3, self.size)
+
+    def plane(self, i: int) -> npt.NDArray[np.float32]:
+        """Return plane i, (3, pixels), not yet multiplied by its scale."""
+        part = slice(self.begins[i], self.begins[i + 1])
+        block = np.zeros((3, self.size), np.float32)
+        for channel, numbers in zip(block, self.numbers[:, part], strict=True):
+            channel[self.lit[part]] = _singles(numbers)
+        return block
+
+    def mix(self, weights: Doubles) -> Doubles:
+        """Return Σ w_i of the planes, (3, pixels) float64. weights: (n, 3), with the scales."""
+        return np.stack(
+            [
+                np.bincount(self.lit, self.of_planes(weights[:, c]) * _singles(channel), self.size)
+                for c, channel in enumerate(self.numbers)
+            ]
+        )
+
+
+def _singles(numbers: npt.NDArray[Any]) -> npt.NDArray[np.float32]:
+    singles = np.empty(numbers.shape, np.float32)
+    copy_as_singles(numbers, singles)
+    return singles
+
+
+class LitPlanes(RowPlanes):
+    """Planes of which only the lit pixels are in memory. planes: one for each light, which are
+    released one by one. size: (height, width).
+    """
+
+    def __init__(self, planes: Sequence[LitPlane], size: tuple[int, int]) -> None:
+        self._count, self._size = len(planes), size
+        self._scales = np.array([plane.scale for plane in planes], np.float32)
+        (height, width), step = size, self.strip_rows
+        edges = [width * row for row in [*range(0, height, step), height]]
+        is_half = [plane.numbers.dtype == np.float16 for plane in planes]
+        self._is_noisy = 2 * sum(is_half) > len(planes)
+        # A few clean ones are kept whole, in float32.
+        self._clean = {
+            i: plane.dense(height * width)
+            for i, plane in enumerate(planes)
+            if self._is_noisy and not is_half[i]
+        }
+        kind = np.float16 if self._is_noisy else np.float32
+        nothing = LitPlane(np.zeros(0, np.uint32), np.zeros((3, 0), kind), 1.0)
+        same = [nothing if i in self._clean else x.in_kind(kind) for i, x in enumerate(planes)]
+        cuts = [np.searchsorted(plane.pixels, np.array(edges, np.uint32)) for plane in same]
+        self._lit = [
+            _Strip.of(same, [slice(*cut[k : k + 2]) for cut in cuts], slice(*ends))
+            for k, ends in enumerate(pairwise(edges))
+        ]
+
+    @property
+    def count(self) -> int:
+        """Number of lights."""
+        return self._count
+
+    @property
+    def size(self) -> tuple[int, int]:
+        """(height, width) in pixels."""
+        return self._size
+
+    @property
+    def nbytes(self) -> int:
+        """Bytes of memory that the planes take."""
+        return sum(strip.nbytes for strip in self._lit)
+
+    @property
+    def is_noisy(self) -> bool:
+        """True if most planes are stored in half floats, whose rounding their noise hides."""
+        return self._is_noisy
+
+    def plane(self, i: int) -> Floats:
+        """Return the plane of light i, (h, w, 3)."""
+        if i in self._clean:
+            plane = self._clean[i].copy()
+        else:
+            plane = np.concatenate([strip.plane(i) for strip in self._lit], axis=1)
+        if self._scales[i] != 1:
+            plane *= self._scales[i]
+        return np.ascontiguousarray(plane.T).reshape(*self._size, 3)
+
+    def rows(self, top: int, bottom: int) -> Floats:
+        """Return rows `top` to `bottom` of all planes, (n, bottom - top, w, 3)."""
+        (height, width), step = self._size, self.strip_rows
+        top, bottom = max(top, 0), min(bottom, height)
+        if top >= bottom:
+            return np.zeros((self._count, 0, width, 3), np.float32)
+        strips = [
+            self._read_strip(k)[:, max(top - k * step, 0) : bottom - k * step]
+            for k in range(top // step, -(-bottom // step))
+        ]
+        return strips[0] if len(strips) == 1 else np.concatenate(strips, axis=1)
+
+    def _read_strip(self, k: int) -> Floats:
+        """Return a strip, (n, rows, w, 3)."""
+        block, begin = self._lit[k].decoded(), k * self.strip_rows * self._size[1]
+        for i, plane in self._clean.items():
+            block[i] = plane[:, begin : begin + block.shape[2]]
+        if (self._scales != 1).any():
+            block *= self._scales[:, None, None]
+        return block.reshape(self._count, 3, -1, self._size[1]).transpose(0, 2, 3, 1)
+
+    def mixes(self, weights: Doubles) -> npt.NDArray[np.float32]:
+        """Return several sums Σ w_i Φ_i, (k, h, w, 3), in one walk. weights: (k, n, 3)."""
+        mixed = np.stack([self.exact_mix(one).T for one in weights]).astype(np.float32)
+        return mixed.reshape(len(weights), *self._size, 3)
+
+    def exact_mix(self, weights: Doubles) -> Doubles:
+        """Return Σ w_i Φ_i channel by channel, (3, p), summed in float64."""
+        scaled = weights * self._scales[:, None]
+        strips = parallel_map(lambda strip: strip.mix(scaled), self._lit, unit="strips")
+        mixed = np.concatenate(strips, axis=1)
+        for i, plane in self._clean.items():
+            mixed += scaled[i][:, None] * plane
+        return np.asarray(mixed)
+
+
+class LitCollector:
+    """Planes that are collected light by light, as long as there is room for their lit pixels."""
+
+    def __init__(self, size: tuple[int, int]) -> None:
+        self._size, self._bytes = size, 0
+        self._planes: dict[str, tuple[LitPlane, ...]] | None = {}
+
+    def add(self, name: str, planes: Sequence[LitPlane]) -> None:
+        """Add the planes of a light; drop all if they take too much memory."""
+        if self._planes is None:
+            return
+        self._planes[name] = tuple(planes)
+        self._bytes += sum(plane.nbytes for plane in planes)
+        if self._bytes > MAX_BYTES:
+            self._planes = None
+
+    def planes(self, names: Sequence[str]) -> list[LitPlanes] | None:
+        """Return each set of planes, in the order of `names`; None if there was no room."""
+        if self._planes is None:
+            return None
+        in_order = [self._planes[name] for name in names]
+        return [LitPlanes(planes, self._size) for planes in zip(*in_order, strict=True)]
