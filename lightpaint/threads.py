@@ -2,19 +2,22 @@
 
 import os
 from collections.abc import Callable, Iterable, Iterator
-from concurrent.futures import ThreadPoolExecutor
-from contextlib import contextmanager
+from concurrent.futures import Future, ThreadPoolExecutor, wait
+from contextlib import contextmanager, suppress
 from contextvars import copy_context
 from functools import cache
 from itertools import count
-from threading import Event, local
+from threading import Event, Thread, local
 from typing import Any, TypeVar
 
 # The controller finds the libraries that are loaded, and NumPy must be among them.
 import numpy as np  # noqa: F401
 from threadpoolctl import ThreadpoolController
 
-from lightpaint.progress import cancellable, cancellation_check
+from lightpaint.progress import cancellable, cancellation_check, counting
+
+#: Seconds between two checks whether work was cancelled while a call runs apart.
+CHECK_S = 0.1
 
 Job = TypeVar("Job")
 Result = TypeVar("Result")
@@ -68,12 +71,14 @@ class _CancelledError(Exception):
     """The end of jobs that are cancelled because another one failed or was interrupted."""
 
 
-def parallel_map(work: Callable[[Job], Result], jobs: Iterable[Job]) -> list[Result]:
+def parallel_map(
+    work: Callable[[Job], Result], jobs: Iterable[Job], *, unit: str | None = None
+) -> list[Result]:
     """Return `work(job)` for each job, several at a time with BLAS on one thread; results in order.
 
     Results are equal, bit for bit, to those of one job after the other. Of several errors that of
     the first job is raised. A job may call this function itself. Cancelled work ends before the
-    next job.
+    next job. unit: the plural of jobs that take equally long, whose number is reported as progress.
     """
     remaining_jobs = list(jobs)
     results: list[Any] = [None] * len(remaining_jobs)
@@ -92,27 +97,78 @@ def parallel_map(work: Callable[[Job], Result], jobs: Iterable[Job]) -> list[Res
                 with cancellable(check_both):
                     check_both()
                     results[k] = work(remaining_jobs[k])
+                    advance()
             except Exception as error:
                 errors[k] = error
 
-    with one_thread():
+    with one_thread(), counting(len(remaining_jobs), unit) as advance:
         # One thread more than processors, so that three channels share two of them evenly.
         max_helpers = (os.cpu_count() or 1) if _limit is None else _limit - 1
         helper_count = min(max_helpers, len(remaining_jobs) - 1)
         helpers = [_pool().submit(copy_context().run, take_turns) for _ in range(helper_count)]
+        # A helper that has not begun by then has nothing to do, and others may need its thread.
         try:
             take_turns()
-        except BaseException:
-            has_ended.set()  # an interrupt waits for no job that has not begun yet
-            raise
-        finally:
-            # A helper that has not begun by now has nothing to do, and others may need its thread.
             for helper in helpers:
                 if not helper.cancel():
                     helper.result()
+        except BaseException:
+            # Jobs that have begun are cancelled; an interrupt waits for no others.
+            has_ended.set()
+            wait([helper for helper in helpers if not helper.cancel()])
+            raise
     if errors:
         raise errors[min(errors)]
     return results
+
+
+def run_apart(work: Callable[..., Result], *arguments: Any) -> Result:
+    """Return `work(*arguments)`, a call of seconds that nothing can interrupt, as of LAPACK.
+
+    It runs in a thread of its own. If the calling thread is interrupted, or its work cancelled, the
+    call is left to itself, and its result is dropped.
+    """
+    check, outcome = cancellation_check(), Future[Result]()
+
+    def run() -> None:
+        try:
+            outcome.set_result(work(*arguments))
+        except BaseException as error:
+            outcome.set_exception(error)
+
+    Thread(target=copy_context().run, args=(run,), name="lightpaint-apart", daemon=True).start()
+    while not wait([outcome], CHECK_S).done:
+        check()
+    return outcome.result()
+
+
+def start_in_background(work: Callable[[], None], *, name: str) -> None:
+    """Start `work` in a thread of this name; `end_background_work` cancels it."""
+    has_ended = Event()
+
+    def check() -> None:
+        if has_ended.is_set():
+            raise _CancelledError
+
+    def run() -> None:
+        try:
+            with cancellable(check), suppress(_CancelledError):
+                work()
+        finally:
+            _background.discard(has_ended)
+
+    _background.add(has_ended)
+    Thread(target=run, name=name).start()
+
+
+def end_background_work() -> None:
+    """Cancel what runs in the background, since the program waits for it when it exits."""
+    for has_ended in list(_background):
+        has_ended.set()
+
+
+#: The events that end the work in the background.
+_background: set[Event] = set()
 
 
 def limit_jobs(count: int | None) -> None:

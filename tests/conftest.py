@@ -15,10 +15,11 @@ from typing import Any
 import numpy as np
 import pytest
 from hypothesis import settings
-from patience import PATIENCE_MS
+from patience import PATIENCE_MS, PATIENCE_S
 from renderer import write_room
 from threadpoolctl import threadpool_limits
 
+from lightpaint import progress
 from lightpaint.basis.basis import Basis, Origin
 from lightpaint.basis.lights import BasisLight
 from lightpaint.basis.render.basis_render import render_basis
@@ -76,6 +77,12 @@ def pytest_terminal_summary(terminalreporter: pytest.TerminalReporter) -> None:
         terminalreporter.write_line(
             f"not tried here, for want of: {', '.join(wanting)} ({len(skipped)} tests)"
         )
+
+
+@pytest.fixture(autouse=True)
+def quiet_stages(monkeypatch: pytest.MonkeyPatch) -> None:
+    """No line on a stage that takes long because the machine is busy."""
+    monkeypatch.setattr(progress, "QUIET_S", PATIENCE_S)
 
 
 @pytest.fixture(scope="session")

@@ -14,6 +14,7 @@ import numpy as np
 import numpy.typing as npt
 
 from lightpaint.arrays import Bools, Doubles, Floats, Indices
+from lightpaint.progress import with_progress
 from lightpaint.threads import one_thread, parallel_map
 
 #: Number of pixels multiplied at a time, whose float64 copies stay in the processor's cache.
@@ -129,7 +130,7 @@ class PlanesBase:
         return f"{type(self).__name__}({self.count} of {width}x{height})"
 
     def __iter__(self) -> Iterator[Floats]:
-        return (self.plane(k) for k in range(self.count))
+        return (self.plane(k) for k in with_progress(range(self.count), "lights"))
 
     def mix(self, weights: Doubles) -> npt.NDArray[np.float32]:
         """Return Σ w_i Φ_i, (h, w, 3)."""
@@ -148,13 +149,13 @@ class PlanesBase:
             block = slice(start, min(start + BLOCK_PIXELS, pixels))
             mixed[:, block] = mix_channels(self.pixels(block), weights)
 
-        parallel_map(fill, range(0, pixels, BLOCK_PIXELS))
+        parallel_map(fill, range(0, pixels, BLOCK_PIXELS), unit="blocks")
         return mixed
 
     def squares(self) -> Doubles:
         """Return Σ Φ² over all pixels and channels, (n,)."""
         totals, pixels = np.zeros(self.count), self.size[0] * self.size[1]
-        for start in range(0, pixels, BLOCK_PIXELS):
+        for start in with_progress(range(0, pixels, BLOCK_PIXELS)):
             block = self.pixels(slice(start, start + BLOCK_PIXELS)).astype(np.float64)
             totals += np.einsum("npc,npc->n", block, block)
         return totals
@@ -180,14 +181,14 @@ class PlanesBase:
         spare = 0 if n <= FEW_LIGHTS else step // 8
         room = np.empty((n + 1, min(step, counted.size) + spare), kind)
         with one_thread() if n <= FEW_LIGHTS else nullcontext():
-            for start in range(0, counted.size, step):
+            for start in with_progress(range(0, counted.size, step)):
                 where = as_slice(counted[start : start + step], spare=spare)
                 values = self.pixels(where)
                 weights, painted = squares(where, values)
                 root, is_per_channel = np.sqrt(weights, dtype=kind), weights.shape[1] == 3
                 # (n + 1, block): the target goes along as one more row.
                 block = room[:, : len(painted)]
-                for c in range(3):
+                for c in with_progress(range(3)):
                     channel_root = root[:, c * is_per_channel]
                     np.multiply(values[..., c], channel_root, out=block[:n])
                     np.multiply(painted[:, c], channel_root, out=block[n], casting="same_kind")
@@ -279,7 +280,7 @@ def power_and_totals(planes: Planes, mask: Bools) -> tuple[Doubles, Doubles]:
     # NumPy sums over such short axes slowly, but multiplies matrices fast; by blocks, which need no
     # copy of the basis, a product is as exact as a sum.
     step, kind = block_of(planes)
-    for start in range(0, len(counted), step):
+    for start in with_progress(range(0, len(counted), step)):
         weights = counted[start : start + step].astype(kind)
         block = planes.pixels(slice(start, start + step))
         for c in range(3):

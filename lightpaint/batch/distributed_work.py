@@ -12,8 +12,13 @@ import numpy as np
 
 from lightpaint.arrays import Floats
 from lightpaint.basis.basis import Basis
-from lightpaint.basis.render.banded_film import check_memory
-from lightpaint.basis.render.basis_render import render_basis, training_samples, with_first_hits
+from lightpaint.basis.render.banded_film import check_memory, renders_in_bands
+from lightpaint.basis.render.basis_render import (
+    check_size,
+    render_basis,
+    training_samples,
+    with_first_hits,
+)
 from lightpaint.basis.render.render_origin import ONE_PASS, basis_lights, method_of
 from lightpaint.basis.render.render_parts import Part, PartSums, plan_parts
 from lightpaint.batch.engine import Engine
@@ -78,7 +83,8 @@ class PartwiseRender:
             # Adding whole parts to earlier sums changes the last bits, compared with one render.
             # That is acceptable only for a finished basis, which was rounded anyway.
             start = None
-        check_memory(scene)
+        check_size(scene)
+        check_memory(scene, in_bands=renders_in_bands(scene, start))
         parts = plan_parts(scene, spp, start=start)
         spool = Spool(scene, parts, seed=seed, start=start)
         film = self._film_of(scene)

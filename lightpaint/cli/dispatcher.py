@@ -69,18 +69,24 @@ def _run_parsed(options: argparse.Namespace, words: Sequence[str], received: Seq
         with _without_garbage(), interruptible_between_pieces():
             from lightpaint.cli.options.command_arguments import values_of
             from lightpaint.cli.output import terminal
+            from lightpaint.progress import stage
             from lightpaint.scene.runtime.variant import SlowBackendWarning
 
             command = _command(options.command)
 
         # The commands report this in their own words.
         warnings.simplefilter("ignore", SlowBackendWarning)
-        outcome = command(**values_of(options, words))
+        with terminal.TerminalListener() as listen, stage("reading the files", listen):
+            values = values_of(options, words)
+        outcome = command(**values)
         if options.as_json and outcome.document is not None:
             terminal.write_json(outcome.document())
         terminal.note("done")
         return outcome.code
     except KeyboardInterrupt as interrupt:
+        from lightpaint.threads import end_background_work
+
+        end_background_work()
         hint = f": {interrupt}" if str(interrupt) else ""
     except Exception as error:
         # An interrupt inside a library often surfaces as an error of its own.

@@ -1,11 +1,12 @@
 """Whole pictures computed in bands of rows, so that intermediate arrays have one band only."""
 
-from collections.abc import Callable, Iterable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from typing import Any, TypeVar
 
 import numpy as np
 import numpy.typing as npt
 
+from lightpaint.progress import with_progress
 from lightpaint.threads import parallel_map
 
 Job = TypeVar("Job")
@@ -39,7 +40,7 @@ def by_bands(make: Callable[..., npt.NDArray[Any]], *pictures: npt.NDArray[Any])
     def fill(rows: slice) -> None:
         result[rows] = make(*(x[rows] for x in pictures))
 
-    parallel_map(fill, others)
+    parallel_map(fill, others, unit="bands")
     return result
 
 
@@ -52,17 +53,24 @@ def sum_by_bands(make: Callable[..., Any], *pictures: npt.NDArray[Any]) -> Any:
     def part(rows: slice) -> Any:
         return make(*(x[rows] for x in pictures))
 
-    return np.sum(parallel_map(part, bands_of(pictures[0].shape)), axis=0)
+    return np.sum(parallel_map(part, bands_of(pictures[0].shape), unit="bands"), axis=0)
 
 
 def in_turns(
-    work: Callable[[Job], Result], jobs: Iterable[Job], size: tuple[int, ...]
+    work: Callable[[Job], Result],
+    jobs: Sequence[Job],
+    size: tuple[int, ...],
+    *,
+    unit: str | None = None,
 ) -> list[Result]:
     """Return work(job) for each job: in parallel, or one by one if the pictures are large.
 
-    size: (height, width) of the pictures, of which each job holds several at a time.
+    size: (height, width) of the pictures, of which each job holds several at a time. unit: as of
+    `parallel_map`.
     """
-    return [work(job) for job in jobs] if is_large(size) else parallel_map(work, jobs)
+    if not is_large(size):
+        return parallel_map(work, jobs, unit=unit)
+    return [work(job) for job in (jobs if unit is None else with_progress(jobs, unit))]
 
 
 def is_large(size: tuple[int, ...]) -> bool:

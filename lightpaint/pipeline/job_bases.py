@@ -15,9 +15,9 @@ from lightpaint.lighting.problem import Problem
 from lightpaint.lighting.solution import Solution
 from lightpaint.pipeline.job.job import Job, PaintedView
 from lightpaint.pipeline.job.settings import Settings
-from lightpaint.progress import Listener, Progress, labelled, listener
+from lightpaint.progress import Announcement, Listener, Pace, Progress, labelled, listener
 from lightpaint.scene.scene import Scene
-from lightpaint.sentences import Hint, Sentence
+from lightpaint.sentences import Hint, Sentence, Word
 
 
 def obtain(
@@ -69,11 +69,23 @@ class _RenderWatch:
     def __init__(self, listen: Listener, *, has_moved: bool, names_cache: bool) -> None:
         self.listen, self._has_moved, self._names_cache = listen, has_moved, names_cache
         self.is_rendered = self.is_all_rendered = self.is_reused = False
+        advice = ": fewer samples or pixels take less"
+        hints = (" (", Hint("spp"), ", ", Hint("resolution", Word("1/2")), ")") * names_cache
+        self._pace, self._begin_s = Pace(), time.monotonic()
+        self._announcement = Announcement("rendering", Sentence(advice, *hints))
 
     def report(self, label: str, done: int, total: int, unit: str = "passes") -> None:
         """Pass progress on. All is rendered if the first report has nothing done."""
         self.is_all_rendered |= not self.is_rendered and done == 0
+        if not self.is_rendered:
+            self._pace, self._begin_s = Pace(done), time.monotonic()
         self.is_rendered = True
+        # A number of seconds is what was asked for.
+        left_s = None if unit == "seconds" else self._pace.left_s(done, total)
+        spent_s = time.monotonic() - self._begin_s
+        remark = self._announcement.remark(spent_s, left_s, done / max(total, 1))
+        if remark is not None:
+            self.listen.say(remark)
         self.listen(label, done, total, unit)
 
     def report_reuse(self, count: int, of: int) -> None:

@@ -1,6 +1,5 @@
 """The pipeline: obtain bases → solve → improve → analyse → relight → predict, verify, report."""
 
-import math
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -33,7 +32,14 @@ from lightpaint.pipeline.sun_search import find_suns
 from lightpaint.placement.placement import Placement
 from lightpaint.placement.suggested_lights import suggest_lights
 from lightpaint.placement.suggestion import MoveSuggestion, Suggestion
-from lightpaint.progress import Listener, Progress, listener, silent
+from lightpaint.progress import (
+    Listener,
+    Progress,
+    listener,
+    silent,
+    spoken_duration,
+    stage,
+)
 from lightpaint.relit.detection_power import LightShares, with_light_tests
 from lightpaint.relit.verification import Verification
 from lightpaint.relit.verification_render import (
@@ -46,7 +52,12 @@ from lightpaint.relit.verification_render import (
 from lightpaint.report.basis_memo import make_ahead
 from lightpaint.report.page.page import prepare_page
 from lightpaint.scene.scene import Scene
-from lightpaint.sentences import Hint, Sentence
+from lightpaint.sentences import Hint, Sentence, Word
+
+#: Advice on stages that every answer needs.
+SOLVE_ADVICE = Sentence(
+    ": a basis of fewer pixels takes less (", Hint("resolution", Word("1/2")), ")"
+)
 
 
 @keywords()
@@ -123,17 +134,20 @@ def answer_job(
     """
     if job.settings.animate:
         return _animated_answer(job, bases, listen)
-    problem = problem_of(job, bases)
-    bases.clear()
-    if job.settings.report:
-        for basis in problem.views.bases:
-            make_ahead(basis, prepare_page)
-    solution = _reduce_noise(job, solution_of(problem), listen)
+    with stage("solving", listen, SOLVE_ADVICE):
+        problem = problem_of(job, bases)
+        bases.clear()
+        if job.settings.report:
+            for basis in problem.views.bases:
+                make_ahead(basis, prepare_page)
+        solution = solution_of(problem)
+    solution = _reduce_noise(job, solution, listen)
     del problem  # some of its arrays are as large as the pictures
     level_errors = () if placement is None else placement.level_errors
-    analyses = analyse(solution, level_errors=level_errors)
-    solution.problem.squares.release()
-    return JobAnswer(solution, analyses, with_findings(solution, analyses).lighting)
+    with stage("analysis", listen, SOLVE_ADVICE):
+        analyses = analyse(solution, level_errors=level_errors)
+        solution.problem.squares.release()
+        return JobAnswer(solution, analyses, with_findings(solution, analyses).lighting)
 
 
 def _reduce_noise(job: Job, solution: Solution, listen: Listener) -> Solution:
@@ -143,7 +157,8 @@ def _reduce_noise(job: Job, solution: Solution, listen: Listener) -> Solution:
         f"solved in {max(certificate.sweeps)} sweeps, to a KKT residual of "
         f"{max(certificate.kkt_residual):.1e}"
     )
-    solution = without_noise(job, solution)
+    with stage("noise correction", listen, Sentence(" (", Hint("literal", True), " skips it)")):
+        solution = without_noise(job, solution)
     pairs = zip((view.scene for view in job.views), solution.problem.views.bases, strict=True)
     scenes = [(scene, basis) for scene, basis in pairs if scene is not None]
     solution = refine_by_rendering(
@@ -161,11 +176,13 @@ def _animated_answer(job: Job, bases: list[Basis], listen: Listener) -> JobAnswe
         for basis, view in zip(bases, job.views, strict=True)
     ]
     bases.clear()
-    solutions = solve_frames(problems, job.painted_frames)
+    with stage("solving", listen, SOLVE_ADVICE):
+        solutions = solve_frames(problems, job.painted_frames)
     del problems
     sweeps = max(max(solution.certificate.sweeps) for solution in solutions)
     listen.note(f"{len(solutions)} frames solved, each in at most {sweeps} sweeps")
-    analyses = tuple(analyse(solution)[0] for solution in solutions)
+    with stage("analysis", listen, SOLVE_ADVICE):
+        analyses = tuple(analyse(solution)[0] for solution in solutions)
     lighting = with_findings(solutions[0], analyses[:1]).lighting
     return JobAnswer(solutions[0], analyses, _with_keys(lighting, job.painted_frames, solutions))
 
@@ -202,7 +219,8 @@ def _finish_view(
     listen.note("analysed, and the lighting written")
     folder = answer.path / view.folder.relative_to(job.folder)
     folder.mkdir(exist_ok=True)
-    predicted = basis.predict(solution.weights)
+    with stage("prediction", listen):
+        predicted = basis.predict(solution.weights)
     verification, budget, relit = None, None, None
     if scene is not None:
         relit = answer.seen_through(scene.sensor)
@@ -226,7 +244,8 @@ def _finish_view(
         move_suggestion=rig.move,
     )
     # The files of the relit scene come to its final folder together with the report.
-    write_report(folder, look, command=settings.command, relit=relit, is_shown=settings.report)
+    with stage("report", listen, Sentence(" (", Hint("report", False), " skips it)")):
+        write_report(folder, look, command=settings.command, relit=relit, is_shown=settings.report)
     listen.note("report written")
     for remark in look.remarks:
         listen.say(remark if len(job.views) == 1 else Sentence(f"{view.folder.name}: ", remark))
@@ -315,9 +334,7 @@ def _verification_text(budget: VerificationBudget, basis: Basis, *, is_fixed: bo
     subject = f"verification of {limit}{budget.spp} samples per pixel on {width}x{height}"
     hint = Sentence(" (", Hint("verify", False), " skips it)")
     if basis.render_s is not None:
-        seconds = math.ceil(budget.share * basis.render_s)
-        duration = f"{seconds} s" if seconds < 120 else f"{math.ceil(seconds / 60)} min"
-        return f"{subject}: at most {duration}" + hint
+        return f"{subject}: at most {spoken_duration(budget.share * basis.render_s)}" + hint
     if budget.share <= 1:
         return f"{subject}: no longer than that many samples of the basis took" + hint
     return f"{subject}: at most {budget.share:.2g} times as long as the basis took" + hint

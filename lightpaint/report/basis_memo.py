@@ -6,7 +6,7 @@ Many looks share a basis, and cores are idle now and then while one of them is s
 import weakref
 from collections.abc import Callable, Hashable
 from concurrent.futures import Future
-from threading import Lock, Thread
+from threading import Lock
 from typing import Any, TypeVar
 
 from lightpaint.basis.basis import Basis
@@ -16,6 +16,7 @@ from lightpaint.basis.cache.denoised_planes import (
     read_denoised_planes,
 )
 from lightpaint.images.pixel_blocks import fitting_factor
+from lightpaint.threads import start_in_background
 
 Result = TypeVar("Result")
 
@@ -88,4 +89,4 @@ def make_ahead(basis: Basis, make: Callable[[Basis], object]) -> None:
         except Exception:  # a later call raises it again
             return
 
-    Thread(target=run, name="lightpaint-ahead").start()
+    start_in_background(run, name="lightpaint-ahead")

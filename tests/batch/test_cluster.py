@@ -1,4 +1,4 @@
-"""A real scheduler and two real worker processes: accidents cost nothing, to the last bit."""
+"""A real scheduler and real worker processes: accidents cost nothing, to the last bit."""
 
 import contextlib
 import json
@@ -21,7 +21,8 @@ from batches import contents
 from command import run
 from renderer import write_room
 
-from lightpaint.basis.render import basis_render
+from lightpaint.basis.file import basis_file
+from lightpaint.basis.render import banded_film, basis_render
 from lightpaint.basis.render import render_parts as parts_module
 from lightpaint.batch.cluster.cluster import Cluster
 from lightpaint.batch.plan.planner import plan
@@ -65,7 +66,7 @@ LONG_S = 120.0
 
 @dataclass
 class Workers:
-    """A scheduler with two workers. slow: folder by which they are held (slow_worker.py)."""
+    """A scheduler with workers. slow: folder by which they are held (slow_worker.py)."""
 
     address: str
     slow: Path
@@ -75,10 +76,10 @@ class Workers:
         with distributed.Client(self.address, set_as_default=False) as client:
             return int(client.run(os.getpid, workers=[worker])[worker])
 
-    def await_two(self) -> None:
-        """Until both are there: a nanny begins another in the place of one that died."""
+    def await_all(self, count: int = 2) -> None:
+        """Until all are there: a nanny begins another in the place of one that died."""
         with distributed.Client(self.address, set_as_default=False) as client:
-            wait_until(lambda: len(client.nthreads()) == 2)
+            wait_until(lambda: len(client.nthreads()) == count)
 
 
 def wait_until(condition: Callable[[], Any]) -> None:
@@ -91,7 +92,13 @@ def wait_until(condition: Callable[[], Any]) -> None:
 
 @pytest.fixture(scope="module")
 def workers(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Workers]:
-    folder = tmp_path_factory.mktemp("cluster")
+    with cluster_of(2, tmp_path_factory.mktemp("cluster")) as worker_pool:
+        yield worker_pool
+
+
+@contextlib.contextmanager
+def cluster_of(count: int, folder: Path) -> Iterator[Workers]:
+    """A scheduler with so many workers."""
     (slow := folder / "slow").mkdir()
     file, tests = folder / "scheduler.json", Path(__file__).parent.parent
     environment = {
@@ -108,7 +115,7 @@ def workers(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Workers]:
         for command in (
             [*dask, "scheduler", "--port", "0", "--host", "127.0.0.1", "--no-dashboard", *options],
             [
-                *dask, "worker", "--nworkers", "2", "--nthreads", "1", "--no-dashboard",
+                *dask, "worker", "--nworkers", str(count), "--nthreads", "1", "--no-dashboard",
                 "--local-directory", str(folder), "--preload", "slow_worker", *options,
             ],
         ):  # fmt: skip
@@ -117,7 +124,7 @@ def workers(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Workers]:
             wait_until(file.exists)
         wait_until(lambda: _address(file))
         worker_pool = Workers(_address(file), slow)
-        worker_pool.await_two()
+        worker_pool.await_all(count)
         yield worker_pool
 
 
@@ -254,7 +261,7 @@ def test_a_cluster_does_what_one_process_does(
 def test_a_worker_killed_in_the_middle_of_a_basis_costs_one_part(
     workers: Workers, reference_batch: tuple[Path, dict[str, bytes]]
 ) -> None:
-    workers.await_two()
+    workers.await_all()
     folder, expected = reference_batch
     spool = folder / "cache-killed" / "parts"
     killer = Killer(workers, "part 3", lambda: len(list(spool.glob("*/[0-9]*-*.npz"))) >= 2)
@@ -269,11 +276,41 @@ def test_a_worker_killed_in_the_middle_of_a_basis_costs_one_part(
     assert list(spool.iterdir()) == []
 
 
+@pytest.mark.nightly
+def test_of_four_workers_two_are_killed_in_the_middle_of_a_basis(
+    tmp_path: Path, reference_batch: tuple[Path, dict[str, bytes]], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """The others take their parts, whose sums this process adds in a file, to the same bits."""
+    folder, expected = reference_batch
+    spool = folder / "cache-halved" / "parts"
+    monkeypatch.setattr(banded_film, "WHOLE_MAX_BYTES", 0)
+    monkeypatch.setattr(basis_file, "SINGLES_MAX_BYTES", 0)
+    with cluster_of(4, tmp_path) as four:
+        killers = [
+            Killer(four, victim, lambda: len(list(spool.glob("*/[0-9]*-*.npz"))) >= 2)
+            for victim in ("part 2", "part 3")
+        ]
+
+        def hear(text: str) -> None:
+            for killer in killers:
+                killer.hear(text)
+
+        listener = ItemListener(hear)
+        run_item(folder, "halved", four, listener)
+    assert all(killer.thread is not None for killer in killers)
+    assert contents(folder / "halved") == expected
+    repeated = {name: count for name, count in listener.starts.items() if count > 1}
+    assert repeated == {"training": 2, "part 2": 2, "part 3": 2}
+    lost = {text for text in listener.remarks if "is lost; trying elsewhere" in text}
+    assert len({text.split(" worker ")[1] for text in lost}) == 2
+    assert list(spool.iterdir()) == []
+
+
 @pytest.mark.nightly  # by day, one is killed in the middle of a basis
 def test_a_worker_killed_in_the_middle_of_a_look_costs_one_try(
     workers: Workers, reference_batch: tuple[Path, dict[str, bytes]]
 ) -> None:
-    workers.await_two()
+    workers.await_all()
     folder, expected = reference_batch
     journal = folder / "look" / "journal.jsonl"
 
@@ -294,7 +331,7 @@ def test_a_worker_killed_in_the_middle_of_a_look_costs_one_try(
 def test_a_worker_that_hangs_and_one_without_memory_are_replaced(
     workers: Workers, reference_batch: tuple[Path, dict[str, bytes]]
 ) -> None:
-    workers.await_two()
+    workers.await_all()
     folder, expected = reference_batch
     (workers.slow / "wait-part 2").touch()
     (workers.slow / "memory-third").touch()
@@ -314,7 +351,7 @@ def test_a_worker_that_hangs_and_one_without_memory_are_replaced(
 def test_a_batch_that_was_killed_goes_on_with_the_parts_that_it_has(
     workers: Workers, reference_batch: tuple[Path, dict[str, bytes]]
 ) -> None:
-    workers.await_two()
+    workers.await_all()
     folder, expected = reference_batch
     spool = folder / "cache-stopped" / "parts"
 
@@ -370,7 +407,7 @@ def test_workers_of_another_version_are_left_out(
 ) -> None:
     from lightpaint.batch.cluster import worker as cluster_worker
 
-    workers.await_two()
+    workers.await_all()
     own_versions = {**cluster_worker.versions(), "lightpaint": "other"}
     # Workers find the function by its name, and theirs is not changed.
     monkeypatch.setattr("lightpaint.batch.cluster.workers.own_versions", lambda: own_versions)

@@ -26,6 +26,7 @@ from lightpaint.errors import LightpaintError
 from lightpaint.files import replacing
 from lightpaint.images.denoiser import denoiser_text, oidn_is_installed
 from lightpaint.images.pixel_blocks import block_mean, blocks_in, resampled
+from lightpaint.progress import with_progress
 from lightpaint.threads import parallel_map
 
 FORMAT, ARRAY_NAMES = "lightpaint-clean 4", ("halves", "scales", "present")
@@ -191,7 +192,7 @@ def obtain_denoised_planes(basis: Basis, *, factor: int = 1) -> DenoisedPlanes |
         shared = _read_shared(basis, keys, factor)
         pairs = [
             shared[k] if k in shared else denoise_to_halves(basis, k, factor)
-            for k in range(len(basis.lights))
+            for k in with_progress(range(len(basis.lights)), "lights")
         ]
         halves, scales = zip(*pairs, strict=True)
         denoised = np.stack(halves), np.array(scales)
@@ -311,6 +312,7 @@ def _content_keys(basis: Basis) -> list[str]:
     keys = parallel_map(
         lambda k: _digest(*(planes.plane(k) for planes in stacks), start=shared),
         range(len(basis.lights)),
+        unit="lights",
     )
     return [*keys, _digest(basis.current_weights, start=" ".join(keys))]
 

@@ -46,7 +46,9 @@ from lightpaint.images.formats.exr import Channels, ExrPart, read_headers, read_
 from lightpaint.images.formats.exr_rows import PartLayout, RowFile, RowsUnsupportedError
 from lightpaint.images.formats.exr_streams import PartHead, room_for, write_streamed
 from lightpaint.keywords import keywords
+from lightpaint.progress import with_progress
 from lightpaint.storage.json_records import fields_of, read_record, strict_json
+from lightpaint.threads import parallel_map
 
 #: The written format, and an older one that is still read, in which all planes are float32.
 FORMAT, OLD_FORMAT = "lightpaint-basis 2", "lightpaint-basis 1"
@@ -59,6 +61,9 @@ SINGLES_MAX_BYTES = 2**27
 
 #: Size of all planes in float32, in bytes, above which they stay in their file.
 IN_MEMORY_MAX_BYTES = 2**31
+
+#: Maximum size in bytes of a basis file that the library reads in less than two seconds.
+QUICK_MAX_BYTES = 2**26
 
 #: Maximum size in bytes of indirect light, images and noise in half floats, that stays in memory.
 INDIRECT_MAX_BYTES = 2**28
@@ -89,7 +94,7 @@ def write_basis(path: str | Path, basis: Basis) -> None:
     others, sums = list(other_parts(basis)), dict[str, str]()
 
     def parts() -> Iterator[tuple[PartHead, Channels]]:
-        for k, light in enumerate(basis.lights):
+        for k, light in enumerate(with_progress(basis.lights, "lights")):
             planes = encoded_planes_of(basis, k)
             texts = light_texts(light, [part.encoding for part in planes])
             channels = light_channels(planes)
@@ -149,7 +154,8 @@ def _is_encoded(lights: int, size: tuple[int, int]) -> bool:
 
 def _encoded(basis: Basis) -> Basis:
     """Return `basis` with planes in the encoding of its file."""
-    of_lights = [encoded_planes_of(basis, k) for k in range(len(basis.lights))]
+    numbers = with_progress(range(len(basis.lights)), "lights")
+    of_lights = [encoded_planes_of(basis, k) for k in numbers]
     images, noise, *indirect = zip(*of_lights, strict=True)
     parts = None
     if indirect:
@@ -196,7 +202,8 @@ class _Parts:
     def check_pixels(self, lights: Sequence[BasisLight], checksums: Checksums | None) -> None:
         """Raise BasisError if a light's pixels are not finite or do not match their checksum."""
         names = LIGHT_CHANNELS | INDIRECT_CHANNELS if self.has_indirect else LIGHT_CHANNELS
-        for light, texts, read in zip(lights, self.texts, self.channel_readers, strict=True):
+        readers = with_progress(self.channel_readers, "lights")
+        for light, texts, read in zip(lights, self.texts, readers, strict=True):
             channels = read()  # one light at a time, since together they may exceed memory
             if not all(np.isfinite(channels[name]).all() for name in names):
                 raise BasisError("holds values that are not finite: make it again")
@@ -225,7 +232,7 @@ def read_basis(path: str | Path) -> Basis:
     try:
         if (large_basis := _read_large(path)) is not None:
             return replace(large_basis, source=str(path))
-        parts = read_parts(path)
+        parts = _read_by_lights(path) or read_parts(path)
         head = _head(p.attributes for p in parts)
         return replace(leave_indirect(_basis_of_parts(parts, head), path), source=str(path))
     except BasisError as error:
@@ -279,6 +286,24 @@ def _read_large(path: Path) -> Basis | None:
     if not light_parts or not is_large(len(light_parts), light_parts[0].size):
         return None
     return _basis_of_rows(file, _head(p.texts for p in file.parts))
+
+
+def _read_by_lights(path: Path) -> list[ExrPart] | None:
+    """Return the parts of a file that takes seconds to read, so that progress shows and a signal
+    acts: one call of the library could not be interrupted. None if it is smaller, or RowFile does
+    not support it.
+    """
+    if path.stat().st_size <= QUICK_MAX_BYTES:
+        return None
+    try:
+        file = RowFile(path)
+    except (RowsUnsupportedError, OSError):
+        return None
+
+    def read(layout: PartLayout) -> ExrPart:
+        return ExrPart("", file.channels(layout), layout.texts, layout.display)
+
+    return parallel_map(read, file.parts, unit="lights")
 
 
 def _head(texts: Iterable[Mapping[str, str]]) -> Mapping[str, str]:

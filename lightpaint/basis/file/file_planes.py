@@ -104,7 +104,7 @@ class RowPlanes(PlanesBase):
             for into, one in zip(mixed, weights, strict=True):
                 into[top : top + step] = mix(rows, one)
 
-        parallel_map(fill, range(0, height, step))
+        parallel_map(fill, range(0, height, step), unit="strips")
         return mixed
 
     def replaced(self, planes: Mapping[int, Floats]) -> Planes:

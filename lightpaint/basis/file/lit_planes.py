@@ -213,7 +213,7 @@ class LitPlanes(RowPlanes):
     def exact_mix(self, weights: Doubles) -> Doubles:
         """Return Σ w_i Φ_i channel by channel, (3, p), summed in float64."""
         scaled = weights * self._scales[:, None]
-        strips = parallel_map(lambda strip: strip.mix(scaled), self._lit)
+        strips = parallel_map(lambda strip: strip.mix(scaled), self._lit, unit="strips")
         mixed = np.concatenate(strips, axis=1)
         for i, plane in self._clean.items():
             mixed += scaled[i][:, None] * plane

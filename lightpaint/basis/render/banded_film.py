@@ -145,8 +145,7 @@ class BandedFilm(FilmSums):
 
         They are computed from the sums on request. spp: samples per pixel of each half.
         """
-        sets = SumSets(self.sums, len(self._tracer.scene.lights), spp)
-        return [(SumPlanes(sets, k), SumPlanes(sets, k + 1)) for k in range(0, sets.count, 2)]
+        return planes_of_sums(self.sums, len(self._tracer.scene.lights), spp)
 
 
 class FileSums:
@@ -256,6 +255,14 @@ class SumPlanes(RowPlanes):
         """Return rows `top` to `bottom` of all planes, (n, bottom - top, w, 3)."""
         rows = slice(max(top, 0), max(bottom, 0))
         return self._sets.rows(slice(0, self.count), rows)[self._number]
+
+
+def planes_of_sums(sums: FileSums, lights: int, spp: int) -> list[tuple[SumPlanes, SumPlanes]]:
+    """Return pairs of images and half differences, computed on request: of all light and, if it is
+    split, of indirect light. lights: number of lights. spp: samples per pixel of each half.
+    """
+    sets = SumSets(sums, lights, spp)
+    return [(SumPlanes(sets, k), SumPlanes(sets, k + 1)) for k in range(0, sets.count, 2)]
 
 
 def renders_in_bands(scene: Scene, start: Basis | None = None) -> bool:

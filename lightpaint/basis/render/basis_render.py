@@ -98,7 +98,7 @@ def render_basis(
         raise SceneError("give a number of samples or a time to render for, not both")
     check_samples(spp=spp, until_spp=until_spp, seed=seed)
     budget = Budget(scene.spp if spp is None else spp, time_s, until_spp, until_variance)
-    _check_size(scene)
+    check_size(scene)
     check_memory(scene, in_bands=renders_in_bands(scene, start))
     if start is not None and not is_of(scene, start, seed):
         raise BasisError("the basis to continue was made from another scene, sensor, film or seed")
@@ -124,7 +124,7 @@ def render_basis(
     return with_first_hits(rendered, scene, seed)
 
 
-def _check_size(scene: Scene) -> None:
+def check_size(scene: Scene) -> None:
     """Raise SceneError if a basis of `scene` would have more values than its file can count."""
     height, width = scene.size
     if len(scene.lights) * height * width * 3 >= 2**32:

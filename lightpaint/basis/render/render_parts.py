@@ -18,9 +18,10 @@ import numpy as np
 from lightpaint.arrays import Floats
 from lightpaint.basis.basis import Basis
 from lightpaint.basis.planes import as_planes
+from lightpaint.basis.render.banded_film import FileSums, planes_of_sums, renders_in_bands
 from lightpaint.basis.render.basis_render import with_first_hits
 from lightpaint.basis.render.integrators import plane_count
-from lightpaint.basis.render.one_pass_basis import basis_of_sums
+from lightpaint.basis.render.one_pass_basis import basis_of_planes, basis_of_sums
 from lightpaint.basis.render.render_budget import PASS_DIVISOR, half_of
 from lightpaint.basis.render.render_origin import ONE_PASS, basis_lights, method_of, origin_of
 from lightpaint.basis.render.separate_renders import (
@@ -183,9 +184,11 @@ class PartSums:
             return
         self._half = 0 if start is None else start.origin.halves[0]
         self._half += parts[0].spp if parts else 0
-        self._halves: Floats | None = (
-            None  # allocated when the first part tells the number of planes and channels
-        )
+        #: Allocated when the first part tells the number of planes and channels; in a file where
+        #: `render_basis` keeps them in one, too.
+        self._halves: Floats | FileSums | None = None
+        if renders_in_bands(scene, start):
+            self._halves = FileSums((2, plane_count(scene), *scene.size, 3))
         self._seen = np.zeros(scene.size, np.float32)
 
     def add(self, part: Part, planes: Floats, seen: Floats) -> None:
@@ -197,7 +200,11 @@ class PartSums:
         if self._halves is None:
             halves, lights, _, _, channels = planes.shape
             self._halves = np.zeros((halves, lights, *self._scene.size, channels), np.float32)
-        self._halves[:, :, part.top : part.bottom] = planes
+        if isinstance(self._halves, FileSums):
+            for half, sums in enumerate(planes):
+                self._halves.write(half, range(part.top, part.bottom), sums)
+        else:
+            self._halves[:, :, part.top : part.bottom] = planes
         self._seen[part.top : part.bottom] = seen.sum(axis=0)
 
     def basis(self, guide_table: Floats | None) -> Basis:
@@ -212,6 +219,10 @@ class PartSums:
         elif self._halves is None:  # `start` had all samples, so there were no parts
             assert start is not None
             start_basis = start
+        elif isinstance(self._halves, FileSums):
+            pairs = planes_of_sums(self._halves, len(scene.lights), self._half)
+            of_render = scene, self._seed, self._seen > 0, self._half, guide_table
+            start_basis = basis_of_planes(pairs, *of_render, is_finished=True, sums=None)
         else:
             halves, seen = list(self._halves), self._seen > 0
             start_basis = basis_of_sums(

@@ -39,6 +39,7 @@ from lightpaint.pipeline.templates import (
     render_template,
     template_of_basis,
 )
+from lightpaint.progress import stage
 from lightpaint.relit.relight import scene_of
 from lightpaint.scene.quality_presets import on_film, samples
 from lightpaint.scene.runtime.variant import use_variant
@@ -127,7 +128,8 @@ def basis(*, scene: SceneFile, output: Path, settings: Settings) -> CommandOutco
         ):
             listen.say(remark)
         basis_on_film = obtain(scene_on_film, settings, listen)
-    write_basis(output, basis_on_film)
+        with stage("writing the basis", listen):
+            write_basis(output, basis_on_film)
     note = " and the fixed light" if basis_on_film.is_fixed.any() else ""
     count = int((~basis_on_film.is_fixed).sum())
     terminal.write(f"{output}: {count} lights{note}, {basis_on_film.origin.spp} samples per pixel")

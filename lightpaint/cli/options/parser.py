@@ -145,6 +145,7 @@ def _solve(parser: argparse.ArgumentParser) -> None:
     add_frames(parser)
     add_method(parser)
     add_verification(parser)
+    add_fields(parser, Settings, "report")
     add_tolerances(parser)
     add_fields(parser, Settings, "cd_per_unit")
     add_lights(parser)

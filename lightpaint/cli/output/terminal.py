@@ -7,6 +7,7 @@ import sys
 import textwrap
 import time
 from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
 from typing import Any
 
 from rich.console import Console
@@ -14,6 +15,7 @@ from rich.progress import (
     BarColumn,
     MofNCompleteColumn,
     Progress,
+    ProgressColumn,
     Task,
     TaskID,
     TextColumn,
@@ -26,6 +28,7 @@ from lightpaint.cli.output import lines
 from lightpaint.cli.output.lines import output_mode
 from lightpaint.cli.output.vocabulary import spoken
 from lightpaint.display_text import visible
+from lightpaint.progress import Pace, pace_of_report, spoken_duration
 
 
 def numbers(rgb: tuple[float, float, float]) -> str:
@@ -130,8 +133,8 @@ def _timed(text: str) -> str:
     return f"{text} [{lap:.2f} s, {total:.2f} s in all]"
 
 
-#: Least seconds between two JSON lines on the same work.
-JSON_INTERVAL_S = 0.5
+#: Least seconds between two JSON lines on the same work, and between two lines of a log.
+JSON_INTERVAL_S, LOG_INTERVAL_S = 0.5, 10.0
 
 #: Maximum number of workers with a line each; of more, only their number is shown.
 MAX_WORKER_LINES = 8
@@ -144,11 +147,31 @@ class _Count(MofNCompleteColumn):
         return Text("") if task.total is None else super().render(task)
 
 
+class _TimeLeft(ProgressColumn):
+    """A column with the time that is left; empty before it is known."""
+
+    def render(self, task: Task) -> Text:
+        end_s = task.fields.get("end_s")
+        if end_s is None or task.finished:
+            return Text("")
+        return Text(f"{spoken_duration(max(end_s - time.monotonic(), 0))} left")
+
+
+@dataclass
+class _Work:
+    """Counted work as last reported. line_s: when a line was last printed; None if never."""
+
+    pace: Pace
+    done: int
+    total: int
+    line_s: float | None = None
+
+
 class TerminalListener:
     """A listener that shows progress and remarks on stderr, each remark once.
 
-    On a terminal it shows bars while it is entered, and a line for each busy worker; in a log, one
-    line for each piece of work that begins.
+    On a terminal it shows bars while it is entered, and a line for each busy worker; in a log, a
+    line for each piece of work that begins, and now and then how far it is.
     """
 
     def __init__(self) -> None:
@@ -157,7 +180,7 @@ class TerminalListener:
         self._tasks: dict[str, TaskID] = {}
         self._workers: dict[str, TaskID] = {}
         self._workers_without_line: set[str] = set()  # workers without a line
-        self._last_line_s: dict[str, float] = {}  # time of the last JSON line on each work
+        self._works: dict[str, _Work] = {}  # by label
 
     def __enter__(self) -> "TerminalListener":
         mode = output_mode()
@@ -167,6 +190,7 @@ class TerminalListener:
                 BarColumn(),
                 _Count(),
                 TimeElapsedColumn(),
+                _TimeLeft(),
             )
             self._bars = Progress(*columns, console=Console(stderr=True), transient=True)
             self._bars.start()
@@ -179,26 +203,50 @@ class TerminalListener:
 
     def __call__(self, label: str, done: int, total: int, unit: str = "passes") -> None:
         """Show that `done` of `total` pieces of the work `label` are finished."""
+        work = self._works.get(label)
+        if work is None or done < work.done or total != work.total:  # it begins, or begins again
+            line_s = None if work is None or done == 0 else work.line_s
+            work = self._works[label] = _Work(pace_of_report() or Pace(done), done, total, line_s)
+        work.done = done
+        left_s = work.pace.left_s(done, total)
         if output_mode().json_progress:
-            self._print_json(label, done, total, unit)
-            return
-        if self._bars is None:
-            if done == 0 and not output_mode().is_quiet:
-                lines.err(f"{label}: {_counted(total, unit)}")
-            return
+            self._print_json(label, work, unit, left_s)
+        elif self._bars is None:
+            self._print_line(label, work, unit, left_s)
+        else:
+            self._draw_bar(label, work, unit, left_s)
+
+    def _draw_bar(self, label: str, work: _Work, unit: str, left_s: float | None) -> None:
+        """Draw the bar of some work."""
+        assert self._bars is not None
         if label not in self._tasks:
             title = label if unit in ("passes", label) else f"{label} ({unit})"
-            self._tasks[label] = self._bars.add_task(visible(title), total=total)
-        self._bars.update(self._tasks[label], completed=done, total=total)
+            self._tasks[label] = self._bars.add_task(visible(title), total=work.total)
+        end_s = None if left_s is None else time.monotonic() + left_s
+        self._bars.update(self._tasks[label], completed=work.done, total=work.total, end_s=end_s)
 
-    def _print_json(self, label: str, done: int, total: int, unit: str) -> None:
-        """Print a JSON line of progress: the first, the last, and some between."""
-        now_s = time.perf_counter()
-        is_between = label in self._last_line_s and 0 < done < total
-        if is_between and now_s < self._last_line_s[label] + JSON_INTERVAL_S:
+    def _print_line(self, label: str, work: _Work, unit: str, left_s: float | None) -> None:
+        """Print a line of a log when work begins, and some between."""
+        now_s, pieces = time.monotonic(), _counted(work.total, unit)
+        if output_mode().is_quiet or (work.done == work.total and work.total > 0):
             return
-        self._last_line_s[label] = now_s
-        lines.err_json({"work": label, "done": done, "total": total, "unit": unit})
+        if work.done > 0 and work.line_s is not None and now_s < work.line_s + LOG_INTERVAL_S:
+            return
+        work.line_s = now_s
+        if work.done == 0:
+            lines.err(f"{label}: {pieces}")
+        else:
+            left = "" if left_s is None else f", {spoken_duration(left_s)} left"
+            lines.err(f"{label}: {work.done} of {pieces}{left}")
+
+    def _print_json(self, label: str, work: _Work, unit: str, left_s: float | None) -> None:
+        """Print a JSON line of progress: the first, the last, and some between."""
+        now_s, is_between = time.monotonic(), 0 < work.done < work.total
+        if is_between and work.line_s is not None and now_s < work.line_s + JSON_INTERVAL_S:
+            return
+        work.line_s = now_s
+        document = {"work": label, "done": work.done, "total": work.total, "unit": unit}
+        lines.err_json(document | {"left_s": None if left_s is None else round(left_s, 1)})
 
     def at_work(self, worker: str, task: str | None) -> None:
         """Show the current task of a worker; None if it is idle."""

@@ -8,6 +8,7 @@ processors.
 import numpy as np
 
 from lightpaint.arrays import Bools, Doubles
+from lightpaint.lighting.algebra.eigenvectors import eigenvectors
 from lightpaint.lighting.algebra.quadratic import Quadratic
 
 #: The eigenvalue of M, of unit diagonal, below which a step along its vector changes nothing that
@@ -38,7 +39,7 @@ def nearest_equal(q: Quadratic, x: Doubles, begin: Doubles) -> Doubles:
         matrix = matrix + q.A[:, f].T @ q.A[:, f]
     if not is_suspect(matrix):
         return x
-    values, vectors = np.linalg.eigh(matrix)
+    values, vectors = eigenvectors(matrix)
     idle = vectors[:, values <= NULL_EIGENVALUE]
     away = idle @ (idle.T @ (x - begin)[f])
     # An unknown that has not moved limits nothing.

@@ -7,6 +7,7 @@ import numpy as np
 
 from lightpaint.arrays import Bools, Doubles
 from lightpaint.basis.light_images import texel_lights
+from lightpaint.lighting.algebra.eigenvectors import eigenvectors
 from lightpaint.lighting.algebra.quadratic import UNREACHED_POWER
 from lightpaint.lighting.solution import Solution
 
@@ -115,7 +116,7 @@ def _cancelling_mixes(
         matrix = cosines[c][np.ix_(lit_heads, lit_heads)]
         if _is_above(matrix, alike):
             continue
-        values, vectors = np.linalg.eigh(matrix)
+        values, vectors = eigenvectors(matrix)
         for value, vector in zip(values, vectors.T, strict=True):
             if value <= alike:
                 part = np.abs(vector) > MIN_PART * np.abs(vector).max()

@@ -23,6 +23,7 @@ from lightpaint.lighting.linear_problem import reduce_lights
 from lightpaint.lighting.problem import gamuts_for, whites_for
 from lightpaint.lighting.solution import Solution
 from lightpaint.lighting.solve import solution_of
+from lightpaint.progress import stage
 
 
 @keywords()
@@ -75,15 +76,17 @@ def analyse(
         (2, 3)
     """
     views = solution.views
-    jobs: list[Callable[[], Any]] = [partial(_appearance_and_diagnosis, view) for view in views]
-    jobs += [partial(error_bars, solution, level_errors=level_errors)]
-    jobs += [partial(best_by_colors, solution)]
-    jobs += [partial(_ambiguities, solution)]
-    jobs += [partial(without_constraints, view) for view in views]
+    jobs: list[tuple[str, Callable[[], Any]]] = [
+        *(("comparison", partial(_appearance_and_diagnosis, view)) for view in views),
+        ("error bars", partial(error_bars, solution, level_errors=level_errors)),
+        ("answers in other colours", partial(best_by_colors, solution)),
+        ("similar lights", partial(_ambiguities, solution)),
+        *(("answer without constraints", partial(without_constraints, x)) for x in views),
+    ]
     # All of them ask for it.
     solution.basis.predict(solution.weights)
     # The jobs are independent, and each leaves a processor idle now and then.
-    answers = iter(in_turns(lambda call: call(), jobs, solution.basis.size))
+    answers = iter(in_turns(lambda job: _run_stage(*job), jobs, solution.basis.size))
     looked_at: list[tuple[Appearance, Diagnosis]] = [next(answers) for _ in views]
     appearances = [view_appearance for view_appearance, _ in looked_at]
     diagnoses = [diagnosis for _, diagnosis in looked_at]
@@ -107,6 +110,12 @@ def analyse(
             Analysis(certified, uncertainty, diagnosis, view_appearance, alike, free, colors)
         )
     return tuple(analyses)
+
+
+def _run_stage(label: str, work: Callable[[], Any]) -> Any:
+    """Return the result of `work`, whose progress is reported under `label`."""
+    with stage(label):
+        return work()
 
 
 def _ambiguities(solution: Solution) -> tuple[Ambiguity, ...]:

@@ -115,8 +115,10 @@ class PixelLoss(ABC):
         if len(self) <= STRIP_PIXELS:
             return [work(slice(0, len(self)), self)]
         if len(self) > MAX_KEPT_PIXELS:
-            return parallel_map(lambda part: work(part, self.subset(part)), self._parts)
-        return parallel_map(lambda strip: work(*strip), self._kept_strips)
+            return parallel_map(
+                lambda part: work(part, self.subset(part)), self._parts, unit="strips"
+            )
+        return parallel_map(lambda strip: work(*strip), self._kept_strips, unit="strips")
 
 
 class Loss(ABC):

@@ -26,6 +26,7 @@ from lightpaint.lighting.loss.lit_pixels import LitPixels
 from lightpaint.lighting.loss.loss import Cut, Loss
 from lightpaint.lighting.loss.weight_penalty import pull_to_current
 from lightpaint.lighting.normal_equations import NormalEquations
+from lightpaint.progress import with_progress
 
 #: Largest RMS noise of the current look, relative to the display's range, at which single pixels
 #: are fitted: that of some 32 samples per pixel on the shipped scenes (docs/benchmarks.md).
@@ -73,7 +74,7 @@ class BinnedPixels:
         current_picture = LitPixels.whole(self.basis, self.loss).predicted(current)
         _, weight = self.loss.pixels.squares(current_picture, from_clipping=False)
         power = np.zeros(current.shape)
-        for start in range(0, weight.shape[1], BLOCK_PIXELS):
+        for start in with_progress(range(0, weight.shape[1], BLOCK_PIXELS)):
             where = slice(start, start + BLOCK_PIXELS)
             halves = self.basis.noise.pixels(where).astype(np.float64)
             power += np.einsum("cp,npc->nc", weight[:, where], np.square(halves))

@@ -257,7 +257,15 @@ class Settings(Fit):
             theme="Verification",
         ),
     ] = None
-    report: bool = True
+    report: Annotated[
+        bool,
+        Option(
+            "--no-report",
+            "write neither report.html nor comparison.png, only the numbers",
+            default="write them",
+            theme="Results",
+        ),
+    ] = True
     force: Annotated[
         bool,
         Option(

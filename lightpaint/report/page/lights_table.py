@@ -190,7 +190,9 @@ def thumbnails_of(basis: Basis, *, is_clean: bool) -> list[tuple[str, tuple[int,
 
     all_lights = range(len(basis.lights))
     return make_once(
-        basis, ("thumbnails", is_clean), lambda: in_turns(shown, all_lights, basis.size)
+        basis,
+        ("thumbnails", is_clean),
+        lambda: in_turns(shown, all_lights, basis.size, unit="lights"),
     )
 
 

@@ -32,6 +32,7 @@ from lightpaint.images.packed_picture import PackedPicture, pack_picture
 from lightpaint.images.pixel_blocks import block_mean
 from lightpaint.lighting.answer.lighting import ALL_REACHED, Lighting
 from lightpaint.lighting.answer.lighting_file import lighting_fields
+from lightpaint.progress import with_progress
 from lightpaint.report.basis_memo import MAX_PIXELS, cached_clean_planes, make_once, page_reduction
 from lightpaint.report.page.figures import CLEAN_REDUCTION, data_uri
 from lightpaint.report.page.html import html
@@ -200,10 +201,12 @@ def _compact_planes(
         return small((planes or basis.planes).plane(int(lights[k])))
 
     if must_denoise:  # by a denoiser that uses all processors itself
-        pictures = [denoise_plane(basis, int(k), factor=factor) for k in lights]
+        pictures = [
+            denoise_plane(basis, k, factor=factor) for k in with_progress(lights.tolist(), "planes")
+        ]
         pictures += denoise_mixes(basis, mixes, factor=factor) if mixes else []
     else:
-        pictures = in_turns(plane, range(len(lights)), basis.size)
+        pictures = in_turns(plane, range(len(lights)), basis.size, unit="planes")
         if planes is not None:
             pictures += [small(planes.mix(mix)) for mix in mixes]
         elif mixes:

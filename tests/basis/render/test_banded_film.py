@@ -18,9 +18,10 @@ from lightpaint.basis.file import basis_file
 from lightpaint.basis.file.file_planes import FilePlanes
 from lightpaint.basis.file.half_floats import EncodedPlanes
 from lightpaint.basis.planes import MemoryPlanes
-from lightpaint.basis.render import banded_film, basis_render
+from lightpaint.basis.render import banded_film, basis_render, render_parts
 from lightpaint.basis.render.banded_film import FileSums, SumPlanes, memory_needed, renders_in_bands
 from lightpaint.basis.render.basis_render import render_basis
+from lightpaint.basis.render.render_parts import PartRenderer, PartSums, plan_parts
 from lightpaint.errors import SceneError
 from lightpaint.progress import Interrupted
 from lightpaint.scene.scene import Scene
@@ -76,6 +77,25 @@ def test_bands_have_the_bits_of_the_whole_film(
         assert planes.rows(3, 9).tobytes() == array[:, 3:9].tobytes()
     assert max(band_memory) <= banded_film.BAND_BYTES
     assert len(band_memory) > 8
+
+
+def test_parts_are_added_in_a_file_to_the_same_bits(
+    small_room: Scene,
+    whole_basis: Basis,
+    band_memory: list[int],
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    monkeypatch.setattr(render_parts, "PART_SAMPLES", 2**11)
+    parts, table = plan_parts(small_room, 20), whole_basis.guide_table
+    renderer, sums = PartRenderer(small_room, 3, table), PartSums(small_room, parts, seed=3)
+    for part in reversed(parts):
+        sums.add(part, *renderer.render(part))
+    renderer.close()
+    basis = sums.basis(table)
+    assert len(parts) > 3
+    assert isinstance(basis.planes, SumPlanes)
+    assert_equal_bits(basis, whole_basis)
+    assert band_memory == []  # rows are written, and none is read before the planes are
 
 
 @pytest.mark.nightly

@@ -19,12 +19,14 @@ import numpy as np
 
 from lightpaint.arrays import Bools, Doubles, Floats, Indices
 from lightpaint.basis.planes import BLOCK_PIXELS, FEW_LIGHTS, Planes, as_slice, block_of
+from lightpaint.lighting.algebra.eigenvectors import eigenvectors
 from lightpaint.lighting.analysis.noise.dominant_pixels import Peaks, t_ratios
 from lightpaint.lighting.analysis.noise.pixel_gradients import PixelGradients
 from lightpaint.lighting.analysis.noise.residuals import Residuals, channel_grain
 from lightpaint.lighting.normal_equations import NormalEquations
 from lightpaint.lighting.problem import Problem
 from lightpaint.lighting.solution import Solution
+from lightpaint.progress import with_progress
 from lightpaint.threads import one_thread, parallel_map
 
 #: Half differences by which the pixel beside may differ. Beyond, it shows something else: an edge,
@@ -159,12 +161,12 @@ def noise_sums(solution: Solution, *, removed: float | None = None) -> Noise:
     length = BLOCK_PIXELS * max(1, -(-counted.size // (BLOCK_PIXELS * PARTS)))
     parts = [counted[k : k + length] for k in range(0, counted.size, length)]
     sums = [_Sums.zeros(len(weights))] + (
-        parallel_map(lambda part: pixels.sums(part, is_coupled=is_coupled), parts)
+        parallel_map(lambda x: pixels.sums(x, is_coupled=is_coupled), parts, unit="parts")
         if len(weights) <= FEW_LIGHTS
-        else [pixels.sums(part, is_coupled=is_coupled) for part in parts]
+        else [pixels.sums(x, is_coupled=is_coupled) for x in with_progress(parts, "parts")]
     )
     error, noise = np.zeros((2, 3))
-    for start in range(0, len(weight), BLOCK_PIXELS):
+    for start in with_progress(range(0, len(weight), BLOCK_PIXELS)):
         part = slice(start, start + BLOCK_PIXELS)
         mixed = residuals.noise(part)
         error += np.square(weight[part] * residuals.residual(part) * mixed).sum(axis=0)
@@ -213,7 +215,7 @@ def painting_covariance(solution: Solution) -> Doubles | None:
         return None
     covariance = np.zeros((3, n, 3, n))
     step, kind = block_of(pixels.planes)
-    for start in range(0, pixels.counted.size, step):
+    for start in with_progress(range(0, pixels.counted.size, step)):
         part = as_slice(pixels.counted[start : start + step])
         lit = pixels.planes.pixels(part)
         rows = [lit[..., c] * roots[part, c].astype(kind) for c in range(3)]
@@ -300,18 +302,18 @@ class NoisyPixels:
         """Sum over some pixels."""
         sums = _Sums.zeros(len(self.weights))
         step, _ = block_of(self.planes)
-        for start in range(0, counted.size, step):
+        for start in with_progress(range(0, counted.size, step)):
             pixels = as_slice(counted[start : start + step])
             arrays = self.noise.pixels(pixels), self.planes.pixels(pixels)
             missed = self.residuals.residual(pixels)
-            rows = [self._rows(sums, pixels, arrays, missed, c) for c in range(3)]
-            for c in range(3):
+            rows = [self._rows(sums, pixels, arrays, missed, c) for c in with_progress(range(3))]
+            for c in with_progress(range(3)):
                 sums.gradient[c, :, c] += rows[c] @ rows[c].T
                 squares = np.square(rows[c])
                 sums.fourth[c] += np.einsum("ip,ip->i", squares, squares)
             if is_coupled:
                 # One path carries all three channels, so their noise goes together.
-                for c, d in ((0, 1), (0, 2), (1, 2)):
+                for c, d in with_progress(((0, 1), (0, 2), (1, 2))):
                     product = rows[c] @ rows[d].T
                     sums.gradient[c, :, d] += product
                     sums.gradient[d, :, c] += product.T
@@ -392,8 +394,7 @@ def denoised_matrix(equations: NormalEquations, power: Doubles) -> Doubles:
 def eigh(M: Doubles) -> tuple[Doubles, Doubles]:
     """Return eigenvalues and vectors; small matrices on one thread, which is faster."""
     with one_thread() if len(M) <= SMALL_MATRIX else nullcontext():
-        values, vectors = np.linalg.eigh(M)
-    return values, vectors
+        return eigenvectors(M)
 
 
 def pseudo_inverse(M: Doubles) -> Doubles:

@@ -27,6 +27,7 @@ from lightpaint.lighting.normal_equations import NormalEquations
 from lightpaint.lighting.problem import Refinement
 from lightpaint.lighting.solution import Solution
 from lightpaint.lighting.solve import solve_again
+from lightpaint.progress import with_progress
 from lightpaint.sentences import Hint
 
 
@@ -126,7 +127,7 @@ def _push_covariance(solution: Solution, noise: Floats, directions: Doubles) -> 
     weight = solution.weight.reshape(len(noise), -1)
     covariance = np.zeros((directions.shape[1], directions.shape[1]))
     counted = np.flatnonzero(solution.importance)
-    for start in range(0, counted.size, BLOCK_PIXELS):
+    for start in with_progress(range(0, counted.size, BLOCK_PIXELS)):
         pixels = counted[start : start + BLOCK_PIXELS]
         lit, push = basis.planes.pixels(pixels), np.zeros((directions.shape[1], pixels.size))
         for c in np.flatnonzero(along.any(axis=(1, 2))):

@@ -52,9 +52,8 @@ def pixel_variances(solution: Solution, aims: Doubles) -> Doubles:
         variances[part] = np.square(push @ rows).sum(axis=0)
 
     counted = pixels.counted
-    parallel_map(
-        fill, [counted[k : k + BLOCK_PIXELS] for k in range(0, counted.size, BLOCK_PIXELS)]
-    )
+    blocks = [counted[k : k + BLOCK_PIXELS] for k in range(0, counted.size, BLOCK_PIXELS)]
+    parallel_map(fill, blocks, unit="blocks")
     return variances.reshape(solution.importance.shape)
 
 

@@ -34,6 +34,7 @@ from lightpaint.lighting.analysis.noise.weight_directions import solve_for, weig
 from lightpaint.lighting.answer.lighting import LightSetting
 from lightpaint.lighting.normal_equations import NormalEquations
 from lightpaint.lighting.solution import Solution
+from lightpaint.progress import with_progress
 
 #: Shares of noise in the part of a light that no other can replace, between which doubt rises from
 #: 0 to 1.
@@ -74,7 +75,7 @@ def weakest_matrix(
     # The power that no other light can replace is 1 over the diagonal of the inverse.
     noisy_inverse = [np.diag(pseudo_inverse(x)) for x in M]
     inverse = [pseudo_inverse(x) for x in weakest]
-    for k in in_doubt:
+    for k in with_progress(in_doubt, "lights"):
         image, half = (planes.plane(k) for planes in (basis.planes, basis.noise))
         for c in np.flatnonzero(doubts[k] > 0):
             D = weight[..., c % weight.shape[2]].ravel()

@@ -11,6 +11,7 @@ from statistics import NormalDist
 import numpy as np
 
 from lightpaint.arrays import Bools, Doubles, Indices
+from lightpaint.lighting.algebra.eigenvectors import eigenvectors
 from lightpaint.lighting.analysis.noise.dominant_pixels import NORMAL_95
 from lightpaint.lighting.analysis.noise.noise import (
     NULL_EIGENVALUE,
@@ -300,7 +301,7 @@ def limit_deviations(covariance: Doubles, sizes: Doubles) -> tuple[Doubles, Doub
     undetermined alone, and lights that look alike are so together.
     """
     scale = np.outer(sizes, sizes)
-    squares, axes = np.linalg.eigh(covariance * scale)
+    squares, axes = eigenvectors(covariance * scale)
     if squares.max(initial=0) <= MAX_DEVIATION**2:
         return covariance, np.zeros_like(covariance)
     relative = (axes * np.minimum(squares, MAX_DEVIATION**2)) @ axes.T
