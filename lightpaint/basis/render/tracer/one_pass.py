@@ -193,7 +193,11 @@ class Tracer:
             first_emitter_samples=dr.opaque(mi.UInt32, first_emitters),
             later_emitter_samples=dr.opaque(mi.UInt32, later),
         )
-        trace_samples(view, numbers, self.guide, planes, rules, pixel, place, begin, end)
+        # Dr.Jit records a loop twice to find values that it never changes, so the innermost of
+        # three loops eight times, and each time asks every single emitter and surface. The kernel
+        # is not faster for it.
+        with dr.scoped_set_flag(dr.JitFlag.OptimizeLoops, False):
+            trace_samples(view, numbers, self.guide, planes, rules, pixel, place, begin, end)
 
 
 def places_by_tile(rows: int, columns: int) -> Indices:
