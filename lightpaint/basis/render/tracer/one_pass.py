@@ -79,7 +79,7 @@ class Tracer:
         self._texels = TexelTable.of(scene, self.loaded)
         self.light_of = lights_by_instance(self.loaded, planes_by_emitter(scene))
         self.guide = EmitterGuide(self.loaded, self.light_of, scene.eye(self.loaded), guide_table)
-        self.guide_table = guide_table
+        self.guide_table = guide_table if self.guide.is_trained else None
         if emitter_samples is None:
             emitter_samples = FIRST_EMITTER_SAMPLES, later_emitter_samples(self.guide.count)
         self._emitter_samples = emitter_samples
