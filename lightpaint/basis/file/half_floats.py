@@ -150,7 +150,9 @@ def encoded_plane(channels: Sequence[npt.NDArray[Any]], scale: float) -> Encoded
 
 def encode_pair(image: Floats, noise: Floats) -> tuple[EncodedPlane, EncodedPlane]:
     """Return the image of a light and its half difference, (h, w, 3), in their best encodings."""
-    image, noise = (np.ascontiguousarray(plane.transpose(2, 0, 1)) for plane in (image, noise))
+    image, noise = (
+        np.ascontiguousarray(plane.transpose(2, 0, 1), np.float32) for plane in (image, noise)
+    )
     strips = [_Strip.of(image, noise, rows) for rows in _strips(noise.shape)]
     exact = _clean_pixels(image, noise)
     return _encode(image, strips, exact), _encode(noise, strips)
@@ -161,7 +163,7 @@ class _Strip:
     """Some rows of a plane. Most planes of many lights are dark in most pixels, and only the others
     take time.
 
-    lit: indices of the numbers that are not zero, in the order of memory, (3, rows, w). hidden: the
+    lit: indices of the numbers that are not +0, in the order of memory, (3, rows, w). hidden: the
     largest power of a rounding error that noise hides, for each tile and channel, as `_power`
     returns it.
     """
@@ -175,7 +177,8 @@ class _Strip:
     def of(cls, image: Floats, noise: Floats, rows: slice) -> "_Strip":
         """Return the strip of an image and its half difference, (3, h, w) each."""
         grain = noise[:, rows]
-        lit = np.flatnonzero((grain != 0) | (image[:, rows] != 0))
+        # By their bits, since a negative number may have been rounded to −0.
+        lit = np.flatnonzero(grain.view(np.uint32) | image[:, rows].view(np.uint32))
         power = _power(grain.reshape(-1)[lit], lit, grain.shape)
         return cls(rows, grain.shape, lit, HIDDEN_SHARE**2 * power)
 
@@ -251,7 +254,8 @@ def _power(values: Floats, places: Indices, shape: tuple[int, ...]) -> Doubles:
     """
     tiles = _tiles(*shape)
     squares = np.square(values, dtype=np.float64)
-    return np.bincount(tiles[places], squares, minlength=int(tiles[-1]) + 1)
+    power = np.bincount(tiles[places], squares, minlength=int(tiles[-1]) + 1)
+    return np.asarray(power, np.float64)
 
 
 @lru_cache(maxsize=4)
