@@ -34,9 +34,9 @@ MEAN_UNITS, MAX_UNITS = 2.0**12, 2.0**31
 FIRST_UNITS = 2.0**20
 #: Weight of the mean over all cells, as a number of samples in the cell.
 PRIOR_SAMPLES = 0.5
-#: Largest ratio of a cell's distance from the camera to its width, in the largest table; the
-#: smallest is half of that.
-CELLS_PER_DISTANCE = 24.0
+#: Largest ratio of a cell's distance from the camera to its width, in a table of this number of
+#: cells or more; the smallest is half of that.
+CELLS_PER_DISTANCE, ENOUGH_CELLS = 24.0, 2**15
 #: The largest number in [0, 1).
 BELOW_1 = 1 - 2**-24
 #: Maximum size of the table: number of entries, and number of cells.
@@ -59,9 +59,10 @@ class EmitterGuide:
         self._lights = np.array(light_of)[instances].astype(int)
         self.count = len(instances)
         self.cells = table_cells(self.count)
-        # The more emitters, the larger the cells: as many surfaces of a scene share an entry of a
-        # small table as of a large one, and each gets as many samples for every emitter.
-        self._cells_per_distance = CELLS_PER_DISTANCE * float(np.sqrt(self.cells / MAX_CELLS))
+        # A scene must not have more cells on its surfaces than there are in the table: those that
+        # share a place in it would mix what they learn.
+        share = min(1.0, self.cells / ENOUGH_CELLS)
+        self._cells_per_distance = CELLS_PER_DISTANCE * float(np.sqrt(share))
         self.eye = eye
         index_of = np.zeros(instances.max() + 1, np.uint32)
         index_of[instances] = np.arange(self.count)
