@@ -245,8 +245,8 @@ def write_mitsuba(folder: Path, count: int) -> Scene:
     shapes = []
     for name, corners in walls():
         shapes.append(_rectangle(corners, SURFACES[name], ""))
-    for corners in lamps_of(count):
-        shapes.append(_rectangle(corners, (0, 0, 0), '<emitter type="area"/>'))
+    for k, corners in enumerate(lamps_of(count)):
+        shapes.append(_rectangle(corners, (0, 0, 0), f'<emitter type="area" id="lamp_{k}"/>'))
     path = folder / "room.xml"
     newline = "\n"
     path.write_text(
@@ -262,7 +262,9 @@ def write_mitsuba(folder: Path, count: int) -> Scene:
 """,
         encoding="utf-8",
     )
-    return load_scene(path)
+    scene = load_scene(path)
+    assert len(scene.lights) == count
+    return scene
 
 
 def _rectangle(corners: Quad, colour: tuple[float, ...], emitter: str) -> str:
