@@ -62,6 +62,32 @@ def test_a_second_time_renders_nothing(scene: Scene) -> None:
     assert obtain_basis(scene, spp=4).origin.spp == 8
 
 
+def test_what_is_kept_is_copied_rather_than_written_again(
+    scene: Scene, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """If the cache holds exactly it: its samples, its lights and all that a file has."""
+    basis, path = obtain_basis(scene, spp=8), tmp_path / "a.basis.exr"
+    write_basis(path, basis)
+    expected = path.read_bytes()
+    written: list[Basis] = []
+    monkeypatch.setattr(cache, "write_basis", lambda path, basis: written.append(basis))
+    cache.write_from_cache(path, basis)
+    assert not written
+    assert path.read_bytes() == expected
+    lights = [replace(light, name=f"{light.name} of the hall") for light in basis.lights]
+    others = [
+        replace(basis, lights=lights),
+        replace(basis, features=None),
+        replace(basis, indirect=None),
+        replace(basis, origin=replace(basis.origin, halves=(5, 5))),
+        replace(basis, origin=replace(basis.origin, seed=7)),  # never rendered
+    ]
+    for other in others:
+        cache.write_from_cache(path, other)
+    assert written == others
+    assert path.read_bytes() == expected
+
+
 def test_more_samples_are_added(scene: Scene) -> None:
     obtain_basis(scene, spp=8)
     assert obtain_basis(scene, spp=20).origin.spp == 20

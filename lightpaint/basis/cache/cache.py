@@ -26,7 +26,13 @@ from platformdirs import user_cache_path
 
 from lightpaint.arrays import Floats
 from lightpaint.basis.basis import Basis, Origin
-from lightpaint.basis.file.basis_file import FORMAT, read_basis, read_origin, write_basis
+from lightpaint.basis.file.basis_file import (
+    FORMAT,
+    is_file_of,
+    read_basis,
+    read_origin,
+    write_basis,
+)
 from lightpaint.display_text import some_names
 from lightpaint.errors import BasisError, LightpaintError, OutputError
 from lightpaint.files import replacing, write_text
@@ -205,6 +211,30 @@ def file_of(basis: Basis) -> Path | None:
     """
     path = _path_of(basis)
     return path if is_own(path) and _entry(path).origin == basis.origin else None
+
+
+def write_from_cache(path: Path, basis: Basis) -> None:
+    """Write a basis from `obtain_basis` as `write_basis` does, by copying its file in the cache if
+    there is one: compressing a thousand planes again takes as long as rendering them.
+    """
+    source = _path_of(basis)
+    try:
+        with replacing(path) as temporary:
+            try:
+                if not is_own(source):
+                    raise _NotCachedError
+                shutil.copyfile(source, temporary)
+            except FileNotFoundError as error:
+                raise _NotCachedError from error
+            # The copy is checked, since another process may replace the file at any time.
+            if not is_file_of(temporary, basis):
+                raise _NotCachedError
+    except _NotCachedError:
+        write_basis(path, basis)
+
+
+class _NotCachedError(Exception):
+    """A basis that the cache does not hold as it is."""
 
 
 def companion_path(basis: Basis, ending: str) -> Path:

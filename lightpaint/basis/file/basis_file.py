@@ -39,7 +39,7 @@ from lightpaint.basis.file.half_floats import EncodedPlanes, PlaneEncoding, enco
 from lightpaint.basis.file.lit_planes import MIN_LIGHTS, LitCollector, LitPlane, LitPlanes
 from lightpaint.basis.lights import BasisLight, Lights
 from lightpaint.basis.planes import IndirectLight, Planes, as_planes
-from lightpaint.errors import BasisError, ImageError
+from lightpaint.errors import BasisError, ImageError, LightpaintError
 from lightpaint.file_reading import file_length
 from lightpaint.files import one_line
 from lightpaint.images.formats.exr import Channels, ExrPart, read_headers, read_parts
@@ -63,7 +63,7 @@ SINGLES_MAX_BYTES = 2**27
 IN_MEMORY_MAX_BYTES = 2**31
 
 #: Maximum size in bytes of a basis file that the library reads in less than two seconds.
-QUICK_MAX_BYTES = 2**26
+QUICK_MAX_BYTES = 2**29
 
 #: Maximum size in bytes of indirect light, images and noise in half floats, that stays in memory.
 INDIRECT_MAX_BYTES = 2**28
@@ -437,3 +437,25 @@ def read_origin(path: Path) -> tuple[Origin, tuple[int, int], tuple[str, ...]]:
     except (*_HEADER_ERRORS, BasisError, StopIteration) as error:
         reason = one_line(str(error)) or "it does not say where it comes from"
         raise BasisError(f"{path} is not a basis this version can read: {reason}") from error
+
+
+def is_file_of(path: Path, basis: Basis) -> bool:
+    """Return whether a file has the origin, the lights and all parts of `basis`, without reading
+    pixels.
+    """
+    try:
+        origin, size, _ = read_origin(path)
+        file = RowFile(path)
+        form = _head(part.texts for part in file.parts)[FORMAT_KEY]
+    except (LightpaintError, RowsUnsupportedError, OSError):
+        return False
+    light_parts = [part for part in file.parts if LIGHT_KEY in part.texts]
+    others = [{*part.channels} for part in file.parts if LIGHT_KEY not in part.texts]
+    has_indirect = all({*part.channels} >= INDIRECT_CHANNELS for part in light_parts)
+    return (
+        (form, origin, size) == (FORMAT, basis.origin, basis.size)
+        and has_indirect == (basis.indirect is not None)
+        and [part.texts[LIGHT_KEY] for part in light_parts]
+        == [light_texts(light, ())[LIGHT_KEY] for light in basis.lights]
+        and others == [{*part.channels} for part in other_parts(basis)]
+    )

@@ -8,8 +8,9 @@ Values that are too bright for half floats, or so dim that they lose digits, are
 a power of two.
 """
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
+from functools import lru_cache
 from threading import Lock
 from typing import Any
 
@@ -39,6 +40,9 @@ CLEAN, CLEAN_RADIUS = 1e-5, 2
 
 #: Maximum size in bytes of planes that are decoded once, in float32, rather than on each walk.
 DECODED_MAX_BYTES = 2**28
+
+#: Number of pixels that are encoded at a time.
+STRIP_PIXELS = 2**16
 
 #: Exponent to which the brightest value is scaled; half floats reach 15.
 BRIGHTEST = 14
@@ -173,19 +177,50 @@ def encoded_plane(channels: Sequence[npt.NDArray[Any]], scale: float) -> Encoded
 
 def encode_pair(image: Floats, noise: Floats) -> tuple[EncodedPlane, EncodedPlane]:
     """Return the image of a light and its half difference, (h, w, 3), in their best encodings."""
-    hidden = HIDDEN_SHARE**2 * _power(noise)
+    image, noise = (
+        np.ascontiguousarray(plane.transpose(2, 0, 1), np.float32) for plane in (image, noise)
+    )
+    strips = [_Strip.of(image, noise, rows) for rows in _strips(noise.shape)]
     exact = _clean_pixels(image, noise)
-    return _encode(image, hidden, exact), _encode(noise, hidden)
+    return _encode(image, strips, exact), _encode(noise, strips)
+
+
+@dataclass(frozen=True)
+class _Strip:
+    """Some rows of a plane. Most planes of many lights are dark in most pixels, and only the others
+    take time.
+
+    lit: indices of the numbers that are not +0, in the order of memory, (3, rows, w). hidden: the
+    largest power of a rounding error that noise hides, for each tile and channel, as `_power`
+    returns it.
+    """
+
+    rows: slice
+    shape: tuple[int, ...]
+    lit: Indices
+    hidden: Doubles
+
+    @classmethod
+    def of(cls, image: Floats, noise: Floats, rows: slice) -> "_Strip":
+        """Return the strip of an image and its half difference, (3, h, w) each."""
+        grain = noise[:, rows]
+        # By their bits, since a negative number may have been rounded to −0.
+        lit = np.flatnonzero(grain.view(np.uint32) | image[:, rows].view(np.uint32))
+        power = _power(grain.reshape(-1)[lit], lit, grain.shape)
+        return cls(rows, grain.shape, lit, HIDDEN_SHARE**2 * power)
 
 
 def _clean_pixels(image: Floats, noise: Floats) -> Bools | None:
     """Return the pixels, (h, w), that have light but no noise, nor have their neighbours; None if
-    there are none.
+    there are none. image, noise: (3, h, w).
     """
     from scipy.ndimage import binary_erosion
 
-    is_clean = (np.abs(noise) <= np.float32(CLEAN) * np.abs(image)).all(axis=-1)
-    is_clean &= image.any(axis=-1)
+    is_clean = np.ones(image.shape[1:], bool)
+    for light, grain in zip(image, noise, strict=True):
+        is_clean &= np.abs(grain) <= np.float32(CLEAN) * np.abs(light)
+    red, green, blue = image != 0
+    is_clean &= red | green | blue
     if not is_clean.any():
         return None
     side = 2 * CLEAN_RADIUS + 1
@@ -193,29 +228,31 @@ def _clean_pixels(image: Floats, noise: Floats) -> Bools | None:
     return np.asarray(inner) if inner.any() else None
 
 
-def _encode(plane: Floats, hidden: Doubles, exact: Bools | None = None) -> EncodedPlane:
-    """Return a plane in half floats if the power of the rounding error is at most `hidden` in every
-    tile and channel; else in float32.
+def _encode(plane: Floats, strips: Sequence[_Strip], exact: Bools | None = None) -> EncodedPlane:
+    """Return a plane, (3, h, w), in half floats if noise hides the rounding error in every tile and
+    channel; else in float32.
 
     exact: (h, w), pixels that must keep their values; None for none.
     """
-    height, width, _ = plane.shape
     for scale in dict.fromkeys((1.0, _scale_of(plane))):
-        encoding, numbers = PlaneEncoding(HALF, scale), np.empty((3, height, width), HALF)
-        for k, top in enumerate(range(0, height, TILE)):
-            rows = np.ascontiguousarray(plane[top : top + TILE].transpose(2, 0, 1))
-            numbers[:, top : top + TILE] = stored = encoding.encoded(rows)
+        encoding, numbers = PlaneEncoding(HALF, scale), np.zeros(plane.shape, HALF)
+        for strip in strips:
+            values = plane[:, strip.rows].reshape(-1)[strip.lit]
+            stored = encoding.encoded(values)
             with np.errstate(over="ignore", invalid="ignore"):
-                rounding = encoding.decoded(stored) - rows
-            if not (_row_power(rounding) <= hidden[k]).all():
+                rounding = encoding.decoded(stored) - values
+            if not (_power(rounding, strip.lit, strip.shape) <= strip.hidden).all():
                 break
             if exact is not None:
-                inside = exact[top : top + TILE]
-                if (np.abs(rounding) > CLEAN * np.abs(rows))[:, inside].any():
+                inside = np.broadcast_to(exact[strip.rows], strip.shape).reshape(-1)[strip.lit]
+                if (np.abs(rounding) > CLEAN * np.abs(values))[inside].any():
                     break
+            rounded = np.zeros(strip.shape, HALF)
+            rounded.reshape(-1)[strip.lit] = stored
+            numbers[:, strip.rows] = rounded
         else:
             return EncodedPlane(encoding, numbers)
-    return EncodedPlane(PlaneEncoding(), np.ascontiguousarray(plane.transpose(2, 0, 1)))
+    return EncodedPlane(PlaneEncoding(), plane)
 
 
 def _scale_of(plane: Floats) -> float:
@@ -229,14 +266,29 @@ def _scale_of(plane: Floats) -> float:
     return float(2.0 ** np.clip(np.frexp(brightest)[1] - BRIGHTEST, -100, 100))
 
 
-def _power(plane: Floats) -> Doubles:
-    """Return Σ x² of each tile and channel, (rows, 3, columns)."""
-    tops = range(0, len(plane), TILE)
-    return np.array([_row_power(plane[top : top + TILE].transpose(2, 0, 1)) for top in tops])
+def _strips(shape: tuple[int, ...]) -> Iterator[slice]:
+    """Yield the rows of one strip after the other of a plane, (3, h, w): whole rows of tiles."""
+    _, height, width = shape
+    step = TILE * max(1, STRIP_PIXELS // (TILE * width))
+    return (slice(top, min(top + step, height)) for top in range(0, height, step))
 
 
-def _row_power(rows: Floats) -> Doubles:
-    """Return Σ x² of each tile in one row of tiles, (3, columns). rows: (3, up to TILE, w)."""
-    # Sum over the rows of pixels first, which stay in the processor's cache.
-    squares = np.square(rows, dtype=np.float64).sum(axis=1)
-    return np.add.reduceat(squares, np.arange(0, rows.shape[2], TILE), axis=1)
+def _power(values: Floats, places: Indices, shape: tuple[int, ...]) -> Doubles:
+    """Return Σ x² of each tile and channel of a strip, as one row.
+
+    values: its numbers at some places in the order of memory; it is zero elsewhere. shape: (3,
+    rows, w).
+    """
+    tiles = _tiles(*shape)
+    squares = np.square(values, dtype=np.float64)
+    power = np.bincount(tiles[places], squares, minlength=int(tiles[-1]) + 1)
+    return np.asarray(power, np.float64)
+
+
+@lru_cache(maxsize=4)
+def _tiles(channels: int, rows: int, width: int) -> npt.NDArray[np.int32]:
+    """Return the index of the tile of each number of a strip, in the order of its memory."""
+    down, across = -(-rows // TILE), -(-width // TILE)
+    first = np.arange(channels)[:, None] * down + np.arange(rows) // TILE
+    tiles = first[:, :, None] * across + np.arange(width) // TILE
+    return read_only(tiles.astype(np.int32).reshape(-1))

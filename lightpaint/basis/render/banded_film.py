@@ -29,7 +29,10 @@ if TYPE_CHECKING:
 
 
 #: Size of the sums of both halves, in bytes, up to which a film is traced whole; size of a band.
-WHOLE_MAX_BYTES, BAND_BYTES = 2**30, 2**27
+WHOLE_MAX_BYTES, BAND_BYTES = 2**30, 2**28
+
+#: Size of the sums, in bytes, that are written to the file at a time.
+WRITE_BYTES = 2**24
 
 
 def _is_banded(scene: Scene) -> bool:
@@ -107,7 +110,7 @@ class WholeFilm(FilmSums):
         """Return the sums of both halves, (planes, h, w, 3). is_last: whether to release them."""
         sums = []
         for half, planes in enumerate(self._halves):
-            sums.append(planes.sums())
+            sums.append(planes.sums(shares_memory=is_last))
             if is_last:  # halves the peak memory
                 self._halves[half] = self._tracer.planes(range(0))
         return sums
@@ -134,7 +137,7 @@ class BandedFilm(FilmSums):
         planes = self._tracer.planes(rows, self.sums.read(half, rows))
         self._tracer.add(planes, half, rows, first, spp)
         self._seen[rows.start : rows.stop] |= planes.seen() > 0
-        self.sums.write(half, rows, planes.sums())
+        self.sums.write(half, rows, planes.sums(shares_memory=True))
 
     def seen(self) -> Bools:
         return self._seen.copy()
@@ -166,6 +169,7 @@ class FileSums:
                 Hint("resolution"),
                 " or fewer lights",
             ) from error
+        self._is_written = np.zeros((shape[0], shape[2]), dtype=bool)
 
     @property
     def array(self) -> Floats:
@@ -174,14 +178,21 @@ class FileSums:
 
     def read(self, half: int, rows: range) -> Floats:
         """Return a copy of some rows of one half, (planes, rows, w, 3)."""
+        if not self._is_written[half, rows.start : rows.stop].any():
+            _, planes, _, width, _ = self.array.shape
+            return np.zeros((planes, len(rows), width, 3), np.float32)
         block = np.array(self.array[half, :, rows.start : rows.stop])
         self._file.release()
         return block
 
     def write(self, half: int, rows: range, sums: Floats) -> None:
-        """Write some rows of one half."""
-        self.array[half, :, rows.start : rows.stop] = sums
-        self._file.release()
+        """Write some rows of one half, (planes, rows, w, 3)."""
+        self._is_written[half, rows.start : rows.stop] = True
+        step = max(1, WRITE_BYTES // max(1, sums[0].nbytes))
+        for first in range(0, len(sums), step):
+            planes = slice(first, first + step)
+            self.array[half, planes, rows.start : rows.stop] = sums[planes]
+            self._file.release()
 
     def halves(self, planes: slice, rows: slice) -> list[Floats]:
         """Return a copy of the sums of both halves for some planes and rows."""

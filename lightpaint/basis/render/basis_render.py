@@ -226,12 +226,13 @@ class _OnePassRender:
         """Add samples step by step until `budget` is spent."""
         with tracing() as let_others_through:
             pixels, done = self._film.band_pixels, self.done
-            for spp in steps(pixels, budget, done, progress, self._is_clean):
+            for k, spp in enumerate(steps(pixels, budget, done, progress, self._is_clean)):
+                if k > 0:  # after the last step the caller keeps what is finished
+                    keeper.now_and_then(self.basis)
                 if not self.tracer.is_trained:
                     train_tracer(self.tracer, let_others_through)
                 self._film.add(self.done, spp, let_others_through)
                 self.done += spp
-                keeper.now_and_then(self.basis)
 
     def _is_clean(self, variance: float) -> bool:
         return bool((self.basis().relative_variances <= variance).all())

@@ -7,6 +7,7 @@ from pathlib import Path
 from typing import Any
 
 from lightpaint.basis.basis import Basis
+from lightpaint.basis.cache.cache import write_from_cache
 from lightpaint.basis.file.basis_file import write_basis
 from lightpaint.cli.commands.solve_command import solve
 from lightpaint.cli.options.job_options import folders_of, is_folder
@@ -128,8 +129,9 @@ def basis(*, scene: SceneFile, output: Path, settings: Settings) -> CommandOutco
         ):
             listen.say(remark)
         basis_on_film = obtain(scene_on_film, settings, listen)
+        write = write_from_cache if settings.use_cache else write_basis
         with stage("writing the basis", listen):
-            write_basis(output, basis_on_film)
+            write(output, basis_on_film)
     note = " and the fixed light" if basis_on_film.is_fixed.any() else ""
     count = int((~basis_on_film.is_fixed).sum())
     terminal.write(f"{output}: {count} lights{note}, {basis_on_film.origin.spp} samples per pixel")

@@ -83,6 +83,8 @@ def find_emitters(parsed: ParsedScene, loaded: Any, hasher: SceneHasher) -> tupl
     hasher: a SceneHasher of that scene.
     """
     node_of = {name: node for node, name in parsed.names.items()}
+    # Reading it walks over everything in the scene.
+    integrator = parsed.integrator().plugin
     emitters = []
     for emitter in loaded.emitters():
         name = emitter.id()
@@ -94,11 +96,11 @@ def find_emitters(parsed: ParsedScene, loaded: Any, hasher: SceneHasher) -> tupl
         plugin = node.props.plugin_name()
         kind = emission_kind(emitter, plugin)
         if kind is None:
-            check_rendered(emitter, plugin, name, parsed.integrator().plugin)
+            check_rendered(emitter, plugin, name, integrator)
         emission = read_emission(emitter, kind, name)
         sampling_weight = float(emitter.sampling_weight())
         is_colour = kind is not None and kind.scaling is Scaling.COLOUR
-        is_dark = is_never_found(plugin, sampling_weight, parsed.integrator().plugin)
+        is_dark = is_never_found(plugin, sampling_weight, integrator)
         site = site_of(emitter, plugin, parsed.shape_plugin(node_of[name]))
         check_site(site, plugin, name)
         emitters.append(

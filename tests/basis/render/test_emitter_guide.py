@@ -181,3 +181,48 @@ def test_a_kept_emitter_that_is_never_sampled_is_as_dark_as_in_mitsuba(tmp_path:
     # hits alone, the bulb not at all.
     assert abs((rest_image - rendered).sum(dtype=np.float64)) <= 5 * np.sqrt(noise)
     assert rendered.sum() > 0
+
+
+def test_a_table_of_another_size_is_learned_anew(tmp_path: Path) -> None:
+    """As one of a version whose tables had other cells."""
+    use_variant()
+    from lightpaint.basis.render.tracer.one_pass import Tracer
+
+    scene = load_scene(write_room(tmp_path, lights=SPOTS))
+    for cells, is_trained in ((2**10, False), (2**16, True)):
+        tracer = Tracer(scene, 0, np.ones((2, cells, 2), np.float32))
+        assert tracer.is_trained is is_trained
+        tracer.close()
+
+
+@pytest.mark.parametrize("lights", [2, 300])
+def test_a_hall_has_fewer_cells_than_the_table(tmp_path: Path, lights: int) -> None:
+    """So that few of them share a place in it and mix what they learn."""
+    use_variant()
+    import drjit as dr
+    import mitsuba as mi
+
+    from lightpaint.basis.render.tracer.emitter_guide import EmitterGuide
+    from lightpaint.basis.render.tracer.light_planes import lights_by_instance
+
+    points = "".join(
+        f'<emitter type="point" id="l{k}"><point name="position" x="{k}" y="9" z="0"/></emitter>'
+        for k in range(lights)
+    )
+    scene = load_scene(write_room(tmp_path, lights=points))
+    loaded = scene.load({})
+    eye = mi.ScalarPoint3f(0, 1.6, 0)
+    guide = EmitterGuide(loaded, lights_by_instance(loaded, scene.plane_of), eye)
+    # A floor of 40 metres, from which the cells of walls and ceiling differ by their place alone.
+    x, z = dr.meshgrid(dr.linspace(mi.Float, -20, 20, 1000), dr.linspace(mi.Float, 0, 40, 1000))
+    floor = dr.zeros(mi.SurfaceInteraction3f, dr.width(x))
+    floor.p, floor.n, floor.wi = mi.Point3f(x, 0, z), mi.Normal3f(0, 1, 0), mi.Vector3f(0, 0, 1)
+    used = np.unique(np.array(guide.cell(floor))).size
+    del guide, loaded
+    assert used < guide_cells(lights) / 3
+
+
+def guide_cells(emitters: int) -> int:
+    from lightpaint.basis.render.tracer.emitter_guide import table_cells
+
+    return table_cells(emitters)

@@ -12,7 +12,7 @@ from renderer import LIGHTS, assert_equal_bits, same_basis, write_room
 import lightpaint.scene.scene_render
 from lightpaint.basis.basis import Basis
 from lightpaint.basis.file.basis_file import read_basis, write_basis
-from lightpaint.basis.render import basis_render
+from lightpaint.basis.render import basis_render, render_budget
 from lightpaint.basis.render.basis_render import render_basis
 from lightpaint.errors import BasisError
 from lightpaint.progress import Interrupted
@@ -127,3 +127,18 @@ def test_nothing_is_mixed(tmp_path: Path, small_room: Scene) -> None:
     changed = load_scene(write_room(tmp_path), parameters={"width": 20})
     with pytest.raises(BasisError, match="another scene, sensor, film or seed"):
         render_basis(changed, spp=8, start=basis)
+
+
+def test_what_is_finished_is_left_to_the_caller_to_keep(
+    small_room: Scene, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """A thousand lights take as long to write as to render."""
+    monkeypatch.setattr(render_budget, "KEEP_EVERY_S", -1.0)
+    for samples_per_pass, has_several_steps in ((2**21, False), (4 * 4 * 24 * 20, True)):
+        monkeypatch.setattr(lightpaint.scene.scene_render, "SAMPLES_PER_PASS", samples_per_pass)
+        kept_spp: list[int] = []
+        basis = render_basis(
+            small_room, spp=20, keep=lambda basis, kept=kept_spp: not kept.append(basis.origin.spp)
+        )
+        assert bool(kept_spp) is has_several_steps
+        assert basis.origin.spp not in kept_spp

@@ -34,12 +34,13 @@ MEAN_UNITS, MAX_UNITS = 2.0**12, 2.0**31
 FIRST_UNITS = 2.0**20
 #: Weight of the mean over all cells, as a number of samples in the cell.
 PRIOR_SAMPLES = 0.5
-#: Largest ratio of a cell's distance from the camera to its width; the smallest is half of that.
-CELLS_PER_DISTANCE = 24.0
+#: Largest ratio of a cell's distance from the camera to its width, in a table of this number of
+#: cells or more; the smallest is half of that.
+CELLS_PER_DISTANCE, ENOUGH_CELLS = 24.0, 2**15
 #: The largest number in [0, 1).
 BELOW_1 = 1 - 2**-24
 #: Maximum size of the table: number of entries, and number of cells.
-MAX_ENTRIES, MAX_CELLS = 2**22, 2**16
+MAX_ENTRIES, MAX_CELLS = 2**21, 2**16
 
 
 class EmitterGuide:
@@ -58,6 +59,10 @@ class EmitterGuide:
         self._lights = np.array(light_of)[instances].astype(int)
         self.count = len(instances)
         self.cells = table_cells(self.count)
+        # A scene must not have more cells on its surfaces than there are in the table: those that
+        # share a place in it would mix what they learn.
+        share = min(1.0, self.cells / ENOUGH_CELLS)
+        self._cells_per_distance = CELLS_PER_DISTANCE * float(np.sqrt(share))
         self.eye = eye
         index_of = np.zeros(instances.max() + 1, np.uint32)
         index_of[instances] = np.arange(self.count)
@@ -68,6 +73,8 @@ class EmitterGuide:
         shape = (2, self.cells, self.count)
         if table is not None and (table.shape != shape or not _is_sane(table)):
             table = None
+        #: Whether it was given what an earlier guide has learned.
+        self.is_trained = table is not None
         self._units = np.full(self.count, FIRST_UNITS)
         self._received_light, self._sample_counts = (
             np.zeros(shape) if table is None else table.astype(float)
@@ -136,7 +143,7 @@ class EmitterGuide:
         side.
         """
         # The exponent of a float is its binary logarithm, so the widths of cells are powers of two.
-        distance = dr.norm(si.p - self.eye) * (1 / CELLS_PER_DISTANCE)
+        distance = dr.norm(si.p - self.eye) * (1 / self._cells_per_distance)
         exponent = dr.clip(dr.reinterpret_array(mi.UInt32, distance) >> 23, 1, 252)
         per_unit = dr.reinterpret_array(mi.Float, (253 - exponent) << 23)
         x, y, z = mi.Vector3i(dr.floor(si.p * per_unit))

@@ -107,13 +107,15 @@ class LightPlanes:
         dr.eval(self._sums, self._seen)
         dr.sync_thread()
 
-    def sums(self) -> Floats:
-        """Return a copy of the sums, (lights, rows, columns, 3).
+    def sums(self, *, shares_memory: bool = False) -> Floats:
+        """Return the sums, (lights, rows, columns, 3).
 
         If split: (2 lights, rows, columns, 3), first the direct light of all lights, then the
-        indirect.
+        indirect. shares_memory: whether to return the sums themselves, if nothing more will be
+        added, rather than a copy.
         """
-        return np.array(self._sums).reshape(self.count, *self.size, 3)
+        sums = np.asarray(self._sums) if shares_memory else np.array(self._sums)
+        return sums.reshape(self.count, *self.size, 3)
 
     def seen(self) -> Floats:
         """Return the number of camera rays in each pixel that saw an emitter, (rows, columns)."""

@@ -79,7 +79,7 @@ class Tracer:
         self._texels = TexelTable.of(scene, self.loaded)
         self.light_of = lights_by_instance(self.loaded, planes_by_emitter(scene))
         self.guide = EmitterGuide(self.loaded, self.light_of, scene.eye(self.loaded), guide_table)
-        self.guide_table = guide_table
+        self.guide_table = guide_table if self.guide.is_trained else None
         if emitter_samples is None:
             emitter_samples = FIRST_EMITTER_SAMPLES, later_emitter_samples(self.guide.count)
         self._emitter_samples = emitter_samples
@@ -193,7 +193,11 @@ class Tracer:
             first_emitter_samples=dr.opaque(mi.UInt32, first_emitters),
             later_emitter_samples=dr.opaque(mi.UInt32, later),
         )
-        trace_samples(view, numbers, self.guide, planes, rules, pixel, place, begin, end)
+        # Dr.Jit records a loop twice to find values that it never changes, so the innermost of
+        # three loops eight times, and each time asks every single emitter and surface. The kernel
+        # is not faster for it.
+        with dr.scoped_set_flag(dr.JitFlag.OptimizeLoops, False):
+            trace_samples(view, numbers, self.guide, planes, rules, pixel, place, begin, end)
 
 
 def places_by_tile(rows: int, columns: int) -> Indices:
