@@ -8,7 +8,7 @@ import numpy.typing as npt
 
 from lightpaint.arrays import Doubles, Indices
 from lightpaint.lighting.algebra.active_set import polish
-from lightpaint.lighting.algebra.clipped_newton import capped_newton, clipped_newton
+from lightpaint.lighting.algebra.clipped_newton import MANY_UNKNOWNS, capped_newton, clipped_newton
 from lightpaint.lighting.algebra.gauss_seidel import sweep
 from lightpaint.lighting.algebra.interior_point import interior_point
 from lightpaint.lighting.algebra.method import Method
@@ -232,6 +232,8 @@ def _solve_polished(
         )
         if residuals[0] <= tolerance:
             return trial[0], 0, steps
+        if q.n > MANY_UNKNOWNS and q.objective(trial[0]) < q.objective(x):
+            x = trial[0]  # many bounds hold it already
     count = 0
     while residual > tolerance and sweeps < max_sweeps:
         gradient = q.gradient(x)

@@ -55,6 +55,10 @@ class Quadratic:
         """The number of unknowns."""
         return self.b.size
 
+    def objective(self, x: Doubles) -> float:
+        """Return ½ xᵀM x − bᵀx."""
+        return float(x @ (0.5 * (self.M @ x) - self.b))
+
     def gradient(self, x: Doubles) -> Doubles:
         """Return M x − b."""
         return self.M @ x - self.b
