@@ -244,8 +244,8 @@ def read_basis(path: str | Path) -> Basis:
 
 
 def leave_indirect(basis: Basis, path: Path) -> Basis:
-    """Return `basis` with indirect planes that are read on demand from `path`, if they take much
-    memory: only denoised pictures need them.
+    """Return `basis` with indirect planes that are read on demand from `path`, if they are large,
+    since only denoised pictures need them.
 
     path: the file that holds exactly this basis; if it does not, or has another layout, `basis` is
     returned unchanged.
@@ -289,9 +289,9 @@ def _read_large(path: Path) -> Basis | None:
 
 
 def _read_by_lights(path: Path) -> list[ExrPart] | None:
-    """Return the parts of a file that takes seconds to read, so that progress shows and a signal
-    acts: one call of the library could not be interrupted. None if it is smaller, or RowFile does
-    not support it.
+    """Return the parts of a file that takes seconds to read, with progress and checks for signals,
+    which one call of the library would not allow. None if the file is smaller, or RowFile does not
+    support it.
     """
     if path.stat().st_size <= QUICK_MAX_BYTES:
         return None

@@ -187,7 +187,7 @@ def encode_pair(image: Floats, noise: Floats) -> tuple[EncodedPlane, EncodedPlan
 
 @dataclass(frozen=True)
 class _Strip:
-    """Some rows of a plane. Most planes of many lights are dark in most pixels, and only the others
+    """A few rows of a plane. Most planes of many lights are dark in most pixels, and only the others
     take time.
 
     lit: indices of the numbers that are not +0, in the order of memory, (3, rows, w). hidden: the

@@ -62,7 +62,7 @@ class LitPlane:
 
 
 @dataclass(frozen=True)
-class _Strip:
+class _LitStrip:
     """The lit pixels of all planes in some rows, plane by plane.
 
     lit: (m,) uint16 or uint32, their indices in the strip. numbers: (3, m). begins: (n + 1,), where
@@ -75,7 +75,7 @@ class _Strip:
     size: int
 
     @classmethod
-    def of(cls, planes: Sequence[LitPlane], parts: Sequence[slice], pixels: slice) -> "_Strip":
+    def of(cls, planes: Sequence[LitPlane], parts: Sequence[slice], pixels: slice) -> "_LitStrip":
         """Return a strip of planes. parts: slices of their lit pixels. pixels: of the picture."""
         size = pixels.stop - pixels.start
         kind = np.uint16 if size <= 2**16 else np.uint32
@@ -150,7 +150,7 @@ class LitPlanes(RowPlanes):
         same = [nothing if i in self._clean else x.in_kind(kind) for i, x in enumerate(planes)]
         cuts = [np.searchsorted(plane.pixels, np.array(edges, np.uint32)) for plane in same]
         self._lit = [
-            _Strip.of(same, [slice(*cut[k : k + 2]) for cut in cuts], slice(*ends))
+            _LitStrip.of(same, [slice(*cut[k : k + 2]) for cut in cuts], slice(*ends))
             for k, ends in enumerate(pairwise(edges))
         ]
 
