@@ -187,8 +187,9 @@ def encode_pair(image: Floats, noise: Floats) -> tuple[EncodedPlane, EncodedPlan
 
 @dataclass(frozen=True)
 class _Strip:
-    """A few rows of a plane. Most planes of many lights are dark in most pixels, and only the others
-    take time.
+    """A few rows of a plane.
+
+    Most planes of many lights are dark in most pixels, and only the others take time.
 
     lit: indices of the numbers that are not +0, in the order of memory, (3, rows, w). hidden: the
     largest power of a rounding error that noise hides, for each tile and channel, as `_power`
