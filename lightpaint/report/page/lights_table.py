@@ -1,6 +1,6 @@
 """The table of lights in the report."""
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -41,6 +41,9 @@ from lightpaint.report.phrases import spoken_percent
 MAP_WIDTH = 144
 #: Share of its pixels that the map may show too bright to tell.
 CLIPPED_SHARE = 0.02
+
+#: Number of lights beyond which only rows that are not folded have a picture, of 10 kB each.
+MAX_THUMBNAILS = 300
 
 
 @dataclass(frozen=True)
@@ -90,6 +93,21 @@ class LightEntry:
     unit: str = ""
     amounts: Sequence[str] = ()
     is_relative: bool = False
+
+
+@dataclass(frozen=True)
+class Thumbnail:
+    """A small picture of a light alone. uri: data: URI. stops: of exposure."""
+
+    uri: str
+    width: int
+    height: int
+    stops: float
+
+    def labelled(self, name: str) -> RowPicture:
+        """Return it as the picture of the light of this name."""
+        label = f"What {name} lights alone, shown at {self.stops:+.1f} stops"
+        return RowPicture(self.uri, self.width, self.height, label)
 
 
 def lights_table(
@@ -156,15 +174,17 @@ def _rows(
     errors = spoken_errors(uncertainty, len(shares))
     settings = {light.name: light for light in lighting.lights}
     rows: list[LightEntry] = []
-    thumbnails = thumbnails_of(basis, is_clean=is_clean)
-    for k, (light, (uri, shape, stops)) in enumerate(zip(basis.lights, thumbnails, strict=True)):
+    if len(basis.lights) <= MAX_THUMBNAILS:
+        thumbnails = thumbnails_of(basis, is_clean=is_clean)
+    else:
+        thumbnails = _thumbnails(basis, most_visible_lights(basis, lighting), is_clean=is_clean)
+    for k, light in enumerate(basis.lights):
         setting = settings[light.name]
         error = UNTOLD_HERE if errors[k] == UNDETERMINED else errors[k]
         changed = change(light, setting)
         notes = filter(None, (*changed.notes, error, _constraint_note(setting)))
-        label = f"What {light.name} lights alone, shown at {stops:+.1f} stops"
         row = LightEntry(
-            [RowPicture(uri, shape[1], shape[0], label)],
+            [thumbnails[k].labelled(light.name)] if k in thumbnails else [],
             light.name,
             " · ".join(filter(None, (light.plugin, light.form))),
             LevelChange(changed.text, tuple(notes)),
@@ -174,26 +194,35 @@ def _rows(
     return rows
 
 
-def thumbnails_of(basis: Basis, *, is_clean: bool) -> list[tuple[str, tuple[int, ...], float]]:
-    """Return the picture of each light alone: data: URI, size and exposure. is_clean: whether
-    denoised; then of the planes that the page shows, if these are there.
+def thumbnails_of(basis: Basis, *, is_clean: bool) -> Mapping[int, Thumbnail]:
+    """Return the picture of each light alone, by its number, made once for a basis.
+
+    is_clean: whether denoised; then of the planes that the page shows, if these are there.
     """
+    all_lights = range(len(basis.lights))
+    return make_once(
+        basis,
+        ("thumbnails", is_clean),
+        lambda: _thumbnails(basis, all_lights, is_clean=is_clean),
+    )
+
+
+def _thumbnails(basis: Basis, lights: Iterable[int], *, is_clean: bool) -> Mapping[int, Thumbnail]:
+    """Return the pictures of some lights, by their numbers."""
     clean, seen = cached_clean_planes(basis) if is_clean else None, basis.emitters_seen
     if clean is not None and not clean.is_whole:
         factor = page_reduction(basis, len(basis.lights))
         seen = block_mean(seen[..., None].astype(np.float32), factor)[..., 0] > 0
 
-    def shown(k: int) -> tuple[str, tuple[int, ...], float]:
+    def shown(k: int) -> Thumbnail:
         plane = basis.planes.plane(k) if clean is None else clean.plane(k)
         picture, stops = thumbnail(plane, seen, is_clean=is_clean and clean is None)
-        return data_uri(to_8_bit(picture), largest_png=0), picture.shape, stops
+        height, width = picture.shape[:2]
+        return Thumbnail(data_uri(to_8_bit(picture), largest_png=0), width, height, stops)
 
-    all_lights = range(len(basis.lights))
-    return make_once(
-        basis,
-        ("thumbnails", is_clean),
-        lambda: in_turns(shown, all_lights, basis.size, unit="lights"),
-    )
+    numbers = [int(k) for k in lights]
+    made = in_turns(shown, numbers, basis.size, unit="lights")
+    return dict(zip(numbers, made, strict=True))
 
 
 def _with_emission(

@@ -40,7 +40,7 @@ from lightpaint.report.page.fit_tables import (
     wishes_section,
 )
 from lightpaint.report.page.html import html
-from lightpaint.report.page.lights_table import lights_table, thumbnails_of
+from lightpaint.report.page.lights_table import MAX_THUMBNAILS, lights_table, thumbnails_of
 from lightpaint.report.page.mixer import mixer_assets, mixer_html, planes_for_page
 from lightpaint.report.page.placement_section import placement_section, suggestion_section
 from lightpaint.report.reported_answer import ReportedAnswer
@@ -160,7 +160,8 @@ def prepare_page(basis: Basis) -> None:
     """Make the parts of a page that depend on the basis alone; `report_page` then finds them."""
     if len(basis.lights) <= ROWS_SHOWN + SPARE_ROWS:
         planes_for_page(basis, is_clean=True)
-    thumbnails_of(basis, is_clean=len(basis.lights) <= MAX_CLEAN_THUMBNAILS)
+    if len(basis.lights) <= MAX_THUMBNAILS:
+        thumbnails_of(basis, is_clean=len(basis.lights) <= MAX_CLEAN_THUMBNAILS)
 
 
 def _wipe(
