@@ -262,12 +262,12 @@ def test_denoised_planes_of_few_samples_do_until_there_are_better_ones(
     cleaned: list[lp.Basis] = []
     real = session_bases.denoise_to_halves
 
-    def denoise_to_halves(noisy_basis: lp.Basis, k: int) -> Any:
+    def denoise_to_halves(noisy_basis: lp.Basis, k: int, factor: int) -> Any:
         if noisy_basis.images is better.images:
             is_taken.set()
             release.wait(PATIENCE_S)
         cleaned.append(noisy_basis)
-        return real(noisy_basis, k)
+        return real(noisy_basis, k, factor)
 
     monkeypatch.setattr(session_bases, "denoise_to_halves", denoise_to_halves)
     monkeypatch.setattr(session_bases, "obtain_bases", lambda *_: iter([[basis], [better]]))
