@@ -49,6 +49,9 @@ from lightpaint.scene.scene_tree import ParsedScene, darkened, with_elements, wi
 
 _Result_T = TypeVar("_Result_T")
 
+#: A shape that is only visible through instances.
+GROUP = "shapegroup"
+
 
 class SceneFiles:
     """The files of a `Scene`, which has these attributes and describes them."""
@@ -365,16 +368,11 @@ class Scene(SceneFiles, Shown):
         *,
         views: Sequence["Scene"] = (),
     ) -> _Result_T:
-        """Return the result of `work` on the loaded scene, which is released afterwards.
-
-        work: must not change materials, which the next scene may take.
-        """
+        """Return the result of `work` on the loaded scene, which is released afterwards."""
         loaded = self.load(emission, views=views)
         try:
             with render_errors(self.path), kernels():
-                result = work(loaded)
-            self.parsed.keep_materials(loaded)
-            return result
+                return work(loaded)
         finally:
             del loaded
             gc.collect()
@@ -391,7 +389,6 @@ def inspect_scene(parsed: ParsedScene, sensor: int) -> dict[str, Any]:
         "spp": int(camera.sampler().sample_count()),
         "has_null": (has_null := _has_null_surfaces(loaded)),
     }
-    parsed.keep_materials(loaded)
     del loaded, camera
     gc.collect()
     has_environment = any(emitter.plugin in ENVIRONMENTS for emitter in emitters)
@@ -420,7 +417,15 @@ def shape_names(parsed: ParsedScene) -> tuple[str, ...]:
     """Return names of a loaded scene's shapes, in order: id, or else mesh file, material or
     kind.
     """
-    return tuple(next(filter(None, _names_of(parsed, k))) for k in parsed.shape_nodes)
+    import mitsuba as mi
+
+    shapes = parsed.children_of(0, mi.ObjectType.Shape)
+    kinds = (parsed.state.nodes[k].props.plugin_name() for k in shapes)
+    return tuple(
+        next(filter(None, _names_of(parsed, k)))
+        for k, kind in zip(shapes, kinds, strict=True)
+        if kind != GROUP
+    )
 
 
 def _names_of(parsed: ParsedScene, node: int) -> Iterator[str]:
