@@ -19,7 +19,6 @@ from lightpaint.validation import number, whole
 WITHOUT = {
     Settings: {
         "transform": "--view and --exposure make it, over that of the painting",
-        "report": "a solve of the command line always writes one",
         "command": "it is the command line",
     },
     RunOptions: {},

@@ -95,9 +95,9 @@ def test_planes_with_added_samples_are_denoised_anew(
     denoised: list[tuple[float, int]] = []
     inner = session_bases.denoise_to_halves
 
-    def denoise(basis: Any, k: int) -> Any:
+    def denoise(basis: Any, k: int, factor: int) -> Any:
         denoised.append((basis.origin.extra_spp, k))
-        return inner(basis, k)
+        return inner(basis, k, factor)
 
     monkeypatch.setattr(session_bases, "denoise_to_halves", denoise)
     studio = Studio([subject], MemoryStore)
