@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from lightpaint.lighting.analysis.noise import noise
-from lightpaint.lighting.analysis.noise.noise import UNCORRECTED, factor, pixels_beside
+from lightpaint.lighting.analysis.noise.noise import UNCORRECTED, factor, values_beside
 from lightpaint.lighting.analysis.noise.noise_correction import correct_noise
 from lightpaint.lighting.analysis.noise.uncertainty import error_bars
 from lightpaint.lighting.analysis.noise.weight_directions import WeightSpread
@@ -80,12 +80,12 @@ def test_pairs_of_pixels_have_the_variance_of_the_gradient(
 def test_a_pixel_that_both_halves_have_met_keeps_its_own_value():
     values = np.array([1.0, 5.0, 1.0, 5.0, 2.0])
     halves = np.array([3.0, 5.0, 0.1, 0.1, 0.0])
-    np.testing.assert_array_equal(pixels_beside(5), [1, 0, 3, 2, 3])
+    np.testing.assert_array_equal(values_beside(np.arange(5)), [1, 0, 3, 2, 3])
     # The first two are mostly noise; the others differ by more than their noise.
     np.testing.assert_allclose(factor(values, halves, 0.25), [4, 2, 1, 5, 2])
     np.testing.assert_array_equal(factor(values, halves, 1), values)
-    np.testing.assert_array_equal(pixels_beside(1), [0])
-    assert pixels_beside(0).size == 0
+    np.testing.assert_array_equal(values_beside(np.arange(1)), [0])
+    assert values_beside(np.arange(0)).size == 0
 
 
 def test_a_light_in_doubt_widens_its_own_spread_alone():

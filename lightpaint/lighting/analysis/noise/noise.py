@@ -76,26 +76,21 @@ def factor(values: Doubles, halves: Doubles, own_share: float) -> Doubles:
     """
     if own_share == 1:
         return values
-    beside = np.empty_like(values)
-    pairs = slice(0, values.shape[-1] // 2 * 2)
-    beside[..., pairs][..., ::2], beside[..., pairs][..., 1::2] = (
-        values[..., pairs][..., 1::2],
-        values[..., pairs][..., ::2],
-    )
-    if values.shape[-1] % 2:
-        beside[..., -1] = values[..., max(values.shape[-1] - 2, 0)]
+    beside = values_beside(values)
     is_alike = np.abs(beside - values) <= MAX_HALVES_APART * np.abs(halves)
     return np.where(is_alike, own_share * values + (1 - own_share) * beside, values)
 
 
-def pixels_beside(count: int) -> Indices:
-    """Return the index of the other pixel of each one's pair, (count,).
+def values_beside(values: Doubles) -> Doubles:
+    """Return for each pixel the value of the other one of its pair, (…, pixels).
 
     The last of an odd number takes the pixel before it, and a single one itself.
     """
-    beside = np.arange(count) ^ 1
+    beside, count = np.empty_like(values), values.shape[-1]
+    even = count // 2 * 2
+    beside[..., :even:2], beside[..., 1:even:2] = values[..., 1:even:2], values[..., :even:2]
     if count % 2:
-        beside[-1] = max(count - 2, 0)
+        beside[..., -1] = values[..., max(count - 2, 0)]
     return beside
 
 
