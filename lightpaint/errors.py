@@ -18,6 +18,7 @@
     ├── BatchError       a manifest of looks; it may list several mistakes, one per line
     ├── LightingError    a lighting.json, or weights that are invalid
     │   └── UnknownLightError  … or a name that none of its lights has; also a KeyError
+    ├── RigError         a rig of fixtures: its MVR, its GDTF types, its addresses
     ├── AccessError      a file or folder that the system refuses to open; also an OSError
     └── OutputError      a file or folder that cannot be written
 
@@ -144,6 +145,10 @@ class UnknownLightError(LightingError, KeyError):
 
 class OutputError(LightpaintError):
     """A file or folder that cannot be written."""
+
+
+class RigError(LightpaintError):
+    """A rig of fixtures that cannot be read, or that contradicts itself."""
 
 
 class AccessError(LightpaintError, OSError):

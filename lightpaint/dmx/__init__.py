@@ -1,0 +1,1 @@
+"""Rigs of fixtures, and the levels that a console sends them."""

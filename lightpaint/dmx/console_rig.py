@@ -1,0 +1,157 @@
+"""A rig as a console sees it: fixtures, their lights, and the channels that control them.
+
+Lengths are in metres, z is up. Colours are linear Rec.709 and may be negative: LEDs lie outside it.
+"""
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from functools import cached_property
+
+from lightpaint.arrays import Position
+from lightpaint.display_text import some_names
+from lightpaint.errors import RigError
+
+#: Channels of a universe.
+UNIVERSE_SIZE = 512
+
+
+@dataclass(frozen=True)
+class DmxChannel:
+    """A channel of a fixture's mode.
+
+    attribute, geometry: what it controls, as GDTF names it (`ColorAdd_R`, `Beam`).
+    offsets: the places of its bytes from the fixture's address, the coarse one first, from 1.
+    dmx_break: the address that they count from, from 1.
+    default: its level at rest, of all its bytes.
+    """
+
+    attribute: str
+    geometry: str
+    offsets: tuple[int, ...]
+    dmx_break: int = 1
+    default: int = 0
+
+    @property
+    def highest(self) -> int:
+        """Its highest level."""
+        return int(256 ** len(self.offsets) - 1)
+
+
+@dataclass(frozen=True)
+class RigEmitter:
+    """Light sources of one colour in a light, such as its red LEDs, which dim together.
+
+    xy: chromaticity of CIE 1931. candela: luminous intensity at full, in the middle of the beam.
+    channels: places, among those of the fixture, of all channels that set it.
+    curve: pairs of a channel's share of its highest level and the share of light that this gives,
+    from (0, 0) to (1, 1), both rising; straight if there are none.
+    watts: power at full, if known.
+    """
+
+    name: str
+    xy: tuple[float, float]
+    candela: float
+    channels: tuple[int, ...]
+    curve: tuple[tuple[float, float], ...] = ()
+    watts: float | None = None
+
+
+@dataclass(frozen=True)
+class RigLight:
+    """A light of a fixture: all its beams together, or one of its pixels.
+
+    name: of the light in scene, lights file and answer.
+    position, direction, up: in the scene; direction and up have length 1.
+    beam_angle, field_angle: full angles in degrees at 50 % and 10 % of the intensity.
+    dimmers: places of the fixture's channels that multiply all its emitters; the first of them
+    carries the level, the others stay at full.
+    """
+
+    name: str
+    position: Position
+    direction: Position
+    up: Position
+    beam_angle: float
+    field_angle: float
+    emitters: tuple[RigEmitter, ...]
+    dimmers: tuple[int, ...] = ()
+
+
+@dataclass(frozen=True)
+class RigFixture:
+    """A fixture at an address of a console.
+
+    fixture_id, name: as the console shows them. kind, mode: its GDTF type and its mode.
+    addresses: the absolute address of each break, from 1; 513 is channel 1 of universe 2.
+    """
+
+    fixture_id: str
+    name: str
+    kind: str
+    mode: str
+    addresses: Mapping[int, int]
+    channels: tuple[DmxChannel, ...]
+    lights: tuple[RigLight, ...]
+
+    def places(self, channel: DmxChannel) -> list[tuple[int, int]]:
+        """Return the universe and the index, 0 to 511, of each byte of a channel."""
+        first = self.addresses[channel.dmx_break]
+        absolute = [first + offset - 2 for offset in channel.offsets]
+        return [(1 + place // UNIVERSE_SIZE, place % UNIVERSE_SIZE) for place in absolute]
+
+
+@dataclass(frozen=True)
+class ConsoleRig:
+    """All fixtures of a show.
+
+    name: of the file it is from. Raises RigError for two fixtures on one address, a channel beyond
+    its universe, and light names that repeat.
+    """
+
+    name: str
+    fixtures: tuple[RigFixture, ...] = field(default_factory=tuple)
+
+    def __post_init__(self) -> None:
+        names = [light.name for fixture in self.fixtures for light in fixture.lights]
+        if repeated := sorted({name for name in names if names.count(name) > 1}):
+            raise RigError(f"{self.name} has several lights named {some_names(repeated)}")
+        owners: dict[tuple[int, int], RigFixture] = {}
+        for fixture in self.fixtures:
+            for channel in fixture.channels:
+                self._check_channel(fixture, channel, owners)
+
+    def _check_channel(
+        self, fixture: RigFixture, channel: DmxChannel, owners: dict[tuple[int, int], RigFixture]
+    ) -> None:
+        places = fixture.places(channel)
+        first = fixture.addresses[channel.dmx_break]
+        if places and any(universe != 1 + (first - 1) // UNIVERSE_SIZE for universe, _ in places):
+            raise RigError(
+                f"{self.name}: {fixture.name!r} at {address_text(first)} needs channel "
+                f"{(first - 1) % UNIVERSE_SIZE + max(channel.offsets)} of its universe, which has "
+                f"{UNIVERSE_SIZE}: give it a lower address"
+            )
+        for universe, index in places:
+            other = owners.setdefault((universe, index), fixture)
+            if other is not fixture:
+                raise RigError(
+                    f"{self.name}: {other.name!r} and {fixture.name!r} are both on "
+                    f"{universe}.{index + 1}: give one of them another address"
+                )
+
+    @cached_property
+    def owners(self) -> Mapping[str, RigFixture]:
+        """The fixture of each light, by the light's name."""
+        return {light.name: fixture for fixture in self.fixtures for light in fixture.lights}
+
+    @cached_property
+    def universes(self) -> list[int]:
+        """The universes that its channels are in."""
+        return sorted(
+            {u for x in self.fixtures for channel in x.channels for u, _ in x.places(channel)}
+        )
+
+
+def address_text(address: int) -> str:
+    """Return an absolute address as people write it, `2.1` for 513."""
+    return f"{1 + (address - 1) // UNIVERSE_SIZE}.{1 + (address - 1) % UNIVERSE_SIZE}"
