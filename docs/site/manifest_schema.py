@@ -4,6 +4,7 @@ A check has the schema of the values that it takes. Only tables with keys of the
 """
 
 from collections.abc import Mapping
+from typing import get_args
 
 from dataclass_schemas import Schema
 
@@ -17,6 +18,7 @@ from lightpaint.batch.manifest.keys import (
     SETTINGS,
     SUBJECT_KEYS,
 )
+from lightpaint.colour.lamp import Preference
 from lightpaint.lighting.constraints.constraints import LIGHT_KEYS
 from lightpaint.validation import Check
 
@@ -46,6 +48,7 @@ def _look_tables() -> dict[str, Schema]:
             "light": _table_of(_closed({key: {} for key in LIGHT_KEYS})),
             "tie": {"type": "array"},
             "prefer_current": _LEVEL,
+            "prefer_emitters": {"enum": list(get_args(Preference))},
             "sparse": {"type": "integer", "minimum": 1},
             "start": _table_of(_EMISSION),
             "near": _LEVEL,

@@ -28,6 +28,7 @@ class BasisLight:
     unit_flux: watts radiated per channel at an emission of 1; None if unknown.
     identity: identity of its plane; planes with equal identities are equal up to noise (see
     `Light.identity`). "" if unknown.
+    is_outside_gamut: whether its emission has negative channels, as LEDs outside Rec.709 have.
     """
 
     name: str
@@ -41,6 +42,7 @@ class BasisLight:
     members: tuple[str, ...] = ()
     unit_flux: RGB | None = None
     identity: str = ""
+    is_outside_gamut: bool = False
 
     def __post_init__(self) -> None:
         if len(self.name) > MAX_NAME:
@@ -49,7 +51,8 @@ class BasisLight:
             object.__setattr__(self, "members", (self.name,))
         if self.is_fixed and self.emission != (1, 1, 1):
             raise BasisError(f"light {self.name!r} is fixed, so its emission must be 1")
-        if not all(map(is_amount, self.emission)):
+        channels = map(abs, self.emission) if self.is_outside_gamut else self.emission
+        if not all(map(is_amount, channels)):
             raise BasisError(
                 f"light {self.name!r} has the emission {list(self.emission)}: need three numbers "
                 f"from 0 to {BRIGHTEST:g}"

@@ -190,9 +190,17 @@ def make_answer(
     ).with_objective(problem.objective(weights), problem.norm2)
     labels_and_effects = _labels_and_effects(problem, equations, optimum.weights)
     fields: dict[str, Any] = {"target": problem.name, "certificate": certificate}
-    fields["scene_identity"] = problem.scene_identity
+    fields |= {
+        "scene_identity": problem.scene_identity,
+        "cd_per_unit": problem.constraints.cd_per_unit,
+    }
     lighting = Lighting.of_weights(
-        problem.lights, weights, labels=labels_and_effects, reached=reached, **fields
+        problem.lights,
+        weights,
+        labels=labels_and_effects,
+        reached=reached,
+        lamps=problem.reduction.lamps,
+        **fields,
     )
     return LinearAnswer(problem, lighting, weights)
 

@@ -164,8 +164,7 @@ def _reduce_noise(job: Job, solution: Solution, listen: Listener) -> Solution:
     solution = refine_by_rendering(
         scenes, solution, rounds=settings.refine, seed=settings.seed, progress=listen
     )
-    lighting = replace(solution.lighting, cd_per_unit=settings.cd_per_unit)
-    lighting = with_places(lighting, job.views[0].scene)
+    lighting = with_places(solution.lighting, job.views[0].scene)
     return replace(solution, lighting=lighting)
 
 

@@ -123,6 +123,7 @@ def load_scene(
         facts = with_split(whole, parsed, sizes, mirrored)
     check_film(path, facts["film"], facts["spp"])
     check_emitters(path, facts["emitters"])
+    facts["emitters"] = _with_colors_of_lamps(facts["emitters"], selection)
     chosen = _select_lights(path, facts["emitters"], selection, group_alike=group_alike)
     if len(adjusted := _adjusted_images(chosen)) < len(sizes):
         # An image of which nothing is adjusted stays as it is, in full detail.
@@ -164,6 +165,22 @@ def with_layout(scene: Scene, image: str, layout: TexelLayout) -> Scene:
     fixed = [light.name for light in scene.lights if light.is_fixed]
     lights = lights_of(facts["emitters"], members, fixed)
     return replace(scene, **facts | {"film": scene.film}, lights=lights, split=split)
+
+
+def _with_colors_of_lamps(
+    emitters: Sequence[Emitter], selection: LightsFile
+) -> tuple[Emitter, ...]:
+    """Return the emitters, of which those may be adjusted whose colour is outside Rec.709 and whose
+    lamp the lights file describes, as in a scene that was relit.
+    """
+    patterns = selection.requests.lamps
+
+    def is_lamp(emitter: Emitter) -> bool:
+        return any(emitter.name == x or fnmatchcase(emitter.name, x) for x in patterns)
+
+    return tuple(
+        replace(x, obstacle="") if x.is_outside_gamut and is_lamp(x) else x for x in emitters
+    )
 
 
 def _image_sizes(

@@ -121,6 +121,7 @@ def basis_lights(scene: Scene) -> Lights:
             x.member_names,
             x.unit_flux,
             identity,
+            min(x.emission) < 0,
         )
         for x, identity in zip(scene.lights, scene.light_identities, strict=True)
     )

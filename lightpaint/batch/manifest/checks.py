@@ -28,7 +28,10 @@ SOLVE_STEPS, GIVEN_LIGHTING_STEPS = ("solve", "predict", "verify", "report"), ("
 BASES = ("basis", "light_groups")
 
 #: Keys of `Constraints.of`, as in a lights file.
-CONSTRAINT_KEYS = ("light", "tie", "prefer_current", "sparse", "start", "near")
+CONSTRAINT_KEYS = (
+    *("light", "tie", "prefer_current", "sparse", "start", "near"),
+    "prefer_emitters",
+)
 
 
 def check_combination(mistakes: Mistakes, table: Table) -> None:

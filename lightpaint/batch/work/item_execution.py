@@ -284,7 +284,6 @@ def publish_solved_lights(
 def _publish_lighting_only(job: Job, lighting: Lighting) -> None:
     """Write the lighting and the relit scene."""
     [view] = job.views
-    lighting = replace(lighting, cd_per_unit=job.settings.cd_per_unit)
     with new_answer(job.results, lighting, scene=view.scene):
         pass  # there are no pictures
 

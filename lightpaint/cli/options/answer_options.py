@@ -2,11 +2,12 @@
 
 import argparse
 from collections.abc import Callable, Mapping
-from typing import Any
+from typing import Any, get_args
 
 from lightpaint.batch.run_options import RunOptions
 from lightpaint.cli.options import arguments
 from lightpaint.cli.options.option_groups import add_fields, add_output, add_view_transform
+from lightpaint.colour.lamp import Preference
 from lightpaint.pipeline.job.settings import Settings
 
 #: Names of the variations.
@@ -313,6 +314,13 @@ def _add_preferences(group: argparse._ArgumentGroup) -> None:
         metavar="STRENGTH",
         help="prefer the current lighting with this strength, like 0.01: lights that the painting"
         " does not determine then stay as they are (default: %(default)s)",
+    )
+    group.add_argument(
+        "--prefer-emitters",
+        choices=get_args(Preference),
+        help="among mixes of a lamp's emitters that look the same, choose the one that needs the "
+        "least power, with the most light from white emitters, or of the fewest emitters (default: "
+        "watts)",
     )
     group.add_argument(
         "--start",

@@ -21,7 +21,7 @@ from lightpaint.colour.display.view_transform import TransformChoice
 from lightpaint.display_text import some_names
 from lightpaint.errors import LOOK_ERRORS, LightpaintError, OutputError, TargetError
 from lightpaint.files import check_files, is_name, is_utf_8, one_line
-from lightpaint.lighting.constraints.constraints import LIGHT_KEYS, Constraints
+from lightpaint.lighting.constraints.constraints import LAMP_KEYS, LIGHT_KEYS, Constraints
 from lightpaint.lighting.constraints.constraints_file import read_constraints
 from lightpaint.pipeline.job.settings import Settings
 from lightpaint.pipeline.job.sources import Painting, PlacementFile, SceneFile
@@ -185,7 +185,7 @@ def transform_of(options: Namespace) -> TransformChoice:
 def constraints_of(options: Namespace) -> Constraints:
     """Return the constraints in the options."""
     lights: dict[str, dict[str, Any]] = {}
-    for key in (key for key in LIGHT_KEYS if key != "off"):
+    for key in (key for key in LIGHT_KEYS if key not in ("off", *LAMP_KEYS)):
         for name, value in getattr(options, key):
             lights.setdefault(name, {})[key] = value
     for name in options.off:
@@ -197,6 +197,7 @@ def constraints_of(options: Namespace) -> Constraints:
         sparse=options.sparse,
         start=dict(options.start),
         near=options.near,
+        prefer_emitters=options.prefer_emitters,
         where=BY_OPTION,
     )
 

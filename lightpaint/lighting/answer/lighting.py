@@ -11,6 +11,7 @@ import numpy as np
 from lightpaint.arrays import RGB, Bools, Doubles, Position, as_rgb
 from lightpaint.basis.basis import Basis
 from lightpaint.basis.lights import BasisLight, Lights
+from lightpaint.colour.lamp import Lamp
 from lightpaint.colour.photometry import Photometry, photometry
 from lightpaint.dataframes import CHANNELS, by_channel, number, pandas, xarray
 from lightpaint.display_text import Shown, some_names, some_of
@@ -49,6 +50,9 @@ class LightSetting:
     reach nothing.
     interval: 95 % interval of each channel, lower and upper end; as standard_error.
     untold: whether the basis has too few samples to determine it.
+    lamp: what mixes its emission from emitters. is_outside_gamut: whether it has a colour outside
+    Rec.709 without that, in the scene. Channels of the emission of such lights, and only of these,
+    may be negative.
     """
 
     name: str
@@ -66,6 +70,8 @@ class LightSetting:
     standard_error: Errors | None = None
     interval: Intervals | None = None
     untold: bool = False
+    lamp: Lamp | None = None
+    is_outside_gamut: bool = False
 
     def __post_init__(self) -> None:
         if len(self.name) > MAX_NAME:
@@ -75,7 +81,7 @@ class LightSetting:
         self._check_errors()
         values = {"emission": self.emission, "weight": self.weight}
         for name, rgb in values.items():
-            if not all(map(is_amount, rgb)):
+            if not all(map(is_amount, map(abs, rgb) if self._may_be_negative else rgb)):
                 raise LightingError(
                     f"light {self.name!r} has the {name} {list(rgb)}: need three numbers from 0 "
                     f"to {BRIGHTEST:g}"
@@ -89,6 +95,10 @@ class LightSetting:
                 f"light {self.name!r} has the unit_flux {list(self.unit_flux)}: need three numbers "
                 f"from 0 to {BRIGHTEST:g}"
             )
+
+    @property
+    def _may_be_negative(self) -> bool:
+        return self.lamp is not None or self.is_outside_gamut
 
     @property
     def physical_emission(self) -> RGB:
@@ -116,6 +126,28 @@ class LightSetting:
             interval=None,
         )
 
+    @cached_property
+    def drives(self) -> Mapping[str, float]:
+        """The drive of each of its emitters, 0 to 1, by name; empty without a lamp of emitters.
+
+        Of an emission that they cannot mix, those of the nearest that they can.
+        """
+        if self.lamp is None:
+            return {}
+        drives = self.lamp.drives_for(np.array(self.emission))
+        return dict(zip(self.lamp.names, drives.tolist(), strict=True))
+
+    @cached_property
+    def drive_errors(self) -> Mapping[str, float | None]:
+        """The standard error of each drive; None where it is unknown, and of a drive at 0 or full,
+        which small errors do not move.
+        """
+        if self.lamp is None or self.standard_error is None:
+            return dict.fromkeys(self.drives)
+        drives = np.array(list(self.drives.values()))
+        errors = self.lamp.drive_errors(drives, self.standard_error)
+        return dict(zip(self.drives, errors, strict=True))
+
     @property
     def is_partly_reached(self) -> bool:
         """True if some of its channels were solved for and others reach nothing."""
@@ -129,7 +161,8 @@ class LightSetting:
                 f"from 0 to {BRIGHTEST:g}, or null where it is unknown"
             )
         for ends in filter(None, self.interval or ()):
-            if not 0 <= ends[0] <= ends[1] <= BRIGHTEST:
+            least = -BRIGHTEST if self._may_be_negative else 0.0
+            if not least <= ends[0] <= ends[1] <= BRIGHTEST:
                 raise LightingError(
                     f"light {self.name!r} has the interval {list(ends)}: need two numbers, "
                     f"0 <= lower <= upper <= {BRIGHTEST:g}"
@@ -340,12 +373,14 @@ class Lighting(Shown, Mapping[str, LightSetting]):
         *,
         labels: Sequence[tuple[str, bool]] | None = None,
         reached: Bools | None = None,
+        lamps: Mapping[int, Lamp] | None = None,
         **fields: Any,
     ) -> "Lighting":
         """Make a lighting of weights (n, 3) in the order of `lights`, which may be those of a
         basis.
 
         labels: for each light its `constraint` and whether this `is_active`. reached: (n, 3).
+        lamps: what mixes a light from emitters, by the light's index.
         """
         if isinstance(lights, Basis):
             fields.setdefault("scene_identity", lights.origin.scene_identity)
@@ -362,9 +397,10 @@ class Lighting(Shown, Mapping[str, LightSetting]):
                 as_rgb(weight),
                 label,
                 (bool(channels[0]), bool(channels[1]), bool(channels[2])),
+                (lamps or {}).get(k),
             )
-            for light, weight, label, channels in zip(
-                lights, weights, labels or [("", False)] * count, is_reached, strict=True
+            for k, (light, weight, label, channels) in enumerate(
+                zip(lights, weights, labels or [("", False)] * count, is_reached, strict=True)
             )
         )
         return cls(settings, **fields)
@@ -402,7 +438,11 @@ class Lighting(Shown, Mapping[str, LightSetting]):
 
 
 def _setting(
-    light: BasisLight, weight: RGB, label: tuple[str, bool], reached: tuple[bool, bool, bool]
+    light: BasisLight,
+    weight: RGB,
+    label: tuple[str, bool],
+    reached: tuple[bool, bool, bool],
+    lamp: Lamp | None,
 ) -> LightSetting:
     # One unit of weight is unit-white emission, so that here the two are the same numbers.
     return LightSetting(
@@ -418,4 +458,6 @@ def _setting(
         constraint=label[0],
         is_active=label[1],
         reached=reached,
+        lamp=lamp,
+        is_outside_gamut=light.is_outside_gamut,
     )

@@ -6,6 +6,7 @@ from dataclasses import asdict, replace
 from pathlib import Path
 from typing import Any
 
+from lightpaint.colour.lamp import Lamp
 from lightpaint.errors import LightingError
 from lightpaint.file_reading import read_text
 from lightpaint.files import one_line, write_text
@@ -24,6 +25,9 @@ MAX_BYTES = 2**23
 
 #: Fields of a lighting that its file has under their own names.
 PLAIN_FIELDS = ("target", "scene_identity", "cd_per_unit", "up")
+
+#: Fields of a light's lamp, which its file has beside the others.
+LAMP_FIELDS = ("emitters", "power_share", "prefer")
 
 #: Fields of a certificate for options of the fit, written where they differ from the paper.
 FIT_FIELDS = ("display", "rounds", "hold", "colors", "noise_removed", "software", "basis_spp")
@@ -152,7 +156,10 @@ def _read_key(data: Mapping[str, Any], lights: Sequence[LightSetting]) -> Lighti
 def _read_setting(name: str, data: Mapping[str, Any]) -> LightSetting:
     if data.get("members") == []:
         raise ValueError("members is a list of names, not empty")
-    return read_record(LightSetting, {**data, "name": name}, others=True)
+    fields = {**data, "name": name}
+    if "emitters" in data:
+        fields["lamp"] = {key: data[key] for key in LAMP_FIELDS if key in data}
+    return read_record(LightSetting, fields, others=True)
 
 
 def _place_fields(place: EmitterPlace) -> dict[str, Any]:
@@ -173,15 +180,27 @@ def _optional_fields(light: LightSetting) -> dict[str, Any]:
         ties["standard_error"] = light.standard_error
     if light.interval is not None:
         ties["interval"] = light.interval
-    if light.untold:
-        ties["untold"] = True
+    for flag in ("untold", "is_outside_gamut"):
+        if getattr(light, flag):
+            ties[flag] = True
     if light.is_fixed:
         ties["is_fixed"] = True
     if light.members != (light.name,):
         ties["members"] = light.members
+    if light.lamp is not None:
+        ties |= _lamp_fields(light, light.lamp)
     if light.constraint:
         ties |= {"constraint": light.constraint, "is_active": light.is_active}
     return ties
+
+
+def _lamp_fields(light: LightSetting, lamp: Lamp) -> dict[str, Any]:
+    """Return the emitters of a light, and their drives, which follow from its emission."""
+    fields: dict[str, Any] = {"drives": dict(light.drives)}
+    if light.standard_error is not None:
+        fields["drive_errors"] = dict(light.drive_errors)
+    emitters = [fields_of(x, "watts") for x in lamp.emitters]
+    return fields | fields_of(lamp, "power_share", "prefer") | {"emitters": emitters}
 
 
 def _photometry(lighting: Lighting, light: LightSetting) -> dict[str, Any]:

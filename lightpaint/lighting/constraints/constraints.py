@@ -10,10 +10,12 @@ from dataclasses import dataclass, field
 from typing import Any
 
 from lightpaint.arrays import RGB
+from lightpaint.colour.lamp import Preference
 from lightpaint.colour.white_range import WhiteRange
 from lightpaint.display_text import some_of
 from lightpaint.errors import ConstraintError
 from lightpaint.keywords import keywords
+from lightpaint.lighting.constraints.emitter_values import EmitterRequest, parse_emitters
 from lightpaint.lighting.constraints.values import (
     Level,
     Lock,
@@ -24,7 +26,10 @@ from lightpaint.lighting.constraints.values import (
     parse_count,
     parse_limits,
     parse_lock,
+    parse_power_share,
+    parse_preference,
     parse_primaries,
+    parse_scale,
     parse_start,
     parse_strength,
     parse_whites,
@@ -32,8 +37,9 @@ from lightpaint.lighting.constraints.values import (
 from lightpaint.sentences import Sentence, SourceKey
 from lightpaint.validation import MAX_LISTED
 
-#: Keys of the constraints on one light.
-LIGHT_KEYS = ("lock", "off", "limits", "color", "kelvin", "duv", "primaries")
+#: Keys of the constraints on one light, the first of which describe the lamp that it is.
+LAMP_KEYS = ("emitters", "power_share")
+LIGHT_KEYS = ("lock", "off", "limits", "color", "kelvin", "duv", "primaries", *LAMP_KEYS)
 
 #: Keys that determine the colours of a light, which can have one of them.
 COLOR_KEYS = ("color", "kelvin", "primaries")
@@ -48,6 +54,8 @@ class LightConstraint:
     primaries: the colours it can mix, each of luminance 1: one for a fixed colour, the two
     ends of a range of white, the LEDs of a fixture; None if any colour will do.
     whites: the range of white that it keeps to, if there is one.
+    emitters: the emitters that mix its light, of which each dims between bounds. power_share: their
+    largest power together, relative to that of all at full.
     label: all this in few words. where: the name of the source in errors.
     """
 
@@ -57,6 +65,8 @@ class LightConstraint:
     most: Level | None = None
     primaries: tuple[RGB, ...] | None = None
     whites: WhiteRange | None = None
+    emitters: tuple[EmitterRequest, ...] = ()
+    power_share: float | None = None
     label: str = ""
     where: SourceKey = field(default_factory=SourceKey)
 
@@ -64,6 +74,11 @@ class LightConstraint:
     def is_fixed(self) -> bool:
         """True if it leaves nothing to solve for."""
         return self.off or self.lock is not None
+
+    @property
+    def has_open_color(self) -> bool:
+        """True if nothing says which colours the light can have."""
+        return not (self.is_fixed or self.primaries is not None or self.emitters)
 
     @classmethod
     def of(cls, table: Mapping[str, Any], *, where: str = "constraint") -> "LightConstraint":
@@ -84,6 +99,9 @@ class LightConstraint:
         )
         primaries = parse_primaries(table, key)
         whites = parse_whites(table, key)
+        emitters = parse_emitters(table, key)
+        share = parse_power_share(table, key)
+        _check_emitters(table, key, primaries)
         if lock is not None and primaries is not None:
             if lock.level is None or lock.color is not None or isinstance(lock.level.amount, tuple):
                 raise ConstraintError(
@@ -100,7 +118,26 @@ class LightConstraint:
                     "of its colours open: lock it at a colour",
                 )
             lock, primaries = Lock(lock.level, primaries[0]), None
-        return cls(lock, "off" in table, least, most, primaries, whites, _label(table), key)
+        is_off, label = "off" in table, _label(table)
+        return cls(lock, is_off, least, most, primaries, whites, emitters, share, label, key)
+
+
+def _check_emitters(
+    table: Mapping[str, Any], where: SourceKey, primaries: tuple[RGB, ...] | None
+) -> None:
+    """Refuse what a lamp of emitters cannot have besides them."""
+    if "emitters" not in table:
+        if "power_share" in table:
+            raise ConstraintError(where, " has power_share without the emitters that share it")
+        return
+    if primaries is not None and len(primaries) > 1:
+        raise ConstraintError(
+            where,
+            f" has emitters and {_first_key(table, COLOR_KEYS)!r}, whose mix would be open: give "
+            "one colour, or leave it out",
+        )
+    if "limits" in table and "power_share" in table:
+        raise ConstraintError(where, " has limits and power_share: give one of them")
 
 
 def _label(table: Mapping[str, Any]) -> str:
@@ -136,6 +173,9 @@ class Constraints:
             scene's. Unpainted parts are held to its look, and lamps to its colours.
         near: Strength of a pull to the lighting to start from, relative to the paint. At 1 a change
             of a light costs as much as its effect on a picture painted all over would count.
+        cd_per_unit: cd/m² of a radiance of 1, for emitters in candelas or lumens.
+        prefer_emitters: Among mixes of a lamp's emitters that look the same, the one with the least
+            "watts", with the most light from "white" emitters, or of the "fewest" emitters.
 
     Examples:
         >>> constraints = lp.Constraints.of({"panel": {"lock": True}})
@@ -152,6 +192,8 @@ class Constraints:
     sparse: int | None = None
     start: Mapping[str, RGB] = field(default_factory=dict)
     near: float = 0.0
+    cd_per_unit: float | None = None
+    prefer_emitters: Preference | None = None
 
     def __repr__(self) -> str:
         parts = [f"{name} {_label(table)}" for name, table, _ in self.lights]
@@ -160,6 +202,8 @@ class Constraints:
         parts += [] if self.sparse is None else [f"sparse {self.sparse}"]
         parts += [f"start {' + '.join(self.start)}"] if self.start else []
         parts += [f"near {self.near:g}"] if self.near else []
+        parts += [f"cd_per_unit {self.cd_per_unit:g}"] if self.cd_per_unit else []
+        parts += [f"prefer_emitters {self.prefer_emitters}"] if self.prefer_emitters else []
         return f"Constraints({some_of(parts, '; ', room=600)})"
 
     def __bool__(self) -> bool:
@@ -177,6 +221,8 @@ class Constraints:
         sparse: int | None = None,
         start: Mapping[str, Any] | None = None,
         near: float = 0.0,
+        cd_per_unit: float | None = None,
+        prefer_emitters: Preference | None = None,
         where: str = "",
     ) -> "Constraints":
         """Make constraints from the tables of a lights file.
@@ -209,6 +255,8 @@ class Constraints:
             parse_count(sparse, source / "sparse"),
             parse_start({} if start is None else start, source / "start"),
             parse_strength(near, source / "near"),
+            parse_scale(cd_per_unit, source / "cd_per_unit"),
+            parse_preference(prefer_emitters, source / "prefer_emitters"),
         )
 
     @keywords()
@@ -227,6 +275,8 @@ class Constraints:
             self.sparse if others.sparse is None else others.sparse,
             {**self.start, **others.start},
             others.near or self.near,
+            others.cd_per_unit or self.cd_per_unit,
+            others.prefer_emitters or self.prefer_emitters,
         )
 
 

@@ -47,6 +47,8 @@ def constraints_of(requests: SceneRequests) -> Constraints:
             sparse=keys.get("sparse"),
             start=keys.get("start", {}),
             near=keys.get("near", 0.0),
+            cd_per_unit=keys.get("cd_per_unit"),
+            prefer_emitters=keys.get("prefer_emitters"),
             where=requests.source,
         )
     except ConstraintError as error:

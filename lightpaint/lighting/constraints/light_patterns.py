@@ -69,7 +69,7 @@ def lights_of_open_color(constraints: Constraints, lights: Sequence[BasisLight])
             zip(lights, constraints_by_light(constraints, lights), strict=True)
         )
         if not (light.is_fixed or light.is_scalar or k in tied)
-        and (constraint is None or not (constraint.is_fixed or constraint.primaries is not None))
+        and (constraint is None or constraint.has_open_color)
     ]
 
 

@@ -2,12 +2,13 @@
 
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, cast, get_args
 
 import numpy as np
 
 from lightpaint.arrays import RGB, as_rgb
 from lightpaint.colour.color import hex_to_rgb, kelvin_to_rgb, luminance
+from lightpaint.colour.lamp import Preference
 from lightpaint.colour.white_range import WhiteRange, white_range
 from lightpaint.errors import ColorError, ConstraintError
 from lightpaint.files import one_line
@@ -57,7 +58,7 @@ def check_lengths(table: Mapping[str, Any], where: SourceKey) -> None:
     """Raise ConstraintError for a value that is longer than any valid one."""
     for key, value in table.items():
         texts = [*value] if isinstance(value, list | tuple) else [value]
-        if key != "primaries":  # which has a limit of its own
+        if key not in ("primaries", "emitters"):  # which have limits of their own
             texts.append(value)
         if isinstance(value, Mapping):
             texts = [x for pair in value.items() for x in pair]
@@ -226,12 +227,43 @@ def parse_count(value: Any, where: SourceKey) -> int | None:
     return value
 
 
+def parse_scale(value: Any, where: SourceKey) -> float | None:
+    """Return cd/m² of a radiance of 1, if given."""
+    if value is not None and not (is_number(value) and 0 < value <= BRIGHTEST):
+        raise ConstraintError(where, f" is {value!r}: expected cd/m² of a radiance of 1, like 1000")
+    return None if value is None else float(value)
+
+
+def parse_preference(value: Any, where: SourceKey) -> Preference | None:
+    """Return the preference among mixes of emitters, if there is one."""
+    known = get_args(Preference)
+    if value is not None and value not in known:
+        raise ConstraintError(
+            where, f" is {one_line(repr(value))}: expected one of {', '.join(known)}"
+        )
+    return cast("Preference | None", value)
+
+
+def parse_power_share(table: Mapping[str, Any], where: SourceKey) -> float | None:
+    """Return the largest power of a lamp's emitters, relative to that of all at full."""
+    value = table.get("power_share")
+    if value is not None and not (is_number(value) and 0 < value <= 1):
+        raise ConstraintError(
+            where / "power_share", f" is {value!r}: expected a share of full power like 0.6"
+        )
+    return None if value is None else float(value)
+
+
 def describe_constraint(key: str, value: Any) -> str:
     """Return a key and its value in few words, for tables."""
     if value is True:
         return key
     if key == "limits":
         return f"limits {_text(value.get('min', 0))} to {_text(value.get('max', '∞'))}"
+    if key == "emitters":
+        return " + ".join(str(emitter["name"]) for emitter in value)
+    if key == "power_share":
+        return f"{100 * value:g}% of full power"
     if key == "kelvin" and isinstance(value, Sequence):
         return f"{_text(value[0])} to {_text(value[-1])} K"
     return f"{_text(value)} K" if key == "kelvin" else f"{key} {_text(value)}"

@@ -1,6 +1,6 @@
 """Knobs, the lights and dimmers that turn by themselves, with the unknowns of each."""
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import Any
@@ -11,6 +11,7 @@ from lightpaint.arrays import Doubles
 from lightpaint.basis.lights import BasisLight
 from lightpaint.colour.color import luminance
 from lightpaint.colour.color_hull import ColorHull
+from lightpaint.colour.lamp import Lamp, Preference
 from lightpaint.colour.white_range import WhiteRange
 from lightpaint.errors import ConstraintError
 from lightpaint.lighting.constraints.constraints import LightConstraint, Tie
@@ -48,25 +49,40 @@ def _mix_limits(
 ) -> tuple[Doubles, Doubles, float, float]:
     """Return bounds on the unknowns, and on the luminance of their sum."""
     lower, upper = np.zeros(count), np.full(count, np.inf)
+    levels = constraint.least, constraint.most
+    if constraint.primaries is not None:
+        return lower, upper, *_luminance_limits(constraint, light, "mixes primaries")
+    for level, is_least in zip(levels, (True, False), strict=True):
+        if level is not None and isinstance(level.amount, tuple):
+            lower, upper = (
+                (np.array(level.amount), upper) if is_least else (lower, np.array(level.amount))
+            )
+    _check_room(constraint, light, lower, upper)
+    least, most = _luminance_limits(constraint, light)
+    return lower, upper, least, most
+
+
+def _luminance_limits(
+    constraint: LightConstraint, light: BasisLight, mixes: str = ""
+) -> tuple[float, float]:
+    """Return bounds on the luminance of a light. mixes: what it does, if it cannot have bounds of
+    its channels.
+    """
     least, most = 0.0, np.inf
     for level, is_least in ((constraint.least, True), (constraint.most, False)):
         if level is None:
             continue
-        if not isinstance(level.amount, tuple):
-            value = _luminance(level, light, constraint)
-            least, most = (value, most) if is_least else (least, value)
-        elif constraint.primaries is not None:
-            raise ConstraintError(
-                constraint.where / "limits",
-                f" has {level} for a light that mixes primaries: give a "
-                "luminance like 2.5 or a share like 40%",
-            )
-        elif is_least:
-            lower = np.array(level.amount)
-        else:
-            upper = np.array(level.amount)
-    _check_room(constraint, light, lower, upper)
-    return lower, upper, least, most
+        if isinstance(level.amount, tuple):
+            if mixes:
+                raise ConstraintError(
+                    constraint.where / "limits",
+                    f" has {level} for a light that {mixes}: give a "
+                    "luminance like 2.5 or a share like 40%",
+                )
+            continue
+        value = _luminance(level, light, constraint)
+        least, most = (value, most) if is_least else (least, value)
+    return least, most
 
 
 def _luminance(level: Level, light: BasisLight, constraint: LightConstraint) -> float:
@@ -205,8 +221,46 @@ def mixing_knob(k: int, light: BasisLight, constraint: LightConstraint) -> Knob:
     return Knob((k,), tuple(unknowns), limit, constraint.whites, window)
 
 
-def dimmer_knob(k: int, light: BasisLight, constraint: LightConstraint) -> Knob:
-    """Make the knob of a light of one colour, which dims."""
+def lamp_of(
+    light: BasisLight,
+    constraint: LightConstraint | None,
+    cd_per_unit: float | None,
+    prefer: Preference | None,
+) -> Lamp | None:
+    """Return the lamp of a light, if its constraint lists emitters."""
+    if constraint is None or not constraint.emitters or light.is_fixed:
+        return None
+    if light.is_scalar:
+        raise ConstraintError(
+            constraint.where,
+            f" lists emitters, and {light.name!r} can only be dimmed as a whole: leave them out",
+        )
+    emitters = tuple(x.in_light(light, cd_per_unit) for x in constraint.emitters)
+    return Lamp(emitters, constraint.power_share, prefer or "watts")
+
+
+def lamp_knob(k: int, light: BasisLight, constraint: LightConstraint, lamp: Lamp) -> Knob:
+    """Make the knob of a lamp, whose unknowns are the drives of its emitters."""
+    lower, upper = np.zeros(len(lamp.most)), lamp.most
+    unknowns = tuple(
+        Unknown(((k, rgb),), 0.0, float(most))
+        for rgb, most in zip(lamp.columns, upper, strict=True)
+    )
+    if lamp.power_share is not None:
+        return Knob((k,), unknowns, (tuple(map(float, lamp.powers)), 0.0, lamp.power_share))
+    least, most = _luminance_limits(constraint, light, "mixes emitters")
+    if least == 0 and np.isinf(most):
+        return Knob((k,), unknowns)
+    coefficients = np.asarray(luminance(lamp.columns), np.float64)
+    _check_room(constraint, light, least, min(most, float(coefficients @ upper)))
+    _check_room(constraint, light, lower, upper)
+    return Knob((k,), unknowns, (tuple(map(float, coefficients)), least, most))
+
+
+def dimmer_knob(
+    k: int, light: BasisLight, constraint: LightConstraint, lamp: Lamp | None = None
+) -> Knob:
+    """Make the knob of a light of one colour, which dims. lamp: what mixes it, if known."""
     if light.is_scalar and constraint.primaries is not None:
         raise ConstraintError(
             constraint.where,
@@ -217,9 +271,23 @@ def dimmer_knob(k: int, light: BasisLight, constraint: LightConstraint) -> Knob:
     direction = np.ones(3) if constraint.primaries is None else np.array(constraint.primaries[0])
     _check_grey(constraint, light)
     lower, upper = _dimmer_limits(constraint, direction, light)
+    if lamp is not None:
+        upper = min(upper, _brightest(lamp, direction, light, constraint))
     _check_room(constraint, light, lower, upper)
     # Round-off may have separated equal ends.
     return Knob((k,), (Unknown(((k, direction),), min(lower, upper), upper),))
+
+
+def _brightest(lamp: Lamp, color: Doubles, light: BasisLight, constraint: LightConstraint) -> float:
+    """Return the largest factor by which a lamp mixes a colour (3,)."""
+    most = lamp.brightest(color)
+    if most == 0:
+        raise ConstraintError(
+            constraint.where,
+            f" asks {light.name!r} for the colour {' '.join(f'{x:.3g}' for x in color)}, which its "
+            f"emitters {', '.join(lamp.names)} cannot mix: choose another",
+        )
+    return most
 
 
 def tied_knob(
@@ -228,15 +296,18 @@ def tied_knob(
     names: str,
     lights: Sequence[BasisLight],
     constraints: Sequence[LightConstraint | None],
+    lamps: Mapping[int, Lamp],
 ) -> Knob:
     """Make the knob of lights on one dimmer; at 1 they have their current luminances.
 
-    A fixed member fixes the dimmer: the unknown's limits meet.
+    A fixed member fixes the dimmer: the unknown's limits meet. lamps: of some of all lights.
     """
     columns, lower, upper = [], 0.0, np.inf
     for k in members:
         constraint = constraints[k] or LightConstraint()
         direction, least, most = _tied_direction(tie, names, lights[k], constraint)
+        if k in lamps and not constraint.is_fixed:
+            most = min(most, _brightest(lamps[k], direction, lights[k], constraint))
         lower, upper = max(lower, least), min(upper, most)
         columns.append((k, direction))
     if lower > upper * (1 + ROUND_OFF):
@@ -284,6 +355,22 @@ def _tied_direction(
         least = most = float(luminance(emission) / luminance(current))
         direction = emission / most if most > 0 else direction
     return direction, least, most
+
+
+def fixed_emission(
+    light: BasisLight, constraint: LightConstraint, lamp: Lamp | None = None
+) -> Doubles:
+    """Return the emission (3,) of a light that is off or locked. lamp: what mixes it, if known."""
+    if constraint.lock is None:
+        return np.zeros(3)
+    emission = locked_emission(light, constraint.lock, constraint.where)
+    if lamp is not None and not lamp.can_mix(emission):
+        raise ConstraintError(
+            constraint.where,
+            f" holds {light.name!r} at {' '.join(f'{x:.4g}' for x in emission)}, which its "
+            f"emitters {', '.join(lamp.names)} cannot mix: lock it at another level or colour",
+        )
+    return emission
 
 
 def locked_emission(light: BasisLight, lock: Lock, where: SourceKey) -> Doubles:

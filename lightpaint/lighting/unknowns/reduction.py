@@ -8,7 +8,7 @@ neighbouring whites (white_mixes.py).
 """
 
 from collections.abc import Collection, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 from itertools import pairwise
 
@@ -16,6 +16,7 @@ import numpy as np
 
 from lightpaint.arrays import Bools, Doubles, Indices
 from lightpaint.basis.lights import BasisLight
+from lightpaint.colour.lamp import Lamp
 from lightpaint.lighting.algebra.quadratic import Cap
 from lightpaint.lighting.constraints.constraints import Constraints
 from lightpaint.lighting.constraints.light_patterns import constraints_by_light, tied_lights
@@ -24,7 +25,9 @@ from lightpaint.lighting.unknowns.knobs import (
     Knob,
     Unknown,
     dimmer_knob,
-    locked_emission,
+    fixed_emission,
+    lamp_knob,
+    lamp_of,
     mixing_knob,
     tied_knob,
 )
@@ -46,6 +49,7 @@ class Reduction:
     knobs: their unknowns, one after the other, are the x.
     is_joined: whether something else couples the channels: a pull to colours.
     gamuts: colours that lights without other constraints keep to.
+    lamps: what mixes a light from emitters, by the light's index.
     """
 
     fixed_weights: Doubles
@@ -53,6 +57,7 @@ class Reduction:
     knobs: tuple[Knob, ...]
     is_joined: bool = False
     gamuts: Gamuts | None = None
+    lamps: Mapping[int, Lamp] = field(default_factory=dict)
 
     @cached_property
     def unknowns(self) -> tuple[Unknown, ...]:
@@ -247,9 +252,12 @@ class Reduction:
         """The least and the most that bounds leave of each weight, (n, 3) each."""
         unknown, light, rgb = self.columns
         low, high = self.fixed_weights.copy(), self.fixed_weights.copy()
-        for end, bounds in ((low, self.lower), (high, self.upper)):
-            most = np.broadcast_to(bounds[unknown, None], rgb.shape)
-            products = np.multiply(most, rgb, out=np.zeros(rgb.shape), where=rgb != 0)
+        least, most = self.lower[unknown, None], self.upper[unknown, None]
+        for end, bounds in (
+            (low, np.where(rgb < 0, most, least)),
+            (high, np.where(rgb < 0, least, most)),
+        ):
+            products = np.multiply(bounds, rgb, out=np.zeros(rgb.shape), where=rgb != 0)
             np.add.at(end, light, products)
         return low, high
 
@@ -297,6 +305,9 @@ def reduce_to(constraints: Constraints, lights: Sequence[BasisLight]) -> Reducti
     by_light = constraints_by_light(constraints, lights)
     labels = ["" if constraint is None else constraint.label for constraint in by_light]
     tied, fixed, knobs = tied_lights(constraints, lights), np.zeros((len(lights), 3)), []
+    scale, prefer = constraints.cd_per_unit, constraints.prefer_emitters
+    made = (lamp_of(light, x, scale, prefer) for light, x in zip(lights, by_light, strict=True))
+    lamps = {k: lamp for k, lamp in enumerate(made) if lamp is not None}
     for k, (light, constraint) in enumerate(zip(lights, by_light, strict=True)):
         if light.is_fixed:
             fixed[k] = 1
@@ -305,7 +316,7 @@ def reduce_to(constraints: Constraints, lights: Sequence[BasisLight]) -> Reducti
             names = ", ".join(lights[i].name for i in members)
             labels[k] = ", ".join(filter(None, [f"tied ({names})", labels[k]]))
             if k == members[0]:
-                knob = tied_knob(tie, members, names, lights, by_light)
+                knob = tied_knob(tie, members, names, lights, by_light, lamps)
                 if any(
                     member_constraint.is_fixed
                     for member_constraint in (by_light[i] for i in members)
@@ -317,17 +328,15 @@ def reduce_to(constraints: Constraints, lights: Sequence[BasisLight]) -> Reducti
                 else:
                     knobs.append(knob)
         elif constraint is not None and constraint.is_fixed:
-            fixed[k] = (
-                0
-                if constraint.lock is None
-                else locked_emission(light, constraint.lock, constraint.where)
-            )
+            fixed[k] = fixed_emission(light, constraint, lamps.get(k))
         elif constraint is None:
             knobs.append(Knob.of_any_colour(k, is_scalar=light.is_scalar))
         elif light.is_scalar or (
             constraint.primaries is not None and len(constraint.primaries) == 1
         ):
-            knobs.append(dimmer_knob(k, light, constraint))
+            knobs.append(dimmer_knob(k, light, constraint, lamps.get(k)))
+        elif k in lamps:
+            knobs.append(lamp_knob(k, light, constraint, lamps[k]))
         else:
             knobs.append(mixing_knob(k, light, constraint))
-    return Reduction(fixed, tuple(labels), tuple(knobs))
+    return Reduction(fixed, tuple(labels), tuple(knobs), lamps=lamps)

@@ -183,6 +183,8 @@ class Job:
         all_constraints = self.constraints
         if isinstance(source, Scene | Basis):
             all_constraints = constraints_of(source.requests).and_then(all_constraints)
+        scale = Constraints(cd_per_unit=self.settings.cd_per_unit)
+        all_constraints = all_constraints.and_then(scale)
         if scenes and bases:
             check_same_view(scenes[0], bases[0])
         check_places(self.placement, scenes)

@@ -1,5 +1,8 @@
 """A lighting as a list of fixtures: colour, kelvin, lumen, and DMX for each channel.
 
+Lamps of emitters have the drive and the level of each of these instead of DMX values for red, green
+and blue.
+
 The list is independent of programs and displays: emissions are linear Rec.709 in the scene's own
 unit, that of a projector as the irradiance of a plane at distance 1. DMX values, 0 to 255, are for
 fixtures with linear response: the colour with its brightest channel at full, and a dimmer. The
@@ -17,6 +20,7 @@ from typing import Any, Literal
 import numpy as np
 
 from lightpaint.arrays import RGB, Position
+from lightpaint.colour.lamp import LampEmitter
 from lightpaint.lighting.answer.lighting import Lighting, LightSetting
 from lightpaint.relit.export.exports import plain_cell
 from lightpaint.version import __version__
@@ -29,12 +33,29 @@ FULL = 255
 
 @dataclass(frozen=True)
 class Dmx:
-    """DMX values for a fixture: 0 to 255 each."""
+    """DMX values for a fixture: 0 to 255 each. red, green, blue: None for a lamp of emitters."""
 
     dimmer: int
-    red: int
-    green: int
-    blue: int
+    red: int | None
+    green: int | None
+    blue: int | None
+
+
+@dataclass(frozen=True)
+class EmitterDrive:
+    """An emitter of a fixture at its drive, with the dimmer of the fixture at full.
+
+    drive: 0 to 1. error: its standard error; None if unknown. level: of its channel of that many
+    `bits`. coarse, fine: its first two bytes; fine is None for a channel of one byte.
+    """
+
+    name: str
+    drive: float
+    error: float | None
+    bits: int
+    level: int
+    coarse: int
+    fine: int | None
 
 
 @dataclass(frozen=True)
@@ -67,7 +88,7 @@ class Fixture:
     red, green, blue: linear emission in `unit`. y: its luminance. lumen, luminous: None unless the
     lighting has an absolute scale. kelvin, duv, hex: None if undefined. dmx: None for fixed lights.
     emitters: its emitters in the scene. place: place of the emitter, if it has only one and the
-    place is known.
+    place is known. drives: of a lamp that mixes its light, in the order of its emitters.
     """
 
     name: str
@@ -85,6 +106,7 @@ class Fixture:
     lumen: float | None
     dmx: Dmx | None
     place: FixturePlace | None = None
+    drives: tuple[EmitterDrive, ...] = ()
 
 
 def fixtures_of(lighting: Lighting) -> list[Fixture]:
@@ -114,6 +136,8 @@ def _full_levels(lightings: Sequence[Lighting]) -> dict[str, float]:
 def _fixture(lighting: Lighting, light: LightSetting, full: Mapping[str, float]) -> Fixture:
     light_photometry = lighting.photometry(light)
     dmx = None if light.is_fixed else dmx_of(light.physical_emission, full[light.unit])
+    if light.lamp is not None:
+        dmx = Dmx(FULL, None, None, None)
     return Fixture(
         light.name,
         light.members,
@@ -128,7 +152,25 @@ def _fixture(lighting: Lighting, light: LightSetting, full: Mapping[str, float])
         light_photometry.flux_lm,
         dmx,
         _place_of(lighting, light),
+        _drives_of(light),
     )
+
+
+def _drives_of(light: LightSetting) -> tuple[EmitterDrive, ...]:
+    """Return the drives of a lamp of emitters; none of another light."""
+    if light.lamp is None:
+        return ()
+    return tuple(
+        _emitter_drive(emitter, light.drives[emitter.name], light.drive_errors[emitter.name])
+        for emitter in light.lamp.emitters
+    )
+
+
+def _emitter_drive(emitter: LampEmitter, drive: float, error: float | None) -> EmitterDrive:
+    level = emitter.level(drive)
+    coarse, *further = level.to_bytes(emitter.bits // 8, "big")
+    fine = further[0] if further else None
+    return EmitterDrive(emitter.name, drive, error, emitter.bits, level, coarse, fine)
 
 
 def _place_of(lighting: Lighting, light: LightSetting) -> FixturePlace | None:
@@ -176,6 +218,10 @@ COLUMNS = (
 )
 
 
+#: Ends of the names of the columns of an emitter, and what they hold.
+ENDS, DRIVE_KEYS = ("", "_coarse", "_fine"), ("drive", "coarse", "fine")
+
+
 def fixtures_csv(lighting: Lighting) -> str:
     """Return a table with a line for each fixture; undefined numbers are empty cells.
 
@@ -183,22 +229,27 @@ def fixtures_csv(lighting: Lighting) -> str:
     """
     text = io.StringIO()
     table = csv.writer(text, lineterminator="\n")
+    lamps = (light.lamp for light in lighting.lights if light.lamp is not None)
+    names = [*dict.fromkeys(name for lamp in lamps for name in lamp.names)]
+    columns = (*COLUMNS, *(plain_cell(f"drive_{name}{end}") for name in names for end in ENDS))
     if not lighting.animation:
-        table.writerows([COLUMNS, *map(_cells_of, fixtures_of(lighting))])
+        table.writerows([columns, *(_cells_of(x, names) for x in fixtures_of(lighting))])
         return text.getvalue()
-    table.writerow(("frame", *COLUMNS))
+    table.writerow(("frame", *columns))
     for frame, fixtures in _fixtures_by_frame(lighting).items():
-        table.writerows([[str(frame), *_cells_of(fixture)] for fixture in fixtures])
+        table.writerows([[str(frame), *_cells_of(x, names)] for x in fixtures])
     return text.getvalue()
 
 
-def _cells_of(fixture: Fixture) -> list[str]:
-    """Return the cells of a fixture's line."""
+def _cells_of(fixture: Fixture, emitters: Sequence[str]) -> list[str]:
+    """Return the cells of a fixture's line. emitters: names of those of all fixtures."""
     record = asdict(fixture)
+    by_name = {x["name"]: x for x in record.pop("drives")}
+    drives = [by_name.get(name, {}).get(key) for name in emitters for key in DRIVE_KEYS]
     dmx_values = record.pop("dmx") or dict.fromkeys(("dimmer", "red", "green", "blue"))
     place = record.pop("place") or asdict(FixturePlace())
     record["emitters"] = " ".join(fixture.emitters)
-    return [_cell(x) for x in (*record.values(), *dmx_values.values(), *place.values())]
+    return [_cell(x) for x in (*record.values(), *dmx_values.values(), *place.values(), *drives)]
 
 
 def fixtures_json(lighting: Lighting) -> str:

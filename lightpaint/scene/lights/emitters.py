@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 
 from lightpaint.arrays import RGB
+from lightpaint.colour.color import luminance
 from lightpaint.colour.photometry import lambertian_flux, point_flux, spot_flux
 from lightpaint.errors import SceneError
 from lightpaint.scene.lights.texels.texel import Texel
@@ -65,6 +66,11 @@ class Emitter:
 
     def __repr__(self) -> str:
         return f"Emitter({self.name!r}, {self.plugin} {self.form})"
+
+    @property
+    def is_outside_gamut(self) -> bool:
+        """True if its colour is outside Rec.709, as those of LEDs are: some channel is negative."""
+        return min(self.emission) < 0 < float(luminance(np.array(self.emission)))
 
     @property
     def hit_by_chance(self) -> bool:

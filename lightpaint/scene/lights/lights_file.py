@@ -21,7 +21,10 @@ from lightpaint.validation import MAX_LISTED, MAX_NAME
 
 SUFFIX = ".lights.toml"
 #: Keys of constraints for the solve.
-CONSTRAINTS = ("light", "tie", "prefer_current", "sparse", "start", "near")
+CONSTRAINTS = (
+    *("light", "tie", "prefer_current", "sparse", "start", "near"),
+    *("cd_per_unit", "prefer_emitters"),
+)
 #: Older key for `prefer_current`, as in `prefer = { current = 0.01 }`.
 OLDER = ("prefer",)
 #: Keys of permitted moves, and those of a light in `[light.NAME]`.
@@ -66,6 +69,15 @@ class SceneRequests:
             for name, table in tables
             if isinstance(table, dict) and SPLIT in table
         }
+
+    @property
+    def lamps(self) -> tuple[str, ...]:
+        """Names and patterns of the lights whose emitters it lists."""
+        lights = self.keys.get("light")
+        tables = lights.items() if isinstance(lights, dict) else ()
+        return tuple(
+            name for name, table in tables if isinstance(table, dict) and "emitters" in table
+        )
 
     @property
     def symmetric(self) -> frozenset[str]:

@@ -1,0 +1,234 @@
+"""Lamps that mix their light from emitters, and the drives with which they mix a colour.
+
+A stage light has four to eight kinds of LEDs, its emitters, each of which dims from 0 to 1, its
+drive. Its emission is Σ dⱼ eⱼ. More than three emitters can mix most colours in many ways; a
+preference chooses one of these, so that the emission stays the same (docs/method.md).
+"""
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+from functools import cached_property, lru_cache
+from itertools import combinations, product
+from typing import Literal
+
+import numpy as np
+
+from lightpaint.arrays import RGB, Bools, Doubles, Indices
+from lightpaint.colour.color import cct_and_duv, luminance
+
+#: What a lamp saves, or uses most, among the drives that mix the same colour.
+Preference = Literal["watts", "white", "fewest"]
+
+#: Most emitters of a lamp: the mixes that are compared grow exponentially with their number.
+MAX_EMITTERS = 10
+
+#: Round-off of drives, relative to their range, and of a determinant relative to its columns.
+ROUND_OFF, SINGULAR = 1e-7, 1e-6
+
+#: Weight of the power among mixes that a preference for something else leaves equal.
+SECOND = 1e-6
+
+
+@dataclass(frozen=True)
+class LampEmitter:
+    """Light sources of one colour in a lamp, which dim together.
+
+    emission: linear Rec.709 at full, in the unit of the light; channels may be negative, since LEDs
+    lie outside Rec.709. most: the largest drive, at most 1. bits: of the channel that sets it.
+    watts: power at full, if known.
+    """
+
+    name: str
+    emission: RGB
+    most: float = 1.0
+    bits: int = 8
+    watts: float | None = None
+
+    def level(self, drive: float) -> int:
+        """Return the level of its channel for a drive."""
+        highest: int = 2**self.bits - 1
+        return round(drive * highest)
+
+
+@dataclass(frozen=True)
+class Lamp:
+    """A lamp of several emitters.
+
+    power_share: the largest power of all emitters together, relative to that of all at full; of
+    emitters of unknown power, the sum of their drives relative to their number.
+    prefer: what to save, or use most, among mixes of the same colour.
+    """
+
+    emitters: tuple[LampEmitter, ...]
+    power_share: float | None = None
+    prefer: Preference = "watts"
+
+    @cached_property
+    def names(self) -> tuple[str, ...]:
+        """The names of its emitters."""
+        return tuple(x.name for x in self.emitters)
+
+    @cached_property
+    def columns(self) -> Doubles:
+        """(e, 3), the emission of each emitter at full."""
+        return np.array([x.emission for x in self.emitters], np.float64)
+
+    @cached_property
+    def most(self) -> Doubles:
+        """(e,), the largest drive of each emitter."""
+        return np.array([x.most for x in self.emitters])
+
+    @cached_property
+    def powers(self) -> Doubles:
+        """(e,), the power of each emitter at full, relative to that of all."""
+        watts = [x.watts for x in self.emitters]
+        known = [w for w in watts if w is not None]
+        powers = np.array(known if len(known) == len(watts) else [1.0] * len(watts))
+        return np.asarray(powers / powers.sum())
+
+    def mix(self, drives: Doubles) -> Doubles:
+        """Return the emission (3,) for drives (e,)."""
+        return np.asarray(drives @ self.columns)
+
+    def drives_for(self, emission: Doubles) -> Doubles:
+        """Return the preferred drives (e,) that mix an emission (3,); of one that it cannot mix,
+        those of the nearest that it can.
+        """
+        mixes = _mixes_of(self)
+        drives = mixes.values(emission)
+        if not len(drives):
+            drives = mixes.values(self.mix(self._nearest_drives(emission)))
+        if not len(drives):  # round-off at a corner of what it can mix
+            return self._nearest_drives(emission)
+        return np.asarray(drives[np.argmin(self._costs(drives))])
+
+    def can_mix(self, emission: Doubles) -> bool:
+        """Return whether some drives mix an emission (3,)."""
+        return len(_mixes_of(self).values(emission)) > 0
+
+    def brightest(self, color: Doubles) -> float:
+        """Return the largest factor by which a colour (3,) can be mixed; 0 if it cannot be."""
+        from scipy.optimize import linprog
+
+        count = len(self.emitters)
+        size = np.abs(color).max()
+        equal = np.hstack([self.columns.T, -color[:, None]]) / size
+        bounds = [(0, x) for x in self.most] + [(0, None)]
+        limits = {}
+        if self.power_share is not None:
+            limits = {"A_ub": [[*self.powers, 0.0]], "b_ub": [self.power_share]}
+        found = linprog(
+            [0.0] * count + [-1.0], A_eq=equal, b_eq=np.zeros(3), bounds=bounds, **limits
+        )
+        return float(found.x[-1]) if found.success else 0.0
+
+    def drive_errors(self, drives: Doubles, errors: Sequence[float | None]) -> list[float | None]:
+        """Return the standard error of each drive for those of the emission's channels; None for a
+        drive at 0 or at its largest, which small errors do not move, and where they are unknown.
+        """
+        inside = (drives > ROUND_OFF) & (drives < self.most * (1 - ROUND_OFF))
+        unknown: list[float | None] = [None] * len(drives)
+        if not inside.any() or any(x is None for x in errors):
+            return unknown
+        spread = np.linalg.pinv(self.columns[inside].T) ** 2 @ np.square(np.array(errors, float))
+        for k, variance in zip(np.flatnonzero(inside), spread, strict=True):
+            unknown[k] = float(np.sqrt(variance))
+        return unknown
+
+    def _nearest_drives(self, emission: Doubles) -> Doubles:
+        """Return the drives of the nearest emission without its limit of power, dimmed into it."""
+        from scipy.optimize import lsq_linear
+
+        scale = np.abs(self.columns).max()
+        bounds = np.zeros(len(self.most)), self.most
+        found = lsq_linear(self.columns.T / scale, emission / scale, bounds, tol=1e-14).x
+        power = float(found @ self.powers)
+        if self.power_share is not None and power > self.power_share:
+            found *= self.power_share / power
+        return np.asarray(found)
+
+    def _costs(self, drives: Doubles) -> Doubles:
+        """Return what the preference counts against each of several mixes (k, e)."""
+        power = drives @ self.powers
+        if self.prefer == "fewest":
+            return np.asarray((drives > ROUND_OFF).sum(axis=1) + SECOND * power)
+        if self.prefer == "white" and self._whites.any():
+            bright = np.where(self._whites, luminance(self.columns), 0)
+            return np.asarray(SECOND * power - drives @ bright / bright.sum())
+        return np.asarray(power)
+
+    @cached_property
+    def _whites(self) -> Bools:
+        """(e,), the emitters whose colour is a white."""
+        return np.array([cct_and_duv(x) is not None for x in self.columns])
+
+
+@dataclass(frozen=True)
+class _Mixes:
+    """The corners of the drives that mix an emission, as functions of the emission.
+
+    A linear preference, and the fewest emitters, are at a corner: there as many drives as there are
+    equations are between their bounds, and each of the others is at one of its two.
+    basis: (3, r), of the emissions that can be mixed. slopes: (k, n, r); constants, (k, n): of the
+    drives, and of the unused power where there is a limit. most: (n,).
+    """
+
+    basis: Doubles
+    slopes: Doubles
+    constants: Doubles
+    most: Doubles
+    count: int
+
+    def values(self, emission: Doubles) -> Doubles:
+        """Return the corners (k, e) for an emission (3,); none if it cannot be mixed."""
+        inside = emission @ self.basis
+        outside = emission - self.basis @ inside
+        if np.abs(outside).max() > ROUND_OFF * np.abs(emission).max(initial=1e-300):
+            return np.zeros((0, self.count))
+        drives = self.slopes @ inside + self.constants
+        room = ROUND_OFF * self.most
+        fits = ((drives >= -room) & (drives <= self.most + room)).all(axis=1)
+        drives = drives[fits]
+        drives = np.where(drives < room, 0, np.where(drives > self.most - room, self.most, drives))
+        return np.asarray(drives[:, : self.count])
+
+
+@lru_cache(256)
+def _mixes_of(lamp: Lamp) -> _Mixes:
+    """Return the corners of a lamp, which those of the same kind share."""
+    U, sizes, _ = np.linalg.svd(lamp.columns.T, full_matrices=False)
+    basis = U[:, sizes > SINGULAR * sizes[0]]
+    equations, most, right = basis.T @ lamp.columns.T, lamp.most, np.zeros(basis.shape[1])
+    if lamp.power_share is not None:
+        # The power that is left is one more drive, without light.
+        equations = np.block(
+            [[equations, np.zeros((len(equations), 1))], [lamp.powers[None], np.ones((1, 1))]]
+        )
+        most, right = np.append(most, lamp.power_share), np.append(right, lamp.power_share)
+    corners = list(_corners(equations, most, right, basis.shape[1]))
+    slopes, constants = (np.array([x[k] for x in corners]) for k in range(2))
+    return _Mixes(basis, slopes, constants, most, len(lamp.emitters))
+
+
+def _corners(
+    equations: Doubles, most: Doubles, right: Doubles, rank: int
+) -> Iterator[tuple[Doubles, Doubles]]:
+    """Yield slopes (n, rank) and constants (n,) of all unknowns at each corner.
+
+    equations: (m, n), of which the first `rank` equal the emission and the others `right`.
+    """
+    rows, count = equations.shape
+    sizes = np.linalg.norm(equations, axis=0)
+    for inner in combinations(range(count), rows):
+        places: Indices = np.array(inner, dtype=np.intp)
+        square = equations[:, places]
+        if abs(np.linalg.det(square)) <= SINGULAR * np.prod(sizes[places]):
+            continue
+        inverse = np.linalg.inv(square)
+        others = np.setdiff1d(np.arange(count), places)
+        for is_full in product((False, True), repeat=len(others)):
+            constant, slope = np.zeros(count), np.zeros((count, rank))
+            constant[others] = np.where(is_full, most[others], 0)
+            constant[places] = inverse @ (right - equations @ constant)
+            slope[places] = inverse[:, :rank]
+            yield slope, constant

@@ -1,0 +1,214 @@
+"""Emitters of lamps as people write them in a lights file: colours, brightness, bounds."""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from itertools import pairwise
+from typing import Any, Literal
+
+import numpy as np
+
+from lightpaint.arrays import RGB, Doubles, as_rgb
+from lightpaint.basis.lights import BasisLight
+from lightpaint.colour.color import luminance
+from lightpaint.colour.lamp import MAX_EMITTERS, LampEmitter
+from lightpaint.colour.photometry import photometry
+from lightpaint.colour.primaries import REC709, colour_science, rgb_to_xyz
+from lightpaint.errors import ConstraintError
+from lightpaint.files import one_line
+from lightpaint.lighting.constraints.values import check_keys
+from lightpaint.sentences import Hint, SourceKey
+from lightpaint.validation import BRIGHTEST, MAX_NAME, is_number
+
+#: Keys of an emitter: of its colour, one of which it needs, and of its brightness at full.
+COLORS, AMOUNTS = ("xy", "rgb", "spectrum"), ("Y", "cd", "lm")
+EMITTER_KEYS = ("name", *COLORS, *AMOUNTS, "max", "bits", "watts")
+
+#: Bits of the channels of fixtures.
+BITS = (8, 16, 24)
+
+#: Wavelengths of a spectrum in nanometres, and the numbers of them.
+WAVELENGTHS, SPECTRUM_SIZES = (300.0, 1000.0), range(2, 1001)
+
+
+@dataclass(frozen=True)
+class EmitterRequest:
+    """An emitter of a lights file.
+
+    color: of luminance 1; channels may be negative. amount: at full, as `per` says: the luminance
+    of its emission in the unit of the light, candelas, or lumens.
+    """
+
+    name: str
+    color: RGB
+    amount: float
+    per: Literal["Y", "cd", "lm"]
+    most: float
+    bits: int
+    watts: float | None
+    where: SourceKey
+
+    def in_light(self, light: BasisLight, cd_per_unit: float | None) -> LampEmitter:
+        """Return the emitter with its emission in the unit of a light.
+
+        cd_per_unit: cd/m² of a radiance of 1. Raises ConstraintError if candelas or lumens say
+        nothing about this light.
+        """
+        level = self.amount
+        if self.per != "Y":
+            level /= self._amount_of_one(light, cd_per_unit)
+        emission = as_rgb(level * np.array(self.color))
+        return LampEmitter(self.name, emission, self.most, self.bits, self.watts)
+
+    def _amount_of_one(self, light: BasisLight, cd_per_unit: float | None) -> float:
+        """Return the candelas or lumens of an emission of luminance 1."""
+        if cd_per_unit is None:
+            raise ConstraintError(
+                self.where,
+                f" is in {self.per}, and nothing says how much light an emission of 1 is: add "
+                "cd_per_unit to the lights file, pass ",
+                Hint("cd_per_unit"),
+                ", or give Y in the scene's unit",
+            )
+        white = photometry(
+            (1, 1, 1), unit=light.unit, unit_flux=light.unit_flux, cd_per_unit=cd_per_unit
+        )
+        found = white.flux_lm
+        if self.per == "cd":
+            # A panel's intensity straight ahead is that of its flux by Lambert's law.
+            lambert = None if white.flux_lm is None else white.flux_lm / np.pi
+            found = {"cd": white.luminous, "cd/m²": lambert}.get(white.luminous_unit)
+        if not found:
+            raise ConstraintError(
+                self.where,
+                f" is in {self.per}, which {light.name!r}, a {light.plugin}, does not have: give "
+                "Y, the luminance of its emission at full",
+            )
+        return float(found)
+
+
+def parse_emitters(table: Mapping[str, Any], light: SourceKey) -> tuple[EmitterRequest, ...]:
+    """Return the emitters of a light, none if its table has none. Raises ConstraintError."""
+    if "emitters" not in table:
+        return ()
+    value, where = table["emitters"], light / "emitters"
+    is_list = isinstance(value, Sequence) and not isinstance(value, str)
+    if not is_list or not value or not all(isinstance(x, Mapping) for x in value):
+        raise ConstraintError(
+            where,
+            f" is {one_line(repr(value))}: expected a list of emitters, "
+            '[{name = "red", xy = [0.69, 0.31], cd = 900}]',
+        )
+    if len(value) > MAX_EMITTERS:
+        raise ConstraintError(
+            where, f" lists {len(value)} emitters: at most {MAX_EMITTERS} can be mixed"
+        )
+    emitters = tuple(_parse_emitter(x, where / str(k + 1)) for k, x in enumerate(value))
+    names = [x.name for x in emitters]
+    if repeated := [name for name in names if names.count(name) > 1]:
+        raise ConstraintError(
+            where, f" has two emitters named {repeated[0]!r}: give each a name of its own"
+        )
+    return emitters
+
+
+def _parse_emitter(table: Mapping[str, Any], where: SourceKey) -> EmitterRequest:
+    check_keys(table, EMITTER_KEYS, where)
+    name = table.get("name")
+    if not isinstance(name, str) or not 0 < len(name.strip()) <= MAX_NAME:
+        raise ConstraintError(where / "name", f' is {one_line(repr(name))}: expected "red"')
+    color_keys = [key for key in COLORS if key in table]
+    if len(color_keys) != 1:
+        found = " and ".join(color_keys) or "no colour"
+        raise ConstraintError(where, f" has {found}: expected one of {', '.join(COLORS)}")
+    amounts = [key for key in AMOUNTS if key in table]
+    if len(amounts) > 1:
+        raise ConstraintError(where, f" has {' and '.join(amounts)}: expected one of them")
+    color = _parse_color(color_keys[0], table[color_keys[0]], where / color_keys[0])
+    size = float(luminance(color))
+    if not amounts and color_keys[0] != "rgb":
+        raise ConstraintError(
+            where,
+            " does not say how bright it is at full: add cd, lm, or Y, the luminance of its "
+            "emission in the scene's unit",
+        )
+    per: Any = amounts[0] if amounts else "Y"
+    amount = _positive(table, per, where) if amounts else size
+    bits = table.get("bits", 8)
+    if type(bits) is not int or bits not in BITS:
+        raise ConstraintError(where / "bits", f" is {bits!r}: expected 8, 16 or 24")
+    most = _positive(table, "max", where, most=1.0) if "max" in table else 1.0
+    watts = _positive(table, "watts", where) if "watts" in table else None
+    return EmitterRequest(name.strip(), as_rgb(color / size), amount, per, most, bits, watts, where)
+
+
+def _positive(
+    table: Mapping[str, Any], key: str, where: SourceKey, *, most: float = BRIGHTEST
+) -> float:
+    value = table[key]
+    if not (is_number(value) and 0 < value <= most):
+        limit = f", at most {most:g}" if most < BRIGHTEST else ""
+        raise ConstraintError(where / key, f" is {one_line(repr(value))}: expected > 0{limit}")
+    return float(value)
+
+
+def _parse_color(key: str, value: Any, where: SourceKey) -> Doubles:
+    """Return the linear Rec.709 colour (3,) of an emitter, with a luminance > 0."""
+    numbers = value if isinstance(value, Sequence) and not isinstance(value, str) else []
+    if key == "spectrum":
+        return _of_spectrum(value, where)
+    count = 2 if key == "xy" else 3
+    if len(numbers) != count or not all(is_number(x) and abs(x) <= BRIGHTEST for x in numbers):
+        expected = "x and y of CIE 1931, [0.69, 0.31]" if key == "xy" else "three numbers"
+        raise ConstraintError(where, f" is {one_line(repr(value))}: expected {expected}")
+    if key == "xy":
+        x, y = map(float, numbers)
+        if not (0 <= x <= 1 and 0 < y <= 1 and x + y <= 1):
+            raise ConstraintError(where, f" is {list(numbers)}: no colour has this x and y")
+        return _of_xyz(np.array([x / y, 1, (1 - x - y) / y]))
+    color = np.array(numbers, np.float64)
+    if luminance(color) <= 0:
+        raise ConstraintError(
+            where, f" is {list(numbers)}, whose luminance is not above 0: no light has this colour"
+        )
+    return color
+
+
+def _of_xyz(xyz: Doubles) -> Doubles:
+    return np.asarray(np.linalg.solve(rgb_to_xyz(REC709), xyz))
+
+
+def _of_spectrum(value: Any, where: SourceKey) -> Doubles:
+    """Return the colour of a spectrum, pairs of nanometres and power, under the CIE's standard
+    observer of 1931.
+    """
+    is_list = isinstance(value, Sequence) and not isinstance(value, str)
+    pairs = [
+        (float(pair[0]), float(pair[1]))
+        for pair in (value if is_list else [])
+        if isinstance(pair, Sequence) and len(pair) == 2 and all(map(is_number, pair))
+    ]
+    low, high = WAVELENGTHS
+    waves = [wave for wave, _ in pairs]
+    if (
+        not is_list
+        or len(pairs) != len(value)
+        or len(pairs) not in SPECTRUM_SIZES
+        or any(b <= a for a, b in pairwise(waves))
+        or not low <= waves[0] <= waves[-1] <= high
+        or not all(0 <= power <= BRIGHTEST for _, power in pairs)
+    ):
+        raise ConstraintError(
+            where,
+            f" is not a spectrum: expected pairs of nanometres, rising from {low:g} to {high:g}, "
+            "and power, [[620, 0.1], [632, 1], [644, 0.1]]",
+        )
+    science = colour_science()
+    # Between its pairs a spectrum is straight, and dark beyond them.
+    grid = np.arange(360, 831)
+    powers = np.interp(grid, waves, [power for _, power in pairs], left=0, right=0)
+    observer = science.MSDS_CMFS["CIE 1931 2 Degree Standard Observer"].copy()
+    matching = observer.align(science.SpectralShape(360, 830, 1)).values
+    xyz = powers @ matching
+    if not xyz[1] > 0:
+        raise ConstraintError(where, " has no power that eyes see: leave this emitter out")
+    return _of_xyz(xyz / xyz[1])

@@ -1,0 +1,268 @@
+"""Lights that mix their colour from emitters: solve, file and errors."""
+
+import json
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+import pytest
+from least_squares import stack_rows
+from nightly import seeds
+from scipy.optimize import lsq_linear
+
+from lightpaint.errors import ConstraintError, LightingError
+from lightpaint.lighting.analysis.analysis import analyse
+from lightpaint.lighting.answer.lighting_file import read_lighting, write_lighting
+from lightpaint.lighting.constraints.constraints import Constraints
+from lightpaint.lighting.constraints.constraints_file import read_constraints
+from lightpaint.lighting.solve import solve
+from lightpaint.target.target import Target
+
+SIZE = (5, 4)
+
+#: Chromaticities of CIE 1931 of usual LEDs.
+RED, GREEN, BLUE = [0.7, 0.299], [0.17, 0.7], [0.135, 0.055]
+WHITE, AMBER, LIME = [0.33, 0.34], [0.57, 0.42], [0.41, 0.55]
+
+RGBW = [
+    {"name": name, "xy": xy, "Y": level, "watts": 12}
+    for name, xy, level in (
+        ("red", RED, 1.9),
+        ("green", GREEN, 3.8),
+        ("blue", BLUE, 0.8),
+        ("white", WHITE, 5.1),
+    )
+]
+SIX = [*RGBW, {"name": "amber", "xy": AMBER, "Y": 2.5}, {"name": "lime", "xy": LIME, "Y": 5.0}]
+
+#: Float64 of this condition, and the oracle's own tolerance.
+SAME = 1e-8
+
+
+def _case(make_basis: Any, seed: int, **lights: Any) -> Any:
+    basis = make_basis(len(lights), SIZE, seed=seed, names=[*lights])
+    rng = np.random.default_rng(seed)
+    image = (rng.random((*SIZE, 3)) * rng.uniform(0.5, 6)).astype(np.float32)
+    target = Target("t", image, rng.random(SIZE).astype(np.float32), everything=False)
+    return basis, target, Constraints.of(lights)
+
+
+@pytest.mark.parametrize("seed", list(seeds(6, 40)))
+def test_the_answer_is_the_bounded_least_squares_of_scipy(make_basis, seed):
+    lights = {"par": {"emitters": RGBW}, "wash": {"emitters": SIX}, "other": {}}
+    basis, target, constraints = _case(make_basis, seed, **lights)
+    solution = solve(basis, target, constraints=constraints, literal=True)
+    assert solution.certificate.converged
+    A, y = stack_rows(basis, target)
+    lamps = solution.problem.reduction.lamps
+    C = np.zeros((9, 13))
+    C[:3, :4], C[3:6, 4:10] = lamps[0].columns.T, lamps[1].columns.T
+    C[6:, 10:] = np.eye(3)
+    bounds = np.zeros(13), np.r_[np.ones(10), np.full(3, np.inf)]
+    best = lsq_linear(A @ C, y, bounds, method="bvls", tol=1e-14)
+    w = solution.weights.ravel()
+    assert ((A @ w - y) ** 2).sum() == pytest.approx(2 * best.cost, rel=SAME, abs=SAME)
+    for k, light in enumerate(solution.lighting.lights[:2]):
+        drives = np.array([*light.drives.values()])
+        assert ((drives >= 0) & (drives <= 1)).all()
+        assert np.allclose(lamps[k].mix(drives), light.emission, atol=1e-5)
+
+
+def test_a_green_outside_rec709_is_answered_with_negative_red(make_basis):
+    basis, target, constraints = _case(make_basis, 3, par={"emitters": RGBW})
+    first = solve(basis, target, constraints=constraints, literal=True)
+    emission = first.problem.reduction.lamps[0].mix(np.array([0.0, 0.8, 0.1, 0.0]))
+    assert emission[0] < 0
+    # A painting has no negative light.
+    green = replace(target, image=np.maximum(basis.mix(emission[None]), 0).astype(np.float32))
+    solution = solve(basis, green, constraints=constraints, literal=True)
+    [light] = solution.lighting.lights
+    assert light.emission[0] < 0
+    objective = solution.problem.objective
+    assert objective(solution.weights).sum() <= objective(emission[None]).sum() * (1 + SAME)
+
+
+def test_the_share_of_power_bounds_the_sum(make_basis):
+    limited = {"par": {"emitters": RGBW, "power_share": 0.3}}
+    basis, target, constraints = _case(make_basis, 1, **limited)
+    bright = replace(target, image=target.image * 50)
+    [light] = solve(basis, bright, constraints=constraints, literal=True).lighting.lights
+    assert sum(light.drives.values()) / 4 == pytest.approx(0.3, abs=1e-6)
+    assert light.is_active
+
+
+def test_a_largest_drive_and_a_limit_of_luminance_hold(make_basis):
+    emitters = [{**x, "max": 0.5} for x in RGBW]
+    basis, target, constraints = _case(make_basis, 1, par={"emitters": emitters})
+    bright = replace(target, image=target.image * 50)
+    [light] = solve(basis, bright, constraints=constraints, literal=True).lighting.lights
+    assert max(light.drives.values()) == pytest.approx(0.5)
+    dimmed = constraints.and_then(Constraints.of({"par": {"limits": {"max": 1.0}}}))
+    solution = solve(basis, bright, constraints=dimmed, literal=True)
+    assert solution.lighting.photometry(solution.lighting["par"]).y == pytest.approx(1.0)
+
+
+def test_a_colour_is_mixed_as_bright_as_the_emitters_can(make_basis):
+    basis, target, constraints = _case(make_basis, 1, par={"emitters": RGBW, "color": "3200K"})
+    bright = replace(target, image=target.image * 50)
+    [light] = solve(basis, bright, constraints=constraints, literal=True).lighting.lights
+    assert light.lamp is not None
+    assert max(light.drives.values()) == pytest.approx(1)
+    assert np.allclose(light.lamp.mix(np.array([*light.drives.values()])), light.emission)
+
+
+def test_preferences_change_the_drives_and_not_the_picture(make_basis):
+    basis, target, constraints = _case(make_basis, 2, wash={"emitters": SIX})
+    answers = {
+        prefer: solve(
+            basis,
+            target,
+            constraints=constraints.and_then(Constraints.of(prefer_emitters=prefer)),
+            literal=True,
+        ).lighting["wash"]
+        for prefer in ("watts", "white", "fewest")
+    }
+    emissions = {light.emission for light in answers.values()}
+    assert len(emissions) == 1
+    count = {key: sum(x > 0 for x in light.drives.values()) for key, light in answers.items()}
+    assert count["fewest"] <= min(count.values())
+    assert answers["white"].drives["white"] >= answers["watts"].drives["white"] - 1e-9
+
+
+def test_candelas_and_lumens_are_of_the_scale(make_basis):
+    basis = make_basis(1, SIZE, names=["par"])
+    spot = replace(basis.lights[0], plugin="spot", unit="W/sr", unit_flux=(0.5, 0.5, 0.5))
+    basis = replace(basis, lights=(spot,))
+    target = Target(
+        "t", np.ones((*SIZE, 3), np.float32), np.ones(SIZE, np.float32), everything=True
+    )
+    for amount, level in (({"cd": 2000}, 2.0), ({"lm": 2000}, 4.0), ({"Y": 3.0}, 3.0)):
+        emitters = [{"name": "white", "xy": WHITE, **amount}]
+        constraints = Constraints.of({"par": {"emitters": emitters}}, cd_per_unit=1000)
+        lamp = solve(basis, target, constraints=constraints).problem.reduction.lamps[0]
+        assert lamp.columns @ [0.2126, 0.7152, 0.0722] == pytest.approx([level], rel=1e-3)
+
+
+def test_a_narrow_spectrum_has_the_colour_of_its_wavelength(make_basis):
+    emitters = [{"name": "laser", "spectrum": [[519, 0], [520, 1], [521, 0]], "Y": 1}]
+    basis, target, constraints = _case(make_basis, 1, par={"emitters": emitters})
+    rgb = solve(basis, target, constraints=constraints).problem.reduction.lamps[0].columns[0]
+    xyz = (
+        np.array(
+            [
+                [0.41239080, 0.35758434, 0.18048079],
+                [0.21263901, 0.71516868, 0.07219232],
+                [0.01933082, 0.11919478, 0.95053215],
+            ]
+        )
+        @ rgb
+    )
+    # CIE 1931 at 520 nm (CIE 15): x 0.0743, y 0.8338.
+    assert xyz[:2] / xyz.sum() == pytest.approx([0.0743, 0.8338], abs=2e-3)
+
+
+def test_drives_are_in_the_file_and_return(make_basis, tmp_path):
+    basis, target, constraints = _case(make_basis, 4, par={"emitters": RGBW}, other={})
+    lighting = analyse(solve(basis, target, constraints=constraints))[0].solution.lighting
+    write_lighting(tmp_path / "a.json", lighting)
+    data = json.loads((tmp_path / "a.json").read_text())["lights"]
+    assert data["par"]["drives"] == lighting["par"].drives
+    assert "drives" not in data["other"]
+    assert read_lighting(tmp_path / "a.json").lights == lighting.lights
+
+
+def test_only_lamps_may_be_negative_in_a_file(make_basis, tmp_path):
+    basis, target, constraints = _case(make_basis, 4, par={"emitters": RGBW})
+    write_lighting(tmp_path / "a.json", solve(basis, target, constraints=constraints).lighting)
+    data = json.loads((tmp_path / "a.json").read_text())
+    data["lights"]["par"] |= {"emission": [-0.1, 1, 0], "weight": [-0.1, 1, 0]}
+    (tmp_path / "b.json").write_text(json.dumps(data))
+    assert read_lighting(tmp_path / "b.json").emission["par"] == (-0.1, 1, 0)
+    del data["lights"]["par"]["emitters"]
+    (tmp_path / "c.json").write_text(json.dumps(data))
+    with pytest.raises(LightingError, match=r"emission \[-0.1, 1.0, 0.0\]: need three numbers"):
+        read_lighting(tmp_path / "c.json")
+
+
+def test_a_lights_file_describes_emitters(tmp_path):
+    path = tmp_path / "hall.lights.toml"
+    path.write_text(
+        'cd_per_unit = 1000\nprefer_emitters = "white"\n[light."par *"]\npower_share = 0.6\n'
+        'emitters = [{name = "red", xy = [0.7, 0.299], cd = 900, bits = 16, max = 0.9}]\n'
+    )
+    constraints = read_constraints(path)
+    assert constraints.cd_per_unit == 1000
+    assert constraints.prefer_emitters == "white"
+    assert "60% of full power" in repr(constraints)
+
+
+WRONG = {
+    "no list": ({"emitters": "red"}, "expected a list of emitters"),
+    "no colour": ({"emitters": [{"name": "a", "cd": 1}]}, "no colour: expected one of xy, rgb"),
+    "two colours": (
+        {"emitters": [{"name": "a", "xy": RED, "rgb": [1, 1, 1]}]},
+        "xy and rgb: expected one of",
+    ),
+    "no brightness": ({"emitters": [{"name": "a", "xy": RED}]}, "how bright it is at full"),
+    "two amounts": ({"emitters": [{"name": "a", "xy": RED, "cd": 1, "lm": 1}]}, "cd and lm"),
+    "no colour of this xy": ({"emitters": [{"name": "a", "xy": [0.9, 0.9], "cd": 1}]}, "no colour"),
+    "dark": ({"emitters": [{"name": "a", "rgb": [-1, 0, 0]}]}, "luminance is not above 0"),
+    "bits": ({"emitters": [{**RGBW[0], "bits": 12}]}, "expected 8, 16 or 24"),
+    "max": ({"emitters": [{**RGBW[0], "max": 1.5}]}, "expected > 0, at most 1"),
+    "a name twice": ({"emitters": [RGBW[0], RGBW[0]]}, "two emitters named 'red'"),
+    "no name": ({"emitters": [{"xy": RED, "cd": 1}]}, 'expected "red"'),
+    "unknown": ({"emitters": [{**RGBW[0], "nm": 630}]}, "has the key 'nm'"),
+    "too many": (
+        {"emitters": [{**RGBW[0], "name": str(k)} for k in range(11)]},
+        "at most 10 can be mixed",
+    ),
+    "spectrum": (
+        {"emitters": [{"name": "a", "spectrum": [[600, 1], [500, 1]], "Y": 1}]},
+        "is not a spectrum",
+    ),
+    "infrared": (
+        {"emitters": [{"name": "a", "spectrum": [[900, 1], [950, 1]], "Y": 1}]},
+        "no power that eyes see",
+    ),
+    "primaries": ({"emitters": RGBW, "primaries": ["#f00", "#00f"]}, "emitters and 'primaries'"),
+    "a range of white": ({"emitters": RGBW, "kelvin": [2700, 6500]}, "emitters and 'kelvin'"),
+    "a share of nothing": ({"power_share": 0.5}, "without the emitters that share it"),
+    "share": ({"emitters": RGBW, "power_share": 2}, "expected a share of full power"),
+    "both limits": (
+        {"emitters": RGBW, "power_share": 0.5, "limits": {"max": 1}},
+        "limits and power_share: give one",
+    ),
+}
+
+
+@pytest.mark.parametrize("case", WRONG)
+def test_mistakes_are_named(case):
+    table, message = WRONG[case]
+    with pytest.raises(ConstraintError, match=message) as error:
+        Constraints.of({"par": table})
+    assert "\n" not in str(error.value)
+
+
+IMPOSSIBLE = {
+    "candelas without a scale": ({"emitters": [{"name": "a", "xy": RED, "cd": 9}]}, "is in cd"),
+    "a colour it cannot mix": (
+        {"emitters": RGBW[3:], "color": "#0000ff"},
+        "its emitters white cannot mix",
+    ),
+    "a lock it cannot mix": (
+        {"emitters": RGBW, "lock": "#ffffff 900"},
+        "emitters red, green, blue, white cannot mix",
+    ),
+    "limits by channel": (
+        {"emitters": RGBW, "limits": {"max": [1, 1, 1]}},
+        "for a light that mixes emitters",
+    ),
+}
+
+
+@pytest.mark.parametrize("case", IMPOSSIBLE)
+def test_what_a_lamp_cannot_do_is_one_line(make_basis, case):
+    table, message = IMPOSSIBLE[case]
+    basis, target, constraints = _case(make_basis, 1, par=table)
+    with pytest.raises(ConstraintError, match=message):
+        solve(basis, target, constraints=constraints)
