@@ -17,6 +17,8 @@ GUIDES = {
     "paint": "painter",
     "batch": "batch",
     "export": "formats",
+    "send": "console",
+    "listen": "console",
     "blender": "blender",
     "relight": "solving",
     "verify": "solving",

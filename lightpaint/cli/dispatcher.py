@@ -24,7 +24,9 @@ _MODULES = {
     "cache": "maintenance",
     "doctor": "maintenance",
     "export": "program_commands",
+    "listen": "console_commands",
     "paint": "paint_command",
+    "send": "console_commands",
     "solve": "solve_command",
 }
 
@@ -143,6 +145,8 @@ ENDINGS = {
     "masks": (".exr", ".png", ".tif", ".tiff", ".jpg", ".jpeg"),
     "lightings": (".json",),
     "lights_file": (".toml",),
+    "lighting": (".json",),
+    "rig": (".mvr",),
 }
 
 

@@ -77,6 +77,7 @@ class ConsoleLink:
         self._frame_began_s = -math.inf
         self._levels: dict[int, bytes] = {}
         self._trouble: str | None = None
+        self._has_sent = False
         self._thread = Thread(target=self._run, name="lightpaint-console", daemon=True)
         self._thread.start()
 
@@ -124,6 +125,11 @@ class ConsoleLink:
     def trouble(self) -> str | None:
         """The network's last refusal, in a sentence; None while packets leave."""
         return self._trouble
+
+    @property
+    def has_sent(self) -> bool:
+        """True once a packet has left."""
+        return self._has_sent
 
     @property
     def is_settled(self) -> bool:
@@ -233,7 +239,7 @@ class ConsoleLink:
             # The cable may be back before the next frame.
             self._trouble = f"cannot send to {self.target}: {error.strerror or error}"
         else:
-            self._trouble = None
+            self._trouble, self._has_sent = None, True
 
 
 def check_library(protocol: DmxProtocol) -> None:

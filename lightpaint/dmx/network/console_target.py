@@ -1,4 +1,4 @@
-"""Where levels go, `sacn://127.0.0.1` or `artnet://broadcast`, and in which universes."""
+"""Targets of levels, `sacn://127.0.0.1` or `artnet://broadcast`, and their universes."""
 
 import socket
 from collections.abc import Mapping

@@ -30,8 +30,9 @@ class Cue:
 def cue_list_csv(rig: ConsoleRig, cues: Sequence[Cue]) -> str:
     """Return a table of cues, counted from 1, with all channels that give light.
 
-    fixture: its id, or its name if it has none. channel: its attribute, after its geometry where a
-    fixture has several. value: 0 to 65535. Raises RigError for drives that do not fit the rig.
+    A fixture goes by its id, or by its name if it has none; a channel by its attribute, after its
+    geometry where a fixture has several. Values are 0 to 65535, whatever bytes a channel has.
+    Raises RigError for drives that do not fit the rig.
     """
     text = io.StringIO()
     table = csv.writer(text, lineterminator="\n")
