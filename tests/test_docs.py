@@ -145,6 +145,8 @@ DEFAULTS = {
     "--port": f"{DEFAULT_PORT}, or any free one if that is taken",
     "--exposure": "0",
     "--space": "8 or 16 bits",
+    "--priority": f"{PRIORITY}, below the {USUAL_PRIORITY} of consoles, which win",
+    "--interface": f"{LOOPBACK}, for programs of this machine",
     "--task-limit": f"{LIMIT_FACTOR:g} times what it is expected to take, at least {MIN_LIMIT_S:g}",
 }
 

@@ -31,7 +31,7 @@ class RigFile:
 
 @dataclass(frozen=True)
 class Sending:
-    """Where to send, and how.
+    """A target, how to send to it, and until when.
 
     target: None to send nothing. universes: of the network by those of the rig, for some.
     priority: None for that of the link.
@@ -102,7 +102,7 @@ def add_send(parser: argparse.ArgumentParser) -> None:
         type=arguments.at_least(0, maximum=200),
         metavar="N",
         help="priority of sACN, of which receivers take the highest (default: 90, below the 100 of "
-        "consoles, so that these win)",
+        "consoles, which win)",
     )
     parser.add_argument(
         "--fps",
@@ -175,7 +175,7 @@ def add_listen(parser: argparse.ArgumentParser) -> None:
         "--port",
         type=arguments.at_least(1, maximum=65535),
         metavar="N",
-        help="port to listen at (default: 5568 for sACN, 6454 for Art-Net)",
+        help="port to listen at (default: that of the protocol)",
     )
     _add_interface(
         parser,
@@ -199,7 +199,7 @@ def _add_universes(parser: argparse.ArgumentParser) -> None:
         default=[],
         metavar="1:5,...",
         help="universe 1 of the rig is universe 5 of the network; may be repeated (default: the "
-        "same number; for Art-Net, which counts from 0, one less)",
+        "same number; of Art-Net one less)",
     )
 
 

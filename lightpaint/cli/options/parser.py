@@ -227,7 +227,7 @@ def _export(parser: argparse.ArgumentParser) -> None:
         "(default: new prims below /lights)",
     )
     add_rig(parser, required=False, purpose="for cues: ")
-    add_fade(parser, "for cues: the time of each (default: 0)")
+    add_fade(parser, "for cues: the time of each (default: none)")
     add_map_size(parser)
     add_view(parser)
     add_output(parser, "DIR", "folder for the files (default: that of lighting.json)")
