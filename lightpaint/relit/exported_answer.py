@@ -20,7 +20,7 @@ from lightpaint.errors import LightpaintError
 from lightpaint.lighting.answer.lighting import Lighting
 from lightpaint.progress import Listener
 from lightpaint.relit.emission_xml import safe_name
-from lightpaint.relit.export.nuke import RigKind, RigLight
+from lightpaint.relit.export.nuke import NukeLight, RigKind
 from lightpaint.relit.export.program_axes import SkyMap, lat_long, map_axes, map_size_for
 from lightpaint.relit.relight import scene_of
 from lightpaint.relit.relit_files import enlarged, images_of_texels, settings_of
@@ -71,7 +71,7 @@ def _quantity(emitter: Emitter, rgb: RGB) -> tuple[str, RGB]:
     return "intensity", (r, g, b)
 
 
-def rig_lights(scene: Scene, lighting: Lighting) -> tuple[list[RigLight], list[str]]:
+def rig_lights(scene: Scene, lighting: Lighting) -> tuple[list[NukeLight], list[str]]:
     """Return points, spots, suns and panels as in `lighting`, and the names of other emitters.
 
     Lights that stay as they are belong to them; skies, meshes, projectors, and lights that are
@@ -93,7 +93,7 @@ def rig_lights(scene: Scene, lighting: Lighting) -> tuple[list[RigLight], list[s
             kelvin = photometry(rgb, unit=emitter.kind.unit).kelvin if is_known else None
             place = places.get(emitter.name)
             rig.append(
-                RigLight(
+                NukeLight(
                     emitter.name,
                     KINDS[emitter.plugin],
                     _intensity(emitter, rgb),
