@@ -150,9 +150,11 @@ class ConsoleRig:
         places = fixture.places(channel)
         first = fixture.addresses[channel.dmx_break]
         if places and any(universe != 1 + (first - 1) // UNIVERSE_SIZE for universe, _ in places):
+            own = [x for x in fixture.channels if x.dmx_break == channel.dmx_break]
+            last = max(offset for x in own for offset in x.offsets)
             raise RigError(
                 f"{self.name}: {fixture.name!r} at {address_text(first)} needs channel "
-                f"{(first - 1) % UNIVERSE_SIZE + max(channel.offsets)} of its universe, which has "
+                f"{(first - 1) % UNIVERSE_SIZE + last} of its universe, which has "
                 f"{UNIVERSE_SIZE}: give it a lower address"
             )
         for universe, index in places:

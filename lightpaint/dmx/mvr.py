@@ -5,7 +5,7 @@ Lengths become metres; z is up, as in the file.
 
 import re
 from collections.abc import Collection, Iterator, Mapping, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, replace
 from itertools import chain, count, islice
 from pathlib import Path
 from typing import Any
@@ -15,7 +15,7 @@ import numpy as np
 
 from lightpaint.arrays import Doubles, Position
 from lightpaint.display_text import some_names
-from lightpaint.dmx.console_rig import ConsoleRig, DmxChannel, RigFixture, RigLight
+from lightpaint.dmx.console_rig import ConsoleRig, RigFixture, RigLight
 from lightpaint.dmx.gdtf.fixture_type import FixtureType
 from lightpaint.dmx.gdtf.mode_lights import FixtureMode, ModeLight
 from lightpaint.dmx.rig_archive import RigArchive, library, reading
@@ -48,11 +48,29 @@ _UNUSUAL = re.compile(r"[^\w \-+()#'&/:;!]")
 
 @dataclass(frozen=True)
 class ShowNode:
-    """An element of a show in its place. matrix: to the world, (4, 4), columns, metres."""
+    """An element of a show in its place.
+
+    matrix: to the world, (4, 4), column vectors, metres. parent: the same of what it hangs on.
+    siblings: the list that it is in.
+    """
 
     element: Element
     matrix: Doubles
     parent: Doubles
+    siblings: Element
+
+
+@dataclass(frozen=True)
+class NamedFixture:
+    """A fixture with an address, and the name of its light, which those of its pixels begin with.
+
+    data: as pymvr reads it. addresses: absolute ones, by the file's breaks.
+    """
+
+    name: str
+    node: ShowNode
+    data: Any
+    addresses: Mapping[int, int]
 
 
 @dataclass(frozen=True)
@@ -82,13 +100,11 @@ class KindSummary:
 class Show:
     """The content of an MVR.
 
-    nodes: the element of each fixture of the rig, in the same order. models: of the room. remarks:
-    on what was left.
+    kinds: its types and modes. models: of the room. remarks: on what was left.
     """
 
     rig: ConsoleRig
     kinds: tuple[KindSummary, ...]
-    nodes: tuple[ShowNode, ...] = field(repr=False)
     models: tuple[PlacedModel, ...] = ()
     remarks: tuple[str, ...] = ()
 
@@ -129,7 +145,7 @@ def read_show(
     with RigArchive(path, path.name, KIND) as archive:
         root = archive.xml(DESCRIPTION)
         with reading(path.name):
-            return _ShowReader(archive, root, folder, zoom, pixels).read()
+            return _ShowReader(archive, root, folder, {"zoom": zoom, "pixels": pixels}).read()
 
 
 def show_nodes(root: Element) -> Iterator[ShowNode]:
@@ -141,7 +157,7 @@ def show_nodes(root: Element) -> Iterator[ShowNode]:
 def _nodes_below(element: Element, matrix: Doubles) -> Iterator[ShowNode]:
     for children in element.findall("ChildList"):
         for child in children:
-            node = ShowNode(child, matrix @ world_matrix(child), matrix)
+            node = ShowNode(child, matrix @ world_matrix(child), matrix, children)
             yield node
             yield from _nodes_below(child, node.matrix)
 
@@ -160,6 +176,47 @@ def world_matrix(element: Element) -> Doubles:
     return matrix
 
 
+def named_fixtures(
+    nodes: Sequence[ShowNode], name: str
+) -> tuple[list[NamedFixture], dict[str, list[str]]]:
+    """Return the fixtures of a show that have a type and an address, and names of others by reason.
+
+    name: of the file, for errors. Raises RigError if there are none.
+    """
+    fixtures: list[NamedFixture] = []
+    left: dict[str, list[str]] = {}
+    used: set[str] = set()
+    for node in (x for x in nodes if x.element.tag == "Fixture"):
+        data = library("pymvr").Fixture(xml_node=_without_children(node.element))
+        addresses = _addresses_of(node.element)
+        reason = _reason_to_leave(data, addresses)
+        if reason:
+            left.setdefault(reason, []).append(data.name)
+            continue
+        label = " ".join(filter(None, (_id_of(data), data.name or "light")))
+        own_name = _free_name(" ".join(_UNUSUAL.sub("_", label).split()), used)
+        used.add(own_name)
+        fixtures.append(NamedFixture(own_name, node, data, addresses))
+    if not fixtures:
+        reasons = "; ".join(f"{some_names(names)} {why}" for why, names in left.items())
+        raise RigError(f"{name} has no fixture" + (f" to use: {reasons}" if left else ""))
+    return fixtures, left
+
+
+def _reason_to_leave(data: Any, addresses: Mapping[int, int]) -> str:
+    if data.multipatch:
+        return "left out, as a copy of another fixture"
+    if not data.gdtf_spec:
+        return "left out, without a GDTF"
+    return "" if addresses else "left out, without an address"
+
+
+def _free_name(name: str, used: Collection[str]) -> str:
+    """Return a name that is not used yet, with a number behind it if need be."""
+    numbered = (f"{name} ({k})" for k in count(2))
+    return next(x for x in chain([name], numbered) if x not in used)
+
+
 class _ShowReader:
     """The reading of one show."""
 
@@ -168,71 +225,45 @@ class _ShowReader:
         archive: RigArchive,
         root: Element,
         gdtf_folder: Path | None,
-        zoom: float | None,
-        pixels: bool,
+        options: Mapping[str, Any],
     ) -> None:
         self.archive, self.root, self.folder = archive, root, gdtf_folder
-        self.options: dict[str, Any] = {"zoom": zoom, "pixels": pixels}
+        self.options = options
         self.types: dict[str, FixtureType] = {}
-        self.left: dict[str, list[str]] = {}
-        self.names: set[str] = set()
 
     def read(self) -> Show:
         nodes = [*show_nodes(self.root)]
-        focus = {x.element.get("uuid"): x.matrix[:3, 3] for x in nodes if _is(x, "FocusPoint")}
-        placed = [x for x in nodes if _is(x, "Fixture")]
-        if not placed:
-            raise RigError(f"{self.archive.name} has no fixture")
-        patched = self._patched(placed)
-        self._read_types({spec for _, fixture, _ in patched for spec in [fixture.gdtf_spec]})
+        points = [x for x in nodes if x.element.tag == "FocusPoint"]
+        focus = {x.element.get("uuid"): x.matrix[:3, 3] for x in points}
+        named, left = named_fixtures(nodes, self.archive.name)
+        self._read_types({fixture.data.gdtf_spec for fixture in named})
         fixtures: list[RigFixture] = []
-        kept: list[ShowNode] = []
         modes: list[FixtureMode] = []
-        for node, fixture, addresses in patched:
-            mode, channels, own = self._mode_of(fixture, addresses)
-            if not mode.lights:
-                self._leave("no channel that dims light", fixture.name)
-            target = focus.get(fixture.focus)
-            lights = self._lights(node, fixture, mode, target)
-            kind = self.types[fixture.gdtf_spec].name
-            label = fixture.name or kind
+        for fixture in named:
+            mode, addresses, missing = self._mode_of(fixture)
+            if missing:
+                numbers = ", ".join(map(str, sorted(missing)))
+                reason = f"without its channels of break {numbers}, which has no address"
+                left.setdefault(reason, []).append(fixture.name)
+            lights = _lights(fixture, mode, focus.get(fixture.data.focus))
+            kind = self.types[fixture.data.gdtf_spec].name
+            label = fixture.data.name or kind
             fixtures.append(
-                RigFixture(_id_of(fixture), label, kind, mode.name, own, channels, lights)
+                RigFixture(
+                    *(_id_of(fixture.data), label, kind, mode.name, addresses),
+                    mode.channels,
+                    lights,
+                )
             )
-            kept.append(node)
             modes.append(mode)
         if not any(x.lights for x in fixtures):
-            raise RigError(f"{self.archive.name} has no fixture that can be dimmed{self._left()}")
+            raise RigError(f"{self.archive.name} has no fixture whose channels dim light")
         rig = ConsoleRig(self.archive.name, tuple(fixtures))
         models = tuple(islice(_models(nodes, self.root), MAX_MODELS + 1))
         if len(models) > MAX_MODELS:
             raise RigError(f"{self.archive.name} shows more than {MAX_MODELS} models")
-        remarks = tuple(f"{some_names(names)}: {why}" for why, names in self.left.items())
-        return Show(rig, _summaries(fixtures, modes), tuple(kept), models, remarks)
-
-    def _left(self) -> str:
-        return "".join(f": {some_names(names)}: {why}" for why, names in self.left.items())
-
-    def _leave(self, why: str, name: str) -> None:
-        self.left.setdefault(why, []).append(name)
-
-    def _patched(self, nodes: Sequence[ShowNode]) -> list[tuple[ShowNode, Any, dict[int, int]]]:
-        """Return fixtures that have a type and an address, with addresses by the file's breaks."""
-        patched = []
-        for node in nodes:
-            fixture = library("pymvr").Fixture(xml_node=_without_children(node.element))
-            addresses = _addresses_of(node.element)
-            if fixture.multipatch:
-                self._leave("left out, as a copy of another fixture", fixture.name)
-            elif not fixture.gdtf_spec:
-                self._leave("left out, without a GDTF", fixture.name)
-            elif not addresses:
-                self._leave("left out, without an address", fixture.name)
-            else:
-                patched.append((node, fixture, addresses))
-        if not patched:
-            raise RigError(f"{self.archive.name} has no fixture with an address{self._left()}")
-        return patched
+        remarks = tuple(f"{some_names(names)}: {why}" for why, names in left.items())
+        return Show(rig, _summaries(fixtures, modes), models, remarks)
 
     def _read_types(self, specs: Collection[str]) -> None:
         """Read each type once. Raises RigError, which lists all that are missing."""
@@ -254,43 +285,28 @@ class _ShowReader:
                 Hint("gdtf_folder"),
             )
 
-    def _mode_of(
-        self, fixture: Any, addresses: Mapping[int, int]
-    ) -> tuple[FixtureMode, tuple[DmxChannel, ...], dict[int, int]]:
-        """Return the mode of a fixture, its channels with an address, and addresses by break."""
-        type_, wanted = self.types[fixture.gdtf_spec], fixture.gdtf_mode or ""
+    def _mode_of(self, fixture: NamedFixture) -> tuple[FixtureMode, dict[int, int], set[int]]:
+        """Return the mode of a fixture, addresses by break, and breaks that have none."""
+        type_, wanted = self.types[fixture.data.gdtf_spec], fixture.data.gdtf_mode or ""
         breaks = type_.breaks(wanted)
         # MVR counts breaks from 0 and GDTF from 1; some programs count from 1 in both.
-        first = 1 if min(addresses) == 0 else 0
-        own = {number + first: address for number, address in addresses.items()}
-        if not breaks & set(own) and len(own) == 1 and len(breaks) == 1:
+        first = 1 if min(fixture.addresses) == 0 else 0
+        own = {number + first: address for number, address in fixture.addresses.items()}
+        if not breaks & own.keys() and len(own) == 1 and len(breaks) == 1:
             own = dict.fromkeys(breaks, min(own.values()))
-        if missing := breaks - set(own):
-            self._leave(
-                f"without the channels of break {some_names(map(str, sorted(missing)))}, which "
-                "has no address",
-                fixture.name,
-            )
         mode = type_.mode(wanted, frozenset(own), **self.options)
-        return mode, mode.channels, own
+        return mode, own, breaks - own.keys()
 
-    def _lights(
-        self, node: ShowNode, fixture: Any, mode: FixtureMode, target: Doubles | None
-    ) -> tuple[RigLight, ...]:
-        label = " ".join(filter(None, (_id_of(fixture), fixture.name or "light")))
-        base = self._free_name(" ".join(_UNUSUAL.sub("_", label).split()))
-        lights = []
-        for light in mode.lights:
-            name = self._free_name(f"{base} px{light.pixel}") if light.pixel else base
-            lights.append(_placed(name, light, node.matrix, target))
-        return tuple(lights)
 
-    def _free_name(self, name: str) -> str:
-        """Return a name that no other light has, and remember it."""
-        numbered = (f"{name} ({k})" for k in count(2))
-        free = next(x for x in chain([name], numbered) if x not in self.names)
-        self.names.add(free)
-        return free
+def _lights(
+    fixture: NamedFixture, mode: FixtureMode, target: Doubles | None
+) -> tuple[RigLight, ...]:
+    """Return the lights of a fixture. target: its focus point, if it has one."""
+    names = [f"{fixture.name} px{x.pixel}" if x.pixel else fixture.name for x in mode.lights]
+    return tuple(
+        _placed(name, light, fixture.node.matrix, target)
+        for name, light in zip(names, mode.lights, strict=True)
+    )
 
 
 def _placed(name: str, light: ModeLight, matrix: Doubles, target: Doubles | None) -> RigLight:
@@ -319,10 +335,6 @@ def _placed(name: str, light: ModeLight, matrix: Doubles, target: Doubles | None
 def _three(values: Doubles) -> Position:
     x, y, z = values.tolist()
     return x, y, z
-
-
-def _is(node: ShowNode, tag: str) -> bool:
-    return node.element.tag == tag
 
 
 def _id_of(fixture: Any) -> str:

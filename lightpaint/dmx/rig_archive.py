@@ -100,18 +100,22 @@ class RigArchive:
         """All members, in their order."""
         return self._zip.infolist()
 
+    def name_of(self, member: zipfile.ZipInfo) -> str:
+        """Return the name of a member as people write it, also where it is not marked as UTF-8."""
+        is_marked = member.flag_bits & 0x800
+        return member.filename if is_marked else _as_utf_8(member.filename)
+
     @cached_property
     def _by_name(self) -> dict[str, str]:
         """The name of each member, by the ways in which files refer to it."""
-        names = self._zip.namelist()
-        folded = {name.casefold(): name for name in names}
-        # A name that is not marked as UTF-8 is read as of code page 437.
-        decoded = {_as_utf_8(name): name for name in names}
-        return folded | decoded | {name: name for name in names}
+        proper = {self.name_of(x): x.filename for x in self._zip.infolist()}
+        folded = {name.casefold(): own for name, own in proper.items()}
+        return folded | proper | {name: name for name in proper.values()}
 
     def find(self, name: str) -> str | None:
         """Return the member that a file in the archive refers to; None if there is none."""
-        ways = (name, _as_utf_8(name), name.casefold())
+        proper = _as_utf_8(name)
+        ways = (name, proper, proper.casefold(), name.casefold())
         return next((self._by_name[way] for way in ways if way in self._by_name), None)
 
     def read(self, member: str) -> bytes:
