@@ -17,6 +17,7 @@ GUIDES = {
     "paint": "painter",
     "batch": "batch",
     "export": "formats",
+    "rig": "stage",
     "blender": "blender",
     "relight": "solving",
     "verify": "solving",

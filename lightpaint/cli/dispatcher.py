@@ -25,6 +25,7 @@ _MODULES = {
     "doctor": "maintenance",
     "export": "program_commands",
     "paint": "paint_command",
+    "rig": "rig_command",
     "solve": "solve_command",
 }
 

@@ -30,6 +30,7 @@ def export(
     scene: SceneFile | None,
     groups: GroupsFile | None,
     stage: Path | None,
+    rig: Path | None,
     output: Path | None,
     force: bool,
 ) -> CommandOutcome:
@@ -41,7 +42,8 @@ def export(
         light_groups = first_frame(find_frames(groups.path), groups.pattern, has_rest=has_rest)
     else:
         light_groups = content(groups)
-    source, listen = Source(content(scene), light_groups, stage), terminal.TerminalListener()
+    source = Source(content(scene), light_groups, stage, rig)
+    listen = terminal.TerminalListener()
     names = names_of_forms(forms, source)
     writers, remark = writers_of(names, answer, source, folder, listen)
     file_writers = {folder / name: make for name, make in writers.items()}

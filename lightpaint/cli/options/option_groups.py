@@ -174,6 +174,26 @@ def add_output(parser: "argparse._ActionsContainer", metavar: str, description: 
     parser.add_argument("-o", "--output", metavar=metavar, help=description)
 
 
+def add_rig_reading(parser: argparse.ArgumentParser) -> None:
+    """Add the options for how a show's fixtures are read."""
+    parser.add_argument(
+        "--gdtf",
+        metavar="FOLDER",
+        help="folder with GDTF files, which come before those of the show with the same names",
+    )
+    parser.add_argument(
+        "--zoom",
+        type=arguments.number(" of degrees"),
+        metavar="DEGREES",
+        help="beam angle of all fixtures that have a zoom (default: as their files say they rest)",
+    )
+    parser.add_argument(
+        "--pixels",
+        action="store_true",
+        help="make a light of each beam that has channels of its own (default: of each fixture)",
+    )
+
+
 def add_server(parser: argparse.ArgumentParser) -> None:
     """Add the options for the painter's address and session."""
     parser.add_argument(
@@ -293,7 +313,8 @@ OTHER_OPTIONS: dict[Theme, str] = {
     "--layers",
     "Lights": "--lights --group --lights-file --no-lights-file --no-group-alike --split "
     "--symmetric --pattern",
-    "Scene and camera": "--scene --stage --sensor -D --integrator --variant",
+    "Scene and camera": "--scene --stage --sensor -D --integrator --variant --room --rig --gdtf "
+    "--zoom --pixels --only-lights",
     "Verification": "--max-miss --min-fit",
     "Shots, looks and advice": "--frames --variations --keep-going",
     "Looks": "--init --only --dry-run",
