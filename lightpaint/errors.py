@@ -19,6 +19,7 @@
     ├── LightingError    a lighting.json, or weights that are invalid
     │   └── UnknownLightError  … or a name that none of its lights has; also a KeyError
     ├── RigError         a rig of fixtures: its MVR, its GDTF types, its addresses
+    ├── ConsoleError     a console's network: an address, a universe, a port that is taken
     ├── AccessError      a file or folder that the system refuses to open; also an OSError
     └── OutputError      a file or folder that cannot be written
 
@@ -149,6 +150,10 @@ class OutputError(LightpaintError):
 
 class RigError(LightpaintError):
     """A rig of fixtures that cannot be read, or that contradicts itself."""
+
+
+class ConsoleError(LightpaintError):
+    """A console's network: a target that does not exist, or a port that is taken."""
 
 
 class AccessError(LightpaintError, OSError):

@@ -25,6 +25,7 @@ Theme = Literal[
     "Shots, looks and advice",
     "Looks",
     "Machines",
+    "Console",
     "Page",
     "Results",
 ]

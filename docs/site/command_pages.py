@@ -18,6 +18,8 @@ GUIDES = {
     "batch": "batch",
     "export": "formats",
     "rig": "stage",
+    "send": "console",
+    "listen": "console",
     "blender": "blender",
     "relight": "solving",
     "verify": "solving",

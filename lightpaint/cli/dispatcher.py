@@ -24,8 +24,10 @@ _MODULES = {
     "cache": "maintenance",
     "doctor": "maintenance",
     "export": "program_commands",
+    "listen": "console_commands",
     "paint": "paint_command",
     "rig": "rig_command",
+    "send": "console_commands",
     "solve": "solve_command",
 }
 
@@ -144,6 +146,8 @@ ENDINGS = {
     "masks": (".exr", ".png", ".tif", ".tiff", ".jpg", ".jpeg"),
     "lightings": (".json",),
     "lights_file": (".toml",),
+    "lighting": (".json",),
+    "rig": (".mvr",),
 }
 
 

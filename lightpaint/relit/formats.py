@@ -301,7 +301,9 @@ def names_of_forms(forms: Iterable[str], source: Source) -> dict[str, str]:
         form = next(form for form in names if FORMS[form].needs_rig)
         raise LightpaintError(f"{form} needs the show that the lights are of: give ", Hint("rig"))
     if source.rig is not None and not has_rig_form:
-        raise LightpaintError(Hint("rig"), " belongs to the form mvr: leave it out, or add that")
+        raise LightpaintError(
+            Hint("rig"), " belongs to mvr and cues: leave it out, or add one of them"
+        )
     if source.stage is not None and UsdFormat.name not in names:
         raise LightpaintError(Hint("stage"), " belongs to the form usd: leave it out, or add that")
     return names

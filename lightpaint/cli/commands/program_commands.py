@@ -5,16 +5,19 @@ import shutil
 import sysconfig
 import zipfile
 from collections.abc import Sequence
+from functools import partial
 from importlib.resources import files
 from importlib.resources.abc import Traversable
 from pathlib import Path
 
 from lightpaint.basis.lightgroups.frame_sequence import find_frames, is_pattern
-from lightpaint.basis.lightgroups.light_groups import first_frame
+from lightpaint.basis.lightgroups.light_groups import LightGroups, first_frame
+from lightpaint.cli.options.console_options import RigFile
 from lightpaint.cli.output import documents, terminal
 from lightpaint.cli.output.lines import CommandOutcome
-from lightpaint.errors import OutputError
+from lightpaint.errors import LightpaintError, OutputError
 from lightpaint.files import check_files, check_writable, write_bytes
+from lightpaint.lighting.answer.lighting import Lighting
 from lightpaint.lighting.answer.lighting_file import read_lighting
 from lightpaint.pipeline.job.sources import GroupsFile, SceneFile, content
 from lightpaint.relit.exported_answer import Source
@@ -22,32 +25,42 @@ from lightpaint.relit.formats import names_of_forms, write_content, writers_of
 from lightpaint.sentences import Hint
 from lightpaint.storage.staging import finish
 
+#: The format that takes several lightings, and its file.
+CUES, CUE_FILE = "cues", "cues.csv"
+
 
 def export(
     *,
-    lighting: Path,
+    lightings: Sequence[Path],
     forms: Sequence[str],
+    rig: RigFile | None,
+    fade_s: float,
     scene: SceneFile | None,
     groups: GroupsFile | None,
     stage: Path | None,
-    rig: Path | None,
     output: Path | None,
     force: bool,
 ) -> CommandOutcome:
     """Run `lightpaint export lighting.json --to FORM,FORM -o DIR`."""
+    lighting, others = lightings[0], [form for form in forms if form != CUES]
+    if len(lightings) > 1 and others:
+        raise LightpaintError(
+            f"{others[0]} takes one lighting, not {len(lightings)}; cues take all"
+        )
+    if CUES in forms and rig is None:
+        raise LightpaintError("cues need the rig of their fixtures: give --rig show.mvr")
     finish(lighting.parent)
     answer, folder = read_lighting(lighting), output or lighting.parent
-    if groups is not None and is_pattern(groups.path):
-        has_rest = any(light.plugin == "rest" for light in answer.lights)
-        light_groups = first_frame(find_frames(groups.path), groups.pattern, has_rest=has_rest)
-    else:
-        light_groups = content(groups)
-    source = Source(content(scene), light_groups, stage, rig)
-    listen = terminal.TerminalListener()
-    names = names_of_forms(forms, source)
+    light_groups, listen = _light_groups(groups, answer), terminal.TerminalListener()
+    show = None if rig is None or (CUES in forms and "mvr" not in forms) else rig.path
+    source = Source(content(scene), light_groups, stage, show)
+    names = names_of_forms(others, source)
     writers, remark = writers_of(names, answer, source, folder, listen)
+    if CUES in forms and rig is not None:
+        writers[CUE_FILE] = partial(_cue_list, lightings, rig, fade_s)
     file_writers = {folder / name: make for name, make in writers.items()}
-    check_files(list(file_writers), [lighting, *source.files])
+    inputs = [*lightings, *source.files, *([] if rig is None else [rig.path])]
+    check_files(list(file_writers), inputs)
     check_writable(folder)
     if not force and (existing_files := [file for file in file_writers if file.exists()]):
         raise OutputError(
@@ -64,6 +77,31 @@ def export(
         listen.say(remark)
     files = list(file_writers)
     return CommandOutcome(lambda: documents.files_document(folder, files, lighting=str(lighting)))
+
+
+def _light_groups(groups: GroupsFile | None, answer: Lighting) -> LightGroups | None:
+    """Return the light groups, of a shot those of its first frame."""
+    if groups is None:
+        return None
+    if not is_pattern(groups.path):
+        return groups.content
+    has_rest = any(light.plugin == "rest" for light in answer.lights)
+    return first_frame(find_frames(groups.path), groups.pattern, has_rest=has_rest)
+
+
+def _cue_list(lightings: Sequence[Path], rig: RigFile, fade_s: float) -> str:
+    """Return a cue for each lighting, in their order."""
+    from lightpaint.cli.commands.console_commands import read_drives, read_rig_file
+    from lightpaint.relit.export.cue_list import Cue, cue_list_csv
+
+    cues = [Cue(_label_of(path), fade_s, read_drives(path)) for path in lightings]
+    return cue_list_csv(read_rig_file(rig), cues)
+
+
+def _label_of(lighting: Path) -> str:
+    """Return the name of a look: its file's, or its folder's where all files are called alike."""
+    path = lighting.absolute()
+    return path.parent.name if path.stem == "lighting" else path.stem
 
 
 #: Folder in the archive: the add-on's name in Blender before 4.2. The library is called otherwise.

@@ -7,6 +7,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from lightpaint.cli.options.argument_order import options_but
+from lightpaint.cli.options.console_options import rig_file, sending_of
 from lightpaint.cli.options.job_options import (
     constraints_of,
     folders_of,
@@ -53,6 +54,23 @@ def values_of(options: Namespace, words: Sequence[str]) -> dict[str, Any]:
             return _batch_arguments(options)
         case "export":
             return _export_arguments(options, output)
+        case "send":
+            return {
+                "lighting": Path(options.lighting),
+                "rig": rig_file(options),
+                "sending": sending_of(options),
+                "dump": options.dump,
+                "force": options.force,
+            }
+        case "listen":
+            return {
+                "rig": rig_file(options),
+                "protocol": options.protocol,
+                "universes": dict(options.universes),
+                "address": options.interface,
+                "port": options.port,
+                "seconds": options.seconds,
+            }
         case "paint":
             return _paint_arguments(options, settings, words)
         case "relight":
@@ -99,12 +117,13 @@ def _template_arguments(options: Namespace, output: Path, settings: Settings) ->
 def _export_arguments(options: Namespace, output: Path | None) -> dict[str, Any]:
     """Return the arguments of `export`."""
     return {
-        "lighting": Path(options.lighting),
+        "lightings": list(map(Path, options.lightings)),
         "forms": options.to,
+        "rig": rig_file(options),
+        "fade_s": options.fade_s,
         "scene": scene_to_export(options),
         "groups": GroupsFile(options.groups, options.pattern) if options.groups else None,
         "stage": Path(options.stage) if options.stage else None,
-        "rig": Path(options.rig) if options.rig else None,
         "output": output,
         "force": options.force,
     }

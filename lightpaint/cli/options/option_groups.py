@@ -319,8 +319,10 @@ OTHER_OPTIONS: dict[Theme, str] = {
     "Shots, looks and advice": "--frames --variations --keep-going",
     "Looks": "--init --only --dry-run",
     "Machines": "--export --log",
+    "Console": "--rig --gdtf --pixels --from --universe --priority --fps --fade --until --blackout "
+    "--interface --seconds",
     "Page": "--host --port --no-browser --new",
-    "Results": "--to --output --table --map-size --no-sheet --json --quiet --verbose "
+    "Results": "--to --dump --output --table --map-size --no-sheet --json --quiet --verbose "
     "--json-progress --help",
 }
 _THEME_OF: dict[str, str] = {

@@ -19,6 +19,7 @@ from lightpaint.cli.options.answer_options import (
     add_verification,
 )
 from lightpaint.cli.options.argument_order import CommandParser, Parser
+from lightpaint.cli.options.console_options import add_fade, add_listen, add_rig, add_send
 from lightpaint.cli.options.option_groups import (
     add_budget,
     add_cache,
@@ -190,18 +191,24 @@ def _paint(parser: argparse.ArgumentParser) -> None:
 
 
 def _export(parser: argparse.ArgumentParser) -> None:
-    parser.add_argument("lighting", metavar="lighting.json", help="file that solve wrote")
+    parser.add_argument(
+        "lightings",
+        metavar="lighting.json",
+        nargs="+",
+        help="file that solve wrote; several, in their order, for cues",
+    )
     parser.add_argument(
         "--to",
         type=arguments.names_of,
         action="extend",
         required=True,
-        metavar="csv,json,mitsuba,usd,blender,nuke,mvr",
+        metavar="csv,json,mitsuba,usd,blender,nuke,mvr,cues",
         help="one format or several. csv, json: fixtures with colour, kelvin, lumen and DMX; "
         "mitsuba: a patch for the XML of the scene; usd: a layer that overrides the lights "
         "of a stage; blender: a Python script that sets lights by name; nuke: a script with the "
         "lights of --scene in Nuke's 3-D system, or one that scales the light groups of --lights; "
-        "mvr: a copy of the show --rig with the colours and places of the lights",
+        "mvr: a copy of the show --rig with the colours and places of the lights; "
+        "cues: a list of cues for consoles, each lighting one, for the fixtures of --rig",
     )
     source_group = parser.add_mutually_exclusive_group()
     source_group.add_argument(
@@ -221,11 +228,8 @@ def _export(parser: argparse.ArgumentParser) -> None:
         help="for usd: stage whose lights the layer overrides, found by their names in the scene "
         "(default: new prims below /lights)",
     )
-    parser.add_argument(
-        "--rig",
-        metavar="SHOW.mvr",
-        help="for mvr: show that the scene was made of with lightpaint rig",
-    )
+    add_rig(parser, required=False, purpose="for mvr and cues: ")
+    add_fade(parser, "for cues: the time of each (default: 0)")
     add_map_size(parser)
     add_view(parser)
     add_output(parser, "DIR", "folder for the files (default: that of lighting.json)")
@@ -309,6 +313,8 @@ _COMMANDS: dict[str, tuple[str, Callable[[argparse.ArgumentParser], None]]] = {
     "batch": ("solve many looks from one manifest; a stopped batch continues", add_batch),
     "export": ("write a lighting for other programs, fixtures and consoles", _export),
     "rig": ("make a scene and a lights file of the fixtures of a show", _rig),
+    "send": ("send the levels of a lighting to a console, or print them", add_send),
+    "listen": ("print the levels that arrive from a console or from send", add_listen),
     "blender": ("write the add-on for Blender, whose lamps follow the painter", _blender),
     "relight": ("write lightings into the scene, and render it", _relight),
     "verify": ("render results again, and compare them with the prediction", _verify),

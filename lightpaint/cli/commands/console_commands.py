@@ -1,0 +1,205 @@
+"""`lightpaint send` and `lightpaint listen`: levels for a console, and what arrives of them."""
+
+import time
+from collections.abc import Iterator, Mapping
+from contextlib import contextmanager
+from pathlib import Path
+
+from lightpaint.cli.options.console_options import RigFile, Sending
+from lightpaint.cli.output import lines, terminal
+from lightpaint.cli.output.console_monitor import LINE_S, ConsoleMonitor
+from lightpaint.cli.output.lines import CommandOutcome, output_mode
+from lightpaint.display_text import some_names
+from lightpaint.dmx.console_rig import ConsoleRig
+from lightpaint.dmx.network.console_link import PRIORITY, ConsoleLink
+from lightpaint.dmx.network.console_receiver import LOOPBACK, ConsoleReceiver
+from lightpaint.dmx.network.console_target import PROTOCOLS, network_universes
+from lightpaint.dmx.rig_drives import RigDrives, check_drives, drives_of
+from lightpaint.errors import ConsoleError, LightingError, OutputError
+from lightpaint.files import check_files, check_writable, write_text
+from lightpaint.lighting.answer.lighting_file import read_lighting
+from lightpaint.relit.export.level_table import (
+    LevelRow,
+    level_csv,
+    level_document,
+    level_json,
+    level_rows,
+)
+from lightpaint.signals import interruptible_between_pieces
+from lightpaint.storage.staging import finish
+
+#: Seconds between two looks at the link.
+POLL_S = 0.05
+
+#: Suffixes of files for levels.
+DUMP_SUFFIXES = (".csv", ".json")
+
+
+def read_rig_file(rig: RigFile) -> ConsoleRig:
+    """Return a rig. Raises RigError for anything else than an MVR with fixtures."""
+    from lightpaint.dmx.mvr import read_rig
+
+    return read_rig(rig.path, gdtf_folder=rig.gdtf, pixels=rig.pixels)
+
+
+def read_drives(lighting: Path) -> RigDrives:
+    """Return the drives of a lighting. Raises LightingError if none of its lights has emitters."""
+    finish(lighting.parent)
+    drives = drives_of(read_lighting(lighting))
+    if not drives:
+        raise LightingError(
+            f"{lighting} has no drives: none of its lights has emitters, as those of a scene that "
+            "was made from a rig"
+        )
+    return drives
+
+
+def send(
+    *, lighting: Path, rig: RigFile, sending: Sending, dump: Path | None, force: bool
+) -> CommandOutcome:
+    """Run `lightpaint send lighting.json --rig show.mvr --to TARGET`."""
+    if dump is not None:
+        _check_dump(dump, [lighting, rig.path], force=force)
+    drives, fixtures = read_drives(lighting), read_rig_file(rig)
+    check_drives(fixtures, drives)
+    universes = _universes_of(fixtures, sending)
+    if dark := [light for light in fixtures.owners if light not in drives]:
+        terminal.say(f"{lighting} has no drives for {some_names(dark)}, which stay dark")
+    if sending.target is not None:
+        with _link(fixtures, sending) as link:
+            if dump is not None:
+                _write_dump(dump, fixtures, drives, universes)
+            _announce(f"sending to {link.address}{_how_to_end(sending)}")
+            _send(link, drives, sending)
+    elif dump is not None:
+        _write_dump(dump, fixtures, drives, universes)
+    else:
+        _print_rows(level_rows(fixtures, drives, universes))
+        terminal.say("nothing is sent without --to, such as --to sacn://127.0.0.1")
+    where = {"target": None if sending.target is None else str(sending.target)}
+    return CommandOutcome(lambda: where | level_document(fixtures, drives, universes))
+
+
+def _universes_of(rig: ConsoleRig, sending: Sending) -> dict[int, int]:
+    """Return the universes of the network by those of the rig; without a target those of sACN."""
+    protocol = PROTOCOLS["sacn"] if sending.target is None else sending.target.protocol
+    return network_universes(rig, protocol, sending.universes)
+
+
+def _check_dump(dump: Path, inputs: list[Path], *, force: bool) -> None:
+    if dump.suffix.lower() not in DUMP_SUFFIXES:
+        raise OutputError(f"--dump {dump}: expected a file {' or '.join(DUMP_SUFFIXES)}")
+    check_files([dump], inputs)
+    check_writable(dump.parent)
+    if dump.exists() and not force:
+        raise OutputError(f"{dump} exists: name another file, or pass --force")
+
+
+def _write_dump(
+    dump: Path, rig: ConsoleRig, drives: RigDrives, universes: Mapping[int, int]
+) -> None:
+    is_csv = dump.suffix.lower() == ".csv"
+    text = (
+        level_csv(level_rows(rig, drives, universes))
+        if is_csv
+        else level_json(rig, drives, universes)
+    )
+    write_text(dump, text)
+    terminal.write(str(dump))
+
+
+def _print_rows(rows: list[LevelRow]) -> None:
+    table = terminal.table("id", "fixture", "light", "emitter", "drive", "channel", "value")
+    for row in rows:
+        channels = "+".join(map(str, row.channels))
+        drive = "" if row.drive is None else f"{row.drive:.3f}"
+        table.row(
+            *(row.fixture_id, row.fixture, row.light, row.emitter, drive),
+            *(f"{row.universe}.{channels}", str(row.value)),
+        )
+    terminal.print_table(table)
+
+
+@contextmanager
+def _link(rig: ConsoleRig, sending: Sending) -> Iterator[ConsoleLink]:
+    """Yield an open link, and end it whole: an interrupt waits until its last packet has left."""
+    assert sending.target is not None
+    link = ConsoleLink.open(
+        *(sending.target, rig),
+        universes=sending.universes,
+        priority=PRIORITY if sending.priority is None else sending.priority,
+        fps=sending.fps,
+        interface=sending.interface,
+    )
+    try:
+        yield link
+    finally:
+        with interruptible_between_pieces():
+            link.close(blackout=sending.blackout)
+
+
+def _how_to_end(sending: Sending) -> str:
+    return " (Ctrl-C ends it)" if sending.until == "ctrl-c" else ""
+
+
+def _send(link: ConsoleLink, drives: RigDrives, sending: Sending) -> None:
+    """Show drives until the end. Raises ConsoleError if the network takes no packet."""
+    end_s = time.monotonic() + sending.until if isinstance(sending.until, float) else None
+    had_trouble = False
+    try:
+        link.show(drives, fade_s=sending.fade_s)
+        while end_s is None or time.monotonic() < end_s:
+            time.sleep(POLL_S)
+            trouble = link.trouble
+            if trouble is not None and not link.has_sent:
+                raise ConsoleError(trouble)
+            if (trouble is not None) != had_trouble:
+                had_trouble = trouble is not None
+                terminal.say(f"{trouble}; trying again" if trouble else "sending again")
+            if sending.until == "done" and link.is_settled:
+                break
+    except KeyboardInterrupt:
+        if sending.until != "ctrl-c":
+            raise
+    if link.trouble is not None:
+        raise ConsoleError(link.trouble)
+
+
+def _announce(text: str) -> None:
+    """Print what happens now: on stderr if stdout is a document for programs."""
+    (lines.err if output_mode().as_json else terminal.write)(text)
+
+
+def listen(
+    *,
+    rig: RigFile | None,
+    protocol: str,
+    universes: dict[int, int],
+    address: str | None,
+    port: int | None,
+    seconds: float | None,
+) -> CommandOutcome:
+    """Run `lightpaint listen --rig show.mvr`."""
+    fixtures = None if rig is None else read_rig_file(rig)
+    if fixtures is None and universes:
+        raise ConsoleError("--universe belongs to the universes of a rig: give --rig, too")
+    known = PROTOCOLS[protocol]
+    numbers = {} if fixtures is None else network_universes(fixtures, known, universes)
+    at = address or LOOPBACK
+    with ConsoleReceiver.open(known, address=at, port=port, groups=numbers.values()) as receiver:
+        monitor = ConsoleMonitor(receiver, fixtures, numbers)
+        how = " (Ctrl-C ends it)" if seconds is None else ""
+        _announce(f"listening for {known.name} at {at}, port {receiver.port}{how}")
+        end_s = None if seconds is None else time.monotonic() + seconds
+        try:
+            while end_s is None or time.monotonic() < end_s:
+                left_s = LINE_S if end_s is None else min(LINE_S, end_s - time.monotonic())
+                receiver.receive(left_s)
+                monitor.print_changes()
+        except KeyboardInterrupt:
+            if seconds is not None:
+                raise
+        monitor.print_changes(at_once=True)
+        if not receiver.levels:
+            terminal.say(f"nothing arrived at {at}, port {receiver.port}")
+        return CommandOutcome(monitor.document)

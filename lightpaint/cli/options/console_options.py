@@ -1,0 +1,257 @@
+"""The options of `send` and `listen`: the rig, the network, and how long."""
+
+import argparse
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Literal
+
+from lightpaint.cli.options import arguments
+from lightpaint.dmx.network.console_target import PROTOCOLS, ConsoleTarget, parse_target
+from lightpaint.errors import ConsoleError
+from lightpaint.validation import parse_number, parse_whole_number
+
+#: When sending ends: with Ctrl-C, once all has been sent, or after so many seconds.
+Until = Literal["ctrl-c", "done"] | float
+
+#: Seconds of a unit of time.
+UNITS = {"": 1.0, "ms": 0.001, "s": 1.0, "min": 60.0}
+
+#: Longest time that may be given, a day: more is a mistake.
+MAX_DURATION_S = 86400.0
+
+
+@dataclass(frozen=True)
+class RigFile:
+    """An MVR, and how to read it. gdtf: folder with fixture types, if there is one."""
+
+    path: Path
+    gdtf: Path | None
+    pixels: bool
+
+
+@dataclass(frozen=True)
+class Sending:
+    """Where to send, and how.
+
+    target: None to send nothing. universes: of the network by those of the rig, for some.
+    priority: None for that of the link.
+    """
+
+    target: ConsoleTarget | None
+    universes: dict[int, int]
+    priority: int | None
+    fps: int
+    fade_s: float
+    until: Until
+    blackout: bool
+    interface: str
+
+
+def add_rig(parser: argparse.ArgumentParser, *, required: bool, purpose: str = "") -> None:
+    """Add the options for the rig of fixtures. purpose: what needs it, if not all does."""
+    parser.add_argument(
+        "--rig",
+        required=required,
+        metavar="show.mvr",
+        help=f"{purpose}MVR with the fixtures, their modes and addresses",
+    )
+    parser.add_argument(
+        "--gdtf",
+        metavar="DIR",
+        help="folder with GDTF files, for those that the MVR lacks or has incomplete",
+    )
+    parser.add_argument(
+        "--pixels",
+        action="store_true",
+        help="each beam of a fixture with channels of its own is a light, as in the scene that was "
+        "made so",
+    )
+
+
+def rig_file(options: argparse.Namespace) -> RigFile | None:
+    """Return the rig that the options name, if any."""
+    if options.rig is None:
+        return None
+    gdtf = None if options.gdtf is None else Path(options.gdtf)
+    return RigFile(Path(options.rig), gdtf, options.pixels)
+
+
+def add_fade(parser: argparse.ArgumentParser, purpose: str) -> None:
+    """Add the option for the time of a fade. purpose: what takes it."""
+    parser.add_argument(
+        "--fade", dest="fade_s", type=duration, default=0.0, metavar="3s", help=purpose
+    )
+
+
+def add_send(parser: argparse.ArgumentParser) -> None:
+    """Add the options of `send`."""
+    parser.add_argument("lighting", metavar="lighting.json", help="file that solve wrote")
+    add_rig(parser, required=True)
+    parser.add_argument(
+        "--to",
+        dest="target",
+        type=target,
+        metavar="TARGET",
+        help="sacn://HOST or artnet://HOST, maybe with a :PORT, to send to one receiver; "
+        "sacn://multicast or artnet://broadcast to reach all (default: send nothing, and print "
+        "the levels)",
+    )
+    _add_universes(parser)
+    parser.add_argument(
+        "--priority",
+        type=arguments.at_least(0, maximum=200),
+        metavar="N",
+        help="priority of sACN, of which receivers take the highest (default: 90, below the 100 of "
+        "consoles, so that these win)",
+    )
+    parser.add_argument(
+        "--fps",
+        type=arguments.at_least(1, maximum=60),
+        default=30,
+        metavar="N",
+        help="frames a second while levels change; else a packet leaves every 0.8 s (default: "
+        "%(default)s)",
+    )
+    add_fade(parser, "fade in from darkness, evenly in light (default: at once)")
+    parser.add_argument(
+        "--until",
+        type=until,
+        default="ctrl-c",
+        metavar="ctrl-c|done|SECONDS",
+        help="when to end: with Ctrl-C, once the fade is over and sent, or after a time (default: "
+        "%(default)s)",
+    )
+    parser.add_argument(
+        "--blackout",
+        action="store_true",
+        help="go dark at the end (default: end the stream with the last levels, of which receivers "
+        "do what they are set to do)",
+    )
+    _add_interface(parser, "send from this IPv4 address of the machine (default: any)")
+    parser.add_argument(
+        "--dump",
+        type=Path,
+        metavar="dmx.csv|dmx.json",
+        help="write the levels of all channels into a table, or with those of whole universes into "
+        "a JSON file",
+    )
+    parser.add_argument(
+        "--force", action="store_true", help="replace an existing file (default: refuse)"
+    )
+
+
+def sending_of(options: argparse.Namespace) -> Sending:
+    """Return where and how the options say to send. Raises ConsoleError for a priority of Art-Net,
+    which has none.
+    """
+    if options.target is not None and options.priority is not None:
+        protocol = options.target.protocol
+        if protocol.scheme != "sacn":
+            raise ConsoleError(f"{protocol.name} has no priority: leave --priority out")
+    return Sending(
+        options.target,
+        dict(options.universes),
+        options.priority,
+        options.fps,
+        options.fade_s,
+        options.until,
+        options.blackout,
+        options.interface or "",
+    )
+
+
+def add_listen(parser: argparse.ArgumentParser) -> None:
+    """Add the options of `listen`."""
+    add_rig(parser, required=False, purpose="print drives of lights instead of channels: ")
+    parser.add_argument(
+        "--from",
+        dest="protocol",
+        choices=tuple(PROTOCOLS),
+        default="sacn",
+        help="protocol to listen for (default: %(default)s)",
+    )
+    _add_universes(parser)
+    parser.add_argument(
+        "--port",
+        type=arguments.at_least(1, maximum=65535),
+        metavar="N",
+        help="port to listen at (default: 5568 for sACN, 6454 for Art-Net)",
+    )
+    _add_interface(
+        parser,
+        "listen at this IPv4 address of the machine; 0.0.0.0 for all, with the multicast of the "
+        "rig's universes (default: 127.0.0.1, for programs of this machine)",
+    )
+    parser.add_argument(
+        "--seconds",
+        type=duration,
+        metavar="N",
+        help="end after this time (default: with Ctrl-C)",
+    )
+
+
+def _add_universes(parser: argparse.ArgumentParser) -> None:
+    parser.add_argument(
+        "--universe",
+        dest="universes",
+        type=universe_pairs,
+        action="extend",
+        default=[],
+        metavar="1:5,...",
+        help="universe 1 of the rig is universe 5 of the network; may be repeated (default: the "
+        "same number; for Art-Net, which counts from 0, one less)",
+    )
+
+
+def _add_interface(parser: argparse.ArgumentParser, description: str) -> None:
+    parser.add_argument("--interface", metavar="ADDRESS", help=description)
+
+
+def target(text: str) -> ConsoleTarget:
+    """Parse where to send, `sacn://HOST`."""
+    try:
+        return parse_target(text)
+    except ConsoleError as error:
+        raise argparse.ArgumentTypeError(str(error)) from None
+
+
+def universe_pairs(text: str) -> list[tuple[int, int]]:
+    """Parse universes of a rig and of the network, `1:5,2:6`."""
+    pairs = []
+    for part in text.split(","):
+        own, colon, network = part.partition(":")
+        try:
+            pairs.append((parse_whole_number(own), parse_whole_number(network)))
+        except ValueError:
+            colon = ""
+        if not colon:
+            raise argparse.ArgumentTypeError(f"{text!r} is not RIG:NETWORK, such as 1:5")
+    return pairs
+
+
+def duration(text: str) -> float:
+    """Parse a time in seconds, `3`, `3s`, `500ms` or `2min`."""
+    number_text = text.strip().rstrip("abcdefghijklmnopqrstuvwxyz")
+    unit = text.strip()[len(number_text) :]
+    try:
+        seconds = parse_number(number_text) * UNITS[unit]
+    except (ValueError, KeyError):
+        seconds = -1.0
+    if not 0 <= seconds <= MAX_DURATION_S:
+        raise argparse.ArgumentTypeError(
+            f"{text!r} is not a time like 3s, 500ms or 2min, of a day at most"
+        )
+    return seconds
+
+
+def until(text: str) -> Until:
+    """Parse when to end."""
+    match text.strip():
+        case "ctrl-c" | "done" as word:
+            return word
+    try:
+        return duration(text)
+    except argparse.ArgumentTypeError:
+        raise argparse.ArgumentTypeError(
+            f"{text!r} is neither ctrl-c nor done, nor a time like 10s"
+        ) from None

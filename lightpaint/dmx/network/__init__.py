@@ -1,0 +1,1 @@
+"""Levels on a network: to a console, and back."""

@@ -1,0 +1,67 @@
+"""Levels as Art-Net 4, by the library `pyartnet`, whose node sends when it is told to."""
+
+import asyncio
+import socket
+from collections.abc import Collection, Mapping
+
+from pyartnet import ArtNetNode
+from pyartnet.base.network import UnicastNetworkTarget
+
+from lightpaint.dmx.console_rig import UNIVERSE_SIZE
+from lightpaint.dmx.network.console_target import ConsoleTarget
+
+#: The address of all nodes in the network.
+BROADCAST = "255.255.255.255"
+
+
+class BroadcastTarget(UnicastNetworkTarget):
+    """An address of many nodes, to which a plain socket may not send."""
+
+    def create_socket(self) -> socket.socket:
+        """Return a socket that may."""
+        created = super().create_socket()
+        created.setsockopt(socket.SOL_SOCKET, socket.SO_BROADCAST, 1)
+        return created
+
+
+class ArtnetOutput:
+    """A controller that sends Art-Net. The protocol has no priority and no end of a stream."""
+
+    def __init__(
+        self, target: ConsoleTarget, universes: Collection[int], *, interface: str
+    ) -> None:
+        """Open a socket; nothing is sent. interface: address of this machine, "" for any.
+
+        Raises ConsoleError for a host without an address.
+        """
+        kind = BroadcastTarget if target.is_group else UnicastNetworkTarget
+        host = BROADCAST if target.is_group else target.address()
+        self._node = ArtNetNode(kind.create(host, target.port, source_ip=interface or None))
+        self._channels = {
+            universe: self._node.add_universe(universe).add_channel(1, UNIVERSE_SIZE)
+            for universe in universes
+        }
+        self._loop = asyncio.new_event_loop()
+        self._loop.run_until_complete(self._open())
+
+    def send(self, levels: Mapping[int, bytes]) -> None:
+        """Send the 512 bytes of each universe. Raises OSError."""
+        self._loop.run_until_complete(self._send(levels))
+
+    def close(self) -> None:
+        """Close the socket; nodes keep their last levels."""
+        try:
+            self._loop.run_until_complete(self._node.__aexit__(None, None, None))
+        finally:
+            self._loop.close()
+
+    async def _open(self) -> None:
+        await self._node.__aenter__()
+        # The schedule is ours: both protocols have the same.
+        await self._node.stop_refresh()
+
+    async def _send(self, levels: Mapping[int, bytes]) -> None:
+        for universe, values in levels.items():
+            self._channels[universe].set_values(values)
+            # Sent here, so that an error reaches the caller, and not the node's own task.
+            self._node.get_universe(universe).send_data()

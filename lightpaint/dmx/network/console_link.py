@@ -1,0 +1,276 @@
+"""A link to a console: what is shown last leaves at a steady rate, from a thread of its own."""
+
+import math
+import socket
+import time
+from collections.abc import Collection, Mapping
+from contextlib import suppress
+from importlib.util import find_spec
+from threading import Condition, Thread
+from types import TracebackType
+from typing import Protocol, Self
+
+from lightpaint.dmx.console_rig import ConsoleRig
+from lightpaint.dmx.levels import encode_levels
+from lightpaint.dmx.network.console_target import (
+    SACN,
+    ConsoleTarget,
+    DmxProtocol,
+    network_universes,
+    parse_target,
+)
+from lightpaint.dmx.network.send_schedule import REPEATS, SendSchedule
+from lightpaint.dmx.rig_drives import DriveFade, RigDrives, check_drives
+from lightpaint.errors import ConsoleError
+
+#: The source of sACN, as consoles show it.
+SOURCE_NAME = "lightpaint"
+
+#: Below that of consoles, 100: what they send wins.
+PRIORITY = 90
+
+#: Highest priority of sACN.
+MAX_PRIORITY = 200
+
+#: Frames in a second; DMX itself carries up to 44.
+FPS, MAX_FPS = 30, 60
+
+
+class LevelOutput(Protocol):
+    """A sender of levels by one protocol, used from one thread."""
+
+    def send(self, levels: Mapping[int, bytes]) -> None:
+        """Send the 512 bytes of each universe, as the network numbers them. Raises OSError."""
+
+    def close(self) -> None:
+        """End what was sent, as the protocol has it."""
+
+
+class ConsoleLink:
+    """A link that sends the drives of a rig to a console while it is open.
+
+        with ConsoleLink.open("sacn://127.0.0.1", rig) as link:
+            link.show({"par left": {"red": 0.4}}, fade_s=3)
+
+    Nothing is sent before the first `show`. All methods may be called from any thread. What is
+    shown last wins: a frame takes it whenever it is due. At the end a stream of sACN is terminated,
+    and receivers do what they are set to do then; nothing goes dark unless it is told to.
+    """
+
+    def __init__(
+        self,
+        target: ConsoleTarget,
+        rig: ConsoleRig,
+        output: LevelOutput,
+        universes: Mapping[int, int],
+        *,
+        priority: int,
+        fps: float,
+    ) -> None:
+        """Start the thread. universes: of the network, by those of the rig."""
+        self.target, self.universes = target, dict(universes)
+        self._rig, self._output, self._priority = rig, output, priority
+        self._frame_s, self._schedule = 1 / fps, SendSchedule()
+        self._changed = Condition()
+        self._fade: DriveFade | None = None
+        self._is_new = self._is_closing = self._goes_dark = False
+        self._frame_began_s = -math.inf
+        self._levels: dict[int, bytes] = {}
+        self._trouble: str | None = None
+        self._has_sent = False
+        self._thread = Thread(target=self._run, name="lightpaint-console", daemon=True)
+        self._thread.start()
+
+    @classmethod
+    def open(
+        cls,
+        target: ConsoleTarget | str,
+        rig: ConsoleRig,
+        *,
+        universes: Mapping[int, int] | None = None,
+        priority: int = PRIORITY,
+        fps: float = FPS,
+        interface: str = "",
+    ) -> Self:
+        """Return a link to a target, like `sacn://127.0.0.1`; nothing is sent yet.
+
+        universes: of the network by those of the rig, for those that differ. priority: of sACN, 0
+        to 200; Art-Net has none. fps: frames in a second. interface: IPv4 address of this machine
+        to send from, "" for any. Raises ConsoleError for a host, a universe or an interface that
+        does not exist, and without the library of the protocol.
+        """
+        target = parse_target(target) if isinstance(target, str) else target
+        numbers = network_universes(rig, target.protocol, universes)
+        if not numbers:
+            raise ConsoleError(f"{rig.name} has no channel: there is nothing to send")
+        if not 0 <= priority <= MAX_PRIORITY:
+            raise ConsoleError(f"the priority is {priority}: expected 0 to {MAX_PRIORITY}")
+        if not 0 < fps <= MAX_FPS:
+            raise ConsoleError(f"fps is {fps:g}: expected more than 0, at most {MAX_FPS}")
+        check_library(target.protocol)
+        output = _open_output(target, numbers.values(), priority=priority, interface=interface)
+        return cls(target, rig, output, numbers, priority=priority, fps=fps)
+
+    @property
+    def address(self) -> str:
+        """The target, universes, source and priority in words."""
+        numbers = [*self.universes.values()]
+        plural = "s" if len(numbers) > 1 else ""
+        text = f"{self.target}, universe{plural} {', '.join(map(str, numbers))}"
+        if self.target.protocol is not SACN:
+            return text
+        return f"{text}, source {SOURCE_NAME!r}, priority {self._priority}"
+
+    @property
+    def trouble(self) -> str | None:
+        """The network's last refusal, in a sentence; None while packets leave."""
+        return self._trouble
+
+    @property
+    def has_sent(self) -> bool:
+        """True once a packet has left."""
+        return self._has_sent
+
+    @property
+    def is_settled(self) -> bool:
+        """True once fades are over and their last levels have been sent as often as they should."""
+        with self._changed:
+            return not self._is_moving() and self._schedule.is_settled
+
+    def show(self, drives: RigDrives, *, fade_s: float = 0.0) -> None:
+        """Show drives instead of what is shown now, at once or in a fade from there.
+
+        drives: by light and emitter, 0 to 1; all others go to 0. Before the first time all are at
+        0. Raises RigError for drives that do not fit the rig, ConsoleError once it is closed.
+        """
+        check_drives(self._rig, drives)
+        kept = {light: dict(values) for light, values in drives.items()}
+        with self._changed:
+            if self._is_closing:
+                raise ConsoleError(f"the link to {self.target} is closed: open it again")
+            now_s = time.monotonic()
+            start: RigDrives = {} if self._fade is None else self._fade.at(now_s)
+            self._fade, self._is_new = DriveFade(start, kept, now_s, fade_s), True
+            self._changed.notify()
+
+    def blackout(self) -> None:
+        """Take all drives to 0 at once. Channels that give no light stay at rest."""
+        self.show({})
+
+    def close(self, *, blackout: bool = False) -> None:
+        """End the link, and wait until its last packet has left.
+
+        blackout: whether to go dark before; else the last levels stay where receivers keep them.
+        """
+        with self._changed:
+            self._is_closing, self._goes_dark = True, blackout
+            self._changed.notify()
+        self._thread.join()
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(
+        self,
+        kind: type[BaseException] | None,
+        error: BaseException | None,
+        trace: TracebackType | None,
+    ) -> None:
+        self.close()
+
+    def _run(self) -> None:
+        """Send frames until the link is closed, then its end."""
+        try:
+            while self._wait():
+                self._send_frame()
+            if self._goes_dark and self._fade is not None:
+                dark = self._encoded({})
+                for _ in range(REPEATS):
+                    self._send(dark)
+        finally:
+            self._is_closing = True
+            # Receivers notice the end of packets by themselves.
+            with suppress(OSError):
+                self._output.close()
+
+    def _wait(self) -> bool:
+        """Wait for the next frame; return False once the link is closed."""
+        with self._changed:
+            while not self._is_closing:
+                left_s = self._due_s() - time.monotonic()
+                if left_s <= 0:
+                    return True
+                self._changed.wait(None if left_s == math.inf else left_s)
+            return False
+
+    def _due_s(self) -> float:
+        """Return the time of the next frame."""
+        if self._fade is None:
+            return math.inf
+        next_s = -math.inf if self._is_moving() else self._schedule.next_s
+        return max(self._frame_began_s + self._frame_s, next_s)
+
+    def _is_moving(self) -> bool:
+        """Return True if the next frame has other drives than the last one, or is the first."""
+        return self._is_new or self._fade is None or not self._fade.is_over(self._frame_began_s)
+
+    def _send_frame(self) -> None:
+        with self._changed:
+            fade, is_moving = self._fade, self._is_moving()
+            assert fade is not None
+            self._frame_began_s = now_s = time.monotonic()
+        if is_moving:
+            self._levels = self._encoded(fade.at(now_s))
+        with self._changed:
+            due = self._schedule.take_due(self._levels, now_s)
+            # A value that came meanwhile is for the next frame.
+            self._is_new = self._fade is not fade
+        self._send(due)
+
+    def _encoded(self, drives: RigDrives) -> dict[int, bytes]:
+        """Return the levels of drives by the universes of the network."""
+        levels = encode_levels(self._rig, drives)
+        return {self.universes[universe]: values for universe, values in levels.items()}
+
+    def _send(self, levels: Mapping[int, bytes]) -> None:
+        try:
+            self._output.send(levels)
+        except OSError as error:
+            # The cable may be back before the next frame.
+            self._trouble = f"cannot send to {self.target}: {error.strerror or error}"
+        else:
+            self._trouble, self._has_sent = None, True
+
+
+def check_library(protocol: DmxProtocol) -> None:
+    """Raise ConsoleError, with what to do, unless the library of a protocol is here."""
+    name = "sacn" if protocol is SACN else "pyartnet"
+    if find_spec(name) is None:
+        raise ConsoleError(f"{protocol.name} needs {name}: pip install 'lightpaint[stage]'")
+
+
+def _open_output(
+    target: ConsoleTarget, universes: Collection[int], *, priority: int, interface: str
+) -> LevelOutput:
+    """Return the output for a target. Raises ConsoleError for an interface of another machine."""
+    try:
+        if interface:
+            with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as tried:
+                tried.bind((interface, 0))
+        if target.protocol is SACN:
+            from lightpaint.dmx.network.sacn_output import SacnOutput
+
+            return SacnOutput(
+                *(target, universes),
+                source_name=SOURCE_NAME,
+                priority=priority,
+                interface=interface,
+            )
+        from lightpaint.dmx.network.artnet_output import ArtnetOutput
+
+        return ArtnetOutput(target, universes, interface=interface)
+    except OSError as error:
+        raise ConsoleError(
+            f"cannot send from {interface or 'this machine'}: {error.strerror or error}; expected "
+            "an IPv4 address of this machine"
+        ) from None

@@ -1,0 +1,68 @@
+"""A list of cues for consoles: a row for each channel of each look."""
+
+import csv
+import io
+from collections import Counter
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+from lightpaint.dmx.console_rig import ConsoleRig, DmxChannel, RigFixture
+from lightpaint.dmx.levels import encode_levels
+from lightpaint.dmx.rig_drives import RigDrives, check_drives
+from lightpaint.relit.export.exports import plain_cell
+from lightpaint.relit.export.level_table import channel_level
+
+#: The full level of a channel, whatever its bytes.
+FULL = 65535
+
+COLUMNS = ("cue", "label", "fade", "fixture", "channel", "value")
+
+
+@dataclass(frozen=True)
+class Cue:
+    """A look with a name. fade_s: seconds to get there."""
+
+    label: str
+    fade_s: float
+    drives: RigDrives
+
+
+def cue_list_csv(rig: ConsoleRig, cues: Sequence[Cue]) -> str:
+    """Return a table of cues, counted from 1, with all channels that give light.
+
+    A fixture goes by its id, or by its name if it has none; a channel by its attribute, after its
+    geometry where a fixture has several. Values are 0 to 65535, whatever bytes a channel has.
+    Raises RigError for drives that do not fit the rig.
+    """
+    text = io.StringIO()
+    table = csv.writer(text, lineterminator="\n")
+    table.writerow(COLUMNS)
+    for number, cue in enumerate(cues, start=1):
+        check_drives(rig, cue.drives)
+        levels = encode_levels(rig, cue.drives)
+        for fixture in rig.fixtures:
+            names = _channel_names(fixture)
+            for channel in _light_channels(fixture):
+                level = channel_level(fixture, channel, levels)
+                value = round(level / channel.highest * FULL)
+                words = (cue.label, fixture.fixture_id or fixture.name, names[channel])
+                label, name, attribute = map(plain_cell, words)
+                table.writerow((number, label, f"{cue.fade_s:g}", name, attribute, value))
+    return text.getvalue()
+
+
+def _light_channels(fixture: RigFixture) -> list[DmxChannel]:
+    """Return the channels that dim the fixture's lights and their emitters, in their order."""
+    used = {k for light in fixture.lights for k in light.dimmers}
+    used |= {k for light in fixture.lights for x in light.emitters for k in x.channels}
+    return [fixture.channels[k] for k in sorted(used)]
+
+
+def _channel_names(fixture: RigFixture) -> dict[DmxChannel, str]:
+    counts = Counter(channel.attribute for channel in fixture.channels)
+    return {
+        channel: channel.attribute
+        if counts[channel.attribute] == 1
+        else f"{channel.geometry}.{channel.attribute}"
+        for channel in fixture.channels
+    }

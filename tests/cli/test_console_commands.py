@@ -1,0 +1,347 @@
+"""`lightpaint send`, `listen` and `export --to cues`: everything stays on loopback."""
+
+import csv
+import json
+import re
+import signal
+import socket
+import subprocess
+import sys
+import threading
+import time
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
+import pytest
+from command import as_from_a_terminal, run, run_refused, succeed
+from console_rigs import lamp, open_port, sacn_fields, sacn_packet
+from patience import PATIENCE_S
+
+from lightpaint.cli.commands import console_commands
+from lightpaint.colour.lamp import Lamp, LampEmitter
+from lightpaint.dmx.console_rig import ConsoleRig
+from lightpaint.dmx.levels import encode_levels
+from lightpaint.lighting.answer.lighting import Lighting, LightSetting
+from lightpaint.lighting.answer.lighting_file import write_lighting
+
+COLORS = ("red", "green", "blue")
+RIG = ConsoleRig(
+    "show.mvr", (lamp("left", 1, colors=COLORS), lamp("right", 513, bits=16, colors=COLORS))
+)
+DRIVES = {"left": (1.0, 0.0, 0.25), "right": (0.125, 0.5, 0.0)}
+
+#: A drive in 8 bits, of which the dimmer has as many.
+TABLE_ROUNDING = 0.5 / 255
+
+
+def setting(name: str, emission: tuple[float, float, float]) -> LightSetting:
+    """A spot whose emitters are the channels of Rec.709, so that its emission is its drives."""
+    axes = ((1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0))
+    emitters = tuple(LampEmitter(x, axis) for x, axis in zip(COLORS, axes, strict=True))
+    return LightSetting(name, "spot", "intensity", "W/sr", emission, emission, lamp=Lamp(emitters))
+
+
+def write_look(path: Path, drives: dict[str, tuple[float, float, float]] = DRIVES) -> Path:
+    lights = tuple(setting(name, emission) for name, emission in drives.items())
+    path.parent.mkdir(exist_ok=True)
+    write_lighting(path, Lighting(lights, target="evening.png", scene_identity="0" * 16))
+    return path
+
+
+@pytest.fixture
+def folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    """A folder with an answer, and a rig that is at hand whatever its file."""
+    monkeypatch.setattr(console_commands, "read_rig_file", lambda _: RIG)
+    write_look(tmp_path / "lighting.json")
+    return tmp_path
+
+
+@pytest.fixture
+def port() -> Iterator[socket.socket]:
+    with open_port() as opened:
+        yield opened
+
+
+def packets_of(port: socket.socket) -> list[Any]:
+    port.settimeout(0)
+    packets = []
+    while True:
+        try:
+            packets.append(sacn_fields(port.recv(2048)))
+        except BlockingIOError:
+            return packets
+
+
+def target_of(port: socket.socket, scheme: str = "sacn") -> str:
+    return f"{scheme}://127.0.0.1:{port.getsockname()[1]}"
+
+
+SEND = ("send", "lighting.json", "--rig", "show.mvr")
+
+
+def test_an_answer_is_sent_and_its_stream_ended(folder: Path, port: socket.socket) -> None:
+    target = target_of(port)
+    output = succeed(folder, *SEND, "--to", target, "--until", "done")
+    assert output == f"sending to {target}, universes 1, 2, source 'lightpaint', priority 90\n"
+    packets = packets_of(port)
+    expected = encode_levels(
+        RIG, {name: dict(zip(COLORS, x, strict=True)) for name, x in DRIVES.items()}
+    )
+    assert all(x.slots == expected[x.universe] for x in packets)
+    assert [x.is_last for x in packets] == [False] * 6 + [True] * 6
+
+
+def test_universes_priority_and_blackout(folder: Path, port: socket.socket) -> None:
+    options = ("--universe", "1:7,2:9", "--priority", 120, "--blackout", "--until", "0.1s")
+    output = succeed(folder, *SEND, "--to", target_of(port), *options)
+    assert "universes 7, 9, source 'lightpaint', priority 120" in output
+    packets = packets_of(port)
+    assert {(x.universe, x.priority) for x in packets} == {(7, 120), (9, 120)}
+    rest = encode_levels(RIG, {})
+    assert packets[-1].slots == rest[2]
+    assert packets[0].slots != rest[1]
+
+
+def test_a_fade_comes_in_from_darkness(folder: Path, port: socket.socket) -> None:
+    succeed(folder, *SEND, "--to", target_of(port), "--fade", "300ms", "--until", "done")
+    reds = [x.slots[0] for x in packets_of(port) if x.universe == 1]
+    assert reds == sorted(reds)
+    assert reds[0] < 30
+    assert reds[-1] == 255
+    assert len(set(reds)) > 4
+
+
+def test_nothing_is_sent_without_a_target(folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    def refuse(*_: Any, **__: Any) -> None:
+        raise AssertionError("no socket is needed")
+
+    monkeypatch.setattr(socket, "socket", refuse)
+    completed = run(folder, *SEND)
+    assert completed.returncode == 0, completed.stderr
+    assert "nothing is sent without --to" in completed.stderr
+    rows = [line.split() for line in completed.stdout.splitlines()]
+    assert rows[0] == ["id", "fixture", "light", "emitter", "drive", "channel", "value"]
+    assert ["101", "left", "left", "blue", "0.250", "1.7", "64"] in rows
+    assert ["613", "right", "right", "dimmer", "2.1", "128"] in rows
+    assert len(rows) == 1 + 2 * 4
+
+
+def test_the_table_has_what_is_sent(folder: Path) -> None:
+    succeed(folder, *SEND, "--dump", "dmx.csv", "--universe", "2:40")
+    with (folder / "dmx.csv").open(newline="") as file:
+        rows = list(csv.DictReader(file))
+    assert [*rows[0]] == [
+        *("fixture_id", "fixture", "light", "emitter"),
+        *("drive", "universe", "channels", "value"),
+    ]
+    [green] = [x for x in rows if (x["light"], x["emitter"]) == ("right", "green")]
+    assert (float(green["drive"]), green["universe"], green["channels"]) == (0.5, "40", "7 8")
+    [dimmer] = [x for x in rows if (x["light"], x["emitter"]) == ("right", "dimmer")]
+    share = int(green["value"]) / 65535 * int(dimmer["value"]) / 255
+    assert share == pytest.approx(0.5, abs=TABLE_ROUNDING)
+
+
+def test_the_document_has_all_levels(folder: Path) -> None:
+    succeed(folder, *SEND, "--dump", "dmx.json")
+    document = json.loads((folder / "dmx.json").read_text())
+    assert document["format"] == "lightpaint-dmx 1"
+    drives = {name: dict(zip(COLORS, x, strict=True)) for name, x in DRIVES.items()}
+    levels = {int(k): bytes(values) for k, values in document["universes"].items()}
+    assert levels == encode_levels(RIG, drives)
+    printed = json.loads(succeed(folder, *SEND, "--json"))
+    assert printed == {"target": None, **document}
+
+
+def test_a_rig_has_lights_that_an_answer_does_not(folder: Path) -> None:
+    write_look(folder / "lighting.json", {"left": (1.0, 0.0, 0.0)})
+    assert "lighting.json has no drives for right, which stay dark" in run(folder, *SEND).stderr
+
+
+@pytest.mark.parametrize(
+    ("arguments", "line"),
+    [
+        (("send", "lighting.json"), "the following arguments are required: --rig"),
+        ((*SEND, "--to", "dmx"), "'dmx' is not a target: expected sacn://127.0.0.1"),
+        ((*SEND, "--to", "sacn://239.255.0.1"), "write sacn://multicast to reach all of them"),
+        ((*SEND, "--to", "artnet://10.0.0.1", "--priority", 90), "Art-Net has no priority"),
+        ((*SEND, "--to", "sacn://127.0.0.1", "--priority", 201), "at most 200"),
+        ((*SEND, "--universe", "1"), "'1' is not RIG:NETWORK, such as 1:5"),
+        ((*SEND, "--universe", "9:1"), "show.mvr has no universe 9: it has 1, 2"),
+        ((*SEND, "--universe", "1:2"), "would both be universe 2"),
+        ((*SEND, "--fade", "soon"), "'soon' is not a time like 3s, 500ms or 2min"),
+        ((*SEND, "--until", "never"), "'never' is neither ctrl-c nor done, nor a time like 10s"),
+        ((*SEND, "--dump", "dmx.txt"), "expected a file .csv or .json"),
+        ((*SEND, "--dump", "lighting.json"), "is an input of this command"),
+        ((*SEND, "--to", "sacn://127.255.255.255", "--until", "done"), "Permission denied"),
+        (("listen", "--universe", "1:5", "--seconds", "0"), "give --rig, too"),
+        (("listen", "--interface", "stage", "--seconds", "0"), "is not an IPv4 address"),
+        (("export", "lighting.json", "--to", "cues"), "give --rig show.mvr"),
+        (
+            ("export", "lighting.json", "lighting.json", "--to", "cues,csv", "--rig", "show.mvr"),
+            "csv takes one lighting, not 2; cues take all",
+        ),
+    ],
+)
+def test_mistakes_are_one_line(folder: Path, arguments: tuple[Any, ...], line: str) -> None:
+    completed = run(folder, *arguments)
+    assert completed.returncode == 2, completed.stdout + completed.stderr
+    [text] = completed.stderr.strip().splitlines()
+    assert line in text
+
+
+def test_what_does_not_fit_is_refused_and_nothing_sent(folder: Path, port: socket.socket) -> None:
+    command = (*SEND, "--to", target_of(port), "--until", "done")
+    write_look(folder / "lighting.json", {"sun": (1.0, 0.0, 0.0)})
+    assert "show.mvr has no light sun: it has left, right" in run_refused(folder, *command)
+    plain = LightSetting("left", "spot", "intensity", "W/sr", (1, 1, 1), (1, 1, 1))
+    lighting = Lighting((plain,), target="evening.png", scene_identity="0" * 16)
+    write_lighting(folder / "lighting.json", lighting)
+    assert "lighting.json has no drives" in run_refused(folder, *command)
+    (folder / "dmx.csv").write_text("mine")
+    write_look(folder / "lighting.json")
+    assert "dmx.csv exists" in run_refused(folder, *command, "--dump", "dmx.csv")
+    assert packets_of(port) == []
+
+
+def test_a_taken_port_is_refused(folder: Path, port: socket.socket) -> None:
+    number = port.getsockname()[1]
+    line = run_refused(folder, "listen", "--port", number, "--seconds", "1")
+    assert f"port {number} of 127.0.0.1 is taken: end the program that listens there" in line
+
+
+class Sender(threading.Thread):
+    """A console that sends packets to a port again and again."""
+
+    def __init__(self, number: int, *packets: bytes) -> None:
+        super().__init__(daemon=True)
+        self._address, self._packets, self.is_over = ("127.0.0.1", number), packets, False
+
+    def run(self) -> None:
+        with open_port() as own:
+            while not self.is_over:
+                for packet in self._packets:
+                    own.sendto(packet, self._address)
+                time.sleep(0.02)
+
+
+def free_port() -> int:
+    with open_port() as port:
+        return int(port.getsockname()[1])
+
+
+def listened(folder: Path, packets: list[bytes], *options: object) -> str:
+    number = free_port()
+    sender = Sender(number, *packets)
+    sender.start()
+    try:
+        return succeed(folder, "listen", "--port", number, "--seconds", "0.5s", *options)
+    finally:
+        sender.is_over = True
+        sender.join()
+
+
+def sent_packets() -> list[bytes]:
+    drives = {name: dict(zip(COLORS, x, strict=True)) for name, x in DRIVES.items()}
+    levels = encode_levels(RIG, drives)
+    # All of one sequence number: the first of each counts.
+    return [sacn_packet(levels[x], universe=x + 10, priority=110) for x in (1, 2)]
+
+
+def test_listen_prints_drives_by_fixture(folder: Path) -> None:
+    options = ("--rig", "show.mvr", "--universe", "1:11,2:12")
+    output = listened(folder, sent_packets(), *options)
+    first, *lines = output.splitlines()
+    assert re.fullmatch(r"listening for sACN at 127\.0\.0\.1, port \d+", first)
+    assert "universe 11: from 'console', priority 110" in lines
+    assert "101 left, left: red=1.000 green=0.000 blue=0.251" in lines
+    assert lines.count("101 left, left: red=1.000 green=0.000 blue=0.251") == 1
+    document = json.loads(listened(folder, sent_packets(), *options, "--json", "-q"))
+    assert document["protocol"] == "sacn"
+    for name, drives in DRIVES.items():
+        for color, drive in zip(COLORS, drives, strict=True):
+            found = document["lights"][name][color]
+            assert found == pytest.approx(drive, abs=TABLE_ROUNDING)
+    assert document["universes"]["11"]["source"] == "console"
+
+
+def test_listen_prints_channels_without_a_rig(folder: Path) -> None:
+    output = listened(folder, [sacn_packet(b"\x01\x00\x05", universe=3)])
+    assert "channels of universe 3: 1=1 3=5" in output.splitlines()
+
+
+def test_listen_says_that_nothing_arrived(folder: Path) -> None:
+    number = free_port()
+    completed = run(folder, "listen", "--port", number, "--seconds", "0.05", "--from", "artnet")
+    assert completed.returncode == 0
+    assert f"nothing arrived at 127.0.0.1, port {number}" in completed.stderr
+
+
+#: A program with a rig of its own: `send` in a process that signals reach.
+PROGRAM = """
+import sys
+sys.path[:0] = [{tests!r}, {here!r}]
+import test_console_commands
+from lightpaint.cli import main
+from lightpaint.cli.commands import console_commands
+console_commands.read_rig_file = lambda _: test_console_commands.RIG
+sys.exit(main({arguments!r}))
+"""
+
+
+@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
+@pytest.mark.parametrize("until", ["ctrl-c", "60s"])
+def test_signals_end_the_stream(
+    folder: Path, port: socket.socket, number: signal.Signals, until: str
+) -> None:
+    """Ctrl-C is how it ends, or too early; either way its stream is terminated."""
+    here = Path(__file__).parent
+    arguments = [*SEND, "--to", target_of(port), "--until", until]
+    program = PROGRAM.format(tests=str(here.parent), here=str(here), arguments=arguments)
+    with subprocess.Popen(
+        [sys.executable, "-c", program],
+        cwd=folder,
+        stdout=subprocess.PIPE,
+        stderr=subprocess.PIPE,
+        text=True,
+        preexec_fn=as_from_a_terminal,
+    ) as process:
+        assert not sacn_fields(port.recv(2048)).is_last
+        process.send_signal(number)
+        output, errors = process.communicate(timeout=PATIENCE_S)
+    assert process.returncode == (0 if until == "ctrl-c" else 128 + number), errors
+    assert output.startswith("sending to sacn://127.0.0.1")
+    assert errors == ("" if until == "ctrl-c" else "lightpaint send: interrupted\n")
+    packets = packets_of(port)
+    assert [x.is_last for x in packets][-6:] == [True] * 6
+    # Nothing went dark.
+    assert packets[-1].slots[:4] != encode_levels(RIG, {})[2][:4]
+
+
+def test_cues_of_several_looks(folder: Path) -> None:
+    write_look(folder / "dusk" / "lighting.json")
+    write_look(folder / "=night.json", {"left": (0.0, 0.0, 0.5)})
+    command = ("export", "dusk/lighting.json", "=night.json", "--to", "cues", "--rig", "show.mvr")
+    output = succeed(folder, *command, "--fade", "2.5s", "-o", "out")
+    assert output == "out/cues.csv\n"
+    with (folder / "out" / "cues.csv").open(newline="") as file:
+        rows = list(csv.DictReader(file))
+    assert [*rows[0]] == ["cue", "label", "fade", "fixture", "channel", "value"]
+    names = ["Dimmer", "ColorAdd_R", "ColorAdd_G", "ColorAdd_B"]
+    assert [x["channel"] for x in rows] == names * 4
+    assert [(x["cue"], x["label"]) for x in rows[::8]] == [("1", "dusk"), ("2", "'=night")]
+    assert {x["fade"] for x in rows} == {"2.5"}
+    assert [x["fixture"] for x in rows[::4]] == ["101", "613"] * 2
+    assert [int(x["value"]) for x in rows[:4]] == [65535, 65535, 0, round(64 / 255 * 65535)]
+    # The dimmer of the second has the largest drive in 8 bits, and green makes up for its rounding.
+    dimmer, _, green = (int(x["value"]) / 65535 for x in rows[4:7])
+    assert dimmer == pytest.approx(128 / 255, abs=0.5 / 65535)
+    assert dimmer * green == pytest.approx(0.5, abs=1 / 65535)
+    assert all(int(x["value"]) == 0 for x in rows[12:])
+
+
+def test_cues_go_beside_other_forms(folder: Path) -> None:
+    command = ("export", "lighting.json", "--to", "csv,cues", "--rig", "show.mvr", "-o", "out")
+    succeed(folder, *command)
+    assert sorted(x.name for x in (folder / "out").iterdir()) == ["cues.csv", "fixtures.csv"]
+    assert "exists" in run(folder, *command).stderr
