@@ -17,6 +17,7 @@ GUIDES = {
     "paint": "painter",
     "batch": "batch",
     "export": "formats",
+    "rig": "stage",
     "send": "console",
     "listen": "console",
     "blender": "blender",

@@ -7,7 +7,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 from functools import cached_property
 
-from lightpaint.arrays import Position
+from lightpaint.arrays import RGB, Position
 from lightpaint.display_text import some_names
 from lightpaint.errors import RigError
 
@@ -23,6 +23,8 @@ class DmxChannel:
     offsets: the places of its bytes from the fixture's address, the coarse one first, from 1.
     dmx_break: the address that they count from, from 1.
     default: its level at rest, of all its bytes.
+    curve: pairs of a share of its highest level and the share of what it controls that this gives,
+    the shares rising from 0 to 1; straight if there are none.
     """
 
     attribute: str
@@ -30,6 +32,7 @@ class DmxChannel:
     offsets: tuple[int, ...]
     dmx_break: int = 1
     default: int = 0
+    curve: tuple[tuple[float, float], ...] = ()
 
     @property
     def highest(self) -> int:
@@ -43,7 +46,7 @@ class RigEmitter:
 
     xy: chromaticity of CIE 1931. candela: luminous intensity at full, in the middle of the beam.
     channels: places, among those of the fixture, of all channels that set it.
-    curve: pairs of a channel's share of its highest level and the share of light that this gives,
+    curve: pairs of a share of what its channels control and the share of light that this gives,
     from (0, 0) to (1, 1), both rising; straight if there are none.
     watts: power at full, if known.
     """
@@ -57,6 +60,19 @@ class RigEmitter:
 
 
 @dataclass(frozen=True)
+class RigFilter:
+    """A filter of a light that moves in without steps, such as cyan.
+
+    density: optical density (natural logarithm) of all of it for red, green and blue; of a part of
+    it in proportion. channels: places of all channels that set it.
+    """
+
+    name: str
+    density: RGB
+    channels: tuple[int, ...]
+
+
+@dataclass(frozen=True)
 class RigLight:
     """A light of a fixture: all its beams together, or one of its pixels.
 
@@ -65,6 +81,11 @@ class RigLight:
     beam_angle, field_angle: full angles in degrees at 50 % and 10 % of the intensity.
     dimmers: places of the fixture's channels that multiply all its emitters; the first of them
     carries the level, the others stay at full.
+    masters: places of channels that multiply it and other lights, and stay at full.
+    filters: three of them, which set red, green and blue, its emitters, instead of channels of
+    these.
+    chromaticity: places of two channels that set x and y of CIE 1931 of the sum of its emitters,
+    and in their place; `dimmers` set the sum's luminance. Empty for other lights.
     """
 
     name: str
@@ -75,6 +96,9 @@ class RigLight:
     field_angle: float
     emitters: tuple[RigEmitter, ...]
     dimmers: tuple[int, ...] = ()
+    masters: tuple[int, ...] = ()
+    filters: tuple[RigFilter, ...] = ()
+    chromaticity: tuple[int, ...] = ()
 
 
 @dataclass(frozen=True)
@@ -126,9 +150,11 @@ class ConsoleRig:
         places = fixture.places(channel)
         first = fixture.addresses[channel.dmx_break]
         if places and any(universe != 1 + (first - 1) // UNIVERSE_SIZE for universe, _ in places):
+            own = [x for x in fixture.channels if x.dmx_break == channel.dmx_break]
+            last = max(offset for x in own for offset in x.offsets)
             raise RigError(
                 f"{self.name}: {fixture.name!r} at {address_text(first)} needs channel "
-                f"{(first - 1) % UNIVERSE_SIZE + max(channel.offsets)} of its universe, which has "
+                f"{(first - 1) % UNIVERSE_SIZE + last} of its universe, which has "
                 f"{UNIVERSE_SIZE}: give it a lower address"
             )
         for universe, index in places:

@@ -5,15 +5,20 @@ largest drive and its emitters the others relative to that, as on a console; so 
 the resolution of the emitters' channels. Its further dimmers are at full, all else is at rest.
 """
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 
 import numpy as np
 
+from lightpaint.dmx.color_mixing import (
+    drives_of_filters,
+    drives_of_xy,
+    filters_for_drives,
+    xy_for_drives,
+)
 from lightpaint.dmx.console_rig import (
     UNIVERSE_SIZE,
     ConsoleRig,
     DmxChannel,
-    RigEmitter,
     RigFixture,
     RigLight,
 )
@@ -52,53 +57,78 @@ def decode_levels(rig: ConsoleRig, universes: Mapping[int, bytes]) -> dict[str, 
 def _levels_of(fixture: RigFixture, light: RigLight, drives: Drives) -> dict[int, int]:
     """Return the levels of the channels of a light, by their places among the fixture's."""
     channels = fixture.channels
-    dimmer = max((drives.get(x.name, 0.0) for x in light.emitters), default=0.0)
-    top = dimmer if light.dimmers else 1.0
-    levels = {k: channels[k].highest for k in light.dimmers[1:]}
-    levels |= {k: _rounded(dimmer, channels[k]) for k in light.dimmers[:1]}
-    if light.dimmers and levels[light.dimmers[0]]:
+    levels = {k: _level(1.0, channels[k]) for k in (*light.dimmers[1:], *light.masters)}
+    wanted = [min(max(drives.get(x.name, 0.0), 0.0), 1.0) for x in light.emitters]
+    if light.filters:
+        dimmer, places = filters_for_drives(light, wanted)
+        for filter_, place in zip(light.filters, places, strict=True):
+            levels |= {k: _level(place, channels[k]) for k in filter_.channels}
+        return levels | {k: _level(dimmer, channels[k]) for k in light.dimmers[:1]}
+    if light.chromaticity:
+        dimmer, xy = xy_for_drives(light, wanted)
+        levels |= {k: _level(v, channels[k]) for k, v in zip(light.chromaticity, xy, strict=True)}
+        return levels | {k: _level(dimmer, channels[k]) for k in light.dimmers[:1]}
+    top = 1.0
+    for k in light.dimmers[:1]:
+        levels[k] = _level(max(wanted, default=0.0), channels[k])
         # The emitters make up for the rounding of the dimmer.
-        top = levels[light.dimmers[0]] / channels[light.dimmers[0]].highest
-    for emitter in light.emitters:
-        share = min(drives.get(emitter.name, 0.0) / top, 1.0) if top else 0.0
-        levels |= {
-            k: _rounded(_channel_share(emitter, share), channels[k]) for k in emitter.channels
-        }
+        top = _share(levels[k], channels[k])
+    for emitter, drive in zip(light.emitters, wanted, strict=True):
+        share = min(drive / top, 1.0) if top > 0 else 0.0
+        controlled = _inverse(emitter.curve, share)
+        levels |= {k: _level(controlled, channels[k]) for k in emitter.channels}
     return levels
 
 
 def _drives_of(
     fixture: RigFixture, light: RigLight, universes: Mapping[int, bytes]
 ) -> dict[str, float]:
-    shares = {
-        k: _read(universes, fixture, fixture.channels[k]) / fixture.channels[k].highest
-        for k in {*light.dimmers, *(k for x in light.emitters for k in x.channels)}
-    }
-    dimmer = float(np.prod([shares[k] for k in light.dimmers]))
-    return {
-        x.name: dimmer * _light_share(x, float(np.mean([shares[k] for k in x.channels] or [1.0])))
-        for x in light.emitters
-    }
+    channels = fixture.channels
+
+    def share(k: int) -> float:
+        return _share(_read(universes, fixture, channels[k]), channels[k])
+
+    def mean(places: Sequence[int]) -> float:
+        return float(np.mean([share(k) for k in places] or [1.0]))
+
+    names = [x.name for x in light.emitters]
+    dimmer = float(np.prod([share(k) for k in (*light.dimmers, *light.masters)]))
+    if light.filters:
+        found = drives_of_filters(light, dimmer, [mean(x.channels) for x in light.filters])
+    elif light.chromaticity:
+        found = drives_of_xy(light, dimmer, [share(k) for k in light.chromaticity])
+    else:
+        found = [dimmer * _forward(x.curve, mean(x.channels)) for x in light.emitters]
+    return dict(zip(names, found, strict=True))
 
 
-def _rounded(share: float, channel: DmxChannel) -> int:
-    return round(min(max(share, 0.0), 1.0) * channel.highest)
+#: Pairs of a level and what it gives, which rises.
+_Curve = Sequence[tuple[float, float]]
 
 
-def _channel_share(emitter: RigEmitter, light: float) -> float:
-    """Return the share of a channel's highest level that gives a share of light."""
-    if not emitter.curve:
-        return light
-    levels, lights = zip(*emitter.curve, strict=True)
-    return float(np.interp(light, lights, levels))
+def _level(share: float, channel: DmxChannel) -> int:
+    """Return the level at which a channel gives a share of what it controls."""
+    return round(min(max(_inverse(channel.curve, share), 0.0), 1.0) * channel.highest)
 
 
-def _light_share(emitter: RigEmitter, level: float) -> float:
-    """Return the share of light that a share of a channel's highest level gives."""
-    if not emitter.curve:
+def _share(level: int, channel: DmxChannel) -> float:
+    """Return the share of what a channel controls that a level gives."""
+    return _forward(channel.curve, level / channel.highest)
+
+
+def _inverse(curve: _Curve, share: float) -> float:
+    if not curve:
+        return share
+    levels, shares = zip(*curve, strict=True)
+    return float(np.interp(share, shares, levels))
+
+
+def _forward(curve: _Curve, level: float) -> float:
+    if not curve:
         return level
-    levels, lights = zip(*emitter.curve, strict=True)
-    return float(np.interp(level, levels, lights))
+    # Levels fall where a channel is inverted.
+    levels, shares = zip(*sorted(curve), strict=True)
+    return float(np.interp(level, levels, shares))
 
 
 def _write(

@@ -20,7 +20,7 @@ from lightpaint.errors import LightpaintError
 from lightpaint.lighting.answer.lighting import Lighting
 from lightpaint.progress import Listener
 from lightpaint.relit.emission_xml import safe_name
-from lightpaint.relit.export.nuke import RigKind, RigLight
+from lightpaint.relit.export.nuke import NukeLight, RigKind
 from lightpaint.relit.export.program_axes import SkyMap, lat_long, map_axes, map_size_for
 from lightpaint.relit.relight import scene_of
 from lightpaint.relit.relit_files import enlarged, images_of_texels, settings_of
@@ -71,7 +71,7 @@ def _quantity(emitter: Emitter, rgb: RGB) -> tuple[str, RGB]:
     return "intensity", (r, g, b)
 
 
-def rig_lights(scene: Scene, lighting: Lighting) -> tuple[list[RigLight], list[str]]:
+def rig_lights(scene: Scene, lighting: Lighting) -> tuple[list[NukeLight], list[str]]:
     """Return points, spots, suns and panels as in `lighting`, and the names of other emitters.
 
     Lights that stay as they are belong to them; skies, meshes, projectors, and lights that are
@@ -93,7 +93,7 @@ def rig_lights(scene: Scene, lighting: Lighting) -> tuple[list[RigLight], list[s
             kelvin = photometry(rgb, unit=emitter.kind.unit).kelvin if is_known else None
             place = places.get(emitter.name)
             rig.append(
-                RigLight(
+                NukeLight(
                     emitter.name,
                     KINDS[emitter.plugin],
                     _intensity(emitter, rgb),
@@ -263,25 +263,26 @@ def _has_flipped_coordinates(scene: Scene, light: Emitter) -> bool:
 #: The map of an image light.
 AnyMap = SkyMap | WallImage | SlideImage
 
-#: A function that makes the text of a file.
-Writer = Callable[[], str]
+#: A function that makes the text of a file, or its bytes.
+Writer = Callable[[], str | bytes]
 
 
 @dataclass(frozen=True)
 class Source:
     """The source of a lighting: a scene, light groups, or neither.
 
-    stage: USD stage with lights named as in the scene.
+    stage: USD stage with lights named as in the scene. rig: show whose fixtures the lights are.
     """
 
     scene: Scene | None = None
     light_groups: LightGroups | None = None
     stage: Path | None = None
+    rig: Path | None = None
 
     @property
     def files(self) -> list[Path]:
         """The files from which the source was read."""
-        files = [] if self.stage is None else [self.stage]
+        files = [x for x in (self.stage, self.rig) if x is not None]
         if self.scene is not None:
             files += self.scene.read_files
         return files + (self.light_groups.files if self.light_groups is not None else [])
@@ -310,6 +311,7 @@ class ExportFormat(ABC):
         file: Name of its file for a scene.
         file_of_groups: The same for light groups; None if it has nothing for these.
         needs_source: Whether it needs the scene or the light groups of the lighting.
+        needs_rig: Whether it needs the show whose fixtures the lights are.
         refers_to_maps: Whether its file refers to maps of image lights.
         keeps_lighting: Whether it gets the lighting as it is; in others, lights whose colours the
             painting does not tell keep those of the scene.
@@ -319,6 +321,7 @@ class ExportFormat(ABC):
     file: str
     file_of_groups: str | None = None
     needs_source: bool = True
+    needs_rig: bool = False
     refers_to_maps: bool = False
     keeps_lighting: bool = False
 

@@ -13,12 +13,13 @@ from lightpaint.basis.light_images import joined_texels
 from lightpaint.colour.color import luminance
 from lightpaint.display_text import some_names
 from lightpaint.errors import LightpaintError, OutputError
-from lightpaint.files import write_text
+from lightpaint.files import write_bytes, write_text
 from lightpaint.images.formats.exr import write_rgb
 from lightpaint.lighting.answer.lighting import Lighting, LightSetting
 from lightpaint.progress import Listener
 from lightpaint.relit.export.exports import blender_script, scene_script
 from lightpaint.relit.export.fixtures import fixtures_csv, fixtures_json
+from lightpaint.relit.export.mvr_copy import show_copy
 from lightpaint.relit.export.nuke import needs_copy, nuke_lights, nuke_script, spoken_unreadable
 from lightpaint.relit.export.program_axes import SkyMap
 from lightpaint.relit.export.usd import check_usd, usd_overrides
@@ -256,12 +257,31 @@ class MitsubaFormat(ExportFormat):
         return lambda: scene_patch(scene, export.lighting)
 
 
+class MvrFormat(ExportFormat):
+    """A copy of the show with the colours and places of the answer."""
+
+    name, file, file_of_groups = "mvr", "relit.mvr", "relit.mvr"
+    needs_source, needs_rig = False, True
+
+    def of_scene(self, export: ExportContext) -> Writer:
+        """Return the writer of the copy, and say which lights the show lacks."""
+        assert export.source.rig is not None
+        copied = show_copy(export.source.rig, export.lighting)
+        if copied.left:
+            export.listen.say(
+                f"{export.source.rig} has no fixture for {some_names(copied.left)}: left out"
+            )
+        return lambda: copied.data
+
+    of_groups = of_scene
+
+
 #: All formats by their names, as commands and manifests have them.
 FORMS: dict[str, ExportFormat] = {
     x.name: x
     for x in (
         *(CsvFormat(), JsonFormat(), MitsubaFormat()),
-        *(UsdFormat(), BlenderFormat(), NukeFormat()),
+        *(UsdFormat(), BlenderFormat(), NukeFormat(), MvrFormat()),
     )
 }
 
@@ -276,6 +296,14 @@ def names_of_forms(forms: Iterable[str], source: Source) -> dict[str, str]:
         if form not in FORMS:
             raise LightpaintError(f"there is no form {form!r}: known are {', '.join(FORMS)}")
         names[form] = FORMS[form].name_for(source)
+    has_rig_form = any(FORMS[form].needs_rig for form in names)
+    if has_rig_form and source.rig is None:
+        form = next(form for form in names if FORMS[form].needs_rig)
+        raise LightpaintError(f"{form} needs the show that the lights are of: give ", Hint("rig"))
+    if source.rig is not None and not has_rig_form:
+        raise LightpaintError(
+            Hint("rig"), " belongs to mvr and cues: leave it out, or add one of them"
+        )
     if source.stage is not None and UsdFormat.name not in names:
         raise LightpaintError(Hint("stage"), " belongs to the form usd: leave it out, or add that")
     return names
@@ -283,8 +311,8 @@ def names_of_forms(forms: Iterable[str], source: Source) -> dict[str, str]:
 
 def writers_of(
     names: Mapping[str, str], lighting: Lighting, source: Source, folder: Path, listen: Listener
-) -> tuple[dict[str, Callable[[], str | Floats]], str]:
-    """Return a function that makes the text or image of each file, by name, and a remark or "".
+) -> tuple[dict[str, Callable[[], str | bytes | Floats]], str]:
+    """Return a function that makes the content of each file, by name, and a remark or "".
 
     names: file names by format, from `names_of_forms`. folder: folder of the files. listen:
     receives remarks on what a format leaves out. Raises LightpaintError if the lighting belongs to
@@ -295,7 +323,7 @@ def writers_of(
         elsewhere, remark = _exported(lighting, source)
     maps = _maps(names, elsewhere, source)
     export = ExportContext(elsewhere, source, folder, listen, maps)
-    writers: dict[str, Callable[[], str | Floats]] = {}
+    writers: dict[str, Callable[[], str | bytes | Floats]] = {}
     for form, name in names.items():
         format_ = FORMS[form]
         kept = replace(export, lighting=lighting) if format_.keeps_lighting else export
@@ -308,10 +336,12 @@ def writers_of(
     return writers | {one.file: partial(np.asarray, one.image) for one in maps}, remark
 
 
-def write_content(path: Path, content: str | Floats) -> None:
+def write_content(path: Path, content: str | bytes | Floats) -> None:
     """Write what a writer has made."""
     if isinstance(content, str):
         write_text(path, content)
+    elif isinstance(content, bytes):
+        write_bytes(path, content)
     else:
         write_rgb(path, content)
 

@@ -1,7 +1,7 @@
 """Phrases of sentences: lights, colours, shares and parts of the picture in words."""
 
 import re
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 
 import numpy as np
 
@@ -10,6 +10,7 @@ from lightpaint.colour.color import luminance
 from lightpaint.display_text import some_names, some_of
 from lightpaint.lighting.analysis.appearance.unpainted_change import UnpaintedChange
 from lightpaint.lighting.analysis.diagnosis import Place
+from lightpaint.lighting.answer.lighting import LightSetting
 
 CHANNELS = ("red", "green", "blue")
 
@@ -156,6 +157,31 @@ def spoken_difference(
 def spoken_percent(share: float) -> str:
     """Return `0.4 %`, `7 %`, `62 %`."""
     return f"{100 * share:.1f} %" if 0 < share < 0.0095 else f"{100 * share:.0f} %"
+
+
+def spoken_drives(drives: Mapping[str, float]) -> str:
+    """Return the drives of emitters, `red 100 %, white 8 %`, without those that are off."""
+    lit = [f"{name} {spoken_percent(drive)}" for name, drive in drives.items() if drive > 0]
+    return ", ".join(lit) or "all emitters off"
+
+
+#: Which of several mixes of a lamp's emitters an answer has, by the preference.
+PREFERENCE_TEXTS = {
+    "watts": "the one that needs the least power",
+    "white": "the one with the most light from white emitters",
+    "fewest": "the one of the fewest emitters",
+}
+
+
+def spoken_preference(lights: Iterable[LightSetting]) -> str:
+    """Return which mix of emitters lamps have, in a sentence; "" without lamps."""
+    preferences = [light.lamp.prefer for light in lights if light.lamp is not None]
+    if not preferences:
+        return ""
+    return (
+        "Of the mixes of emitters that give the same light, each lamp has "
+        f"{PREFERENCE_TEXTS[preferences[0]]}."
+    )
 
 
 def spoken_percents(shares: Iterable[float]) -> list[str]:

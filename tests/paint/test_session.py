@@ -34,6 +34,7 @@ from lightpaint.paint.store.session_requests import (
 )
 from lightpaint.paint.store.store import MemoryStore
 from lightpaint.pipeline.job.settings import Settings
+from lightpaint.scene.lights.lights_file import SceneRequests
 
 SIZE = (18, 32)
 
@@ -111,6 +112,24 @@ def paint(
         "image": image,
         "importance": np.ones(shape, np.float32),
     }
+
+
+def test_lamps_of_emitters_show_their_drives(basis: lp.Basis):
+    emitters = [
+        {"name": name, "xy": xy, "Y": 1.0}
+        for name, xy in (("red", [0.7, 0.299]), ("green", [0.17, 0.7]), ("blue", [0.135, 0.055]))
+    ]
+    keys = {"light": {basis.names[1]: {"emitters": emitters}}}
+    session = session_of(basis.with_requests(SceneRequests(keys, "hall.lights.toml")))
+    assert [len(session.live_answer.lamps[k].emitters) for k in session.live_answer.lamps] == [3]
+    session.handle(*paint(1, (2, 9, 3, 12), 0.9))
+    lights = session.findings.lights
+    assert lights is not None
+    assert [light.drives is None for light in lights] == [True, False, True]
+    drives = np.array(lights[1].drives)
+    assert ((drives >= 0) & (drives <= 1)).all()
+    lamp = session.live_answer.lamps[1]
+    np.testing.assert_allclose(lamp.mix(drives), session.weights[1], atol=1e-5)
 
 
 def test_an_answer_is_that_of_solve(basis: lp.Basis):

@@ -224,7 +224,10 @@ class Handover:
     stage: str = ""
 
 
-HANDOVER_KEYS: dict[str, Check] = {"to": _some_of(FORMS), "stage": TEXT}
+#: Forms that looks of a manifest have: none that is of a show.
+HANDOVER_FORMS = [name for name, form in FORMS.items() if not form.needs_rig]
+
+HANDOVER_KEYS: dict[str, Check] = {"to": _some_of(HANDOVER_FORMS), "stage": TEXT}
 
 
 @dataclass

@@ -37,7 +37,7 @@ from lightpaint.report.diagnosis_sentences import (
 )
 from lightpaint.report.measures import energy_shares
 from lightpaint.report.page.constraint_section import closer_choice
-from lightpaint.report.phrases import spoken_percent
+from lightpaint.report.phrases import spoken_drives, spoken_percent, spoken_preference
 from lightpaint.sentences import Sentence, SourceKey
 
 Table = Literal["short", "full"]
@@ -312,9 +312,17 @@ def _show_all(look: Look) -> None:
             f"{100 * shares[k]:.1f} %",
             "" if light.is_fixed else appearance.color,
             *appearance.amounts[: len(amounts)],
-            *([light.constraint + "*" * light.is_active] if has_constraints else []),
+            *([_constraint_text(light)] if has_constraints else []),
         )
     terminal.print_table(table)
+    if note := spoken_preference(look.lighting.lights):
+        terminal.tell(note)
+
+
+def _constraint_text(light: LightSetting) -> str:
+    """Return the constraint on a light, of a lamp the drives of its emitters."""
+    text = light.constraint if light.lamp is None else spoken_drives(light.drives)
+    return text + "*" * light.is_active
 
 
 def _emission_text(light: LightSetting) -> str:

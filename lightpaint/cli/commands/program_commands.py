@@ -52,7 +52,8 @@ def export(
     finish(lighting.parent)
     answer, folder = read_lighting(lighting), output or lighting.parent
     light_groups, listen = _light_groups(groups, answer), terminal.TerminalListener()
-    source = Source(content(scene), light_groups, stage)
+    show = None if rig is None or (CUES in forms and "mvr" not in forms) else rig.path
+    source = Source(content(scene), light_groups, stage, show)
     names = names_of_forms(others, source)
     writers, remark = writers_of(names, answer, source, folder, listen)
     if CUES in forms and rig is not None:

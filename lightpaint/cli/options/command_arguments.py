@@ -80,6 +80,8 @@ def values_of(options: Namespace, words: Sequence[str]) -> dict[str, Any]:
         case "verify":
             folders = list(map(Path, options.folders))
             return {"folders": folders, "variant": options.variant, "settings": settings}
+        case "rig":
+            return _rig_arguments(options, output)
         case "blender":
             return {"output": output or Path("lightpaint-blender.zip"), "force": options.force}
         case "cache":
@@ -125,6 +127,25 @@ def _export_arguments(options: Namespace, output: Path | None) -> dict[str, Any]
         "output": output,
         "force": options.force,
     }
+
+
+def _rig_arguments(options: Namespace, output: Path | None) -> dict[str, Any]:
+    """Return the arguments of `rig`."""
+    show = Path(options.show)
+    return {
+        "show": show,
+        "output": output or Path(f"{show.stem}.xml"),
+        "room": Path(options.room) if options.room else None,
+        "only_lights": options.only_lights,
+        "force": options.force,
+        **rig_reading_of(options),
+    }
+
+
+def rig_reading_of(options: Namespace) -> dict[str, Any]:
+    """Return the arguments of `read_rig` but for its path."""
+    folder = Path(options.gdtf) if options.gdtf else None
+    return {"gdtf_folder": folder, "zoom": options.zoom, "pixels": options.pixels}
 
 
 def _solve_arguments(options: Namespace, settings: Settings) -> dict[str, Any]:

@@ -6,6 +6,7 @@ from pathlib import Path
 from typing import Literal
 
 from lightpaint.cli.options import arguments
+from lightpaint.cli.options.option_groups import add_rig_reading
 from lightpaint.dmx.network.console_target import PROTOCOLS, ConsoleTarget, parse_target
 from lightpaint.errors import ConsoleError
 from lightpaint.validation import parse_number, parse_whole_number
@@ -55,17 +56,7 @@ def add_rig(parser: argparse.ArgumentParser, *, required: bool, purpose: str = "
         metavar="show.mvr",
         help=f"{purpose}MVR with the fixtures, their modes and addresses",
     )
-    parser.add_argument(
-        "--gdtf",
-        metavar="DIR",
-        help="folder with GDTF files, for those that the MVR lacks or has incomplete",
-    )
-    parser.add_argument(
-        "--pixels",
-        action="store_true",
-        help="each beam of a fixture with channels of its own is a light, as in the scene that was "
-        "made so",
-    )
+    add_rig_reading(parser, has_zoom=False)
 
 
 def rig_file(options: argparse.Namespace) -> RigFile | None:

@@ -174,6 +174,28 @@ def add_output(parser: "argparse._ActionsContainer", metavar: str, description: 
     parser.add_argument("-o", "--output", metavar=metavar, help=description)
 
 
+def add_rig_reading(parser: argparse.ArgumentParser, *, has_zoom: bool) -> None:
+    """Add the options for how a show's fixtures are read. has_zoom: whether beams matter."""
+    parser.add_argument(
+        "--gdtf",
+        metavar="FOLDER",
+        help="folder with GDTF files, which come before those of the show with the same names",
+    )
+    if has_zoom:
+        parser.add_argument(
+            "--zoom",
+            type=arguments.number(" of degrees"),
+            metavar="DEGREES",
+            help="beam angle of all fixtures that have a zoom (default: as their files say they "
+            "rest)",
+        )
+    parser.add_argument(
+        "--pixels",
+        action="store_true",
+        help="make a light of each beam that has channels of its own (default: of each fixture)",
+    )
+
+
 def add_server(parser: argparse.ArgumentParser) -> None:
     """Add the options for the painter's address and session."""
     parser.add_argument(
@@ -293,13 +315,13 @@ OTHER_OPTIONS: dict[Theme, str] = {
     "--layers",
     "Lights": "--lights --group --lights-file --no-lights-file --no-group-alike --split "
     "--symmetric --pattern",
-    "Scene and camera": "--scene --stage --sensor -D --integrator --variant",
+    "Scene and camera": "--scene --stage --sensor -D --integrator --variant --room --rig --gdtf "
+    "--zoom --pixels --only-lights",
     "Verification": "--max-miss --min-fit",
     "Shots, looks and advice": "--frames --variations --keep-going",
     "Looks": "--init --only --dry-run",
     "Machines": "--export --log",
-    "Console": "--rig --gdtf --pixels --from --universe --priority --fps --fade --until --blackout "
-    "--interface --seconds",
+    "Console": "--from --universe --priority --fps --fade --until --blackout --interface --seconds",
     "Page": "--host --port --no-browser --new",
     "Results": "--to --dump --output --table --map-size --no-sheet --json --quiet --verbose "
     "--json-progress --help",

@@ -28,6 +28,7 @@ from lightpaint.cli.options.option_groups import (
     add_map_size,
     add_output,
     add_output_mode,
+    add_rig_reading,
     add_sampling,
     add_scene,
     add_server,
@@ -201,11 +202,12 @@ def _export(parser: argparse.ArgumentParser) -> None:
         type=arguments.names_of,
         action="extend",
         required=True,
-        metavar="csv,json,mitsuba,usd,blender,nuke,cues",
+        metavar="csv,json,mitsuba,usd,blender,nuke,mvr,cues",
         help="one format or several. csv, json: fixtures with colour, kelvin, lumen and DMX; "
         "mitsuba: a patch for the XML of the scene; usd: a layer that overrides the lights "
         "of a stage; blender: a Python script that sets lights by name; nuke: a script with the "
         "lights of --scene in Nuke's 3-D system, or one that scales the light groups of --lights; "
+        "mvr: a copy of the show --rig with the colours and places of the lights; "
         "cues: a list of cues for consoles, each lighting one, for the fixtures of --rig",
     )
     source_group = parser.add_mutually_exclusive_group()
@@ -226,12 +228,36 @@ def _export(parser: argparse.ArgumentParser) -> None:
         help="for usd: stage whose lights the layer overrides, found by their names in the scene "
         "(default: new prims below /lights)",
     )
-    add_rig(parser, required=False, purpose="for cues: ")
+    add_rig(parser, required=False, purpose="for mvr and cues: ")
     add_fade(parser, "for cues: the time of each (default: none)")
     add_map_size(parser)
     add_view(parser)
     add_output(parser, "DIR", "folder for the files (default: that of lighting.json)")
     add_fields(parser, Settings, "force")
+
+
+def _rig(parser: argparse.ArgumentParser) -> None:
+    parser.add_argument("show", metavar="SHOW.mvr", help="show of MVR 1.4 to 1.6")
+    parser.add_argument(
+        "--room",
+        metavar="SCENE.xml",
+        help="Mitsuba scene to hang the lights in, in metres and with z up (default: the models of "
+        "the show that are .glb, else a floor)",
+    )
+    parser.add_argument(
+        "--only-lights",
+        action="store_true",
+        help="write a scene with nothing but the lights, to include in another",
+    )
+    add_rig_reading(parser, has_zoom=True)
+    add_output(
+        parser,
+        "F.xml",
+        "scene to write, with its lights file and meshes beside it (default: named after the show)",
+    )
+    parser.add_argument(
+        "--force", action="store_true", help="replace existing files (default: refuse)"
+    )
 
 
 def _blender(parser: argparse.ArgumentParser) -> None:
@@ -286,6 +312,7 @@ _COMMANDS: dict[str, tuple[str, Callable[[argparse.ArgumentParser], None]]] = {
     "paint": ("paint in the browser, and see the closest lighting as you paint", _paint),
     "batch": ("solve many looks from one manifest; a stopped batch continues", add_batch),
     "export": ("write a lighting for other programs, fixtures and consoles", _export),
+    "rig": ("make a scene and a lights file of the fixtures of a show", _rig),
     "send": ("send the levels of a lighting to a console, or print them", add_send),
     "listen": ("print the levels that arrive from a console or from send", add_listen),
     "blender": ("write the add-on for Blender, whose lamps follow the painter", _blender),

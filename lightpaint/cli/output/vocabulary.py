@@ -16,6 +16,7 @@ RECORDS = (Settings, RunOptions)
 _OTHER_OPTIONS = {
     "folder": "-o",
     "frames": "--frames",
+    "gdtf_folder": "--gdtf",
     "groups": "--group",
     "integrator": "--integrator",
     "layer": "--layer",
@@ -29,6 +30,7 @@ _OTHER_OPTIONS = {
     "pattern": "--pattern",
     "placement": "--places",
     "port": "--port",
+    "rig": "--rig",
     "scene": "--scene",
     "sensor": "-s",
     "split": "--split",

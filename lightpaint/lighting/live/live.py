@@ -21,6 +21,7 @@ from operator import add
 from lightpaint.arrays import RGB, Doubles
 from lightpaint.basis.basis import Basis
 from lightpaint.basis.light_images import texel_lights
+from lightpaint.colour.lamp import Lamp
 from lightpaint.lighting.constraints.color_restrictions import WhiteLimits, painted_whites
 from lightpaint.lighting.constraints.constraints import Constraints
 from lightpaint.lighting.constraints.start_lighting import start_weights
@@ -118,6 +119,11 @@ class LiveSolver:
             reads_wash = self._fit.reads_wishes(is_sketch=self._is_sketch)
             if not self._has_tiles or reads_wash or self._fit.colors == "white":
                 self._film(view)
+
+    @property
+    def lamps(self) -> Mapping[int, Lamp]:
+        """The lamps that mix lights from emitters, by the light's index."""
+        return self._reduction.lamps
 
     @property
     def mode(self) -> Space:

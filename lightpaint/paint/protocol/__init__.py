@@ -55,6 +55,7 @@ from lightpaint.paint.protocol.light_requests import (
 from lightpaint.paint.protocol.message_parts import (
     Camera,
     EditState,
+    EmitterInfo,
     HistoryInfo,
     ImageInfo,
     LayerInfo,

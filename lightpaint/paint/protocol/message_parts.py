@@ -11,6 +11,14 @@ from lightpaint.paint.store.history_steps import Region
 
 
 @dataclass(frozen=True)
+class EmitterInfo:
+    """An emitter of a lamp, such as its red LEDs. swatch: its colour for a screen, as in CSS."""
+
+    name: str
+    swatch: str
+
+
+@dataclass(frozen=True)
 class LightInfo:
     """The constant properties of a light.
 
@@ -18,7 +26,8 @@ class LightInfo:
     scene. form: how the scene writes its emission. members: its emitters, if it is a group. group:
     name of that group; null for a single emitter. is_fixed: whether it is not adjusted. is_scalar:
     whether one number stands for all channels. scale: factor of its stored plane. name, label: its
-    name in the scene, and as people read it. unit: of its emission.
+    name in the scene, and as people read it. unit: of its emission. emitters: those that mix the
+    light of a lamp, if its lights file lists them.
     """
 
     name: str
@@ -33,6 +42,7 @@ class LightInfo:
     is_fixed: bool
     is_scalar: bool
     scale: float
+    emitters: tuple[EmitterInfo, ...] = ()
 
 
 @dataclass(frozen=True)

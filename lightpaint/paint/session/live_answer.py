@@ -1,6 +1,6 @@
 """The requests of a session, and the answer that follows them and the brush."""
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 
 import numpy as np
 
@@ -8,6 +8,7 @@ from lightpaint.arrays import Doubles
 from lightpaint.basis.basis import Basis
 from lightpaint.basis.lights import Lights
 from lightpaint.colour.display.view_transform import ViewTransform
+from lightpaint.colour.lamp import Lamp
 from lightpaint.lighting.constraints.constraints import Constraints
 from lightpaint.lighting.constraints.constraints_file import constraints_of
 from lightpaint.lighting.fit import resolve_fit
@@ -64,6 +65,11 @@ class LiveAnswer:
     def requests_at_rest(self) -> SessionRequests:
         """The requests without those of a slider that still moves."""
         return self.before_slider or self.requests
+
+    @property
+    def lamps(self) -> Mapping[int, Lamp]:
+        """The lamps that mix lights from emitters, by the light's index."""
+        return self._live.lamps
 
     @property
     def mode(self) -> str:

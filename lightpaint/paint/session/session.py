@@ -249,7 +249,9 @@ class Session:
     @property
     def findings(self) -> protocol.Findings:
         """Findings that need no analysis."""
-        findings = answer_findings([view.basis for view in self.views], self.weights)
+        findings = answer_findings(
+            [view.basis for view in self.views], self.weights, self.live_answer.lamps
+        )
         if self.is_painted:
             return findings
         return replace(findings, headline=unpainted_headline(self.live_answer))

@@ -1,6 +1,6 @@
 """Messages of a session about its answer and its edits: sentences, figures, changed pixels."""
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import Any
 
@@ -10,6 +10,7 @@ from lightpaint.arrays import Doubles, as_rgb
 from lightpaint.basis.basis import Basis
 from lightpaint.basis.lights import BasisLight
 from lightpaint.colour.color import LUMINANCE, luminance, rgb_to_hex
+from lightpaint.colour.lamp import Lamp, LampEmitter
 from lightpaint.colour.photometry import photometry
 from lightpaint.lighting.analysis.analysis import Analysis
 from lightpaint.lighting.analysis.appearance.appearance import INVISIBLE, Appearance
@@ -23,6 +24,7 @@ from lightpaint.paint.protocol import (
     Advice,
     CanvasPatch,
     Closeness,
+    EmitterInfo,
     Findings,
     LayerInfo,
     LayerList,
@@ -98,8 +100,10 @@ MISS_TEXTS = {
 CONSTRAINED_MISS_TEXTS = {"forbidden": "would need colours or levels that the lights may not have"}
 
 
-def light_info(light: BasisLight, scale: float) -> LightInfo:
-    """Return the constant properties of a light. scale: as in `LightInfo`."""
+def light_info(light: BasisLight, scale: float, lamp: Lamp | None = None) -> LightInfo:
+    """Return the constant properties of a light. scale: as in `LightInfo`. lamp: what mixes it, if
+    known.
+    """
     members = tuple(light.members)
     return LightInfo(
         name=light.name,
@@ -114,18 +118,29 @@ def light_info(light: BasisLight, scale: float) -> LightInfo:
         is_fixed=light.is_fixed,
         is_scalar=light.is_scalar,
         scale=scale,
+        emitters=() if lamp is None else tuple(map(_emitter_info, lamp.emitters)),
     )
 
 
-def answer_findings(bases: Sequence[Basis], weights: Doubles) -> Findings:
+def _emitter_info(emitter: LampEmitter) -> EmitterInfo:
+    color = np.maximum(np.array(emitter.emission), 0)
+    return EmitterInfo(emitter.name, rgb_to_hex(color))
+
+
+def answer_findings(
+    bases: Sequence[Basis], weights: Doubles, lamps: Mapping[int, Lamp] | None = None
+) -> Findings:
     """Return the immediate findings on each light: emission, change, colour, share of the picture.
 
-    With several views, `shares` has its part of each.
+    With several views, `shares` has its part of each. lamps: what mixes a light from emitters, by
+    the light's index.
     """
     lit = [(basis.totals * weights) @ LUMINANCE for basis in bases]
     lights = tuple(
-        _light_answer(light, weight, share)
-        for light, weight, share in zip(bases[0].lights, weights, _shares(sum(lit)), strict=True)
+        _light_answer(light, weight, share, (lamps or {}).get(k))
+        for k, (light, weight, share) in enumerate(
+            zip(bases[0].lights, weights, _shares(sum(lit)), strict=True)
+        )
     )
     shares = tuple(_shares(x) for x in lit) if len(bases) > 1 else None
     return Findings(lights=lights, shares=shares)
@@ -136,7 +151,9 @@ def _shares(lit: Doubles) -> tuple[float, ...]:
     return tuple(float(x) / whole if whole > 0 else 0.0 for x in lit)
 
 
-def _light_answer(light: BasisLight, weight: Doubles, share: float) -> LightAnswer:
+def _light_answer(
+    light: BasisLight, weight: Doubles, share: float, lamp: Lamp | None
+) -> LightAnswer:
     colour = photometry(as_rgb(weight), unit=light.unit)
     current, answered = (
         float(luminance(np.asarray(x, np.float64))) for x in (light.emission, weight)
@@ -151,6 +168,7 @@ def _light_answer(light: BasisLight, weight: Doubles, share: float) -> LightAnsw
         swatch=colour.hex or rgb_to_hex(np.asarray(light.emission, np.float64)),
         is_on=answered > OFF * current,
         share=share,
+        drives=None if lamp is None else tuple(lamp.drives_for(weight).tolist()),
     )
 
 

@@ -226,10 +226,14 @@ def state_fields(
     """
     basis = session.basis
     views = tuple(map(_view_info, session.views, session.bases))
+    lamps = session.live_answer.lamps
     return {
         "size": views[0].size,
         "objects": views[0].objects,
-        "lights": tuple(map(light_info, basis.lights, views[0].scales)),
+        "lights": tuple(
+            light_info(light, scale, lamps.get(k))
+            for k, (light, scale) in enumerate(zip(basis.lights, views[0].scales, strict=True))
+        ),
         "images": tuple(map(_image_info, light_images(basis.lights))),
         "views": views,
         "transforms": tuple(transform.name for transform in offered_transforms(session)),

@@ -298,7 +298,7 @@ def plain(text: str) -> str:
 
 
 @dataclass(frozen=True)
-class RigLight:
+class NukeLight:
     """A light that shines from a point or in one direction.
 
     emission: its intensity along its axis in W/sr, or irradiance of a sun in W/m². kelvin: None if
@@ -315,7 +315,7 @@ class RigLight:
 
 
 def nuke_lights(
-    lights: Sequence[RigLight], *, up: Position, about: str, left: Sequence[str] = ()
+    lights: Sequence[NukeLight], *, up: Position, about: str, left: Sequence[str] = ()
 ) -> str:
     """Return a script with a Light2 node for each light, and a Scene that gathers them.
 
@@ -366,7 +366,7 @@ def rotate_of(direction: Position) -> Position:
     return math.degrees(math.atan2(y, level)), heading, 0.0
 
 
-def _brightness(light: RigLight) -> dict[str, str]:
+def _brightness(light: NukeLight) -> dict[str, str]:
     """Return colour, with its brightest channel at 1, intensity and falloff of a light."""
     brightest = max(*light.emission, 0.0)
     color = [v / brightest for v in light.emission] if brightest > 0 else [1.0] * 3
@@ -374,7 +374,7 @@ def _brightness(light: RigLight) -> dict[str, str]:
     return {"color": _vector(color), "intensity": f"{brightest / math.pi:.9g}", **falloff}
 
 
-def _cone(light: RigLight) -> dict[str, str]:
+def _cone(light: NukeLight) -> dict[str, str]:
     """Return the cone of a spot, whose light fades inward from its edge, or of a panel.
 
     Angles are of the whole cone; a negative penumbra lies inside it. The light of a panel falls off
@@ -389,7 +389,7 @@ def _cone(light: RigLight) -> dict[str, str]:
     return {"cone_angle": f"{cutoff:.9g}", "cone_penumbra_angle": f"{beam - cutoff + 0.0:.9g}"}
 
 
-def _label(light: RigLight, node_name: str) -> str:
+def _label(light: NukeLight, node_name: str) -> str:
     """Return the label of a node: the light's name if Nuke cannot have it, and what changed."""
     rows = [plain(light.name)] if light.name != node_name else []
     if light.is_new:

@@ -35,7 +35,7 @@ from lightpaint.report.diagnosis_sentences import (
 from lightpaint.report.measures import energy_shares
 from lightpaint.report.page.figures import data_uri, thumbnail
 from lightpaint.report.page.html import html
-from lightpaint.report.phrases import spoken_percent
+from lightpaint.report.phrases import spoken_drives, spoken_percent, spoken_preference
 
 #: Width of the map of an image in pixels.
 MAP_WIDTH = 144
@@ -144,6 +144,7 @@ def lights_table(
         shown = [rows[k] for k in visible_indices]
         folded = [(note, [rows[k] for k in other_indices])]
     has_scale = solution.lighting.cd_per_unit is not None
+    lead = " ".join(filter(None, (lead, spoken_preference(solution.lighting.lights))))
     return html("lights", lead=lead, shown=shown, folded=folded, has_scale=has_scale)
 
 
@@ -262,6 +263,8 @@ def change(light: BasisLight, setting: LightSetting) -> LevelChange:
 def _constraint_note(setting: LightSetting) -> str:
     """Return the constraint on a light, and whether it holds the light."""
     note = " (limits it)" if setting.is_active else ""
+    if setting.lamp is not None:
+        return f"{spoken_drives(setting.drives)}{note}"
     return f"{setting.constraint}{note}" if setting.constraint else ""
 
 

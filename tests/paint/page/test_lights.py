@@ -68,6 +68,28 @@ def test_the_solve_starts_from_lamps_that_were_set(painter: Painter) -> None:
 
 
 @pytest.mark.nightly
+def test_a_lamp_of_emitters_shows_a_bar_for_each_drive(painter: Painter) -> None:
+    drives = painter.page.locator('[data-light="key"] .drives')
+    assert drives.count() == 0  # its lights file lists none
+    painter.page.evaluate(
+        """() => {
+            const { store } = window.painter;
+            const [first, ...others] = store.value.lights;
+            const emitters = [{ name: 'red', swatch: '#f00' }, { name: 'white', swatch: '#fff' }];
+            const [answer, ...answers] = store.value.lightAnswers;
+            store.set({
+                lights: [{ ...first, emitters }, ...others],
+                lightAnswers: [{ ...answer, drives: [0.25, 1] }, ...answers],
+            });
+        }"""
+    )
+    assert drives.get_attribute("aria-label") == "Drives: red 25 %, white 100 %"
+    widths = drives.locator("i").evaluate_all(
+        "bars => bars.map(x => x.style.getPropertyValue('--drive'))"
+    )
+    assert widths == ["0.25", "1"]
+
+
 def test_a_level_is_typed_in_stops_or_percent(painter: Painter) -> None:
     current = painter.page.evaluate("() => window.painter.store.value.lights[0].present")
 

@@ -53,13 +53,22 @@ export interface Layer {
 }
 
 /**
+ * An emitter of a lamp, such as its red LEDs. swatch: its colour for a screen, as in CSS.
+ */
+export interface EmitterInfo {
+  name: string;
+  swatch: string;
+}
+
+/**
  * The constant properties of a light.
  *
  * present: its emission before anything was painted. parameter, plugin: its definition in the
  * scene. form: how the scene writes its emission. members: its emitters, if it is a group. group:
  * name of that group; null for a single emitter. is_fixed: whether it is not adjusted. is_scalar:
  * whether one number stands for all channels. scale: factor of its stored plane. name, label: its
- * name in the scene, and as people read it. unit: of its emission.
+ * name in the scene, and as people read it. unit: of its emission. emitters: those that mix the
+ * light of a lamp, if its lights file lists them.
  */
 export interface LightInfo {
   name: string;
@@ -74,6 +83,7 @@ export interface LightInfo {
   is_fixed: boolean;
   is_scalar: boolean;
   scale: number;
+  emitters: EmitterInfo[];
 }
 
 /**
@@ -467,7 +477,7 @@ export interface AnswerChoice {
  * that is not white. share: of the light in the picture. error: its uncertainty, in words.
  * is_constrained: whether a constraint limits it. is_unreached: whether no paint depends on it.
  * emission: linear, in the unit of the light. swatch: its colour for a screen, as in CSS. is_on:
- * whether it shines.
+ * whether it shines. drives: of the emitters of a lamp, 0 to 1, in their order.
  */
 export interface LightAnswer {
   emission: RGB;
@@ -479,6 +489,7 @@ export interface LightAnswer {
   error?: string;
   is_constrained?: boolean;
   is_unreached?: boolean;
+  drives?: number[];
 }
 
 /**

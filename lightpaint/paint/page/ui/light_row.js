@@ -60,7 +60,7 @@ export class LightRow extends Component {
 
   render() {
     const { k, light, app, isOpen, hasSlider, pointerShare, isMute, constraints, ui } = this.props;
-    const { isSelected } = this.props;
+    const { isSelected, answer } = this.props;
     const { store } = app;
     const dimClass = isMute || constraints?.off ? 'is-dim' : '';
     const select = (/** @type {MouseEvent} */ event) => pressLight(store, k, event);
@@ -91,6 +91,7 @@ export class LightRow extends Component {
           ${this.renderButtons()}
         </div>
         ${this.renderNumbers()}
+        ${light.emitters.length > 0 && html`<${Drives} emitters=${light.emitters} drives=${answer?.drives ?? []} />`}
         ${hasSlider && !light.is_fixed && this.renderDimmer()}
       </div>
       ${isOpen && html`<${LightConstraints} ...${this.props} />`}
@@ -197,6 +198,17 @@ export function Share({ share, pointerShare }) {
   return html`<span class=${`share ${isAtPointer ? 'is-here' : ''}`}
     data-tip=${isAtPointer ? t('Share of the light here') : t("Share of the picture's light")}>
     <i style=${{ '--share': String(value) }}></i><span>${percentText(value)}</span></span>`;
+}
+
+/** The drives of a lamp's emitters, a bar for each.
+ * @param {{emitters: Light["emitters"], drives: number[]}} props */
+function Drives({ emitters, drives }) {
+  const text = emitters.map(({ name }, j) => `${name} ${percentText(drives[j] ?? 0)}`).join(', ');
+  return html`<span class="drives" role="img" aria-label=${t('Drives: {text}', { text })} data-tip=${text}>
+    ${emitters.map(
+      ({ name, swatch }, j) =>
+        html`<i key=${name} style=${{ '--drive': String(drives[j] ?? 0), color: swatch }}></i>`,
+    )}</span>`;
 }
 
 /** Remarks below the picture, where they do not change the height of the row.

@@ -114,6 +114,7 @@ export class FakeHost {
         scale: 1,
         is_fixed: false,
         is_scalar: false,
+        emitters: [],
         group: room.n > 12 && k >= 8 ? `Row ${'ABCDEFG'[Math.floor((k - 8) / 8)] ?? 'H'}` : null,
       })),
       images: [],

@@ -1,0 +1,200 @@
+"""Colours of emitters, filters and lamps in a GDTF file, and usual ones where a file has none."""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any
+from xml.etree.ElementTree import Element
+
+import numpy as np
+
+from lightpaint.arrays import RGB, Doubles, as_rgb
+from lightpaint.colour.color import luminance
+from lightpaint.colour.planckian_locus import uv_of_black_body, xy_of, xy_of_spectrum, xyz_of
+from lightpaint.colour.primaries import REC709, rgb_to_xyz
+from lightpaint.dmx.gdtf.mode_channels import Curve
+from lightpaint.dmx.rig_archive import library
+
+#: Chromaticity of CIE 1931.
+Chromaticity = tuple[float, float]
+
+#: Least y of a chromaticity, and least share of light that a filter lets through.
+LEAST_Y, LEAST_TRANSMISSION = 0.002, 0.002
+
+#: Name of an emitter, its usual chromaticity and its usual share of a fixture's luminance, by what
+#: follows `ColorAdd_`. Some programs write A and L.
+USUAL: Mapping[str, tuple[str, Chromaticity, float]] = {
+    "R": ("red", (0.69, 0.305), 20),
+    "G": ("green", (0.17, 0.70), 45),
+    "B": ("blue", (0.14, 0.05), 8),
+    "C": ("cyan", (0.10, 0.35), 25),
+    "M": ("magenta", (0.38, 0.16), 15),
+    "Y": ("yellow", (0.48, 0.51), 40),
+    "RY": ("amber", (0.56, 0.43), 30),
+    "A": ("amber", (0.56, 0.43), 30),
+    "GY": ("lime", (0.41, 0.55), 60),
+    "L": ("lime", (0.41, 0.55), 60),
+    "GC": ("mint", (0.14, 0.55), 30),
+    "BC": ("azure", (0.12, 0.15), 12),
+    "BM": ("indigo", (0.16, 0.02), 4),
+    "RM": ("pink", (0.50, 0.25), 18),
+    "W": ("white", (0.3127, 0.3290), 60),
+    "WW": ("warm white", (0.44, 0.403), 55),
+    "CW": ("cool white", (0.3127, 0.3290), 60),
+    "UV": ("uv", (0.168, 0.008), 1),
+}
+
+#: Transmission of usual filters in linear Rec.709, by what follows `ColorSub_`.
+USUAL_FILTERS: Mapping[str, RGB] = {
+    "C": (0.02, 0.70, 0.85),
+    "M": (0.85, 0.02, 0.70),
+    "Y": (0.95, 0.85, 0.02),
+}
+
+
+def rgb_of_xy(xy: Chromaticity) -> Doubles:
+    """Return the linear Rec.709 colour of luminance 1, (3,); channels may be negative."""
+    x, y = xy
+    return np.asarray(np.linalg.solve(rgb_to_xyz(REC709), [x / y, 1.0, (1 - x - y) / y]))
+
+
+#: The colour of equal power at all wavelengths, of which a filter lets a part through.
+EQUAL_ENERGY = rgb_of_xy((1 / 3, 1 / 3))
+
+
+@dataclass(frozen=True)
+class EmitterColour:
+    """What a file says of an emitter.
+
+    xy: its chromaticity. share: its luminance relative to others of the file. candela: what was
+    measured at full, if it was. curve: pairs of a share of full, and of the light that was measured
+    there. is_usual: whether the file has no colour, so that this is a usual one.
+    """
+
+    name: str
+    xy: Chromaticity
+    share: float
+    candela: float | None = None
+    curve: Curve = ()
+    is_usual: bool = False
+
+
+def emitter_colour(suffix: str, link: str | None, emitters: Sequence[Element]) -> EmitterColour:
+    """Return the colour of the emitter that a channel dims.
+
+    suffix: what follows `ColorAdd_` in the channel's attribute. link: name of the emitter, if the
+    channel says it. emitters: of the file.
+    """
+    name, xy, share = USUAL.get(suffix, (suffix.lower() or "light", (0.3127, 0.3290), 30.0))
+    by_name = {x.get("Name", "").casefold(): x for x in emitters}
+    element = by_name.get((link or name).casefold(), by_name.get(name))
+    if element is None:
+        return EmitterColour(name, xy, share, is_usual=True)
+    found = _parsed(element.get("Color"))
+    measured = library("pygdtf").Emitter(xml_node=element)
+    wave = measured.dominant_wave_length
+    own = found[0] if found else _spectral(measured.measurements)
+    if own is None and wave:
+        own = xy_of_spectrum(np.array([wave]), np.ones(1))
+    candela, curve = _measured_light(measured.measurements)
+    return EmitterColour(
+        " ".join(element.get("Name", "").lower().split()) or name,
+        _bounded(own or xy),
+        found[1] if found and found[1] > 0 else share,
+        candela,
+        curve,
+        is_usual=own is None,
+    )
+
+
+def _parsed(text: str | None) -> tuple[Chromaticity, float] | None:
+    """Return chromaticity and Y of the text of a colour; None if there is none."""
+    if not text:
+        return None
+    numbers = [float(x) for x in text.split(",")]
+    if len(numbers) < 2 or not 0 < numbers[1] <= 1:
+        return None
+    return _bounded((numbers[0], numbers[1])), numbers[2] if len(numbers) > 2 else 0.0
+
+
+def _bounded(xy: Chromaticity) -> Chromaticity:
+    """Return the chromaticity as a light may have it: positive X, Y and Z."""
+    x, y = max(xy[0], 0.0), max(xy[1], LEAST_Y)
+    size = max(x + y, 1.0)
+    return x / size, y / size
+
+
+def _spectral(measurements: Sequence[Any]) -> Chromaticity | None:
+    """Return the chromaticity of the spectrum that was measured at the highest level."""
+    for measurement in sorted(measurements, key=lambda x: -float(x.physical)):
+        points = sorted((x.wave_length, x.energy) for x in measurement.measurement_points)
+        if len(points) > 1:
+            waves, power = np.array(points, float).T
+            return xy_of_spectrum(waves, np.maximum(power, 0))
+    return None
+
+
+def _measured_light(measurements: Sequence[Any]) -> tuple[float | None, Curve]:
+    """Return candelas at full, and the light at shares of full if that is not in proportion."""
+    pairs = sorted((float(x.physical), float(x.luminous_intensity)) for x in measurements)
+    pairs = [(level, candela) for level, candela in pairs if level > 0 and candela > 0]
+    if not pairs:
+        return None, ()
+    top_level, top = pairs[-1]
+    points = [(0.0, 0.0), *((level / top_level, candela / top) for level, candela in pairs)]
+    rising = [points[0]]
+    for level, light in points[1:]:
+        if level > rising[-1][0] and light > rising[-1][1]:
+            rising.append((level, light))
+    is_straight = all(abs(level - light) < 1e-3 for level, light in rising)
+    return top, () if is_straight or rising[-1] != (1.0, 1.0) else tuple(rising)
+
+
+def xy_of_kelvin(kelvin: float) -> Chromaticity:
+    """Return the chromaticity of a black body."""
+    [uv] = uv_of_black_body(np.array([min(max(kelvin, 1000.0), 100_000.0)]))
+    return xy_of(xyz_of(uv))
+
+
+def primaries_of(xy: Chromaticity) -> list[EmitterColour]:
+    """Return red, green and blue of Rec.709, whose sum is light of a chromaticity."""
+    light = np.maximum(rgb_of_xy(xy), 1e-3)
+    shares = light * luminance(np.eye(3)) / float(luminance(light))
+    corners = np.reshape(REC709[:6], (3, 2)).tolist()
+    names = ("red", "green", "blue")
+    return [
+        EmitterColour(name, (x, y), float(share))
+        for name, (x, y), share in zip(names, corners, shares, strict=True)
+    ]
+
+
+def density_of(suffix: str, filters: Sequence[Element], link: str | None) -> tuple[RGB, bool]:
+    """Return the optical density (natural logarithm) of a filter all the way in, in linear Rec.709.
+
+    The densities at all measured positions are fitted by a straight line from none. Also returns
+    whether the file says nothing of it, so that it is a usual one.
+    """
+    element = next((x for x in filters if x.get("Name") == link), None)
+    points = [] if element is None else _transmissions(element)
+    if not points:
+        return as_rgb(-np.log(USUAL_FILTERS[suffix])), True
+    places = np.array([place for place, _ in points])
+    densities = -np.log(np.clip([x for _, x in points], LEAST_TRANSMISSION, 1.0))
+    return as_rgb(places @ densities / (places @ places)), False
+
+
+def _transmissions(element: Element) -> list[tuple[float, Doubles]]:
+    """Return how far in a filter is, 0 to 1, and its transmission there in linear Rec.709."""
+    points = []
+    for measurement in library("pygdtf").Filter(xml_node=element).measurements:
+        spectrum = sorted((x.wave_length, x.energy) for x in measurement.measurement_points)
+        if len(spectrum) > 1 and measurement.physical > 0 and measurement.transmission > 0:
+            waves, passed = np.array(spectrum, float).T
+            xy = xy_of_spectrum(waves, np.maximum(passed, 0))
+            if xy is not None:
+                percent = float(measurement.transmission)
+                level = percent / 100 if percent > 1 else percent
+                points.append((measurement.physical / 100, level * rgb_of_xy(xy) / EQUAL_ENERGY))
+    colour = _parsed(element.get("Color"))
+    if not points and colour is not None and colour[1] > 0:
+        points.append((1.0, min(colour[1], 100.0) / 100 * rgb_of_xy(colour[0])))
+    return points

@@ -1,0 +1,434 @@
+"""The lights of a mode: which channels set them, how bright they are, in which colours.
+
+A channel acts on its geometry and on all that hangs on that. A beam's emitters are those of the
+nearest geometry above it which has channels for a colour; its dimmers are all above it.
+"""
+
+import re
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from dataclasses import dataclass, replace
+from typing import Any
+from xml.etree.ElementTree import Element
+
+import numpy as np
+
+from lightpaint.arrays import Doubles
+from lightpaint.dmx.color_mixing import can_invert
+from lightpaint.dmx.console_rig import DmxChannel, RigEmitter, RigFilter
+from lightpaint.dmx.gdtf.emitter_colour import (
+    USUAL_FILTERS,
+    EmitterColour,
+    density_of,
+    emitter_colour,
+    primaries_of,
+    xy_of_kelvin,
+)
+from lightpaint.dmx.gdtf.geometry_tree import Placed
+from lightpaint.dmx.gdtf.mode_channels import ChannelFunction, Curve, ModeChannel, curve_of
+from lightpaint.dmx.spot_cone import solid_angle
+
+#: What is assumed of a fixture whose file does not say it: lumens, degrees at 50 % and at 10 % of
+#: the intensity, kelvin.
+USUAL_LUMENS, USUAL_BEAM, USUAL_FIELD, USUAL_KELVIN = 1000.0, 25.0, 40.0, 6000.0
+
+#: Least candelas that a file can mean, and largest ratio of two fluxes that agree.
+LEAST_CANDELA, AGREEING = 1.0, 3.0
+
+#: Angles of beams in degrees.
+NARROWEST, WIDEST = 0.5, 170.0
+
+#: The ways to mix colours, by the attributes of their channels: the first one that a mode has.
+_ADDED, _NAMED_RGB = re.compile(r"ColorAdd_(\w+)"), re.compile(r"ColorRGB_(Red|Green|Blue)")
+_FILTERED, _XY = re.compile(r"ColorSub_([CMY])"), re.compile(r"CIE_([XY])")
+_WAYS = (_ADDED, _NAMED_RGB, _XY, _FILTERED)
+#: How many of the channels of a way are needed.
+_NEEDED = {_ADDED: 1, _NAMED_RGB: 3, _XY: 2, _FILTERED: 3}
+
+_DIMMER = re.compile(r"(Dimmer|CIE_Brightness|ColorRGB_Dimmer)(\d*)")
+
+#: Channels that change the colour, and stay at rest.
+_RESTING = re.compile(r"CT[OBC]|Color\d+|ColorMacro\d*|HSB_\w+|Color(Add|Sub|RGB)_\w+|Tint")
+
+
+@dataclass(frozen=True)
+class ModeLight:
+    """A light in the axes of its fixture, in metres; all else as in `RigLight`.
+
+    pixel: number of the pixel, from 1; 0 for the whole fixture.
+    """
+
+    pixel: int
+    position: Doubles
+    direction: Doubles
+    up: Doubles
+    beam_angle: float
+    field_angle: float
+    emitters: tuple[RigEmitter, ...]
+    dimmers: tuple[int, ...] = ()
+    masters: tuple[int, ...] = ()
+    filters: tuple[RigFilter, ...] = ()
+    chromaticity: tuple[int, ...] = ()
+
+
+@dataclass(frozen=True)
+class FixtureMode:
+    """A mode: its channels, its lights, where its emission comes from, and what to know of it."""
+
+    name: str
+    channels: tuple[DmxChannel, ...]
+    lights: tuple[ModeLight, ...]
+    emission: str
+    remarks: tuple[str, ...] = ()
+
+
+@dataclass(frozen=True)
+class _Beam:
+    """A beam: its place in the tree, lumens and watts if the file has them, and full angles."""
+
+    node: int
+    placed: Placed
+    flux: float | None
+    watts: float | None
+    xy: tuple[float, float]
+    beam_angle: float
+    field_angle: float
+
+    @property
+    def solid_angle(self) -> float:
+        return solid_angle(self.beam_angle, self.field_angle)
+
+
+class ModeReader:
+    """The lights of one mode, from its geometries and channels.
+
+    emitters, filters, profiles: elements of the type. zoom: wanted beam angle; None for the
+    one that the file rests at.
+    """
+
+    def __init__(
+        self,
+        name: str,
+        tree: Sequence[Placed],
+        channels: Sequence[ModeChannel],
+        elements: Callable[[str], list[Element]],
+        *,
+        zoom: float | None,
+    ) -> None:
+        self.name, self.tree, self.channels = name, tree, list(channels)
+        self.emitters, self.filters = elements("Emitters/Emitter"), elements("Filters/Filter")
+        self.profiles = {x.get("Name", ""): x for x in elements("DMXProfiles/DMXProfile")}
+        self.remarks: list[str] = []
+        self.dmx = [x.dmx for x in self.channels]
+        self.beams = self._beams(zoom)
+        self.way = self._way()
+
+    def read(self, *, pixels: bool) -> FixtureMode:
+        """Return the mode. pixels: True for a light for each beam that has channels of its own."""
+        groups = self._groups(pixels=pixels)
+        candelas, emission = self._candelas()
+        lights = []
+        for k, group in enumerate(groups):
+            others = [beam for other in groups if other is not group for beam in other]
+            number = k + 1 if len(groups) > 1 else 0
+            light = self._light(number, group, others, candelas)
+            if light is not None:
+                lights.append(light)
+        if not lights:
+            self._remark("no channel of it dims light, so it is left out")
+        self._remark_resting(lights)
+        return FixtureMode(self.name, tuple(self.dmx), tuple(lights), emission, tuple(self.remarks))
+
+    def _remark(self, text: str) -> None:
+        if text not in self.remarks:
+            self.remarks.append(text)
+
+    def _with_attribute(self, pattern: re.Pattern[str]) -> Iterable[tuple[int, re.Match[str]]]:
+        """Yield places of channels with a function whose attribute matches."""
+        for k, channel in enumerate(self.channels):
+            for attribute in dict.fromkeys(x.attribute for x in channel.functions):
+                if match := pattern.fullmatch(attribute):
+                    yield k, match
+
+    def _way(self) -> re.Pattern[str] | None:
+        """Return the way in which the mode mixes colours; None if it has one colour."""
+        for way in _WAYS:
+            if len({match[1] for _, match in self._with_attribute(way)}) >= _NEEDED[way]:
+                return way
+        return None
+
+    # ---- Beams ---------------------------------------------------------------------------------
+
+    def _beams(self, zoom: float | None) -> list[_Beam]:
+        found = [k for k, placed in enumerate(self.tree) if placed.beam is not None]
+        if not found:
+            self._remark(
+                f"no beam in its GDTF: {USUAL_BEAM:g}° at 50 % and {USUAL_FIELD:g}° at 10 %"
+            )
+            root = self.tree[0] if self.tree else Placed("", "", np.eye(4), (0,))
+            usual = xy_of_kelvin(USUAL_KELVIN)
+            return [_Beam(0, root, None, None, usual, USUAL_BEAM, USUAL_FIELD)]
+        return [self._beam(k, self.tree[k], zoom) for k in found]
+
+    def _beam(self, node: int, placed: Placed, zoom: float | None) -> _Beam:
+        beam, given = placed.beam, placed.given
+        flux = beam.luminous_flux if "LuminousFlux" in given and beam.luminous_flux > 1 else None
+        power = beam.power_consumption
+        watts = power if "PowerConsumption" in given and power > 0 else None
+        angle = min(max(beam.beam_angle, NARROWEST), WIDEST)
+        field = min(max(beam.field_angle, angle), WIDEST)
+        if (zoomed := self._zoomed(node, zoom)) is not None:
+            angle, field = zoomed, min(zoomed * field / angle, WIDEST)
+        xy = xy_of_kelvin(beam.color_temperature)
+        return _Beam(node, placed, flux, watts, xy, angle, field)
+
+    def _zoomed(self, node: int, zoom: float | None) -> float | None:
+        """Return the beam angle that a zoom gives, and set it; None without a zoom."""
+        for k, channel in enumerate(self.channels):
+            function = channel.function("Zoom")
+            if function is None or channel.node not in self.tree[node].ancestry:
+                continue
+            start, end = function.physical
+            if (start, end) == (0.0, 1.0) or max(start, end) > WIDEST:
+                self._remark("its zoom has no angles")
+                return None
+            if zoom is not None:
+                self.dmx[k] = replace(self.dmx[k], default=function.level_of(zoom))
+                if not min(start, end) <= zoom <= max(start, end):
+                    self._remark(f"its zoom goes from {min(start, end):g}° to {max(start, end):g}°")
+            return max(function.value_at(self.dmx[k].default), NARROWEST)
+        return None
+
+    # ---- Lights --------------------------------------------------------------------------------
+
+    def _colour_channels(self, beam: _Beam) -> dict[str, list[int]]:
+        """Return places of the channels that set a beam's colour, by what they set."""
+        if self.way is None:
+            return {}
+        by_node: dict[int, dict[str, list[int]]] = {}
+        for k, match in self._with_attribute(self.way):
+            by_node.setdefault(self.channels[k].node, {}).setdefault(match[1], []).append(k)
+        for node in reversed(beam.placed.ancestry):
+            if len(by_node.get(node, {})) >= _NEEDED[self.way]:
+                return by_node[node]
+        return {}
+
+    def _groups(self, *, pixels: bool) -> list[list[_Beam]]:
+        """Return the beams of each light. Beams without colour beside coloured ones are left."""
+        coloured = [beam for beam in self.beams if self._colour_channels(beam)]
+        if coloured and len(coloured) < len(self.beams):
+            self._remark(f"{len(self.beams) - len(coloured)} of its beams mix no colour: left out")
+        beams = coloured or self.beams
+        if not pixels:
+            return [beams]
+        groups: dict[Any, list[_Beam]] = {}
+        for beam in beams:
+            colour = sorted(k for places in self._colour_channels(beam).values() for k in places)
+            dimmers = sorted(k for k, _ in self._dimmers([beam]))
+            groups.setdefault((*colour, *dimmers), []).append(beam)
+        return [*groups.values()]
+
+    def _dimmers(self, beams: Sequence[_Beam]) -> list[tuple[int, bool]]:
+        """Return places of dimmers of some of the beams, and whether each dims all of them."""
+        found = []
+        matches = [*self._with_attribute(_DIMMER)]
+        # Numbered dimmers of one geometry are beside each other, others behind each other.
+        has_numbers = sum(bool(match[2]) for _, match in matches) > 1
+        for k, match in matches:
+            dimmed = [b for b in beams if self.channels[k].node in b.placed.ancestry]
+            if dimmed:
+                is_whole = len(dimmed) == len(beams) and not (has_numbers and match[2])
+                found.append((k, is_whole))
+        return found
+
+    def _light(
+        self,
+        number: int,
+        beams: Sequence[_Beam],
+        others: Sequence[_Beam],
+        candelas: Mapping[tuple[int, str], float],
+    ) -> ModeLight | None:
+        chain = self._dimmers(beams)
+        shared = {k for k, _ in self._dimmers(others)}
+        own = sorted((k for k, whole in chain if whole and k not in shared), key=self._fineness)
+        masters = [k for k, whole in chain if whole and k in shared]
+        parts = [k for k, whole in chain if not whole]
+        for k in (*own, *masters, *parts):
+            self._shape(k, _DIMMER)
+        emitters = self._emitters(beams, candelas)
+        filters, chromaticity = self._filters(beams), self._chromaticity(beams)
+        is_plain = not (filters or chromaticity or any(x.channels for x in emitters))
+        if is_plain and not own:
+            if not parts:
+                return None
+            # One colour, and dimmers beside each other: these are the channels of its emitter.
+            emitters, parts = [replace(x, channels=tuple(parts)) for x in emitters], []
+        for k in parts:
+            self.dmx[k] = replace(self.dmx[k], default=self._full(k))
+        middle = _middle(beams)
+        return ModeLight(
+            number,
+            *middle,
+            max(x.beam_angle for x in beams),
+            max(x.field_angle for x in beams),
+            tuple(emitters),
+            tuple(own),
+            tuple(masters),
+            filters,
+            chromaticity,
+        )
+
+    def _fineness(self, place: int) -> int:
+        """Return the sort key of a dimmer: the finest first, since it carries the level."""
+        return -len(self.dmx[place].offsets)
+
+    def _full(self, place: int) -> int:
+        curve = self.dmx[place].curve
+        return round((curve[-1][0] if curve else 1.0) * self.dmx[place].highest)
+
+    def _shape(self, place: int, pattern: re.Pattern[str]) -> ChannelFunction:
+        """Set the curve of a channel to that of its function, and return the function."""
+        channel = self.channels[place]
+        function = next(
+            channel.function(x.attribute)
+            for x in channel.functions
+            if pattern.fullmatch(x.attribute)
+        )
+        assert function is not None
+        curve = curve_of(function, self.dmx[place].highest, self.profiles)
+        self.dmx[place] = replace(self.dmx[place], curve=curve)
+        return function
+
+    def _emitters(
+        self, beams: Sequence[_Beam], candelas: Mapping[tuple[int, str], float]
+    ) -> list[RigEmitter]:
+        """Return the emitters of some beams together."""
+        channels: dict[str, set[int]] = {}
+        colours: dict[str, EmitterColour] = {}
+        totals: dict[str, float] = {}
+        for beam in beams:
+            for colour, places in self._colours(beam):
+                colours.setdefault(colour.name, colour)
+                channels.setdefault(colour.name, set()).update(places)
+                added = candelas[beam.node, colour.name]
+                totals[colour.name] = totals.get(colour.name, 0.0) + added
+        watts = [x.watts for x in beams if x.watts is not None]
+        share = sum(watts) / len(colours) if len(watts) == len(beams) else None
+        return [
+            RigEmitter(name, x.xy, totals[name], tuple(sorted(channels[name])), x.curve, share)
+            for name, x in colours.items()
+        ]
+
+    def _colours(self, beam: _Beam) -> list[tuple[EmitterColour, list[int]]]:
+        """Return the emitters of a beam, with the places of their channels."""
+        found = self._colour_channels(beam)
+        if self.way is _ADDED:
+            colours = []
+            for suffix, places in found.items():
+                link = self._shape(places[0], _ADDED).element.get("Emitter")
+                for k in places[1:]:
+                    self._shape(k, _ADDED)
+                colour = emitter_colour(suffix, link, self.emitters)
+                if colour.is_usual:
+                    self._remark("its GDTF has no colours of emitters: usual ones are assumed")
+                colours.append((colour, places))
+            return colours
+        if self.way is _NAMED_RGB and found:
+            # Emitters of Rec.709, which such modes name unless they say otherwise.
+            for places in found.values():
+                for k in places:
+                    self._shape(k, _NAMED_RGB)
+            return [(x, found[x.name.capitalize()]) for x in primaries_of((0.3127, 0.3290))]
+        if found and (self.way is _XY or self._filters([beam])):
+            return [(x, []) for x in primaries_of(beam.xy)]
+        return [(EmitterColour("white", beam.xy, 1.0), [])]
+
+    def _filters(self, beams: Sequence[_Beam]) -> tuple[RigFilter, ...]:
+        """Return the filters of some beams together; none if they cannot set all colours."""
+        if self.way is not _FILTERED:
+            return ()
+        channels: dict[str, set[int]] = {}
+        for beam in beams:
+            for suffix, places in self._colour_channels(beam).items():
+                channels.setdefault(suffix, set()).update(places)
+        filters = []
+        for suffix in (x for x in USUAL_FILTERS if x in channels):
+            places = sorted(channels[suffix])
+            functions = [self._shape(k, _FILTERED) for k in places]
+            density, is_usual = density_of(suffix, self.filters, functions[0].element.get("Filter"))
+            if is_usual:
+                self._remark("its GDTF has no transmission of filters: usual ones are assumed")
+            name = {"C": "cyan", "M": "magenta", "Y": "yellow"}[suffix]
+            filters.append(RigFilter(name, density, tuple(places)))
+        if len(filters) < 3 or not can_invert([x.density for x in filters]):
+            self._remark("its filters do not tell colours apart: it has one colour")
+            return ()
+        return tuple(filters)
+
+    def _chromaticity(self, beams: Sequence[_Beam]) -> tuple[int, ...]:
+        """Return places of the channels of x and y of some beams."""
+        if self.way is not _XY:
+            return ()
+        found = self._colour_channels(beams[0])
+        for letter in "XY":
+            for k in found[letter]:
+                function = self._shape(k, _XY)
+                ends = zip((function.first, function.last), function.physical, strict=True)
+                curve: Curve = tuple((level / self.dmx[k].highest, x) for level, x in ends)
+                self.dmx[k] = replace(self.dmx[k], curve=curve)
+        return found["X"][0], found["Y"][0]
+
+    def _remark_resting(self, lights: Sequence[ModeLight]) -> None:
+        """Remark on channels that change the colour, but rest."""
+        used = {k for light in lights for k in light.chromaticity}
+        for light in lights:
+            used |= {k for x in light.emitters for k in x.channels}
+            used |= {k for x in light.filters for k in x.channels}
+        resting = {match[0] for k, match in self._with_attribute(_RESTING) if k not in used}
+        if resting:
+            self._remark(f"at rest: {', '.join(sorted(resting))}")
+
+    # ---- Emission ------------------------------------------------------------------------------
+
+    def _candelas(self) -> tuple[dict[tuple[int, str], float], str]:
+        """Return candelas at full by beam and emitter, and where they come from.
+
+        What was measured of emitters is taken if it is more than a candela, and its flux agrees
+        with that of the beams; else the flux of the beams, in the luminances of the emitters.
+        """
+        by_beam = {beam.node: [x for x, _ in self._colours(beam)] for beam in self.beams}
+        counts: dict[str, int] = {}
+        for colours in by_beam.values():
+            for x in colours:
+                counts[x.name] = counts.get(x.name, 0) + 1
+        measured = {
+            (beam.node, x.name): x.candela / counts[x.name]
+            for beam in self.beams
+            for x in by_beam[beam.node]
+            if x.candela is not None and x.candela > LEAST_CANDELA
+        }
+        fluxes = [beam.flux for beam in self.beams]
+        known = sum(x for x in fluxes if x is not None) if None not in fluxes else None
+        angles = {beam.node: beam.solid_angle for beam in self.beams}
+        if len(measured) == sum(map(len, by_beam.values())):
+            lumens = sum(candela * angles[node] for (node, _), candela in measured.items())
+            if known is None or 1 / AGREEING <= lumens / known <= AGREEING:
+                return measured, "LuminousIntensity"
+            self._remark("its LuminousIntensity does not fit its LuminousFlux and beam")
+        if known is None:
+            self._remark(f"its GDTF has no light: {USUAL_LUMENS:g} lm are assumed")
+        candelas = {}
+        for beam in self.beams:
+            flux = USUAL_LUMENS / len(self.beams) if known is None else beam.flux or 0.0
+            total = sum(x.share for x in by_beam[beam.node])
+            for x in by_beam[beam.node]:
+                candelas[beam.node, x.name] = flux * x.share / total / angles[beam.node]
+        return candelas, "LuminousFlux" if known is not None else f"{USUAL_LUMENS:g} lm"
+
+
+def _middle(beams: Sequence[_Beam]) -> tuple[Doubles, Doubles, Doubles]:
+    """Return position, direction and up of the middle of some beams, in the fixture's axes."""
+    matrices = np.array([beam.placed.matrix for beam in beams])
+    direction, up = -matrices[:, :3, 2].mean(axis=0), matrices[:, :3, 1].mean(axis=0)
+    if np.linalg.norm(direction) < 1e-3:  # beams all around
+        direction, up = -matrices[0, :3, 2], matrices[0, :3, 1]
+    return matrices[:, :3, 3].mean(axis=0), direction, up

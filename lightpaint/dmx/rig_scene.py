@@ -1,0 +1,242 @@
+"""A rig as a scene for Mitsuba and a lights file beside it, as texts."""
+
+import json
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import PurePosixPath
+
+import numpy as np
+
+from lightpaint.arrays import Doubles
+from lightpaint.dmx.console_rig import ConsoleRig, RigEmitter, RigFixture, RigLight
+from lightpaint.dmx.spot_cone import spot_cone
+from lightpaint.scene.checks.tokens import tag
+from lightpaint.scene.properties.site import across
+
+#: Share of full at which every light begins.
+STARTING_SHARE = 0.5
+
+#: Radiance that a white wall, lit by half of the lights that reach it, is to have.
+MIDDLE_RADIANCE = 0.5
+
+#: Resolution and samples of the sensor, and its horizontal field of view in degrees.
+FILM, SAMPLES, FIELD_OF_VIEW = (960, 540), 64, 50.0
+
+#: Room around what the sensor shows, relative to it, and height of its eye in metres.
+MARGIN, EYE_HEIGHT = 1.15, 1.7
+
+#: Metres around the middle of a beam that it lights.
+LIT_AROUND = 1.0
+
+#: Farthest throw of a light that points at no floor, and least size of the floor, in metres.
+LONGEST_THROW, LEAST_FLOOR = 10.0, 6.0
+
+#: Bits of a channel that a lights file knows.
+MAX_BITS = 24
+
+
+@dataclass(frozen=True)
+class Room:
+    """What stands around the lights.
+
+    include: file of a scene, from the folder of the rig's; "" for none. has_sensor, has_integrator:
+    whether that scene has them. meshes: files beside the rig's scene. points: (k, 3), of the
+    meshes' bounds.
+    """
+
+    include: str = ""
+    has_sensor: bool = False
+    has_integrator: bool = False
+    meshes: tuple[str, ...] = ()
+    points: Doubles | None = None
+
+
+def cd_per_unit(rig: ConsoleRig) -> float:
+    """Return the candelas of an intensity of 1, a round number.
+
+    With all lights at `STARTING_SHARE`, a white wall that some of them reach has a radiance of
+    about `MIDDLE_RADIANCE`.
+    """
+    lights = lights_of(rig)
+    lux = [_candela(light) / _throw(light) ** 2 for light in lights]
+    wall = STARTING_SHARE * float(np.mean(lux)) * math.sqrt(len(lux)) / 2 / math.pi
+    exact = max(wall / MIDDLE_RADIANCE, 1e-6)
+    power = 10.0 ** math.floor(math.log10(exact))
+    return float(min((k * power for k in (1, 2, 5, 10)), key=lambda x: abs(math.log(x / exact))))
+
+
+def scene_text(rig: ConsoleRig, unit: float, room: Room | None) -> str:
+    """Return the scene. unit: candelas of an intensity of 1. room: None for the lights alone."""
+    lines = ['<?xml version="1.0" encoding="utf-8"?>']
+    lines += [f"<!-- {_comment(rig.name)}: metres, z up; an intensity of 1 is {unit:g} cd. -->"]
+    lines += ['<scene version="3.0.0">']
+    if room is not None:
+        lines += _indented(_room_lines(rig, room))
+    for fixture in rig.fixtures:
+        for light in fixture.lights:
+            lines += _indented(_spot(light, unit))
+    return "\n".join([*lines, "</scene>", ""])
+
+
+def lights_text(rig: ConsoleRig, unit: float) -> str:
+    """Return the lights file: all lights of the rig with their emitters.
+
+    unit: candelas of an intensity of 1.
+    """
+    lines = [f"# Lights of {_comment(rig.name)}. Others in the scene stay as they are."]
+    lines += [f"cd_per_unit = {unit:g}"]
+    names = [_quoted(light.name) for light in lights_of(rig)]
+    lines += ["lights = [", *(f"    {name}," for name in names), "]"]
+    for fixture in rig.fixtures:
+        for light in fixture.lights:
+            lines += ["", f"[light.{_quoted(light.name)}]", "emitters = ["]
+            lines += [f"    {_emitter(x, light, fixture)}," for x in light.emitters]
+            lines += ["]"]
+    return "\n".join([*lines, ""])
+
+
+def lights_of(rig: ConsoleRig) -> list[RigLight]:
+    """Return the lights of all fixtures."""
+    return [light for fixture in rig.fixtures for light in fixture.lights]
+
+
+def _candela(light: RigLight) -> float:
+    return sum(x.candela for x in light.emitters)
+
+
+def _emitter(emitter: RigEmitter, light: RigLight, fixture: RigFixture) -> str:
+    """Return an emitter as an inline table of TOML."""
+    x, y = emitter.xy
+    channels = emitter.channels or light.dimmers
+    if light.filters:
+        channels = tuple(k for filter_ in light.filters for k in filter_.channels)
+    channels = light.chromaticity or channels
+    byte_counts = [len(fixture.channels[k].offsets) for k in channels]
+    bits = min(8 * min(byte_counts, default=1), MAX_BITS)
+    fields = [f"name = {_quoted(emitter.name)}", f"xy = [{x:.5g}, {y:.5g}]"]
+    fields += [f"cd = {emitter.candela:.6g}", "max = 1", f"bits = {bits}"]
+    if emitter.watts is not None:
+        fields.append(f"watts = {emitter.watts:.6g}")
+    return f"{{ {', '.join(fields)} }}"
+
+
+def _quoted(text: str) -> str:
+    return json.dumps(text, ensure_ascii=False).replace("\x7f", "\\u007f")
+
+
+def _comment(text: str) -> str:
+    return text.replace("--", "- -")
+
+
+def _indented(lines: Sequence[str]) -> list[str]:
+    return [f"    {line}" for line in lines]
+
+
+def _spot(light: RigLight, unit: float) -> list[str]:
+    cutoff, width = spot_cone(light.beam_angle, light.field_angle)
+    level = STARTING_SHARE * _candela(light) / unit
+    direction = np.array(light.direction)
+    up = np.array(light.up)
+    if np.linalg.norm(np.cross(direction, up)) < 1e-3:
+        up = across(direction)[0]
+    origin, target = np.array(light.position), np.array(light.position) + direction
+    lookat = tag("lookat", origin=_point(origin), target=_point(target), up=_point(up))
+    return [
+        tag("emitter", type="spot", id=light.name).replace("/>", ">"),
+        f'    <transform name="to_world">{lookat}</transform>',
+        f"    {tag('float', name='cutoff_angle', value=f'{cutoff:.6g}')}",
+        f"    {tag('float', name='beam_width', value=f'{width:.6g}')}",
+        f"    {tag('rgb', name='intensity', value=f'{level:.6g}')}",
+        "</emitter>",
+    ]
+
+
+def _point(values: Doubles) -> str:
+    # To a micrometre, and without -0.
+    return ", ".join(f"{round(v, 6) + 0.0:.9g}" for v in values.tolist())
+
+
+def _room_lines(rig: ConsoleRig, room: Room) -> list[str]:
+    """Return the elements of a scene but for the lights of the rig."""
+    lines = []
+    if room.include:
+        lines += [tag("include", filename=room.include)]
+    if not room.has_integrator:
+        lines += ['<integrator type="path"><integer name="max_depth" value="6"/></integrator>']
+    if not room.has_sensor:
+        lines += _sensor(rig, room)
+    for mesh in room.meshes:
+        bsdf = '<bsdf type="diffuse"><rgb name="reflectance" value="0.5"/></bsdf>'
+        file = tag("string", name="filename", value=str(PurePosixPath(mesh)))
+        lines += [
+            '<shape type="ply">',
+            f"    {file}",
+            f'    <bsdf type="twosided">{bsdf}</bsdf>',
+            "</shape>",
+        ]
+    if not room.include and not room.meshes:
+        lines += _floor(_lit_points(rig))
+    return lines
+
+
+def _lit_points(rig: ConsoleRig) -> Doubles:
+    """Return where the lights are and where their beams end, (2n, 3)."""
+    lights = lights_of(rig)
+    places = np.array([light.position for light in lights])
+    ways = np.array([light.direction for light in lights])
+    throws = np.array([_throw(light) for light in lights])
+    return np.concatenate([places, places + throws[:, None] * ways])
+
+
+def _throw(light: RigLight) -> float:
+    """Return the metres from a light to the floor, z = 0, along its axis."""
+    height, fall = light.position[2], -light.direction[2]
+    distance = height / fall if height > 0 and fall > 1e-3 else LONGEST_THROW
+    return max(min(distance, LONGEST_THROW), 1.0)
+
+
+def _sensor(rig: ConsoleRig, room: Room) -> list[str]:
+    """Return a sensor in front, at -y, that shows the room; of a floor alone, what is lit of it."""
+    points = _lit_points(rig)
+    points = points[len(points) // 2 :] if room.points is None else room.points
+    low, high = points.min(axis=0) - LIT_AROUND, points.max(axis=0) + LIT_AROUND
+    aspect = FILM[0] / FILM[1]
+    width = MARGIN * max(high[0] - low[0], aspect * (high[2] - low[2]), 1.0)
+    distance = width / 2 / math.tan(math.radians(FIELD_OF_VIEW / 2))
+    middle = (low + high) / 2
+    eye = low[2] + EYE_HEIGHT if room.points is not None else middle[2] + distance / 2
+    origin = np.array([middle[0], low[1] - distance, max(eye, 0.0)])
+    lookat = tag("lookat", origin=_point(origin), target=_point(middle), up="0, 0, 1")
+    width_px, height_px = FILM
+    return [
+        '<sensor type="perspective" id="front">',
+        f"    {tag('float', name='fov', value=f'{FIELD_OF_VIEW:g}')}",
+        f'    <transform name="to_world">{lookat}</transform>',
+        '    <sampler type="independent">',
+        f"        {tag('integer', name='sample_count', value=str(SAMPLES))}",
+        "    </sampler>",
+        '    <film type="hdrfilm">',
+        f"        {tag('integer', name='width', value=str(width_px))}",
+        f"        {tag('integer', name='height', value=str(height_px))}",
+        '        <rfilter type="box"/>',
+        "    </film>",
+        "</sensor>",
+    ]
+
+
+def _floor(points: Doubles) -> list[str]:
+    """Return a floor below all points."""
+    low, high = points.min(axis=0), points.max(axis=0)
+    middle = (low + high) / 2
+    half = np.maximum(MARGIN * (high - low), LEAST_FLOOR) / 2
+    (x, y), (across_x, across_y), z = middle[:2].round(3), half[:2].round(3), min(low[2], 0.0)
+    scale = tag("scale", x=f"{across_x:g}", y=f"{across_y:g}")
+    place = tag("translate", x=f"{x + 0.0:g}", y=f"{y + 0.0:g}", z=f"{z:g}")
+    return [
+        '<shape type="rectangle" id="floor">',
+        f'    <transform name="to_world">{scale}{place}</transform>',
+        '    <bsdf type="twosided"><bsdf type="diffuse">'
+        '<rgb name="reflectance" value="0.4"/></bsdf></bsdf>',
+        "</shape>",
+    ]

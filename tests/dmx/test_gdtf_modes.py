@@ -1,0 +1,276 @@
+"""Types of fixtures: what their channels do, how bright their emitters are, what is assumed."""
+
+import math
+
+import numpy as np
+import pytest
+from rig_files import BEAM, RGBW, RGBW_CHANNELS, channel, gdtf
+
+from lightpaint.dmx.gdtf import geometry_tree, mode_channels
+from lightpaint.dmx.gdtf.fixture_type import FixtureType
+from lightpaint.dmx.gdtf.mode_channels import dmx_value
+from lightpaint.dmx.gdtf.mode_lights import FixtureMode
+from lightpaint.dmx.spot_cone import solid_angle, spot_cone
+from lightpaint.errors import RigError
+
+
+def read_mode(data: bytes, *, zoom: float | None = None, pixels: bool = False) -> FixtureMode:
+    return FixtureType(data, "lamp.gdtf").mode("One", zoom=zoom, pixels=pixels)
+
+
+@pytest.mark.parametrize(
+    ("text", "byte_count", "level"),
+    [
+        ("128/1", 1, 128),
+        ("128/1", 2, 0x8080),
+        ("128/1s", 2, 0x8000),
+        ("255/1", 3, 0xFFFFFF),
+        ("32768/2", 2, 32768),
+        ("32768/2s", 2, 32768),
+        ("4660/2", 1, 0x12),
+        ("None", 2, 0),
+    ],
+)
+def test_values_are_repeated_or_shifted_as_the_standard_says(
+    text: str, byte_count: int, level: int
+) -> None:
+    assert dmx_value(text, byte_count) == level
+
+
+def test_flux_is_shared_by_luminance_and_the_spot_radiates_it() -> None:
+    """5000 lm in relative luminances 20, 40, 8, 52."""
+    mode = read_mode(gdtf())
+    [light] = mode.lights
+    candelas = {x.name: x.candela for x in light.emitters}
+    lumens = sum(candelas.values()) * solid_angle(30, 45)
+    assert math.isclose(lumens, 5000, rel_tol=1e-9)
+    assert math.isclose(candelas["white"] / candelas["red"], 52 / 20, rel_tol=1e-9)
+    assert mode.emission == "LuminousFlux"
+    assert light.dimmers == (0,)
+    assert [x.channels for x in light.emitters] == [(1,), (2,), (3,), (4,)]
+    assert light.emitters[0].xy == (0.69, 0.309)
+
+
+def test_the_solid_angle_is_the_integral_of_the_spots_profile() -> None:
+    cutoff, width = np.radians(spot_cone(30, 45))
+    theta = np.linspace(0, cutoff, 200_001)
+    profile = np.clip((cutoff - theta) / (cutoff - width), 0, 1)
+    integral = np.trapezoid(2 * np.pi * np.sin(theta) * profile, theta)
+    assert math.isclose(solid_angle(30, 45), integral, rel_tol=1e-8)  # of the sum of 2e5 steps
+
+
+def test_a_spot_has_half_its_intensity_at_the_beam_and_a_tenth_at_the_field() -> None:
+    cutoff, width = spot_cone(30, 45)
+    assert math.isclose((cutoff - 15) / (cutoff - width), 0.5)
+    assert math.isclose((cutoff - 22.5) / (cutoff - width), 0.1)
+    for beam, field in ((25, 25), (10, 60), (170, 170), (40, 20)):
+        cutoff, width = spot_cone(beam, field)
+        assert 0 <= width < cutoff < 90
+
+
+def _measured(candela: float) -> str:
+    """Four emitters of which each was measured with this intensity."""
+    measurement = f'<Measurement Physical="100" LuminousIntensity="{candela}"/></Emitter>'
+    return RGBW.replace("/>", f">{measurement}")
+
+
+def test_measured_intensity_counts_where_its_flux_agrees() -> None:
+    plausible = 5000 / solid_angle(30, 45) / 4
+    for candela, source in (
+        (plausible, "LuminousIntensity"),
+        (2.9 * plausible, "LuminousIntensity"),
+        (4 * plausible, "LuminousFlux"),
+        (plausible / 4, "LuminousFlux"),
+        (1.0, "LuminousFlux"),
+    ):
+        mode = read_mode(gdtf(described=f"<Emitters>{_measured(candela)}</Emitters>"))
+        assert mode.emission == source
+        if source == "LuminousIntensity":
+            assert all(
+                math.isclose(x.candela, candela, rel_tol=1e-6) for x in mode.lights[0].emitters
+            )
+
+
+def test_without_any_light_a_thousand_lumens_are_assumed_and_said() -> None:
+    mode = read_mode(gdtf(geometries='<Geometry Name="Body"><Beam Name="Beam"/></Geometry>'))
+    [light] = mode.lights
+    lumens = sum(x.candela for x in light.emitters) * solid_angle(25, 25)
+    assert math.isclose(lumens, 1000, rel_tol=1e-9)
+    assert mode.emission == "1000 lm"
+    assert "its GDTF has no light: 1000 lm are assumed" in mode.remarks
+
+
+def test_a_file_of_dimmers_alone_is_one_white_that_all_of_them_set() -> None:
+    """As some programs write for types that they do not know."""
+    channels = "".join(channel(f"Dimmer{k}", str(k), geometry="Body") for k in (1, 2, 3))
+    mode = read_mode(gdtf(channels, geometries='<Geometry Name="Body"/>', described=""))
+    [light] = mode.lights
+    [emitter] = light.emitters
+    assert (emitter.name, emitter.channels, light.dimmers) == ("white", (0, 1, 2), ())
+    assert any("no beam in its GDTF" in remark for remark in mode.remarks)
+
+
+def test_emitters_without_colour_have_their_spectrum_wavelength_or_usual_colour() -> None:
+    line = '<Emitter Name="Red" DominantWaveLength="630"/>'
+    peak = "".join(
+        f'<MeasurementPoint WaveLength="{wave}" Energy="{energy}"/>'
+        for wave, energy in ((620, 0), (630, 1), (640, 0))
+    )
+    spectrum = (
+        '<Emitter Name="Red"><Measurement Physical="100" LuminousIntensity="0">'
+        f"{peak}</Measurement></Emitter>"
+    )
+    found = {}
+    for name, described in {"line": line, "spectrum": spectrum, "none": ""}.items():
+        mode = read_mode(
+            gdtf(channel("ColorAdd_R", "1"), described=f"<Emitters>{described}</Emitters>")
+        )
+        found[name] = mode.lights[0].emitters[0].xy
+        assert ("usual ones are assumed" in " ".join(mode.remarks)) == (name == "none")
+    # CIE 1931 at 630 nm.
+    assert np.allclose(found["line"], (0.7079, 0.2920), atol=1e-4)  # as tables are rounded
+    assert np.allclose(found["spectrum"], found["line"], atol=5e-3)
+    assert found["none"] == (0.69, 0.305)
+
+
+def test_dimmers_in_a_chain_multiply_and_the_finest_carries_the_level() -> None:
+    tree = f'<Geometry Name="Body"><Axis Name="Head">{BEAM}</Axis></Geometry>'
+    channels = channel("Dimmer", "1", geometry="Body") + channel("Dimmer", "2,3", geometry="Head")
+    mode = read_mode(gdtf(channels + channel("ColorAdd_W", "4"), geometries=tree))
+    [light] = mode.lights
+    assert light.dimmers == (1, 0)
+    assert [x.channels for x in light.emitters] == [(2,)]
+
+
+def _zoomed(rest: str) -> bytes:
+    zoom = channel("Zoom", "6,7", default=rest, function='PhysicalFrom="10" PhysicalTo="50"')
+    return gdtf(RGBW_CHANNELS + zoom)
+
+
+def test_zoom_is_at_rest_or_as_wanted_and_then_sent() -> None:
+    [light] = read_mode(_zoomed("0/2")).lights
+    assert (light.beam_angle, light.field_angle) == (10, 15)  # the field in proportion
+    mode = read_mode(_zoomed("0/2"), zoom=30)
+    assert math.isclose(mode.lights[0].beam_angle, 30, abs_tol=40 / 65535)
+    assert mode.channels[5].default == 32768
+    wide = read_mode(_zoomed("0/2"), zoom=80)
+    assert wide.lights[0].beam_angle == 50
+    assert "its zoom goes from 10° to 50°" in wide.remarks
+    # The same light in a wider beam.
+    narrow = read_mode(_zoomed("0/2"))
+    totals = [
+        sum(x.candela for x in m.lights[0].emitters)
+        * solid_angle(m.lights[0].beam_angle, m.lights[0].field_angle)
+        for m in (narrow, wide)
+    ]
+    assert np.allclose(totals, 5000)
+
+
+#: Three pixels that repeat one geometry of two levels, whose colours are below its first.
+PIXELS = '<Geometry Name="Cell"><Axis Name="Inner">' + BEAM + "</Axis></Geometry>"
+ROW = "".join(
+    f'<GeometryReference Name="P{k}" Geometry="Cell" '
+    f'Position="{{1,0,0,{k / 10}}}{{0,1,0,0}}{{0,0,1,0}}{{0,0,0,1}}">'
+    f'<Break DMXBreak="1" DMXOffset="{2 + 3 * k}"/></GeometryReference>'
+    for k in range(3)
+)
+CELLS = channel("Dimmer", "1", geometry="Bar") + "".join(
+    channel(f"ColorAdd_{c}", str(k + 1), geometry="Inner", dmx_break="Overwrite")
+    for k, c in enumerate("RGB")
+)
+
+
+def _bar() -> bytes:
+    geometries = PIXELS + f'<Geometry Name="Bar">{ROW}</Geometry>'
+    return gdtf(CELLS, geometries=geometries, root="Bar")
+
+
+def test_pixels_below_references_have_channels_and_places_of_their_own() -> None:
+    mode = read_mode(_bar(), pixels=True)
+    assert [x.offsets for x in mode.channels] == [(k,) for k in range(1, 11)]
+    assert [light.pixel for light in mode.lights] == [1, 2, 3]
+    channels = [[x.channels for x in light.emitters] for light in mode.lights]
+    assert channels == [[(1,), (2,), (3,)], [(4,), (5,), (6,)], [(7,), (8,), (9,)]]
+    assert np.allclose([light.position[0] for light in mode.lights], [0, 0.1, 0.2])
+    # The dimmer of all stays at full.
+    assert [(x.dimmers, x.masters) for x in mode.lights] == [((), (0,))] * 3
+
+
+def test_without_pixels_a_fixture_is_one_light_of_all_its_beams() -> None:
+    [light] = read_mode(_bar()).lights
+    assert [x.channels for x in light.emitters] == [(1, 4, 7), (2, 5, 8), (3, 6, 9)]
+    assert light.dimmers == (0,)
+    assert np.allclose(light.position, (0.1, 0, 0))
+    parts = read_mode(_bar(), pixels=True).lights
+    whole = sum(x.candela for x in light.emitters)
+    assert math.isclose(sum(x.candela for p in parts for x in p.emitters), whole)
+
+
+def test_references_in_a_circle_and_too_many_geometries_are_one_line(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    circle = (
+        '<Geometry Name="Body"><GeometryReference Name="R" Geometry="Other"/></Geometry>'
+        '<Geometry Name="Other"><GeometryReference Name="S" Geometry="Other"/></Geometry>'
+    )
+    with pytest.raises(RigError, match=r"lamp.gdtf: its geometry 'Other' refers to itself"):
+        read_mode(gdtf(geometries=circle))
+    monkeypatch.setattr(geometry_tree, "MAX_GEOMETRIES", 3)
+    with pytest.raises(RigError, match="more than 3 geometries"):
+        read_mode(_bar())
+    monkeypatch.undo()
+    monkeypatch.setattr(mode_channels, "MAX_CHANNELS", 9)
+    with pytest.raises(RigError, match="more than 9 channels"):
+        read_mode(_bar())
+
+
+def test_a_channel_that_dims_in_a_part_of_its_range_is_inverted_by_its_curve() -> None:
+    both = (
+        '<DMXChannel DMXBreak="1" Offset="1" Geometry="Beam"><LogicalChannel Attribute="Dimmer">'
+        '<ChannelFunction Name="a" Attribute="Shutter1" DMXFrom="0/1"/>'
+        '<ChannelFunction Name="b" Attribute="Dimmer" DMXFrom="51/1" PhysicalFrom="1" '
+        'PhysicalTo="0"/></LogicalChannel></DMXChannel>'
+    )
+    mode = read_mode(gdtf(both))
+    curve = mode.channels[0].curve
+    assert np.allclose(curve[0], (1.0, 0.0))
+    assert np.allclose(curve[-1], (0.2, 1.0))
+
+
+def test_a_profile_is_inverted_whether_of_a_hundred_or_of_one() -> None:
+    for points in (
+        '<Point DMXPercentage="0" CFC2="0.01"/>',
+        '<Point DMXPercentage="0" CFC2="1"/>',
+    ):
+        profiles = f'<DMXProfiles><DMXProfile Name="square">{points}</DMXProfile></DMXProfiles>'
+        data = gdtf(channel("Dimmer", "1", function='DMXProfile="square"'), described=profiles)
+        levels, shares = np.transpose(read_mode(data).channels[0].curve)
+        assert np.allclose(shares, levels**2, atol=1e-12)
+
+
+def test_emitters_that_were_measured_at_several_levels_have_a_curve() -> None:
+    measured = (
+        '<Emitter Name="White" Color="0.31,0.33,100"><Measurement Physical="50" '
+        'LuminousIntensity="1500"/><Measurement Physical="100" LuminousIntensity="2000"/></Emitter>'
+    )
+    data = gdtf(
+        channel("ColorAdd_W", "1"),
+        geometries='<Geometry Name="Body"><Beam Name="Beam"/></Geometry>',
+        described=f"<Emitters>{measured}</Emitters>",
+    )
+    [emitter] = read_mode(data).lights[0].emitters
+    assert emitter.candela == 2000
+    assert emitter.curve == ((0.0, 0.0), (0.5, 0.75), (1.0, 1.0))
+
+
+def test_what_changes_the_colour_and_stays_at_rest_is_named() -> None:
+    more = channel("CTO", "6", default="17/1") + channel("Color1", "7") + channel("Gobo1", "8")
+    mode = read_mode(gdtf(RGBW_CHANNELS + more))
+    assert mode.remarks == ("at rest: CTO, Color1",)
+    assert mode.channels[5].default == 17
+
+
+def test_a_fixture_whose_channels_dim_nothing_has_no_light() -> None:
+    mode = read_mode(gdtf(channel("Pan", "1")))
+    assert mode.lights == ()
+    assert "no channel of it dims light, so it is left out" in mode.remarks
