@@ -165,7 +165,12 @@ def _send(link: ConsoleLink, drives: RigDrives, sending: Sending) -> None:
 
 def _announce(text: str) -> None:
     """Print what happens now: on stderr if stdout is a document for programs."""
-    (lines.err if output_mode().as_json else terminal.write)(text)
+    if not output_mode().as_json:
+        terminal.write(text)
+    elif output_mode().json_progress:
+        lines.err_json({"remark": text})
+    else:
+        lines.err(text)
 
 
 def listen(
