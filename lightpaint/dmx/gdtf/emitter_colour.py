@@ -60,7 +60,7 @@ def rgb_of_xy(xy: Chromaticity) -> Doubles:
 
 @cache
 def _equal_energy() -> Doubles:
-    """Return the colour of equal power at all wavelengths, of which a filter lets a part through."""
+    """Return the colour of equal power at all wavelengths, which filters are measured against."""
     xy = xy_of_spectrum(np.array([300.0, 900.0]), np.ones(2))
     assert xy is not None
     return rgb_of_xy(xy)

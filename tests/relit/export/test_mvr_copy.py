@@ -81,9 +81,9 @@ def test_lights_move_to_their_places_in_the_answer_with_and_without_focus_points
     assert [*after] == [*before]
     for name, light in after.items():
         position, target = wanted.get(name, (before[name].position, None))
-        direction = (
-            before[name].direction if target is None else unit(np.subtract(target, position))
-        )
+        way = before[name].direction
+        if target is not None:
+            way = unit(np.subtract(target, position))
         assert np.allclose(light.direction, way, atol=WRITTEN)
         if name != "201 Wash 1":
             assert np.allclose(light.position, position, atol=WRITTEN)
