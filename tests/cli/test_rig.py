@@ -49,7 +49,7 @@ def test_remarks_are_beside_the_type_they_are_of(tmp_path: Path) -> None:
     write_mvr(tmp_path / "a.mvr", layered(fixture(), fixture("b", number="2", address="0")))
     completed = run(tmp_path, "rig", "a.mvr", "--only-lights")
     assert completed.returncode == 0
-    assert "b: left out, without an address" in completed.stderr
+    assert "2 b: no address" in completed.stderr
     assert "<sensor" not in (tmp_path / "a.xml").read_text()
 
 
