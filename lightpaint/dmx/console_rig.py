@@ -100,6 +100,14 @@ class RigLight:
     filters: tuple[RigFilter, ...] = ()
     chromaticity: tuple[int, ...] = ()
 
+    @property
+    def is_controlled(self) -> bool:
+        """Whether channels set it: not those of a fixture without an address, or of which only a
+        placeholder is known.
+        """
+        channels = [x.channels for x in self.emitters] + [x.channels for x in self.filters]
+        return any((*channels, self.dimmers, self.chromaticity))
+
 
 @dataclass(frozen=True)
 class RigFixture:

@@ -92,6 +92,8 @@ def _drives_of(
         return float(np.mean([share(k) for k in places] or [1.0]))
 
     names = [x.name for x in light.emitters]
+    if not light.is_controlled:
+        return dict.fromkeys(names, 0.0)
     dimmer = float(np.prod([share(k) for k in (*light.dimmers, *light.masters)]))
     if light.filters:
         found = drives_of_filters(light, dimmer, [mean(x.channels) for x in light.filters])

@@ -7,6 +7,7 @@ nearest geometry above it which has channels for a colour; its dimmers are all a
 import re
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
+from functools import cache, partial
 from typing import Any
 from xml.etree.ElementTree import Element
 
@@ -26,6 +27,7 @@ from lightpaint.dmx.gdtf.emitter_colour import (
 from lightpaint.dmx.gdtf.geometry_tree import Placed
 from lightpaint.dmx.gdtf.mode_channels import ChannelFunction, Curve, ModeChannel, curve_of
 from lightpaint.dmx.spot_cone import solid_angle
+from lightpaint.sentences import Hint, Sentence
 
 #: What is assumed of a fixture whose file does not say it: lumens, degrees at 50 % and at 10 % of
 #: the intensity, kelvin.
@@ -45,6 +47,13 @@ _WAYS = (_ADDED, _NAMED_RGB, _XY, _FILTERED)
 _NEEDED = {_ADDED: 1, _NAMED_RGB: 3, _XY: 2, _FILTERED: 3}
 
 _DIMMER = re.compile(r"(Dimmer|CIE_Brightness|ColorRGB_Dimmer)(\d*)")
+
+#: What to know of a file that some programs write for types that they do not know.
+_PLACEHOLDER = Sentence(
+    "its GDTF is a placeholder, all of whose channels are dimmers: it has one colour, and nothing "
+    "is sent to it; give its own file with ",
+    Hint("gdtf_folder"),
+)
 
 #: Channels that change the colour, and stay at rest.
 _RESTING = re.compile(r"CT[OBC]|Color\d+|ColorMacro\d*|HSB_\w+|Color(Add|Sub|RGB)_\w+|Tint")
@@ -119,6 +128,7 @@ class ModeReader:
         self.profiles = {x.get("Name", ""): x for x in elements("DMXProfiles/DMXProfile")}
         self.remarks: list[str] = []
         self.dmx = [x.dmx for x in self.channels]
+        self.emitter_colour = cache(partial(emitter_colour, emitters=tuple(self.emitters)))
         self.beams = self._beams(zoom)
         self.way = self._way()
 
@@ -126,6 +136,10 @@ class ModeReader:
         """Return the mode. pixels: True for a light for each beam that has channels of its own."""
         groups = self._groups(pixels=pixels)
         candelas, emission = self._candelas()
+        if self._is_placeholder():
+            lone = self._lone_light(groups[0], candelas)
+            remarks = (_PLACEHOLDER, *self.remarks)
+            return FixtureMode(self.name, tuple(self.dmx), (lone,), emission, remarks)
         lights = []
         for k, group in enumerate(groups):
             others = [beam for other in groups if other is not group for beam in other]
@@ -137,6 +151,14 @@ class ModeReader:
             self._remark("no channel of it dims light, so it is left out")
         self._remark_resting(lights)
         return FixtureMode(self.name, tuple(self.dmx), tuple(lights), emission, tuple(self.remarks))
+
+    def _is_placeholder(self) -> bool:
+        """Return whether the file stands for a type that a program does not know: no beam, and all
+        channels, whatever they do, called dimmers.
+        """
+        has_beam = any(placed.beam is not None for placed in self.tree)
+        numbered = {match[0] for _, match in self._with_attribute(_DIMMER) if match[2]}
+        return not has_beam and len(numbered) > 1
 
     def _remark(self, text: str) -> None:
         if text not in self.remarks:
@@ -230,14 +252,10 @@ class ModeReader:
     def _dimmers(self, beams: Sequence[_Beam]) -> list[tuple[int, bool]]:
         """Return places of dimmers of some of the beams, and whether each dims all of them."""
         found = []
-        matches = [*self._with_attribute(_DIMMER)]
-        # Numbered dimmers of one geometry are beside each other, others behind each other.
-        has_numbers = sum(bool(match[2]) for _, match in matches) > 1
-        for k, match in matches:
+        for k, _ in self._with_attribute(_DIMMER):
             dimmed = [b for b in beams if self.channels[k].node in b.placed.ancestry]
             if dimmed:
-                is_whole = len(dimmed) == len(beams) and not (has_numbers and match[2])
-                found.append((k, is_whole))
+                found.append((k, len(dimmed) == len(beams)))
         return found
 
     def _light(
@@ -276,6 +294,14 @@ class ModeReader:
             filters,
             chromaticity,
         )
+
+    def _lone_light(
+        self, beams: Sequence[_Beam], candelas: Mapping[tuple[int, str], float]
+    ) -> ModeLight:
+        """Return the light of some beams that no channel sets."""
+        angles = max(x.beam_angle for x in beams), max(x.field_angle for x in beams)
+        emitters = tuple(self._emitters(beams, candelas))
+        return ModeLight(0, *_middle(beams), *angles, emitters)
 
     def _fineness(self, place: int) -> int:
         """Return the sort key of a dimmer: the finest first, since it carries the level."""
@@ -327,7 +353,7 @@ class ModeReader:
                 link = self._shape(places[0], _ADDED).element.get("Emitter")
                 for k in places[1:]:
                     self._shape(k, _ADDED)
-                colour = emitter_colour(suffix, link, self.emitters)
+                colour = self.emitter_colour(suffix, link)
                 if colour.is_usual:
                     self._remark("its GDTF has no colours of emitters: usual ones are assumed")
                 colours.append((colour, places))
