@@ -19,6 +19,9 @@ from lightpaint.batch.manifest.entries import MAX_LOOKS
 from lightpaint.batch.manifest.keys import MAX_FRAMES
 from lightpaint.cli.commands.render_commands import template_lines
 from lightpaint.cli.options.parser import command_parser
+from lightpaint.dmx.network.console_link import PRIORITY
+from lightpaint.dmx.network.console_receiver import LOOPBACK
+from lightpaint.dmx.network.dmx_packets import USUAL_PRIORITY
 from lightpaint.lighting.constraints.color_restrictions import LAMP_KELVINS
 from lightpaint.lighting.fit import DEFAULT_HOLD
 from lightpaint.paint.server.address import DEFAULT_PORT
@@ -145,6 +148,8 @@ DEFAULTS = {
     "--port": f"{DEFAULT_PORT}, or any free one if that is taken",
     "--exposure": "0",
     "--space": "8 or 16 bits",
+    "--priority": f"{PRIORITY}, below the {USUAL_PRIORITY} of consoles, which win",
+    "--interface": f"{LOOPBACK}, for programs of this machine",
     "--task-limit": f"{LIMIT_FACTOR:g} times what it is expected to take, at least {MIN_LIMIT_S:g}",
 }
 

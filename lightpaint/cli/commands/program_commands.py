@@ -76,7 +76,10 @@ def export(
     if remark:
         listen.say(remark)
     files = list(file_writers)
-    return CommandOutcome(lambda: documents.files_document(folder, files, lighting=str(lighting)))
+    several = {"lightings": list(map(str, lightings))} if len(lightings) > 1 else {}
+    return CommandOutcome(
+        lambda: documents.files_document(folder, files, lighting=str(lighting), **several)
+    )
 
 
 def _light_groups(groups: GroupsFile | None, answer: Lighting) -> LightGroups | None:

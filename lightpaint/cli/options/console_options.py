@@ -6,6 +6,7 @@ from pathlib import Path
 from typing import Literal
 
 from lightpaint.cli.options import arguments
+from lightpaint.cli.options.option_groups import add_rig_reading
 from lightpaint.dmx.network.console_target import PROTOCOLS, ConsoleTarget, parse_target
 from lightpaint.errors import ConsoleError
 from lightpaint.validation import parse_number, parse_whole_number
@@ -31,7 +32,7 @@ class RigFile:
 
 @dataclass(frozen=True)
 class Sending:
-    """Where to send, and how.
+    """A target, how to send to it, and until when.
 
     target: None to send nothing. universes: of the network by those of the rig, for some.
     priority: None for that of the link.
@@ -55,17 +56,7 @@ def add_rig(parser: argparse.ArgumentParser, *, required: bool, purpose: str = "
         metavar="show.mvr",
         help=f"{purpose}MVR with the fixtures, their modes and addresses",
     )
-    parser.add_argument(
-        "--gdtf",
-        metavar="DIR",
-        help="folder with GDTF files, for those that the MVR lacks or has incomplete",
-    )
-    parser.add_argument(
-        "--pixels",
-        action="store_true",
-        help="each beam of a fixture with channels of its own is a light, as in the scene that was "
-        "made so",
-    )
+    add_rig_reading(parser, has_zoom=False)
 
 
 def rig_file(options: argparse.Namespace) -> RigFile | None:
@@ -108,7 +99,7 @@ def _add_priority(parser: argparse.ArgumentParser) -> None:
         type=arguments.at_least(0, maximum=200),
         metavar="N",
         help="priority of sACN, of which receivers take the highest (default: 90, below the 100 of "
-        "consoles, so that these win)",
+        "consoles, which win)",
     )
 
 
@@ -208,7 +199,7 @@ def add_listen(parser: argparse.ArgumentParser) -> None:
         "--port",
         type=arguments.at_least(1, maximum=65535),
         metavar="N",
-        help="port to listen at (default: 5568 for sACN, 6454 for Art-Net)",
+        help="port to listen at (default: that of the protocol)",
     )
     _add_interface(
         parser,
@@ -232,7 +223,7 @@ def _add_universes(parser: argparse.ArgumentParser) -> None:
         default=[],
         metavar="1:5,...",
         help="universe 1 of the rig is universe 5 of the network; may be repeated (default: the "
-        "same number; for Art-Net, which counts from 0, one less)",
+        "same number; of Art-Net one less)",
     )
 
 

@@ -174,19 +174,21 @@ def add_output(parser: "argparse._ActionsContainer", metavar: str, description: 
     parser.add_argument("-o", "--output", metavar=metavar, help=description)
 
 
-def add_rig_reading(parser: argparse.ArgumentParser) -> None:
-    """Add the options for how a show's fixtures are read."""
+def add_rig_reading(parser: argparse.ArgumentParser, *, has_zoom: bool) -> None:
+    """Add the options for how a show's fixtures are read. has_zoom: whether beams matter."""
     parser.add_argument(
         "--gdtf",
         metavar="FOLDER",
         help="folder with GDTF files, which come before those of the show with the same names",
     )
-    parser.add_argument(
-        "--zoom",
-        type=arguments.number(" of degrees"),
-        metavar="DEGREES",
-        help="beam angle of all fixtures that have a zoom (default: as their files say they rest)",
-    )
+    if has_zoom:
+        parser.add_argument(
+            "--zoom",
+            type=arguments.number(" of degrees"),
+            metavar="DEGREES",
+            help="beam angle of all fixtures that have a zoom (default: as their files say they "
+            "rest)",
+        )
     parser.add_argument(
         "--pixels",
         action="store_true",
@@ -319,8 +321,7 @@ OTHER_OPTIONS: dict[Theme, str] = {
     "Shots, looks and advice": "--frames --variations --keep-going",
     "Looks": "--init --only --dry-run",
     "Machines": "--export --log",
-    "Console": "--rig --gdtf --pixels --from --universe --priority --fps --fade --until --blackout "
-    "--interface --seconds",
+    "Console": "--from --universe --priority --fps --fade --until --blackout --interface --seconds",
     "Page": "--host --port --no-browser --new",
     "Results": "--to --dump --output --table --map-size --no-sheet --json --quiet --verbose "
     "--json-progress --help",

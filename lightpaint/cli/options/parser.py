@@ -236,7 +236,7 @@ def _export(parser: argparse.ArgumentParser) -> None:
         "(default: new prims below /lights)",
     )
     add_rig(parser, required=False, purpose="for mvr and cues: ")
-    add_fade(parser, "for cues: the time of each (default: 0)")
+    add_fade(parser, "for cues: the time of each (default: none)")
     add_map_size(parser)
     add_view(parser)
     add_output(parser, "DIR", "folder for the files (default: that of lighting.json)")
@@ -256,7 +256,7 @@ def _rig(parser: argparse.ArgumentParser) -> None:
         action="store_true",
         help="write a scene with nothing but the lights, to include in another",
     )
-    add_rig_reading(parser)
+    add_rig_reading(parser, has_zoom=True)
     add_output(
         parser,
         "F.xml",
