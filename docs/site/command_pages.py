@@ -17,7 +17,7 @@ GUIDES = {
     "paint": "painter",
     "batch": "batch",
     "export": "formats",
-    "rig": "stage",
+    "rig": "rigs",
     "send": "stage",
     "listen": "stage",
     "blender": "blender",

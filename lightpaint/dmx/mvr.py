@@ -269,7 +269,7 @@ class _ShowReader:
         own = {} if self.folder is None else _files_in(self.folder)
         missing = []
         for spec in sorted(specs):
-            member = self.archive.find(spec)
+            member = self.archive.find(spec) or self.archive.find(f"{spec}.gdtf")
             name = _plain(spec)
             if (file := own.get(name.casefold())) is not None:
                 self.types[spec] = FixtureType(read_bytes(file, "GDTF", RigError), file.name)

@@ -1,6 +1,5 @@
 """`lightpaint rig`: the fixtures of a show as a scene with a lights file."""
 
-from dataclasses import asdict
 from pathlib import Path
 from typing import Any
 
@@ -107,9 +106,10 @@ def _document(
         cd_per_unit=unit,
         types=[_kind(kind) for kind in show.kinds],
         fixtures=fixtures,
-        remarks=remarks,
+        remarks=[spoken(x) for x in remarks],
     )
 
 
 def _kind(kind: KindSummary) -> dict[str, Any]:
-    return {("type" if key == "kind" else key): value for key, value in asdict(kind).items()}
+    fields = {("type" if key == "kind" else key): value for key, value in vars(kind).items()}
+    return {**fields, "remarks": [spoken(x) for x in kind.remarks]}

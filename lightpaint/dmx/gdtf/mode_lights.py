@@ -5,9 +5,10 @@ nearest geometry above it which has channels for a colour; its dimmers are all a
 """
 
 import re
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections import Counter
+from collections.abc import Callable, Collection, Mapping, Sequence
 from dataclasses import dataclass, replace
-from functools import cache, partial
+from functools import cache, cached_property, partial
 from typing import Any
 from xml.etree.ElementTree import Element
 
@@ -128,7 +129,9 @@ class ModeReader:
         self.profiles = {x.get("Name", ""): x for x in elements("DMXProfiles/DMXProfile")}
         self.remarks: list[str] = []
         self.dmx = [x.dmx for x in self.channels]
+        # These are asked for each beam, of which there may be hundreds.
         self.emitter_colour = cache(partial(emitter_colour, emitters=tuple(self.emitters)))
+        self._with_attribute, self._shape = cache(self._find_attribute), cache(self._set_curve)
         self.beams = self._beams(zoom)
         self.way = self._way()
 
@@ -141,10 +144,12 @@ class ModeReader:
             remarks = (_PLACEHOLDER, *self.remarks)
             return FixtureMode(self.name, tuple(self.dmx), (lone,), emission, remarks)
         lights = []
-        for k, group in enumerate(groups):
-            others = [beam for other in groups if other is not group for beam in other]
+        dimmers = [[self._dimmers(beam) for beam in group] for group in groups]
+        counts = Counter(k for own in dimmers for k in set().union(*own))
+        shared = {k for k, count in counts.items() if count > 1}
+        for k, (group, own) in enumerate(zip(groups, dimmers, strict=True)):
             number = k + 1 if len(groups) > 1 else 0
-            light = self._light(number, group, others, candelas)
+            light = self._light(number, group, own, shared, candelas)
             if light is not None:
                 lights.append(light)
         if not lights:
@@ -164,12 +169,14 @@ class ModeReader:
         if text not in self.remarks:
             self.remarks.append(text)
 
-    def _with_attribute(self, pattern: re.Pattern[str]) -> Iterable[tuple[int, re.Match[str]]]:
-        """Yield places of channels with a function whose attribute matches."""
-        for k, channel in enumerate(self.channels):
-            for attribute in dict.fromkeys(x.attribute for x in channel.functions):
-                if match := pattern.fullmatch(attribute):
-                    yield k, match
+    def _find_attribute(self, pattern: re.Pattern[str]) -> list[tuple[int, re.Match[str]]]:
+        """Return places of channels with a function whose attribute matches."""
+        return [
+            (k, match)
+            for k, channel in enumerate(self.channels)
+            for attribute in dict.fromkeys(x.attribute for x in channel.functions)
+            if (match := pattern.fullmatch(attribute))
+        ]
 
     def _way(self) -> re.Pattern[str] | None:
         """Return the way in which the mode mixes colours; None if it has one colour."""
@@ -226,13 +233,17 @@ class ModeReader:
         """Return places of the channels that set a beam's colour, by what they set."""
         if self.way is None:
             return {}
+        by_node, needed = self._colours_by_node, _NEEDED[self.way]
+        nodes = (x for x in reversed(beam.placed.ancestry) if len(by_node.get(x, ())) >= needed)
+        return by_node.get(next(nodes, -1), {})
+
+    @cached_property
+    def _colours_by_node(self) -> dict[int, dict[str, list[int]]]:
+        """The places of the channels that mix colours, by geometry and by what they set."""
         by_node: dict[int, dict[str, list[int]]] = {}
-        for k, match in self._with_attribute(self.way):
+        for k, match in self._with_attribute(self.way) if self.way else ():
             by_node.setdefault(self.channels[k].node, {}).setdefault(match[1], []).append(k)
-        for node in reversed(beam.placed.ancestry):
-            if len(by_node.get(node, {})) >= _NEEDED[self.way]:
-                return by_node[node]
-        return {}
+        return by_node
 
     def _groups(self, *, pixels: bool) -> list[list[_Beam]]:
         """Return the beams of each light. Beams without colour beside coloured ones are left."""
@@ -245,31 +256,31 @@ class ModeReader:
         groups: dict[Any, list[_Beam]] = {}
         for beam in beams:
             colour = sorted(k for places in self._colour_channels(beam).values() for k in places)
-            dimmers = sorted(k for k, _ in self._dimmers([beam]))
+            dimmers = sorted(self._dimmers(beam))
             groups.setdefault((*colour, *dimmers), []).append(beam)
         return [*groups.values()]
 
-    def _dimmers(self, beams: Sequence[_Beam]) -> list[tuple[int, bool]]:
-        """Return places of dimmers of some of the beams, and whether each dims all of them."""
-        found = []
-        for k, _ in self._with_attribute(_DIMMER):
-            dimmed = [b for b in beams if self.channels[k].node in b.placed.ancestry]
-            if dimmed:
-                found.append((k, len(dimmed) == len(beams)))
-        return found
+    def _dimmers(self, beam: _Beam) -> set[int]:
+        """Return the places of the dimmers of a beam."""
+        nodes = set(beam.placed.ancestry)
+        return {k for k, _ in self._with_attribute(_DIMMER) if self.channels[k].node in nodes}
 
     def _light(
         self,
         number: int,
         beams: Sequence[_Beam],
-        others: Sequence[_Beam],
+        dimmers: Sequence[set[int]],
+        shared: Collection[int],
         candelas: Mapping[tuple[int, str], float],
     ) -> ModeLight | None:
-        chain = self._dimmers(beams)
-        shared = {k for k, _ in self._dimmers(others)}
-        own = sorted((k for k, whole in chain if whole and k not in shared), key=self._fineness)
-        masters = [k for k, whole in chain if whole and k in shared]
-        parts = [k for k, whole in chain if not whole]
+        """Return the light of some beams; None if no channel dims it.
+
+        dimmers: of each beam. shared: those that other lights have, too.
+        """
+        whole = set.intersection(*dimmers)
+        parts = sorted(set().union(*dimmers) - whole)
+        own = sorted(sorted(whole.difference(shared)), key=self._fineness)
+        masters = sorted(whole.intersection(shared))
         for k in (*own, *masters, *parts):
             self._shape(k, _DIMMER)
         emitters = self._emitters(beams, candelas)
@@ -311,7 +322,7 @@ class ModeReader:
         curve = self.dmx[place].curve
         return round((curve[-1][0] if curve else 1.0) * self.dmx[place].highest)
 
-    def _shape(self, place: int, pattern: re.Pattern[str]) -> ChannelFunction:
+    def _set_curve(self, place: int, pattern: re.Pattern[str]) -> ChannelFunction:
         """Set the curve of a channel to that of its function, and return the function."""
         channel = self.channels[place]
         function = next(
