@@ -35,10 +35,15 @@ DRIVES = {"left": (1.0, 0.0, 0.25), "right": (0.125, 0.5, 0.0)}
 TABLE_ROUNDING = 0.5 / 255
 
 
-def setting(name: str, emission: tuple[float, float, float]) -> LightSetting:
-    """A spot whose emitters are the channels of Rec.709, so that its emission is its drives."""
-    axes = ((1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0))
-    emitters = tuple(LampEmitter(x, axis) for x, axis in zip(COLORS, axes, strict=True))
+#: The channels of Rec.709 as emitters: an emission is their drives.
+AXES = ((1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0))
+CHANNELS = tuple(LampEmitter(x, axis) for x, axis in zip(COLORS, AXES, strict=True))
+
+
+def setting(
+    name: str, emission: tuple[float, float, float], emitters: tuple[LampEmitter, ...] = CHANNELS
+) -> LightSetting:
+    """A spot of emitters."""
     return LightSetting(name, "spot", "intensity", "W/sr", emission, emission, lamp=Lamp(emitters))
 
 
@@ -254,8 +259,8 @@ def test_listen_prints_drives_by_fixture(folder: Path) -> None:
     first, *lines = output.splitlines()
     assert re.fullmatch(r"listening for sACN at 127\.0\.0\.1, port \d+", first)
     assert "universe 11: from 'console', priority 110" in lines
-    assert "101 left, left: red=1.000 green=0.000 blue=0.251" in lines
-    assert lines.count("101 left, left: red=1.000 green=0.000 blue=0.251") == 1
+    assert "left at 1.1: red=1.000 green=0.000 blue=0.251" in lines
+    assert lines.count("left at 1.1: red=1.000 green=0.000 blue=0.251") == 1
     document = json.loads(listened(folder, sent_packets(), *options, "--json", "-q"))
     assert document["protocol"] == "sacn"
     for name, drives in DRIVES.items():
@@ -275,6 +280,34 @@ def test_listen_says_that_nothing_arrived(folder: Path) -> None:
     completed = run(folder, "listen", "--port", number, "--seconds", "0.05", "--from", "artnet")
     assert completed.returncode == 0
     assert f"nothing arrived at 127.0.0.1, port {number}" in completed.stderr
+
+
+#: The example rig, four PARs and two washes.
+SHOW = Path(__file__).resolve().parents[2] / "scenes" / "rig" / "show.mvr"
+
+
+def test_an_answer_goes_by_the_file_of_a_show_and_comes_back(
+    tmp_path: Path, port: socket.socket
+) -> None:
+    """From an MVR and an answer to packets, and from these to drives."""
+    axes = {"red": (3.0, -0.2, 0.0), "green": (-0.5, 2.0, 0.0), "blue": (0.2, -0.3, 5.0)}
+    emitters = tuple(
+        LampEmitter(name, rgb) for name, rgb in (axes | {"white": (1.0, 1.0, 1.0)}).items()
+    )
+    light = setting("102 PAR 2", (1.5, 0.5, 2.0), emitters)
+    lighting = Lighting((light,), target="evening.png", scene_identity="0" * 16)
+    write_lighting(tmp_path / "lighting.json", lighting)
+    command = ("lighting.json", "--rig", SHOW, "--to", target_of(port), "--until", "done")
+    succeed(tmp_path, "send", *command)
+    packets = [port.recv(2048), port.recv(2048)]  # the first of both universes
+    document = json.loads(listened(tmp_path, packets, "--rig", SHOW, "--json", "-q"))
+    assert 0 < max(light.drives.values()) <= 1
+    for name, drive in light.drives.items():
+        # The rounding of a dimmer and of an emitter, in 8 bits each.
+        found = document["lights"]["102 PAR 2"][name]
+        assert found == pytest.approx(drive, abs=2 * TABLE_ROUNDING)
+    assert len(document["lights"]) == 6
+    assert not any(document["lights"]["101 PAR 1"].values())
 
 
 #: A program with a rig of its own: `send` in a process that signals reach.

@@ -113,10 +113,8 @@ def _print_rows(rows: list[LevelRow]) -> None:
     for row in rows:
         channels = "+".join(map(str, row.channels))
         drive = "" if row.drive is None else f"{row.drive:.3f}"
-        table.row(
-            *(row.fixture_id, row.fixture, row.light, row.emitter, drive),
-            *(f"{row.universe}.{channels}", str(row.value)),
-        )
+        where = ("", "") if row.value is None else (f"{row.universe}.{channels}", str(row.value))
+        table.row(row.fixture_id, row.fixture, row.light, row.emitter, drive, *where)
     terminal.print_table(table)
 
 

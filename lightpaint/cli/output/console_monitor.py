@@ -6,7 +6,7 @@ from typing import Any
 
 from lightpaint.cli.output import terminal
 from lightpaint.display_text import some_of
-from lightpaint.dmx.console_rig import ConsoleRig, RigFixture
+from lightpaint.dmx.console_rig import ConsoleRig, RigFixture, address_text
 from lightpaint.dmx.levels import decode_levels
 from lightpaint.dmx.network.console_receiver import ConsoleReceiver
 
@@ -74,11 +74,11 @@ class ConsoleMonitor:
         }
 
     def _light_texts(self) -> dict[str, str]:
-        """Return the drives of each light, and the fixture that it is of."""
+        """Return the drives of each light, with the address of its fixture."""
         assert self._rig is not None
         owners = self._rig.owners
         return {
-            f"{_fixture_text(owners[light])}, {light}": " ".join(
+            f"{light} at {_address_of(owners[light])}": " ".join(
                 f"{name}={drive:.3f}" for name, drive in drives.items()
             )
             for light, drives in self._drives().items()
@@ -101,5 +101,5 @@ def _universes_of(fixture: RigFixture) -> set[int]:
     return {x for channel in fixture.channels for x, _ in fixture.places(channel)}
 
 
-def _fixture_text(fixture: RigFixture) -> str:
-    return " ".join(filter(None, (fixture.fixture_id, fixture.name)))
+def _address_of(fixture: RigFixture) -> str:
+    return " and ".join(map(address_text, fixture.addresses.values()))

@@ -10,7 +10,7 @@ from lightpaint.dmx.console_rig import ConsoleRig, DmxChannel, RigFixture
 from lightpaint.dmx.levels import encode_levels
 from lightpaint.dmx.rig_drives import RigDrives, check_drives
 from lightpaint.relit.export.exports import plain_cell
-from lightpaint.relit.export.level_table import channel_level
+from lightpaint.relit.export.level_table import channel_level, light_channels
 
 #: The full level of a channel, whatever its bytes.
 FULL = 65535
@@ -52,9 +52,8 @@ def cue_list_csv(rig: ConsoleRig, cues: Sequence[Cue]) -> str:
 
 
 def _light_channels(fixture: RigFixture) -> list[DmxChannel]:
-    """Return the channels that dim the fixture's lights and their emitters, in their order."""
-    used = {k for light in fixture.lights for k in light.dimmers}
-    used |= {k for light in fixture.lights for x in light.emitters for k in x.channels}
+    """Return the channels that the fixture's lights set, in their order."""
+    used = {k for light in fixture.lights for _, k in light_channels(light)}
     return [fixture.channels[k] for k in sorted(used)]
 
 

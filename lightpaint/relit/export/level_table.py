@@ -7,7 +7,7 @@ from collections.abc import Iterator, Mapping
 from dataclasses import astuple, dataclass, fields
 from typing import Any, Literal
 
-from lightpaint.dmx.console_rig import ConsoleRig, DmxChannel, RigFixture
+from lightpaint.dmx.console_rig import ConsoleRig, DmxChannel, RigFixture, RigLight
 from lightpaint.dmx.levels import encode_levels
 from lightpaint.dmx.rig_drives import RigDrives
 from lightpaint.relit.export.exports import plain_cell
@@ -18,10 +18,12 @@ FORMAT: Literal["lightpaint-dmx 1"] = "lightpaint-dmx 1"
 
 @dataclass(frozen=True)
 class LevelRow:
-    """A channel of a light: of its dimmer, or of an emitter.
+    """A channel that a light sets.
 
-    drive: of the emitter, 0 to 1; None for a dimmer, which several share. universe: as the network
-    numbers it. channels: 1 to 512, that of the coarse byte first. value: of all bytes.
+    emitter: which it sets; `dimmer`, the name of a filter, or x or y of a chromaticity for one that
+    sets several. drive: of the emitter, 0 to 1; None for several. universe: as the network numbers
+    it. channels: 1 to 512, that of the coarse byte first. value: of all bytes. An emitter without a
+    channel of its own has a row for its drive alone.
     """
 
     fixture_id: str
@@ -29,13 +31,23 @@ class LevelRow:
     light: str
     emitter: str
     drive: float | None
-    universe: int
+    universe: int | None
     channels: tuple[int, ...]
-    value: int
+    value: int | None
 
 
 #: What stands for an emitter in the row of a dimmer.
 DIMMER = "dimmer"
+
+
+def light_channels(light: RigLight) -> list[tuple[str, int]]:
+    """Return what a light sets, and the place of the channel among those of its fixture."""
+    return [
+        *((DIMMER, k) for k in (*light.masters, *light.dimmers)),
+        *((name, k) for name, k in zip("xy", light.chromaticity, strict=False)),
+        *((x.name, k) for x in light.filters for k in x.channels),
+        *((x.name, k) for x in light.emitters for k in x.channels),
+    ]
 
 
 def level_rows(rig: ConsoleRig, drives: RigDrives, universes: Mapping[int, int]) -> list[LevelRow]:
@@ -54,20 +66,18 @@ def _rows(
     universes: Mapping[int, int],
 ) -> Iterator[LevelRow]:
     for light in fixture.lights:
-        of_light = drives.get(light.name, {})
-        places: list[tuple[str, float | None, int]] = [(DIMMER, None, k) for k in light.dimmers]
-        for emitter in light.emitters:
-            of_emitter = of_light.get(emitter.name, 0.0)
-            places += [(emitter.name, of_emitter, k) for k in emitter.channels]
-        for name, drive, k in places:
-            channel = fixture.channels[k]
-            where = fixture.places(channel)
+        of_light = {x.name: drives.get(light.name, {}).get(x.name, 0.0) for x in light.emitters}
+        named, set_by = (fixture.fixture_id, fixture.name, light.name), light_channels(light)
+        for name, k in set_by:
+            where = fixture.places(fixture.channels[k])
             yield LevelRow(
-                *(fixture.fixture_id, fixture.name, light.name, name, drive),
+                *(*named, name, of_light.get(name)),
                 universes[where[0][0]],
                 tuple(index + 1 for _, index in where),
-                channel_level(fixture, channel, levels),
+                channel_level(fixture, fixture.channels[k], levels),
             )
+        for name in sorted(of_light.keys() - {name for name, _ in set_by}):
+            yield LevelRow(*named, name, of_light[name], None, (), None)
 
 
 def channel_level(fixture: RigFixture, channel: DmxChannel, levels: Mapping[int, bytes]) -> int:
