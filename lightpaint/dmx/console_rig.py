@@ -100,6 +100,14 @@ class RigLight:
     filters: tuple[RigFilter, ...] = ()
     chromaticity: tuple[int, ...] = ()
 
+    @property
+    def is_controlled(self) -> bool:
+        """Whether channels set it: not those of a fixture without an address, or of which only a
+        placeholder is known.
+        """
+        channels = [x.channels for x in self.emitters] + [x.channels for x in self.filters]
+        return any((*channels, self.dimmers, self.chromaticity))
+
 
 @dataclass(frozen=True)
 class RigFixture:
@@ -122,6 +130,14 @@ class RigFixture:
         first = self.addresses[channel.dmx_break]
         absolute = [first + offset - 2 for offset in channel.offsets]
         return [(1 + place // UNIVERSE_SIZE, place % UNIVERSE_SIZE) for place in absolute]
+
+    def set_level(
+        self, universes: Mapping[int, bytearray], channel: DmxChannel, level: int
+    ) -> None:
+        """Write the level of a channel into the bytes of its universe."""
+        values = level.to_bytes(len(channel.offsets), "big")
+        for (universe, index), value in zip(self.places(channel), values, strict=True):
+            universes[universe][index] = value
 
 
 @dataclass(frozen=True)
@@ -169,6 +185,15 @@ class ConsoleRig:
     def owners(self) -> Mapping[str, RigFixture]:
         """The fixture of each light, by the light's name."""
         return {light.name: fixture for fixture in self.fixtures for light in fixture.lights}
+
+    @cached_property
+    def rest(self) -> Mapping[int, bytes]:
+        """The 512 bytes of each universe with all channels at rest."""
+        universes = {universe: bytearray(UNIVERSE_SIZE) for universe in self.universes}
+        for fixture in self.fixtures:
+            for channel in fixture.channels:
+                fixture.set_level(universes, channel, channel.default)
+        return {universe: bytes(levels) for universe, levels in universes.items()}
 
     @cached_property
     def universes(self) -> list[int]:

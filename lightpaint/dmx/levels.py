@@ -16,7 +16,6 @@ from lightpaint.dmx.color_mixing import (
     xy_for_drives,
 )
 from lightpaint.dmx.console_rig import (
-    UNIVERSE_SIZE,
     ConsoleRig,
     DmxChannel,
     RigFixture,
@@ -32,13 +31,12 @@ def encode_levels(rig: ConsoleRig, drives: Mapping[str, Drives]) -> dict[int, by
 
     drives: by name of light; a light without any, and each emitter without one, is at 0.
     """
-    universes = {universe: bytearray(UNIVERSE_SIZE) for universe in rig.universes}
+    universes = {universe: bytearray(levels) for universe, levels in rig.rest.items()}
     for fixture in rig.fixtures:
-        levels = {k: channel.default for k, channel in enumerate(fixture.channels)}
         for light in fixture.lights:
-            levels |= _levels_of(fixture, light, drives.get(light.name, {}))
-        for k, level in levels.items():
-            _write(universes, fixture, fixture.channels[k], level)
+            levels = _levels_of(fixture, light, drives.get(light.name, {}))
+            for k, level in levels.items():
+                fixture.set_level(universes, fixture.channels[k], level)
     return {universe: bytes(levels) for universe, levels in universes.items()}
 
 
@@ -92,6 +90,8 @@ def _drives_of(
         return float(np.mean([share(k) for k in places] or [1.0]))
 
     names = [x.name for x in light.emitters]
+    if not light.is_controlled:
+        return dict.fromkeys(names, 0.0)
     dimmer = float(np.prod([share(k) for k in (*light.dimmers, *light.masters)]))
     if light.filters:
         found = drives_of_filters(light, dimmer, [mean(x.channels) for x in light.filters])
@@ -129,14 +129,6 @@ def _forward(curve: _Curve, level: float) -> float:
     # Levels fall where a channel is inverted.
     levels, shares = zip(*sorted(curve), strict=True)
     return float(np.interp(level, levels, shares))
-
-
-def _write(
-    universes: Mapping[int, bytearray], fixture: RigFixture, channel: DmxChannel, level: int
-) -> None:
-    values = level.to_bytes(len(channel.offsets), "big")
-    for (universe, index), value in zip(fixture.places(channel), values, strict=True):
-        universes[universe][index] = value
 
 
 def _read(universes: Mapping[int, bytes], fixture: RigFixture, channel: DmxChannel) -> int:

@@ -39,6 +39,9 @@ MAX_MODELS = 20_000
 #: Least distance of a focus point from a light, in metres.
 NEAREST_FOCUS = 0.01
 
+#: What to know of fixtures without an address.
+_UNPATCHED = "no address, so the lights are in the scene, but nothing is sent to them"
+
 #: Elements of a list of children that are geometry, and have models.
 _OBJECTS = ("SceneObject", "Truss", "Support", "VideoScreen", "Projector")
 
@@ -62,9 +65,9 @@ class ShowNode:
 
 @dataclass(frozen=True)
 class NamedFixture:
-    """A fixture with an address, and the name of its light, which those of its pixels begin with.
+    """A fixture, and the name of its light, which those of its pixels begin with.
 
-    data: as pymvr reads it. addresses: absolute ones, by the file's breaks.
+    data: as pymvr reads it. addresses: absolute ones, by the file's breaks; empty without any.
     """
 
     name: str
@@ -179,7 +182,7 @@ def world_matrix(element: Element) -> Doubles:
 def named_fixtures(
     nodes: Sequence[ShowNode], name: str
 ) -> tuple[list[NamedFixture], dict[str, list[str]]]:
-    """Return the fixtures of a show that have a type and an address, and names of others by reason.
+    """Return the fixtures of a show that have a type, and the names of others by reason.
 
     name: of the file, for errors. Raises RigError if there are none.
     """
@@ -189,9 +192,9 @@ def named_fixtures(
     for node in (x for x in nodes if x.element.tag == "Fixture"):
         data = library("pymvr").Fixture(xml_node=_without_children(node.element))
         addresses = _addresses_of(node.element)
-        reason = _reason_to_leave(data, addresses)
-        if reason:
-            left.setdefault(reason, []).append(data.name)
+        if data.multipatch or not data.gdtf_spec:
+            reason = "as a copy of another fixture" if data.multipatch else "without a GDTF"
+            left.setdefault(f"left out, {reason}", []).append(data.name)
             continue
         label = " ".join(filter(None, (_id_of(data), data.name or "light")))
         own_name = _free_name(" ".join(_UNUSUAL.sub("_", label).split()), used)
@@ -201,14 +204,6 @@ def named_fixtures(
         reasons = "; ".join(f"{some_names(names)} {why}" for why, names in left.items())
         raise RigError(f"{name} has no fixture" + (f" to use: {reasons}" if left else ""))
     return fixtures, left
-
-
-def _reason_to_leave(data: Any, addresses: Mapping[int, int]) -> str:
-    if data.multipatch:
-        return "left out, as a copy of another fixture"
-    if not data.gdtf_spec:
-        return "left out, without a GDTF"
-    return "" if addresses else "left out, without an address"
 
 
 def _free_name(name: str, used: Collection[str]) -> str:
@@ -248,10 +243,14 @@ class _ShowReader:
             lights = _lights(fixture, mode, focus.get(fixture.data.focus))
             kind = self.types[fixture.data.gdtf_spec].name
             label = fixture.data.name or kind
+            channels = mode.channels
+            if not addresses:
+                left.setdefault(_UNPATCHED, []).append(fixture.name)
+                lights, channels = tuple(map(_uncontrolled, lights)), ()
             fixtures.append(
                 RigFixture(
                     *(_id_of(fixture.data), label, kind, mode.name, addresses),
-                    mode.channels,
+                    channels,
                     lights,
                 )
             )
@@ -270,7 +269,7 @@ class _ShowReader:
         own = {} if self.folder is None else _files_in(self.folder)
         missing = []
         for spec in sorted(specs):
-            member = self.archive.find(spec)
+            member = self.archive.find(spec) or self.archive.find(f"{spec}.gdtf")
             name = _plain(spec)
             if (file := own.get(name.casefold())) is not None:
                 self.types[spec] = FixtureType(read_bytes(file, "GDTF", RigError), file.name)
@@ -289,6 +288,8 @@ class _ShowReader:
         """Return the mode of a fixture, addresses by break, and breaks that have none."""
         type_, wanted = self.types[fixture.data.gdtf_spec], fixture.data.gdtf_mode or ""
         breaks = type_.breaks(wanted)
+        if not fixture.addresses:
+            return type_.mode(wanted, **self.options), {}, set()
         # MVR counts breaks from 0 and GDTF from 1; some programs count from 1 in both.
         first = 1 if min(fixture.addresses) == 0 else 0
         own = {number + first: address for number, address in fixture.addresses.items()}
@@ -330,6 +331,12 @@ def _placed(name: str, light: ModeLight, matrix: Doubles, target: Doubles | None
         light.filters,
         light.chromaticity,
     )
+
+
+def _uncontrolled(light: RigLight) -> RigLight:
+    """Return a light without its channels."""
+    emitters = tuple(replace(x, channels=()) for x in light.emitters)
+    return replace(light, emitters=emitters, dimmers=(), masters=(), filters=(), chromaticity=())
 
 
 def _three(values: Doubles) -> Position:

@@ -18,6 +18,7 @@ from lightpaint.errors import SceneError
 from lightpaint.file_reading import read_bytes
 from lightpaint.files import first_line
 from lightpaint.scene.checks.tokens import markup
+from lightpaint.sentences import Hint, Sentence
 
 #: Folder of the meshes, beside the scene.
 MESHES = "meshes"
@@ -67,8 +68,8 @@ def room_of_show(path: Path, models: Sequence[PlacedModel]) -> RoomFiles:
     known = {x: places for x, places in by_file.items() if x.lower().endswith(READ_FORMATS)}
     remarks = _left_out(by_file.keys() - known.keys())
     if known and (trimesh := _trimesh()) is None:
-        names = f"{len(known)} models" if len(known) > 1 else "a model"
-        remarks.append(f"{names} in glTF left out: pip install trimesh to have them in the room")
+        names = f"{len(known)} models" if len(known) > 1 else "1 model"
+        remarks.append(f"{names} in .glb left out: pip install trimesh to read them")
         known = {}
     files: dict[str, bytes] = {}
     bounds, triangles = [], 0
@@ -100,11 +101,13 @@ def _left_out(files: Iterable[str]) -> list[str]:
     for file in files:
         ending = Path(file).suffix.lower() or "no format"
         counts[ending] = counts.get(ending, 0) + 1
-    return [
-        f"{count} {'models' if count > 1 else 'model'} in {ending} left out: give the room as a "
-        "scene, or export glTF"
-        for ending, count in sorted(counts.items())
-    ]
+    remarks: list[str] = []
+    for ending, count in sorted(counts.items()):
+        models = f"{count} {'models' if count > 1 else 'model'} in {ending}"
+        remarks.append(
+            Sentence(models, " left out: give a scene with ", Hint("room"), ", or export .glb")
+        )
+    return remarks
 
 
 def _trimesh() -> Any:

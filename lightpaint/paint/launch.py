@@ -17,6 +17,7 @@ from lightpaint.paint.server.address import BoundSocket, listen
 from lightpaint.paint.server.server import Server, check_installed
 from lightpaint.paint.session_file import SessionFile
 from lightpaint.paint.store.database import set_aside
+from lightpaint.paint.studio.console_switch import Console
 from lightpaint.paint.studio.studio import Studio
 from lightpaint.paint.subject import Subject
 from lightpaint.signals import interruptible_between_pieces
@@ -35,13 +36,15 @@ def paint_in_browser(
     new: bool = False,
     host: str | None = None,
     port: int | None = None,
+    console: Console | None = None,
     say: Callable[[str], None] = lambda _: None,
 ) -> None:
     """Serve a page that paints these views until Ctrl-C or a signal; the session file keeps all
     work.
 
     on_ready: called when the page can be opened. new: whether an earlier session is set aside.
-    host, port: as in `listen`. say: receives remarks.
+    host, port: as in `listen`. console: one that the page can send the answer to. say: receives
+    remarks.
 
     Raises PaintError if the session cannot be opened, OutputError if the last steps could not be
     written.
@@ -52,7 +55,7 @@ def paint_in_browser(
     path = folder / SESSION_FILE
     listening = listen(host, port)  # before anything is written
     with listening[0]:
-        _serve_session(listening, subjects, on_ready, path, new=new, say=say)
+        _serve_session(listening, subjects, on_ready, path, new=new, console=console, say=say)
 
 
 def _serve_session(
@@ -62,13 +65,14 @@ def _serve_session(
     path: Path,
     *,
     new: bool,
+    console: Console | None,
     say: Callable[[str], None],
 ) -> None:
     """Serve the session of a file, which is created if it does not exist."""
     if new and (kept_path := set_aside(path)) is not None:
         say(f"the earlier session is kept as {kept_path}")
     session_file = SessionFile(subjects, path, say)
-    studio = Studio(subjects, session_file.open_store)
+    studio = Studio(subjects, session_file.open_store, console=console)
     studio.on_unsaved = say
     try:
         server = Server(studio, session_file.store, listening=listening, say=say)

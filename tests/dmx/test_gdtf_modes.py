@@ -100,14 +100,19 @@ def test_without_any_light_a_thousand_lumens_are_assumed_and_said() -> None:
     assert "its GDTF has no light: 1000 lm are assumed" in mode.remarks
 
 
-def test_a_file_of_dimmers_alone_is_one_white_that_all_of_them_set() -> None:
-    """As some programs write for types that they do not know."""
+def test_a_placeholder_of_dimmers_is_one_white_that_nothing_is_sent_to() -> None:
+    """As some programs write for types that they do not know: pan would be a dimmer, too."""
     channels = "".join(channel(f"Dimmer{k}", str(k), geometry="Body") for k in (1, 2, 3))
     mode = read_mode(gdtf(channels, geometries='<Geometry Name="Body"/>', described=""))
     [light] = mode.lights
     [emitter] = light.emitters
-    assert (emitter.name, emitter.channels, light.dimmers) == ("white", (0, 1, 2), ())
-    assert any("no beam in its GDTF" in remark for remark in mode.remarks)
+    assert (emitter.name, emitter.channels, light.dimmers) == ("white", (), ())
+    assert "its GDTF is a placeholder" in mode.remarks[0]
+    assert "no beam in its GDTF" in mode.remarks[1]
+    alone = gdtf(
+        channel("Dimmer1", "1", geometry="Body"), geometries='<Geometry Name="Body"/>', described=""
+    )
+    assert read_mode(alone).lights[0].dimmers == (0,)
 
 
 def test_emitters_without_colour_have_their_spectrum_wavelength_or_usual_colour() -> None:

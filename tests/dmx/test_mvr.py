@@ -18,6 +18,7 @@ from rig_files import (
 
 from lightpaint.dmx import mvr
 from lightpaint.dmx.console_rig import ConsoleRig, RigLight
+from lightpaint.dmx.levels import decode_levels, encode_levels
 from lightpaint.dmx.mvr import read_rig, read_show
 from lightpaint.errors import RigError
 
@@ -106,7 +107,7 @@ def test_addresses_are_absolute_and_breaks_count_from_0_or_1(tmp_path: Path) -> 
     assert rig.universes == [1, 2]
 
 
-def test_what_has_no_address_or_type_is_left_out_and_named(tmp_path: Path) -> None:
+def test_what_has_no_type_is_left_out_and_what_has_no_address_is_only_seen(tmp_path: Path) -> None:
     children = [
         fixture("used"),
         fixture("unpatched", number="2", address="0"),
@@ -114,12 +115,26 @@ def test_what_has_no_address_or_type_is_left_out_and_named(tmp_path: Path) -> No
         fixture("copy", number="4", address="30").replace("<Fixture ", '<Fixture multipatch="x" '),
     ]
     show = read_show(write_mvr(tmp_path / "a.mvr", layered(*children)))
-    assert [x.name for x in show.rig.fixtures] == ["used"]
+    assert [x.name for x in show.rig.fixtures] == ["used", "unpatched"]
     assert show.remarks == (
-        "unpatched: left out, without an address",
         "hoist: left out, without a GDTF",
         "copy: left out, as a copy of another fixture",
+        "2 unpatched: no address, so the lights are in the scene, but nothing is sent to them",
     )
+
+
+def test_nothing_is_sent_to_what_has_no_address(tmp_path: Path) -> None:
+    children = [fixture("a", address="0"), fixture("b", number="2")]
+    rig = read_rig(write_mvr(tmp_path / "a.mvr", layered(*children)))
+    full = {
+        x.name: dict.fromkeys(("red", "green", "blue", "white"), 1.0)
+        for x in lights_of(rig).values()
+    }
+    levels = encode_levels(rig, full)
+    assert levels == {1: bytes([255] * 5 + [0] * 507)}
+    found = decode_levels(rig, levels)
+    assert [*found["1 a"].values()] == [0.0] * 4
+    assert [*found["2 b"].values()] == [1.0] * 4
 
 
 def test_a_gdtf_is_found_whatever_its_letters_and_its_ending(tmp_path: Path) -> None:
@@ -154,7 +169,7 @@ def test_a_folder_completes_and_replaces_types(tmp_path: Path) -> None:
             "a.mvr: 'PAR' at 1.510 needs channel 514 of its universe, which has 512: give it a "
             "lower address",
         ),
-        ([fixture(address="0")], "a.mvr has no fixture to use: PAR left out, without an address"),
+        ([fixture(spec="")], "a.mvr has no fixture to use: PAR left out, without a GDTF"),
         ([fixture(matrix="{1,0}")], "a.mvr has a value that cannot be read: "),
         ([fixture(matrix="{0,0,0}{0,0,0}{0,0,0}{0,0,0}")], "a.mvr has a value that cannot be rea"),
         ([fixture(address="x")], "a.mvr has a value that cannot be read: "),

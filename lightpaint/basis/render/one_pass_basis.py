@@ -127,7 +127,8 @@ def add_halves(halves: Sequence[Floats], planes: Planes, noise: Planes, spp: Hal
 def mean_and_half_difference(halves: Sequence[Floats], spp: HalfCounts) -> tuple[Floats, Floats]:
     """Return mean and half difference of undivided sums, computed in place.
 
-    halves: two undivided sums, (n, h, w, 3). spp: samples per pixel of each.
+    halves: two undivided sums, (n, h, w, 3). spp: samples per pixel of each. Numbers that are not
+    finite become 0: a single one among hundreds of millions would make the basis useless.
     """
     (a, b), (mean, half_difference) = spp, halves
     # In place and one light at a time, since these are the largest arrays of all.
@@ -138,4 +139,7 @@ def mean_and_half_difference(halves: Sequence[Floats], spp: HalfCounts) -> tuple
         plane_b /= 2
         # A equals the overall mean plus B's share of the samples times the difference A − B.
         plane_a -= plane_b * np.asarray(2 * b / (a + b), np.float32)
+        if not (np.isfinite(plane_a).all() and np.isfinite(plane_b).all()):
+            broken = ~(np.isfinite(plane_a) & np.isfinite(plane_b))
+            plane_a[broken] = plane_b[broken] = 0
     return mean, half_difference

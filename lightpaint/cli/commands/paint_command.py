@@ -21,8 +21,11 @@ from lightpaint.pipeline.job.settings import Settings
 from lightpaint.pipeline.job.sources import BasisFile, GroupsFile, SceneFile
 
 if TYPE_CHECKING:
+    from lightpaint.cli.options.console_options import RigFile
+    from lightpaint.dmx.network.console_target import ConsoleTarget
     from lightpaint.paint.server.server import Server
     from lightpaint.paint.store.session_requests import SessionRequests
+    from lightpaint.paint.studio.console_switch import Console
     from lightpaint.paint.subject import Subject
 
 #: The risk of an address that others can reach.
@@ -52,8 +55,12 @@ def paint(
     host: str | None,
     port: int | None,
     with_browser: bool,
+    console: Mapping[str, Any] | None = None,
 ) -> CommandOutcome:
-    """Run `lightpaint paint SCENE|BASIS|LIGHTS`, for one view or several."""
+    """Run `lightpaint paint SCENE|BASIS|LIGHTS`, for one view or several.
+
+    console: the arguments of `_console`.
+    """
     # The server and the session file import much that no other command needs.
     from lightpaint.paint.server.server import check_installed
     from lightpaint.paint.subject_factory import make_subjects
@@ -80,7 +87,30 @@ def paint(
     if (groups := subjects[0].groups) is not None:
         for remark in groups.remarks:
             terminal.say(remark)
-    return _serve(subjects, new=new, host=host, port=port, with_browser=with_browser)
+    link = None if console is None else _console(**console)
+    return _serve(subjects, new=new, host=host, port=port, with_browser=with_browser, console=link)
+
+
+def _console(
+    *,
+    rig: "RigFile",
+    target: "ConsoleTarget | None",
+    universes: dict[int, int],
+    priority: int | None,
+) -> "Console":
+    """Return the console of a rig, and say what it will send to. Nothing is sent yet."""
+    from lightpaint.cli.commands.console_commands import read_rig_file
+    from lightpaint.dmx.network.console_link import PRIORITY, ConsoleLink, link_address
+    from lightpaint.paint.studio.console_switch import Console
+
+    fixtures = read_rig_file(rig)
+    if target is None:
+        return Console(fixtures)
+    chosen = PRIORITY if priority is None else priority
+    address = link_address(target, fixtures, universes=universes, priority=chosen)
+    terminal.say(f"console: {address}; nothing is sent before it is switched on in the page")
+    open_link = partial(ConsoleLink.open, target, fixtures, universes=universes, priority=chosen)
+    return Console(fixtures, open_link, address)
 
 
 def _serve(
@@ -90,6 +120,7 @@ def _serve(
     host: str | None,
     port: int | None,
     with_browser: bool,
+    console: "Console | None",
 ) -> CommandOutcome:
     """Serve the painter until its end."""
     from lightpaint.paint.launch import paint_in_browser
@@ -106,7 +137,13 @@ def _serve(
 
     try:
         paint_in_browser(
-            subjects, on_open, new=new, host=host, port=port, say=lambda text: _print_lines(text)
+            subjects,
+            on_open,
+            new=new,
+            host=host,
+            port=port,
+            console=console,
+            say=lambda text: _print_lines(text),
         )
     except KeyboardInterrupt:
         if not addresses:  # it had not started

@@ -1,11 +1,11 @@
 """`lightpaint rig`: the fixtures of a show as a scene with a lights file."""
 
-from dataclasses import asdict
 from pathlib import Path
 from typing import Any
 
 from lightpaint.cli.output import documents, terminal
 from lightpaint.cli.output.lines import CommandOutcome
+from lightpaint.cli.output.vocabulary import spoken
 from lightpaint.dmx.console_rig import address_text
 from lightpaint.dmx.mvr import KindSummary, Show, read_show
 from lightpaint.dmx.rig_room import RoomFiles, room_of_scene, room_of_show
@@ -13,7 +13,7 @@ from lightpaint.dmx.rig_scene import Room, cd_per_unit, lights_of, lights_text, 
 from lightpaint.errors import OutputError, RigError
 from lightpaint.files import check_files, check_writable, write_bytes, write_text
 from lightpaint.scene.lights.lights_file import lights_file_beside
-from lightpaint.sentences import Hint
+from lightpaint.sentences import Hint, Sentence
 from lightpaint.storage.staging import finish, staged
 
 
@@ -76,7 +76,7 @@ def _print(show: Show, files: list[Path]) -> None:
     terminal.print_table(table)
     for kind in show.kinds:
         for remark in kind.remarks:
-            terminal.write(f"{kind.kind}: {remark}")
+            terminal.write(spoken(Sentence(f"{kind.kind}: ", remark)))
     count = len(lights_of(show.rig))
     universes = ", ".join(map(str, show.rig.universes))
     terminal.write(f"{count} {'lights' if count > 1 else 'light'}, universes {universes}")
@@ -106,9 +106,10 @@ def _document(
         cd_per_unit=unit,
         types=[_kind(kind) for kind in show.kinds],
         fixtures=fixtures,
-        remarks=remarks,
+        remarks=[spoken(x) for x in remarks],
     )
 
 
 def _kind(kind: KindSummary) -> dict[str, Any]:
-    return {("type" if key == "kind" else key): value for key, value in asdict(kind).items()}
+    fields = {("type" if key == "kind" else key): value for key, value in vars(kind).items()}
+    return {**fields, "remarks": [spoken(x) for x in kind.remarks]}

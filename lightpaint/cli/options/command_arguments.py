@@ -7,7 +7,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from lightpaint.cli.options.argument_order import options_but
-from lightpaint.cli.options.console_options import rig_file, sending_of
+from lightpaint.cli.options.console_options import console_of, rig_file, sending_of
 from lightpaint.cli.options.job_options import (
     constraints_of,
     folders_of,
@@ -215,6 +215,7 @@ def _paint_arguments(
     [folder] = folders_of(options.output and Path(options.output), [session_name])
     # The command that the page shows for exported paintings has only options that `solve` knows.
     excluded = ["output", "new", "layers", "host", "port", "with_browser", "view", "exposure"]
+    excluded += ["rig", "gdtf", "pixels", "target", "universes", "priority"]
     excluded += ["as_json", "is_quiet", "is_verbose", "json_progress"]
     excluded += ["lights"] * isinstance(source, GroupsFile) + ["sensors"] * (len(sources) > 1)
     return {
@@ -229,4 +230,15 @@ def _paint_arguments(
         "host": options.host,
         "port": options.port,
         "with_browser": options.with_browser,
+        "console": _console_arguments(options),
     }
+
+
+def _console_arguments(options: Namespace) -> dict[str, Any] | None:
+    """Return the arguments of the painter's console; None without a rig."""
+    named = console_of(options)
+    if named is None:
+        return None
+    rig, target = named
+    universes = dict(options.universes)
+    return {"rig": rig, "target": target, "universes": universes, "priority": options.priority}

@@ -74,20 +74,26 @@ def add_fade(parser: argparse.ArgumentParser, purpose: str) -> None:
     )
 
 
-def add_send(parser: argparse.ArgumentParser) -> None:
-    """Add the options of `send`."""
-    parser.add_argument("lighting", metavar="lighting.json", help="file that solve wrote")
-    add_rig(parser, required=True)
+def add_console(parser: argparse.ArgumentParser) -> None:
+    """Add the options for a console that follows the painter."""
+    add_rig(parser, required=False, purpose="for --to: ")
+    _add_target(parser, "(default: none)")
+    _add_universes(parser)
+    _add_priority(parser)
+
+
+def _add_target(parser: argparse.ArgumentParser, default: str) -> None:
     parser.add_argument(
         "--to",
         dest="target",
         type=target,
         metavar="TARGET",
         help="sacn://HOST or artnet://HOST, maybe with a :PORT, to send to one receiver; "
-        "sacn://multicast or artnet://broadcast to reach all (default: send nothing, and print "
-        "the levels)",
+        f"sacn://multicast or artnet://broadcast to reach all {default}",
     )
-    _add_universes(parser)
+
+
+def _add_priority(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--priority",
         type=arguments.at_least(0, maximum=200),
@@ -95,6 +101,29 @@ def add_send(parser: argparse.ArgumentParser) -> None:
         help="priority of sACN, of which receivers take the highest (default: 90, below the 100 of "
         "consoles, which win)",
     )
+
+
+def console_of(options: argparse.Namespace) -> tuple[RigFile, ConsoleTarget | None] | None:
+    """Return the rig of a painter and the target of its console, if the options name them.
+
+    Raises ConsoleError for a target without a rig, and a priority that the protocol lacks.
+    """
+    rig = rig_file(options)
+    if rig is None:
+        if options.target is not None:
+            raise ConsoleError(f"--to {options.target} sends to the fixtures of a rig: add --rig")
+        return None
+    _check_priority(options)
+    return rig, options.target
+
+
+def add_send(parser: argparse.ArgumentParser) -> None:
+    """Add the options of `send`."""
+    parser.add_argument("lighting", metavar="lighting.json", help="file that solve wrote")
+    add_rig(parser, required=True)
+    _add_target(parser, "(default: send nothing, and print the levels)")
+    _add_universes(parser)
+    _add_priority(parser)
     parser.add_argument(
         "--fps",
         type=arguments.at_least(1, maximum=60),
@@ -135,10 +164,7 @@ def sending_of(options: argparse.Namespace) -> Sending:
     """Return where and how the options say to send. Raises ConsoleError for a priority of Art-Net,
     which has none.
     """
-    if options.target is not None and options.priority is not None:
-        protocol = options.target.protocol
-        if protocol.scheme != "sacn":
-            raise ConsoleError(f"{protocol.name} has no priority: leave --priority out")
+    _check_priority(options)
     return Sending(
         options.target,
         dict(options.universes),
@@ -149,6 +175,13 @@ def sending_of(options: argparse.Namespace) -> Sending:
         options.blackout,
         options.interface or "",
     )
+
+
+def _check_priority(options: argparse.Namespace) -> None:
+    if options.target is not None and options.priority is not None:
+        protocol = options.target.protocol
+        if protocol.scheme != "sacn":
+            raise ConsoleError(f"{protocol.name} has no priority: leave --priority out")
 
 
 def add_listen(parser: argparse.ArgumentParser) -> None:

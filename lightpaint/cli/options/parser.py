@@ -19,7 +19,13 @@ from lightpaint.cli.options.answer_options import (
     add_verification,
 )
 from lightpaint.cli.options.argument_order import CommandParser, Parser
-from lightpaint.cli.options.console_options import add_fade, add_listen, add_rig, add_send
+from lightpaint.cli.options.console_options import (
+    add_console,
+    add_fade,
+    add_listen,
+    add_rig,
+    add_send,
+)
 from lightpaint.cli.options.option_groups import (
     add_budget,
     add_cache,
@@ -176,6 +182,7 @@ def _paint(parser: argparse.ArgumentParser) -> None:
         "folder for session and exports (default: named after the scene)",
     )
     add_server(parser)
+    add_console(parser)
     add_fit(parser)
     add_view_transform(parser, "srgb", "metered like a camera; 0 with --view")
     add_lights(parser)

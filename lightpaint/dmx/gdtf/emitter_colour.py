@@ -2,6 +2,7 @@
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from functools import cache
 from typing import Any
 from xml.etree.ElementTree import Element
 
@@ -57,8 +58,12 @@ def rgb_of_xy(xy: Chromaticity) -> Doubles:
     return np.asarray(np.linalg.solve(rgb_to_xyz(REC709), [x / y, 1.0, (1 - x - y) / y]))
 
 
-#: The colour of equal power at all wavelengths, of which a filter lets a part through.
-EQUAL_ENERGY = rgb_of_xy((1 / 3, 1 / 3))
+@cache
+def _equal_energy() -> Doubles:
+    """Return the colour of equal power at all wavelengths, which filters are measured against."""
+    xy = xy_of_spectrum(np.array([300.0, 900.0]), np.ones(2))
+    assert xy is not None
+    return rgb_of_xy(xy)
 
 
 @dataclass(frozen=True)
@@ -193,7 +198,7 @@ def _transmissions(element: Element) -> list[tuple[float, Doubles]]:
             if xy is not None:
                 percent = float(measurement.transmission)
                 level = percent / 100 if percent > 1 else percent
-                points.append((measurement.physical / 100, level * rgb_of_xy(xy) / EQUAL_ENERGY))
+                points.append((measurement.physical / 100, level * rgb_of_xy(xy) / _equal_energy()))
     colour = _parsed(element.get("Color"))
     if not points and colour is not None and colour[1] > 0:
         points.append((1.0, min(colour[1], 100.0) / 100 * rgb_of_xy(colour[0])))

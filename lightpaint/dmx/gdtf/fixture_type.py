@@ -3,6 +3,8 @@
 from functools import cache
 from xml.etree.ElementTree import Element
 
+import numpy as np
+
 from lightpaint.display_text import some_names
 from lightpaint.dmx.gdtf.geometry_tree import Placed, geometry_tree
 from lightpaint.dmx.gdtf.mode_channels import ModeChannel, mode_channels
@@ -54,7 +56,11 @@ class FixtureType:
         tree, channels = self._parts(name)
         kept = [x for x in channels if breaks is None or x.dmx.dmx_break in breaks]
         with reading(self.file):
-            return ModeReader(name, tree, kept, self._described, zoom=zoom).read(pixels=pixels)
+            mode = ModeReader(name, tree, kept, self._described, zoom=zoom).read(pixels=pixels)
+            numbers = [(*x.xy, x.candela) for light in mode.lights for x in light.emitters]
+            if not np.isfinite(numbers).all():
+                raise ValueError("light that is not finite")
+            return mode
 
     def _read_parts(self, name: str) -> tuple[list[Placed], list[ModeChannel]]:
         """Return the geometries and channels of a mode."""

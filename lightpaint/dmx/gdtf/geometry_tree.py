@@ -124,4 +124,7 @@ def matrix_of(text: str | None) -> Doubles:
     """Return a matrix of GDTF, (4, 4): column vectors, metres."""
     # pygdtf reads no blanks between the braces.
     written: Any = re.sub(r"\}\s*\{", "}{", text) if text else 0
-    return np.array(library("pygdtf").value.Matrix(written).matrix, float)
+    matrix = np.array(library("pygdtf").value.Matrix(written).matrix, float)
+    if not np.isfinite(matrix).all():
+        raise ValueError(f"the matrix {text}")
+    return matrix

@@ -5,8 +5,10 @@ nearest geometry above it which has channels for a colour; its dimmers are all a
 """
 
 import re
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections import Counter
+from collections.abc import Callable, Collection, Mapping, Sequence
 from dataclasses import dataclass, replace
+from functools import cache, cached_property, partial
 from typing import Any
 from xml.etree.ElementTree import Element
 
@@ -26,6 +28,7 @@ from lightpaint.dmx.gdtf.emitter_colour import (
 from lightpaint.dmx.gdtf.geometry_tree import Placed
 from lightpaint.dmx.gdtf.mode_channels import ChannelFunction, Curve, ModeChannel, curve_of
 from lightpaint.dmx.spot_cone import solid_angle
+from lightpaint.sentences import Hint, Sentence
 
 #: What is assumed of a fixture whose file does not say it: lumens, degrees at 50 % and at 10 % of
 #: the intensity, kelvin.
@@ -45,6 +48,13 @@ _WAYS = (_ADDED, _NAMED_RGB, _XY, _FILTERED)
 _NEEDED = {_ADDED: 1, _NAMED_RGB: 3, _XY: 2, _FILTERED: 3}
 
 _DIMMER = re.compile(r"(Dimmer|CIE_Brightness|ColorRGB_Dimmer)(\d*)")
+
+#: What to know of a file that some programs write for types that they do not know.
+_PLACEHOLDER = Sentence(
+    "its GDTF is a placeholder, all of whose channels are dimmers: it has one colour, and nothing "
+    "is sent to it; give its own file with ",
+    Hint("gdtf_folder"),
+)
 
 #: Channels that change the colour, and stay at rest.
 _RESTING = re.compile(r"CT[OBC]|Color\d+|ColorMacro\d*|HSB_\w+|Color(Add|Sub|RGB)_\w+|Tint")
@@ -119,6 +129,9 @@ class ModeReader:
         self.profiles = {x.get("Name", ""): x for x in elements("DMXProfiles/DMXProfile")}
         self.remarks: list[str] = []
         self.dmx = [x.dmx for x in self.channels]
+        # These are asked for each beam, of which there may be hundreds.
+        self.emitter_colour = cache(partial(emitter_colour, emitters=tuple(self.emitters)))
+        self._with_attribute, self._shape = cache(self._find_attribute), cache(self._set_curve)
         self.beams = self._beams(zoom)
         self.way = self._way()
 
@@ -126,11 +139,17 @@ class ModeReader:
         """Return the mode. pixels: True for a light for each beam that has channels of its own."""
         groups = self._groups(pixels=pixels)
         candelas, emission = self._candelas()
+        if self._is_placeholder():
+            lone = self._lone_light(groups[0], candelas)
+            remarks = (_PLACEHOLDER, *self.remarks)
+            return FixtureMode(self.name, tuple(self.dmx), (lone,), emission, remarks)
         lights = []
-        for k, group in enumerate(groups):
-            others = [beam for other in groups if other is not group for beam in other]
+        dimmers = [[self._dimmers(beam) for beam in group] for group in groups]
+        counts = Counter(k for own in dimmers for k in set().union(*own))
+        shared = {k for k, count in counts.items() if count > 1}
+        for k, (group, own) in enumerate(zip(groups, dimmers, strict=True)):
             number = k + 1 if len(groups) > 1 else 0
-            light = self._light(number, group, others, candelas)
+            light = self._light(number, group, own, shared, candelas)
             if light is not None:
                 lights.append(light)
         if not lights:
@@ -138,16 +157,26 @@ class ModeReader:
         self._remark_resting(lights)
         return FixtureMode(self.name, tuple(self.dmx), tuple(lights), emission, tuple(self.remarks))
 
+    def _is_placeholder(self) -> bool:
+        """Return whether the file stands for a type that a program does not know: no beam, and all
+        channels, whatever they do, called dimmers.
+        """
+        has_beam = any(placed.beam is not None for placed in self.tree)
+        numbered = {match[0] for _, match in self._with_attribute(_DIMMER) if match[2]}
+        return not has_beam and len(numbered) > 1
+
     def _remark(self, text: str) -> None:
         if text not in self.remarks:
             self.remarks.append(text)
 
-    def _with_attribute(self, pattern: re.Pattern[str]) -> Iterable[tuple[int, re.Match[str]]]:
-        """Yield places of channels with a function whose attribute matches."""
-        for k, channel in enumerate(self.channels):
-            for attribute in dict.fromkeys(x.attribute for x in channel.functions):
-                if match := pattern.fullmatch(attribute):
-                    yield k, match
+    def _find_attribute(self, pattern: re.Pattern[str]) -> list[tuple[int, re.Match[str]]]:
+        """Return places of channels with a function whose attribute matches."""
+        return [
+            (k, match)
+            for k, channel in enumerate(self.channels)
+            for attribute in dict.fromkeys(x.attribute for x in channel.functions)
+            if (match := pattern.fullmatch(attribute))
+        ]
 
     def _way(self) -> re.Pattern[str] | None:
         """Return the way in which the mode mixes colours; None if it has one colour."""
@@ -204,13 +233,17 @@ class ModeReader:
         """Return places of the channels that set a beam's colour, by what they set."""
         if self.way is None:
             return {}
+        by_node, needed = self._colours_by_node, _NEEDED[self.way]
+        nodes = (x for x in reversed(beam.placed.ancestry) if len(by_node.get(x, ())) >= needed)
+        return by_node.get(next(nodes, -1), {})
+
+    @cached_property
+    def _colours_by_node(self) -> dict[int, dict[str, list[int]]]:
+        """The places of the channels that mix colours, by geometry and by what they set."""
         by_node: dict[int, dict[str, list[int]]] = {}
-        for k, match in self._with_attribute(self.way):
+        for k, match in self._with_attribute(self.way) if self.way else ():
             by_node.setdefault(self.channels[k].node, {}).setdefault(match[1], []).append(k)
-        for node in reversed(beam.placed.ancestry):
-            if len(by_node.get(node, {})) >= _NEEDED[self.way]:
-                return by_node[node]
-        return {}
+        return by_node
 
     def _groups(self, *, pixels: bool) -> list[list[_Beam]]:
         """Return the beams of each light. Beams without colour beside coloured ones are left."""
@@ -223,35 +256,31 @@ class ModeReader:
         groups: dict[Any, list[_Beam]] = {}
         for beam in beams:
             colour = sorted(k for places in self._colour_channels(beam).values() for k in places)
-            dimmers = sorted(k for k, _ in self._dimmers([beam]))
+            dimmers = sorted(self._dimmers(beam))
             groups.setdefault((*colour, *dimmers), []).append(beam)
         return [*groups.values()]
 
-    def _dimmers(self, beams: Sequence[_Beam]) -> list[tuple[int, bool]]:
-        """Return places of dimmers of some of the beams, and whether each dims all of them."""
-        found = []
-        matches = [*self._with_attribute(_DIMMER)]
-        # Numbered dimmers of one geometry are beside each other, others behind each other.
-        has_numbers = sum(bool(match[2]) for _, match in matches) > 1
-        for k, match in matches:
-            dimmed = [b for b in beams if self.channels[k].node in b.placed.ancestry]
-            if dimmed:
-                is_whole = len(dimmed) == len(beams) and not (has_numbers and match[2])
-                found.append((k, is_whole))
-        return found
+    def _dimmers(self, beam: _Beam) -> set[int]:
+        """Return the places of the dimmers of a beam."""
+        nodes = set(beam.placed.ancestry)
+        return {k for k, _ in self._with_attribute(_DIMMER) if self.channels[k].node in nodes}
 
     def _light(
         self,
         number: int,
         beams: Sequence[_Beam],
-        others: Sequence[_Beam],
+        dimmers: Sequence[set[int]],
+        shared: Collection[int],
         candelas: Mapping[tuple[int, str], float],
     ) -> ModeLight | None:
-        chain = self._dimmers(beams)
-        shared = {k for k, _ in self._dimmers(others)}
-        own = sorted((k for k, whole in chain if whole and k not in shared), key=self._fineness)
-        masters = [k for k, whole in chain if whole and k in shared]
-        parts = [k for k, whole in chain if not whole]
+        """Return the light of some beams; None if no channel dims it.
+
+        dimmers: of each beam. shared: those that other lights have, too.
+        """
+        whole = set.intersection(*dimmers)
+        parts = sorted(set().union(*dimmers) - whole)
+        own = sorted(sorted(whole.difference(shared)), key=self._fineness)
+        masters = sorted(whole.intersection(shared))
         for k in (*own, *masters, *parts):
             self._shape(k, _DIMMER)
         emitters = self._emitters(beams, candelas)
@@ -277,6 +306,14 @@ class ModeReader:
             chromaticity,
         )
 
+    def _lone_light(
+        self, beams: Sequence[_Beam], candelas: Mapping[tuple[int, str], float]
+    ) -> ModeLight:
+        """Return the light of some beams that no channel sets."""
+        angles = max(x.beam_angle for x in beams), max(x.field_angle for x in beams)
+        emitters = tuple(self._emitters(beams, candelas))
+        return ModeLight(0, *_middle(beams), *angles, emitters)
+
     def _fineness(self, place: int) -> int:
         """Return the sort key of a dimmer: the finest first, since it carries the level."""
         return -len(self.dmx[place].offsets)
@@ -285,7 +322,7 @@ class ModeReader:
         curve = self.dmx[place].curve
         return round((curve[-1][0] if curve else 1.0) * self.dmx[place].highest)
 
-    def _shape(self, place: int, pattern: re.Pattern[str]) -> ChannelFunction:
+    def _set_curve(self, place: int, pattern: re.Pattern[str]) -> ChannelFunction:
         """Set the curve of a channel to that of its function, and return the function."""
         channel = self.channels[place]
         function = next(
@@ -327,7 +364,7 @@ class ModeReader:
                 link = self._shape(places[0], _ADDED).element.get("Emitter")
                 for k in places[1:]:
                     self._shape(k, _ADDED)
-                colour = emitter_colour(suffix, link, self.emitters)
+                colour = self.emitter_colour(suffix, link)
                 if colour.is_usual:
                     self._remark("its GDTF has no colours of emitters: usual ones are assumed")
                 colours.append((colour, places))

@@ -114,12 +114,7 @@ class ConsoleLink:
     @property
     def address(self) -> str:
         """The target, universes, source and priority in words."""
-        numbers = [*self.universes.values()]
-        plural = "s" if len(numbers) > 1 else ""
-        text = f"{self.target}, universe{plural} {', '.join(map(str, numbers))}"
-        if self.target.protocol is not SACN:
-            return text
-        return f"{text}, source {SOURCE_NAME!r}, priority {self._priority}"
+        return _address_of(self.target, self.universes.values(), self._priority)
 
     @property
     def trouble(self) -> str | None:
@@ -240,6 +235,27 @@ class ConsoleLink:
             self._trouble = f"cannot send to {self.target}: {error.strerror or error}"
         else:
             self._trouble, self._has_sent = None, True
+
+
+def link_address(
+    target: ConsoleTarget,
+    rig: ConsoleRig,
+    *,
+    universes: Mapping[int, int] | None = None,
+    priority: int = PRIORITY,
+) -> str:
+    """Return `ConsoleLink.address` of a link that is not open. Raises as `ConsoleLink.open`."""
+    check_library(target.protocol)
+    numbers = network_universes(rig, target.protocol, universes)
+    return _address_of(target, numbers.values(), priority)
+
+
+def _address_of(target: ConsoleTarget, universes: Collection[int], priority: int) -> str:
+    plural = "s" if len(universes) > 1 else ""
+    text = f"{target}, universe{plural} {', '.join(map(str, universes))}"
+    if target.protocol is not SACN:
+        return text
+    return f"{text}, source {SOURCE_NAME!r}, priority {priority}"
 
 
 def check_library(protocol: DmxProtocol) -> None:

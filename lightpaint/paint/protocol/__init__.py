@@ -24,6 +24,7 @@ from lightpaint.paint.protocol.events import (
     AnswerUpdate,
     CanvasPatch,
     Closing,
+    ConsoleState,
     DraggedPlane,
     Failure,
     LookList,
@@ -54,6 +55,7 @@ from lightpaint.paint.protocol.light_requests import (
 )
 from lightpaint.paint.protocol.message_parts import (
     Camera,
+    ConsoleInfo,
     EditState,
     EmitterInfo,
     HistoryInfo,
@@ -108,6 +110,7 @@ from lightpaint.paint.protocol.painting_requests import (
 )
 from lightpaint.paint.protocol.requests import (
     VERSION,
+    BlackOut,
     ChangeSettings,
     DropRender,
     Explain,
@@ -118,6 +121,7 @@ from lightpaint.paint.protocol.requests import (
     Preview,
     RenderFinal,
     StopRender,
+    SwitchConsole,
     TakeOver,
     Verify,
 )

@@ -15,6 +15,7 @@ from lightpaint.paint.protocol.answer_parts import AnswerChoice, Findings
 from lightpaint.paint.protocol.base import OPTIONAL, Event
 from lightpaint.paint.protocol.message_parts import (
     Camera,
+    ConsoleInfo,
     EditState,
     ImageInfo,
     LightInfo,
@@ -74,7 +75,7 @@ class SessionState(EditState, Event, kind="state", is_observed=True):
     folder: names of the scene file and of the session. can_render: whether there is a scene to
     render, and not a basis alone. can_report: whether a report can be written. images: lights that
     are images. transforms: names of view transforms. transform: the one in use. basis: how many
-    samples the planes have. answer: how close the last one is.
+    samples the planes have. answer: how close the last one is. console: null if there is none.
     """
 
     version: int
@@ -104,6 +105,7 @@ class SessionState(EditState, Event, kind="state", is_observed=True):
     is_back: bool = True
     choices: tuple[AnswerChoice, ...] = ()
     renders: tuple[RenderInfo, ...] = ()
+    console: ConsoleInfo | None = None
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -283,6 +285,13 @@ class Rig(Event, kind="rig"):
     surfaces: tuple[str, ...]
     objects: tuple[PlanObject, ...]
     skies: tuple[SkyAxes, ...]
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class ConsoleState(Event, kind="console"):
+    """The state of the console: the answer to requests about it."""
+
+    console: ConsoleInfo | None
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)

@@ -11,6 +11,20 @@ from lightpaint.paint.store.history_steps import Region
 
 
 @dataclass(frozen=True)
+class ConsoleInfo:
+    """The console that the answer can be sent to.
+
+    address: target, universes, source and priority in words. is_on: whether it follows the brush.
+    is_dark: whether it was blacked out. trouble: why nothing leaves, in a sentence.
+    """
+
+    address: str
+    is_on: bool
+    is_dark: bool
+    trouble: str | None = None
+
+
+@dataclass(frozen=True)
 class EmitterInfo:
     """An emitter of a lamp, such as its red LEDs. swatch: its colour for a screen, as in CSS."""
 
@@ -27,7 +41,8 @@ class LightInfo:
     name of that group; null for a single emitter. is_fixed: whether it is not adjusted. is_scalar:
     whether one number stands for all channels. scale: factor of its stored plane. name, label: its
     name in the scene, and as people read it. unit: of its emission. emitters: those that mix the
-    light of a lamp, if its lights file lists them.
+    light of a lamp, if its lights file lists them. address: its fixture and first channel on a
+    console; "" if unknown.
     """
 
     name: str
@@ -43,6 +58,7 @@ class LightInfo:
     is_scalar: bool
     scale: float
     emitters: tuple[EmitterInfo, ...] = ()
+    address: str = ""
 
 
 @dataclass(frozen=True)

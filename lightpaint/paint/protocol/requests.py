@@ -112,6 +112,22 @@ class StopRender(Request, kind="stop_render"):
 
 
 @dataclass(frozen=True)
+class SwitchConsole(Request, kind="switch_console"):
+    """Send the answer to the console from now on, as it follows the brush, or end that. Answered by
+    `console`.
+
+    is_on: whether to send.
+    """
+
+    is_on: bool
+
+
+@dataclass(frozen=True)
+class BlackOut(Request, kind="black_out"):
+    """Take all lamps of the console to 0 until it is switched on again. Answered by `console`."""
+
+
+@dataclass(frozen=True)
 class DropRender(Request, kind="drop_render"):
     """Take a final render that has ended off the list; its files stay. Answered by `renders`.
 

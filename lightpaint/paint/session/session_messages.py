@@ -100,9 +100,11 @@ MISS_TEXTS = {
 CONSTRAINED_MISS_TEXTS = {"forbidden": "would need colours or levels that the lights may not have"}
 
 
-def light_info(light: BasisLight, scale: float, lamp: Lamp | None = None) -> LightInfo:
+def light_info(
+    light: BasisLight, scale: float, lamp: Lamp | None = None, address: str = ""
+) -> LightInfo:
     """Return the constant properties of a light. scale: as in `LightInfo`. lamp: what mixes it, if
-    known.
+    known. address: as in `LightInfo`.
     """
     members = tuple(light.members)
     return LightInfo(
@@ -118,6 +120,7 @@ def light_info(light: BasisLight, scale: float, lamp: Lamp | None = None) -> Lig
         is_fixed=light.is_fixed,
         is_scalar=light.is_scalar,
         scale=scale,
+        address=address,
         emitters=() if lamp is None else tuple(map(_emitter_info, lamp.emitters)),
     )
 

@@ -1,6 +1,6 @@
 """The state of a session for a client that connects, and the pictures of its views."""
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from functools import partial
 from typing import Any
 
@@ -218,11 +218,17 @@ def _view_info(view: Canvas, basis: Basis) -> ViewInfo:
 
 
 def state_fields(
-    session: Session, pictures: PictureTable, looks: LookLibrary, *, target_spp: int | None
+    session: Session,
+    pictures: PictureTable,
+    looks: LookLibrary,
+    *,
+    target_spp: int | None,
+    addresses: Mapping[str, str] | None = None,
 ) -> dict[str, Any]:
     """Return fields of `SessionState`.
 
-    target_spp: the samples per pixel that the basis will have; None if it is finished.
+    target_spp: the samples per pixel that the basis will have; None if it is finished. addresses:
+    the fixture and first channel of lights on a console, by their names.
     """
     basis = session.basis
     views = tuple(map(_view_info, session.views, session.bases))
@@ -231,7 +237,7 @@ def state_fields(
         "size": views[0].size,
         "objects": views[0].objects,
         "lights": tuple(
-            light_info(light, scale, lamps.get(k))
+            light_info(light, scale, lamps.get(k), (addresses or {}).get(light.name, ""))
             for k, (light, scale) in enumerate(zip(basis.lights, views[0].scales, strict=True))
         ),
         "images": tuple(map(_image_info, light_images(basis.lights))),

@@ -44,6 +44,7 @@ from lightpaint.paint.store.history_steps import Identity, Pixels
 from lightpaint.paint.store.session_requests import SessionRequests
 from lightpaint.paint.store.store import Store
 from lightpaint.paint.studio.background_jobs import BackgroundJobs
+from lightpaint.paint.studio.console_switch import Console, ConsoleSwitch
 from lightpaint.paint.studio.exact_answers import (
     ChoiceSolver,
     ExactAnswers,
@@ -63,6 +64,7 @@ class Studio:
     Args:
         subjects: The views to be painted, under one lighting.
         open_store: Opens the store of their session once their lights are known.
+        console: The console that its answer can be sent to, if there is one.
 
     Attributes:
         publisher: Sends messages that answer no request, and pictures, to pages.
@@ -73,7 +75,11 @@ class Studio:
     """
 
     def __init__(
-        self, subjects: Sequence[Subject], open_store: Callable[[Identity], Store]
+        self,
+        subjects: Sequence[Subject],
+        open_store: Callable[[Identity], Store],
+        *,
+        console: Console | None = None,
     ) -> None:
         self.subjects = tuple(subjects)
         self.on_unsaved: Callable[[str], None] = lambda _: None
@@ -109,6 +115,7 @@ class Studio:
         self._sampling = BackgroundSampling(self.subjects, access, self._bases, publisher)
         self._choices = ChoiceSolver(access, publisher, denoiser.clean_planes)
         self._exact_answers = ExactAnswers(access, publisher, self._follow_exact)
+        self._console = ConsoleSwitch(console)
         self._write_retry = UnsavedRetry(lambda: self.store, self._publish_save_state)
         self._comparison = LookComparison(access, publisher, self._mover, threads)
         self._jobs = BackgroundJobs(
@@ -155,6 +162,7 @@ class Studio:
 
     def close(self) -> None:
         """End the session; all work is kept, even a stroke whose end never arrived."""
+        self._console.close()
         self.publisher.close()
         self._exact_answers.stop()
         self._choices.stop()
@@ -209,8 +217,10 @@ class Studio:
                 self.publisher.pictures,
                 self._access.looks,
                 target_spp=self.subjects[0].target_spp,
+                addresses=self._console.addresses,
             ),
             "renders": self._renders.infos,
+            "console": self._console.info,
             "verifications": self._jobs.verifications(session.version),
             "command": self._jobs.solve_command(sensors, session.requests),
         }
@@ -261,6 +271,8 @@ class Studio:
                     return self._jobs.handle(message)
                 case protocol.RenderFinal() | protocol.StopRender() | protocol.DropRender():
                     return self._renders.handle(message)
+                case protocol.SwitchConsole() | protocol.BlackOut():
+                    return self._console.handle(message, session)
                 case protocol.ImportLayers():
                     return self._layer_imports.handle(message, arrays)
                 case protocol.AddReference() | protocol.DropReference():
@@ -284,6 +296,8 @@ class Studio:
                     messages = session.handle(message, arrays)
             messages = self._show_moves(messages, view=view)
             has_changed = session.version != version
+            if has_changed:
+                self._console.follow(session)
         if has_changed:  # a selection changes no light
             self._exact_answers.notify()
         return messages
@@ -366,7 +380,9 @@ class Studio:
         self.publisher.publish(Notice(text=text, tone=tone))
 
     def _follow_exact(self, snapshot: SessionSnapshot, solution: Solution) -> None:
-        """Start the work that follows an exact answer and its analysis."""
+        """Start the work that follows an exact answer and its analysis, and show it."""
+        with self._access.lock:
+            self._console.follow(self._access.session)
         self._choices.give(snapshot, solution)
         self._sampling.give(snapshot, solution)
 

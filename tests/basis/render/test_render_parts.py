@@ -15,6 +15,7 @@ from lightpaint.basis.basis import Basis
 from lightpaint.basis.render import basis_render, render_budget
 from lightpaint.basis.render import render_parts as parts_module
 from lightpaint.basis.render.basis_render import render_basis
+from lightpaint.basis.render.one_pass_basis import mean_and_half_difference
 from lightpaint.basis.render.render_parts import Part, PartRenderer, PartSums, plan_parts
 from lightpaint.errors import SceneError
 from lightpaint.scene.runtime.kernel_threads import limit_threads
@@ -168,3 +169,13 @@ def test_lights_that_are_rendered_one_by_one(tmp_path: Path) -> None:
     single_render = render_basis(scene, spp=8)
     assert is_same(parts, single_render)
     assert parts.origin == single_render.origin
+
+
+def test_a_number_that_is_not_finite_becomes_dark_and_leaves_the_others() -> None:
+    first, second = (np.full((2, 4, 5, 3), x, np.float32) for x in (8, 4))
+    first[1, 2, 3, 0], second[0, 1, 1, 2] = np.nan, np.inf
+    mean, half_difference = mean_and_half_difference([first, second], (4, 4))
+    broken = np.zeros((2, 4, 5, 3), bool)
+    broken[1, 2, 3, 0] = broken[0, 1, 1, 2] = True
+    assert (mean == np.where(broken, 0, 1.5)).all()
+    assert (half_difference == np.where(broken, 0, 0.5)).all()

@@ -90,6 +90,24 @@ def test_a_lamp_of_emitters_shows_a_bar_for_each_drive(painter: Painter) -> None
     assert widths == ["0.25", "1"]
 
 
+def test_a_blackout_of_the_console_takes_two_presses(painter: Painter) -> None:
+    assert painter.page.get_by_role("checkbox", name="Console").count() == 0  # there is none
+    console = {"address": "sacn://127.0.0.1, universe 1", "is_on": False, "is_dark": False}
+    painter.tell(kind="console", console={**console, "trouble": None})
+    painter.page.get_by_role("checkbox", name="Console").click()
+    assert painter.requests("switch_console") == [{"kind": "switch_console", "is_on": True}]
+    painter.tell(kind="console", console={**console, "is_on": True, "trouble": None})
+    painter.button("Blackout").click()
+    assert painter.requests("black_out") == []
+    painter.button("Press again").click()
+    assert painter.requests("black_out") == [{"kind": "black_out"}]
+    painter.tell(
+        kind="console", console={**console, "is_on": True, "is_dark": True, "trouble": None}
+    )
+    painter.button("Light again").click()
+    assert painter.requests("switch_console")[-1]["is_on"] is True
+
+
 def test_a_level_is_typed_in_stops_or_percent(painter: Painter) -> None:
     current = painter.page.evaluate("() => window.painter.store.value.lights[0].present")
 

@@ -53,6 +53,19 @@ export interface Layer {
 }
 
 /**
+ * The console that the answer can be sent to.
+ *
+ * address: target, universes, source and priority in words. is_on: whether it follows the brush.
+ * is_dark: whether it was blacked out. trouble: why nothing leaves, in a sentence.
+ */
+export interface ConsoleInfo {
+  address: string;
+  is_on: boolean;
+  is_dark: boolean;
+  trouble: string | null;
+}
+
+/**
  * An emitter of a lamp, such as its red LEDs. swatch: its colour for a screen, as in CSS.
  */
 export interface EmitterInfo {
@@ -68,7 +81,8 @@ export interface EmitterInfo {
  * name of that group; null for a single emitter. is_fixed: whether it is not adjusted. is_scalar:
  * whether one number stands for all channels. scale: factor of its stored plane. name, label: its
  * name in the scene, and as people read it. unit: of its emission. emitters: those that mix the
- * light of a lamp, if its lights file lists them.
+ * light of a lamp, if its lights file lists them. address: its fixture and first channel on a
+ * console; "" if unknown.
  */
 export interface LightInfo {
   name: string;
@@ -84,6 +98,7 @@ export interface LightInfo {
   is_scalar: boolean;
   scale: number;
   emitters: EmitterInfo[];
+  address: string;
 }
 
 /**
@@ -706,7 +721,7 @@ export interface SessionPending {
  * folder: names of the scene file and of the session. can_render: whether there is a scene to
  * render, and not a basis alone. can_report: whether a report can be written. images: lights that
  * are images. transforms: names of view transforms. transform: the one in use. basis: how many
- * samples the planes have. answer: how close the last one is.
+ * samples the planes have. answer: how close the last one is. console: null if there is none.
  */
 export interface SessionState {
   kind: 'state';
@@ -751,6 +766,7 @@ export interface SessionState {
   is_back: boolean;
   choices: AnswerChoice[];
   renders: RenderInfo[];
+  console: ConsoleInfo | null;
   arrays: { weights: Picture };
 }
 
@@ -982,6 +998,16 @@ export interface Rig {
   surfaces: string[];
   objects: PlanObject[];
   skies: SkyAxes[];
+  arrays: {  };
+}
+
+/**
+ * The state of the console: the answer to requests about it.
+ */
+export interface ConsoleState {
+  kind: 'console';
+  reply?: number;
+  console: ConsoleInfo | null;
   arrays: {  };
 }
 
@@ -1524,6 +1550,22 @@ export interface StopRender {
 }
 
 /**
+ * Send the answer to the console from now on, as it follows the brush, or end that. Answered by
+ * `console`.
+ *
+ * is_on: whether to send.
+ */
+export interface SwitchConsole {
+  is_on: boolean;
+}
+
+/**
+ * Take all lamps of the console to 0 until it is switched on again. Answered by `console`.
+ */
+export interface BlackOut {
+}
+
+/**
  * Take a final render that has ended off the list; its files stay. Answered by `renders`.
  *
  * render: its id.
@@ -1607,6 +1649,7 @@ export interface Events {
   references: ReferenceList;
   choices: AnswerChoices;
   rig: Rig;
+  console: ConsoleState;
   notice: Notice;
   failed: Failure;
   closed: Closing;
@@ -1657,6 +1700,8 @@ export interface Requests {
   export: Export;
   render_final: RenderFinal;
   stop_render: StopRender;
+  switch_console: SwitchConsole;
+  black_out: BlackOut;
   drop_render: DropRender;
   verify: Verify;
   explain: Explain;

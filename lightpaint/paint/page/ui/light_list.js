@@ -14,6 +14,7 @@ import {
   searchLights,
   sortLights,
 } from './lamps/listed_lights.js';
+import { ConsoleRow } from './lamps/console_row.js';
 import { MasterDimmer } from './lamps/master_dimmer.js';
 import { StartLamps } from './lamps/start_lamps.js';
 import { VirtualRows } from './lamps/virtual_rows.js';
@@ -48,6 +49,7 @@ export function LightList({ ui, app }) {
     key === 'Enter' && indices.length && store.set({ selectedLights: indices });
   return html`<div class=${`lights ${isAnswerHidden(ui) ? 'is-unseen' : ''}`}>
     ${ui.lights.length > 1 && html`<${MasterDimmer} ui=${ui} app=${app} />`}
+    <${ConsoleRow} ui=${ui} app=${app} />
     <${StartLamps} ui=${ui} app=${app} />
     ${
       ui.lights.length > 1 &&

@@ -85,7 +85,7 @@ export class LightRow extends Component {
             aria-label=${light.label} onClick=${press} data-tip=${
               light.members.length > 1
                 ? `${light.label}: ${light.members.join(', ')}`
-                : `${light.label}, ${light.plugin}`
+                : [light.label, light.address || light.plugin].join(', ')
             }>
             <${Icon} name="fold" /><span class="its-name"><${Name} name=${light.label} /></span></button>
           ${this.renderButtons()}

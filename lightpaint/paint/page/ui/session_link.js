@@ -48,6 +48,7 @@ const EVENT_KINDS = [
   'choices',
   'exported',
   'renders',
+  'console',
   'verified',
   'explained',
   'previewed',
@@ -149,6 +150,7 @@ export class SessionLink {
       choices: (/** @type {HostEvents['choices']} */ m) => choicesUpdate(m, this.store.value),
       exported: (/** @type {HostEvents['exported']} */ m) => this.takeExport(m),
       renders: (/** @type {HostEvents['renders']} */ m) => this.takeRenders(m),
+      console: (/** @type {HostEvents['console']} */ m) => ({ console: m.console }),
       verified: (/** @type {HostEvents['verified']} */ m) =>
         verificationUpdate(m, this.store.value),
       explained: (/** @type {HostEvents['explained']} */ m) =>

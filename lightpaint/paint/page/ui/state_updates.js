@@ -64,6 +64,7 @@ export function stateUpdate(message, /** @type {import('./ui_state.js').Ui} */ p
     references: message.references ?? [],
     choices: message.choices ?? [],
     choicesVersion: -1,
+    console: message.console ?? null,
     ...rendersUpdate(message, previous),
     hint: Boolean(message.is_new),
     connection: 'open',

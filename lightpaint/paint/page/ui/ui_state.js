@@ -1,6 +1,7 @@
 /** The state of the interface: data from the session, and settings of the page itself. */
 
 import { INITIAL_CHOICES } from './answer_choices.js';
+import { INITIAL_CONSOLE } from './lamps/console_row.js';
 import { INITIAL_IMAGES } from './images/image_state.js';
 import { INITIAL_LAMPS } from './lamps/lamp_state.js';
 import { INITIAL_RENDERS } from './exports/render_state.js';
@@ -47,6 +48,7 @@ import { initialSelection } from './selection/selection_settings.js';
  *   & import("./references/reference_state.js").ReferenceState
  *   & import("./scopes/scope_state.js").ScopeState
  *   & import("./answer_choices.js").ChoiceState
+ *   & import("./lamps/console_row.js").ConsoleUi
  *   & import("./images/image_state.js").ImageState & import("./exports/render_state.js").RenderState
  *   & BaseUi} Ui
  *
@@ -318,6 +320,7 @@ export function initialState() {
     ...DEFAULT_PREFERENCES,
     ...INITIAL_REFERENCES,
     ...INITIAL_CHOICES,
+    ...INITIAL_CONSOLE,
     ...INITIAL_SCOPES,
     ...INITIAL_RENDERS,
   };
