@@ -27,9 +27,8 @@ RIDGE = 8 * EPSILON
 #: Ridge to use instead where that one is lost in rounding.
 FIRM_RIDGE = 1e-12
 
-#: Steps after which methods take over that cannot cycle; and of many unknowns, for which those
-#: methods take hundreds of steps of half a second.
-MAX_STEPS, MAX_STEPS_OF_MANY = 10, 40
+#: Steps after which methods take over that cannot cycle.
+MAX_STEPS = 10
 
 #: Number of unknowns that are many.
 MANY_UNKNOWNS = 512
@@ -58,14 +57,13 @@ def clipped_newton(
     `tolerance`, x is useless.
     """
     matrix, counts = np.eye(0), np.einsum("cii->ci", M) > 0
-    max_steps = MAX_STEPS if M.shape[1] <= MANY_UNKNOWNS else MAX_STEPS_OF_MANY
     check = cancellation_check()
-    for step in range(max_steps + 1):
+    for step in range(MAX_STEPS + 1):
         check()
         gradient = np.matmul(M, x[:, :, None])[:, :, 0] - b
         residual = np.abs(kkt_step(gradient, x, lower, upper)).max(axis=1, initial=0) / size
         is_open = residual > tolerance
-        if step == max_steps or not is_open.any():
+        if step == MAX_STEPS or not is_open.any():
             break
         stays = ((x <= lower) & (gradient > 0)) | ((x >= upper) & (gradient < 0))
         # Solved problems do not change while others still need steps.
