@@ -113,7 +113,7 @@ def projected_newton(
     """Take clipped steps that lower the objective, from x, (n,); return the last point, and
     their number.
 
-    A step that does not lower it enough is halved before it is clipped, so these steps cannot
+    A step that does not lower it enough is shortened before it is clipped, so these steps cannot
     cycle; they end at the tolerance, where none lowers the objective, or at `MAX_STEPS`.
     """
     check = cancellation_check()
@@ -150,7 +150,7 @@ def _lower_point(q: Quadratic, x: Doubles, move: Doubles, gradient: Doubles) -> 
         slope = float(gradient @ change)
         if slope + 0.5 * float(change @ (q.M @ change)) <= KEPT_PROMISE * slope < 0:
             return point
-        part /= 2
+        part /= 4
     return None
 
 

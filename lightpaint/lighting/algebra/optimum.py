@@ -253,8 +253,7 @@ def _solve_polished(
 ) -> tuple[Doubles, int, int]:
     """Solve by Newton's clipped steps, or else by polishes with sweeps between them.
 
-    factor: of many unknowns, whose clipped steps may not raise the objective: where they do, they
-    cycle.
+    factor: of many unknowns, for which steps that never raise the objective come in between.
     """
     _, _, residual = q.violations(x)
     sweeps, steps = 0, 0
@@ -267,11 +266,6 @@ def _solve_polished(
             steps += more_steps
             if kkt <= tolerance and q.violations(solved)[2] <= tolerance:
                 return solved, 0, steps
-    elif residual > tolerance and max_sweeps > 0 and factor is not None:
-        x, steps = projected_newton(q, x, factor, tolerance=tolerance)
-        _, _, residual = q.violations(x)
-        if residual <= max(tolerance, q.round_off(x)):
-            return x, 0, steps
     elif residual > tolerance and max_sweeps > 0:
         trial, residuals, steps, _ = clipped_newton(
             q.M[None],
@@ -281,9 +275,16 @@ def _solve_polished(
             x[None],
             np.array([q.size]),
             tolerance=tolerance,
+            newton_step=None if factor is None else factor.newton_step,
         )
         if residuals[0] <= tolerance:
             return trial[0], 0, steps
+        if factor is not None:
+            x, more_steps = projected_newton(q, x, factor, tolerance=tolerance)
+            steps += more_steps
+            _, _, residual = q.violations(x)
+            if residual <= max(tolerance, q.round_off(x)):
+                return x, 0, steps
     count = 0
     while residual > tolerance and sweeps < max_sweeps:
         gradient = q.gradient(x)
