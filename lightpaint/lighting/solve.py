@@ -1,8 +1,10 @@
 """The solve: a basis and a painting become a lighting."""
 
 from collections.abc import Sequence
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from typing import Any
+
+import numpy as np
 
 from lightpaint.arrays import Bools, Doubles
 from lightpaint.basis.basis import Basis
@@ -18,14 +20,23 @@ from lightpaint.lighting.linear_solve import (
 )
 from lightpaint.lighting.loss.lit_pixels import DeferredSquares, LitPixels
 from lightpaint.lighting.loss.pixel_bins import BinnedPixels, bin_pixels, block_side
-from lightpaint.lighting.loss.reweighting import Descent, WeightTerms, descend, total_loss
-from lightpaint.lighting.loss.warm_start import find_near_optimum
+from lightpaint.lighting.loss.reweighting import (
+    MANY_LIGHTS,
+    MIN_STEP,
+    Descent,
+    WeightTerms,
+    descend,
+    total_loss,
+)
+from lightpaint.lighting.loss.warm_start import find_near_optimum, is_sampled
 from lightpaint.lighting.loss.weight_penalty import pull_to_current
 from lightpaint.lighting.normal_equations import NormalEquations
 from lightpaint.lighting.problem import Problem
 from lightpaint.lighting.solution import Solution
 from lightpaint.lighting.unknowns.reduced_problem import (
     ReducedOptimum,
+    ReducedSolver,
+    nearest_unknowns,
     solve_reduced,
 )
 from lightpaint.lighting.unknowns.white_mixes import next_whites
@@ -34,6 +45,10 @@ from lightpaint.target.target import Target
 #: Maximum number of steps of lights to other whites, for a loss that is not linear, and the share
 #: of the loss that a step has to gain.
 MAX_WHITE_STEPS, MIN_GAIN = 20, 1e-7
+
+#: Change of a light's picture at which the first descents of many lights end, before they choose
+#: their whites anew.
+ROUGH_STEP = 1e-3
 
 
 @keywords(Fit)
@@ -165,38 +180,37 @@ def _solution(answer: LinearAnswer[Problem]) -> Solution:
 
 
 def _descend(
-    problem: Problem,
-    start: Doubles,
-    reached: Bools,
-    blocks: BinnedPixels | None,
-    *,
-    is_near: bool = False,
+    problem: Problem, start: Doubles, reached: Bools, blocks: BinnedPixels | None
 ) -> Solution:
     """Descend from weights (n, 3) to the least loss under the constraints.
 
-    reached: as in `make_answer`. blocks: from `_blocks_of`. is_near: whether the start is near the
-    least. The two whites that lights mix, and the lights that are confined to their gamuts, stay
-    the same while the loss falls, and are chosen anew at its minimum.
+    reached: as in `make_answer`. blocks: from `_blocks_of`. The two whites that lights mix, and the
+    lights that are confined to their gamuts, stay the same while the loss falls, and are chosen
+    anew at its minimum: of many lights at first near it.
     """
-    solution = _descend_once(problem, start, reached, blocks, is_near=is_near)
+    until = ROUGH_STEP if len(start) >= MANY_LIGHTS else MIN_STEP
     if not problem.reduction.has_choices:
-        return solution
-    count, value = solution.certificate.rounds, loss_with_pull(solution)
-    for _ in range(MAX_WHITE_STEPS):
-        current = solution.problem
-        equations = current.with_pull(current.solved)
-        reduction, optimum = next_whites(equations, current.reduction, solution.weights)
-        if all(a is b for a, b in zip(reduction.knobs, current.reduction.knobs, strict=True)):
+        until = MIN_STEP
+    low = _least_loss(problem, start, blocks, is_near=False, until=until)
+    count = 1 + low.descent.reweighting.rounds
+    for _ in range(MAX_WHITE_STEPS if problem.reduction.has_choices else 0):
+        reduction, optimum = next_whites(low.pulled, problem.reduction, low.descent.weights)
+        is_same = all(a is b for a, b in zip(reduction.knobs, problem.reduction.knobs, strict=True))
+        if is_same and until <= MIN_STEP:
             break
-        is_confined = reduction.gamut_knobs != current.reduction.gamut_knobs
-        current = current.with_whites(reduction)
-        nearer = _descend_once(current, optimum.weights, reached, blocks, is_near=True)
-        count, reached_loss = count + nearer.certificate.rounds, loss_with_pull(nearer)
+        if is_same:
+            until = MIN_STEP
+        is_confined = reduction.gamut_knobs != problem.reduction.gamut_knobs
+        nearer_problem = problem.with_whites(reduction)
+        nearer = _least_loss(nearer_problem, optimum.weights, blocks, is_near=True, until=until)
+        count += 1 + nearer.descent.reweighting.rounds
         # A light that left its gamut has to return, whatever that costs.
-        if not is_confined and reached_loss > value * (1 - MIN_GAIN):
-            break
-        solution, value = nearer, reached_loss
-    return solution.with_certificate_fields(rounds=count)
+        if not (is_confined or is_same) and nearer.loss > low.loss * (1 - MIN_GAIN):
+            if until <= MIN_STEP:
+                break
+            until = MIN_STEP
+        problem, low = nearer_problem, nearer
+    return _solution_at(problem, low, reached, blocks).with_certificate_fields(rounds=count)
 
 
 def loss_with_pull(solution: Solution) -> float:
@@ -206,51 +220,46 @@ def loss_with_pull(solution: Solution) -> float:
     return float(problem.objective(w).sum()) + pull
 
 
-def _descend_once(
-    problem: Problem,
-    start: Doubles,
-    reached: Bools,
-    blocks: BinnedPixels | None,
-    *,
-    is_near: bool = False,
-) -> Solution:
-    """Descend to the least loss over the current reduction. For the arguments see `_descend`."""
-    descent, optimum = _least_loss(problem, start, blocks, is_near=is_near)
-    if blocks is not None:
-        solved = _problem_of_blocks(problem, descent, blocks)
-    else:
-        solved = replace(problem, squares=descent.squares, equations=descent.equations)
-    equations = solved.with_pull(solved.solved)
-    solution = _solution(make_answer(solved, optimum, descent.weights, equations, reached))
-    converged = optimum.converged and descent.reweighting.converged
-    result = solution.with_certificate_fields(
-        converged=converged, rounds=1 + descent.reweighting.rounds
-    )
-    return replace(result, reweighting=descent.reweighting)
+@dataclass(frozen=True)
+class _LeastLoss:
+    """The end of a descent under one reduction.
+
+    optimum: of its last linear problem. loss: of its weights, with the pull. pulled: the equations
+    of the squares at these weights, with the pull.
+    """
+
+    descent: Descent
+    optimum: ReducedOptimum
+    loss: float
+    pulled: NormalEquations
 
 
 def _least_loss(
-    problem: Problem, start: Doubles, blocks: BinnedPixels | None, *, is_near: bool
-) -> tuple[Descent, ReducedOptimum]:
-    """Return the descent to the least loss, and the optimum of its last linear problem.
+    problem: Problem,
+    start: Doubles,
+    blocks: BinnedPixels | None,
+    *,
+    is_near: bool,
+    until: float,
+) -> _LeastLoss:
+    """Descend to the least loss over the current reduction.
 
-    The descent begins at `start`, or at the current weights where these lead lower.
+    The descent begins at `start`, or at the current weights where these lead lower. is_near:
+    whether the start is near the least. until: see `run_rounds`.
     """
-    basis, loss, pull, equations = problem.basis, problem.loss, problem.pull, problem.equations
+    basis, loss, pull = problem.basis, problem.loss, problem.pull
     if blocks is not None:
-        basis, loss, equations = blocks.basis, blocks.loss, blocks.equations
+        basis, loss = blocks.basis, blocks.loss
         pull = blocks.prior if pull is None else pull + blocks.prior
-
-    def best_of(equations: NormalEquations, begin: Doubles) -> ReducedOptimum:
-        pulled = equations if pull is None else equations + pull
-        return solve_reduced(pulled, problem.reduction, begin, method=problem.fit.method)
+    solver = ReducedSolver(problem.reduction, pull=pull, method=problem.fit.method)
 
     def weights_of(equations: NormalEquations, begin: Doubles) -> Doubles:
-        return best_of(equations, begin).weights
+        return solver.solve(equations, begin).weights
 
     def descend_from(begin: Doubles) -> Descent:
         near_optimum = None
-        if not is_near:
+        if not is_near and is_sampled(loss, len(begin)):
+            equations = problem.equations if blocks is None else blocks.equations
             near_optimum = find_near_optimum(basis, loss, equations, begin, weights_of, pull=pull)
         begin, from_clipping = (
             (begin, not is_near) if near_optimum is None else (near_optimum, False)
@@ -262,26 +271,52 @@ def _least_loss(
             weights_of,
             pull=pull,
             from_clipping=from_clipping,
-            known=(problem.squares, equations) if loss.pixels.has_pieces else None,
+            until=until,
+            known=(problem.squares, problem.equations) if loss.pixels.has_pieces else None,
         )
 
     descent = descend_from(start)
-    current, lit = nearest_to_current(problem), LitPixels.of(basis, loss)
+    lit = LitPixels.of(basis, loss)
 
     def loss_at(weights: Doubles) -> float:
         return total_loss(lit.pixels, WeightTerms(pull), weights, lit.predicted(weights))
 
-    if loss_at(descent.weights) > loss_at(current):
+    current, reached_loss = nearest_to_current(problem), loss_at(descent.weights)
+    if reached_loss > loss_at(current):
         # A worse valley: from the current lighting every step leads downhill.
         descent = descend_from(current)
-    return descent, best_of(descent.equations, descent.reweighting.at)
+        reached_loss = loss_at(descent.weights)
+    optimum = solver.solve(descent.equations, descent.reweighting.at)
+    pulled = descent.equations if pull is None else descent.equations + pull
+    return _LeastLoss(descent, optimum, reached_loss, pulled)
+
+
+def _solution_at(
+    problem: Problem, low: _LeastLoss, reached: Bools, blocks: BinnedPixels | None
+) -> Solution:
+    """Return the solution at the end of a descent. reached: as in `make_answer`."""
+    descent, optimum = low.descent, low.optimum
+    if blocks is not None:
+        solved = _problem_of_blocks(problem, descent, blocks)
+    else:
+        solved = replace(problem, squares=descent.squares, equations=descent.equations)
+    equations = solved.with_pull(solved.solved)
+    solution = _solution(make_answer(solved, optimum, descent.weights, equations, reached))
+    converged = optimum.converged and descent.reweighting.converged
+    result = solution.with_certificate_fields(converged=converged)
+    return replace(result, reweighting=descent.reweighting)
 
 
 def nearest_to_current(problem: Problem) -> Doubles:
     """Return the weights (n, 3) nearest to those to start from that constraints allow."""
-    current = problem.reference
+    current, reduction = problem.reference, problem.reduction
+    if len(current) >= MANY_LIGHTS:
+        all_lights = np.ones(len(current), dtype=bool)
+        nearest = reduction.weights(nearest_unknowns(reduction, current, all_lights))
+        if np.allclose(nearest, current, rtol=1e-9, atol=0):
+            return nearest
     pull = pull_to_current(problem.basis.power, current)
-    return solve_reduced(pull, problem.reduction, current).weights
+    return solve_reduced(pull, reduction, current).weights
 
 
 def _problem_of_blocks(problem: Problem, descent: Descent, blocks: BinnedPixels) -> Problem:

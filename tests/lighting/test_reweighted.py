@@ -12,6 +12,7 @@ from scipy.optimize import minimize, nnls
 from lightpaint.basis.basis import Basis
 from lightpaint.colour.display.view_transform import ViewTransform
 from lightpaint.images.estimate import Estimate
+from lightpaint.lighting import solve as solve_module
 from lightpaint.lighting.analysis.diagnosis import diagnose
 from lightpaint.lighting.analysis.noise.noise_correction import correct_noise
 from lightpaint.lighting.analysis.noise.refinement import refine
@@ -534,3 +535,35 @@ def test_lights_once_chosen_stay_chosen(
         assert [x.constraint for x in solution_again.lighting.lights] == [
             x.constraint for x in solution.lighting.lights
         ]
+
+
+def _some_lights(make_basis: Any) -> tuple[Basis, Target]:
+    """A look of twelve lights, and a painting over it that makes half of it warm and bright."""
+    basis, _, _ = _random_problem(make_basis, 5, n=12)
+    image = basis.current_look.copy()
+    image[:, :4] *= [2.5, 1.6, 0.4]
+    image[:, 4:] *= [0.3, 0.4, 0.6]
+    return basis, Target(
+        "t", image, np.ones(SIZE, np.float32), False, through_view=True, over_look=True
+    )
+
+
+@pytest.mark.parametrize("colors", ["free", "gentle", "white"])
+def test_rounds_of_many_lights_keep_matrices_and_come_to_the_same_answer(
+    make_basis: Any, monkeypatch: pytest.MonkeyPatch, colors: Any
+) -> None:
+    basis, target = _some_lights(make_basis)
+    expected = solve(basis, target, colors=colors)
+    sums: list[int] = []
+    equations = LitPixels.equations
+    monkeypatch.setattr(LitPixels, "equations", lambda *x: (sums.append(1), equations(*x))[1])
+    solve(basis, target, colors=colors)
+    of_all = len(sums)
+    for module in (reweighting, solve_module):
+        monkeypatch.setattr(module, "MANY_LIGHTS", 12)
+    solution = solve(basis, target, colors=colors)
+    assert len(sums) - of_all < of_all
+    assert solution.certificate.converged
+    missed, least = (sum(x.certificate.objective) for x in (solution, expected))
+    assert missed == pytest.approx(least, rel=1e-6)  # the step at which rounds end
+    np.testing.assert_allclose(solution.weights, expected.weights, atol=2e-4)

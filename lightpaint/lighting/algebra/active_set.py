@@ -6,6 +6,7 @@ import numpy as np
 
 from lightpaint.arrays import Bools, Doubles
 from lightpaint.lighting.algebra.clipped_newton import RIDGE, solve_ridged
+from lightpaint.lighting.algebra.free_factor import FreeFactor
 from lightpaint.lighting.algebra.quadratic import EPSILON, Quadratic
 from lightpaint.progress import cancellation_check
 
@@ -18,10 +19,17 @@ class _Working:
     capped: Bools
 
 
-def polish(q: Quadratic, x: Doubles, *, tolerance: float, max_steps: int) -> tuple[Doubles, int]:
+def polish(
+    q: Quadratic,
+    x: Doubles,
+    *,
+    tolerance: float,
+    max_steps: int,
+    factor: FreeFactor | None = None,
+) -> tuple[Doubles, int]:
     """Find the optimum from a feasible x by an active set; unknowns at bounds equal them exactly.
 
-    Returns (x, steps).
+    factor: of a problem of many unknowns without caps. Returns (x, steps).
 
     Each step is Newton's on the free unknowns. If it leaves the box, it is clipped there and
     the bounds it hit are held; if that would not lower the objective, it ends at the first limit.
@@ -37,7 +45,10 @@ def polish(q: Quadratic, x: Doubles, *, tolerance: float, max_steps: int) -> tup
     for step in range(max_steps):
         check()
         gradient = q.gradient(x)
-        move = _newton(q, x, gradient, working)
+        if factor is not None:
+            move = factor.newton_step(working.free, gradient)
+        else:
+            move = _newton(q, x, gradient, working)
         target = x + move
         beyond = working.free & ((target < q.lower) | (target > q.upper))
         exceeded = _exceeded_caps(q, target, working)

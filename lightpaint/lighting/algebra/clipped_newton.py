@@ -11,6 +11,8 @@ Under caps each step also guesses anew which caps hold: it holds a cap that is e
 one that would have to push outwards. The steps may violate caps on their way.
 """
 
+from collections.abc import Callable
+
 import numpy as np
 
 from lightpaint.arrays import Bools, Doubles, Indices
@@ -27,15 +29,18 @@ RIDGE = 8 * EPSILON
 #: Ridge to use instead where that one is lost in rounding.
 FIRM_RIDGE = 1e-12
 
-#: Steps after which methods take over that cannot cycle; and of many unknowns, for which those
-#: methods take hundreds of steps of half a second.
-MAX_STEPS, MAX_STEPS_OF_MANY = 10, 40
+#: Steps after which methods take over that cannot cycle.
+MAX_STEPS = 10
 
 #: Number of unknowns that are many.
 MANY_UNKNOWNS = 512
 
 #: Steps after which methods take over that cannot cycle.
 MAX_CAPPED_STEPS = 20
+
+#: A function from the unknowns that are free, (n,), and the gradient, (n,), to the step to their
+#: optimum, (n,).
+NewtonStep = Callable[[Bools, Doubles], Doubles]
 
 
 def clipped_newton(
@@ -47,29 +52,34 @@ def clipped_newton(
     size: Doubles,
     *,
     tolerance: float,
+    newton_step: NewtonStep | None = None,
 ) -> tuple[Doubles, Doubles, int, bool]:
     """Minimise ½ xᵀM x − bᵀx, lower <= x <= upper, for each of c problems.
 
     M: (c, n, n), scaled to a unit diagonal, with rows of 0 where an unknown changes nothing;
     b, lower, upper: (c, n), or one bound for all. x: (c, n), between the bounds, to begin with.
-    size: (c,), scale of the KKT residuals. Returns x, which equals the bounds that hold it to the
-    last bit, the KKT residuals, (c,), the number of steps, and whether the matrix of the last step
-    may be singular: other x are then as good (see nearest_optimum.py). If a residual is above
-    `tolerance`, x is useless.
+    size: (c,), scale of the KKT residuals. newton_step: of one problem, a quicker way to steps.
+    Returns x, which equals the bounds that hold it to the last bit, the KKT residuals, (c,), the
+    number of steps, and whether the matrix of the last step may be singular: other x are then as
+    good (see nearest_optimum.py); not known with `newton_step`. If a residual is above `tolerance`,
+    x is useless.
     """
     matrix, counts = np.eye(0), np.einsum("cii->ci", M) > 0
-    max_steps = MAX_STEPS if M.shape[1] <= MANY_UNKNOWNS else MAX_STEPS_OF_MANY
     check = cancellation_check()
-    for step in range(max_steps + 1):
+    for step in range(MAX_STEPS + 1):
         check()
         gradient = np.matmul(M, x[:, :, None])[:, :, 0] - b
         residual = np.abs(kkt_step(gradient, x, lower, upper)).max(axis=1, initial=0) / size
         is_open = residual > tolerance
-        if step == max_steps or not is_open.any():
+        if step == MAX_STEPS or not is_open.any():
             break
         stays = ((x <= lower) & (gradient > 0)) | ((x >= upper) & (gradient < 0))
         # Solved problems do not change while others still need steps.
-        move, matrix = _newton(M, gradient, counts & ~stays & is_open[:, None])
+        free = counts & ~stays & is_open[:, None]
+        if newton_step is not None:
+            move = newton_step(free[0], gradient[0])[None]
+        else:
+            move, matrix = _newton(M, gradient, free)
         x = np.minimum(np.maximum(x + move, lower), upper)
     return x, residual, step, is_suspect(matrix)
 

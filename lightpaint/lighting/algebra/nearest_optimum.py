@@ -5,6 +5,8 @@ solver's steps in such a direction are round-off divided by round-off, which dif
 processors.
 """
 
+from collections.abc import Callable
+
 import numpy as np
 
 from lightpaint.arrays import Bools, Doubles
@@ -25,14 +27,21 @@ def is_suspect(M: Doubles) -> bool:
     return bool(np.square(pivots.min(initial=1.0)) < SUSPECT_PIVOT)
 
 
-def nearest_equal(q: Quadratic, x: Doubles, begin: Doubles) -> Doubles:
+def nearest_equal(
+    q: Quadratic,
+    x: Doubles,
+    begin: Doubles,
+    *,
+    knows_regular: Callable[[Bools], bool] = lambda free: False,
+) -> Doubles:
     """Return the point nearest to `begin` among those as good as x, (n,), as far as bounds allow.
 
-    Unknowns at bounds stay there, and the sums that caps limit keep their values.
+    Unknowns at bounds stay there, and the sums that caps limit keep their values. knows_regular:
+    whether the matrix of some unknowns, (n,), is known not to be singular.
     """
     free: Bools = (x > q.lower) & (x < q.upper) & (np.diag(q.M) > 0)
     f = np.flatnonzero(free)
-    if f.size < 2:
+    if f.size < 2 or knows_regular(free):
         return x
     matrix = q.M[f][:, f]
     if q.groups:

@@ -9,6 +9,7 @@ import numpy.typing as npt
 from lightpaint.arrays import Doubles, Indices
 from lightpaint.lighting.algebra.active_set import polish
 from lightpaint.lighting.algebra.clipped_newton import MANY_UNKNOWNS, capped_newton, clipped_newton
+from lightpaint.lighting.algebra.free_factor import FreeFactor, projected_newton
 from lightpaint.lighting.algebra.gauss_seidel import sweep
 from lightpaint.lighting.algebra.interior_point import interior_point
 from lightpaint.lighting.algebra.method import Method
@@ -16,6 +17,9 @@ from lightpaint.lighting.algebra.nearest_optimum import nearest_equal
 from lightpaint.lighting.algebra.quadratic import UNREACHED_POWER, Cap, Quadratic, scaled
 from lightpaint.progress import cancellation_check
 from lightpaint.threads import one_thread, parallel_map
+
+#: Largest KKT residual of an optimum, unless the round-off of M x − b is larger.
+TOLERANCE = 1e-12
 
 #: The multipliers of a problem without caps.
 NO_CAPS = np.zeros(0)
@@ -67,7 +71,7 @@ def minimise(
     caps: Iterable[Cap] = (),
     start: Doubles | None = None,
     method: Method = "polished",
-    tolerance: float = 1e-12,
+    tolerance: float = TOLERANCE,
     max_sweeps: int = 20_000,
 ) -> Optimum:
     """Minimise ½ xᵀM x − bᵀx over lower ≤ x ≤ upper and the caps.
@@ -82,31 +86,70 @@ def minimise(
 
     Raises ValueError if shapes do not fit or no x satisfies bounds and caps.
     """
-    q = scaled(np.asarray(M, np.float64), np.asarray(b, np.float64), lower, upper, tuple(caps))
-    begin = np.zeros(q.n) if start is None else np.asarray(start, np.float64)
-    x = q.feasible(begin / q.scale)
-    if not (q.b > 0).any():
-        # The target needs no light: where bounds allow it, all lights off is exactly optimal.
-        dark = q.feasible(np.where(np.diag(q.M) > 0, 0.0, x))
-        x = dark if q.violations(dark)[2] == 0 else x
-    by_method = _solve_by_sweeps if method == "gauss-seidel" else _solve_polished
-    start_at = x
-    with one_thread():
-        x, sweeps, steps = by_method(q, x, tolerance, max_sweeps)
-        gradient, multipliers, residual = q.violations(x)
-        if steps and (nearest := nearest_equal(q, x, start_at)) is not x:
-            violations = q.violations(nearest)
-            if violations[2] <= max(tolerance, residual):
-                x, (gradient, multipliers, residual) = nearest, violations
-    return Optimum(
-        _unscaled(q, x, lower, upper),
-        gradient / q.scale,
-        multipliers / q.cap_scale,
-        residual,
-        sweeps,
-        steps,
-        max(tolerance, q.round_off(x)),
-    )
+    family = QuadraticFamily(M, lower=lower, upper=upper, caps=caps, method=method)
+    return family.minimise(b, start, tolerance=tolerance, max_sweeps=max_sweeps)
+
+
+class QuadraticFamily:
+    """Problems that differ in b alone, for which the work on M is done once. See `minimise`."""
+
+    def __init__(
+        self,
+        M: Doubles,
+        *,
+        lower: npt.ArrayLike = 0.0,
+        upper: npt.ArrayLike = np.inf,
+        caps: Iterable[Cap] = (),
+        method: Method = "polished",
+    ) -> None:
+        M = np.asarray(M, np.float64)
+        self._q = scaled(M, np.zeros(len(M)), lower, upper, tuple(caps))
+        self._lower, self._upper, self._method = lower, upper, method
+        is_large = self._q.n > MANY_UNKNOWNS and not self._q.groups
+        self._factor = FreeFactor(self._q.M) if is_large else None
+
+    def minimise(
+        self,
+        b: Doubles,
+        start: Doubles | None = None,
+        *,
+        tolerance: float = TOLERANCE,
+        max_sweeps: int = 20_000,
+    ) -> Optimum:
+        """Minimise ½ xᵀM x − bᵀx within the limits. b, start: (n,)."""
+        q = self._q.with_right_side(np.asarray(b, np.float64))
+        begin = np.zeros(q.n) if start is None else np.asarray(start, np.float64)
+        x = q.feasible(begin / q.scale)
+        if not (q.b > 0).any():
+            # The target needs no light: where bounds allow it, all lights off is exactly optimal.
+            dark = q.feasible(np.where(np.diag(q.M) > 0, 0.0, x))
+            x = dark if q.violations(dark)[2] == 0 else x
+        start_at, factor = x, self._factor
+        with one_thread():
+            if self._method == "gauss-seidel":
+                x, sweeps, steps = _solve_by_sweeps(q, x, tolerance, max_sweeps)
+            else:
+                x, sweeps, steps = _solve_polished(q, x, tolerance, max_sweeps, factor)
+            gradient, multipliers, residual = q.violations(x)
+            if steps and (nearest := _nearest(q, x, start_at, factor)) is not x:
+                violations = q.violations(nearest)
+                if violations[2] <= max(tolerance, residual):
+                    x, (gradient, multipliers, residual) = nearest, violations
+        return Optimum(
+            _unscaled(q, x, self._lower, self._upper),
+            gradient / q.scale,
+            multipliers / q.cap_scale,
+            residual,
+            sweeps,
+            steps,
+            max(tolerance, q.round_off(x)),
+        )
+
+
+def _nearest(q: Quadratic, x: Doubles, start: Doubles, factor: FreeFactor | None) -> Doubles:
+    if factor is None:
+        return nearest_equal(q, x, start)
+    return nearest_equal(q, x, start, knows_regular=factor.knows_regular)
 
 
 def minimise_each(
@@ -117,7 +160,7 @@ def minimise_each(
     upper: Doubles,
     start: Doubles,
     method: Method = "polished",
-    tolerance: float = 1e-12,
+    tolerance: float = TOLERANCE,
     max_sweeps: int = 20_000,
 ) -> list[Optimum]:
     """Minimise as `minimise` does, for each of c problems of one size, without caps.
@@ -206,9 +249,12 @@ def _gradient_sizes(M: Doubles, b: Doubles, low: Doubles, high: Doubles) -> Doub
 
 
 def _solve_polished(
-    q: Quadratic, x: Doubles, tolerance: float, max_sweeps: int
+    q: Quadratic, x: Doubles, tolerance: float, max_sweeps: int, factor: FreeFactor | None
 ) -> tuple[Doubles, int, int]:
-    """Solve by Newton's clipped steps, or else by polishes with sweeps between them."""
+    """Solve by Newton's clipped steps, or else by polishes with sweeps between them.
+
+    factor: of many unknowns, for which steps that never raise the objective come in between.
+    """
     _, _, residual = q.violations(x)
     sweeps, steps = 0, 0
     if residual > tolerance and max_sweeps > 0 and q.groups:
@@ -229,18 +275,24 @@ def _solve_polished(
             x[None],
             np.array([q.size]),
             tolerance=tolerance,
+            newton_step=None if factor is None else factor.newton_step,
         )
         if residuals[0] <= tolerance:
             return trial[0], 0, steps
-        if q.n > MANY_UNKNOWNS and q.objective(trial[0]) < q.objective(x):
-            x = trial[0]  # many bounds hold it already
+        if factor is not None:
+            x, more_steps = projected_newton(q, x, factor, tolerance=tolerance)
+            steps += more_steps
+            _, _, residual = q.violations(x)
+            if residual <= max(tolerance, q.round_off(x)):
+                return x, 0, steps
     count = 0
     while residual > tolerance and sweeps < max_sweeps:
         gradient = q.gradient(x)
         for _ in range(min(count, max_sweeps - sweeps)):
             sweep(q, x, gradient)
             sweeps += 1
-        x, extra_steps = polish(q, x, tolerance=tolerance, max_steps=50 + 3 * min(q.n, 300))
+        most = 50 + 3 * min(q.n, 300)
+        x, extra_steps = polish(q, x, tolerance=tolerance, max_steps=most, factor=factor)
         steps += extra_steps
         _, _, residual = q.violations(x)
         if residual <= q.round_off(x) or sweeps >= 8 * SWEEPS_BETWEEN:

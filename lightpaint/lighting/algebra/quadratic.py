@@ -5,7 +5,7 @@
 The limits a_k, "caps", have positive coefficients and share no unknown.
 """
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 import numpy.typing as npt
@@ -16,6 +16,8 @@ EPSILON = float(np.finfo(np.float64).eps)
 
 #: An unknown whose M_ii is below this share of the greatest changes nothing that counts.
 UNREACHED_POWER = 1e-24
+
+NOT_FINITE = "M and b must be finite: some picture has a pixel that is not"
 
 
 @dataclass(frozen=True)
@@ -54,6 +56,18 @@ class Quadratic:
     def n(self) -> int:
         """The number of unknowns."""
         return self.b.size
+
+    def with_right_side(self, b: Doubles) -> "Quadratic":
+        """Return the same problem with another b, (n,), not scaled.
+
+        Raises ValueError if it does not fit.
+        """
+        if b.shape != (self.n,):
+            raise ValueError(f"M is {self.M.shape} and b {b.shape}: expected ({self.n},)")
+        if not np.isfinite(b).all():
+            raise ValueError(NOT_FINITE)
+        b = np.where(self.M.diagonal() > 0, b * self.scale, 0.0)
+        return replace(self, b=b, size=_gradient_size(self.M, b, self.lower, self.upper))
 
     def objective(self, x: Doubles) -> float:
         """Return ½ xᵀM x − bᵀx."""
@@ -171,7 +185,7 @@ def scaled(
     if M.shape != (n, n):
         raise ValueError(f"M is {M.shape} and b {b.shape}: expected ({n}, {n})")
     if not (np.isfinite(M).all() and np.isfinite(b).all()):
-        raise ValueError("M and b must be finite: some picture has a pixel that is not")
+        raise ValueError(NOT_FINITE)
     low = np.broadcast_to(np.asarray(lower, np.float64), n)
     high = np.broadcast_to(np.asarray(upper, np.float64), n)
     if not (low <= high).all():
@@ -186,12 +200,17 @@ def scaled(
     b = b * inward
     low, high = low / scale, high / scale
     A, cap_lower, cap_upper, cap_scale, groups = _scaled_caps(caps, scale, low, high)
-    nearest = np.clip(0.0, low, high)
-    pull = M @ nearest if nearest.any() else nearest
-    size = max(float(np.abs(b).max(initial=0)), float(np.abs(pull).max(initial=0))) or 1.0
+    size = _gradient_size(M, b, low, high)
     return Quadratic(
         M, b, low, high, scale, A, cap_lower, cap_upper, cap_scale, tuple(groups), size
     )
+
+
+def _gradient_size(M: Doubles, b: Doubles, low: Doubles, high: Doubles) -> float:
+    """Return the largest entry of b and of M x at the bounds nearest to 0."""
+    nearest = np.clip(0.0, low, high)
+    pull = M @ nearest if nearest.any() else nearest
+    return max(float(np.abs(b).max(initial=0)), float(np.abs(pull).max(initial=0))) or 1.0
 
 
 def _scaled_caps(

@@ -78,6 +78,17 @@ class LitPixels:
         values, slopes = zip(*self.pixels.map_strips(strip_terms), strict=True)
         return sum(values), np.asarray(sum(slopes))
 
+    def products(self, picture: Doubles) -> Doubles:
+        """Return the inner products of each light with a picture (3, p), (n, 3)."""
+
+        def strip_products(strip: slice, _: PixelLoss) -> Doubles:
+            rows = self.planes.pixels(strip)
+            return np.stack(
+                [rows[..., c].astype(np.float64) @ picture[c, strip] for c in range(3)], axis=1
+            )
+
+        return np.asarray(sum(self.pixels.map_strips(strip_products)))
+
     def slope(self, image: Doubles, weight: Doubles, x: Doubles, ahead: Doubles) -> float:
         """Return half of the slope at which Σ weight (image − x)² falls at x on the way to
         `ahead`."""

@@ -26,6 +26,11 @@ MAX_ROUNDS = 100
 #: until they are.
 MIN_STEP, MIN_FALL = 1e-6, 1e-11
 
+#: Number of lights from which the sums of a round take so long that rounds keep the matrix of the
+#: last one where its step, as above, was at most this; and the step at which rounds that draw
+#: clipped values back end then, since others follow.
+MANY_LIGHTS, KEPT_STEP, CLIPPED_STEP = 200, 0.1, 1e-3
+
 #: Least decrease of a step, relative to that predicted by the gradient, and the shortest step.
 KEPT_PROMISE, SHORTEST_STEP = 1e-4, 2.0**-20
 
@@ -129,11 +134,12 @@ def descend(
     *,
     pull: NormalEquations | None = None,
     from_clipping: bool = True,
+    until: float = MIN_STEP,
     known: tuple[Squares, NormalEquations] | None = None,
 ) -> Descent:
     """Minimise `loss` over the weights that `solve` may return, from `start`, (n, 3).
 
-    pull: of the weights, added to the loss; `solve` adds it by itself. from_clipping: see
+    pull: of the weights, added to the loss; `solve` adds it by itself. from_clipping, until: see
     `run_rounds`. known: squares whose problem is known.
     """
     lit = LitPixels.of(basis, loss)
@@ -143,6 +149,7 @@ def descend(
         start,
         solve,
         from_clipping=from_clipping,
+        until=until,
         known=None if known is None else lit.summed(*known),
     )
     x, image, weight = result.x, result.image, result.weight
@@ -169,24 +176,35 @@ def run_rounds(
 
     from_clipping: whether rounds first draw clipped values back, before they use the loss's own
     slope. until: the change of a light's picture at which they end. known: squares of these pixels
-    whose problem is known.
+    whose problem is known. Unless `until` is small, the equations of the result may have the matrix
+    of an earlier round.
     """
     pixels = lit.pixels
     from_clipping = from_clipping and pixels.has_clipping
     w, x = start, lit.predicted(start)
     value = total_loss(pixels, terms, w, x)
-    count = 0
+    count, matrix, keeps_matrix = 0, None, lit.planes.count >= MANY_LIGHTS
     while True:
-        round_ = _Round.of(lit, terms, w, x, solve, from_clipping=from_clipping, known=known)
+        round_ = _Round.of(
+            lit, terms, w, x, solve, from_clipping=from_clipping, known=known, matrix=matrix
+        )
         if pixels.has_pieces:  # other squares change all pixels in each round
             known = SummedSquares(round_.image, round_.weight, round_.equations)
         count += 1
-        done = round_.has_converged(pixels, x, value, until)
+        is_first_part = keeps_matrix and from_clipping
+        done = round_.has_converged(pixels, x, value, max(until, CLIPPED_STEP * is_first_part))
+        if matrix is not None and done and not is_first_part and until <= MIN_STEP:
+            matrix = None  # the last round is of the squares themselves
+            continue
         part, reached = 1.0, total_loss(pixels, terms, round_.best, round_.ahead)
         is_worse = reached > value * (1 + ROUND_OFF)
         if is_worse or from_clipping or not done:
             steps = (w, round_.best), (x, round_.ahead)
             part, reached = _line_search(pixels, terms, *steps, value, reached, round_.fall)
+        if matrix is not None and part == 0:
+            matrix = None
+            continue
+        is_near = part == 1 and round_.step <= KEPT_STEP and not (from_clipping and done)
         if from_clipping and (done or part == 0):
             from_clipping = False
             if part == 0:
@@ -200,6 +218,7 @@ def run_rounds(
             return RoundsResult(weights, w, x, from_clipping, *squares, count, round_.step, small)
         w, x = interpolate(w, round_.best, part), interpolate(x, round_.ahead, part)
         value = reached
+        matrix = round_.equations if keeps_matrix and is_near and not pixels.has_pieces else None
         del round_  # else its pictures would coexist with the next ones
 
 
@@ -230,10 +249,19 @@ class _Round:
         *,
         from_clipping: bool,
         known: SummedSquares | None,
+        matrix: NormalEquations | None = None,
     ) -> "_Round":
-        """Make the squares, and solve for their optimum."""
+        """Make the squares, and solve for their optimum.
+
+        matrix: equations whose M stands for that of the squares: a step along the same gradient.
+        """
         image, weight = lit.pixels.squares(x, from_clipping=from_clipping)
-        equations = lit.equations(image, weight, known)
+        if matrix is None:
+            equations = lit.equations(image, weight, known)
+        else:
+            slope = lit.products(weight * (image - x))
+            b = np.einsum("cij,jc->ci", matrix.M, w) + slope.T
+            equations = replace(matrix, b=b)
         best = solve(terms.tilted(equations), w)
         ahead = lit.predicted(best)
         step = relative_change(equations, w, best)

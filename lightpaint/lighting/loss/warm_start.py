@@ -52,13 +52,11 @@ def find_near_optimum(
     *,
     pull: NormalEquations | None = None,
 ) -> Doubles | None:
-    """Return weights (n, 3) near the end of rounds over all pixels; None if that is not quicker.
+    """Return weights (n, 3) near the end of rounds over all pixels; None if a sample leads nowhere.
 
     equations: of the pixels with the importance of `loss`. For the others see `descend`.
     """
-    size = max(MIN_SAMPLE, PIXELS_PER_LIGHT * len(start))
-    if loss.pixels.has_pieces or np.count_nonzero(loss.importance) * MAX_SAMPLE_SHARE < size:
-        return None
+    size = _sample_size(len(start))
     lit = LitPixels.of(basis, loss)
     part = sample_pixels(lit, np.einsum("cii->ic", equations.M), size)
     terms = WeightTerms(pull)
@@ -82,6 +80,16 @@ def find_near_optimum(
             return w
         last_step, tolerance = step, STEP_RATIO * min(step, FIRST_STEP)
     return w
+
+
+def is_sampled(loss: Loss, lights: int) -> bool:
+    """Return whether a sample of the pixels is quicker than all of them."""
+    counted = np.count_nonzero(loss.importance)
+    return not loss.pixels.has_pieces and counted * MAX_SAMPLE_SHARE >= _sample_size(lights)
+
+
+def _sample_size(lights: int) -> int:
+    return max(MIN_SAMPLE, PIXELS_PER_LIGHT * lights)
 
 
 def sample_pixels(lit: LitPixels, power: Doubles, size: int) -> LitPixels:

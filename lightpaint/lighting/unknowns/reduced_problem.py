@@ -11,8 +11,15 @@ from typing import Any
 import numpy as np
 
 from lightpaint.arrays import Bools, Doubles, Indices
+from lightpaint.lighting.algebra.clipped_newton import MANY_UNKNOWNS
 from lightpaint.lighting.algebra.method import Method
-from lightpaint.lighting.algebra.optimum import Optimum, minimise, minimise_each
+from lightpaint.lighting.algebra.optimum import (
+    TOLERANCE,
+    Optimum,
+    QuadraticFamily,
+    minimise,
+    minimise_each,
+)
 from lightpaint.lighting.algebra.quadratic import Cap, clip_to_sums
 from lightpaint.lighting.normal_equations import NormalEquations
 from lightpaint.lighting.unknowns.knobs import Knob
@@ -201,30 +208,110 @@ def solve_reduced(
     constraints allow. x: the unknowns to begin with, where they are known; else those nearest to
     `start`. method, tolerance, max_sweeps: see `minimise`.
     """
-    lit = equations.reached
-    reached: Bools = np.ones(lit.shape, dtype=bool) if lit.all() else reduction.determined(lit)
-    x = nearest_unknowns(reduction, start, np.any(reached, axis=1)) if x is None else x.copy()
-    options: dict[str, Any] = {"method": method, "tolerance": tolerance, "max_sweeps": max_sweeps}
-    sides = _move_fixed_to_right(equations, reduction, lit, start)
-    optima = _solve_blocks(sides, equations.coupling, reduction, x, options)
-    multipliers, cap_multipliers = np.zeros(x.size), np.zeros(len(reduction.caps))
-    residuals, tolerances, sweeps = np.zeros(3), np.full(3, tolerance), [0, 0, 0]
-    for block, optimum in zip(reduction.blocks, optima, strict=True):
-        x[block.unknowns], multipliers[block.unknowns] = optimum.x, optimum.multipliers
-        cap_multipliers[block.cap_indices] = optimum.cap_multipliers
-        for c in block.channels:
-            residuals[c], sweeps[c] = optimum.kkt_residual, optimum.sweeps
-            tolerances[c] = optimum.tolerance
-    return ReducedOptimum(
-        x,
-        multipliers,
-        cap_multipliers,
-        reduction.weights(x),
-        residuals,
-        tolerances,
-        (sweeps[0], sweeps[1], sweeps[2]),
-        reached,
-    )
+    options: dict[str, Any] = {"tolerance": tolerance, "max_sweeps": max_sweeps}
+    return ReducedSolver(reduction, method=method).solve(equations, start, x=x, **options)
+
+
+class ReducedSolver:
+    """Solves problems with one pull under one reduction, as `solve_reduced` does.
+
+    The work on a matrix serves the next problem, if that has the same one.
+    """
+
+    def __init__(
+        self,
+        reduction: Reduction,
+        *,
+        pull: NormalEquations | None = None,
+        method: Method = "polished",
+    ) -> None:
+        self._reduction, self._pull, self._method = reduction, pull, method
+        self._last: NormalEquations | None = None
+        self._pulled: NormalEquations | None = None
+        self._families: list[QuadraticFamily] = []
+
+    def solve(
+        self,
+        equations: NormalEquations,
+        start: Doubles,
+        *,
+        x: Doubles | None = None,
+        **options: Any,
+    ) -> ReducedOptimum:
+        """Minimise the objective with the pull; for the arguments see `solve_reduced`."""
+        reduction, equations = self._reduction, self._with_pull(equations)
+        lit = equations.reached
+        reached: Bools = np.ones(lit.shape, dtype=bool) if lit.all() else reduction.determined(lit)
+        is_reached = np.any(reached, axis=1)
+        x = nearest_unknowns(reduction, start, is_reached) if x is None else x.copy()
+        optima = self._solve_blocks(equations, lit, start, x, options)
+        multipliers, cap_multipliers = np.zeros(x.size), np.zeros(len(reduction.caps))
+        tolerance = options.get("tolerance", TOLERANCE)
+        residuals, tolerances, sweeps = np.zeros(3), np.full(3, tolerance), [0, 0, 0]
+        for block, optimum in zip(reduction.blocks, optima, strict=True):
+            x[block.unknowns], multipliers[block.unknowns] = optimum.x, optimum.multipliers
+            cap_multipliers[block.cap_indices] = optimum.cap_multipliers
+            for c in block.channels:
+                residuals[c], sweeps[c] = optimum.kkt_residual, optimum.sweeps
+                tolerances[c] = optimum.tolerance
+        return ReducedOptimum(
+            x,
+            multipliers,
+            cap_multipliers,
+            reduction.weights(x),
+            residuals,
+            tolerances,
+            (sweeps[0], sweeps[1], sweeps[2]),
+            reached,
+        )
+
+    def _with_pull(self, equations: NormalEquations) -> NormalEquations:
+        """Return the equations with the pull; forget the work on another matrix."""
+        last, pull, pulled = self._last, self._pull, self._pulled
+        is_same = last is not None and last.M is equations.M and last.coupling is equations.coupling
+        self._last = equations
+        if pulled is None or not is_same:
+            self._families = []
+            self._pulled = equations if pull is None else equations + pull
+            return self._pulled
+        if pull is None:
+            return equations
+        norm2 = equations.target_norm2 + pull.target_norm2
+        return replace(pulled, b=equations.b + pull.b, target_norm2=norm2)
+
+    def _solve_blocks(
+        self,
+        equations: NormalEquations,
+        lit: Bools,
+        start: Doubles,
+        x: Doubles,
+        options: dict[str, Any],
+    ) -> list[Optimum]:
+        """Solve each block from its part of x; three alike blocks of few lights in the same
+        calls."""
+        reduction, coupling = self._reduction, equations.coupling
+        M, b = _move_fixed_to_right(equations, reduction, lit, start)
+        is_large = (
+            max((block.unknowns.size for block in reduction.blocks), default=0) > MANY_UNKNOWNS
+        )
+        alike = reduction.alike_blocks
+        if alike is not None and not is_large:
+            if (lights := alike.lights) is not None:
+                M, b = M[:, lights[:, None], lights], b[:, lights]
+            begin, bounds = x[alike.unknowns], {"lower": alike.lower, "upper": alike.upper}
+            return minimise_each(M, b, start=begin, method=self._method, **bounds, **options)
+        if not self._families:
+            self._families = [
+                QuadraticFamily(p.M, lower=p.lower, upper=p.upper, caps=p.caps, method=self._method)
+                for p in _block_problems((M, b), coupling, reduction)
+            ]
+
+        def solve(job: tuple[Block, QuadraticFamily]) -> Optimum:
+            block, family = job
+            return family.minimise(_block_right_side(b, block), x[block.unknowns], **options)
+
+        jobs = list(zip(reduction.blocks, self._families, strict=True))
+        return parallel_map(solve, jobs) if len(jobs) > 1 else [solve(job) for job in jobs]
 
 
 def reduced_problems(equations: NormalEquations, reduction: Reduction) -> list[ReducedProblem]:
@@ -261,7 +348,7 @@ def _block_problems(
     problems = []
     for block in reduction.blocks:
         lower, upper = reduction.lower[block.unknowns], reduction.upper[block.unknowns]
-        M, b = _block_equations(*sides, block)
+        M, b = _block_matrix(sides[0], block), _block_right_side(sides[1], block)
         if coupling is not None:
             p = block.pairs
             np.add.at(
@@ -275,50 +362,35 @@ def _block_problems(
     return problems
 
 
-def _block_equations(M: Doubles, b: Doubles, block: Block) -> tuple[Doubles, Doubles]:
-    """Return M' and b' in the unknowns of a block."""
+def _block_matrix(M: Doubles, block: Block) -> Doubles:
+    """Return M' in the unknowns of a block."""
     if block.is_plain:
         [c], lights = block.channels, block.entries[0].lights
-        if block.is_in_order and lights.size == b.shape[1]:
-            return M[c], b[c]
-        return M[c][lights[:, None], lights], b[c, lights]
-    made_M, made_b = (
-        np.zeros((block.unknowns.size, block.unknowns.size)),
-        np.zeros(block.unknowns.size),
-    )
+        if block.is_in_order and lights.size == M.shape[1]:
+            return M[c]
+        return M[c][lights[:, None], lights]
+    made = np.zeros((block.unknowns.size, block.unknowns.size))
     for c, e in zip(block.channels, block.entries, strict=True):
         part = M[c][e.lights[:, None], e.lights] * e.values[:, None] * e.values
-        right = b[c, e.lights] * e.values
         if e.lights.size > e.columns.size:
             # Most columns are of one light: the sum over those of several is a short one.
             part = np.add.reduceat(np.add.reduceat(part, e.first, 0), e.first, 1)
+        made[e.columns[:, None], e.columns] += part
+    return made
+
+
+def _block_right_side(b: Doubles, block: Block) -> Doubles:
+    """Return b' in the unknowns of a block."""
+    if block.is_plain:
+        [c], lights = block.channels, block.entries[0].lights
+        return b[c] if block.is_in_order and lights.size == b.shape[1] else b[c, lights]
+    made = np.zeros(block.unknowns.size)
+    for c, e in zip(block.channels, block.entries, strict=True):
+        right = b[c, e.lights] * e.values
+        if e.lights.size > e.columns.size:
             right = np.add.reduceat(right, e.first)
-        made_M[e.columns[:, None], e.columns] += part
-        made_b[e.columns] += right
-    return made_M, made_b
-
-
-def _solve_blocks(
-    sides: tuple[Doubles, Doubles],
-    coupling: Doubles | None,
-    reduction: Reduction,
-    x: Doubles,
-    options: dict[str, Any],
-) -> list[Optimum]:
-    """Solve each block from its part of x; three alike blocks in the same calls."""
-    if (alike := reduction.alike_blocks) is not None:
-        (M, b), lights = sides, alike.lights
-        if lights is not None:
-            M, b = M[:, lights[:, None], lights], b[:, lights]
-        begin = x[alike.unknowns]
-        return minimise_each(M, b, lower=alike.lower, upper=alike.upper, start=begin, **options)
-
-    def solve(p: ReducedProblem) -> Optimum:
-        begin = x[p.unknowns]
-        return minimise(p.M, p.b, lower=p.lower, upper=p.upper, caps=p.caps, start=begin, **options)
-
-    parts = _block_problems(sides, coupling, reduction)
-    return parallel_map(solve, parts) if len(parts) > 1 else [solve(p) for p in parts]
+        made[e.columns] += right
+    return made
 
 
 def _without_dark_channels(
