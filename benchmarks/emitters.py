@@ -1,0 +1,200 @@
+"""Lamps of emitters against answers of three numbers a lamp, and the way through DMX.
+
+    pip install '.[stage]'
+    python benchmarks/emitters.py [--spp 64] [--drives 504]
+
+The shipped show, four lamps with four emitters and two with six, lights its room with known drives.
+The picture gets 2 % of noise, and is solved
+
+    three numbers    as lamps without emitters, which have any colour in Rec.709
+    levels of these  when the red, green and blue emitters get the levels of fixtures.csv, at the
+                     best common scale
+    drives           as lamps of emitters
+    received         by the drives that a receiver decodes after sACN on this machine
+    rendered         by Mitsuba with the received drives, in blocks of 5 x 5 pixels, whose noise is
+                     that of the basis and of this render; and the means of its channels, relative
+
+Errors are relative to the picture without noise (RMS). Then lamps of six emitters with so many
+drives are solved, beside the same lights with three channels each.
+"""
+
+from __future__ import annotations
+
+import argparse
+import subprocess
+import sys
+import tempfile
+import time
+from collections.abc import Callable
+from dataclasses import replace
+from pathlib import Path
+from subprocess import DEVNULL
+from typing import Any
+
+import numpy as np
+
+ROOT = Path(__file__).resolve().parent.parent
+sys.path.insert(0, str(ROOT))
+
+import lightpaint as lp  # noqa: E402
+from lightpaint.basis.basis import Basis, Origin  # noqa: E402
+from lightpaint.basis.lights import BasisLight  # noqa: E402
+from lightpaint.dmx.levels import decode_levels  # noqa: E402
+from lightpaint.dmx.mvr import read_rig  # noqa: E402
+from lightpaint.dmx.network.console_link import ConsoleLink  # noqa: E402
+from lightpaint.dmx.network.console_receiver import ConsoleReceiver  # noqa: E402
+from lightpaint.dmx.network.console_target import PROTOCOLS, network_universes  # noqa: E402
+from lightpaint.lighting.answer.lighting import Lighting  # noqa: E402
+from lightpaint.lighting.unknowns.reduction import reduce_to  # noqa: E402
+from lightpaint.relit.export.fixtures import fixtures_of  # noqa: E402
+from lightpaint.scene.quality_presets import on_film  # noqa: E402
+from lightpaint.scene.scene_render import Stream, render  # noqa: E402
+
+SHOW, ROOM = ROOT / "scenes" / "rig" / "show.mvr", ROOT / "scenes" / "rig" / "room.xml"
+RESOLUTION, BLOCK = "1/2", 5
+NOISE, SEED = 0.02, 7
+
+#: Emitters that today's levels for red, green and blue drive.
+RGB = ("red", "green", "blue")
+
+
+def error(picture: Any, truth: Any) -> float:
+    """Return the RMS difference of two pictures, relative to the second."""
+    return float(np.sqrt(np.square(picture - truth).sum() / np.square(truth).sum()))
+
+
+def blocks(image: Any) -> Any:
+    """Return the means of blocks."""
+    h, w, _ = image.shape
+    return image.reshape(h // BLOCK, BLOCK, w // BLOCK, BLOCK, 3).mean((1, 3))
+
+
+def show_scene(folder: Path) -> Path:
+    """Return the scene that `lightpaint rig` makes of the show."""
+    scene = folder / "rig.xml"
+    words = ["rig", str(SHOW), "--room", str(ROOM), "-o", str(scene), "-q"]
+    subprocess.run([sys.executable, "-m", "lightpaint", *words], check=True, stdout=DEVNULL)
+    return scene
+
+
+def levels_today(lighting: Lighting, lamps: Any, names: Any) -> Any:
+    """Return the emissions (n, 3) that the levels of fixtures.csv give on these emitters."""
+    emissions = np.zeros((len(names), 3))
+    for k, fixture in enumerate(fixtures_of(lighting)):
+        dmx = fixture.dmx
+        levels = dict(zip(RGB, (dmx.red, dmx.green, dmx.blue), strict=True))
+        drives = [levels.get(name, 0) / 255 for name in lamps[k].names]
+        emissions[k] = dmx.dimmer / 255 * lamps[k].mix(np.array(drives))
+    return emissions
+
+
+def received_drives(rig: Any, drives: Any) -> Any:
+    """Send drives by sACN to this machine, and return those that arrive."""
+    sacn = PROTOCOLS["sacn"]
+    numbers = network_universes(rig, sacn, {})
+    with (
+        ConsoleReceiver.open(sacn, address="127.0.0.1") as receiver,
+        ConsoleLink.open("sacn://127.0.0.1", rig) as link,
+    ):
+        link.show(drives)
+        end = time.monotonic() + 3
+        while time.monotonic() < end and len(receiver.levels) < len(numbers):
+            receiver.receive(0.1)
+        levels = {own: receiver.levels[number] for own, number in numbers.items()}
+    return decode_levels(rig, levels)
+
+
+def compare(spp: int) -> None:
+    """Print the errors of all ways."""
+    with tempfile.TemporaryDirectory() as folder:
+        path = show_scene(Path(folder))
+        scene = on_film(lp.load_scene(path), None, RESOLUTION)
+        basis = lp.render_basis(scene, spp=spp)
+        constraints = lp.read_constraints(path.with_suffix(".lights.toml"))
+        lamps, names = reduce_to(constraints, basis.lights).lamps, basis.names
+        rng = np.random.default_rng(SEED)
+        steps = np.array([0, 0, 32, 90, 180, 255]) / 255
+        true = np.array([lamps[k].mix(rng.choice(steps, len(lamps[k].most))) for k in lamps])
+        truth = basis.mix(true)
+        noisy = truth * (1 + NOISE * rng.standard_normal(truth.shape[:2]))[..., None]
+        target = lp.Target(
+            "known", noisy.astype(np.float32), np.ones(truth.shape[:2], np.float32), everything=True
+        )
+        three = lp.solve(basis.with_requests(type(basis.requests)()), target, literal=True)
+        found = lp.solve(basis, target, constraints=constraints, literal=True)
+        rows = {"three numbers": basis.mix(three.weights)}
+        levels = basis.mix(levels_today(three.lighting, lamps, names))
+        rows["levels of these"] = levels * float((levels * truth).sum() / np.square(levels).sum())
+        rows["drives"] = basis.mix(found.weights)
+        rig = read_rig(SHOW)
+        arrived = received_drives(rig, {x.name: x.drives for x in found.lighting.lights})
+        emissions = np.array(
+            [lamps[k].mix(np.array([*arrived[name].values()])) for k, name in enumerate(names)]
+        )
+        rows["received"] = basis.mix(emissions)
+        for name, picture in rows.items():
+            print(f"{name:16} {100 * error(picture, truth):6.2f} %")
+        lighting = Lighting.of_weights(basis, emissions, lamps=lamps)
+        relit = lp.relight(scene, lighting, Path(folder) / "relit.xml")
+        relit = on_film(relit, None, RESOLUTION)
+        rendered = render(relit, spp=4 * spp, seed=SEED, stream=Stream.VERIFICATION).image
+        means = rendered.mean((0, 1)) / truth.mean((0, 1))
+        print(
+            f"{'rendered':16} {100 * error(blocks(rendered), blocks(truth)):6.2f} %, means of "
+            f"channels {', '.join(f'{x:.4f}' for x in means)}"
+        )
+
+
+def seconds(call: Callable[[], Any]) -> float:
+    """Return the least processor seconds of five calls."""
+    times = []
+    for _ in range(5):
+        start = time.process_time()
+        call()
+        times.append(time.process_time() - start)
+    return min(times)
+
+
+def speed(drives: int) -> None:
+    """Print the time of a solve for so many drives, relative to three channels a light."""
+    lights, size = drives // 6, (45, 80)
+    rng = np.random.default_rng(SEED)
+    images = (rng.random((lights, *size, 3)) ** 8).astype(np.float32)
+    basis = Basis(
+        tuple(BasisLight(f"l{k}", "spot", "intensity", "W/sr", (1, 1, 1)) for k in range(lights)),
+        images,
+        np.zeros_like(images),
+        np.zeros(size, bool),
+        Origin("made", "made", "camera", 0, "separate", (0, 0), (0, 0)),
+    )
+    xy = {
+        **{"red": [0.7, 0.299], "green": [0.17, 0.7], "blue": [0.135, 0.055]},
+        **{"white": [0.33, 0.34], "amber": [0.57, 0.42], "lime": [0.41, 0.55]},
+    }
+    emitters = [{"name": name, "xy": x, "Y": 1.0} for name, x in xy.items()]
+    lamps = lp.Constraints.of({"l*": {"emitters": emitters}})
+    image = (basis.mix(rng.random((lights, 3)) * 3) * rng.uniform(0.8, 1.2, (*size, 1))).astype(
+        "f4"
+    )
+    target = lp.Target("made", image, np.ones(size, np.float32), everything=True)
+    three = seconds(lambda: lp.solve(basis, target, literal=True))
+    many = seconds(lambda: lp.solve(basis, target, constraints=lamps, literal=True))
+    print(
+        f"{6 * lights} drives of {lights} lamps: {many:.3f} s, {many / three:.1f} times that of "
+        f"{lights} lights with three channels"
+    )
+    solution = lp.solve(basis, target, constraints=lamps, literal=True)
+    fresh = [replace(x) for x in solution.lighting.lights]
+    start = time.process_time()
+    for light in fresh:
+        _ = light.drives
+    print(f"preferred mixes of all: {1000 * (time.process_time() - start):.0f} ms")
+
+
+if __name__ == "__main__":
+    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    parser.add_argument("--spp", type=int, default=64)
+    parser.add_argument("--drives", type=int, default=504)
+    asked = parser.parse_args()
+    speed(asked.drives)
+    compare(asked.spp)
