@@ -110,8 +110,8 @@ def test_models_of_other_formats_are_named(tmp_path: Path) -> None:
     found = room_of_show(show, models)
     assert found.files == {}
     assert found.remarks == (
-        "2 models in .3ds left out: give a scene with room=..., or export .glb",
-        "1 model in .obj left out: give a scene with room=..., or export .glb",
+        "2 models in .3ds left out: give a scene as the room, or export .glb",
+        "1 model in .obj left out: give a scene as the room, or export .glb",
     )
 
 

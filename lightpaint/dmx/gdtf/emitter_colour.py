@@ -68,7 +68,7 @@ def _equal_energy() -> Doubles:
 
 @dataclass(frozen=True)
 class EmitterColour:
-    """What a file says of an emitter.
+    """The colour and brightness of an emitter, as far as a file has them.
 
     xy: its chromaticity. share: its luminance relative to others of the file. candela: what was
     measured at full, if it was. curve: pairs of a share of full, and of the light that was measured
