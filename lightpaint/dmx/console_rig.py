@@ -19,7 +19,7 @@ UNIVERSE_SIZE = 512
 class DmxChannel:
     """A channel of a fixture's mode.
 
-    attribute, geometry: what it controls, as GDTF names it (`ColorAdd_R`, `Beam`).
+    attribute, geometry: what it controls, as GDTF names it (ColorAdd_R, Beam).
     offsets: the places of its bytes from the fixture's address, the coarse one first, from 1.
     dmx_break: the address that they count from, from 1.
     default: its level at rest, of all its bytes.
@@ -102,8 +102,8 @@ class RigLight:
 
     @property
     def is_controlled(self) -> bool:
-        """Whether channels set it: not those of a fixture without an address, or of which only a
-        placeholder is known.
+        """True if channels set it: not for a fixture without an address, or of which there is only
+        a placeholder.
         """
         channels = [x.channels for x in self.emitters] + [x.channels for x in self.filters]
         return any((*channels, self.dimmers, self.chromaticity))

@@ -1,4 +1,4 @@
-"""What stands around the lights of a show: its models as meshes, or a scene of the user's own."""
+"""The room around the lights of a show: its models as meshes, or a scene of the user's own."""
 
 import io
 import os
@@ -18,7 +18,6 @@ from lightpaint.errors import SceneError
 from lightpaint.file_reading import read_bytes
 from lightpaint.files import first_line
 from lightpaint.scene.checks.tokens import markup
-from lightpaint.sentences import Hint, Sentence
 
 #: Folder of the meshes, beside the scene.
 MESHES = "meshes"
@@ -104,9 +103,7 @@ def _left_out(files: Iterable[str]) -> list[str]:
     remarks: list[str] = []
     for ending, count in sorted(counts.items()):
         models = f"{count} {'models' if count > 1 else 'model'} in {ending}"
-        remarks.append(
-            Sentence(models, " left out: give a scene with ", Hint("room"), ", or export .glb")
-        )
+        remarks.append(f"{models} left out: give a scene as the room, or export .glb")
     return remarks
 
 

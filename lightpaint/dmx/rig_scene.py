@@ -38,7 +38,7 @@ MAX_BITS = 24
 
 @dataclass(frozen=True)
 class Room:
-    """What stands around the lights.
+    """The surroundings of the lights.
 
     include: file of a scene, from the folder of the rig's; "" for none. has_sensor, has_integrator:
     whether that scene has them. meshes: files beside the rig's scene. points: (k, 3), of the

@@ -37,6 +37,11 @@ def test_values_are_repeated_or_shifted_as_the_standard_says(
     assert dmx_value(text, byte_count) == level
 
 
+def test_older_files_have_the_default_in_the_channel() -> None:
+    old = channel("CTO", "6", default="1/1").replace("Offset=", 'Default="17/1" Offset=')
+    assert read_mode(gdtf(RGBW_CHANNELS + old)).channels[5].default == 17
+
+
 def test_flux_is_shared_by_luminance_and_the_spot_radiates_it() -> None:
     """5000 lm in relative luminances 20, 40, 8, 52."""
     mode = read_mode(gdtf())

@@ -1,6 +1,5 @@
 """Shows: places, targets, names, addresses, and one line for what cannot be used."""
 
-import zipfile
 from pathlib import Path
 
 import numpy as np
@@ -12,6 +11,7 @@ from rig_files import (
     fixture,
     gdtf,
     layered,
+    unzipped,
     write_mvr,
     zipped,
 )
@@ -234,8 +234,7 @@ def test_models_of_symbols_are_in_their_places_and_repetition_has_an_end(
 
 
 def _replace_in(path: Path, old: str, new: str) -> None:
-    with zipfile.ZipFile(path) as archive:
-        files = {name: archive.read(name) for name in archive.namelist()}
+    files = unzipped(path.read_bytes())
     name = "GeneralSceneDescription.xml"
     files[name] = files[name].decode().replace(old, new).encode()
     path.write_bytes(zipped(files))

@@ -4,12 +4,11 @@ import json
 import math
 import struct
 import tomllib
-import zipfile
 from pathlib import Path
 
 import numpy as np
 import pytest
-from rig_files import EXAMPLE, UPRIGHT, fixture, layered, write_mvr, zipped
+from rig_files import EXAMPLE, UPRIGHT, fixture, layered, unzipped, write_mvr, zipped
 
 from lightpaint.colour.photometry import spot_flux
 from lightpaint.dmx import rig_room
@@ -110,8 +109,8 @@ def test_models_of_other_formats_are_named(tmp_path: Path) -> None:
     found = room_of_show(show, models)
     assert found.files == {}
     assert found.remarks == (
-        "2 models in .3ds left out: give a scene with room=..., or export .glb",
-        "1 model in .obj left out: give a scene with room=..., or export .glb",
+        "2 models in .3ds left out: give a scene as the room, or export .glb",
+        "1 model in .obj left out: give a scene as the room, or export .glb",
     )
 
 
@@ -154,8 +153,7 @@ def test_models_in_gltf_become_meshes_in_their_places_with_z_up(tmp_path: Path) 
         '<Geometry3D fileName="box.glb"/></Geometries></SceneObject>'
     )
     path = write_mvr(tmp_path / "a.mvr", layered(fixture(), box))
-    with zipfile.ZipFile(path) as archive:
-        files = {name: archive.read(name) for name in archive.namelist()}
+    files = unzipped(path.read_bytes())
     path.write_bytes(zipped({**files, "box.glb": _glb()}))
     found = room_of_show(path, read_show(path).models)
     assert found.remarks == ()

@@ -31,7 +31,6 @@ _OTHER_OPTIONS = {
     "placement": "--places",
     "port": "--port",
     "rig": "--rig",
-    "room": "--room",
     "scene": "--scene",
     "sensor": "-s",
     "split": "--split",

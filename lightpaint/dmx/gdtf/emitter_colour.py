@@ -68,7 +68,7 @@ def _equal_energy() -> Doubles:
 
 @dataclass(frozen=True)
 class EmitterColour:
-    """What a file says of an emitter.
+    """The colour and brightness of an emitter, as far as a file has them.
 
     xy: its chromaticity. share: its luminance relative to others of the file. candela: what was
     measured at full, if it was. curve: pairs of a share of full, and of the light that was measured
@@ -131,11 +131,18 @@ def _bounded(xy: Chromaticity) -> Chromaticity:
 def _spectral(measurements: Sequence[Any]) -> Chromaticity | None:
     """Return the chromaticity of the spectrum that was measured at the highest level."""
     for measurement in sorted(measurements, key=lambda x: -float(x.physical)):
-        points = sorted((x.wave_length, x.energy) for x in measurement.measurement_points)
+        points = _spectrum(measurement)
         if len(points) > 1:
-            waves, power = np.array(points, float).T
-            return xy_of_spectrum(waves, np.maximum(power, 0))
+            return xy_of_spectrum(*points.T)
     return None
+
+
+def _spectrum(measurement: Any) -> Doubles:
+    """Return wavelengths in nanometres, rising, and powers, (k, 2)."""
+    points = sorted((x.wave_length, max(x.energy, 0.0)) for x in measurement.measurement_points)
+    if not np.isfinite(points).all():
+        raise ValueError("a spectrum that is not finite")
+    return np.array(points, float)
 
 
 def _measured_light(measurements: Sequence[Any]) -> tuple[float | None, Curve]:
@@ -191,10 +198,9 @@ def _transmissions(element: Element) -> list[tuple[float, Doubles]]:
     """Return how far in a filter is, 0 to 1, and its transmission there in linear Rec.709."""
     points = []
     for measurement in library("pygdtf").Filter(xml_node=element).measurements:
-        spectrum = sorted((x.wave_length, x.energy) for x in measurement.measurement_points)
+        spectrum = _spectrum(measurement)
         if len(spectrum) > 1 and measurement.physical > 0 and measurement.transmission > 0:
-            waves, passed = np.array(spectrum, float).T
-            xy = xy_of_spectrum(waves, np.maximum(passed, 0))
+            xy = xy_of_spectrum(*spectrum.T)
             if xy is not None:
                 percent = float(measurement.transmission)
                 level = percent / 100 if percent > 1 else percent

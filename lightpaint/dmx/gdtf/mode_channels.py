@@ -194,5 +194,7 @@ def _cubics(points: Sequence[object], inputs: Doubles) -> Doubles:
     starts = np.array([_start(point) for point in points])
     which = np.clip(np.searchsorted(starts, inputs, side="right") - 1, 0, None)
     factors = np.array([[getattr(x, f"cfc{k}") for k in range(4)] for x in points], float)[which]
+    if not (np.isfinite(factors).all() and np.isfinite(starts).all()):
+        raise ValueError("a DMXProfile that is not finite")
     away = inputs - starts[which]
     return np.asarray((factors * away[:, None] ** np.arange(4)).sum(axis=1))
