@@ -28,6 +28,13 @@ def _controller() -> ThreadpoolController:
     return ThreadpoolController()
 
 
+def find_loaded_libraries() -> None:
+    """Let `one_thread` limit libraries, too, that were loaded after its first call: SciPy has a
+    BLAS of its own.
+    """
+    _controller.cache_clear()
+
+
 _limits = local()
 
 

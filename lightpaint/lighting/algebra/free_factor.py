@@ -5,6 +5,9 @@ bounds are nearly the same. A factor of those that were free serves the others b
 held unknown is a constraint on the step, and a released one a further row.
 """
 
+from functools import cache
+from typing import Any
+
 import numpy as np
 
 from lightpaint.arrays import Bools, Doubles, Indices
@@ -12,6 +15,7 @@ from lightpaint.lighting.algebra.clipped_newton import RIDGE, solve_ridged
 from lightpaint.lighting.algebra.nearest_optimum import SUSPECT_PIVOT
 from lightpaint.lighting.algebra.quadratic import Quadratic, kkt_residual
 from lightpaint.progress import cancellation_check
+from lightpaint.threads import find_loaded_libraries
 
 #: Unknowns that may differ from those of the factor, as a share of these: with more, a new factor
 #: is as quick.
@@ -22,10 +26,22 @@ MAX_CHANGED_SHARE = 1 / 6
 MAX_STEPS, KEPT_PROMISE, SHORTEST_PART = 100, 1e-4, 2.0**-12
 
 
+@cache
+def _libraries() -> tuple[Any, Any]:
+    """Return SciPy's LAPACK and BLAS, loaded where unknowns are many; `one_thread` limits them
+    from then on.
+    """
+    from scipy.linalg import blas, lapack
+
+    find_loaded_libraries()
+    return lapack, blas
+
+
 class FreeFactor:
     """The steps of problems with one M, scaled to a unit diagonal, (n, n)."""
 
     def __init__(self, M: Doubles) -> None:
+        _libraries()
         self._M, self._counts = M, M.diagonal() > 0
         self._rows = np.zeros(0, np.intp)  # the unknowns of the factor
         self._factor: Doubles | None = None  # None if it is singular, or nearly so
@@ -58,19 +74,18 @@ class FreeFactor:
 
     def _factored(self, rows: Indices, right: Doubles) -> Doubles:
         """Factor the matrix of some unknowns, and solve it."""
-        from scipy.linalg.lapack import dpotrf, dpotrs
-
+        lapack, _ = _libraries()
         matrix = self._M[np.ix_(rows, rows)]
         matrix.flat[:: rows.size + 1] += RIDGE * rows.size**0.5
         # The transpose is the same matrix in the order of LAPACK, which needs no copy of it.
-        factor, failed = dpotrf(matrix.T, lower=1, clean=0, overwrite_a=1)
+        factor, failed = lapack.dpotrf(matrix.T, lower=1, clean=0, overwrite_a=1)
         pivots = np.square(factor.diagonal())
         is_regular = not failed and pivots.min() >= SUSPECT_PIVOT
         self._rows, self._factor = rows, factor if is_regular else None
         self._regular[:] = False
         self._regular[rows] = is_regular
         if not failed:
-            return np.asarray(dpotrs(factor, right, lower=1)[0])
+            return np.asarray(lapack.dpotrs(factor, right, lower=1)[0])
         matrix = self._M[np.ix_(rows, rows)]
         matrix.flat[:: rows.size + 1] += RIDGE * rows.size**0.5
         return solve_ridged(matrix, right, rows.size)
@@ -81,17 +96,15 @@ class FreeFactor:
 
         held: places among the factor's unknowns; added: unknowns.
         """
-        from scipy.linalg.blas import dtrsm, dtrsv
-
-        rows, factor = self._rows, self._factor
+        (_, blas), rows, factor = _libraries(), self._rows, self._factor
         assert factor is not None
-        half = dtrsv(factor, -gradient[rows], lower=1)
+        half = blas.dtrsv(factor, -gradient[rows], lower=1)
         if held.size or added.size:
             k = added.size
             beside = np.zeros((rows.size, k + held.size), order="F")
             beside[:, :k] = self._M[np.ix_(added, rows)].T
             beside[held, k + np.arange(held.size)] = 1
-            beside = dtrsm(1.0, factor, beside, lower=1, overwrite_b=1)
+            beside = blas.dtrsm(1.0, factor, beside, lower=1, overwrite_b=1)
             small = -(beside.T @ beside)
             small[:k, :k] += self._M[np.ix_(added, added)] + RIDGE * rows.size**0.5 * np.eye(k)
             if not _is_regular(small[:k, :k]):
@@ -102,7 +115,7 @@ class FreeFactor:
             half -= beside @ pushes
             move[added] = pushes[:k]
             self._regular[added] = True
-        move[rows] = dtrsv(factor, half, lower=1, trans=1)
+        move[rows] = blas.dtrsv(factor, half, lower=1, trans=1)
         move[rows[held]] = 0
         return True
 

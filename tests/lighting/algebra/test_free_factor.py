@@ -4,11 +4,13 @@ from typing import Any
 
 import numpy as np
 import pytest
+from threadpoolctl import ThreadpoolController
 
 from lightpaint.lighting.algebra import optimum as optimum_module
 from lightpaint.lighting.algebra.free_factor import FreeFactor, projected_newton
 from lightpaint.lighting.algebra.optimum import QuadraticFamily, minimise
 from lightpaint.lighting.algebra.quadratic import Quadratic, kkt_residual, scaled
+from lightpaint.threads import one_thread
 
 N = 60
 
@@ -103,3 +105,10 @@ def test_a_right_side_that_does_not_fit_is_refused() -> None:
         QuadraticFamily(M).minimise(b[:-1])
     with pytest.raises(ValueError, match="finite"):
         QuadraticFamily(M).minimise(np.full(N, np.nan))
+
+
+def test_the_library_of_factors_runs_on_one_thread() -> None:
+    FreeFactor(np.eye(2))  # which loads SciPy's, that has a BLAS of its own
+    with one_thread():
+        libraries = [x for x in ThreadpoolController().info() if x["user_api"] == "blas"]
+        assert [x["num_threads"] for x in libraries] == [1] * len(libraries)
