@@ -14,6 +14,7 @@ from lightpaint.basis.basis import Origin
 from lightpaint.basis.lights import BasisLight
 from lightpaint.batch.gallery.summary import SummaryRow
 from lightpaint.batch.manifest.file_names import SUMMARY_FORMAT
+from lightpaint.colour.lamp import Lamp
 from lightpaint.lighting.answer.certificate import Certificate
 from lightpaint.lighting.answer.lighting import EmitterPlace, Lighting, LightSetting
 from lightpaint.lighting.answer.lighting_file import FORMAT
@@ -55,6 +56,12 @@ def lighting_schema() -> Schema:
     head = schema_of(Lighting)["properties"]
     light, place = schema_of(LightSetting, "name"), schema_of(EmitterPlace, "name")
     light["properties"]["photometry"] = {"type": "object"}
+    # The fields of its lamp stand beside its own.
+    del light["properties"]["lamp"]
+    light["properties"] |= schema_of(Lamp)["properties"]
+    drives = {"type": "object", "additionalProperties": {"type": "number"}}
+    errors = {"type": "object", "additionalProperties": {"type": ["number", "null"]}}
+    light["properties"] |= {"drives": drives, "drive_errors": errors}
     rgb = list_of([{"type": "number"}] * 3)
     key = {
         "type": "object",

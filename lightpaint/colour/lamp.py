@@ -9,15 +9,12 @@ from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from functools import cached_property, lru_cache
 from itertools import combinations, product
-from typing import Literal
 
 import numpy as np
 
 from lightpaint.arrays import RGB, Bools, Doubles, Indices
 from lightpaint.colour.color import cct_and_duv, luminance
-
-#: What a lamp saves, or uses most, among the drives that mix the same colour.
-Preference = Literal["watts", "white", "fewest"]
+from lightpaint.colour.emitter_preference import Preference
 
 #: Most emitters of a lamp: the mixes that are compared grow exponentially with their number.
 MAX_EMITTERS = 10

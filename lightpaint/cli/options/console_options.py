@@ -236,7 +236,7 @@ def target(text: str) -> ConsoleTarget:
     try:
         return parse_target(text)
     except ConsoleError as error:
-        raise argparse.ArgumentTypeError(str(error)) from None
+        raise argparse.ArgumentTypeError(error.sentence) from None
 
 
 def universe_pairs(text: str) -> list[tuple[int, int]]:

@@ -4,12 +4,15 @@ import socket
 from collections.abc import Mapping
 from dataclasses import dataclass
 from ipaddress import AddressValueError, IPv4Address
+from typing import TYPE_CHECKING
 
 from lightpaint.display_text import some_names
-from lightpaint.dmx.console_rig import ConsoleRig
 from lightpaint.errors import ConsoleError
 from lightpaint.files import one_line
 from lightpaint.validation import parse_whole_number
+
+if TYPE_CHECKING:
+    from lightpaint.dmx.console_rig import ConsoleRig
 
 
 @dataclass(frozen=True)
@@ -109,7 +112,7 @@ def parse_target(text: str) -> ConsoleTarget:
 
 
 def network_universes(
-    rig: ConsoleRig, protocol: DmxProtocol, given: Mapping[int, int] | None = None
+    rig: "ConsoleRig", protocol: DmxProtocol, given: Mapping[int, int] | None = None
 ) -> dict[int, int]:
     """Return the universe of the network for each one of a rig.
 

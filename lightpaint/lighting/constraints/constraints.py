@@ -10,7 +10,7 @@ from dataclasses import dataclass, field
 from typing import Any
 
 from lightpaint.arrays import RGB
-from lightpaint.colour.lamp import Preference
+from lightpaint.colour.emitter_preference import Preference
 from lightpaint.colour.white_range import WhiteRange
 from lightpaint.display_text import some_of
 from lightpaint.errors import ConstraintError

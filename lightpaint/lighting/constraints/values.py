@@ -8,7 +8,7 @@ import numpy as np
 
 from lightpaint.arrays import RGB, as_rgb
 from lightpaint.colour.color import hex_to_rgb, kelvin_to_rgb, luminance
-from lightpaint.colour.lamp import Preference
+from lightpaint.colour.emitter_preference import Preference
 from lightpaint.colour.white_range import WhiteRange, white_range
 from lightpaint.errors import ColorError, ConstraintError
 from lightpaint.files import one_line

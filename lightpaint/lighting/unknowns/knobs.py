@@ -11,7 +11,8 @@ from lightpaint.arrays import Doubles
 from lightpaint.basis.lights import BasisLight
 from lightpaint.colour.color import luminance
 from lightpaint.colour.color_hull import ColorHull
-from lightpaint.colour.lamp import Lamp, Preference
+from lightpaint.colour.emitter_preference import Preference
+from lightpaint.colour.lamp import Lamp
 from lightpaint.colour.white_range import WhiteRange
 from lightpaint.errors import ConstraintError
 from lightpaint.lighting.constraints.constraints import LightConstraint, Tie
