@@ -7,7 +7,7 @@ from typing import Literal
 
 from lightpaint.cli.options import arguments
 from lightpaint.cli.options.option_groups import add_rig_reading
-from lightpaint.dmx.network.console_target import PROTOCOLS, ConsoleTarget, parse_target
+from lightpaint.dmx.network.console_target import PROTOCOLS, SACN, ConsoleTarget, parse_target
 from lightpaint.errors import ConsoleError
 from lightpaint.validation import parse_number, parse_whole_number
 
@@ -86,7 +86,6 @@ def _add_target(parser: argparse.ArgumentParser, default: str) -> None:
     parser.add_argument(
         "--to",
         dest="target",
-        type=target,
         metavar="TARGET",
         help="sacn://HOST or artnet://HOST, maybe with a :PORT, to send to one receiver; "
         f"sacn://multicast or artnet://broadcast to reach all {default}",
@@ -106,15 +105,15 @@ def _add_priority(parser: argparse.ArgumentParser) -> None:
 def console_of(options: argparse.Namespace) -> tuple[RigFile, ConsoleTarget | None] | None:
     """Return the rig of a painter and the target of its console, if the options name them.
 
-    Raises ConsoleError for a target without a rig, and a priority that the protocol lacks.
+    Raises ConsoleError for a target without a rig, for what is not a target, and for a priority
+    that its protocol lacks.
     """
-    rig = rig_file(options)
+    rig, target = rig_file(options), _target_of(options)
     if rig is None:
-        if options.target is not None:
-            raise ConsoleError(f"--to {options.target} sends to the fixtures of a rig: add --rig")
+        if target is not None:
+            raise ConsoleError(f"--to {target} sends to the fixtures of a rig: add --rig")
         return None
-    _check_priority(options)
-    return rig, options.target
+    return rig, target
 
 
 def add_send(parser: argparse.ArgumentParser) -> None:
@@ -161,12 +160,12 @@ def add_send(parser: argparse.ArgumentParser) -> None:
 
 
 def sending_of(options: argparse.Namespace) -> Sending:
-    """Return where and how the options say to send. Raises ConsoleError for a priority of Art-Net,
-    which has none.
+    """Return where and how the options say to send.
+
+    Raises ConsoleError for what is not a target, and for a priority that its protocol lacks.
     """
-    _check_priority(options)
     return Sending(
-        options.target,
+        _target_of(options),
         dict(options.universes),
         options.priority,
         options.fps,
@@ -177,11 +176,14 @@ def sending_of(options: argparse.Namespace) -> Sending:
     )
 
 
-def _check_priority(options: argparse.Namespace) -> None:
-    if options.target is not None and options.priority is not None:
-        protocol = options.target.protocol
-        if protocol.scheme != "sacn":
-            raise ConsoleError(f"{protocol.name} has no priority: leave --priority out")
+def _target_of(options: argparse.Namespace) -> ConsoleTarget | None:
+    """Return the target that the options name, if any, once it goes with their priority."""
+    if options.target is None:
+        return None
+    target = parse_target(options.target)
+    if options.priority is not None and target.protocol is not SACN:
+        raise ConsoleError(f"{target.protocol.name} has no priority: leave --priority out")
+    return target
 
 
 def add_listen(parser: argparse.ArgumentParser) -> None:
@@ -229,14 +231,6 @@ def _add_universes(parser: argparse.ArgumentParser) -> None:
 
 def _add_interface(parser: argparse.ArgumentParser, description: str) -> None:
     parser.add_argument("--interface", metavar="ADDRESS", help=description)
-
-
-def target(text: str) -> ConsoleTarget:
-    """Parse where to send, `sacn://HOST`."""
-    try:
-        return parse_target(text)
-    except ConsoleError as error:
-        raise argparse.ArgumentTypeError(error.sentence) from None
 
 
 def universe_pairs(text: str) -> list[tuple[int, int]]:
