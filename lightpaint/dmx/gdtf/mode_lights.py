@@ -111,8 +111,8 @@ class _Beam:
 class ModeReader:
     """The lights of one mode, from its geometries and channels.
 
-    emitters, filters, profiles: elements of the type. zoom: wanted beam angle; None for the
-    one that the file rests at.
+    elements: returns the elements at a path of the type's physical descriptions. zoom: wanted beam
+    angle in degrees; None for the one that the file rests at.
     """
 
     def __init__(
