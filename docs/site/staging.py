@@ -30,7 +30,7 @@ TUTORIALS = {
     "a-blender-shot": "blender-6-keyed",
     "the-sky-for-a-picture": "sky-2-painting",
     "hang-three-lights": "three-lights-1-painting",
-    "a-rig-that-follows": "rig-4-console",
+    "a-rig-that-follows": "rig-5-console",
     "fifty-looks-overnight": "fifty-3-gallery",
 }
 

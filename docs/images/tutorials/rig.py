@@ -16,7 +16,7 @@ import sys
 from pathlib import Path
 
 from PIL import Image
-from steps import FILES, clone, comparison, keep, lightpaint, painter, work_folder
+from steps import FILES, browser_page, clone, comparison, keep, lightpaint, painter, work_folder
 
 from brush import Canvas, Everywhere, Stroke  # isort: skip
 
@@ -53,8 +53,17 @@ def main() -> None:
         keep(Image.open(folder / "template" / "blue-and-amber.png"), "rig-2-painting")
         lightpaint(folder, "solve", "rig.xml", "template/blue-and-amber.png", "-o", "two-sides")
         keep(comparison(folder / "two-sides" / "comparison.png", 0, 1), "rig-3-answer")
+        lights_table(folder / "two-sides" / "report.html")
         lightpaint(folder, "send", "two-sides/lighting.json", "--rig", SHOW)
         follow(folder)
+
+
+def lights_table(report: Path) -> None:
+    """Keep the table of lights of a report, with the drives of each."""
+    with browser_page() as page:
+        page.goto(report.as_uri())
+        page.wait_for_timeout(2000)
+        keep(page.locator("table.lights").first.screenshot(), "rig-4-drives")
 
 
 def follow(folder: Path) -> None:
@@ -70,7 +79,7 @@ def follow(folder: Path) -> None:
         page.mouse.move(560, 230, steps=20)
         page.mouse.up()
         page.wait_for_timeout(6000)
-        keep(page.screenshot(), "rig-4-console")
+        keep(page.screenshot(), "rig-5-console")
         page.get_by_role("checkbox", name="Console").click()
     print("\n".join(receiver.communicate()[0].splitlines()[-12:]))
 
