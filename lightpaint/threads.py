@@ -29,8 +29,8 @@ def _controller() -> ThreadpoolController:
 
 
 def find_loaded_libraries() -> None:
-    """Let `one_thread` limit libraries, too, that were loaded after its first call: SciPy has a
-    BLAS of its own.
+    """Include libraries in `one_thread` that were loaded after its first call: SciPy has a BLAS of
+    its own.
     """
     _controller.cache_clear()
 

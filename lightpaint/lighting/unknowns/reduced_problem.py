@@ -298,8 +298,8 @@ class ReducedSolver:
         if alike is not None and not is_large:
             if (lights := alike.lights) is not None:
                 M, b = M[:, lights[:, None], lights], b[:, lights]
-            begin, bounds = x[alike.unknowns], {"lower": alike.lower, "upper": alike.upper}
-            return minimise_each(M, b, start=begin, method=self._method, **bounds, **options)
+            options = {"lower": alike.lower, "upper": alike.upper, **options}
+            return minimise_each(M, b, start=x[alike.unknowns], method=self._method, **options)
         if not self._families:
             self._families = [
                 QuadraticFamily(p.M, lower=p.lower, upper=p.upper, caps=p.caps, method=self._method)
@@ -367,8 +367,8 @@ def _block_matrix(M: Doubles, block: Block) -> Doubles:
     if block.is_plain:
         [c], lights = block.channels, block.entries[0].lights
         if block.is_in_order and lights.size == M.shape[1]:
-            return M[c]
-        return M[c][lights[:, None], lights]
+            return np.asarray(M[c])
+        return np.asarray(M[c][lights[:, None], lights])
     made = np.zeros((block.unknowns.size, block.unknowns.size))
     for c, e in zip(block.channels, block.entries, strict=True):
         part = M[c][e.lights[:, None], e.lights] * e.values[:, None] * e.values
@@ -383,7 +383,8 @@ def _block_right_side(b: Doubles, block: Block) -> Doubles:
     """Return b' in the unknowns of a block."""
     if block.is_plain:
         [c], lights = block.channels, block.entries[0].lights
-        return b[c] if block.is_in_order and lights.size == b.shape[1] else b[c, lights]
+        is_whole = block.is_in_order and lights.size == b.shape[1]
+        return np.asarray(b[c] if is_whole else b[c, lights])
     made = np.zeros(block.unknowns.size)
     for c, e in zip(block.channels, block.entries, strict=True):
         right = b[c, e.lights] * e.values
