@@ -85,7 +85,7 @@ def find_near_optimum(
 def is_sampled(loss: Loss, lights: int) -> bool:
     """Return whether a sample of the pixels is quicker than all of them."""
     counted = np.count_nonzero(loss.importance)
-    return not loss.pixels.has_pieces and counted * MAX_SAMPLE_SHARE >= _sample_size(lights)
+    return not loss.pixels.has_pieces and bool(counted * MAX_SAMPLE_SHARE >= _sample_size(lights))
 
 
 def _sample_size(lights: int) -> int:

@@ -29,6 +29,9 @@ from lightpaint.lighting.solve import solution_of
 from lightpaint.target.target import Target
 from lightpaint.target.wish_finding import find_wishes
 
+#: Lights beyond which their colours are not tried as a reason.
+MAX_COLORED_LIGHTS = 300
+
 #: Groups of reasons: the hold of unpainted pixels, colours of lights, constraints, and the
 #: paintings of other views.
 LimitGroup = Literal["hold", "colors", "constraints", "views"]
@@ -106,11 +109,15 @@ class PixelSample:
 
     @property
     def groups(self) -> tuple[LimitGroup, ...]:
-        """The groups of reasons besides the painting that are in force."""
-        fit = self.problem.fit
+        """The groups of reasons besides the painting that are in force.
+
+        Of many lights the choice of colours is no group: a solve with each in any colour would take
+        as long as the answer.
+        """
+        fit, lights = self.problem.fit, self.problem.basis.lights
         on: dict[LimitGroup, bool] = {
             "hold": bool(fit.hold or fit.unpainted),
-            "colors": fit.colors != "free",
+            "colors": fit.colors != "free" and len(lights) <= MAX_COLORED_LIGHTS,
             "constraints": bool(self.problem.constraints),
             "views": bool(self.other_views),
         }
