@@ -68,8 +68,8 @@ def _levels_of(fixture: RigFixture, light: RigLight, drives: Drives) -> dict[int
         return levels | {k: _level(dimmer, channels[k]) for k in light.dimmers[:1]}
     top = 1.0
     for k in light.dimmers[:1]:
-        levels[k] = _level(max(wanted, default=0.0), channels[k])
-        # The emitters make up for the rounding of the dimmer.
+        # Emitters make up for a dimmer that is rounded up; they could not for one rounded down.
+        levels[k] = _level_of_at_least(max(wanted, default=0.0), channels[k])
         top = _share(levels[k], channels[k])
     for emitter, drive in zip(light.emitters, wanted, strict=True):
         share = min(drive / top, 1.0) if top > 0 else 0.0
@@ -109,6 +109,17 @@ _Curve = Sequence[tuple[float, float]]
 def _level(share: float, channel: DmxChannel) -> int:
     """Return the level at which a channel gives a share of what it controls."""
     return round(min(max(_inverse(channel.curve, share), 0.0), 1.0) * channel.highest)
+
+
+def _level_of_at_least(share: float, channel: DmxChannel) -> int:
+    """Return the level at which a channel gives a share of what it controls, or little more."""
+    level = _level(share, channel)
+    enough = [
+        x
+        for x in (level - 1, level, level + 1)
+        if 0 <= x <= channel.highest and _share(x, channel) >= share
+    ]
+    return min(enough, key=lambda x: _share(x, channel), default=level)
 
 
 def _share(level: int, channel: DmxChannel) -> float:

@@ -1,5 +1,6 @@
 """What leaves for a console, byte by byte against the standards, and when."""
 
+import math
 import socket
 import time
 from collections.abc import Callable
@@ -106,7 +107,7 @@ def test_only_fixtures_of_the_rig_have_levels() -> None:
     assert {k: x for k, x in enumerate(first.slots) if x} == of_left
     # The second stands at 501: its shutter and the middle of its pan, its dimmer and white.
     assert not any(second.slots[:500])
-    assert second.slots[500:504] == bytes([round(0.3 * 255), 32, 128, 0])
+    assert second.slots[500:504] == bytes([math.ceil(0.3 * 255), 32, 128, 0])
 
 
 @pytest.mark.parametrize("scheme", ["sacn", "artnet"])
