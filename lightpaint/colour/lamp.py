@@ -203,19 +203,21 @@ def _mixes_of(lamp: Lamp) -> _Mixes:
         )
         most, right = np.append(most, lamp.power_share), np.append(right, lamp.power_share)
     corners = list(_corners(equations, most, right, basis.shape[1]))
-    slopes, constants = (np.array([x[k] for x in corners]) for k in range(2))
+    slopes, constants = (np.concatenate([x[k] for x in corners]) for k in range(2))
     return _Mixes(basis, slopes, constants, most, len(lamp.emitters))
 
 
 def _corners(
     equations: Doubles, most: Doubles, right: Doubles, rank: int
 ) -> Iterator[tuple[Doubles, Doubles]]:
-    """Yield slopes (n, rank) and constants (n,) of all unknowns at each corner.
+    """Yield slopes (k, n, rank) and constants (k, n) of all unknowns at the corners that have the
+    same unknowns between their bounds.
 
     equations: (m, n), of which the first `rank` equal the emission and the others `right`.
     """
     rows, count = equations.shape
     sizes = np.linalg.norm(equations, axis=0)
+    is_full = np.array(list(product((0.0, 1.0), repeat=count - rows)))
     for inner in combinations(range(count), rows):
         places: Indices = np.array(inner, dtype=np.intp)
         square = equations[:, places]
@@ -223,9 +225,8 @@ def _corners(
             continue
         inverse = np.linalg.inv(square)
         others = np.setdiff1d(np.arange(count), places)
-        for is_full in product((False, True), repeat=len(others)):
-            constant, slope = np.zeros(count), np.zeros((count, rank))
-            constant[others] = np.where(is_full, most[others], 0)
-            constant[places] = inverse @ (right - equations @ constant)
-            slope[places] = inverse[:, :rank]
-            yield slope, constant
+        constants, slope = np.zeros((len(is_full), count)), np.zeros((count, rank))
+        constants[:, others] = is_full * most[others]
+        constants[:, places] = (right - constants @ equations.T) @ inverse.T
+        slope[places] = inverse[:, :rank]
+        yield np.broadcast_to(slope, (len(is_full), count, rank)), constants
