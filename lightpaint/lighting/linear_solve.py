@@ -188,7 +188,7 @@ def make_answer(
         software=Software.installed(),
         basis_spp=problem.spp,
     ).with_objective(problem.objective(weights), problem.norm2)
-    labels_and_effects = _labels_and_effects(problem, equations, optimum.weights)
+    labels_and_effects = _labels_and_effects(problem, equations, optimum)
     fields: dict[str, Any] = {"target": problem.name, "certificate": certificate}
     fields |= {
         "scene_identity": problem.scene_identity,
@@ -206,16 +206,37 @@ def make_answer(
 
 
 def _labels_and_effects(
-    problem: LinearProblem, equations: NormalEquations, weights: Doubles
+    problem: LinearProblem, equations: NormalEquations, optimum: ReducedOptimum
 ) -> Sequence[tuple[str, bool]]:
     """Return the constraint on each light, and whether the light would change without it."""
     labels = problem.reduction.labels
     if not any(labels):
         return [(label, False) for label in labels]
-    effects = _has_effect(equations, problem.lights.is_scalar, weights)
+    effects = _has_effect(equations, problem.lights.is_scalar, optimum.weights)
+    for k, is_at_most in _lamps_at_most(problem.reduction, optimum).items():
+        effects[k] = is_at_most
     return [
         (label, bool(label) and bool(effect)) for label, effect in zip(labels, effects, strict=True)
     ]
+
+
+def _lamps_at_most(reduction: Reduction, optimum: ReducedOptimum) -> dict[int, bool]:
+    """Return, by the index of a light that mixes emitters, whether one of them would be driven
+    beyond its largest drive, or all together beyond their limit.
+
+    An emitter at 0 holds a lamp back no more than a channel at 0 does other lights.
+    """
+    held, scale = optimum.multipliers, np.abs(optimum.multipliers).max(initial=0)
+    is_held = (optimum.x >= reduction.upper) & (held < -MIN_PULL * scale)
+    capped = {
+        cap.unknowns[0]: bool(multiplier)
+        for cap, multiplier in zip(reduction.caps, optimum.cap_multipliers, strict=True)
+    }
+    return {
+        knob.lights[0]: bool(is_held[list(places)].any()) or capped.get(places[0], False)
+        for knob, places in zip(reduction.knobs, reduction.places, strict=True)
+        if len(knob.lights) == 1 and knob.lights[0] in reduction.lamps and len(places) > 1
+    }
 
 
 def _has_effect(equations: NormalEquations, scalar: Bools, weights: Doubles) -> Bools:

@@ -79,6 +79,7 @@ def test_a_green_outside_rec709_is_answered_with_negative_red(make_basis):
     solution = solve(basis, green, constraints=constraints, literal=True)
     [light] = solution.lighting.lights
     assert light.emission[0] < 0
+    assert not light.is_active  # emitters at 0 hold nothing back
     objective = solution.problem.objective
     assert objective(solution.weights).sum() <= objective(emission[None]).sum() * (1 + SAME)
 
@@ -98,6 +99,7 @@ def test_a_largest_drive_and_a_limit_of_luminance_hold(make_basis):
     bright = replace(target, image=target.image * 50)
     [light] = solve(basis, bright, constraints=constraints, literal=True).lighting.lights
     assert max(light.drives.values()) == pytest.approx(0.5)
+    assert light.is_active
     dimmed = constraints.and_then(Constraints.of({"par": {"limits": {"max": 1.0}}}))
     solution = solve(basis, bright, constraints=dimmed, literal=True)
     assert solution.lighting.photometry(solution.lighting["par"]).y == pytest.approx(1.0)
