@@ -91,4 +91,4 @@ def test_an_answer_goes_back_into_its_show(folder: Path) -> None:
     assert read_rig(folder / "out" / "relit.mvr").fixtures == read_rig(folder / "show.mvr").fixtures
     assert "give --rig" in run_refused(folder, *export, "-o", "none")
     csv = ("export", "lighting.json", "--to", "csv", "--rig", "show.mvr", "-o", "none")
-    assert "--rig belongs to the form mvr" in run_refused(folder, *csv)
+    assert "--rig belongs to mvr and cues" in run_refused(folder, *csv)

@@ -1,5 +1,6 @@
 """What leaves for a console, byte by byte against the standards, and when."""
 
+import asyncio
 import math
 import socket
 import time
@@ -408,3 +409,16 @@ def test_our_receiver_reads_what_our_sender_sends(protocol: Any) -> None:
                 receiver.receive(PATIENCE_S)
     levels = {universe: receiver.levels[number] for universe, number in numbers.items()}
     assert levels == encode_levels(RIG, LOOK)
+
+
+def test_a_link_opens_where_a_loop_runs_as_in_a_notebook() -> None:
+    async def opened() -> bool:
+        with (
+            open_port() as port,
+            ConsoleLink.open(f"artnet://127.0.0.1:{port.getsockname()[1]}", RIG) as link,
+        ):
+            link.show(LOOK)
+            port.settimeout(PATIENCE_S)
+            return bool(port.recv(1024))
+
+    assert asyncio.run(opened())

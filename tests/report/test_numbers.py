@@ -168,7 +168,7 @@ def test_writing_neither_solves_nor_sums_anew(
         monkeypatch.setattr(owner, name, count_calls)
 
     count(solve_module, "_solution")
-    count(reduced_problem, "_solve_blocks")
+    count(reduced_problem.ReducedSolver, "_solve_blocks")
     count(solve_module, "descend")
     count(Basis, "mix")
     count(Basis.__dict__["totals"], "func")

@@ -3,6 +3,7 @@
 import asyncio
 import socket
 from collections.abc import Collection, Mapping
+from concurrent.futures import ThreadPoolExecutor
 
 from pyartnet import ArtNetNode
 from pyartnet.base.network import UnicastNetworkTarget
@@ -42,10 +43,12 @@ class ArtnetOutput:
             for universe in universes
         }
         self._loop = asyncio.new_event_loop()
-        self._loop.run_until_complete(self._open())
+        # The caller's thread may have a loop of its own, as in a notebook.
+        with ThreadPoolExecutor(1) as thread:
+            thread.submit(self._loop.run_until_complete, self._open()).result()
 
     def send(self, levels: Mapping[int, bytes]) -> None:
-        """Send the 512 bytes of each universe. Raises OSError."""
+        """Send the 512 bytes of each universe, from a thread without a loop. Raises OSError."""
         self._loop.run_until_complete(self._send(levels))
 
     def close(self) -> None:

@@ -111,7 +111,7 @@ class PixelSample:
     def groups(self) -> tuple[LimitGroup, ...]:
         """The groups of reasons besides the painting that are in force.
 
-        Of many lights the choice of colours is no group: a solve with each in any colour would take
+        Of many lights the choice of colours is left out: a solve with each in any colour would take
         as long as the answer.
         """
         fit, lights = self.problem.fit, self.problem.basis.lights
