@@ -1,4 +1,4 @@
-"""What leaves for a console, byte by byte against the standards, and when."""
+"""Packets that leave for a console, byte by byte against the standards, and their times."""
 
 import asyncio
 import math

@@ -27,7 +27,7 @@ EMITTERS = [
 
 @dataclass
 class RecordedLink:
-    """What a link was told, in place of a network."""
+    """A link that notes what it is told, in place of a network."""
 
     shown: list[Any] = field(default_factory=list)
     is_closed: bool = False
