@@ -22,6 +22,10 @@ MAX_EMITTERS = 10
 #: Round-off of drives, relative to their range, and of a determinant relative to its columns.
 ROUND_OFF, SINGULAR = 1e-7, 1e-6
 
+#: The least colour temperature of a white emitter, in kelvin, and the largest Duv: amber LEDs are
+#: warmer, lime ones farther from Planck's locus.
+WARMEST_WHITE, WHITE_DUV = 2200.0, 0.02
+
 #: Weight of the power among mixes that a preference for something else leaves equal.
 SECOND = 1e-6
 
@@ -157,7 +161,12 @@ class Lamp:
     @cached_property
     def _whites(self) -> Bools:
         """(e,), the emitters whose colour is a white."""
-        return np.array([cct_and_duv(x) is not None for x in self.columns])
+        return np.array([_is_white(x) for x in self.columns])
+
+
+def _is_white(color: Doubles) -> bool:
+    white = cct_and_duv(color)
+    return white is not None and white[0] >= WARMEST_WHITE and abs(white[1]) <= WHITE_DUV
 
 
 @dataclass(frozen=True)

@@ -267,6 +267,11 @@ class MvrFormat(ExportFormat):
         """Return the writer of the copy, and say which lights the show lacks."""
         assert export.source.rig is not None
         copied = show_copy(export.source.rig, export.lighting)
+        if len(copied.left) == len(export.lighting.fixed ^ {*export.lighting}):
+            raise LightpaintError(
+                f"{export.source.rig} has no fixture for any light of the lighting, such as "
+                f"{some_names(copied.left)}: give the show that its scene was made from"
+            )
         if copied.left:
             export.listen.say(
                 f"{export.source.rig} has no fixture for {some_names(copied.left)}: left out"

@@ -176,3 +176,9 @@ def test_a_lights_file_with_a_wrong_value_names_file_light_and_key(
     assert completed.returncode == 2
     assert f"{tmp_path / 'l.toml'}: light.bulb.color is 'blue': expected" in completed.stderr
     assert "basis:" not in completed.stderr
+
+
+def test_two_scales_are_refused(room: Path) -> None:
+    (room / "two.toml").write_text("cd_per_unit = 1000\n")
+    words = ["solve", "room.xml", "t.exr", "--lights-file", "two.toml", "--unit", 500]
+    assert "cd_per_unit is 1000 in the lights file and 500 by --unit" in run_refused(room, *words)

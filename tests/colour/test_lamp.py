@@ -129,3 +129,15 @@ def test_errors_of_drives_are_those_of_the_linear_map():
 def test_levels_fill_the_bits_of_a_channel():
     assert LampEmitter("e", WHITE, bits=8).level(1.0) == 255
     assert LampEmitter("e", WHITE, bits=16).level(0.5) == 32768
+
+
+def test_amber_and_lime_are_no_whites():
+    lamp = _lamp(COLORS, prefer="white")
+    emission = lamp.mix(np.array([0.3, 0.3, 0.3, 0.3, 0.3, 0.3]))
+    found = lamp.drives_for(emission)
+    most = -_least(lamp, emission, [0, 0, 0, -1, 0, 0])
+    assert found[3] == pytest.approx(most, abs=SAME)
+    without_white = _lamp((*COLORS[:3], AMBER, LIME))
+    emission = without_white.mix(np.full(5, 0.3))
+    drives = replace(without_white, prefer="white").drives_for(emission)
+    assert np.allclose(drives, without_white.drives_for(emission))  # that of least power

@@ -165,7 +165,7 @@ def test_zoom_is_at_rest_or_as_wanted_and_then_sent() -> None:
     assert mode.channels[5].default == 32768
     wide = read_mode(_zoomed("0/2"), zoom=80)
     assert wide.lights[0].beam_angle == 50
-    assert "its zoom goes from 10° to 50°" in wide.remarks
+    assert "its zoom goes from 10° to 50°: 50° is used" in wide.remarks
     # The same light in a wider beam.
     narrow = read_mode(_zoomed("0/2"))
     totals = [

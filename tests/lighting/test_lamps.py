@@ -213,7 +213,7 @@ WRONG = {
     "bits": ({"emitters": [{**RGBW[0], "bits": 12}]}, "expected 8, 16 or 24"),
     "max": ({"emitters": [{**RGBW[0], "max": 1.5}]}, "expected > 0, at most 1"),
     "a name twice": ({"emitters": [RGBW[0], RGBW[0]]}, "two emitters named 'red'"),
-    "no name": ({"emitters": [{"xy": RED, "cd": 1}]}, 'expected "red"'),
+    "no name": ({"emitters": [{"xy": RED, "cd": 1}]}, "has no name: give it one"),
     "unknown": ({"emitters": [{**RGBW[0], "nm": 630}]}, "has the key 'nm'"),
     "too many": (
         {"emitters": [{**RGBW[0], "name": str(k)} for k in range(11)]},
@@ -227,8 +227,14 @@ WRONG = {
         {"emitters": [{"name": "a", "spectrum": [[900, 1], [950, 1]], "Y": 1}]},
         "no power that eyes see",
     ),
-    "primaries": ({"emitters": RGBW, "primaries": ["#f00", "#00f"]}, "emitters and 'primaries'"),
-    "a range of white": ({"emitters": RGBW, "kelvin": [2700, 6500]}, "emitters and 'kelvin'"),
+    "primaries": (
+        {"emitters": RGBW, "primaries": ["#f00", "#00f"]},
+        "emitters and 'primaries', and",
+    ),
+    "a range of white": (
+        {"emitters": RGBW, "kelvin": [2700, 6500]},
+        "emitters and 'kelvin', and its",
+    ),
     "a share of nothing": ({"power_share": 0.5}, "without the emitters that share it"),
     "share": ({"emitters": RGBW, "power_share": 2}, "expected a share of full power"),
     "both limits": (

@@ -222,8 +222,10 @@ class ModeReader:
                 return None
             if zoom is not None:
                 self.dmx[k] = replace(self.dmx[k], default=function.level_of(zoom))
-                if not min(start, end) <= zoom <= max(start, end):
-                    self._remark(f"its zoom goes from {min(start, end):g}° to {max(start, end):g}°")
+                least, most = sorted((start, end))
+                if not least <= zoom <= most:
+                    used = min(max(zoom, least), most)
+                    self._remark(f"its zoom goes from {least:g}° to {most:g}°: {used:g}° is used")
             return max(function.value_at(self.dmx[k].default), NARROWEST)
         return None
 

@@ -133,8 +133,8 @@ def _check_emitters(
     if primaries is not None and len(primaries) > 1:
         raise ConstraintError(
             where,
-            f" has emitters and {_first_key(table, COLOR_KEYS)!r}, whose mix would be open: give "
-            "one colour, or leave it out",
+            f" has emitters and {_first_key(table, COLOR_KEYS)!r}, and its emitters already say "
+            "which colours it can mix: give one colour, or leave it out",
         )
     if "limits" in table and "power_share" in table:
         raise ConstraintError(where, " has limits and power_share: give one of them")

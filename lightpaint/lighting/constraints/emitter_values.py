@@ -113,7 +113,9 @@ def parse_emitters(table: Mapping[str, Any], light: SourceKey) -> tuple[EmitterR
 
 def _parse_emitter(table: Mapping[str, Any], where: SourceKey) -> EmitterRequest:
     check_keys(table, EMITTER_KEYS, where)
-    name = table.get("name")
+    if "name" not in table:
+        raise ConstraintError(where, ' has no name: give it one, such as name = "red"')
+    name = table["name"]
     if not isinstance(name, str) or not 0 < len(name.strip()) <= MAX_NAME:
         raise ConstraintError(where / "name", f' is {one_line(repr(name))}: expected "red"')
     color_keys = [key for key in COLORS if key in table]

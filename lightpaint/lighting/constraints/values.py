@@ -230,7 +230,9 @@ def parse_count(value: Any, where: SourceKey) -> int | None:
 def parse_scale(value: Any, where: SourceKey) -> float | None:
     """Return cd/m² of a radiance of 1, if given."""
     if value is not None and not (is_number(value) and 0 < value <= BRIGHTEST):
-        raise ConstraintError(where, f" is {value!r}: expected cd/m² of a radiance of 1, like 1000")
+        raise ConstraintError(
+            where, f" is {value!r}: expected candelas of an intensity of 1 in the scene, like 1000"
+        )
     return None if value is None else float(value)
 
 

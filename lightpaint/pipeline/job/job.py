@@ -19,7 +19,7 @@ from lightpaint.basis.lightgroups.light_groups import LightGroups
 from lightpaint.basis.lights import Lights
 from lightpaint.basis.render.render_origin import basis_lights
 from lightpaint.display_text import short_repr
-from lightpaint.errors import LightpaintError, TargetError
+from lightpaint.errors import ConstraintError, LightpaintError, TargetError
 from lightpaint.files import check_writable
 from lightpaint.images.pixel_blocks import whole_factor
 from lightpaint.keywords import keywords
@@ -183,6 +183,7 @@ class Job:
         all_constraints = self.constraints
         if isinstance(source, Scene | Basis):
             all_constraints = constraints_of(source.requests).and_then(all_constraints)
+        _check_one_scale(all_constraints, self.settings)
         scale = Constraints(cd_per_unit=self.settings.cd_per_unit)
         all_constraints = all_constraints.and_then(scale)
         if scenes and bases:
@@ -431,4 +432,15 @@ def check_same_picture(target: Target, scene: Scene) -> None:
             Hint("sensor", target.sensor),
             ", or pass ",
             Hint("find", False),
+        )
+
+
+def _check_one_scale(constraints: Constraints, settings: Settings) -> None:
+    """Raise ConstraintError if a lights file and the settings say different scales."""
+    own, given = constraints.cd_per_unit, settings.cd_per_unit
+    if own is not None and given is not None and own != given:
+        raise ConstraintError(
+            f"cd_per_unit is {own:g} in the lights file and {given:g} by ",
+            Hint("cd_per_unit"),
+            ": drives depend on it; leave one out",
         )

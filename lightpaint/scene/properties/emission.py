@@ -123,7 +123,8 @@ def why_not_adjusted(plugin: str, kind: EmissionKind | None, emission: RGB) -> s
         parameter = PLUGINS[plugin][0]
         return f"has a textured {parameter} that is neither a bitmap nor a single colour"
     if min(emission) < 0:
-        return f"has a negative {kind.parameter}, {' '.join(f'{v:g}' for v in emission)}"
+        numbers = " ".join(f"{v:g}" for v in emission)
+        return f"has a negative {kind.parameter}, {numbers}, and no lights file lists its emitters"
     return ""
 
 
