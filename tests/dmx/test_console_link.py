@@ -5,6 +5,7 @@ import math
 import socket
 import time
 from collections.abc import Callable
+from concurrent.futures import ThreadPoolExecutor
 from threading import Event
 from typing import Any
 
@@ -421,4 +422,6 @@ def test_a_link_opens_where_a_loop_runs_as_in_a_notebook() -> None:
             port.settimeout(PATIENCE_S)
             return bool(port.recv(1024))
 
-    assert asyncio.run(opened())
+    # In a thread of its own, since a browser's tests may have left a loop in this one.
+    with ThreadPoolExecutor(1) as thread:
+        assert thread.submit(asyncio.run, opened()).result()
