@@ -309,22 +309,13 @@ class ReducedSolver:
             options = {"lower": alike.lower, "upper": alike.upper, **options}
             return minimise_each(M, b, start=x[alike.unknowns], method=self._method, **options)
         if not self._families:
-            self._families = [
-                QuadraticFamily(p.M, lower=p.lower, upper=p.upper, caps=p.caps, method=self._method)
-                for p in _block_problems((M, b), coupling, reduction)
-            ]
+            problems = _block_problems((M, b), coupling, reduction)
+            self._families = [self._family(p, p.M) for p in problems]
             # Many drives give the same light. With a ridge one of them is best, and found in a
             # sixth of the time; it is an optimum without the ridge, too, up to the tolerance.
             self._ridged = [
-                QuadraticFamily(
-                    p.M + np.diag(RIDGE * p.M.diagonal()),
-                    lower=p.lower,
-                    upper=p.upper,
-                    caps=p.caps,
-                    method=self._method,
-                )
-                for p in _block_problems((M, b), coupling, reduction)
-                if reduction.has_equal_mixes
+                self._family(p, p.M + np.diag(RIDGE * p.M.diagonal()))
+                for p in (problems if reduction.has_equal_mixes else ())
             ]
 
         def solve(job: tuple[Block, QuadraticFamily, QuadraticFamily | None]) -> Optimum:
@@ -337,6 +328,11 @@ class ReducedSolver:
         ridged: list[QuadraticFamily | None] = [*self._ridged] or [None] * len(self._families)
         jobs = list(zip(reduction.blocks, self._families, ridged, strict=True))
         return parallel_map(solve, jobs) if len(jobs) > 1 else [solve(job) for job in jobs]
+
+    def _family(self, problem: ReducedProblem, M: Doubles) -> QuadraticFamily:
+        """Return the family of problems with a matrix (k, k), and the bounds and caps of `problem`."""
+        p = problem
+        return QuadraticFamily(M, lower=p.lower, upper=p.upper, caps=p.caps, method=self._method)
 
 
 def reduced_problems(equations: NormalEquations, reduction: Reduction) -> list[ReducedProblem]:
