@@ -330,7 +330,7 @@ class ReducedSolver:
         return parallel_map(solve, jobs) if len(jobs) > 1 else [solve(job) for job in jobs]
 
     def _family(self, problem: ReducedProblem, M: Doubles) -> QuadraticFamily:
-        """Return the family of problems with a matrix (k, k), and the bounds and caps of `problem`."""
+        """Return the problems with a matrix (k, k) and the bounds and caps of `problem`."""
         p = problem
         return QuadraticFamily(M, lower=p.lower, upper=p.upper, caps=p.caps, method=self._method)
 
