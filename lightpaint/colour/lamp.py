@@ -107,6 +107,14 @@ class Lamp:
         """Return whether some drives mix an emission (3,)."""
         return len(_mixes_of(self).values(emission)) > 0
 
+    def watts_for(self, emission: Doubles) -> float | None:
+        """Return the power at which it emits (3,); None if that of an emitter is unknown."""
+        watts = [x.watts for x in self.emitters]
+        known = [w for w in watts if w is not None]
+        if len(known) < len(watts):
+            return None
+        return float(self.drives_for(emission) @ np.array(known))
+
     def brightest(self, color: Doubles) -> float:
         """Return the largest factor by which a colour (3,) can be mixed; 0 if it cannot be."""
         from scipy.optimize import linprog

@@ -212,7 +212,7 @@ def _labels_and_effects(
     labels = problem.reduction.labels
     if not any(labels):
         return [(label, False) for label in labels]
-    effects = _has_effect(equations, problem.lights.is_scalar, optimum.weights)
+    effects = _has_effect(equations, problem.lights.is_scalar, optimum)
     for k, is_at_most in _lamps_at_most(problem.reduction, optimum).items():
         effects[k] = is_at_most
     return [
@@ -239,7 +239,7 @@ def _lamps_at_most(reduction: Reduction, optimum: ReducedOptimum) -> dict[int, b
     }
 
 
-def _has_effect(equations: NormalEquations, scalar: Bools, weights: Doubles) -> Bools:
+def _has_effect(equations: NormalEquations, scalar: Bools, optimum: ReducedOptimum) -> Bools:
     """Return, (n,), whether a light would change if it alone were released.
 
     scalar: (n,), of which there is one weight for all channels. The gradient g = M w − b must
@@ -248,7 +248,8 @@ def _has_effect(equations: NormalEquations, scalar: Bools, weights: Doubles) -> 
     """
     lit = equations.reached
     power = np.where(lit, np.einsum("cii->ic", equations.M), 0)
-    g = np.where(lit, equations.gradient(weights), 0)
+    weights = optimum.weights
+    g = np.where(lit, optimum.gradient(equations), 0)
     size = np.abs(equations.b.T[lit] / np.sqrt(power[lit])).max(initial=0) or 1.0
     # The channels of a light with one weight pull together.
     g[scalar], power[scalar] = (x[scalar].sum(axis=1, keepdims=True) for x in (g, power))

@@ -258,7 +258,7 @@ def _bounded_answer(solution: Solution, equations: NormalEquations) -> BoundedAn
         reduction,
         solution.problem.full,
         optimum,
-        np.where(lit, equations.gradient(optimum.weights), 0),
+        np.where(lit, optimum.gradient(equations), 0),
         np.where(lit, np.einsum("cii->ic", equations.M), 0),
         tuple(light.is_active for light in solution.lighting.lights),
     )

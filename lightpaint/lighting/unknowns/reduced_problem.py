@@ -5,7 +5,7 @@ every set of channels that the unknowns couple. Without constraints C is the ide
 problems in the lights themselves.
 """
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from typing import Any
 
 import numpy as np
@@ -21,6 +21,7 @@ from lightpaint.lighting.algebra.optimum import (
     minimise_each,
 )
 from lightpaint.lighting.algebra.quadratic import Cap, clip_to_sums
+from lightpaint.lighting.algebra.required_sums import CLOSE, RequiredSums
 from lightpaint.lighting.normal_equations import NormalEquations
 from lightpaint.lighting.unknowns.knobs import Knob
 from lightpaint.lighting.unknowns.reduction import Reduction
@@ -37,6 +38,9 @@ BOUND_ROUND_OFF = 1e-12
 #: Ridges, relative to the diagonal, that make one of several equal mixes of colours the best: of a
 #: solve, whose optimum then is one without it, and of the mixes to start from.
 RIDGE, MIX_RIDGE = 1e-12, 1e-9
+
+#: The multipliers of no requirements.
+NOTHING = np.zeros(0)
 
 #: Pull towards the start in channels where a light reaches nothing, relative to its other channels.
 DARK_PULL = 1e-8
@@ -182,6 +186,8 @@ class ReducedOptimum:
     optimality conditions, after scaling, and its limit. sweeps: (3,).
     reached: (n, 3), whether the unknowns that move a light in a channel reach any pixel; true for
     fixed lights.
+    required: (m,), multipliers of the requirements, >= 0; none without requirements.
+    push: (n, 3), the rise of the gradient that they balance; None without.
     """
 
     x: Doubles
@@ -192,6 +198,13 @@ class ReducedOptimum:
     tolerance: Doubles
     sweeps: tuple[int, int, int]
     reached: Bools
+    required: Doubles = field(default_factory=lambda: np.zeros(0))
+    push: Doubles | None = None
+
+    def gradient(self, equations: NormalEquations) -> Doubles:
+        """Return the gradient (n, 3) at the weights, M w - b, less what requirements balance."""
+        gradient = equations.gradient(self.weights)
+        return gradient if self.push is None else gradient - self.push
 
     @property
     def converged(self) -> bool:
@@ -237,6 +250,8 @@ class ReducedSolver:
         self._pulled: NormalEquations | None = None
         self._families: list[QuadraticFamily] = []
         self._ridged: list[QuadraticFamily] = []
+        self._sums: RequiredSums | None = None
+        self._required: Doubles | None = None
 
     def solve(
         self,
@@ -248,11 +263,14 @@ class ReducedSolver:
     ) -> ReducedOptimum:
         """Minimise the objective with the pull; for the arguments see `solve_reduced`."""
         reduction, equations = self._reduction, self._with_pull(equations)
-        lit = equations.reached
+        lit = _lit(equations, reduction)
         reached: Bools = np.ones(lit.shape, dtype=bool) if lit.all() else reduction.determined(lit)
         is_reached = np.any(reached, axis=1)
         x = nearest_unknowns(reduction, start, is_reached) if x is None else x.copy()
-        optima = self._solve_blocks(equations, lit, start, x, options)
+        if reduction.requirements is None:
+            optima, required = self._solve_blocks(equations, lit, start, x, options), NOTHING
+        else:
+            optima, required = self._solve_required(equations, lit, start, x, options)
         multipliers, cap_multipliers = np.zeros(x.size), np.zeros(len(reduction.caps))
         tolerance = options.get("tolerance", TOLERANCE)
         residuals, tolerances, sweeps = np.zeros(3), np.full(3, tolerance), [0, 0, 0]
@@ -271,6 +289,8 @@ class ReducedSolver:
             tolerances,
             (sweeps[0], sweeps[1], sweeps[2]),
             reached,
+            required,
+            _push(reduction, required),
         )
 
     def _with_pull(self, equations: NormalEquations) -> NormalEquations:
@@ -279,7 +299,7 @@ class ReducedSolver:
         is_same = last is not None and last.M is equations.M and last.coupling is equations.coupling
         self._last = equations
         if pulled is None or not is_same:
-            self._families = []
+            self._families, self._sums = [], None
             self._pulled = equations if pull is None else equations + pull
             return self._pulled
         if pull is None:
@@ -329,10 +349,58 @@ class ReducedSolver:
         jobs = list(zip(reduction.blocks, self._families, ridged, strict=True))
         return parallel_map(solve, jobs) if len(jobs) > 1 else [solve(job) for job in jobs]
 
+    def _solve_required(
+        self,
+        equations: NormalEquations,
+        lit: Bools,
+        start: Doubles,
+        x: Doubles,
+        options: dict[str, Any],
+    ) -> tuple[list[Optimum], Doubles]:
+        """Solve under requirements, which make one block; return it, and their multipliers (m,)."""
+        reduction = self._reduction
+        M, b = _move_fixed_to_right(equations, reduction, lit, start)
+        [block] = reduction.blocks
+        if self._sums is None:
+            [p] = _block_problems((M, b), equations.coupling, reduction)
+            rows, least = reduction.required
+            self._sums = RequiredSums(
+                p.M,
+                rows[:, block.unknowns],
+                least,
+                lower=p.lower,
+                upper=p.upper,
+                caps=p.caps,
+                method=self._method,
+            )
+        right, begin = _block_right_side(b, block), x[block.unknowns]
+        found = self._sums.minimise(right, begin, multipliers=self._required, **options)
+        self._required = found.multipliers
+        optimum = found.optimum
+        if found.miss > CLOSE:
+            residual = max(optimum.kkt_residual, found.miss)
+            optimum = replace(optimum, kkt_residual=residual)
+        return [optimum], found.multipliers
+
     def _family(self, problem: ReducedProblem, M: Doubles) -> QuadraticFamily:
         """Return the problems with a matrix (k, k) and the bounds and caps of `problem`."""
         p = problem
         return QuadraticFamily(M, lower=p.lower, upper=p.upper, caps=p.caps, method=self._method)
+
+
+def _lit(equations: NormalEquations, reduction: Reduction) -> Bools:
+    """Return, (n, 3), whether a light reaches something that counts, or that is required."""
+    lit = equations.reached
+    if reduction.requirements is not None:
+        lit = lit | (reduction.requirements.rows != 0).any(axis=0)
+    return lit
+
+
+def _push(reduction: Reduction, required: Doubles) -> Doubles | None:
+    """Return what requirements with these multipliers, (m,), balance of the gradient, (n, 3)."""
+    if reduction.requirements is None:
+        return None
+    return np.asarray(np.einsum("m,mnc->nc", required, reduction.requirements.rows))
 
 
 def reduced_problems(equations: NormalEquations, reduction: Reduction) -> list[ReducedProblem]:

@@ -31,6 +31,11 @@ from lightpaint.lighting.unknowns.knobs import (
     mixing_knob,
     tied_knob,
 )
+from lightpaint.lighting.unknowns.requirements import (
+    Requirements,
+    watts_of_fixed,
+    watts_of_unknowns,
+)
 from lightpaint.lighting.unknowns.unknown_blocks import (
     AlikeBlocks,
     Block,
@@ -50,6 +55,7 @@ class Reduction:
     is_joined: whether something else couples the channels: a pull to colours.
     gamuts: colours that lights without other constraints keep to.
     lamps: what mixes a light from emitters, by the light's index.
+    requirements: sums that the answer has to reach, if there are any.
     """
 
     fixed_weights: Doubles
@@ -58,6 +64,7 @@ class Reduction:
     is_joined: bool = False
     gamuts: Gamuts | None = None
     lamps: Mapping[int, Lamp] = field(default_factory=dict)
+    requirements: Requirements | None = None
 
     @cached_property
     def unknowns(self) -> tuple[Unknown, ...]:
@@ -109,6 +116,10 @@ class Reduction:
     def with_gamuts(self, gamuts: Gamuts) -> "Reduction":
         """Return the reduction with lights of any colour keeping to `gamuts`."""
         return replace(self, gamuts=gamuts)
+
+    def with_requirements(self, requirements: Requirements) -> "Reduction":
+        """Return the reduction with sums that the answer has to reach, which couple all lights."""
+        return replace(self, requirements=requirements, is_joined=True)
 
     def confined_to_sides(self, sides: Mapping[int, int | None]) -> "Reduction":
         """Return the reduction with knobs, by their places, confined to a side of their gamuts; to
@@ -168,6 +179,23 @@ class Reduction:
             np.array([i for _, i, _ in entries], dtype=np.intp),
             np.array([rgb for _, _, rgb in entries], dtype=np.float64).reshape(-1, 3),
         )
+
+    @cached_property
+    def required(self) -> tuple[Doubles, Doubles]:
+        """The requirements in the unknowns, R x ≥ r: (m, k) and (m,)."""
+        requirements = self.requirements
+        assert requirements is not None
+        unknown, light, rgb = self.columns
+        rows = np.zeros((len(requirements), len(self.unknowns)))
+        entries = np.einsum("mec,ec->me", requirements.rows[:, light], rgb)
+        np.add.at(rows, (slice(None), unknown), entries)
+        least = requirements.least - np.einsum("mnc,nc->m", requirements.rows, self.fixed_weights)
+        if requirements.watts.any():
+            rows += np.outer(requirements.watts, watts_of_unknowns(self.knobs, self.lamps))
+            with_knobs = {light for knob in self.knobs for light in knob.lights}
+            fixed = {k: lamp for k, lamp in self.lamps.items() if k not in with_knobs}
+            least -= requirements.watts * watts_of_fixed(self.fixed_weights, fixed)
+        return rows, least
 
     @cached_property
     def limited_knobs(self) -> tuple[LimitedKnobs, ...]:

@@ -232,7 +232,7 @@ def _better_windows(
     First all that move to the next white, none of which has to give up its current mix; only
     then the one light that gains most by a jump.
     """
-    gradient = equations.gradient(optimum.weights)
+    gradient = optimum.gradient(equations)
     # The noise correction may leave a black picture with less than nothing.
     power = np.maximum(np.einsum("cii->ic", equations.M), 0)
     # The slope of a light that is round-off, in units of its own picture.
@@ -392,7 +392,7 @@ def _next_sides(
     sides: dict[int, int] = {}
     if not reduction.confined_knobs:
         return sides
-    gradient = equations.gradient(optimum.weights)
+    gradient = optimum.gradient(equations)
     for k in reduction.confined_knobs:
         gamut, side, light = _confined_gamut(reduction, k)
         x = optimum.x[list(reduction.places[k])]

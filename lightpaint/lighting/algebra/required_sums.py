@@ -1,0 +1,180 @@
+"""The optimum under requirements, sums of unknowns that have to reach given values.
+
+    minimise ½ xᵀM x − bᵀx    with    lower ≤ x ≤ upper    and    R x ≥ r
+
+Unlike caps, the sums may share unknowns and have coefficients of either sign, and there may be
+thousands, few of which hold. The method of multipliers (Hestenes 1969, Powell 1969; for
+inequalities Rockafellar, SIAM Journal on Control 12, 1974) solves problems without requirements: a
+penalty draws x to the sums that it misses, and their multipliers, updated each time, replace it.
+At its end the multipliers prove the optimum as those of bounds do.
+"""
+
+from collections.abc import Iterable
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from lightpaint.arrays import Bools, Doubles
+from lightpaint.lighting.algebra.method import Method
+from lightpaint.lighting.algebra.optimum import Optimum, QuadraticFamily
+from lightpaint.lighting.algebra.quadratic import Cap
+from lightpaint.progress import cancellation_check
+
+#: Weight of the penalty, relative to a unit diagonal of M; its growth where the sums approach
+#: their values slowly, and what is slow.
+PENALTY, GROWTH, SLOW = 10.0, 10.0, 0.25
+
+#: Largest miss of a sum, relative to its size; most updates of the multipliers, and most changes of
+#: the sums that count between two updates.
+CLOSE, MAX_UPDATES, MAX_CHANGES = 1e-9, 60, 40
+
+#: Diagonal of M, relative to the largest, below which an unknown is scaled as if it had this one:
+#: a light that no painted pixel sees still lights what is required.
+LEAST_DIAGONAL = 1e-6
+
+#: Bisections that end a step where the penalty is least.
+BISECTIONS = 40
+
+
+@dataclass(frozen=True)
+class RequiredOptimum:
+    """The best x under requirements.
+
+    optimum: of the problem in which the multipliers, (m,), stand for them. multipliers: >= 0, the
+    rise of the objective with each required value. miss: the largest shortfall of a sum, relative
+    to its size.
+    """
+
+    optimum: Optimum
+    multipliers: Doubles
+    miss: float
+
+    @property
+    def converged(self) -> bool:
+        """True if all sums reach their values, and x is optimal."""
+        return self.miss <= CLOSE and self.optimum.converged
+
+
+class RequiredSums:
+    """Problems with one M and the same sums, which differ in b.
+
+    M: (k, k). rows: (m, k), R. least: (m,), r. lower, upper, caps, method: as in `minimise`.
+    """
+
+    def __init__(
+        self,
+        M: Doubles,
+        rows: Doubles,
+        least: Doubles,
+        *,
+        lower: Doubles,
+        upper: Doubles,
+        caps: Iterable[Cap] = (),
+        method: Method = "polished",
+    ) -> None:
+        self._M, self._rows, self._least = M, rows, least
+        self._limits: dict[str, Any] = {
+            "lower": lower,
+            "upper": upper,
+            "caps": tuple(caps),
+            "method": method,
+        }
+        power = M.diagonal()
+        largest = float(power.max(initial=0)) or 1.0
+        spread = np.einsum("mk,k->m", np.square(rows), 1 / np.maximum(power, LEAST_DIAGONAL * largest))
+        self._sizes = np.where(spread > 0, spread, 1.0)
+        self._penalty = PENALTY
+        self._families: dict[bytes, QuadraticFamily] = {}
+
+    def minimise(
+        self,
+        b: Doubles,
+        start: Doubles,
+        *,
+        multipliers: Doubles | None = None,
+        **options: Any,
+    ) -> RequiredOptimum:
+        """Minimise for b, (k,), from start, (k,), and the multipliers, (m,), of a similar problem.
+
+        options: of `QuadraticFamily.minimise`.
+        """
+        duals = np.zeros(len(self._least)) if multipliers is None else multipliers
+        x, last, check = start, np.inf, cancellation_check()
+        for _ in range(MAX_UPDATES):
+            check()
+            optimum = self._with_multipliers(b, x, duals, options)
+            x, weights = optimum.x, self._weights
+            sums = self._rows @ x
+            updated = np.maximum(0.0, duals + weights * (self._least - sums))
+            # What an update changes is the miss of sums that hold, and of others the excess of
+            # their multipliers.
+            sizes = np.maximum(np.abs(self._least), np.abs(self._rows) @ np.abs(x))
+            sizes = np.where(sizes > 0, sizes, 1.0)
+            miss = float((np.abs(updated - duals) / (weights * sizes)).max(initial=0))
+            duals = updated
+            if miss <= CLOSE:
+                break
+            if miss > SLOW * last:
+                self._penalty *= GROWTH
+                self._families.clear()
+            last = miss
+        short = float(((self._least - self._rows @ x) / sizes).max(initial=0))
+        return RequiredOptimum(optimum, duals, max(short, 0.0))
+
+    @property
+    def _weights(self) -> Doubles:
+        """(m,), of the penalty of each sum."""
+        return self._penalty / self._sizes
+
+    def _with_multipliers(
+        self, b: Doubles, x: Doubles, duals: Doubles, options: dict[str, Any]
+    ) -> Optimum:
+        """Return the optimum with the penalty of the sums that count, under fixed multipliers."""
+        counted: Bools | None = None
+        for _ in range(MAX_CHANGES):
+            counts = self._counts(x, duals)
+            if counted is not None and (counts == counted).all():
+                break
+            counted = counts
+            optimum = self._minimise_counted(b, x, duals, counted, options)
+            x = self._end_of_step(b, x, optimum.x, duals)
+        return optimum
+
+    def _counts(self, x: Doubles, duals: Doubles) -> Bools:
+        """Return, (m,), which sums miss their values or are held by their multipliers."""
+        return np.asarray(duals + self._weights * (self._least - self._rows @ x) > 0)
+
+    def _minimise_counted(
+        self, b: Doubles, x: Doubles, duals: Doubles, counted: Bools, options: dict[str, Any]
+    ) -> Optimum:
+        rows, weights = self._rows[counted], self._weights[counted]
+        key = np.packbits(counted).tobytes()
+        if key not in self._families:
+            self._families.clear()
+            M = self._M + (rows.T * weights) @ rows
+            self._families[key] = QuadraticFamily(M, **self._limits)
+        right = b + (weights * self._least[counted] + duals[counted]) @ rows
+        return self._families[key].minimise(right, x, **options)
+
+    def _end_of_step(self, b: Doubles, x: Doubles, target: Doubles, duals: Doubles) -> Doubles:
+        """Return where on the way from x to the optimum of some sums the penalty of all is least.
+
+        It is the optimum itself unless sums that did not count are missed there.
+        """
+        move = target - x
+        slope, curve = float(move @ (self._M @ x - b)), float(move @ self._M @ move)
+        weights, rises = self._weights, self._rows @ move
+        pulls = duals + weights * (self._least - self._rows @ x)
+
+        def slope_at(t: float) -> float:
+            held = np.maximum(0.0, pulls - t * weights * rises)
+            return slope + t * curve - float(held @ rises)
+
+        if slope_at(1.0) <= 0:
+            return target
+        low, high = 0.0, 1.0
+        for _ in range(BISECTIONS):
+            middle = (low + high) / 2
+            low, high = (low, middle) if slope_at(middle) > 0 else (middle, high)
+        return np.asarray(x + high * move)
