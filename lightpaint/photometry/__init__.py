@@ -1,0 +1,1 @@
+"""Photometry of a scene: illuminance in lux on measuring planes, from every light."""

@@ -1,0 +1,150 @@
+"""Illuminance at the points of measuring planes, as a linear function of the lights' weights.
+
+A radiance of 1 in all channels stands for u cd/m², so an irradiance (R, G, B) is
+
+    E = u (0.2126 R + 0.7152 G + 0.0722 B) lx
+
+Values are estimates with noise. Two halves of the samples give the half difference of each point,
+which has one degree of freedom only: errors are pooled over the points of a plane.
+"""
+
+import math
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+
+from lightpaint.arrays import Doubles
+from lightpaint.basis.lights import Lights
+from lightpaint.display_text import some_names
+from lightpaint.errors import SceneError
+from lightpaint.photometry.measuring_plane import MeasuringPlane, slices_of
+
+#: Points this many standard errors of a difference above the least one may be the darkest.
+CANDIDATE_ERRORS = 3.0
+
+
+@dataclass(frozen=True)
+class PlaneReading:
+    """The illuminance on a plane, in lx, and its uniformity; errors are standard errors.
+
+    uniformity: the least point over the mean. least_bias: bound on how far the least point is
+    expected to lie below the darkest point's true illuminance, since noise makes the minimum of
+    several points too low; that of the uniformity is `least_bias` / `mean`. points: their number.
+    """
+
+    mean: float
+    mean_error: float
+    uniformity: float
+    uniformity_error: float
+    least: float
+    most: float
+    points: int
+    least_error: float
+    least_bias: float
+
+
+@dataclass(frozen=True)
+class Illuminance:
+    """The illuminance at the points of planes, per light.
+
+    planes: whose points follow each other. lights: the lights, in the order of `matrix`. matrix:
+    (p, n, 3), lx at each point per unit weight of a light in a channel. half_differences: (p, n,
+    3), half the difference of two halves of the samples. cd_per_unit: cd/m² of a radiance of 1.
+    """
+
+    planes: tuple[MeasuringPlane, ...]
+    lights: Lights
+    matrix: Doubles
+    half_differences: Doubles
+    cd_per_unit: float
+
+    def __post_init__(self) -> None:
+        expected = sum(len(plane) for plane in self.planes), len(self.lights), 3
+        for name, values in (
+            ("matrix", self.matrix),
+            ("half_differences", self.half_differences),
+        ):
+            if values.shape != expected:
+                raise SceneError(f"{name} has the shape {values.shape}: expected {expected}")
+
+    def __repr__(self) -> str:
+        points, lights, _ = self.matrix.shape
+        names = some_names(plane.name for plane in self.planes)
+        return f"Illuminance({points} points of {names} from {lights} lights)"
+
+    @cached_property
+    def _slices(self) -> dict[str, slice]:
+        return slices_of(self.planes)
+
+    def points_of(self, plane: str) -> slice:
+        """Return where the points of a plane lie among all. Raises SceneError without it."""
+        if plane not in self._slices:
+            raise SceneError(f"no plane {plane!r}: there is {some_names(self._slices)}")
+        return self._slices[plane]
+
+    def of(self, weights: Doubles) -> Doubles:
+        """Return the illuminance in lx at all points, (p,). weights: (n, 3)."""
+        return self._mix(self.matrix, weights)
+
+    def standard_errors(self, weights: Doubles) -> Doubles:
+        """Return the standard errors of `of(weights)`, (p,) in lx.
+
+        The relative error is taken to be equal at all lit points of a plane, and is the root mean
+        square of their relative half differences.
+        """
+        values, halves = self.of(weights), self._mix(self.half_differences, weights)
+        errors = np.zeros(len(values))
+        for part in self._slices.values():
+            is_lit = values[part] > 0
+            relative = halves[part][is_lit] / values[part][is_lit]
+            if relative.size:
+                errors[part] = np.abs(values[part]) * math.sqrt(float(np.mean(relative**2)))
+        return errors
+
+    def reading(self, plane: str, weights: Doubles) -> PlaneReading:
+        """Return the illuminance on a plane. weights: (n, 3). Raises SceneError without it."""
+        part = self.points_of(plane)
+        values, errors = self.of(weights)[part], self.standard_errors(weights)[part]
+        halves = self._mix(self.half_differences[part], weights)
+        mean, least = float(values.mean()), float(values.min())
+        # The points are independent, so their own half differences give the error of the mean.
+        mean_error = float(np.sqrt((halves**2).sum())) / len(values)
+        least_error = float(errors[np.argmin(values)])
+        uniformity = least / mean if mean > 0 else 0.0
+        relative = math.hypot(least_error / least, mean_error / mean) if least > 0 else 0.0
+        return PlaneReading(
+            mean=mean,
+            mean_error=mean_error,
+            uniformity=uniformity,
+            uniformity_error=uniformity * relative,
+            least=least,
+            most=float(values.max()),
+            points=len(values),
+            least_error=least_error,
+            least_bias=_bias_bound(values, errors),
+        )
+
+    def readings(self, weights: Doubles) -> dict[str, PlaneReading]:
+        """Return the illuminance on all planes, by name. weights: (n, 3)."""
+        return {plane.name: self.reading(plane.name, weights) for plane in self.planes}
+
+    def _mix(self, matrix: Doubles, weights: Doubles) -> Doubles:
+        """Return Σ matrix · weights, (p,)."""
+        shape, expected = np.shape(weights), self.matrix.shape[1:]
+        if shape != expected:
+            raise SceneError(f"weights of the shape {shape}: expected {expected}, a row per light")
+        return np.asarray(matrix.reshape(len(matrix), -1) @ np.asarray(weights).reshape(-1))
+
+
+def _bias_bound(values: Doubles, errors: Doubles) -> float:
+    """Return a bound on how far the minimum of noisy values is expected below the true minimum.
+
+    The expected minimum of k normal errors is at least −√(2 ln k) standard errors. k counts the
+    points that noise alone may separate from the least one.
+    """
+    least = int(np.argmin(values))
+    differences = np.hypot(errors, errors[least])
+    is_candidate = values - values[least] <= CANDIDATE_ERRORS * differences
+    largest = float(errors[is_candidate].max())
+    return math.sqrt(2 * math.log(int(is_candidate.sum()))) * largest

@@ -1,0 +1,103 @@
+"""Measuring planes: points at which illuminance is measured, and what is wished for there."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+from functools import cached_property
+
+import numpy as np
+
+from lightpaint.arrays import Doubles, Indices
+from lightpaint.errors import SceneError
+
+
+@dataclass(frozen=True)
+class Ratio:
+    """A wish that the mean of a plane is at least `at_least` times the mean of plane `to`."""
+
+    to: str
+    at_least: float
+
+
+@dataclass(frozen=True)
+class Wishes:
+    """The wishes for the illuminance on a plane; None for what is not wished for.
+
+    mean: least mean illuminance in lx. uniformity: least ratio of minimum to mean, 0 to 1. most:
+    largest illuminance of a point in lx. ratios: least ratios to the means of other planes.
+    preset: name of the row of a standard that gave what was not set by itself; "" for none.
+    """
+
+    mean: float | None = None
+    uniformity: float | None = None
+    most: float | None = None
+    ratios: tuple[Ratio, ...] = ()
+    preset: str = ""
+
+    @property
+    def is_empty(self) -> bool:
+        """True if nothing is wished for."""
+        return (self.mean, self.uniformity, self.most, self.ratios) == (None, None, None, ())
+
+
+@dataclass(frozen=True)
+class PowerBudget:
+    """A limit of electrical power: in watts, or in W/m² of the floor; None where not limited."""
+
+    watts: float | None = None
+    per_area: float | None = None
+
+
+@dataclass(frozen=True)
+class MeasuringPlane:
+    """Points on a plane or on surfaces, and the directions in which illuminance is measured there.
+
+    points: (p, 3) in scene units, which are metres. normals: (p, 3), unit vectors. spacing:
+    distance of neighbours in metres; 0 for listed points. area_m2: area that the points stand for;
+    0 for listed points. shape: rows and columns of the grid; None if its outline is ragged, or for
+    listed points. cells: (p, 2), row and column of each point in a picture of the plane.
+    is_cylindrical: whether cylindrical illuminance around the normals is measured, the mean over
+    all directions perpendicular to them.
+    """
+
+    name: str
+    points: Doubles
+    normals: Doubles
+    spacing: float
+    area_m2: float
+    shape: tuple[int, int] | None
+    cells: Indices
+    wishes: Wishes = field(default_factory=Wishes)
+    is_cylindrical: bool = False
+
+    def __post_init__(self) -> None:
+        count = len(self.points)
+        if not count or self.points.shape != (count, 3) or self.normals.shape != (count, 3):
+            raise SceneError(
+                f"plane {self.name!r} has points {self.points.shape} and normals "
+                f"{self.normals.shape}: expected (p, 3) each, with at least one point"
+            )
+        if self.cells.shape != (count, 2):
+            raise SceneError(f"plane {self.name!r} has cells {self.cells.shape}: expected (p, 2)")
+
+    def __len__(self) -> int:
+        return len(self.points)
+
+    @cached_property
+    def picture_size(self) -> tuple[int, int]:
+        """Rows and columns of a picture with a pixel for each cell; some may have no point."""
+        rows, columns = self.cells.max(axis=0) + 1
+        return int(rows), int(columns)
+
+    def picture(self, values: Doubles) -> Doubles:
+        """Return values at the points, (p,), as a picture (rows, columns); NaN without a point."""
+        picture = np.full(self.picture_size, np.nan)
+        picture[self.cells[:, 0], self.cells[:, 1]] = values
+        return picture
+
+
+def slices_of(planes: Sequence[MeasuringPlane]) -> dict[str, slice]:
+    """Return where the points of each plane lie among the points of all, by name of the plane."""
+    ends = np.cumsum([len(plane) for plane in planes]).tolist()
+    return {
+        plane.name: slice(end - len(plane), end) for plane, end in zip(planes, ends, strict=True)
+    }
