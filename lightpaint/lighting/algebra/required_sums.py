@@ -82,7 +82,9 @@ class RequiredSums:
         }
         power = M.diagonal()
         largest = float(power.max(initial=0)) or 1.0
-        spread = np.einsum("mk,k->m", np.square(rows), 1 / np.maximum(power, LEAST_DIAGONAL * largest))
+        spread = np.einsum(
+            "mk,k->m", np.square(rows), 1 / np.maximum(power, LEAST_DIAGONAL * largest)
+        )
         self._sizes = np.where(spread > 0, spread, 1.0)
         self._penalty = PENALTY
         self._families: dict[bytes, QuadraticFamily] = {}

@@ -21,7 +21,7 @@ from lightpaint.lighting.analysis.noise.noise import (
 )
 from lightpaint.lighting.normal_equations import NormalEquations
 from lightpaint.lighting.solution import Solution
-from lightpaint.lighting.unknowns.reduced_problem import solve_reduced
+from lightpaint.lighting.unknowns.reduced_problem import ReducedOptimum, solve_reduced
 from lightpaint.lighting.unknowns.reduction import Reduction
 
 #: Relative distance at which a sum counts as at its limit.
@@ -98,8 +98,8 @@ def block_freedoms(solution: Solution, equations: NormalEquations) -> Iterator[B
     equations: of the solve.
     """
     reduction, lit = solution.problem.local_reduction, solution.equations.reached
-    x = solve_reduced(equations, reduction, solution.weights).x
-    rows, distances = _active_caps(reduction, x)
+    optimum = solve_reduced(equations, reduction, solution.weights)
+    x, (rows, distances) = optimum.x, _active_sums(reduction, optimum)
     for block in reduction.blocks:
         unknowns = block.unknowns
         columns = _columns(reduction, unknowns, lit)
@@ -163,6 +163,17 @@ def _columns(reduction: Reduction, unknowns: Indices, lit: Bools) -> Doubles:
     for c in range(3):
         columns[c, light[is_chosen], place[unknown[is_chosen]]] = rgb[is_chosen, c]
     return (columns * lit.T[:, :, None]).reshape(3 * len(lit), unknowns.size)
+
+
+def _active_sums(reduction: Reduction, optimum: ReducedOptimum) -> tuple[Doubles, Doubles]:
+    """Return coefficients of active caps and requirements; for the result see `_active_caps`."""
+    rows, room = _active_caps(reduction, optimum.x)
+    held = np.flatnonzero(optimum.required > 0)
+    if not held.size:
+        return rows, room
+    required = reduction.required[0][held]
+    required = -required / np.linalg.norm(required, axis=1, keepdims=True)
+    return np.vstack([rows, required]), np.append(room, np.full(held.size, np.inf))
 
 
 def _active_caps(reduction: Reduction, x: Doubles) -> tuple[Doubles, Doubles]:

@@ -1,0 +1,1 @@
+"""Wishes for illuminance and power, as requirements of a solve."""

@@ -1,0 +1,159 @@
+"""Linear programs over the lights: the least power that meets all wishes, or how far they go.
+
+Of thousands of points few limit the answer. So a program begins without the rows of points, and
+those that its answer misses are added until none is missed (Kelley's cutting planes). HiGHS solves
+each program, through SciPy.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from lightpaint.arrays import Doubles, Indices
+from lightpaint.errors import LightpaintError
+from lightpaint.lighting.unknowns.reduction import Reduction
+from lightpaint.lighting.unknowns.requirements import watts_of_fixed, watts_of_unknowns
+from lightpaint.lighting.wishes.wished_light import WishedLight
+from lightpaint.progress import cancellation_check
+
+#: Rows of points that are added at a time, largest miss of a row relative to its size, and most
+#: rounds.
+ADDED_ROWS, CLOSE, MAX_ROUNDS = 40, 1e-9, 200
+
+#: Weight of the power where as much as possible of all wishes is sought: of the brightest answer.
+SECOND = 1e-6
+
+#: A share of a wish below this is round-off.
+LEAST_SHARE = 1e-7
+
+
+@dataclass(frozen=True)
+class Program:
+    """The solution of a linear program.
+
+    x: (k,). shares: (w,), what is given up of each wish. multipliers: (m,), the rise of the cost
+    with each required value. cost: of x.
+    """
+
+    x: Doubles
+    shares: Doubles
+    multipliers: Doubles
+    cost: float
+
+
+def least_watts(wished: WishedLight, reduction: Reduction) -> Program:
+    """Return the unknowns that meet all wishes with the least power.
+
+    Wishes that nothing meets are met as far as possible first.
+    """
+    shares = shares_given_up(wished, reduction)
+    watts = watts_of_unknowns(reduction.knobs, reduction.lamps)
+    return _solve(wished, reduction, watts, wished.slack_of(shares), shares)
+
+
+def shares_given_up(wished: WishedLight, reduction: Reduction) -> Doubles:
+    """Return the least share of each wish, (w,), that has to be given up so that all others hold:
+    all 0 if all can be met.
+    """
+    watts = watts_of_unknowns(reduction.knobs, reduction.lamps)
+    if not watts.any():
+        watts = np.abs(reduction.required[0]).sum(axis=0)
+    costs = SECOND * watts / max(float(watts.max(initial=0)), 1e-300)
+    return _solve(wished, reduction, costs, None, None).shares
+
+
+def power_of(reduction: Reduction, x: Doubles) -> float:
+    """Return the power in watts at unknowns x, (k,), with that of lamps that stay as they are."""
+    with_knobs = {light for knob in reduction.knobs for light in knob.lights}
+    fixed = {k: lamp for k, lamp in reduction.lamps.items() if k not in with_knobs}
+    watts = watts_of_unknowns(reduction.knobs, reduction.lamps)
+    return float(watts @ x) + watts_of_fixed(reduction.fixed_weights, fixed)
+
+
+def _solve(
+    wished: WishedLight,
+    reduction: Reduction,
+    cost: Doubles,
+    slack: Doubles | None,
+    shares: Doubles | None,
+) -> Program:
+    """Solve for x and, where no slack of the rows is given, for the shares of wishes."""
+    rows, least = reduction.required
+    if slack is not None:
+        # What has to be given up is given up by a hair more than that.
+        least = least - slack * (1 + CLOSE)
+    given = np.zeros((len(rows), 0))
+    if slack is None:
+        given = np.zeros((len(rows), len(wished.wishes)))
+        for k, wish in enumerate(wished.wishes):
+            given[wish.rows, k] = 0.0 if wish.is_hard else wish.size
+    count = len(reduction.unknowns)
+    columns = np.hstack([rows, given])
+    sizes = np.maximum(np.abs(columns).max(axis=1, initial=0), 1e-300)
+    columns, least = columns / sizes[:, None], least / sizes
+    costs = np.concatenate([cost, np.ones(given.shape[1])])
+    bounds = np.column_stack(
+        [
+            np.concatenate([reduction.lower, np.zeros(given.shape[1])]),
+            np.concatenate([reduction.upper, np.ones(given.shape[1])]),
+        ]
+    )
+    used = [k for wish in wished.wishes if _length(wish.rows) == 1 for k in _places(wish.rows)]
+    fixed_rows, fixed_least = _cap_rows(reduction, columns.shape[1])
+    check = cancellation_check()
+    for _ in range(MAX_ROUNDS):
+        check()
+        x, duals = _linprog(
+            costs,
+            np.vstack([columns[used], fixed_rows]),
+            np.concatenate([least[used], fixed_least]),
+            bounds,
+        )
+        missed = least - columns @ x
+        scale = np.maximum(np.abs(least), np.abs(columns) @ np.abs(x))
+        beyond = np.flatnonzero(missed > CLOSE * scale)
+        more = [k for k in beyond[np.argsort(-missed[beyond])] if k not in used][:ADDED_ROWS]
+        if not more:
+            break
+        used += more
+    multipliers = np.zeros(len(rows))
+    multipliers[used] = duals[: len(used)] / sizes[used]
+    found = x[count:] if shares is None else shares
+    found = np.where(found < LEAST_SHARE, 0.0, found)
+    return Program(x[:count], found, multipliers, float(costs @ x))
+
+
+def _linprog(
+    costs: Doubles, rows: Doubles, least: Doubles, bounds: Doubles
+) -> tuple[Doubles, Doubles]:
+    """Minimise costs · x with rows x >= least; return x and the multipliers of rows, >= 0."""
+    from scipy.optimize import linprog
+
+    found = linprog(costs, A_ub=-rows, b_ub=-least, bounds=bounds, method="highs")
+    if not found.success:
+        raise LightpaintError(
+            "no setting of the lamps meets their own limits and the limit of power: allow more "
+            "watts, or lower limits that keep lamps on"
+        )
+    return np.asarray(found.x), -np.asarray(found.ineqlin.marginals)
+
+
+def _cap_rows(reduction: Reduction, columns: int) -> tuple[Doubles, Doubles]:
+    """Return limits on sums of a lamp's unknowns as rows, at least as large as (c,)."""
+    rows, least = list[Doubles](), list[float]()
+    for cap in reduction.caps:
+        row = np.zeros(columns)
+        row[list(cap.unknowns)] = cap.coefficients
+        for sign, limit in ((1, cap.lower), (-1, cap.upper)):
+            if np.isfinite(limit):
+                rows.append(sign * row)
+                least.append(sign * limit)
+    return np.array(rows).reshape(-1, columns), np.array(least)
+
+
+def _length(rows: slice) -> int:
+    return int(rows.stop - rows.start)
+
+
+def _places(rows: slice) -> Indices:
+    return np.arange(rows.start, rows.stop)

@@ -1,0 +1,37 @@
+"""A painting and wishes for illuminance together: one convex problem."""
+
+from dataclasses import dataclass, replace
+
+from lightpaint.arrays import Doubles
+from lightpaint.lighting.problem import Problem
+from lightpaint.lighting.wishes.linear_programs import shares_given_up
+from lightpaint.lighting.wishes.wished_light import WishedLight
+
+
+@dataclass(frozen=True)
+class RequiredProblem:
+    """A problem whose answer meets wishes.
+
+    problem: with the wishes as requirements. shares: (w,), what had to be given up of each wish, 0
+    of those that are met.
+    """
+
+    problem: Problem
+    shares: Doubles
+
+
+def with_wishes(problem: Problem, wished: WishedLight) -> RequiredProblem:
+    """Return the problem under wishes; where these contradict the limits of lamps or each other,
+    under as much of them as possible.
+    """
+    if wished.is_empty:
+        return RequiredProblem(problem, wished.requirements.least[:0])
+    reduction = problem.reduction.with_requirements(wished.requirements)
+    shares = shares_given_up(wished, reduction)
+    if shares.any():
+        slack = wished.slack_of(shares) * (1 + 1e-9)
+        reduction = reduction.with_requirements(wished.requirements.lowered(slack))
+    requirements = reduction.requirements
+    assert requirements is not None
+    full = problem.full.with_requirements(requirements)
+    return RequiredProblem(replace(problem, reduction=reduction, full=full), shares)
