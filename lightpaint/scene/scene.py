@@ -40,6 +40,7 @@ from lightpaint.scene.plane_identity import SceneHasher
 from lightpaint.scene.properties.emission import ENVIRONMENTS, read_emitted_image
 from lightpaint.scene.properties.film import Film, camera_named, reduced, reduction
 from lightpaint.scene.properties.integrator import Integrator, IntegratorChoice
+from lightpaint.scene.properties.measuring_points import MeasuringPoints
 from lightpaint.scene.properties.pose import Pose, motion_of, upward_axis
 from lightpaint.scene.properties.site import EmitterPlace, Site
 from lightpaint.scene.runtime.kernel_threads import kernels
@@ -136,6 +137,7 @@ class Scene(SceneFiles, Shown):
         map_size: Size of their images as written; None for a pixel per texel.
         added: Emitters of `with_new_emitters`, which are in no file.
         old_sites: Sites in the file of the emitters that `moved` has moved, by name.
+        points: Points of `at_points`, which replace the film's pixels; None for a film.
 
     Examples:
         >>> scene = lp.load_scene("room.xml")
@@ -168,6 +170,7 @@ class Scene(SceneFiles, Shown):
     map_size: GridSize | None = None
     added: tuple[NewEmitter, ...] = ()
     old_sites: Mapping[str, Site] = field(default_factory=dict)
+    points: MeasuringPoints | None = None
 
     def __post_init__(self) -> None:
         for name in ("lights", "emitters"):
@@ -180,17 +183,25 @@ class Scene(SceneFiles, Shown):
 
     @property
     def identity(self) -> str:
-        """Identity of its basis: `content`, and how emitters are grouped, kept or split, if any."""
+        """Identity of its basis: `content`, how emitters are grouped, kept or split, if any, and
+        its points.
+        """
+        content = self._seen(self.content)
         is_single = all(x.member_names == (x.name,) and not x.is_fixed for x in self.lights)
         if is_single and not self.split:
-            return self.content
+            return content
         structure = [(x.name, x.member_names, x.is_fixed) for x in self.lights]
-        return hashlib.sha256(repr((self.content, structure)).encode()).hexdigest()[:32]
+        return hashlib.sha256(repr((content, structure)).encode()).hexdigest()[:32]
 
     @property
     def light_identities(self) -> tuple[str, ...]:
         """Identity of the image of each light; see `Light.identity`."""
-        return tuple(light.identity(self.unlit_content) for light in self.lights)
+        unlit_content = self._seen(self.unlit_content)
+        return tuple(light.identity(unlit_content) for light in self.lights)
+
+    def _seen(self, content: str) -> str:
+        """Return a hash of the scene as that of the scene seen at its points, if it has any."""
+        return content if self.points is None else self.points.identify(content)
 
     @property
     def plane_of(self) -> Mapping[str, int]:
@@ -232,12 +243,22 @@ class Scene(SceneFiles, Shown):
         """
         return replace(self, film=reduced(self.film, reduction(self.film, resolution)))
 
+    def at_points(self, points: MeasuringPoints) -> "Scene":
+        """Return this scene as seen at points: its basis is the irradiance there, (1, p) pixels.
+
+        Light is traced by the same rules as for a picture; a point counts as a surface seen.
+        """
+        film = Film(self.film.sensor, (len(points), 1), (len(points), 1), (0, 0))
+        return replace(self, film=film, points=points)
+
     def camera(self, loaded: Any) -> Any:
         """Return the sensor of this scene in a scene that `load` returned."""
         return camera_named(loaded, self.sensor_names[self.sensor])
 
     def eye(self, loaded: Any) -> Any:
-        """Return the position of the sensor, as an `mi.Point3f`."""
+        """Return the position of the sensor, as an `mi.Point3f`, or a place beside all points."""
+        if self.points is not None:
+            return self.points.place_beside()
         return self.camera(loaded).world_transform().translation()
 
     @keywords()

@@ -148,9 +148,9 @@ def _check_equal_samples(start: Basis) -> None:
 def with_first_hits(basis: Basis, scene: Scene, seed: int, *, loaded: Any = None) -> Basis:
     """Return `basis` with features and objects, which a basis from an earlier version may lack.
 
-    loaded: the loaded `scene`, if available.
+    Measurements at points have none. loaded: the loaded `scene`, if available.
     """
-    if _has_first_hits(basis):
+    if scene.points is not None or _has_first_hits(basis):
         return basis
     features, objects = render_first_hits(scene, seed=seed, loaded=loaded)
     return replace(basis, features=features, objects=objects)

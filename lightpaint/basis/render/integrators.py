@@ -64,7 +64,10 @@ def has_indirect_planes(scene: Scene) -> bool:
     """Return whether the one pass stores indirect light separately from direct light.
 
     That doubles the memory, which is affordable for small pictures, the ones shown to people.
+    Measurements at points are no pictures, and are not denoised.
     """
+    if scene.points is not None:
+        return False
     height, width = scene.size
     is_small = 12 * len(scene.lights) * height * width <= SPLIT_MAX_BYTES
     return is_small and depth_limit(scene.integrator) > 2
@@ -81,6 +84,8 @@ def needs_a_bounce(scene: Scene) -> bool:
     `path` treats such a path as one that hit nothing, and discards the light that it gathered on
     masks, unless an environment is visible behind them.
     """
+    if scene.points is not None:
+        return False  # each path begins with a bounce
     sees_backdrop = any(x.plugin in ENVIRONMENTS for x in scene.emitters)
     is_hidden = scene.integrator.hide_emitters or not sees_backdrop
     return scene.integrator.plugin == "path" and scene.has_null and is_hidden

@@ -77,9 +77,16 @@ def method_of(scene: Scene) -> str:
     """Return the method for rendering a basis of `scene`: `ONE_PASS` or `SEPARATE`.
 
     Raises SceneError for images in texels that one pass cannot render: Mitsuba does not sample a
-    map in which only texels at a pole are lit.
+    map in which only texels at a pole are lit. The same for points, which Mitsuba does not measure.
     """
     reason = why_not_one_pass(scene)
+    if reason is not None and scene.points is not None:
+        raise SceneError(
+            f"{reason}, and light at points is only measured where one pass renders all lights: "
+            "use ",
+            Hint("integrator", "path"),
+            " and a variant like llvm_ad_rgb",
+        )
     if reason is not None and scene.split:
         raise SceneError(
             f"{reason}, so that each light is rendered by itself, and {some_names(scene.split)} "

@@ -31,6 +31,7 @@ from lightpaint.basis.render.integrators import (
 from lightpaint.basis.render.tracer.emitter_guide import EmitterGuide
 from lightpaint.basis.render.tracer.light_planes import LightPlanes, lights_by_instance
 from lightpaint.basis.render.tracer.path_tracer import Rules, View, trace_paths, trace_samples
+from lightpaint.basis.render.tracer.point_surfaces import PointSurfaces
 from lightpaint.basis.render.tracer.sobol import SobolPairs
 from lightpaint.basis.render.tracer.texel_table import TexelTable
 from lightpaint.scene.runtime.kernel_threads import kernels
@@ -214,10 +215,11 @@ def later_emitter_samples(emitters: int) -> int:
 
 
 def view_of(scene: Scene, loaded: Any) -> View:
-    """Return the view of the camera of `scene`. loaded: the loaded scene."""
+    """Return the view of `scene`, by its camera or at its points. loaded: the loaded scene."""
     camera = scene.camera(loaded)
     width, height = (int(v) // scene.film.block for v in camera.film().crop_size())
-    return View(loaded, camera, width, height)
+    points = None if scene.points is None else PointSurfaces(scene.points)
+    return View(loaded, camera, width, height, points)
 
 
 def rules_of(scene: Scene) -> Rules:

@@ -57,23 +57,25 @@ class Rules(NamedTuple):
 
 
 class View(NamedTuple):
-    """The pixels that a camera of the scene sees.
+    """The pixels that a camera of the scene sees, or the points at which light is measured.
 
     width, height: number of pixels into which the film's crop window is divided, its own or larger
-    ones.
+    ones. points: `PointSurfaces`, one for each pixel, at which paths start instead of the camera;
+    None for a camera.
     """
 
     scene: Any
     camera: Any
     width: int
     height: int
+    points: Any = None
 
 
 def _camera_rays(view, sampler, numbers, pixel, term):
     """Return one ray per sample, with random numbers drawn in the order of Mitsuba's
     SamplingIntegrator.
     """
-    _, sensor, width, height = view
+    sensor, width, height = view.camera, view.width, view.height
     film = sensor.film()
     corner = mi.Vector2f(pixel % width, pixel // width) + mi.Vector2f(film.crop_offset())
     position = corner + (sampler.next_2d() if numbers is None else numbers.pair(term, FILM))
@@ -90,18 +92,53 @@ def _camera_rays(view, sampler, numbers, pixel, term):
     return ray, weight
 
 
-def _first_hit(scene, ray, rules):
+def _first_hit(view, ray, rules):
     """Return the first hit along a camera ray, which passes through area lights if these are
-    hidden.
+    hidden; or along a ray from a measuring point, which does not.
     """
-    pi = scene.ray_intersect_preliminary(ray, True)
-    if not rules.hide_emitters:
+    scene = view.scene
+    pi = scene.ray_intersect_preliminary(ray, view.points is None)
+    if not rules.hide_emitters or view.points is not None:
         return pi
     si = pi.compute_surface_interaction(ray, mi.RayFlags.Minimal)
     behind = pi.is_valid() & (si.shape.emitter() != None)  # noqa: E711 (compares arrays)
     skipping = mi.load_dict({"type": "path", "hide_emitters": True})
     beyond = skipping.skip_area_emitters(scene, si.spawn_ray(ray.d), True, behind)
     return dr.select(behind, beyond, pi)
+
+
+class _Start(NamedTuple):
+    """Rays that leave measuring points.
+
+    weight: irradiance per radiance along the ray. point, cell: the point, and its guide cell. pdf:
+    density with which the direction of the ray was chosen.
+    """
+
+    ray: Any
+    weight: Any
+    point: Any
+    cell: Any
+    pdf: Any
+
+
+def _leave_points(view, numbers, guide, planes, rules, pixel, place, term):
+    """Add the direct light at measuring points to `planes`, and return rays for the rest.
+
+    A point is the first vertex of its path, as a surface is that a camera sees.
+    """
+    bsdf, depth = view.points.bsdf, mi.UInt32(0)
+    si = view.points.at(pixel, numbers.pair(term, APERTURE).x)
+    cell, count = guide.cell(si), rules.emitter_samples_at(depth)
+    number, is_lit = numbers.at_vertex(term, depth, 0), rules.max_depth > 1
+    # The irradiance is π times the radiance of a white surface.
+    weight = mi.Spectrum(dr.pi)
+    _sample_emitters(
+        view.scene, guide, planes, place, si, bsdf, weight, cell, number, count, depth, is_lit
+    )
+    lobe, direction, _ = _numbers_of_surface(None, numbers, term, depth)
+    sample, bsdf_weight = bsdf.sample(mi.BSDFContext(), si, lobe, direction)
+    ray = si.spawn_ray(si.to_world(sample.wo))
+    return _Start(ray, weight * bsdf_weight, mi.Interaction3f(si), cell, sample.pdf)
 
 
 @dr.syntax
@@ -119,18 +156,23 @@ def trace_samples(view, numbers, guide, planes, rules, pixel, place, term, end):
 
 @dr.syntax
 def trace_paths(view, sampler, numbers, guide, planes, rules, pixel, place, term):
-    """Trace one path from the camera for each pixel, and add its light to `planes`.
+    """Trace one path from the camera, or from a measuring point, for each pixel, and add its light
+    to `planes`.
 
     term: number of the sample. The other parameters are those of `trace_samples`.
     """
     scene = view.scene
-    ray, weight = _camera_rays(view, sampler, numbers, pixel, term)
+    if dr.hint(view.points is None, mode="scalar"):
+        ray, weight = _camera_rays(view, sampler, numbers, pixel, term)
+    else:
+        start = _leave_points(view, numbers, guide, planes, rules, pixel, place, term)
+        ray, weight = start.ray, start.weight
     # fmt: off
     throughput = mi.Spectrum(1)                 # Fraction of radiance that reaches the camera
     eta = mi.Float(1)                           # Product of relative indices of refraction
     depth = mi.UInt32(0)                        # Number of vertices after the camera
     active = rules.max_depth > 0                # Paths that continue
-    pi = _first_hit(scene, ray, rules)          # Intersection of the ray
+    pi = _first_hit(view, ray, rules)           # Intersection of the ray
     previous = dr.zeros(mi.Interaction3f)       # Vertex at which the ray starts
     previous_pdf = mi.Float(1)                  # Density with which its BSDF sampled the ray
     previous_delta = mi.Bool(True)              # Whether that density is a delta function
@@ -138,6 +180,13 @@ def trace_paths(view, sampler, numbers, guide, planes, rules, pixel, place, term
     cell = mi.UInt32(0)                         # Guide cell of the current vertex
     looks_through = mi.Bool(True)               # Whether all surfaces so far were clear
     # fmt: on
+
+    if dr.hint(view.points is not None, mode="scalar"):
+        depth = mi.UInt32(1)
+        active = rules.max_depth > 1
+        previous, previous_pdf, previous_cell = start.point, start.pdf, start.cell
+        previous_delta = mi.Bool(False)
+        looks_through = mi.Bool(False)
 
     if dr.hint(rules.must_bounce, mode="scalar"):
         active = _will_bounce(scene, sampler, numbers, term, ray, pi, active, rules)
