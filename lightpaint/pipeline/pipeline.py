@@ -16,6 +16,7 @@ from lightpaint.lighting.answer.lighting_keys import LightingKey
 from lightpaint.lighting.problem import Problem
 from lightpaint.lighting.solution import Solution
 from lightpaint.lighting.solve import solution_of
+from lightpaint.lighting.wishes.planes_answer import PlanesAnswer
 from lightpaint.pipeline.job.job import Job, PaintedView
 from lightpaint.pipeline.job.settings import Settings
 from lightpaint.pipeline.job_bases import obtain_bases_of, problem_of, view_listener, without_noise
@@ -29,6 +30,12 @@ from lightpaint.pipeline.results.answer_folder import (
 )
 from lightpaint.pipeline.results.results import Look, write_predicted, write_report
 from lightpaint.pipeline.sun_search import find_suns
+from lightpaint.pipeline.wished_planes import (
+    MeasuredPlanes,
+    answer_on_planes,
+    planes_of_job,
+    require,
+)
 from lightpaint.placement.placement import Placement
 from lightpaint.placement.suggested_lights import suggest_lights
 from lightpaint.placement.suggestion import MoveSuggestion, Suggestion
@@ -88,12 +95,15 @@ def run(job: Job, progress: Progress = silent, *, bases: list[Basis] | None = No
     job, obtained = find_suns(job, obtained, listen)
     if job.settings.error is not None:
         obtained = add_needed_samples(job, obtained, listen)
-    found = answer_job(job, obtained, listen, placement=placement)
+    planes = planes_of_job(job, listen)
+    found = answer_job(job, obtained, listen, placement=placement, planes=planes)
     rig = _suggest(job, found.solution, placement, listen)
     lighting, scene = found.lighting, job.views[0].scene
     with new_answer(job.results, lighting, scene=scene, groups=job.groups) as answer:
         looks = [
-            _finish_view(job, answer, view, analysis, rig, view_listener(job, view, listen))
+            _finish_view(
+                job, answer, view, analysis, rig, found.planes, view_listener(job, view, listen)
+            )
             for view, analysis in zip(job.views, found.analyses, strict=True)
         ]
     return [_reloaded(look) for look in looks] if answer.has_moved_paths else looks
@@ -113,12 +123,13 @@ class JobAnswer:
     """An answer before it is written.
 
     solution: of all views together, or of the first frame if lights change. analyses: of each view.
-    lighting: with what the analyses found.
+    lighting: with what the analyses found. planes: what it gives on measuring planes, None without.
     """
 
     solution: Solution
     analyses: tuple[Analysis, ...]
     lighting: Lighting
+    planes: PlanesAnswer | None = None
 
 
 def answer_job(
@@ -127,16 +138,20 @@ def answer_job(
     listen: Listener,
     *,
     placement: Placement | None = None,
+    planes: MeasuredPlanes | None = None,
 ) -> JobAnswer:
     """Solve a job and analyse its answer.
 
     bases: of its views; the list is emptied. placement: of lights whose places were searched for.
+    planes: on which the answer has to give some illuminance.
     """
     if job.settings.animate:
         return _animated_answer(job, bases, listen)
     with stage("solving", listen, SOLVE_ADVICE):
         problem = problem_of(job, bases)
         bases.clear()
+        required = None if planes is None else require(problem, planes, listen)
+        problem = problem if required is None else required.problem
         if job.settings.report:
             for basis in problem.views.bases:
                 make_ahead(basis, prepare_page)
@@ -146,8 +161,12 @@ def answer_job(
     level_errors = () if placement is None else placement.level_errors
     with stage("analysis", listen, SOLVE_ADVICE):
         analyses = analyse(solution, level_errors=level_errors)
+        on_planes = None
+        if planes is not None and required is not None:
+            on_planes = answer_on_planes(solution, planes, required)
         solution.problem.squares.release()
-        return JobAnswer(solution, analyses, with_findings(solution, analyses).lighting)
+        lighting = with_findings(solution, analyses).lighting
+        return JobAnswer(solution, analyses, lighting, on_planes)
 
 
 def _reduce_noise(job: Job, solution: Solution, listen: Listener) -> Solution:
@@ -210,6 +229,7 @@ def _finish_view(
     view: PaintedView,
     analysis: Analysis,
     rig: _RigFindings,
+    planes: PlanesAnswer | None,
     listen: Listener,
 ) -> Look:
     """Predict, verify and report a view; return its look."""
@@ -241,6 +261,7 @@ def _finish_view(
         suggestions=rig.suggestions,
         placement=rig.placement,
         move_suggestion=rig.move,
+        planes=planes,
     )
     # The files of the relit scene come to its final folder together with the report.
     with stage("report", listen, Sentence(" (", Hint("report", False), " skips it)")):

@@ -46,6 +46,7 @@ from lightpaint.report.measures import (
     relative_residual,
 )
 from lightpaint.report.page.diagnosis_section import maps_limit
+from lightpaint.report.planes_text import planes_numbers
 from lightpaint.report.reported_answer import ReportedAnswer
 from lightpaint.report.rig.hung_lights import placement_numbers
 from lightpaint.target.target import Target
@@ -79,6 +80,7 @@ def report_numbers(answer: ReportedAnswer, *, missed: Residual | None = None) ->
         "verification": None if verification is None else verification_numbers(verification),
         "suggestions": _suggestion_list(answer.suggestions, solution.lighting.cd_per_unit),
         "turn": None if answer.turn is None else _turn(answer.turn),
+        "planes": None if answer.planes is None else planes_numbers(answer.planes),
         "placement": None if answer.hung is None else placement_numbers(answer.hung),
     }
     return json.dumps(finite(numbers), indent=2, ensure_ascii=False, allow_nan=False) + "\n"

@@ -10,6 +10,7 @@ from lightpaint.lighting.analysis.appearance.color_choices import Choices
 from lightpaint.lighting.analysis.diagnosis import Diagnosis
 from lightpaint.lighting.analysis.noise.uncertainty import Uncertainty
 from lightpaint.lighting.solution import Solution
+from lightpaint.lighting.wishes.planes_answer import PlanesAnswer
 from lightpaint.placement.suggestion import MoveSuggestion, Suggestion
 from lightpaint.relit.verification import Verification
 from lightpaint.report.rig.hung_lights import HungLights
@@ -24,7 +25,8 @@ class ReportedAnswer:
     that checks the prediction. command: the shell command that made the result. uncertainty,
     diagnosis, unconstrained, suggestions, hung: without them the report has no such section.
     turn: the turn of a spot that would help most, if any. appearance: the result of
-    `compare_appearance`, if known. color_choices: the answers of other colours, if known.
+    `compare_appearance`, if known. color_choices: the answers of other colours, if known. planes:
+    what it gives on measuring planes, if there are any.
     """
 
     basis: Basis
@@ -41,3 +43,4 @@ class ReportedAnswer:
     hung: HungLights | None = None
     appearance: Appearance | None = None
     color_choices: Choices = ()
+    planes: PlanesAnswer | None = None

@@ -18,6 +18,7 @@ from lightpaint.display_text import some_names, some_of
 from lightpaint.lighting.analysis.appearance.constraint_kinds import KEYS_BY_KIND
 from lightpaint.lighting.analysis.appearance.limiting_reasons import Reason
 from lightpaint.lighting.answer.lighting import LightSetting
+from lightpaint.lighting.wishes.planes_answer import PlanesAnswer
 from lightpaint.pipeline.job.settings import Settings
 from lightpaint.pipeline.results.results import Look
 from lightpaint.report.answer_pictures import spoken_view
@@ -37,6 +38,7 @@ from lightpaint.report.diagnosis_sentences import (
 )
 from lightpaint.report.measures import energy_shares
 from lightpaint.report.page.constraint_section import closer_choice
+from lightpaint.report.planes_text import HEADINGS, plane_rows, planes_sentences
 from lightpaint.report.phrases import spoken_drives, spoken_percent, spoken_preference
 from lightpaint.sentences import Sentence, SourceKey
 
@@ -66,6 +68,8 @@ def show_look(look: Look, folder: Path, *, table: Table = "short") -> None:
     else:
         _show_short(look)
     terminal.write("")
+    if look.planes is not None:
+        show_planes(look.planes)
     terminal.tell(fit_sentence(look.solution, instead="--literal turns this off"))
     certificate = look.solution.certificate
     if curve := certificate.curve:
@@ -81,6 +85,17 @@ def show_look(look: Look, folder: Path, *, table: Table = "short") -> None:
         )
     if look.verification is not None and not look.verification.agrees:
         terminal.say(f"WARNING: {spoken_agreement(look.verification)}")
+
+
+def show_planes(answer: PlanesAnswer) -> None:
+    """Print what an answer gives on measuring planes."""
+    table = terminal.table(*HEADINGS)
+    for row in plane_rows(answer):
+        table.row(*row)
+    terminal.print_table(table)
+    for sentence in planes_sentences(answer):
+        terminal.tell(sentence)
+    terminal.write("")
 
 
 def _sentences(look: Look, table: Table) -> list[str]:

@@ -2,6 +2,8 @@
 
 from dataclasses import dataclass, replace
 
+import numpy as np
+
 from lightpaint.arrays import Doubles
 from lightpaint.lighting.problem import Problem
 from lightpaint.lighting.wishes.linear_programs import shares_given_up
@@ -12,11 +14,12 @@ from lightpaint.lighting.wishes.wished_light import WishedLight
 class RequiredProblem:
     """A problem whose answer meets wishes.
 
-    problem: with the wishes as requirements. shares: (w,), what had to be given up of each wish, 0
-    of those that are met.
+    problem: with the wishes as requirements. wished: the wishes. shares: (w,), what had to be given
+    up of each, 0 of those that are met.
     """
 
     problem: Problem
+    wished: WishedLight
     shares: Doubles
 
 
@@ -25,7 +28,7 @@ def with_wishes(problem: Problem, wished: WishedLight) -> RequiredProblem:
     under as much of them as possible.
     """
     if wished.is_empty:
-        return RequiredProblem(problem, wished.requirements.least[:0])
+        return RequiredProblem(problem, wished, np.zeros(0))
     reduction = problem.reduction.with_requirements(wished.requirements)
     shares = shares_given_up(wished, reduction)
     if shares.any():
@@ -34,4 +37,4 @@ def with_wishes(problem: Problem, wished: WishedLight) -> RequiredProblem:
     requirements = reduction.requirements
     assert requirements is not None
     full = problem.full.with_requirements(requirements)
-    return RequiredProblem(replace(problem, reduction=reduction, full=full), shares)
+    return RequiredProblem(replace(problem, reduction=reduction, full=full), wished, shares)

@@ -64,6 +64,8 @@ class Settings(Fit):
         animate: True to find a lighting for each painted frame of a shot, and lights that change
             smoothly between them, instead of one lighting for all.
         cd_per_unit: cd/m² that a radiance of 1 stands for, for luminous quantities in the results.
+        planes: Path of a planes file, whose planes need certain illuminances: the answer meets
+            these, and comes as close to the painting as it then can. Needs a scene.
         verify: Whether to render the relit scene and compare it with the prediction, with at most
             as many samples as the basis, so that it takes no longer.
         verify_spp: Samples per pixel of the verification on the whole film, instead of that limit.
@@ -237,6 +239,17 @@ class Settings(Fit):
             theme="Lights",
         ),
     ] = None
+    planes: Annotated[
+        str | None,
+        a(str, "the path of a planes file"),
+        Option(
+            "--planes FILE",
+            "measuring planes, with the illuminance that they need: the lighting that comes "
+            "closest to the painting and meets it (docs/photometry.md)",
+            default="no requirements",
+            theme="Lights",
+        ),
+    ] = None
     verify: Annotated[
         bool,
         Option(
@@ -358,6 +371,7 @@ class SettingsByName(TypedDict, total=False):
     move_lights: bool
     animate: bool
     cd_per_unit: float | None
+    planes: str | None
     verify: bool
     verify_spp: int | None
     report: bool

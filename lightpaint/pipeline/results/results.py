@@ -19,6 +19,7 @@ from lightpaint.lighting.analysis.diagnosis import Diagnosis
 from lightpaint.lighting.analysis.noise.uncertainty import Uncertainty
 from lightpaint.lighting.answer.lighting import Lighting
 from lightpaint.lighting.solution import Solution
+from lightpaint.lighting.wishes.planes_answer import PlanesAnswer
 from lightpaint.pipeline.results.placement_changes import hung_of
 from lightpaint.placement.placement import Placement
 from lightpaint.placement.suggestion import MoveSuggestion, Suggestion
@@ -85,6 +86,7 @@ class Look:
         placement: The places that were found for lights; None if none may move.
         move_suggestion: The turn of a spot that would help most, if suggestions were requested and
             one surely helps.
+        planes: What the answer gives on measuring planes; None without any.
 
     Examples:
         >>> look = lp.paint_with_light(None, "painting.exr", "evening", basis="room.basis.exr")
@@ -102,6 +104,7 @@ class Look:
     suggestions: tuple[Suggestion, ...] | None = None
     placement: Placement | None = None
     move_suggestion: MoveSuggestion | None = None
+    planes: PlanesAnswer | None = None
 
     def __repr__(self) -> str:
         return f"Look(of {self.target.name}: {self.verdict})"
@@ -256,6 +259,7 @@ def _reported_answer(look: Look, command: str) -> ReportedAnswer:
         hung=None if look.placement is None else hung_of(look.placement, look.lighting),
         appearance=look.analysis.appearance,
         color_choices=look.analysis.color_choices,
+        planes=look.planes,
     )
 
 

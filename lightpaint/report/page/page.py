@@ -42,6 +42,7 @@ from lightpaint.report.page.fit_tables import (
 from lightpaint.report.page.html import html
 from lightpaint.report.page.lights_table import MAX_THUMBNAILS, lights_table, thumbnails_of
 from lightpaint.report.page.mixer import mixer_assets, mixer_html, planes_for_page
+from lightpaint.report.page.planes_section import planes_section
 from lightpaint.report.page.placement_section import placement_section, suggestion_section
 from lightpaint.report.reported_answer import ReportedAnswer
 from lightpaint.report.verdict import spoken_samples, verdict
@@ -112,6 +113,7 @@ def report_page(
         colors=colors_section(answer.color_choices),
         exposure=_exposure(transform, predicted.image, looks.denoiser),
         wishes=wishes_section(answer.appearance),
+        planes=planes_section(answer.planes),
         places=placement_section(answer.hung, shown_answer, basis.features),
         suggestions=suggestion_section(
             answer.suggestions,

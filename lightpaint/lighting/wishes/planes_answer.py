@@ -1,0 +1,133 @@
+"""What a lighting gives on measuring planes, beside what was wished for there."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+
+from lightpaint.arrays import Doubles
+from lightpaint.errors import ConstraintError
+from lightpaint.lighting.unknowns.reduction import Reduction
+from lightpaint.lighting.unknowns.requirements import watts_of_fixed
+from lightpaint.lighting.wishes.wished_light import Wish, WishedLight, check_powers
+from lightpaint.photometry.illuminance import PlaneReading
+
+#: Relative shortfall from which a wish is not met: rows are met up to round-off.
+MISSED = 1e-4
+
+#: Relative distance from its largest at which a drive is at full.
+AT_FULL = 1e-3
+
+
+@dataclass(frozen=True)
+class WishOutcome:
+    """A wish, and what came of it.
+
+    reached: in the unit of what was asked, at the sure end of its 95 % interval. price: the rise of
+    the least power in watts with each unit that is asked; None where a painting was solved for.
+    """
+
+    wish: Wish
+    reached: float
+    price: float | None = None
+
+    @property
+    def is_met(self) -> bool:
+        """True if what was asked for is there."""
+        asked, room = self.wish.asked, MISSED * abs(self.wish.asked)
+        if self.wish.kind in ("max", "power"):
+            return self.reached <= asked + room
+        return self.reached >= asked - room
+
+
+@dataclass(frozen=True)
+class PlanesAnswer:
+    """A lighting on measuring planes.
+
+    outcomes: of all wishes. readings: of all planes, by name. watts: the power of all lamps; None
+    if that of one is unknown. floor_m2: the area of planes that face upwards; 0 without any.
+    all_at_full: whether no lamp could give more. cost_delta_e: the mean CIEDE2000 to the painting
+    beyond that of an answer without wishes; None without a painting.
+    """
+
+    wished: WishedLight
+    weights: Doubles
+    outcomes: tuple[WishOutcome, ...]
+    watts: float | None
+    floor_m2: float
+    all_at_full: bool
+    cost_delta_e: float | None = None
+
+    @cached_property
+    def readings(self) -> Mapping[str, PlaneReading]:
+        """The illuminance on each plane, by its name."""
+        return self.wished.illuminance.readings(self.weights)
+
+    @property
+    def missed(self) -> tuple[WishOutcome, ...]:
+        """The wishes that are not met."""
+        return tuple(x for x in self.outcomes if not x.is_met)
+
+
+def planes_answer(
+    wished: WishedLight,
+    reduction: Reduction,
+    weights: Doubles,
+    *,
+    floor_m2: float,
+    prices: Doubles | None = None,
+    cost_delta_e: float | None = None,
+) -> PlanesAnswer:
+    """Return what weights (n, 3) give.
+
+    reduction: of the lights. prices: of each wish, (w,), in watts per unit; see `WishOutcome`.
+    """
+    watts = _power(reduction, wished, weights)
+    sums = np.einsum("mnc,nc->m", wished.requirements.rows, weights)
+    outcomes = tuple(
+        WishOutcome(
+            wish,
+            _reached(wished, wish, sums, weights, watts),
+            None if prices is None else float(prices[k]),
+        )
+        for k, wish in enumerate(wished.wishes)
+    )
+    is_full = _is_all_at_full(reduction, weights)
+    return PlanesAnswer(wished, weights, outcomes, watts, floor_m2, is_full, cost_delta_e)
+
+
+def _reached(
+    wished: WishedLight, wish: Wish, rows: Doubles, weights: Doubles, watts: float | None
+) -> float:
+    """Return what came of a wish, at the sure end of its interval."""
+    if wish.kind == "power":
+        return float("nan") if watts is None else watts
+    values, illuminance = rows[wish.rows], wished.illuminance
+    if wish.kind == "mean":
+        return float(values.min())
+    if wish.kind == "max":
+        return -float(values.min())
+    base = illuminance.reading(wish.to or wish.plane, weights).mean
+    return wish.asked + float(values.min()) / base if base > 0 else 0.0
+
+
+def _power(reduction: Reduction, wished: WishedLight, weights: Doubles) -> float | None:
+    """Return the power of all lamps in watts; None if that of one is unknown."""
+    try:
+        check_powers(reduction, wished.illuminance.lights.names, "")
+    except ConstraintError:
+        return None
+    return watts_of_fixed(weights, reduction.lamps)
+
+
+def _is_all_at_full(reduction: Reduction, weights: Doubles) -> bool:
+    """Return whether no lamp could give more light."""
+    movable = {light for knob in reduction.knobs for light in knob.lights}
+    if not movable <= set(reduction.lamps):
+        return False
+    for light in movable:
+        lamp = reduction.lamps[light]
+        if (lamp.drives_for(weights[light]) < lamp.most * (1 - AT_FULL)).any():
+            return False
+    return bool(movable)

@@ -1,0 +1,141 @@
+"""Planes on which a job wishes for illuminance: measured before the solve, and read after it."""
+
+from dataclasses import dataclass, replace
+from pathlib import Path
+
+import numpy as np
+
+from lightpaint.arrays import Doubles
+from lightpaint.errors import LightpaintError
+from lightpaint.lighting.analysis.appearance.display_difference import PaintComparison
+from lightpaint.lighting.problem import Problem
+from lightpaint.lighting.solution import Solution
+from lightpaint.lighting.solve import solution_of
+from lightpaint.lighting.unknowns.reduction import Reduction
+from lightpaint.lighting.wishes.planes_answer import PlanesAnswer, planes_answer
+from lightpaint.lighting.wishes.required_problem import RequiredProblem, with_wishes
+from lightpaint.lighting.wishes.wished_light import WishedLight, wished_light
+from lightpaint.photometry.illuminance import Illuminance
+from lightpaint.photometry.measure import measure_illuminance
+from lightpaint.photometry.planes_file import PlanesFile, read_planes
+from lightpaint.pipeline.job.job import Job
+from lightpaint.pipeline.job.settings import Settings
+from lightpaint.progress import Listener
+from lightpaint.scene.scene import Scene
+from lightpaint.sentences import Hint
+
+#: Largest error of a plane's mean, at 95 %, unless the settings say another.
+MEAN_ERROR = 0.02
+
+
+@dataclass(frozen=True)
+class MeasuredPlanes:
+    """Planes of a file with the illuminance of each light on them.
+
+    floor_m2: the area of planes that face upwards.
+    """
+
+    file: PlanesFile
+    illuminance: Illuminance
+    floor_m2: float
+
+    def wished_of(self, reduction: Reduction) -> WishedLight:
+        """Return the wishes as requirements of the lights of `reduction`."""
+        budget = self.file.power
+        return wished_light(self.illuminance, budget, reduction, floor_m2=self.floor_m2)
+
+
+def measure_planes(
+    scene: Scene,
+    path: str | Path,
+    settings: Settings,
+    cd_per_unit: float | None,
+    listen: Listener,
+) -> MeasuredPlanes:
+    """Measure the illuminance of each light on the planes of a file.
+
+    cd_per_unit: of the lights file or the settings. Raises LightpaintError if nothing says what a
+    radiance of 1 stands for.
+    """
+    file = read_planes(path, scene)
+    if cd_per_unit is None:
+        raise LightpaintError(
+            f"{path} asks for lux, and nothing says how many cd/m² a radiance of 1 is: pass ",
+            Hint("cd_per_unit", 1),
+            ", or cd_per_unit in the lights file",
+        )
+    illuminance = measure_illuminance(
+        scene,
+        file.planes,
+        error=settings.error or MEAN_ERROR,
+        cd_per_unit=cd_per_unit,
+        seed=settings.seed,
+        use_cache=settings.use_cache,
+        progress=listen,
+    )
+    points = sum(len(plane) for plane in file.planes)
+    listen.note(f"illuminance measured at {points} points of {len(file.planes)} planes")
+    return MeasuredPlanes(file, illuminance, _floor_area(file, scene))
+
+
+def planes_of_job(job: Job, listen: Listener) -> MeasuredPlanes | None:
+    """Return the planes that a job wishes for, measured; None without any."""
+    if job.settings.planes is None:
+        return None
+    scene = job.views[0].scene
+    if scene is None:
+        raise LightpaintError(
+            f"{job.settings.planes} has planes to measure, and a saved basis has no scene: give "
+            "the scene instead"
+        )
+    scale = job.all_constraints.cd_per_unit
+    return measure_planes(scene, job.settings.planes, job.settings, scale, listen)
+
+
+def require(problem: Problem, planes: MeasuredPlanes, listen: Listener) -> RequiredProblem:
+    """Return the problem under the wishes for planes, and say what is not within reach."""
+    required = with_wishes(problem, planes.wished_of(problem.reduction))
+    if required.shares.any():
+        listen.note("not all that planes ask for is within reach: as much of it as there can be")
+    return required
+
+
+def answer_on_planes(
+    solution: Solution, planes: MeasuredPlanes, required: RequiredProblem
+) -> PlanesAnswer:
+    """Return what a solution gives on planes, and what their wishes cost the picture."""
+    reduction = solution.problem.reduction
+    return planes_answer(
+        required.wished,
+        reduction,
+        solution.weights,
+        floor_m2=planes.floor_m2,
+        cost_delta_e=_cost_in_delta_e(solution),
+    )
+
+
+def _cost_in_delta_e(solution: Solution) -> float | None:
+    """Return by how much the answer is further from the painting than one without wishes."""
+    problem = solution.problem
+    if problem.reduction.requirements is None:
+        return None
+    free = _without_requirements(problem)
+    look = PaintComparison.of_problem(problem)
+    rows = look.rows(problem.basis.planes)
+
+    def missed(weights: Doubles) -> float:
+        return look.mean(look.difference(np.einsum("npc,nc->pc", rows, weights)))
+
+    return missed(solution.weights) - missed(solution_of(free, start=solution.weights).weights)
+
+
+def _without_requirements(problem: Problem) -> Problem:
+    reduction = replace(problem.reduction, requirements=None)
+    return replace(problem, reduction=reduction, full=replace(problem.full, requirements=None))
+
+
+def _floor_area(file: PlanesFile, scene: Scene) -> float:
+    up = np.array(scene.up)
+    return sum(
+        plane.area_m2 for plane in file.planes if float((plane.normals @ up).mean()) > 0.7
+    )

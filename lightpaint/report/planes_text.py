@@ -1,0 +1,140 @@
+"""What a lighting gives on measuring planes, in words and in rows of tables."""
+
+import math
+from collections.abc import Iterator
+from typing import Any
+
+from lightpaint.lighting.wishes.planes_answer import PlanesAnswer, WishOutcome
+from lightpaint.lighting.wishes.wished_light import NORMAL_95
+from lightpaint.photometry.illuminance import PlaneReading
+from lightpaint.photometry.measuring_plane import MeasuringPlane
+
+#: Headings of a table of planes.
+HEADINGS = ("plane", "Em lx", "U0", "least lx", "most lx", "needed", "W/m² per 100 lx")
+
+#: A step of what is asked for that people think in, for prices: lx, a share, and watts.
+STEPS = {"mean": (10.0, "last 10 lx on"), "uniformity": (0.01, "last .01 of uniformity on")}
+
+#: Price in watts below which it is not worth a sentence.
+LEAST_PRICE = 0.05
+
+#: Cost of wishes in CIEDE2000 below which they cost the picture nothing that shows.
+LEAST_COST = 0.05
+
+
+def plane_rows(answer: PlanesAnswer) -> Iterator[tuple[str, ...]]:
+    """Yield a row for each plane, in the order of `HEADINGS`."""
+    for plane in answer.wished.illuminance.planes:
+        reading = answer.readings[plane.name]
+        yield (
+            plane.name,
+            f"{reading.mean:.0f} ± {NORMAL_95 * reading.mean_error:.1g}",
+            f"{reading.uniformity:.2f} ± {NORMAL_95 * reading.uniformity_error:.1g}",
+            f"{reading.least:.0f}",
+            f"{reading.most:.0f}",
+            needed(plane),
+            _density(answer, reading),
+        )
+
+
+def needed(plane: MeasuringPlane) -> str:
+    """Return what a plane needs in few words; "" if nothing."""
+    wishes = plane.wishes
+    parts = [] if wishes.mean is None else [f"{wishes.mean:g} lx"]
+    parts += [] if wishes.uniformity is None else [f"U0 {wishes.uniformity:g}"]
+    parts += [] if wishes.most is None else [f"at most {wishes.most:g} lx"]
+    parts += [f"{x.at_least:g} of {x.to}" for x in wishes.ratios]
+    return ", ".join(parts)
+
+
+def planes_sentences(answer: PlanesAnswer) -> list[str]:
+    """Return what is missed, what the power is, and what the needs of planes cost."""
+    sentences = [_missed(answer, outcome) for outcome in answer.missed]
+    if not answer.missed and answer.outcomes:
+        sentences.append("All that the planes need is there.")
+    if answer.watts is not None:
+        power = f"The lamps take {answer.watts:.4g} W"
+        if answer.floor_m2:
+            power += f", {answer.watts / answer.floor_m2:.3g} W/m²"
+        sentences.append(f"{power}.")
+    sentences += _prices(answer)
+    if answer.cost_delta_e is not None:
+        cost = answer.cost_delta_e
+        text = f"by ΔE {cost:.1f} further" if cost >= LEAST_COST else "no further"
+        sentences.append(f"With the needs of planes the picture is {text} from the painting.")
+    return sentences
+
+
+def planes_numbers(answer: PlanesAnswer) -> dict[str, Any]:
+    """Return the planes as numbers of report.json."""
+    planes = {}
+    for name, reading in answer.readings.items():
+        planes[name] = {
+            "mean_lx": reading.mean,
+            "mean_error_lx": reading.mean_error,
+            "uniformity": reading.uniformity,
+            "uniformity_error": reading.uniformity_error,
+            "least_lx": reading.least,
+            "most_lx": reading.most,
+            "points": reading.points,
+            "needs": [_outcome_numbers(x) for x in answer.outcomes if x.wish.plane == name],
+        }
+    budget = [x.wish.asked for x in answer.outcomes if x.wish.kind == "power"]
+    return {
+        "planes": planes,
+        "watts": answer.watts,
+        "budget_watts": min(budget, default=None),
+        "floor_m2": answer.floor_m2 or None,
+        "cost_delta_e": answer.cost_delta_e,
+    }
+
+
+def _outcome_numbers(outcome: WishOutcome) -> dict[str, Any]:
+    wish = outcome.wish
+    return {
+        "kind": wish.kind,
+        "asked": wish.asked,
+        "to": wish.to or None,
+        "reached": outcome.reached,
+        "is_met": outcome.is_met,
+        "watts_per_unit": outcome.price,
+    }
+
+
+def _density(answer: PlanesAnswer, reading: PlaneReading) -> str:
+    """Return the power per m² and 100 lx; "" where something of that is unknown."""
+    if answer.watts is None or not answer.floor_m2 or not reading.mean:
+        return ""
+    return f"{answer.watts / answer.floor_m2 / (reading.mean / 100):.2f}"
+
+
+def _missed(answer: PlanesAnswer, outcome: WishOutcome) -> str:
+    wish, reached = outcome.wish, outcome.reached
+    if wish.kind == "mean":
+        text = f"{wish.plane}: {reached:.0f} of {wish.asked:g} lx"
+        if not answer.all_at_full:
+            return f"{text}, as much as the other needs leave."
+        count = len(answer.wished.illuminance.lights)
+        more = math.ceil(count * (wish.asked / reached - 1)) if reached > 0 else 0
+        advice = f"; about {more} more lamps like these {count} would do" if more else ""
+        return f"{text}: all lamps are at full{advice}."
+    if wish.kind == "uniformity":
+        return f"{wish.plane}: a uniformity of {reached:.2f}, where {wish.asked:g} is needed."
+    if wish.kind == "max":
+        return f"{wish.plane}: a point has {reached:.0f} lx, where {wish.asked:g} is the most."
+    if wish.kind == "ratio":
+        return (
+            f"{wish.plane}: {reached:.2f} of the illuminance of {wish.to}, where {wish.asked:g} "
+            "is needed."
+        )
+    return f"The lamps take {reached:.4g} W, where {wish.asked:g} W are allowed."
+
+
+def _prices(answer: PlanesAnswer) -> Iterator[str]:
+    """Yield what the last steps of needs cost, where they cost power."""
+    for outcome in answer.outcomes:
+        if outcome.price is None or outcome.wish.kind not in STEPS:
+            continue
+        step, text = STEPS[outcome.wish.kind]
+        if (watts := step * outcome.price) >= LEAST_PRICE:
+            yield f"The {text} {outcome.wish.plane} cost {watts:.2g} W."
