@@ -5,7 +5,7 @@ A radiance of 1 in all channels stands for u cd/m², so an irradiance (R, G, B) 
     E = u (0.2126 R + 0.7152 G + 0.0722 B) lx
 
 Values are estimates with noise. Two halves of the samples give the half difference of each point,
-which has one degree of freedom only: errors are pooled over the points of a plane.
+which alone has one degree of freedom, so a point's error also counts those of its plane.
 """
 
 import math
@@ -19,6 +19,11 @@ from lightpaint.basis.lights import Lights
 from lightpaint.display_text import some_names
 from lightpaint.errors import SceneError
 from lightpaint.photometry.measuring_plane import MeasuringPlane, slices_of
+
+#: Share of a plane's mean below which the error of a point is taken to be as large as there.
+DARK_SHARE = 0.1
+#: Weight of a plane's mean square error against a point's own, in degrees of freedom.
+POOLED_DEGREES = 4
 
 #: Points this many standard errors of a difference above the least one may be the darkest.
 CANDIDATE_ERRORS = 3.0
@@ -90,16 +95,18 @@ class Illuminance:
     def standard_errors(self, weights: Doubles) -> Doubles:
         """Return the standard errors of `of(weights)`, (p,) in lx.
 
-        The relative error is taken to be equal at all lit points of a plane, and is the root mean
-        square of their relative half differences.
+        The error of a point is estimated from its own half difference and, with four times the
+        weight, from the root mean square over its plane of the half differences in relation to the
+        light. The light of a point below a tenth of the mean counts as that much.
         """
         values, halves = self.of(weights), self._mix(self.half_differences, weights)
         errors = np.zeros(len(values))
         for part in self._slices.values():
-            is_lit = values[part] > 0
-            relative = halves[part][is_lit] / values[part][is_lit]
-            if relative.size:
-                errors[part] = np.abs(values[part]) * math.sqrt(float(np.mean(relative**2)))
+            light = floored(values[part])
+            if light.any():
+                pooled = light**2 * np.mean((halves[part] / light) ** 2)
+                squares = POOLED_DEGREES * pooled + halves[part] ** 2
+                errors[part] = np.sqrt(squares / (POOLED_DEGREES + 1))
         return errors
 
     def reading(self, plane: str, weights: Doubles) -> PlaneReading:
@@ -135,6 +142,11 @@ class Illuminance:
         if shape != expected:
             raise SceneError(f"weights of the shape {shape}: expected {expected}, a row per light")
         return np.asarray(matrix.reshape(len(matrix), -1) @ np.asarray(weights).reshape(-1))
+
+
+def floored(values: Doubles) -> Doubles:
+    """Return the illuminance of a plane, (p,), at least `DARK_SHARE` of its mean at each point."""
+    return np.asarray(np.maximum(np.abs(values), DARK_SHARE * np.abs(values).mean()))
 
 
 def _bias_bound(values: Doubles, errors: Doubles) -> float:

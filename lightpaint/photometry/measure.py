@@ -1,13 +1,40 @@
-"""Measures the illuminance at points of planes, from every light, in one pass."""
+"""Measures the illuminance at points of planes, from every light, in one pass.
+
+The points take the place of the film's pixels (`Scene.at_points`), so a measurement is a basis: it
+is rendered by the same path tracer and cached in the same files as pictures are.
+"""
 
 from collections.abc import Sequence
 
-from lightpaint.photometry.illuminance import Illuminance
+import numpy as np
+from scipy.special import stdtrit
+
+from lightpaint.arrays import Doubles, Floats
+from lightpaint.basis.basis import Basis
+from lightpaint.basis.cache.cached_render import obtain_basis
+from lightpaint.basis.lights import Lights
+from lightpaint.colour.color import LUMINANCE
+from lightpaint.display_text import brief, some_names
+from lightpaint.errors import SceneError
+from lightpaint.keywords import keywords
+from lightpaint.photometry.illuminance import Illuminance, floored
 from lightpaint.photometry.measuring_plane import MeasuringPlane
-from lightpaint.progress import Progress, silent
+from lightpaint.progress import Progress, listener, silent
+from lightpaint.scene.properties.measuring_points import MeasuringPoints
 from lightpaint.scene.scene import Scene
+from lightpaint.validation import Check, between, number
+
+#: Samples per point of the first round, and beyond which none are added.
+FIRST_SPP, MOST_SPP = 64, 2**16
+#: Factors by which a round increases the number of samples, and share of the squared error that
+#: was asked for at which it aims.
+LEAST_GROWTH, MOST_GROWTH, AIM = 2, 16, 0.8
+
+#: Share of the brightest plane's mean below which a plane's errors count as of one that bright.
+DIM_SHARE = 1e-3
 
 
+@keywords()
 def measure_illuminance(
     scene: Scene,
     planes: Sequence[MeasuringPlane],
@@ -19,10 +46,105 @@ def measure_illuminance(
     use_cache: bool = True,
     progress: Progress = silent,
 ) -> Illuminance:
-    """Return the illuminance at the points of `planes` from every light of `scene`.
+    """Measure the illuminance at the points of planes, from every light of `scene` alone.
 
-    spp: samples per point; by default as many as the error needs. error: largest relative error of
-    the 95 % interval of a plane's mean, and standard error of a point, with all lights as they are.
-    cd_per_unit: cd/m² of a radiance of 1. Raises Interrupted on Ctrl-C, which keeps samples.
+    Args:
+        scene: From `load_scene`.
+        planes: From `read_planes`.
+        spp: Samples per point; by default as many as `error` needs, at most 65,536.
+        error: Largest half width of the 95 % interval of a plane's mean, and standard error of its
+            points, both relative and with all lights as they are now. A point with less than a
+            tenth of the mean, or a plane with less than a thousandth of the light of the brightest,
+            counts as one with that much.
+        cd_per_unit: cd/m² of a radiance of 1 in the scene.
+        seed: Any number >= 0; different seeds give independent measurements.
+        use_cache: Whether measurements are cached as bases are.
+        progress: Called with the progress of the work.
+
+    Raises:
+        SceneError: If the scene cannot be rendered in one pass, or an argument is invalid.
+        Interrupted: On Ctrl-C, which keeps the samples so far.
     """
-    raise NotImplementedError
+    _check("error", error, between(1e-6, 1, "a relative error"))
+    _check("cd_per_unit", cd_per_unit, number("cd/m²"))
+    listen, at_points = listener(progress), scene.at_points(points_of(planes))
+    goal = FIRST_SPP if spp is None else spp
+    while True:
+        basis = obtain_basis(at_points, spp=goal, seed=seed, use_cache=use_cache, progress=listen)
+        measured = illuminance_of(basis, planes, cd_per_unit)
+        if spp is not None:
+            return measured
+        excess = error_excess(measured, weights_on(measured.lights), error)
+        if excess <= 1:
+            return measured
+        if basis.origin.spp >= MOST_SPP:
+            listen.say(
+                f"{MOST_SPP} samples per point are the most that are taken, and the errors are "
+                f"{excess:.1f} times as large as asked for"
+            )
+            return measured
+        growth = np.clip(excess**2 / AIM, LEAST_GROWTH, MOST_GROWTH)
+        goal = min(int(growth * basis.origin.spp), MOST_SPP)
+
+
+def _check(name: str, value: float, check: Check) -> None:
+    """Raise SceneError for an argument that `check` refuses."""
+    if not check.is_valid(value):
+        raise SceneError(f"{name} is {brief(value)}: expected {check.expectation}")
+
+
+def points_of(planes: Sequence[MeasuringPlane]) -> MeasuringPoints:
+    """Return the points of all planes. Raises SceneError without a plane, or for equal names."""
+    names = [plane.name for plane in planes]
+    if not planes or len(set(names)) < len(names):
+        given = some_names(names) or "none"
+        raise SceneError(f"planes are {given}: expected at least one, each with a name of its own")
+    return MeasuringPoints(
+        np.concatenate([plane.points for plane in planes]),
+        np.concatenate([plane.normals for plane in planes]),
+        np.concatenate([np.full(len(plane), plane.is_cylindrical) for plane in planes]),
+    )
+
+
+def illuminance_of(
+    basis: Basis, planes: Sequence[MeasuringPlane], cd_per_unit: float
+) -> Illuminance:
+    """Return the illuminance on `planes`, from the basis of their points."""
+
+    def in_lux(irradiance: Floats) -> Doubles:
+        return np.asarray(cd_per_unit * irradiance[:, 0].swapaxes(0, 1) * LUMINANCE, np.float64)
+
+    return Illuminance(
+        tuple(planes),
+        basis.lights,
+        in_lux(basis.images),
+        in_lux(basis.half_differences),
+        float(cd_per_unit),
+    )
+
+
+def weights_on(lights: Lights) -> Doubles:
+    """Return the weights of all lights as they are now, (n, 3); 1 each if all are dark."""
+    current = lights.current_weights
+    return current if current[~lights.is_fixed].any() else np.ones_like(current)
+
+
+def error_excess(measured: Illuminance, weights: Doubles, error: float) -> float:
+    """Return the largest ratio of an error of a plane to the one asked for.
+
+    error: relative. Of a plane's mean this is half of its 95 % interval, by Student's distribution
+    with as many degrees of freedom as it has points; of its points the root mean square of their
+    standard errors in relation to their light.
+    """
+    values, errors = measured.of(weights), measured.standard_errors(weights)
+    readings = measured.readings(weights)
+    dimmest = DIM_SHARE * max(reading.mean for reading in readings.values())
+    excess = 0.0
+    for name, reading in readings.items():
+        if (scale := max(reading.mean, dimmest)) > 0:
+            part = measured.points_of(name)
+            half_width = float(stdtrit(reading.points, 0.975)) * reading.mean_error
+            relative = errors[part] / np.maximum(floored(values[part]), dimmest)
+            of_points = float(np.sqrt(np.mean(relative**2)))
+            excess = max(excess, half_width / scale / error, of_points / error)
+    return excess
