@@ -26,6 +26,7 @@ _MODULES = {
     "export": "program_commands",
     "listen": "console_commands",
     "paint": "paint_command",
+    "plan": "plan_command",
     "rig": "rig_command",
     "send": "console_commands",
     "solve": "solve_command",

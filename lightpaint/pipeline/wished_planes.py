@@ -136,6 +136,4 @@ def _without_requirements(problem: Problem) -> Problem:
 
 def _floor_area(file: PlanesFile, scene: Scene) -> float:
     up = np.array(scene.up)
-    return sum(
-        plane.area_m2 for plane in file.planes if float((plane.normals @ up).mean()) > 0.7
-    )
+    return sum(plane.area_m2 for plane in file.planes if float((plane.normals @ up).mean()) > 0.7)

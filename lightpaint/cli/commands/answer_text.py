@@ -38,8 +38,8 @@ from lightpaint.report.diagnosis_sentences import (
 )
 from lightpaint.report.measures import energy_shares
 from lightpaint.report.page.constraint_section import closer_choice
-from lightpaint.report.planes_text import HEADINGS, plane_rows, planes_sentences
 from lightpaint.report.phrases import spoken_drives, spoken_percent, spoken_preference
+from lightpaint.report.planes_text import HEADINGS, plane_rows, planes_sentences
 from lightpaint.sentences import Sentence, SourceKey
 
 Table = Literal["short", "full"]

@@ -2,7 +2,7 @@
 
 from argparse import Namespace
 from collections.abc import Sequence
-from dataclasses import fields
+from dataclasses import fields, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -70,6 +70,14 @@ def values_of(options: Namespace, words: Sequence[str]) -> dict[str, Any]:
                 "address": options.interface,
                 "port": options.port,
                 "seconds": options.seconds,
+            }
+        case "plan":
+            return {
+                "scene": scene_of(options),
+                "planes": Path(options.planes) if options.planes else None,
+                "output": output,
+                "constraints": constraints_of(options),
+                "settings": replace(settings, planes=None),
             }
         case "paint":
             return _paint_arguments(options, settings, words)

@@ -313,7 +313,7 @@ def _parser_of(option: Option, check: Check) -> Callable[[str], Any]:
 OTHER_OPTIONS: dict[Theme, str] = {
     "Painting": "--target --mask --layer --template --no-template --paint --view --exposure "
     "--layers",
-    "Lights": "--lights --group --lights-file --no-lights-file --no-group-alike --split "
+    "Lights": "--least --lights --group --lights-file --no-lights-file --no-group-alike --split "
     "--symmetric --pattern",
     "Scene and camera": "--scene --stage --sensor -D --integrator --variant --room --rig --gdtf "
     "--zoom --pixels --only-lights",

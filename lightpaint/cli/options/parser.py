@@ -287,6 +287,27 @@ def _relight(parser: argparse.ArgumentParser) -> None:
     add_fields(parser, Settings, "force")
 
 
+def _plan(parser: argparse.ArgumentParser) -> None:
+    add_scene(parser)
+    parser.add_argument(
+        "--planes",
+        metavar="FILE",
+        help="measuring planes and what they need (default: hall.planes.toml beside hall.xml)",
+    )
+    parser.add_argument(
+        "--least",
+        choices=("watts",),
+        default="watts",
+        help="what to save where needs can be met in several ways (default: %(default)s)",
+    )
+    add_lights(parser)
+    add_constraints(parser)
+    add_fields(parser, Settings, "error", "seed", "cd_per_unit")
+    add_cache(parser)
+    add_output(parser, "DIR", "result folder (default: named after the scene)")
+    add_fields(parser, Settings, "force")
+
+
 def _verify(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("folders", metavar="DIR", nargs="+", help="result folder of solve")
     add_sampling(parser, default="the basis's")
@@ -317,6 +338,7 @@ _COMMANDS: dict[str, tuple[str, Callable[[argparse.ArgumentParser], None]]] = {
     "template": ("render the current look as a template to paint over", _template),
     "solve": ("find the lighting that comes closest to a painting", _solve),
     "paint": ("paint in the browser, and see the closest lighting as you paint", _paint),
+    "plan": ("find the least power that meets the needs of measuring planes", _plan),
     "batch": ("solve many looks from one manifest; a stopped batch continues", add_batch),
     "export": ("write a lighting for other programs, fixtures and consoles", _export),
     "rig": ("make a scene and a lights file of the fixtures of a show", _rig),

@@ -188,7 +188,9 @@ class Reduction:
         unknown, light, rgb = self.columns
         rows = np.zeros((len(requirements), len(self.unknowns)))
         entries = np.einsum("mec,ec->me", requirements.rows[:, light], rgb)
-        np.add.at(rows, (slice(None), unknown), entries)
+        if len(unknown):
+            columns, first = np.unique(unknown, return_index=True)
+            rows[:, columns] = np.add.reduceat(entries, first, axis=1)
         least = requirements.least - np.einsum("mnc,nc->m", requirements.rows, self.fixed_weights)
         if requirements.watts.any():
             rows += np.outer(requirements.watts, watts_of_unknowns(self.knobs, self.lamps))

@@ -42,8 +42,8 @@ from lightpaint.report.page.fit_tables import (
 from lightpaint.report.page.html import html
 from lightpaint.report.page.lights_table import MAX_THUMBNAILS, lights_table, thumbnails_of
 from lightpaint.report.page.mixer import mixer_assets, mixer_html, planes_for_page
-from lightpaint.report.page.planes_section import planes_section
 from lightpaint.report.page.placement_section import placement_section, suggestion_section
+from lightpaint.report.page.planes_section import planes_section
 from lightpaint.report.reported_answer import ReportedAnswer
 from lightpaint.report.verdict import spoken_samples, verdict
 from lightpaint.report.visible_emitters import emitter_remarks

@@ -1,0 +1,102 @@
+"""A plan: the lamps' settings of least power that meet the needs of planes, without a painting."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+from lightpaint.basis.render.render_origin import basis_lights
+from lightpaint.keywords import keywords
+from lightpaint.lighting.answer.lighting import Lighting
+from lightpaint.lighting.constraints.constraints import Constraints
+from lightpaint.lighting.constraints.constraints_file import constraints_of
+from lightpaint.lighting.unknowns.reduction import Reduction, reduce_to
+from lightpaint.lighting.wishes.linear_programs import least_watts
+from lightpaint.lighting.wishes.planes_answer import PlanesAnswer, planes_answer
+from lightpaint.lighting.wishes.wished_light import check_powers
+from lightpaint.pipeline.job.settings import Settings
+from lightpaint.pipeline.results.answer_folder import answer_files
+from lightpaint.pipeline.results.result_folder import ResultFolder
+from lightpaint.pipeline.wished_planes import MeasuredPlanes, measure_planes
+from lightpaint.progress import Progress, listener, silent
+from lightpaint.scene.scene import Scene
+
+#: The file of a plan's numbers.
+PLAN = "plan.json"
+
+
+@dataclass(frozen=True)
+class LightPlan:
+    """The settings of least power. lighting: of all lamps. planes: what it gives on the planes."""
+
+    lighting: Lighting
+    planes: PlanesAnswer
+
+
+@keywords()
+def plan_lighting(
+    scene: Scene,
+    planes: str | Path,
+    *,
+    constraints: Constraints | None = None,
+    settings: Settings | None = None,
+    progress: Progress = silent,
+) -> LightPlan:
+    """Find the settings of the lamps that meet the needs of planes with the least power.
+
+    Args:
+        scene: From `load_scene`. Its lights file gives each lamp's emitters, with their power.
+        planes: Path of a planes file.
+        constraints: On lights; they override those of the lights file.
+        settings: Of these `error`, `seed`, `use_cache` and `cd_per_unit` count.
+        progress: Called with the progress of the work.
+
+    Returns:
+        The lighting, and what it gives on the planes. Needs beyond all lamps are met as far as they
+        can be.
+
+    Raises:
+        LightpaintError: If the power of a lamp is unknown, or nothing says what a radiance of 1 is.
+        SceneError: For an invalid planes file.
+    """
+    settings, listen = settings or Settings(), listener(progress)
+    every = constraints_of(scene.requests).and_then(constraints or Constraints())
+    every = every.and_then(Constraints(cd_per_unit=settings.cd_per_unit))
+    lights = basis_lights(scene)
+    reduction = reduce_to(every, lights)
+    check_powers(reduction, [light.name for light in lights], "the least power")
+    measured = measure_planes(scene, planes, settings, every.cd_per_unit, listen)
+    return plan_of(measured, reduction, scene_identity=scene.identity)
+
+
+def plan_of(planes: MeasuredPlanes, reduction: Reduction, *, scene_identity: str = "") -> LightPlan:
+    """Return the plan for measured planes. reduction: of the lights, without requirements."""
+    wished = planes.wished_of(reduction)
+    required = reduction.with_requirements(wished.requirements)
+    program = least_watts(wished, required)
+    weights = required.weights(program.x)
+    answer = planes_answer(
+        wished,
+        reduction,
+        weights,
+        floor_m2=planes.floor_m2,
+        prices=wished.multipliers_of(program.multipliers),
+    )
+    lighting = Lighting.of_weights(
+        planes.illuminance.lights,
+        weights,
+        labels=[(label, False) for label in reduction.labels],
+        lamps=reduction.lamps,
+        target=planes.file.path.name,
+        scene_identity=scene_identity,
+        cd_per_unit=planes.illuminance.cd_per_unit,
+    )
+    return LightPlan(lighting, answer)
+
+
+def plan_folder(
+    scene: Scene, planes: Path, folder: Path, names: Sequence[str], *, force: bool
+) -> ResultFolder:
+    """Return the folder that a plan is written to. names: of further files."""
+    files = [*answer_files(folder, scene=scene), *(folder / name for name in (PLAN, *names))]
+    reads = (planes, *scene.read_files)
+    return ResultFolder(folder, tuple(files), reads, (planes,), force=force)
