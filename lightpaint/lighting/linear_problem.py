@@ -231,7 +231,9 @@ def reduce_lights(
         constraints = whiten_open_lights(constraints, lights, whites)
     # Pulls to the colours of lights and images couple the channels.
     is_joined = fit.colors == "gentle" or bool(texel_lights(lights).any())
-    reduction = replace(reduce_to(constraints, lights), is_joined=is_joined)
+    reduction = reduce_to(constraints, lights)
+    is_joined = is_joined or reduction.is_joined
+    reduction = replace(reduction, is_joined=is_joined)
     if fit.colors == "own":
         labels = own_color_labels(reduction.labels, constraints, lights)
         dimmers = reduce_to(keep_own_colors(constraints, lights), lights)

@@ -1,6 +1,6 @@
 """Planes on which a job wishes for illuminance: measured before the solve, and read after it."""
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
@@ -13,7 +13,7 @@ from lightpaint.lighting.solution import Solution
 from lightpaint.lighting.solve import solution_of
 from lightpaint.lighting.unknowns.reduction import Reduction
 from lightpaint.lighting.wishes.planes_answer import PlanesAnswer, planes_answer
-from lightpaint.lighting.wishes.required_problem import RequiredProblem, with_wishes
+from lightpaint.lighting.wishes.required_problem import RequiredProblem, with_wishes, without_wishes
 from lightpaint.lighting.wishes.wished_light import WishedLight, wished_light
 from lightpaint.photometry.illuminance import Illuminance
 from lightpaint.photometry.measure import measure_illuminance
@@ -119,7 +119,7 @@ def _cost_in_delta_e(solution: Solution) -> float | None:
     problem = solution.problem
     if problem.reduction.requirements is None:
         return None
-    free = _without_requirements(problem)
+    free = without_wishes(problem)
     look = PaintComparison.of_problem(problem)
     rows = look.rows(problem.basis.planes)
 
@@ -127,11 +127,6 @@ def _cost_in_delta_e(solution: Solution) -> float | None:
         return look.mean(look.difference(np.einsum("npc,nc->pc", rows, weights)))
 
     return missed(solution.weights) - missed(solution_of(free, start=solution.weights).weights)
-
-
-def _without_requirements(problem: Problem) -> Problem:
-    reduction = replace(problem.reduction, requirements=None)
-    return replace(problem, reduction=reduction, full=replace(problem.full, requirements=None))
 
 
 def _floor_area(file: PlanesFile, scene: Scene) -> float:

@@ -16,6 +16,7 @@ from lightpaint.display_text import some_of
 from lightpaint.errors import ConstraintError
 from lightpaint.keywords import keywords
 from lightpaint.lighting.constraints.emitter_values import EmitterRequest, parse_emitters
+from lightpaint.lighting.constraints.requirements import Requirements
 from lightpaint.lighting.constraints.values import (
     Level,
     Lock,
@@ -176,6 +177,7 @@ class Constraints:
         cd_per_unit: cd/m² of a radiance of 1, for emitters in candelas or lumens.
         prefer_emitters: Among mixes of a lamp's emitters that look the same, the one with the least
             "watts", with the most light from "white" emitters, or of the "fewest" emitters.
+        requirements: Sums of light and power that the answer has to reach, in memory only.
 
     Examples:
         >>> constraints = lp.Constraints.of({"panel": {"lock": True}})
@@ -194,6 +196,7 @@ class Constraints:
     near: float = 0.0
     cd_per_unit: float | None = None
     prefer_emitters: Preference | None = None
+    requirements: Requirements | None = field(default=None, compare=False)
 
     def __repr__(self) -> str:
         parts = [f"{name} {_label(table)}" for name, table, _ in self.lights]
@@ -204,10 +207,11 @@ class Constraints:
         parts += [f"near {self.near:g}"] if self.near else []
         parts += [f"cd_per_unit {self.cd_per_unit:g}"] if self.cd_per_unit else []
         parts += [f"prefer_emitters {self.prefer_emitters}"] if self.prefer_emitters else []
+        parts += [] if self.requirements is None else [f"{len(self.requirements)} requirements"]
         return f"Constraints({some_of(parts, '; ', room=600)})"
 
     def __bool__(self) -> bool:
-        is_any_set = bool(self.prefer_current or self.start or self.near)
+        is_any_set = bool(self.prefer_current or self.start or self.near or self.requirements)
         return is_any_set or bool(self.lights or self.ties or self.sparse is not None)
 
     @classmethod
@@ -277,6 +281,7 @@ class Constraints:
             others.near or self.near,
             others.cd_per_unit or self.cd_per_unit,
             others.prefer_emitters or self.prefer_emitters,
+            others.requirements or self.requirements,
         )
 
 

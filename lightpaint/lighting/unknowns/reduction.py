@@ -17,9 +17,11 @@ import numpy as np
 from lightpaint.arrays import Bools, Doubles, Indices
 from lightpaint.basis.lights import BasisLight
 from lightpaint.colour.lamp import Lamp
+from lightpaint.errors import ConstraintError
 from lightpaint.lighting.algebra.quadratic import Cap
 from lightpaint.lighting.constraints.constraints import Constraints
 from lightpaint.lighting.constraints.light_patterns import constraints_by_light, tied_lights
+from lightpaint.lighting.constraints.requirements import Requirements
 from lightpaint.lighting.unknowns.gamuts import Gamuts
 from lightpaint.lighting.unknowns.knobs import (
     Knob,
@@ -31,11 +33,7 @@ from lightpaint.lighting.unknowns.knobs import (
     mixing_knob,
     tied_knob,
 )
-from lightpaint.lighting.unknowns.requirements import (
-    Requirements,
-    watts_of_fixed,
-    watts_of_unknowns,
-)
+from lightpaint.lighting.unknowns.lamp_powers import watts_of_fixed, watts_of_unknowns
 from lightpaint.lighting.unknowns.unknown_blocks import (
     AlikeBlocks,
     Block,
@@ -118,7 +116,15 @@ class Reduction:
         return replace(self, gamuts=gamuts)
 
     def with_requirements(self, requirements: Requirements) -> "Reduction":
-        """Return the reduction with sums that the answer has to reach, which couple all lights."""
+        """Return the reduction with sums that the answer has to reach, which couple all lights.
+
+        Raises ConstraintError if they are of other lights.
+        """
+        if requirements.rows.shape[1] != len(self.labels):
+            raise ConstraintError(
+                f"what planes need was measured for {requirements.rows.shape[1]} lights, and there "
+                f"are {len(self.labels)}: measure anew"
+            )
         return replace(self, requirements=requirements, is_joined=True)
 
     def confined_to_sides(self, sides: Mapping[int, int | None]) -> "Reduction":
@@ -334,8 +340,9 @@ def only_knobs(reduction: Reduction, chosen: Collection[int]) -> Reduction:
 def reduce_to(constraints: Constraints, lights: Sequence[BasisLight]) -> Reduction:
     """Return the unknowns that `constraints` leave among `lights`.
 
-    Raises ConstraintError for a light that is not there, and for the impossible: a colour for a
-    light that has only a dimmer, a light on two dimmers, limits that leave nothing.
+    Raises ConstraintError for a light that is not there, for requirements of other lights, and for
+    the impossible: a colour for a light that has only a dimmer, a light on two dimmers, limits that
+    leave nothing.
     """
     by_light = constraints_by_light(constraints, lights)
     labels = ["" if constraint is None else constraint.label for constraint in by_light]
@@ -374,4 +381,7 @@ def reduce_to(constraints: Constraints, lights: Sequence[BasisLight]) -> Reducti
             knobs.append(lamp_knob(k, light, constraint, lamps[k]))
         else:
             knobs.append(mixing_knob(k, light, constraint))
-    return Reduction(fixed, tuple(labels), tuple(knobs), lamps=lamps)
+    reduction = Reduction(fixed, tuple(labels), tuple(knobs), lamps=lamps)
+    if constraints.requirements is None:
+        return reduction
+    return reduction.with_requirements(constraints.requirements)

@@ -11,8 +11,8 @@ import numpy as np
 
 from lightpaint.arrays import Doubles, Indices
 from lightpaint.errors import LightpaintError
+from lightpaint.lighting.unknowns.lamp_powers import watts_of_fixed, watts_of_unknowns
 from lightpaint.lighting.unknowns.reduction import Reduction
-from lightpaint.lighting.unknowns.requirements import watts_of_fixed, watts_of_unknowns
 from lightpaint.lighting.wishes.wished_light import WishedLight
 from lightpaint.progress import cancellation_check
 

@@ -8,8 +8,8 @@ import numpy as np
 
 from lightpaint.arrays import Doubles
 from lightpaint.errors import ConstraintError
+from lightpaint.lighting.unknowns.lamp_powers import watts_of_fixed
 from lightpaint.lighting.unknowns.reduction import Reduction
-from lightpaint.lighting.unknowns.requirements import watts_of_fixed
 from lightpaint.lighting.wishes.wished_light import Wish, WishedLight, check_powers
 from lightpaint.photometry.illuminance import PlaneReading
 

@@ -36,5 +36,20 @@ def with_wishes(problem: Problem, wished: WishedLight) -> RequiredProblem:
         reduction = reduction.with_requirements(wished.requirements.lowered(slack))
     requirements = reduction.requirements
     assert requirements is not None
-    full = problem.full.with_requirements(requirements)
-    return RequiredProblem(replace(problem, reduction=reduction, full=full), wished, shares)
+    required = replace(
+        problem,
+        constraints=replace(problem.constraints, requirements=requirements),
+        reduction=reduction,
+        full=problem.full.with_requirements(requirements),
+    )
+    return RequiredProblem(required, wished, shares)
+
+
+def without_wishes(problem: Problem) -> Problem:
+    """Return the problem without requirements."""
+    return replace(
+        problem,
+        constraints=replace(problem.constraints, requirements=None),
+        reduction=replace(problem.reduction, requirements=None),
+        full=replace(problem.full, requirements=None),
+    )

@@ -17,8 +17,8 @@ import numpy as np
 
 from lightpaint.arrays import Doubles
 from lightpaint.errors import ConstraintError
+from lightpaint.lighting.constraints.requirements import Requirements
 from lightpaint.lighting.unknowns.reduction import Reduction
-from lightpaint.lighting.unknowns.requirements import Requirements
 from lightpaint.photometry.illuminance import Illuminance
 from lightpaint.photometry.measuring_plane import MeasuringPlane, PowerBudget
 

@@ -183,8 +183,6 @@ def _with_colors(problem: Problem, colors: Colors) -> Problem:
     full = reduce_lights(
         problem.constraints, problem.lights, fit, gamuts, whites_for(expected, fit)
     )
-    if (requirements := problem.full.requirements) is not None:
-        full = full.with_requirements(requirements)
     reduction = full
     if problem.reduction is not problem.full:
         knobs = enumerate(problem.reduction.knobs)
