@@ -18,6 +18,8 @@ from lightpaint.errors import ImageError, SceneError
 from lightpaint.file_reading import file_length
 from lightpaint.files import one_line
 from lightpaint.images.formats.exr import read_parts
+from lightpaint.luminaires.registration import LUMINAIRE_PLUGINS
+from lightpaint.luminaires.web_file import read_web
 
 #: Maximum size in bytes of a file that is read.
 MAX_ASSET = 2**32
@@ -87,6 +89,8 @@ def check_asset(path: Path, plugin: str, index: int = 0) -> None:
             _check_volume(path, length)
         elif plugin in ("bitmap", "envmap", "projector", "spot", "area"):
             _check_picture(path, length)
+        elif plugin in LUMINAIRE_PLUGINS:
+            read_web(path)
     except MeshError as damage:
         raise SceneError(f"{path} is damaged: {one_line(str(damage))}; export it again") from None
     except ImageError as error:

@@ -17,15 +17,17 @@ from typing import Any
 
 from lightpaint.errors import BackendError
 from lightpaint.files import one_line
+from lightpaint.luminaires.registration import LUMINAIRE_PLUGINS, can_have_luminaires
 from lightpaint.scene.checks.tokens import place_of_node
 
 #: Environment variable that names a folder with the user's own plugins.
 VARIABLE = "LIGHTPAINT_PLUGINS"
 
-#: Integrators that Mitsuba implements in Python for JIT variants; they have no plugin file.
-IN_PYTHON = frozenset(
-    ["direct_projective", "prb", "prb_basic", "prb_projective", "prbvolpath", "volprim_rf_basic"]
-)
+#: Integrators that Mitsuba implements in Python for JIT variants, and emitters that lightpaint
+#: adds; they have no plugin file.
+IN_PYTHON = LUMINAIRE_PLUGINS | {
+    *("direct_projective", "prb", "prb_basic", "prb_projective", "prbvolpath", "volprim_rf_basic"),
+}
 #: The root of a scene, which is part of Mitsuba's core.
 BUILT_IN = frozenset({"scene"})
 
@@ -74,6 +76,8 @@ def check_plugins(state: Any, resolver: Any) -> None:
 
     Must be called before the scene is built. resolver: the resolver that Mitsuba will use.
     """
+    import mitsuba as mi
+
     plugins = loaded_plugins()
     for node in _in_use(state):
         name = str(node.props.plugin_name())
@@ -81,6 +85,11 @@ def check_plugins(state: Any, resolver: Any) -> None:
             continue
         kind = str(node.type).rpartition(".")[2].lower()
         prefix = f"{place_of_node(state, node)}Mitsuba has no {kind} plugin {one_line(repr(name))}"
+        if name in LUMINAIRE_PLUGINS and not can_have_luminaires(mi.variant()):
+            raise UnknownPluginError(
+                f"{place_of_node(state, node)}the {kind} {name!r} needs a variant of Dr.Jit, such "
+                f"as llvm_ad_rgb, and this is {mi.variant()}"
+            )
         if name in IN_PYTHON:
             if file := _shadowing_file(name, resolver):
                 raise UnknownPluginError(

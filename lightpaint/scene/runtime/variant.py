@@ -11,6 +11,7 @@ from typing import Any
 
 from lightpaint.errors import BackendError
 from lightpaint.keywords import keywords
+from lightpaint.luminaires.registration import register_luminaires
 from lightpaint.scene.runtime.llvm import INSTALL_LLVM, OLDEST_LLVM, Llvm, prepare_llvm
 from lightpaint.scene.runtime.plugins import loaded_plugins
 from lightpaint.sentences import Sentence
@@ -112,6 +113,7 @@ def _start(requested: str | None) -> Backend:
         backend = _set(mi, requested, llvm)
     mi.set_log_level(mi.LogLevel.Error)
     loaded_plugins()  # before any scene adds search folders
+    register_luminaires()
     return backend
 
 

@@ -1,0 +1,1 @@
+"""Luminaires: measured light distributions, their files, and emitters of Mitsuba that have them."""

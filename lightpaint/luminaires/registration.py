@@ -1,0 +1,41 @@
+"""Adds the emitters of luminaires to Mitsuba, for the variant that is set and for later ones."""
+
+import importlib
+import sys
+from typing import Any
+
+#: Plugins that this package adds to Mitsuba: a point and a flat shape.
+POINT_PLUGIN, AREA_PLUGIN = "ies", "iesarea"
+LUMINAIRE_PLUGINS = frozenset({POINT_PLUGIN, AREA_PLUGIN})
+
+_MODULE = "lightpaint.luminaires.emitter_plugins"
+
+
+def can_have_luminaires(variant: str) -> bool:
+    """Return whether a variant of Mitsuba runs these emitters at full speed: those of Dr.Jit do."""
+    return variant.endswith("_rgb") and not variant.startswith("scalar")
+
+
+def register_luminaires() -> None:
+    """Add the emitters to Mitsuba in the present variant, if there is one that can have them."""
+    import mitsuba as mi
+
+    variant = mi.variant()
+    if variant is None or not can_have_luminaires(variant):
+        return
+    module = sys.modules.get(_MODULE)
+    if module is None:
+        importlib.import_module(_MODULE)
+    elif variant != module.VARIANT:
+        importlib.reload(module)  # its base class is that of the variant
+
+
+def register_luminaires_always() -> None:
+    """Add the emitters to Mitsuba now, and whenever a variant is set."""
+    import mitsuba as mi
+
+    def follow(old: Any, new: Any) -> None:
+        register_luminaires()
+
+    mi.detail.add_variant_callback(follow)
+    register_luminaires()
