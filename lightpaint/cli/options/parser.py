@@ -155,7 +155,7 @@ def _solve(parser: argparse.ArgumentParser) -> None:
     add_verification(parser)
     add_fields(parser, Settings, "report")
     add_tolerances(parser)
-    add_fields(parser, Settings, "cd_per_unit")
+    add_fields(parser, Settings, "cd_per_unit", "planes")
     add_lights(parser)
     add_split(parser)
     add_map_size(parser)
@@ -301,6 +301,7 @@ def _plan(parser: argparse.ArgumentParser) -> None:
         help="what to save where needs can be met in several ways (default: %(default)s)",
     )
     add_lights(parser)
+    add_split(parser)
     add_constraints(parser)
     add_fields(parser, Settings, "error", "seed", "cd_per_unit")
     add_cache(parser)

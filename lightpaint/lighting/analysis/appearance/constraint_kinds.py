@@ -12,11 +12,11 @@ from lightpaint.sentences import SourceKey
 
 #: Kinds of constraints: of single lights, of those on one dimmer, and of all together.
 ConstraintKind = Literal[
-    "off", "lock", "limits", "colour", "tie", "sparse", "prefer_current", "near"
+    "off", "lock", "limits", "colour", "tie", "sparse", "prefer_current", "near", "planes"
 ]
 
 #: Those of all lights together.
-ALL_LIGHTS_KINDS: tuple[ConstraintKind, ...] = ("sparse", "prefer_current", "near")
+ALL_LIGHTS_KINDS: tuple[ConstraintKind, ...] = ("sparse", "prefer_current", "near", "planes")
 
 #: Kinds of constraints on single lights.
 SINGLE_LIGHT_KINDS: tuple[ConstraintKind, ...] = ("off", "lock", "limits", "colour")
@@ -64,6 +64,7 @@ class ConstraintsByLight:
         by_kind["sparse"] = all_lights if self.constraints.sparse is not None else ()
         by_kind["prefer_current"] = all_lights if self.constraints.prefer_current else ()
         by_kind["near"] = all_lights if self.constraints.near else ()
+        by_kind["planes"] = all_lights if self.constraints.requirements else ()
         return {kind: table for kind, table in by_kind.items() if table}
 
     def units(self, lights: Sequence[int]) -> list[list[int]]:
@@ -82,6 +83,8 @@ class ConstraintsByLight:
             return replace(self.constraints, prefer_current=0.0)
         if kind == "near":
             return replace(self.constraints, near=0.0)
+        if kind == "planes":
+            return replace(self.constraints, requirements=None)
         if kind == "tie":
             tied = tied_lights(self.constraints, self.lights)
             removed = {id(tied[k][0]) for k in lights}
