@@ -25,6 +25,7 @@ _MODULES = {
     "doctor": "maintenance",
     "export": "program_commands",
     "listen": "console_commands",
+    "measure": "measure_command",
     "paint": "paint_command",
     "plan": "plan_command",
     "rig": "rig_command",
@@ -148,6 +149,7 @@ ENDINGS = {
     "lightings": (".json",),
     "lights_file": (".toml",),
     "lighting": (".json",),
+    "planes": (".toml",),
     "rig": (".mvr",),
 }
 

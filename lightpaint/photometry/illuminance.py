@@ -13,6 +13,7 @@ from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
+from scipy.special import stdtrit
 
 from lightpaint.arrays import Doubles
 from lightpaint.basis.lights import Lights
@@ -47,6 +48,18 @@ class PlaneReading:
     points: int
     least_error: float
     least_bias: float
+
+    @property
+    def mean_interval(self) -> float:
+        """Half of the 95 % interval of the mean, by Student's distribution with as many degrees of
+        freedom as there are points.
+        """
+        return float(stdtrit(self.points, 0.975)) * self.mean_error
+
+    @property
+    def uniformity_interval(self) -> float:
+        """Half of the 95 % interval of the uniformity, without its bias."""
+        return float(stdtrit(self.points, 0.975)) * self.uniformity_error
 
 
 @dataclass(frozen=True)

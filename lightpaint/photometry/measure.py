@@ -7,7 +7,6 @@ is rendered by the same path tracer and cached in the same files as pictures are
 from collections.abc import Sequence
 
 import numpy as np
-from scipy.special import stdtrit
 
 from lightpaint.arrays import Doubles, Floats
 from lightpaint.basis.basis import Basis
@@ -42,6 +41,7 @@ def measure_illuminance(
     spp: int | None = None,
     error: float = 0.02,
     cd_per_unit: float = 1.0,
+    weights: Doubles | None = None,
     seed: int = 0,
     use_cache: bool = True,
     progress: Progress = silent,
@@ -53,10 +53,12 @@ def measure_illuminance(
         planes: From `read_planes`.
         spp: Samples per point; by default as many as `error` needs, at most 65,536.
         error: Largest half width of the 95 % interval of a plane's mean, and standard error of its
-            points, both relative and with all lights as they are now. A point with less than a
+            points, both relative and with the lights of `weights`. A point with less than a
             tenth of the mean, or a plane with less than a thousandth of the light of the brightest,
             counts as one with that much.
         cd_per_unit: cd/m² of a radiance of 1 in the scene.
+        weights: Weights of the lights, (n, 3), with which errors are judged; by default those of
+            the scene as it is now.
         seed: Any number >= 0; different seeds give independent measurements.
         use_cache: Whether measurements are cached as bases are.
         progress: Called with the progress of the work.
@@ -74,7 +76,8 @@ def measure_illuminance(
         measured = illuminance_of(basis, planes, cd_per_unit)
         if spp is not None:
             return measured
-        excess = error_excess(measured, weights_on(measured.lights), error)
+        judged = weights_on(measured.lights) if weights is None else weights
+        excess = error_excess(measured, judged, error)
         if excess <= 1:
             return measured
         if basis.origin.spp >= MOST_SPP:
@@ -132,9 +135,8 @@ def weights_on(lights: Lights) -> Doubles:
 def error_excess(measured: Illuminance, weights: Doubles, error: float) -> float:
     """Return the largest ratio of an error of a plane to the one asked for.
 
-    error: relative. Of a plane's mean this is half of its 95 % interval, by Student's distribution
-    with as many degrees of freedom as it has points; of its points the root mean square of their
-    standard errors in relation to their light.
+    error: relative. Of a plane's mean this is half of its 95 % interval, of its points the root
+    mean square of their standard errors in relation to their light.
     """
     values, errors = measured.of(weights), measured.standard_errors(weights)
     readings = measured.readings(weights)
@@ -143,8 +145,7 @@ def error_excess(measured: Illuminance, weights: Doubles, error: float) -> float
     for name, reading in readings.items():
         if (scale := max(reading.mean, dimmest)) > 0:
             part = measured.points_of(name)
-            half_width = float(stdtrit(reading.points, 0.975)) * reading.mean_error
             relative = errors[part] / np.maximum(floored(values[part]), dimmest)
             of_points = float(np.sqrt(np.mean(relative**2)))
-            excess = max(excess, half_width / scale / error, of_points / error)
+            excess = max(excess, reading.mean_interval / scale / error, of_points / error)
     return excess

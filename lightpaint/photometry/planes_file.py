@@ -14,7 +14,7 @@ from lightpaint.arrays import Doubles, Position
 from lightpaint.display_text import some_names, with_similar_name
 from lightpaint.errors import SceneError
 from lightpaint.file_reading import read_text
-from lightpaint.files import one_line
+from lightpaint.files import is_name, one_line
 from lightpaint.keywords import keywords
 from lightpaint.photometry.measuring_plane import MeasuringPlane, PowerBudget, Ratio, Wishes
 from lightpaint.photometry.plane_placement import CYLINDRICAL, PlaneRequest, place_plane
@@ -121,6 +121,8 @@ def _check_known(table: Any, known: Iterable[str], where: str, example: str) -> 
 
 def _request(name: str, table: Any, where: SourceKey, planes: Mapping[str, Any]) -> PlaneRequest:
     """Return a plane as its table describes it."""
+    if not is_name(name):
+        raise SceneError(f"{where} cannot be the name of a file, as that of a plane's picture is")
     _check_known(table, PLANE_KEYS, where, 'shape = "floor"')
     places = [key for key in PLACES if key in table]
     if len(places) != 1:

@@ -43,6 +43,8 @@ def values_of(options: Namespace, words: Sequence[str]) -> dict[str, Any]:
         case "basis":
             output = output or Path(Path(options.scene).stem + ".basis.exr")
             return {"scene": scene_of(options), "output": output, "settings": settings}
+        case "measure":
+            return _measure_arguments(options, output or Path("measured"), settings)
         case "template":
             return _template_arguments(options, output or Path("template"), settings)
         case "demo":
@@ -107,6 +109,20 @@ def _lights_arguments(options: Namespace, output: Path | None) -> dict[str, Any]
         "sheet": (output or Path("lights.png")) if is_drawn else None,
         "is_named": output is not None,
         "force": options.force,
+    }
+
+
+def _measure_arguments(options: Namespace, output: Path, settings: Settings) -> dict[str, Any]:
+    """Return the arguments of `measure`. A lighting says how its lights are grouped."""
+    scene = scene_of(options)
+    if options.lighting:
+        scene = scene_of(options, is_to_solve=False, use_lights_file=False)
+    return {
+        "scene": scene,
+        "planes": Path(options.planes) if options.planes else None,
+        "lighting": Path(options.lighting) if options.lighting else None,
+        "output": output,
+        "settings": settings,
     }
 
 

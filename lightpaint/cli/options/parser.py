@@ -44,6 +44,7 @@ from lightpaint.cli.options.option_groups import (
     add_view_transform,
 )
 from lightpaint.pipeline.job.settings import Settings
+from lightpaint.validation import parse_share
 from lightpaint.version import __version__
 
 #: Exit codes, for scripts.
@@ -100,6 +101,34 @@ def _basis(parser: argparse.ArgumentParser) -> None:
     add_budget(parser)
     add_cache(parser)
     add_output(parser, "F.basis.exr", "file to write (default: <scene>.basis.exr)")
+
+
+def _measure(parser: argparse.ArgumentParser) -> None:
+    add_scene(parser)
+    parser.add_argument(
+        "--planes",
+        metavar="F.toml",
+        help="file with the planes to measure on (default: <scene>.planes.toml)",
+    )
+    parser.add_argument(
+        "--lighting",
+        metavar="lighting.json",
+        help="file that solve wrote: measure with its lights (default: as the scene has them)",
+    )
+    add_lights(parser)
+    add_split(parser)
+    add_fields(parser, Settings, "cd_per_unit", default="that of the lights file")
+    add_fields(parser, Settings, "spp", default="as many as --error needs")
+    parser.add_argument(
+        "--error",
+        type=arguments.parsed_by(parse_share),
+        metavar="SHARE",
+        help="measure until the mean of each plane is known this well, at 95%%, and its points "
+        "with this standard error (default: 2%%)",
+    )
+    add_fields(parser, Settings, "seed", "use_cache")
+    add_output(parser, "DIR", "folder for tables and pictures (default: measured/)")
+    add_fields(parser, Settings, "force")
 
 
 def _template(parser: argparse.ArgumentParser) -> None:
@@ -336,6 +365,7 @@ _COMMANDS: dict[str, tuple[str, Callable[[argparse.ArgumentParser], None]]] = {
     "demo": ("solve the example that comes with lightpaint", _demo),
     "lights": ("list the lights of a scene", _lights),
     "basis": ("render the image of each light alone", _basis),
+    "measure": ("measure the illuminance on planes of a scene, in lux", _measure),
     "template": ("render the current look as a template to paint over", _template),
     "solve": ("find the lighting that comes closest to a painting", _solve),
     "paint": ("paint in the browser, and see the closest lighting as you paint", _paint),

@@ -29,6 +29,7 @@ _OTHER_OPTIONS = {
     "parameters": "-D",
     "pattern": "--pattern",
     "placement": "--places",
+    "planes": "--planes",
     "port": "--port",
     "rig": "--rig",
     "scene": "--scene",

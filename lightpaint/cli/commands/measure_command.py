@@ -1,0 +1,157 @@
+"""`lightpaint measure`: the illuminance on the planes of a scene."""
+
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+
+import numpy as np
+
+from lightpaint.arrays import RGB, Doubles
+from lightpaint.basis.render.render_origin import basis_lights
+from lightpaint.cli.output import terminal
+from lightpaint.cli.output.lines import CommandOutcome
+from lightpaint.errors import OutputError, SceneError
+from lightpaint.files import check_files, check_writable
+from lightpaint.lighting.answer.lighting_file import read_lighting
+from lightpaint.lighting.constraints.constraints_file import constraints_of
+from lightpaint.photometry.illuminance import Illuminance
+from lightpaint.photometry.measure import measure_illuminance
+from lightpaint.photometry.planes_file import planes_file_beside, read_planes
+from lightpaint.photometry.readings_file import (
+    POINTS,
+    is_measured_folder,
+    missed_wishes,
+    readings_document,
+    readings_files,
+    write_readings,
+)
+from lightpaint.photometry.wish_presets import PRESETS
+from lightpaint.pipeline.job.settings import Settings
+from lightpaint.pipeline.job.sources import SceneFile
+from lightpaint.progress import stage
+from lightpaint.relit.relight import scene_of
+from lightpaint.scene.scene import Scene
+from lightpaint.sentences import Hint
+from lightpaint.storage.staging import finish, staged
+
+#: Error of a measurement, if neither an error nor samples are given.
+DEFAULT_ERROR = 0.02
+
+
+def measure(
+    *,
+    scene: SceneFile,
+    planes: Path | None,
+    lighting: Path | None,
+    output: Path,
+    settings: Settings,
+) -> CommandOutcome:
+    """Run `lightpaint measure SCENE`."""
+    content, emission, unit = _lit_scene(scene, lighting, settings)
+    planes_path = planes or planes_file_beside(content.path)
+    if planes is None and not planes_path.is_file():
+        raise SceneError(
+            f"{planes_path} does not exist: write where to measure into it (docs/photometry.md), "
+            "or name another file with ",
+            Hint("planes"),
+        )
+    with terminal.TerminalListener() as listen, stage("placing the points", listen):
+        found = read_planes(planes_path, content)
+    weights = _weights(content, emission)
+    inputs = [*content.read_files, planes_path, *([] if lighting is None else [lighting])]
+    files = [output / name for name in readings_files(found.planes)]
+    _check(output, files, inputs, force=settings.force)
+    with terminal.TerminalListener() as listen:
+        measured = measure_illuminance(
+            content,
+            found.planes,
+            spp=settings.spp,
+            error=DEFAULT_ERROR if settings.error is None else settings.error,
+            cd_per_unit=unit,
+            weights=weights,
+            seed=settings.seed,
+            use_cache=settings.use_cache,
+            progress=listen,
+        )
+    origin = content.path.name + ("" if lighting is None else f" lit by {lighting.name}")
+    with staged(output) as folder:
+        write_readings(folder, measured, weights, origin)
+    _print(measured, weights)
+    terminal.write(f"{output / POINTS}: all points; a picture of each plane beside it")
+    written = {"scene": str(content.path), "files": [*map(str, files)]}
+    return CommandOutcome(lambda: readings_document(measured, weights) | written)
+
+
+def _lit_scene(
+    source: SceneFile, lighting: Path | None, settings: Settings
+) -> tuple[Scene, Mapping[str, RGB] | None, float]:
+    """Return the scene, the emissions of a lighting, and cd/m² of a radiance of 1.
+
+    Raises SceneError if nothing says the last.
+    """
+    scene, emission = source.content, None
+    own = constraints_of(scene.requests).cd_per_unit
+    if lighting is not None:
+        finish(lighting.parent)
+        answer = read_lighting(lighting)
+        scene, emission = scene_of(scene, answer), answer.emission
+        own = answer.cd_per_unit or own
+    given = settings.cd_per_unit
+    if given is None and own is None:
+        raise SceneError(
+            "a radiance of 1 is how many cd/m²? Lux need that number: add ",
+            Hint("cd_per_unit"),
+            ", or cd_per_unit to the lights file",
+        )
+    if given is not None and own is not None and given != own:
+        file = "lights file" if lighting is None else "lighting"
+        raise SceneError(
+            f"cd_per_unit is {own:g} in the {file} and {given:g} by ",
+            Hint("cd_per_unit"),
+            ": leave one out",
+        )
+    return scene, emission, float(given or own or 0)
+
+
+def _weights(scene: Scene, emission: Mapping[str, RGB] | None) -> Doubles:
+    """Return the weights of the lights, (n, 3): those of a lighting, or the current ones."""
+    lights = basis_lights(scene)
+    if emission is None:
+        return lights.current_weights
+    return np.array([emission[name] for name in lights.names], np.float64)
+
+
+def _check(folder: Path, files: Sequence[Path], inputs: Sequence[Path], *, force: bool) -> None:
+    """Raise OutputError if the files of a measurement cannot or should not be written."""
+    if folder.is_file():
+        raise OutputError(f"{folder} is a file: name a folder with -o")
+    check_files(files, inputs)
+    check_writable(folder)
+    finish(folder)
+    existing_files = [file for file in files if file.exists()]
+    if existing_files and not force and not is_measured_folder(folder):
+        raise OutputError(
+            f"{existing_files[0]} exists and is of no measurement: name another folder with -o, "
+            "or pass ",
+            Hint("force", True),
+        )
+
+
+def _print(measured: Illuminance, weights: Doubles) -> None:
+    """Print a row for each plane, the wishes that are missed, and where presets are from."""
+    table = terminal.table("plane", "points", "Em lx", "±", "U0", "±", "least lx", "most lx")
+    for name, reading in measured.readings(weights).items():
+        table.row(
+            name,
+            str(reading.points),
+            f"{reading.mean:.4g}",
+            f"{reading.mean_interval:.2g}",
+            f"{reading.uniformity:.2f}",
+            f"{reading.uniformity_interval:.2g}",
+            f"{reading.least:.4g}",
+            f"{reading.most:.4g}",
+        )
+    terminal.print_table(table)
+    for text in missed_wishes(measured, weights):
+        terminal.write(text)
+    for name in sorted({plane.wishes.preset for plane in measured.planes} - {""}):
+        terminal.say(f"{name}: {PRESETS[name]}")

@@ -1,0 +1,114 @@
+"""False-colour pictures of the illuminance on a plane, with isolux lines and a scale."""
+
+import math
+from collections.abc import Sequence
+
+import numpy as np
+import numpy.typing as npt
+from PIL import Image, ImageDraw, ImageFont
+
+from lightpaint.arrays import Doubles
+from lightpaint.display_text import visible
+from lightpaint.photometry.measuring_plane import MeasuringPlane
+
+#: Colours from little to much light, evenly spaced: they also differ in lightness, for those who
+#: see few colours and for prints without any.
+COLOURS = np.array(
+    [(38, 14, 74), (59, 60, 138), (42, 110, 142), (32, 156, 137), (98, 200, 98), (248, 230, 60)],
+    float,
+)
+GROUND, TEXT, LINE = (24, 24, 26), (226, 226, 226), 0.55
+
+#: Approximate side of the longer side of a plane's picture, largest side of a cell, and space for
+#: the scale at the right and the title above, in pixels.
+LONGEST, LARGEST_CELL, SCALE_WIDTH, TITLE_HEIGHT, MARGIN = 640, 96, 120, 40, 16
+#: Approximate number of isolux lines, and least height of the picture.
+STEPS, LEAST_HEIGHT = 10, 240
+
+
+def isolux_levels(most: float) -> list[float]:
+    """Return the levels of isolux lines up to `most` lx: multiples of 1, 2 or 5 times a power of
+    ten.
+    """
+    if not most > 0:
+        return [0.0, 1.0]
+    raw = most / STEPS
+    power = 10.0 ** math.floor(math.log10(raw))
+    step = next(power * k for k in (1, 2, 5, 10) if raw <= power * k * (1 + 1e-9))
+    return [step * k for k in range(math.ceil(most / step - 1e-9) + 1)]
+
+
+def false_colours(plane: MeasuringPlane, values: Doubles, title: str) -> npt.NDArray[np.uint8]:
+    """Return a picture of the illuminance on a plane, (h, w, 3).
+
+    values: (p,), lx at its points. Between points the light is interpolated; cells without a point
+    stay dark. Lines are where it passes a level of the scale.
+    """
+    cells = plane.picture(values)[::-1]
+    side = max(1, min(LARGEST_CELL, LONGEST // max(cells.shape)))
+    levels = isolux_levels(float(values.max()))
+    picture = _painted(cells, side, levels)
+    height = max(picture.shape[0], LEAST_HEIGHT) + TITLE_HEIGHT + MARGIN
+    width = picture.shape[1] + 2 * MARGIN + SCALE_WIDTH
+    font = ImageFont.load_default(14)
+    sheet = Image.new("RGB", (max(width, 360), height), GROUND)
+    sheet.paste(Image.fromarray(picture), (MARGIN, TITLE_HEIGHT))
+    draw = ImageDraw.Draw(sheet)
+    draw.text((MARGIN, 12), visible(title), TEXT, font)
+    left, top = picture.shape[1] + 2 * MARGIN, TITLE_HEIGHT
+    _draw_scale(draw, levels, (left, top, height - top - MARGIN), font)
+    return np.asarray(sheet)
+
+
+def _painted(cells: Doubles, side: int, levels: Sequence[float]) -> npt.NDArray[np.uint8]:
+    """Return the colours of interpolated cells, with lines at levels, (h, w, 3)."""
+    rows, columns = cells.shape
+    light = _interpolated(cells, (np.arange(rows * side) + 0.5) / side - 0.5, axis=0)
+    light = _interpolated(light, (np.arange(columns * side) + 0.5) / side - 0.5, axis=1)
+    own = np.kron(cells, np.ones((side, side)))
+    # At the edges of a ragged plane an interpolation lacks a neighbour.
+    light = np.where(np.isnan(light), own, light)
+    light[np.isnan(own)] = np.nan
+    band = np.searchsorted(levels, np.nan_to_num(light), side="right") - 1
+    picture = colours_of(np.nan_to_num(light) / levels[-1])
+    is_line = np.zeros(light.shape, bool)
+    for axis in (0, 1):
+        is_line |= np.diff(band, axis=axis, prepend=np.take(band, [0], axis=axis)) != 0
+    picture[is_line] *= LINE
+    picture[np.isnan(light)] = GROUND
+    return np.round(picture).astype(np.uint8)
+
+
+def _interpolated(cells: Doubles, places: Doubles, axis: int) -> Doubles:
+    """Return cells linearly interpolated along an axis. places: in cells, from their centres."""
+    last = cells.shape[axis] - 1
+    places = np.clip(places, 0, last)
+    low = np.minimum(places.astype(int), max(last - 1, 0))
+    share = np.expand_dims(places - low, 1 - axis)
+    near, far = (np.take(cells, np.minimum(k, last), axis=axis) for k in (low, low + 1))
+    return np.asarray((1 - share) * near + share * far)
+
+
+def colours_of(shares: Doubles) -> Doubles:
+    """Return the colours of shares of the scale, 0 to 1, with a last axis of 3, 0 to 255."""
+    places = np.linspace(0, 1, len(COLOURS))
+    return np.stack([np.interp(shares, places, channel) for channel in COLOURS.T], axis=-1)
+
+
+def _draw_scale(
+    draw: ImageDraw.ImageDraw,
+    levels: Sequence[float],
+    box: tuple[int, int, int],
+    font: ImageFont.FreeTypeFont | ImageFont.ImageFont,
+) -> None:
+    """Draw the scale, the brightest above. box: left, top and height."""
+    left, top, height = box
+    for y in range(height):
+        share = 1 - y / max(height - 1, 1)
+        r, g, b = (int(v) for v in colours_of(np.array(share)))
+        draw.line([(left, top + y), (left + 16, top + y)], (r, g, b))
+    for level in levels:
+        y = top + round((height - 1) * (1 - level / levels[-1]))
+        draw.line([(left, y), (left + 20, y)], TEXT)
+        unit = " lx" if level == levels[-1] else ""
+        draw.text((left + 26, y - 8), f"{level:g}{unit}", TEXT, font)
