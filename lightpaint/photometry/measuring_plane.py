@@ -41,10 +41,15 @@ class Wishes:
 
 @dataclass(frozen=True)
 class PowerBudget:
-    """A limit of electrical power: in watts, or in W/m² of the floor; None where not limited."""
+    """A limit of electrical power: in watts, or in W/m² of the floor; None where not limited.
+
+    area: m² of the floor that power is divided by; None for that of the largest plane that faces
+    upwards.
+    """
 
     watts: float | None = None
     per_area: float | None = None
+    area: float | None = None
 
 
 @dataclass(frozen=True)

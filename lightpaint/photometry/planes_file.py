@@ -87,6 +87,12 @@ def read_planes(path: str | Path, scene: Scene) -> PlanesFile:
     return PlanesFile(path, scene.while_loaded(place), power)
 
 
+def plane_names(path: str | Path) -> tuple[str, ...]:
+    """Return the names of the planes of a file, without a scene. Raises SceneError."""
+    requests, _ = _parse(Path(path))
+    return tuple(request.name for request in requests)
+
+
 def _parse(path: Path) -> tuple[list[PlaneRequest], PowerBudget]:
     """Return the planes and the power of a planes file, without a scene."""
     text = read_text(path, "planes file", SceneError, limit=MAX_BYTES)
@@ -254,10 +260,11 @@ def _ratio(name: str, table: Any, where: SourceKey, planes: Mapping[str, Any]) -
 
 def _power(table: Any, where: SourceKey) -> PowerBudget:
     """Return the limit of power."""
-    _check_known(table, ("watts", "per_area"), where, "watts = 300")
-    if len(table) > 1:
+    _check_known(table, ("watts", "per_area", "area"), where, "watts = 300")
+    if {"watts", "per_area"} <= set(table):
         raise SceneError(f"{where} has watts and per_area: expected one of them")
     return PowerBudget(
         _number(table, "watts", where, 0, MOST_WATTS),
         _number(table, "per_area", where, 0, MOST_WATTS),
+        _number(table, "area", where, 0, MOST_METRES**2),
     )

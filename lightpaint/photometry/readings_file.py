@@ -3,7 +3,7 @@
 import csv
 import io
 import json
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping
 from dataclasses import asdict
 from pathlib import Path
 from typing import Any
@@ -24,9 +24,9 @@ FORMAT = "lightpaint-illuminance 1"
 POINTS, PLANES, PICTURE_SUFFIX = "planes.csv", "planes.json", ".png"
 
 
-def readings_files(planes: Sequence[MeasuringPlane]) -> list[str]:
-    """Return the names of the files that `write_readings` writes."""
-    return [POINTS, PLANES, *(plane.name + PICTURE_SUFFIX for plane in planes)]
+def readings_files(planes: Iterable[str]) -> list[str]:
+    """Return the names of the files that `write_readings` writes. planes: their names."""
+    return [POINTS, PLANES, *(name + PICTURE_SUFFIX for name in planes)]
 
 
 def write_readings(folder: Path, measured: Illuminance, weights: Doubles, origin: str) -> None:

@@ -1,6 +1,5 @@
-"""A plan: the lamps' settings of least power that meet the needs of planes, without a painting."""
+"""A plan: settings of the lamps that meet the wishes for planes with the least power."""
 
-from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -15,6 +14,7 @@ from lightpaint.lighting.wishes.planes_answer import PlanesAnswer, planes_answer
 from lightpaint.lighting.wishes.wished_light import check_powers
 from lightpaint.pipeline.job.settings import Settings
 from lightpaint.pipeline.results.answer_folder import answer_files
+from lightpaint.pipeline.results.planes_folder import files_of_planes
 from lightpaint.pipeline.results.result_folder import ResultFolder
 from lightpaint.pipeline.wished_planes import MeasuredPlanes, measure_planes
 from lightpaint.progress import Progress, listener, silent
@@ -41,7 +41,7 @@ def plan_lighting(
     settings: Settings | None = None,
     progress: Progress = silent,
 ) -> LightPlan:
-    """Find the settings of the lamps that meet the needs of planes with the least power.
+    """Find the settings of the lamps that meet the wishes for planes with the least power.
 
     Args:
         scene: From `load_scene`. Its lights file gives each lamp's emitters, with their power.
@@ -51,8 +51,8 @@ def plan_lighting(
         progress: Called with the progress of the work.
 
     Returns:
-        The lighting, and what it gives on the planes. Needs beyond all lamps are met as far as they
-        can be.
+        The lighting, and what it gives on the planes. Wishes beyond all lamps are met as far as
+        they can be.
 
     Raises:
         LightpaintError: If the power of a lamp is unknown, or nothing says what a radiance of 1 is.
@@ -93,10 +93,8 @@ def plan_of(planes: MeasuredPlanes, reduction: Reduction, *, scene_identity: str
     return LightPlan(lighting, answer)
 
 
-def plan_folder(
-    scene: Scene, planes: Path, folder: Path, names: Sequence[str], *, force: bool
-) -> ResultFolder:
-    """Return the folder that a plan is written to. names: of further files."""
-    files = [*answer_files(folder, scene=scene), *(folder / name for name in (PLAN, *names))]
+def plan_folder(scene: Scene, planes: Path, folder: Path, *, force: bool) -> ResultFolder:
+    """Return the folder that a plan is written to."""
+    files = [*answer_files(folder, scene=scene), folder / PLAN, *files_of_planes(folder, planes)]
     reads = (planes, *scene.read_files)
     return ResultFolder(folder, tuple(files), reads, (planes,), force=force)

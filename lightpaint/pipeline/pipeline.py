@@ -23,11 +23,13 @@ from lightpaint.pipeline.job_bases import obtain_bases_of, problem_of, view_list
 from lightpaint.pipeline.needed_samples import add_needed_samples
 from lightpaint.pipeline.placed_lights import place_lights, suggest_move
 from lightpaint.pipeline.results.answer_folder import (
+    LIGHTING,
     AnswerFolder,
     new_answer,
     reload_relit,
     with_places,
 )
+from lightpaint.pipeline.results.planes_folder import write_planes
 from lightpaint.pipeline.results.results import Look, write_predicted, write_report
 from lightpaint.pipeline.sun_search import find_suns
 from lightpaint.pipeline.wished_planes import (
@@ -106,6 +108,8 @@ def run(job: Job, progress: Progress = silent, *, bases: list[Basis] | None = No
             )
             for view, analysis in zip(job.views, found.analyses, strict=True)
         ]
+        if found.planes is not None and scene is not None:
+            write_planes(answer.path, found.planes, f"{scene.path.name} lit by {LIGHTING}")
     return [_reloaded(look) for look in looks] if answer.has_moved_paths else looks
 
 

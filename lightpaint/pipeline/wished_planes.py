@@ -27,12 +27,15 @@ from lightpaint.sentences import Hint
 #: Largest error of a plane's mean, at 95 %, unless the settings say another.
 MEAN_ERROR = 0.02
 
+#: Least cosine between the normal of a plane and the vertical at which it faces upwards.
+FACING_UP = 0.7
+
 
 @dataclass(frozen=True)
 class MeasuredPlanes:
     """Planes of a file with the illuminance of each light on them.
 
-    floor_m2: the area of planes that face upwards.
+    floor_m2: the area that power is divided by; 0 if there is none.
     """
 
     file: PlanesFile
@@ -83,11 +86,7 @@ def planes_of_job(job: Job, listen: Listener) -> MeasuredPlanes | None:
     if job.settings.planes is None:
         return None
     scene = job.views[0].scene
-    if scene is None:
-        raise LightpaintError(
-            f"{job.settings.planes} has planes to measure, and a saved basis has no scene: give "
-            "the scene instead"
-        )
+    assert scene is not None
     scale = job.all_constraints.cd_per_unit
     return measure_planes(scene, job.settings.planes, job.settings, scale, listen)
 
@@ -130,5 +129,8 @@ def _cost_in_delta_e(solution: Solution) -> float | None:
 
 
 def _floor_area(file: PlanesFile, scene: Scene) -> float:
+    if file.power.area is not None:
+        return file.power.area
     up = np.array(scene.up)
-    return sum(plane.area_m2 for plane in file.planes if float((plane.normals @ up).mean()) > 0.7)
+    areas = (x.area_m2 for x in file.planes if float((x.normals @ up).mean()) > FACING_UP)
+    return max(areas, default=0.0)

@@ -10,7 +10,7 @@ from lightpaint.photometry.illuminance import PlaneReading
 from lightpaint.photometry.measuring_plane import MeasuringPlane
 
 #: Headings of a table of planes.
-HEADINGS = ("plane", "Em lx", "U0", "least lx", "most lx", "needed", "W/m² per 100 lx")
+HEADINGS = ("plane", "Em lx", "U0", "least lx", "most lx", "wished for", "W/m² per 100 lx")
 
 #: A step of what is asked for that people think in, for prices: lx, a share, and watts.
 STEPS = {"mean": (10.0, "last 10 lx on"), "uniformity": (0.01, "last .01 of uniformity on")}
@@ -32,13 +32,13 @@ def plane_rows(answer: PlanesAnswer) -> Iterator[tuple[str, ...]]:
             f"{reading.uniformity:.2f} ± {NORMAL_95 * reading.uniformity_error:.1g}",
             f"{reading.least:.0f}",
             f"{reading.most:.0f}",
-            needed(plane),
+            wishes_text(plane),
             _density(answer, reading),
         )
 
 
-def needed(plane: MeasuringPlane) -> str:
-    """Return what a plane needs in few words; "" if nothing."""
+def wishes_text(plane: MeasuringPlane) -> str:
+    """Return what is wished for on a plane in few words; "" for nothing."""
     wishes = plane.wishes
     parts = [] if wishes.mean is None else [f"{wishes.mean:g} lx"]
     parts += [] if wishes.uniformity is None else [f"U0 {wishes.uniformity:g}"]
@@ -48,10 +48,10 @@ def needed(plane: MeasuringPlane) -> str:
 
 
 def planes_sentences(answer: PlanesAnswer) -> list[str]:
-    """Return what is missed, what the power is, and what the needs of planes cost."""
+    """Return what is missed, what the power is, and what the wishes cost."""
     sentences = [_missed(answer, outcome) for outcome in answer.missed]
     if not answer.missed and answer.outcomes:
-        sentences.append("All that the planes need is there.")
+        sentences.append("All wishes for the planes are met.")
     if answer.watts is not None:
         power = f"The lamps take {answer.watts:.4g} W"
         if answer.floor_m2:
@@ -61,7 +61,7 @@ def planes_sentences(answer: PlanesAnswer) -> list[str]:
     if answer.cost_delta_e is not None:
         cost = answer.cost_delta_e
         text = f"by ΔE {cost:.1f} further" if cost >= LEAST_COST else "no further"
-        sentences.append(f"With the needs of planes the picture is {text} from the painting.")
+        sentences.append(f"With these wishes the picture is {text} from the painting.")
     return sentences
 
 
@@ -77,7 +77,7 @@ def planes_numbers(answer: PlanesAnswer) -> dict[str, Any]:
             "least_lx": reading.least,
             "most_lx": reading.most,
             "points": reading.points,
-            "needs": [_outcome_numbers(x) for x in answer.outcomes if x.wish.plane == name],
+            "wishes": [_outcome_numbers(x) for x in answer.outcomes if x.wish.plane == name],
         }
     budget = [x.wish.asked for x in answer.outcomes if x.wish.kind == "power"]
     return {
@@ -113,25 +113,22 @@ def _missed(answer: PlanesAnswer, outcome: WishOutcome) -> str:
     if wish.kind == "mean":
         text = f"{wish.plane}: {reached:.0f} of {wish.asked:g} lx"
         if not answer.all_at_full:
-            return f"{text}, as much as the other needs leave."
+            return f"{text}, as much as the other wishes leave."
         count = len(answer.wished.illuminance.lights)
         more = math.ceil(count * (wish.asked / reached - 1)) if reached > 0 else 0
         advice = f"; about {more} more lamps like these {count} would do" if more else ""
         return f"{text}: all lamps are at full{advice}."
     if wish.kind == "uniformity":
-        return f"{wish.plane}: a uniformity of {reached:.2f}, where {wish.asked:g} is needed."
+        return f"{wish.plane}: a uniformity of {reached:.2f}, wished for {wish.asked:g}."
     if wish.kind == "max":
-        return f"{wish.plane}: a point has {reached:.0f} lx, where {wish.asked:g} is the most."
+        return f"{wish.plane}: up to {reached:.0f} lx, wished for at most {wish.asked:g}."
     if wish.kind == "ratio":
-        return (
-            f"{wish.plane}: {reached:.2f} of the illuminance of {wish.to}, where {wish.asked:g} "
-            "is needed."
-        )
+        return f"{wish.plane}: {reached:.2f} of the mean of {wish.to}, wished for {wish.asked:g}."
     return f"The lamps take {reached:.4g} W, where {wish.asked:g} W are allowed."
 
 
 def _prices(answer: PlanesAnswer) -> Iterator[str]:
-    """Yield what the last steps of needs cost, where they cost power."""
+    """Yield what the last steps of wishes cost, where they cost power."""
     for outcome in answer.outcomes:
         if outcome.price is None or outcome.wish.kind not in STEPS:
             continue

@@ -52,7 +52,7 @@ REASON_CLAUSES: dict[str, tuple[str, str]] = {
     "sparse": ("the number of lights is limited",) * 2,
     "prefer_current": ("lights are pulled towards their current setting",) * 2,
     "near": ("lights stay near the lighting that you started from",) * 2,
-    "planes": ("measuring planes need other light",) * 2,
+    "planes": ("wishes for measuring planes are met",) * 2,
     "views": ("view {} asks for different light", "views {} ask for different light"),
 }
 
@@ -130,11 +130,11 @@ def headline(appearance: Appearance) -> str:
 
 def spoken_current(appearance: Appearance) -> str:
     """Say that the current lighting comes closer than the answer, and offer it unless measuring
-    planes need something else.
+    planes have wishes.
     """
     if any(reason.kind == "planes" for reason in appearance.reasons):
         return (
-            "What the measuring planes need leads away from the paint (mean ΔE "
+            "What is wished for on measuring planes leads away from the paint (mean ΔE "
             f"{appearance.requested_change:.1f} as the scene is, {appearance.delta_e:.1f} in this "
             "answer)."
         )

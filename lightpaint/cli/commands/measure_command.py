@@ -58,7 +58,7 @@ def measure(
         found = read_planes(planes_path, content)
     weights = _weights(content, emission)
     inputs = [*content.read_files, planes_path, *([] if lighting is None else [lighting])]
-    files = [output / name for name in readings_files(found.planes)]
+    files = [output / name for name in readings_files(x.name for x in found.planes)]
     _check(output, files, inputs, force=settings.force)
     with terminal.TerminalListener() as listen:
         measured = measure_illuminance(

@@ -1,4 +1,4 @@
-"""`lightpaint plan`: the least power that meets the needs of measuring planes."""
+"""`lightpaint plan`: the least power that meets the wishes for measuring planes."""
 
 import json
 from pathlib import Path
@@ -17,6 +17,7 @@ from lightpaint.pipeline.job.settings import Settings
 from lightpaint.pipeline.job.sources import SceneFile
 from lightpaint.pipeline.light_plan import PLAN, LightPlan, plan_folder, plan_lighting
 from lightpaint.pipeline.results.answer_folder import new_answer
+from lightpaint.pipeline.results.planes_folder import write_planes
 from lightpaint.report.phrases import spoken_drives
 from lightpaint.report.planes_text import planes_numbers
 from lightpaint.version import __version__
@@ -35,11 +36,11 @@ def plan(
     path = planes or planes_file_beside(content.path)
     if planes is None and not path.is_file():
         raise SceneError(
-            f"{content.path} has no {path.name} beside it: write one, with the planes and what "
-            "they need, or name one with --planes"
+            f"{content.path} has no {path.name} beside it: write one, with the planes and what is "
+            "wished for there, or name one with --planes"
         )
     folder = output or Path(f"{content.path.stem}-plan")
-    results = plan_folder(content, path, folder, (), force=settings.force)
+    results = plan_folder(content, path, folder, force=settings.force)
     results.check()
     with terminal.TerminalListener() as listen:
         found = plan_lighting(
@@ -48,6 +49,7 @@ def plan(
     with new_answer(results, found.lighting, scene=content) as answer:
         text = json.dumps(_numbers(found), indent=2, ensure_ascii=False, allow_nan=False)
         write_text(answer.path / PLAN, text + "\n")
+        write_planes(answer.path, found.planes, f"{content.path.name} as planned")
     show_planes(found.planes)
     _show_lamps(found)
     terminal.write(f"results in {folder}/")

@@ -321,13 +321,14 @@ def _plan(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--planes",
         metavar="FILE",
-        help="measuring planes and what they need (default: hall.planes.toml beside hall.xml)",
+        help="measuring planes and what is wished for there (default: hall.planes.toml beside "
+        "hall.xml)",
     )
     parser.add_argument(
         "--least",
         choices=("watts",),
         default="watts",
-        help="what to save where needs can be met in several ways (default: %(default)s)",
+        help="what to save where wishes can be met in several ways (default: %(default)s)",
     )
     add_lights(parser)
     add_split(parser)
@@ -369,7 +370,7 @@ _COMMANDS: dict[str, tuple[str, Callable[[argparse.ArgumentParser], None]]] = {
     "template": ("render the current look as a template to paint over", _template),
     "solve": ("find the lighting that comes closest to a painting", _solve),
     "paint": ("paint in the browser, and see the closest lighting as you paint", _paint),
-    "plan": ("find the least power that meets the needs of measuring planes", _plan),
+    "plan": ("find the least power that meets the wishes for measuring planes", _plan),
     "batch": ("solve many looks from one manifest; a stopped batch continues", add_batch),
     "export": ("write a lighting for other programs, fixtures and consoles", _export),
     "rig": ("make a scene and a lights file of the fixtures of a show", _rig),

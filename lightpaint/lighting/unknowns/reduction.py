@@ -122,8 +122,8 @@ class Reduction:
         """
         if requirements.rows.shape[1] != len(self.labels):
             raise ConstraintError(
-                f"what planes need was measured for {requirements.rows.shape[1]} lights, and there "
-                f"are {len(self.labels)}: measure anew"
+                f"wishes for planes are of {requirements.rows.shape[1]} lights, and there are "
+                f"{len(self.labels)}: measure anew"
             )
         return replace(self, requirements=requirements, is_joined=True)
 

@@ -46,7 +46,7 @@ class PlanesAnswer:
     """A lighting on measuring planes.
 
     outcomes: of all wishes. readings: of all planes, by name. watts: the power of all lamps; None
-    if that of one is unknown. floor_m2: the area of planes that face upwards; 0 without any.
+    if that of one is unknown. floor_m2: the area that it is divided by; 0 without one.
     all_at_full: whether no lamp could give more. cost_delta_e: the mean CIEDE2000 to the painting
     beyond that of an answer without wishes; None without a painting.
     """

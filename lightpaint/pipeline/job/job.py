@@ -56,6 +56,7 @@ from lightpaint.pipeline.job.sources import (
     content,
 )
 from lightpaint.pipeline.results.answer_folder import answer_files
+from lightpaint.pipeline.results.planes_folder import files_of_planes
 from lightpaint.pipeline.results.result_folder import ResultFolder
 from lightpaint.pipeline.results.results import (
     SOLVE_RESULTS,
@@ -305,7 +306,10 @@ class Job:
         for view in views:
             check_writable(view.folder)
             files += [view.folder / name for name in (VIEW_RESULTS if scenes else SOLVE_RESULTS)]
+        if self.settings.planes is not None:
+            files += files_of_planes(self.folder, self.settings.planes)
         reads = [file for target in targets for file in target.files]
+        reads += [Path(x) for x in (self.settings.planes,) if x is not None]
         reads += [file for scene in scenes for file in scene.read_files]
         others = (*self.given_bases, self.placement)
         reads += [Path(x.path) for x in others if isinstance(x, BasisFile | PlacementFile)]

@@ -64,7 +64,7 @@ class Settings(Fit):
         animate: True to find a lighting for each painted frame of a shot, and lights that change
             smoothly between them, instead of one lighting for all.
         cd_per_unit: cd/m² that a radiance of 1 stands for, for luminous quantities in the results.
-        planes: Path of a planes file, whose planes need certain illuminances: the answer meets
+        planes: Path of a planes file, with wishes for illuminance: the answer meets
             these, and comes as close to the painting as it then can. Needs a scene.
         verify: Whether to render the relit scene and compare it with the prediction, with at most
             as many samples as the basis, so that it takes no longer.
@@ -244,7 +244,7 @@ class Settings(Fit):
         a(str, "the path of a planes file"),
         Option(
             "--planes FILE",
-            "measuring planes, with the illuminance that they need: the lighting that comes "
+            "measuring planes, with the illuminance that is wished for: the lighting that comes "
             "closest to the painting and meets it (docs/photometry.md)",
             default="no requirements",
             theme="Lights",

@@ -1,14 +1,18 @@
 """The section of the report on measuring planes."""
 
+from typing import Any
+
 from markupsafe import Markup
 
 from lightpaint.lighting.wishes.planes_answer import PlanesAnswer
+from lightpaint.photometry.false_colour import false_colours
+from lightpaint.report.page.figures import data_uri
 from lightpaint.report.page.html import html
 from lightpaint.report.planes_text import HEADINGS, plane_rows, planes_sentences
 
 
 def planes_section(answer: PlanesAnswer | None) -> Markup:
-    """Return the table of planes with what is said of it; nothing without planes."""
+    """Return the table of planes, what is said of it, and false colours; nothing without planes."""
     if answer is None:
         return Markup("")
     return html(
@@ -16,4 +20,17 @@ def planes_section(answer: PlanesAnswer | None) -> Markup:
         headings=HEADINGS,
         rows=[*plane_rows(answer)],
         sentences=planes_sentences(answer),
+        pictures=_pictures(answer),
     )
+
+
+def _pictures(answer: PlanesAnswer) -> list[dict[str, Any]]:
+    """Return false colours of the illuminance on each plane."""
+    illuminance, pictures = answer.wished.illuminance, []
+    values = illuminance.of(answer.weights)
+    for plane in illuminance.planes:
+        pixels = false_colours(plane, values[illuminance.points_of(plane.name)], plane.name)
+        height, width = pixels.shape[:2]
+        source = data_uri(pixels)
+        pictures.append({"name": plane.name, "width": width, "height": height, "source": source})
+    return pictures
