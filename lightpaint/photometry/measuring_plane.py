@@ -1,6 +1,6 @@
 """Measuring planes: points at which illuminance is measured, and what is wished for there."""
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
 
@@ -50,6 +50,17 @@ class PowerBudget:
     watts: float | None = None
     per_area: float | None = None
     area: float | None = None
+
+
+@dataclass(frozen=True)
+class LightCase:
+    """A case in which all wishes have to hold, such as a clear noon, or night.
+
+    factors: emission of lights that stay as they are, by name or pattern, relative to now.
+    """
+
+    name: str
+    factors: Mapping[str, float]
 
 
 @dataclass(frozen=True)

@@ -44,8 +44,13 @@ class MeasuredPlanes:
 
     def wished_of(self, reduction: Reduction) -> WishedLight:
         """Return the wishes as requirements of the lights of `reduction`."""
-        budget = self.file.power
-        return wished_light(self.illuminance, budget, reduction, floor_m2=self.floor_m2)
+        return wished_light(
+            self.illuminance,
+            self.file.power,
+            reduction,
+            floor_m2=self.floor_m2,
+            cases=self.file.cases,
+        )
 
 
 def measure_planes(

@@ -12,10 +12,16 @@ FOLDER = "planes"
 
 def files_of_planes(folder: Path, planes: str | Path) -> list[Path]:
     """Return the files of measured planes in a result folder. planes: the path of their file."""
-    return [folder / FOLDER / name for name in readings_files(plane_names(planes))]
+    names, cases = plane_names(planes)
+    files = readings_files(names)
+    return [folder / FOLDER / case / name for case in cases or ("",) for name in files]
 
 
 def write_planes(folder: Path, answer: PlanesAnswer, origin: str) -> None:
-    """Write what an answer gives on planes. origin: of the light, in words."""
-    (folder / FOLDER).mkdir(exist_ok=True)
-    write_readings(folder / FOLDER, answer.wished.illuminance, answer.weights, origin)
+    """Write what an answer gives on planes, in a folder for each case. origin: of the light, in
+    words.
+    """
+    for case, weights in answer.weights_by_case.items():
+        place, words = folder / FOLDER / case, f"{origin}, {case}" if case else origin
+        place.mkdir(parents=True, exist_ok=True)
+        write_readings(place, answer.wished.illuminance, weights, words)

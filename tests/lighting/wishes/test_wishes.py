@@ -16,10 +16,17 @@ from lightpaint.lighting.problem import Problem
 from lightpaint.lighting.solve import solution_of
 from lightpaint.lighting.unknowns.reduction import reduce_to
 from lightpaint.lighting.wishes.linear_programs import least_watts, power_of, shares_given_up
+from lightpaint.lighting.wishes.planes_answer import planes_answer
 from lightpaint.lighting.wishes.required_problem import with_wishes
 from lightpaint.lighting.wishes.wished_light import wished_light
 from lightpaint.photometry.illuminance import Illuminance
-from lightpaint.photometry.measuring_plane import MeasuringPlane, PowerBudget, Ratio, Wishes
+from lightpaint.photometry.measuring_plane import (
+    LightCase,
+    MeasuringPlane,
+    PowerBudget,
+    Ratio,
+    Wishes,
+)
 from lightpaint.target.target import Target
 
 #: Rows are met up to 1e-9 of their size, and the oracles have tolerances of their own.
@@ -157,3 +164,41 @@ def test_a_ratio_to_no_plane_is_refused(make_basis):
     basis, _, illuminance = _case(make_basis, [desk])
     with pytest.raises(ConstraintError, match="a ratio to 'flor', which is not a plane"):
         wished_light(illuminance, PowerBudget(), reduce_to(_lamps(LAMPS), basis.lights))
+
+
+def test_wishes_hold_in_all_cases(make_basis):
+    desk = _plane("desk", 8, mean=400.0)
+    basis = make_basis(LAMPS, (5, 4))
+    constraints = _lamps(LAMPS - 1).and_then(Constraints.of({"light 3": {"lock": True}}))
+    reduction = reduce_to(constraints, basis.lights)
+    illuminance = _illuminance(basis, [desk])
+    cases = (LightCase("night", {"light 3": 0.0}), LightCase("noon", {"light 3": 2.0}))
+    wished = wished_light(illuminance, PowerBudget(), reduction, cases=cases)
+    assert [(wish.case, wish.plane) for wish in wished.wishes] == [
+        ("night", "desk"),
+        ("noon", "desk"),
+    ]
+    required = reduction.with_requirements(wished.requirements)
+    weights = required.weights(least_watts(wished, required).x)
+    answer = planes_answer(wished, reduction, weights, floor_m2=0.0)
+    night, noon = answer.readings["night", "desk"].mean, answer.readings["noon", "desk"].mean
+    sky = illuminance.matrix[:, 3].mean(axis=0) @ basis.lights.current_weights[3]
+    assert night == pytest.approx(400, rel=SAME)  # which needs the most, and gets no more than that
+    assert noon == pytest.approx(400 + 2 * sky, rel=SAME)
+    reached = [outcome.reached for outcome in answer.outcomes]
+    assert reached == pytest.approx([night, noon], rel=SAME)
+
+
+@pytest.mark.parametrize(
+    ("factors", "message"),
+    [
+        ({"light 0": 0.0}, "case 'night' sets 'light 0', which the solve adjusts: lock it"),
+        ({"skyy": 0.0}, "case 'night' sets 'skyy': no light has this name"),
+    ],
+)
+def test_cases_are_of_lights_that_stay(make_basis, factors, message):
+    basis = make_basis(LAMPS, (5, 4))
+    illuminance = _illuminance(basis, [_plane("desk", 4, mean=400.0)])
+    reduction = reduce_to(_lamps(LAMPS), basis.lights)
+    with pytest.raises(ConstraintError, match=message):
+        wished_light(illuminance, PowerBudget(), reduction, cases=[LightCase("night", factors)])
