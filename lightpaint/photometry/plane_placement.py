@@ -33,8 +33,8 @@ FACING_RAYS = 256
 #: Distance in metres above a shape at which rays towards it start.
 STEP_M = 0.01
 
-#: Normals that are within this cosine of up are those of a floor, not of a wall.
-UPRIGHT = 1e-3
+#: Cosine of normal and up below which a plane is upright, and sine below which it is level.
+UPRIGHT, LEVEL_SINE = 1e-3, 0.01
 
 CYLINDRICAL = "cylindrical"
 
@@ -258,14 +258,16 @@ def _on_surface(
 
 
 def _sides(normal: Doubles, up: Doubles) -> tuple[Doubles, Doubles]:
-    """Return the horizontal and the other side of a plane, as unit vectors, (3,) each."""
-    across = np.cross(up, normal)
-    if float(np.linalg.norm(across)) < UPRIGHT * 10:
-        # On a floor, along the axes of the scene.
-        across = np.roll(np.abs(up).round(), 1) if np.abs(up).max() > 0.999 else np.eye(3)[0]
-        across = across - (across @ normal) * normal
-    across = across / np.linalg.norm(across)
-    return across, np.cross(normal, across)
+    """Return the directions to the right and upwards in a picture of a plane, (3,) each.
+
+    It is seen from the side of its normal: a wall as it stands, a floor along the scene's axes.
+    """
+    right = np.cross(up, normal)
+    if float(np.linalg.norm(right)) < LEVEL_SINE:
+        right = np.eye(3)[1 if abs(up[0]) > LEVEL_SINE else 0]
+        right = right - (right @ normal) * normal
+    right = right / np.linalg.norm(right)
+    return right, np.cross(normal, right)
 
 
 def _kept_from_walls(request: PlaneRequest, grid: _Grid, room: RoomRays) -> _Grid:
