@@ -11,6 +11,7 @@ from lightpaint.colour.display.view_transform import TransformChoice
 from lightpaint.errors import PaintError, SceneError
 from lightpaint.file_reading import file_length
 from lightpaint.files import scene_name
+from lightpaint.lighting.constraints.absolute_scale import with_scale
 from lightpaint.lighting.constraints.constraints import Constraints
 from lightpaint.lighting.constraints.constraints_file import constraints_of
 from lightpaint.lighting.joined_views import check_same_lights
@@ -144,7 +145,8 @@ def _check_size(basis: Basis, name: str) -> None:
 
 def _check_constraints(lights: Lights, constraints: Constraints) -> None:
     """Raise ConstraintError unless lights can meet these constraints and their lights file's."""
-    reduce_to(constraints_of(lights.requests).and_then(constraints), lights)
+    all_constraints = constraints_of(lights.requests).and_then(constraints)
+    reduce_to(with_scale(all_constraints, lights), lights)
 
 
 def _name_of(source: Paintable) -> str:

@@ -5,7 +5,7 @@ written in its own encoding.
 """
 
 import re
-from collections.abc import Collection, Mapping
+from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 
@@ -88,6 +88,11 @@ class XmlFile:
     def replace(self, element: Element, text: str) -> None:
         """Replace `element` by `text`."""
         self._edits.append((element.start, element.end, text.encode()))
+
+    def replace_by_lines(self, element: Element, lines: Sequence[str]) -> None:
+        """Replace `element` by `lines`, indented as it is."""
+        indent = _indent_before(self.text, element.start)
+        self.replace(element, f"{self._newline}{indent}".join(lines))
 
     def set_attribute(self, element: Element, name: str, value: str) -> None:
         """Set an attribute of `element` that it has. value: text without special characters."""

@@ -23,6 +23,7 @@ from lightpaint.errors import ConstraintError, LightpaintError, TargetError
 from lightpaint.files import check_writable
 from lightpaint.images.pixel_blocks import whole_factor
 from lightpaint.keywords import keywords
+from lightpaint.lighting.constraints.absolute_scale import agreed_scale, with_scale
 from lightpaint.lighting.constraints.constraints import Constraints
 from lightpaint.lighting.constraints.constraints_file import constraints_of
 from lightpaint.lighting.fit import resolve_for_targets
@@ -185,6 +186,8 @@ class Job:
         if isinstance(source, Scene | Basis):
             all_constraints = constraints_of(source.requests).and_then(all_constraints)
         _check_one_scale(all_constraints, self.settings)
+        for scene in scenes:
+            agreed_scale(scene.cd_per_unit, self.settings.cd_per_unit)
         scale = Constraints(cd_per_unit=self.settings.cd_per_unit)
         all_constraints = all_constraints.and_then(scale)
         if scenes and bases:
@@ -192,7 +195,9 @@ class Job:
         check_places(self.placement, scenes)
         check_animation(self.settings, all_constraints, len(self.painted_frames))
         # Reports impossible constraints before rendering.
-        reduce_to(all_constraints, self._lights(scenes, bases))
+        lights = self._lights(scenes, bases)
+        all_constraints = with_scale(all_constraints, lights)
+        reduce_to(all_constraints, lights)
         if scenes and (count := wanted_sun(self.settings, scenes)):
             sky_for_sun(scenes[0], count)
         if self.settings.suggest:

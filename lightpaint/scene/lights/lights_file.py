@@ -13,11 +13,12 @@ from typing import Any
 from lightpaint.errors import SceneError
 from lightpaint.file_reading import read_text
 from lightpaint.files import one_line
+from lightpaint.luminaires.luminaire_request import PHOTOMETRY, LuminaireRequest, luminaires_in
 from lightpaint.scene.lights.texels.image_domains import GridSize
 from lightpaint.scene.lights.texels.texel import image_of, parse_size
 from lightpaint.scene.lights.texels.texel_layout import TexelLayout
 from lightpaint.storage.json_records import strict_toml
-from lightpaint.validation import MAX_LISTED, MAX_NAME
+from lightpaint.validation import BRIGHTEST, MAX_LISTED, MAX_NAME, is_number
 
 SUFFIX = ".lights.toml"
 #: Keys of constraints for the solve.
@@ -76,8 +77,42 @@ class SceneRequests:
         lights = self.keys.get("light")
         tables = lights.items() if isinstance(lights, dict) else ()
         return tuple(
-            name for name, table in tables if isinstance(table, dict) and "emitters" in table
+            name
+            for name, table in tables
+            if isinstance(table, dict) and ("emitters" in table or PHOTOMETRY in table)
         )
+
+    @property
+    def cd_per_unit(self) -> float:
+        """Candelas of an intensity of 1 in a scene with luminaires: 1 unless the file says it.
+
+        Raises SceneError for an invalid value.
+        """
+        value = self.keys.get("cd_per_unit", 1.0)
+        if not (is_number(value) and 0 < value <= BRIGHTEST):
+            raise SceneError(
+                f"{self.source}: cd_per_unit is {one_line(repr(value))}: expected candelas of an "
+                "intensity of 1 in the scene, like 1"
+            )
+        return float(value)
+
+    @property
+    def luminaires(self) -> dict[str, LuminaireRequest]:
+        """Luminaires, by name or pattern of the lights whose places they take.
+
+        Raises SceneError for an invalid value, and for keys that a luminaire cannot have.
+        """
+        lights = self.keys.get("light")
+        luminaires = luminaires_in(lights, self.source)
+        for name in luminaires:
+            assert isinstance(lights, Mapping)
+            if refused := [key for key in (*IMAGE_KEYS, *MOVES) if key in lights[name]]:
+                reason = "shows no picture" if refused[0] in IMAGE_KEYS else "stays where it is"
+                raise SceneError(
+                    f"{self.source}: light.{one_line(name)} has {PHOTOMETRY} and {refused[0]}, and "
+                    f"a luminaire {reason}: leave one out"
+                )
+        return luminaires
 
     @property
     def symmetric(self) -> frozenset[str]:
