@@ -24,6 +24,7 @@ from lightpaint.dmx.console_rig import ConsoleRig
 from lightpaint.dmx.levels import encode_levels
 from lightpaint.lighting.answer.lighting import Lighting, LightSetting
 from lightpaint.lighting.answer.lighting_file import write_lighting
+from lightpaint.scene.properties.site import EmitterPlace, unit
 
 COLORS = ("red", "green", "blue")
 RIG = ConsoleRig(
@@ -308,6 +309,37 @@ def test_an_answer_goes_by_the_file_of_a_show_and_comes_back(
         assert found == pytest.approx(drive, abs=2 * TABLE_ROUNDING)
     assert len(document["lights"]) == 6
     assert not any(document["lights"]["101 PAR 1"].values())
+
+
+def test_pan_and_tilt_are_sent_when_asked_for(tmp_path: Path) -> None:
+    """Of a wash that hangs turned by 90°: +y of the stage is to its right, −90° of pan."""
+    light = setting("201 Wash 1", (1.0, 0.5, 0.0))
+    place = EmitterPlace("201 Wash 1", (-2.6, 3.4, 5.1), unit((0.0, 1.0, -1.0)))
+    turned = EmitterPlace("101 PAR 1", (-3.2, -2.5, 5.1), (0.0, 0.0, 1.0))
+    lighting = Lighting(
+        (light,),
+        target="evening.png",
+        scene_identity="0" * 16,
+        places=(place, turned),
+        up=(0.0, 0.0, 1.0),
+    )
+    write_lighting(tmp_path / "lighting.json", lighting)
+    command = ("send", "lighting.json", "--rig", SHOW, "--dump", "dmx.csv", "--force")
+    succeed(tmp_path, *command)
+    assert "pan" not in (tmp_path / "dmx.csv").read_text()
+    completed = run(tmp_path, *command, "--positions")
+    assert completed.returncode == 0, completed.stderr
+    assert "'101 PAR 1' has no pan and tilt: turn it by" in completed.stderr
+    with (tmp_path / "dmx.csv").open(newline="") as file:
+        rows = {(x["light"], x["emitter"]): x for x in csv.DictReader(file)}
+    pan, tilt = (int(rows["201 Wash 1", x]["value"]) / 65535 for x in ("pan", "tilt"))
+    assert (rows["201 Wash 1", "pan"]["channels"], rows["201 Wash 1", "pan"]["drive"]) == (
+        "1 2",
+        "",
+    )
+    # Pan goes from 270° down to −270°, tilt from −130° to 130°; a level is 0.01°.
+    assert 270 - 540 * pan == pytest.approx(-90, abs=0.01)
+    assert -130 + 260 * tilt == pytest.approx(45, abs=0.01)
 
 
 #: A program with a rig of its own: `send` in a process that signals reach.

@@ -143,6 +143,7 @@ def test_several_views_are_named_by_sensors_or_are_bases(make_basis: Any) -> Non
         ("room.basis.exr --layers none.ora", r"none\.ora"),
         ("room.basis.exr --layers room.basis.exr", "does not say what its layers mean"),
         ("room.basis.exr --port 70000", "70000"),
+        ("room.basis.exr --rig a.mvr --positions", "--positions belongs to what is sent"),
         ("room.basis.exr -o room.basis.exr", "cannot write"),
     ],
 )

@@ -1,13 +1,21 @@
 """The painter's console: nothing is sent before it is switched on, then each answer is."""
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import Any
 
 import numpy as np
 import pytest
 
 import lightpaint as lp
-from lightpaint.dmx.console_rig import ConsoleRig, DmxChannel, RigEmitter, RigFixture, RigLight
+from lightpaint.dmx.console_rig import (
+    ConsoleRig,
+    DmxChannel,
+    RigAxis,
+    RigEmitter,
+    RigFixture,
+    RigHead,
+    RigLight,
+)
 from lightpaint.errors import PaintError, RigError
 from lightpaint.paint import protocol
 from lightpaint.paint.session.session import Session
@@ -32,9 +40,11 @@ class RecordedLink:
     shown: list[Any] = field(default_factory=list)
     is_closed: bool = False
     trouble: str | None = None
+    rig: ConsoleRig | None = None
 
-    def show(self, drives: Any) -> None:
-        """Note drives."""
+    def show(self, drives: Any, *, rig: ConsoleRig | None = None) -> None:
+        """Note drives, and the rig that they are for."""
+        self.rig = rig
         if "nowhere" in drives:
             raise RigError("the rig has no light nowhere")
         self.shown.append(drives)
@@ -124,6 +134,37 @@ def test_without_a_target_there_is_only_the_address_of_lights(session: Session) 
     for message in (protocol.SwitchConsole(True), protocol.BlackOut()):
         with pytest.raises(PaintError, match="there is no console"):
             switch.handle(message, session)
+
+
+@pytest.mark.parametrize("has_positions", [False, True])
+def test_heads_follow_lights_that_move_if_they_are_to(
+    session: Session, has_positions: bool
+) -> None:
+    link, warnings = RecordedLink(), list[str]()
+    axis = RigAxis("tilt", 3, (1, 0, 0), (0, 255), (-90, 90))
+    [still] = _rig().fixtures
+    channels = (*still.channels, DmxChannel("Tilt", "Head", (4,), default=128))
+    head = RigHead((axis,), (0, 0, -1), ("lamp 1",))
+    rig = ConsoleRig("r", (replace(still, channels=channels, heads=(head,)),))
+    ways = [(0, 0, -1), (0, 1, 0), (1, 0, 0), (1, 0, 0)]
+    switch = ConsoleSwitch(
+        Console(rig, lambda: link, "sacn://127.0.0.1", has_positions=has_positions),
+        find_directions=lambda _: {"lamp 1": ways.pop(0)},
+        warn=warnings.append,
+    )
+    switch.handle(protocol.SwitchConsole(True), session)
+    levels = []
+    for _ in range(3):
+        switch.follow(session)
+        levels.append(None if link.rig is None else link.rig.fixtures[0].channels[3].default)
+    if has_positions:
+        # +y is 90° of tilt; +x is across it.
+        assert levels[0] == 255
+        assert len(warnings) == 1
+        assert "so it misses by 90°" in warnings[0]
+    else:
+        assert levels == [None] * 3
+        assert warnings == []
 
 
 def test_a_blackout_of_a_console_that_is_off_is_refused(session: Session) -> None:

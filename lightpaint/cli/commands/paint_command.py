@@ -97,6 +97,7 @@ def _console(
     target: "ConsoleTarget | None",
     universes: dict[int, int],
     priority: int | None,
+    positions: bool,
 ) -> "Console":
     """Return the console of a rig, and say what it will send to. Nothing is sent yet."""
     from lightpaint.cli.commands.console_commands import read_rig_file
@@ -110,7 +111,7 @@ def _console(
     address = link_address(target, fixtures, universes=universes, priority=chosen)
     terminal.say(f"console: {address}; nothing is sent before it is switched on in the page")
     open_link = partial(ConsoleLink.open, target, fixtures, universes=universes, priority=chosen)
-    return Console(fixtures, open_link, address)
+    return Console(fixtures, open_link, address, has_positions=positions)
 
 
 def _serve(

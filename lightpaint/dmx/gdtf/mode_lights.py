@@ -27,6 +27,7 @@ from lightpaint.dmx.gdtf.emitter_colour import (
 )
 from lightpaint.dmx.gdtf.geometry_tree import Placed
 from lightpaint.dmx.gdtf.mode_channels import ChannelFunction, Curve, ModeChannel, curve_of
+from lightpaint.dmx.gdtf.mode_heads import ModeHead, mode_heads
 from lightpaint.dmx.spot_cone import solid_angle
 from lightpaint.sentences import Hint, Sentence
 
@@ -82,13 +83,16 @@ class ModeLight:
 
 @dataclass(frozen=True)
 class FixtureMode:
-    """A mode: its channels, its lights, where its emission comes from, and what to know of it."""
+    """A mode: its channels, its lights, where its emission comes from, what to know of it, and what
+    turns.
+    """
 
     name: str
     channels: tuple[DmxChannel, ...]
     lights: tuple[ModeLight, ...]
     emission: str
     remarks: tuple[str, ...] = ()
+    heads: tuple[ModeHead, ...] = ()
 
 
 @dataclass(frozen=True)
@@ -143,7 +147,7 @@ class ModeReader:
             lone = self._lone_light(groups[0], candelas)
             remarks = (_PLACEHOLDER, *self.remarks)
             return FixtureMode(self.name, tuple(self.dmx), (lone,), emission, remarks)
-        lights = []
+        lights, beams = [], []
         dimmers = [[self._dimmers(beam) for beam in group] for group in groups]
         counts = Counter(k for own in dimmers for k in set().union(*own))
         shared = {k for k, count in counts.items() if count > 1}
@@ -152,10 +156,13 @@ class ModeReader:
             light = self._light(number, group, own, shared, candelas)
             if light is not None:
                 lights.append(light)
+                beams.append([beam.placed for beam in group])
         if not lights:
             self._remark("no channel of it dims light, so it is left out")
         self._remark_resting(lights)
-        return FixtureMode(self.name, tuple(self.dmx), tuple(lights), emission, tuple(self.remarks))
+        heads = mode_heads(self.tree, self.channels, beams)
+        remarks = tuple(self.remarks)
+        return FixtureMode(self.name, tuple(self.dmx), tuple(lights), emission, remarks, heads)
 
     def _is_placeholder(self) -> bool:
         """Return whether the file stands for a type that a program does not know: no beam, and all
