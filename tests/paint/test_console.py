@@ -18,8 +18,10 @@ from lightpaint.dmx.console_rig import (
 )
 from lightpaint.errors import PaintError, RigError
 from lightpaint.paint import protocol
+from lightpaint.paint.session.look_library import LookLibrary
+from lightpaint.paint.session.picture_table import PictureTable
 from lightpaint.paint.session.session import Session
-from lightpaint.paint.store.history_steps import Identity
+from lightpaint.paint.store.history_steps import Identity, StoredLook
 from lightpaint.paint.store.store import MemoryStore
 from lightpaint.paint.studio.console_switch import Console, ConsoleSwitch, drives_of_session
 from lightpaint.pipeline.job.settings import Settings
@@ -171,6 +173,23 @@ def test_a_blackout_of_a_console_that_is_off_is_refused(session: Session) -> Non
     switch = ConsoleSwitch(Console(_rig(), RecordedLink, "sacn://127.0.0.1"))
     with pytest.raises(PaintError, match="nothing is sent"):
         switch.handle(protocol.BlackOut(), session)
+
+
+def test_looks_keep_their_drives_and_learn_them_when_lamps_change(session: Session) -> None:
+    _paint(session)
+    session.handle(protocol.SetMaster(0.5), {})
+    library = LookLibrary(session, PictureTable())
+    library.handle(protocol.SaveLook("dusk"))
+    [look] = session.store.looks()
+    assert look.fields["drives"] == drives_of_session(session)
+    # As a file that knew other lamps, or none, has it.
+    for others in ({"lamp 1": {"red": 0.1}}, None):
+        fields = {**look.fields, "drives": others}
+        if others is None:
+            del fields["drives"]
+        session.store.put_look(StoredLook(look.id, fields, look.arrays))
+        LookLibrary(session, PictureTable())
+        assert session.store.looks()[0].fields["drives"] == drives_of_session(session)
 
 
 def test_the_master_dimmer_dims_the_drives(session: Session) -> None:

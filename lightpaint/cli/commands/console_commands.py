@@ -44,13 +44,9 @@ def read_rig_file(rig: RigFile) -> ConsoleRig:
     return read_rig(rig.path, gdtf_folder=rig.gdtf, pixels=rig.pixels)
 
 
-def read_drives(path: Path) -> RigDrives:
-    """Return the drives of a lighting. Raises LightingError if none of its lights has emitters."""
-    return _read_answer(path)[1]
-
-
-def _read_answer(path: Path) -> tuple[Lighting, RigDrives]:
-    """Return a lighting and its drives. Raises LightingError as `read_drives`."""
+def read_answer(path: Path) -> tuple[Lighting, RigDrives]:
+    """Return a lighting and its drives. Raises LightingError if none of its lights has
+    emitters."""
     finish(path.parent)
     lighting = read_lighting(path)
     drives = drives_of(lighting)
@@ -68,7 +64,7 @@ def send(
     """Run `lightpaint send lighting.json --rig show.mvr --to TARGET`."""
     if dump is not None:
         _check_dump(dump, [lighting, rig.path], force=force)
-    (answer, drives), fixtures = _read_answer(lighting), read_rig_file(rig)
+    (answer, drives), fixtures = read_answer(lighting), read_rig_file(rig)
     check_drives(fixtures, drives)
     if sending.positions:
         fixtures, remarks = aimed_rig(fixtures, directions_of(answer))

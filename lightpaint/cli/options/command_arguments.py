@@ -121,6 +121,7 @@ def _export_arguments(options: Namespace, output: Path | None) -> dict[str, Any]
         "forms": options.to,
         "rig": rig_file(options),
         "fade_s": options.fade_s,
+        "positions": options.positions,
         "scene": scene_to_export(options),
         "groups": GroupsFile(options.groups, options.pattern) if options.groups else None,
         "stage": Path(options.stage) if options.stage else None,

@@ -81,14 +81,16 @@ def add_console(parser: argparse.ArgumentParser) -> None:
     _add_target(parser, "(default: none)")
     _add_universes(parser)
     _add_priority(parser)
-    _add_positions(parser)
+    add_positions(parser)
 
 
-def _add_positions(parser: argparse.ArgumentParser) -> None:
+def add_positions(parser: argparse.ArgumentParser, *, purpose: str = "") -> None:
+    """Add the option for pan and tilt. purpose: what needs it, if not all does."""
     parser.add_argument(
         "--positions",
         action="store_true",
-        help="set pan and tilt so that fixtures point where their lights do (default: they rest)",
+        help=f"{purpose}set pan and tilt so that fixtures point where their lights do (default: "
+        "they rest)",
     )
 
 
@@ -135,7 +137,7 @@ def add_send(parser: argparse.ArgumentParser) -> None:
     _add_target(parser, "(default: send nothing, and print the levels)")
     _add_universes(parser)
     _add_priority(parser)
-    _add_positions(parser)
+    add_positions(parser)
     parser.add_argument(
         "--fps",
         type=arguments.at_least(1, maximum=60),

@@ -45,7 +45,7 @@ class ChannelFunction:
 
     @property
     def ends(self) -> tuple[float, float]:
-        """What it does at its first and its last level, also if it is inverted."""
+        """The values at its first and its last level, also if it is inverted."""
         start, end = self.physical
         return (end, start) if self.element.get("DMXInvert") == "Yes" else (start, end)
 
