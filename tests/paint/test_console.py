@@ -1,6 +1,8 @@
 """The painter's console: nothing is sent before it is switched on, then each answer is."""
 
 from dataclasses import dataclass, field, replace
+from functools import partial
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -16,6 +18,7 @@ from lightpaint.dmx.console_rig import (
     RigHead,
     RigLight,
 )
+from lightpaint.dmx.rig_drives import check_lamps
 from lightpaint.errors import PaintError, RigError
 from lightpaint.paint import protocol
 from lightpaint.paint.session.look_library import LookLibrary
@@ -24,7 +27,9 @@ from lightpaint.paint.session.session import Session
 from lightpaint.paint.store.history_steps import Identity, StoredLook
 from lightpaint.paint.store.store import MemoryStore
 from lightpaint.paint.studio.console_switch import Console, ConsoleSwitch, drives_of_session
+from lightpaint.paint.subject_factory import make_subject
 from lightpaint.pipeline.job.settings import Settings
+from lightpaint.pipeline.job.sources import SceneFile
 from lightpaint.scene.lights.lights_file import SceneRequests
 
 SIZE = (8, 12)
@@ -83,6 +88,32 @@ def _paint(session: Session) -> None:
     """Paint a bright rectangle."""
     arrays = {"image": np.full((4, 5, 3), 0.9, np.float32), "importance": np.ones((4, 5), "f4")}
     session.handle(protocol.Paint(1, (2, 6, 3, 8), True, view=0), arrays)
+
+
+def test_a_show_without_a_lamp_is_refused_before_anything_is_painted(
+    make_basis: Any, tmp_path: Path
+) -> None:
+    """Of a basis, and of a scene that was never loaded by its lights file."""
+    keys = {"light": {"lamp 1": {"emitters": EMITTERS}}}
+    basis = make_basis(2, SIZE, names=["lamp 0", "lamp 1"])
+    basis = basis.with_requests(SceneRequests(keys, "hall.lights.toml"))
+    (tmp_path / "hall.xml").write_text("<scene/>")
+    listed = ", ".join(f'{{ name = "{x["name"]}", xy = {x["xy"]}, Y = 1 }}' for x in EMITTERS)
+    text = f'[light."lamp 1"]\nemitters = [{listed}]\n'
+    (tmp_path / "hall.lights.toml").write_text(text)
+    scene = SceneFile(str(tmp_path / "hall.xml"))
+    [fixture] = _rig().fixtures
+    other = ConsoleRig("r", (replace(fixture, lights=(replace(fixture.lights[0], name="x"),)),))
+    one = replace(fixture.lights[0], emitters=fixture.lights[0].emitters[:2])
+    fewer = ConsoleRig("r", (replace(fixture, lights=(one,)),))
+    for source in (basis, scene):
+        make_subject(source, tmp_path, check_lamps=partial(check_lamps, _rig()))
+        for rig, message in (
+            (other, "r has no light lamp 1: it has x"),
+            (fewer, "'lamp 1' of r has no emitter blue: it has green, red"),
+        ):
+            with pytest.raises(RigError, match=message):
+                make_subject(source, tmp_path, check_lamps=partial(check_lamps, rig))
 
 
 def test_nothing_is_sent_before_it_is_on_and_then_each_answer(session: Session) -> None:
