@@ -23,6 +23,7 @@ from light_groups import interleaved, pictures
 from nightly import nightly
 from patience import PATIENCE_S
 from raw_message import RawMessage
+from rig_files import EXAMPLE
 from server_key import key_of, offered
 from websockets.exceptions import ConnectionClosedError
 from websockets.sync.client import ClientConnection, connect
@@ -143,6 +144,8 @@ def test_several_views_are_named_by_sensors_or_are_bases(make_basis: Any) -> Non
         ("room.basis.exr --layers none.ora", r"none\.ora"),
         ("room.basis.exr --layers room.basis.exr", "does not say what its layers mean"),
         ("room.basis.exr --port 70000", "70000"),
+        ("room.basis.exr --rig a.mvr --positions", "--positions belongs to what is sent"),
+        (f"room.basis.exr --rig {EXAMPLE}", "none of the lights has emitters, so that nothing"),
         ("room.basis.exr -o room.basis.exr", "cannot write"),
     ],
 )

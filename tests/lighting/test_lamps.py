@@ -215,6 +215,8 @@ WRONG = {
     "a name twice": ({"emitters": [RGBW[0], RGBW[0]]}, "two emitters named 'red'"),
     "no name": ({"emitters": [{"xy": RED, "cd": 1}]}, "has no name: give it one"),
     "unknown": ({"emitters": [{**RGBW[0], "nm": 630}]}, "has the key 'nm'"),
+    "misspelt": ({"emitters": [{**RGBW[0], "wats": 3}]}, "did you mean 'watts'"),
+    "misspelt above": ({"emiters": RGBW}, "did you mean 'emitters'"),
     "too many": (
         {"emitters": [{**RGBW[0], "name": str(k)} for k in range(11)]},
         "at most 10 can be mixed",
@@ -267,6 +269,17 @@ IMPOSSIBLE = {
         "for a light that mixes emitters",
     ),
 }
+
+
+def test_a_lock_that_is_out_of_range_says_what_the_lamp_reaches(make_basis):
+    basis, target, lamp = _case(make_basis, 1, par={"emitters": [{"name": "w", "rgb": [1, 2, 3]}]})
+    for lock, message in (
+        ([2.0, 4.0, 6.0], r"in this colour they reach 1 2 3, a level of 1\.86; lock it at that"),
+        ([1.0, 0.0, 0.0], "they have no light of this colour, and all together reach 1 2 3"),
+    ):
+        held = lamp.and_then(Constraints.of({"par": {"lock": lock}}))
+        with pytest.raises(ConstraintError, match=message):
+            solve(basis, target, constraints=held)
 
 
 @pytest.mark.parametrize("case", IMPOSSIBLE)

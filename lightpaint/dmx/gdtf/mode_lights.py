@@ -18,15 +18,19 @@ from lightpaint.arrays import Doubles
 from lightpaint.dmx.color_mixing import can_invert
 from lightpaint.dmx.console_rig import DmxChannel, RigEmitter, RigFilter
 from lightpaint.dmx.gdtf.emitter_colour import (
+    SPACES,
     USUAL_FILTERS,
     EmitterColour,
+    colour_space,
     density_of,
     emitter_colour,
     primaries_of,
+    rgb_emitters,
     xy_of_kelvin,
 )
 from lightpaint.dmx.gdtf.geometry_tree import Placed
 from lightpaint.dmx.gdtf.mode_channels import ChannelFunction, Curve, ModeChannel, curve_of
+from lightpaint.dmx.gdtf.mode_heads import ModeHead, mode_heads
 from lightpaint.dmx.spot_cone import solid_angle
 from lightpaint.sentences import Hint, Sentence
 
@@ -82,13 +86,16 @@ class ModeLight:
 
 @dataclass(frozen=True)
 class FixtureMode:
-    """A mode: its channels, its lights, where its emission comes from, and what to know of it."""
+    """A mode: its channels, its lights, where its emission comes from, what to know of it, and what
+    turns.
+    """
 
     name: str
     channels: tuple[DmxChannel, ...]
     lights: tuple[ModeLight, ...]
     emission: str
     remarks: tuple[str, ...] = ()
+    heads: tuple[ModeHead, ...] = ()
 
 
 @dataclass(frozen=True)
@@ -126,6 +133,7 @@ class ModeReader:
     ) -> None:
         self.name, self.tree, self.channels = name, tree, list(channels)
         self.emitters, self.filters = elements("Emitters/Emitter"), elements("Filters/Filter")
+        self.spaces = elements("ColorSpace"), elements("AdditionalColorSpaces/ColorSpace")
         self.profiles = {x.get("Name", ""): x for x in elements("DMXProfiles/DMXProfile")}
         self.remarks: list[str] = []
         self.dmx = [x.dmx for x in self.channels]
@@ -143,7 +151,7 @@ class ModeReader:
             lone = self._lone_light(groups[0], candelas)
             remarks = (_PLACEHOLDER, *self.remarks)
             return FixtureMode(self.name, tuple(self.dmx), (lone,), emission, remarks)
-        lights = []
+        lights, beams = [], []
         dimmers = [[self._dimmers(beam) for beam in group] for group in groups]
         counts = Counter(k for own in dimmers for k in set().union(*own))
         shared = {k for k, count in counts.items() if count > 1}
@@ -152,10 +160,13 @@ class ModeReader:
             light = self._light(number, group, own, shared, candelas)
             if light is not None:
                 lights.append(light)
+                beams.append([beam.placed for beam in group])
         if not lights:
             self._remark("no channel of it dims light, so it is left out")
         self._remark_resting(lights)
-        return FixtureMode(self.name, tuple(self.dmx), tuple(lights), emission, tuple(self.remarks))
+        heads = mode_heads(self.tree, self.channels, beams)
+        remarks = tuple(self.remarks)
+        return FixtureMode(self.name, tuple(self.dmx), tuple(lights), emission, remarks, heads)
 
     def _is_placeholder(self) -> bool:
         """Return whether the file stands for a type that a program does not know: no beam, and all
@@ -372,14 +383,25 @@ class ModeReader:
                 colours.append((colour, places))
             return colours
         if self.way is _NAMED_RGB and found:
-            # Emitters of Rec.709, which such modes name unless they say otherwise.
-            for places in found.values():
-                for k in places:
-                    self._shape(k, _NAMED_RGB)
-            return [(x, found[x.name.capitalize()]) for x in primaries_of((0.3127, 0.3290))]
+            return self._named_rgb([found[name] for name in ("Red", "Green", "Blue")])
         if found and (self.way is _XY or self._filters([beam])):
-            return [(x, []) for x in primaries_of(beam.xy)]
+            space = replace(SPACES["sRGB"], white=beam.xy)
+            return [(x, []) for x in primaries_of(space)]
         return [(EmitterColour("white", beam.xy, 1.0), [])]
+
+    def _named_rgb(self, channels: Sequence[list[int]]) -> list[tuple[EmitterColour, list[int]]]:
+        """Return red, green and blue with the places of their channels: emitters of the file, or
+        colours of a space.
+        """
+        elements = []
+        for places in channels:
+            elements.append(self._shape(places[0], _NAMED_RGB).element)
+            for k in places[1:]:
+                self._shape(k, _NAMED_RGB)
+        emitters = rgb_emitters([x.get("Emitter") for x in elements], self.emitters)
+        if not emitters:
+            emitters = primaries_of(colour_space(elements[0].get("ColorSpace"), *self.spaces))
+        return [*zip(emitters, channels, strict=True)]
 
     def _filters(self, beams: Sequence[_Beam]) -> tuple[RigFilter, ...]:
         """Return the filters of some beams together; none if they cannot set all colours."""

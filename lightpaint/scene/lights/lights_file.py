@@ -10,6 +10,7 @@ from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
 
+from lightpaint.display_text import known_keys
 from lightpaint.errors import SceneError
 from lightpaint.file_reading import read_text
 from lightpaint.files import one_line
@@ -239,8 +240,9 @@ def read_keys(path: Path) -> dict[str, Any]:
         reason = one_line(str(error).replace("at end of document", end))
         raise SceneError(f"{path} is not TOML: {reason}") from None
     if unknown := [key for key in data if key not in (*KNOWN_KEYS, *OLDER)]:
+        key = unknown[0]
         raise SceneError(
-            f"{path}: unknown key {one_line(repr(unknown[0]))}; known are {', '.join(KNOWN_KEYS)}"
+            f"{path}: unknown key {one_line(repr(key))}; {known_keys(key, KNOWN_KEYS)}"
         )
     if any(not -(2**63) <= number < 2**63 for number in _integers(data)):
         raise SceneError(f"{path} is not TOML: it has an integer of more than 64 bits")
