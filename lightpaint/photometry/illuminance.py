@@ -154,7 +154,7 @@ class Illuminance:
         shape, expected = np.shape(weights), self.matrix.shape[1:]
         if shape != expected:
             raise SceneError(f"weights of the shape {shape}: expected {expected}, a row per light")
-        return np.asarray(matrix.reshape(len(matrix), -1) @ np.asarray(weights).reshape(-1))
+        return np.asarray(matrix.reshape(len(matrix), np.size(weights)) @ np.ravel(weights))
 
 
 def floored(values: Doubles) -> Doubles:

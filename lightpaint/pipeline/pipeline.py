@@ -97,7 +97,7 @@ def run(job: Job, progress: Progress = silent, *, bases: list[Basis] | None = No
     job, obtained = find_suns(job, obtained, listen)
     if job.settings.error is not None:
         obtained = add_needed_samples(job, obtained, listen)
-    planes = planes_of_job(job, listen)
+    planes = planes_of_job(job, obtained[0].lights, listen)
     found = answer_job(job, obtained, listen, placement=placement, planes=planes)
     rig = _suggest(job, found.solution, placement, listen)
     lighting, scene = found.lighting, job.views[0].scene
@@ -108,7 +108,7 @@ def run(job: Job, progress: Progress = silent, *, bases: list[Basis] | None = No
             )
             for view, analysis in zip(job.views, found.analyses, strict=True)
         ]
-        if found.planes is not None and scene is not None:
+        if found.planes is not None and job.settings.planes is not None and scene is not None:
             write_planes(answer.path, found.planes, f"{scene.path.name} lit by {LIGHTING}")
     return [_reloaded(look) for look in looks] if answer.has_moved_paths else looks
 

@@ -1,11 +1,12 @@
 """Planes on which a job wishes for illuminance: measured before the solve, and read after it."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
 
 from lightpaint.arrays import Doubles
+from lightpaint.basis.lights import Lights
 from lightpaint.errors import LightpaintError
 from lightpaint.lighting.analysis.appearance.display_difference import PaintComparison
 from lightpaint.lighting.problem import Problem
@@ -17,6 +18,7 @@ from lightpaint.lighting.wishes.required_problem import RequiredProblem, with_wi
 from lightpaint.lighting.wishes.wished_light import WishedLight, wished_light
 from lightpaint.photometry.illuminance import Illuminance
 from lightpaint.photometry.measure import measure_illuminance
+from lightpaint.photometry.measuring_plane import PowerBudget
 from lightpaint.photometry.planes_file import PlanesFile, read_planes
 from lightpaint.pipeline.job.job import Job
 from lightpaint.pipeline.job.settings import Settings
@@ -83,17 +85,28 @@ def measure_planes(
     )
     points = sum(len(plane) for plane in file.planes)
     listen.note(f"illuminance measured at {points} points of {len(file.planes)} planes")
-    return MeasuredPlanes(file, illuminance, _floor_area(file, scene))
+    floor_m2 = _floor_area(file, scene)
+    if settings.watts is not None:
+        file = replace(file, power=PowerBudget(settings.watts))
+    return MeasuredPlanes(file, illuminance, floor_m2)
 
 
-def planes_of_job(job: Job, listen: Listener) -> MeasuredPlanes | None:
-    """Return the planes that a job wishes for, measured; None without any."""
-    if job.settings.planes is None:
-        return None
-    scene = job.views[0].scene
-    assert scene is not None
+def limited_power(watts: float, lights: Lights) -> MeasuredPlanes:
+    """Return no planes, and a limit of the power of all lamps."""
+    nothing = np.zeros((0, len(lights), 3))
+    illuminance = Illuminance((), lights, nothing, nothing, 1.0)
+    return MeasuredPlanes(PlanesFile(Path(), (), PowerBudget(watts)), illuminance, 0.0)
+
+
+def planes_of_job(job: Job, lights: Lights, listen: Listener) -> MeasuredPlanes | None:
+    """Return the planes that a job wishes for, measured, and its limit of power; None without
+    either.
+    """
+    settings, scene = job.settings, job.views[0].scene
+    if settings.planes is None or scene is None:
+        return None if settings.watts is None else limited_power(settings.watts, lights)
     scale = job.all_constraints.cd_per_unit
-    return measure_planes(scene, job.settings.planes, job.settings, scale, listen)
+    return measure_planes(scene, settings.planes, settings, scale, listen)
 
 
 def require(problem: Problem, planes: MeasuredPlanes, listen: Listener) -> RequiredProblem:

@@ -56,7 +56,8 @@ def planes_sentences(answer: PlanesAnswer) -> list[str]:
     """Return what is missed, what the power is, and what the wishes cost."""
     sentences = [_missed(answer, outcome) for outcome in answer.missed]
     if not answer.missed and answer.outcomes:
-        sentences.append("All wishes for the planes are met.")
+        what = "All wishes for the planes are" if answer.readings else "The limit of power is"
+        sentences.append(f"{what} met.")
     if answer.watts is not None:
         power = f"The lamps take {answer.watts:.4g} W"
         if answer.floor_m2:
@@ -140,7 +141,7 @@ def _missed(answer: PlanesAnswer, outcome: WishOutcome) -> str:
 def _prices(answer: PlanesAnswer) -> Iterator[str]:
     """Yield what the last steps of wishes cost, where they cost power."""
     for outcome in answer.outcomes:
-        if outcome.price is None or outcome.wish.kind not in STEPS:
+        if outcome.price is None or outcome.wish.kind not in STEPS or not outcome.is_met:
             continue
         step, text = STEPS[outcome.wish.kind]
         if (watts := step * outcome.price) >= LEAST_PRICE:
