@@ -77,6 +77,11 @@ class LuminaireRequest:
         """Its input power at full; None if neither says it."""
         return self.web.watts if self.input_watts is None else self.input_watts
 
+    def scale(self, cd_per_unit: float) -> float:
+        """Return the factor of the candela of its file in a scene."""
+        own = 1.0 if self.lumens is None else self.lumens / self.web.flux
+        return own * self.factor / cd_per_unit
+
     def parameters(self, cd_per_unit: float) -> dict[str, float]:
         """Return the numbers of its emitter that differ from their defaults."""
         numbers = {

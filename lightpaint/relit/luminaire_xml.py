@@ -55,8 +55,8 @@ def luminaire_xml(
         return panel_lines(hung.name, str(shape.plugin_name()), matrix, lines)
     matrix = np.array(props["to_world"].matrix, np.float64).reshape(4, 4)
     if spots := _spots(hung):
-        scale = web_scale(scene, emitter)
-        return _spot_lines(hung.name, spots, matrix, numbers, scale, level, weight)
+        candela = np.multiply(level, hung.scale)
+        return _spot_lines(hung.name, spots, matrix, numbers, candela, weight)
     return luminaire_lines(
         POINT_PLUGIN, hung.name, file, numbers, level, matrix, sampling_weight=weight
     )
@@ -71,16 +71,9 @@ def written_emission(scene: Scene, emitter: Emitter, level: RGB) -> RGB:
     spots = _spots(hung) if hung is not None and emitter.plugin == POINT_PLUGIN else ()
     if not spots:
         return level
-    r, g, b = (web_scale(scene, emitter) * spots[0].candela * channel for channel in level)
-    return r, g, b
-
-
-def web_scale(scene: Scene, emitter: Emitter) -> float:
-    """Return the factor of a luminaire's candela in the scene."""
-    hung = luminaire_of(scene, emitter)
     assert hung is not None
-    assert emitter.unit_flux is not None
-    return emitter.unit_flux / hung.request.web.flux
+    r, g, b = (hung.scale * spots[0].candela * channel for channel in level)
+    return r, g, b
 
 
 def plugin_remark(scene: Scene) -> str | None:
@@ -108,18 +101,20 @@ def _spot_lines(
     spots: Sequence[SpotPart],
     matrix: Doubles,
     numbers: dict[str, float],
-    scale: float,
-    level: RGB,
+    level: Doubles,
     weight: float,
 ) -> list[str]:
-    """Return the XML of spots, the first of which has the name of the luminaire."""
+    """Return the XML of spots, the first of which has the name of the luminaire.
+
+    level: (3,), by which their candela are multiplied.
+    """
     turn, tilt = numbers.get("turn", 0.0), numbers.get("tilt", 0.0)
     hung = np.eye(4)
     hung[:3, 3] = matrix[:3, 3]
     hung[:3, :3] = world_from_web(matrix[:3, :3], turn=turn, tilt=tilt) @ EMITTER_FROM_WEB.T
     lines: list[str] = []
-    for k, spot in enumerate(spots if any(level) else spots[:1]):
-        colour = " ".join(f"{np.float32(scale * spot.candela * x):.9g}" for x in level)
+    for k, spot in enumerate(spots if level.any() else spots[:1]):
+        colour = " ".join(f"{np.float32(spot.candela * x):.9g}" for x in level)
         inner = [
             matrix_text(hung),
             tag("float", name="beam_width", value=f"{spot.beam:.9g}"),

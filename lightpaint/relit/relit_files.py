@@ -35,7 +35,7 @@ class _Edits:
     by byte offset.
     integrators: replacements of elements, by byte offset; None for an addition.
     moved: child elements to set in the elements of moved lights, by byte offset, as XML by name.
-    added: lines of the elements of new lights.
+    added: lines of the elements of new lights. removed: byte offsets of elements to leave out.
     """
 
     original: Path
@@ -44,6 +44,7 @@ class _Edits:
     integrators: dict[int | None, str] = field(default_factory=dict)
     moved: dict[int, Mapping[str, str]] = field(default_factory=dict)
     added: list[str] = field(default_factory=list)
+    removed: list[int] = field(default_factory=list)
 
 
 def relit_files(
@@ -93,6 +94,9 @@ def _edits_of(scene: Scene, emission: Mapping[str, RGB]) -> dict[Path, _Edits]:
     settings |= kept
     _edit_emitters(scene, edits, settings, unchanged, sampled)
     _edit_integrators(scene, edits)
+    for index, offset in (x for hung in scene.luminaires for x in hung.further):
+        file = scene.files[index]
+        edits.setdefault(file.resolve(), _Edits(file)).removed.append(offset)
     for file, offset, children in scene.moved_elements:
         edits.setdefault(file.resolve(), _Edits(file)).moved[offset] = children
     return edits
@@ -247,6 +251,8 @@ def _edit(edit: _Edits, folder: Path, scene: Scene, stem: str) -> tuple[bytes, d
     for at, text in edit.integrators.items():
         if at is not None:
             xml.replace(xml.element_at(at), text)
+    for at in edit.removed:
+        xml.remove(xml.element_at(at))
     images: dict[str, Floats] = {}
     for offset in sorted({*edit.settings, *edit.texel_images, *edit.moved}):
         if offset in edit.settings and luminaire_of(scene, edit.settings[offset][0]) is not None:

@@ -69,6 +69,7 @@ from lightpaint.placement.placement import PlacementRecord
 from lightpaint.placement.rigging import Rigging
 from lightpaint.placement.suggested_lights import check_suggestible
 from lightpaint.relit.export.nuke import spoken_unreadable
+from lightpaint.relit.luminaire_xml import plugin_remark
 from lightpaint.scene.quality_presets import on_film
 from lightpaint.scene.scene import Scene
 from lightpaint.sentences import Hint, Sentence
@@ -346,6 +347,7 @@ class Job:
         rendered_scenes = [] if self.basis is not None else [x.scene for x in self.views if x.scene]
         if (first := self.views[0].scene) is not None:
             remarks += remarks_of_scene(first, is_rendered=bool(rendered_scenes))
+            remarks += filter(None, [plugin_remark(first)])
         films = [scene.size for scene in scenes] if rendered_scenes else [None] * len(targets)
         for target, view, film in zip(targets, self.views, films, strict=True):
             remarks += remarks_of_target(target, view.target.size, view.scene, self.fit, film=film)

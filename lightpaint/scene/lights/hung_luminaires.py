@@ -19,6 +19,7 @@ from lightpaint.display_text import some_names
 from lightpaint.errors import SceneError
 from lightpaint.luminaires.luminaire_request import LuminaireRequest
 from lightpaint.luminaires.plugin_names import AREA_PLUGIN, LUMINAIRE_PLUGINS, POINT_PLUGIN
+from lightpaint.luminaires.spot_sum import spots_of
 from lightpaint.luminaires.web import PhotometricWeb
 from lightpaint.luminaires.web_file import flux_remark
 from lightpaint.luminaires.web_frame import EMITTER_FROM_WEB, hanging_frame, world_from_web
@@ -46,16 +47,20 @@ SPOT_MARK = ".spot"
 class HungLuminaire:
     """A luminaire in a scene.
 
-    name: of its emitter. file, offset: of the element whose place it takes. distance: to the
-    nearest surface that it lights, if that was looked for. is_panel: whether its size counts.
+    name: of its emitter. file, offset: of the element whose place it takes. scale: factor of the
+    candela of its file. distance: to the nearest surface that it lights, if that was looked for.
+    is_panel: whether its size counts. further: file and offset of spots that were part of its light
+    in a relit scene, and that it replaces.
     """
 
     name: str
     request: LuminaireRequest
     file: int
     offset: int
+    scale: float
     distance: float | None = None
     is_panel: bool = False
+    further: tuple[tuple[int, int], ...] = ()
 
     def remarks(self) -> list[str]:
         """Return what its user should know of it."""
@@ -89,16 +94,26 @@ def hang_luminaires(
     Raises SceneError for a name that no emitter has, and for one whose place cannot be taken.
     """
     chosen = _chosen(parsed, requests, groups)
-    spots = [node for node, name in parsed.names.items() if _is_further_spot(name, parsed, chosen)]
-    parsed = without_emitters(parsed, spots) if spots else copied(parsed)
+    whole = {parsed.names[node] for node in chosen}
+    further = {k: luminaire_of_spot(parsed.names[k]) for k in parsed.emitter_nodes}
+    further = {k: name for k, name in further.items() if name in whole}
+    parsed = without_emitters(parsed, further.keys()) if further else copied(parsed)
     distances = _distances(parsed, chosen, up)
     for node, request in chosen.items():
-        name, place = parsed.names[node], parsed.state.nodes[node]
+        name = parsed.names[node]
         distance = distances.get(node)
         is_panel = distance is not None and distance < FAR * request.web.opening.largest
         hung = HungLuminaire(
-            name, request, place.file_index, int(place.offset) - 1, distance, is_panel
+            name,
+            request,
+            *_element(parsed, node),
+            request.scale(cd_per_unit),
+            distance,
+            is_panel,
+            tuple(_element(parsed, k) for k, whole in further.items() if whole == name),
         )
+        if name in further.values():
+            _rejoin(parsed.state.nodes[node].props, hung)
         file = os.path.relpath(request.path.resolve(), parsed.path.resolve().parent)
         numbers = request.parameters(cd_per_unit)
         if is_panel:
@@ -107,6 +122,11 @@ def hang_luminaires(
             _become_luminaire(parsed, node, Path(file).as_posix(), numbers, up)
             parsed.luminaires[node] = hung
     return parsed
+
+
+def _element(parsed: ParsedScene, node: int) -> tuple[int, int]:
+    """Return the file of an element, and the offset of its `<`."""
+    return parsed.state.nodes[node].file_index, int(parsed.state.nodes[node].offset) - 1
 
 
 def copied(parsed: ParsedScene) -> ParsedScene:
@@ -148,10 +168,15 @@ def luminaire_of_spot(name: str) -> str:
     return stem if mark and number.isdecimal() else ""
 
 
-def _is_further_spot(
-    name: str, parsed: ParsedScene, chosen: Mapping[int, LuminaireRequest]
-) -> bool:
-    return luminaire_of_spot(name) in {parsed.names[node] for node in chosen}
+def _rejoin(props: Any, hung: HungLuminaire) -> None:
+    """Make the first of a luminaire's spots a luminaire at their level, which the others leave."""
+    import mitsuba as mi
+
+    spots = spots_of(hung.request.web)
+    first = hung.scale * spots[0].candela if spots else 1.0
+    level = np.array(props.get("intensity", 0.0), float).ravel() / first
+    props.set_plugin_name(POINT_PLUGIN)
+    props["intensity"] = mi.ScalarColor3f(*np.broadcast_to(level, 3).tolist())
 
 
 def _check_place(parsed: ParsedScene, node: int) -> None:
@@ -223,8 +248,9 @@ def _level(parsed: ParsedScene, node: int) -> tuple[float, ...]:
     import mitsuba as mi
 
     props = parsed.state.nodes[node].props
-    colors = [props[k] for k in ("intensity", "radiance") if k in props]
-    colors = [np.array(x, float).ravel() for x in colors if isinstance(x, mi.ScalarColor3f | float)]
+    plain = (mi.Properties.Type.Color, mi.Properties.Type.Float)
+    keys = [k for k in ("intensity", "radiance") if k in props and props.type(k) in plain]
+    colors = [np.array(props[k], float).ravel() for k in keys]
     if props.plugin_name() in LUMINAIRE_PLUGINS and colors:
         return tuple(np.broadcast_to(colors[0], 3).tolist())
     return (0.0,) * 3 if colors and not colors[0].any() else (1.0,) * 3
