@@ -21,8 +21,8 @@ from lightpaint.display_text import some_names
 from lightpaint.errors import SceneError
 from lightpaint.photometry.measuring_plane import MeasuringPlane, slices_of
 
-#: Share of a plane's mean below which the error of a point is taken to be as large as there.
-DARK_SHARE = 0.1
+#: Share of a plane's mean that a point has at least, where errors are related to its light.
+DARK_SHARE = 0.3
 #: Weight of a plane's mean square error against a point's own, in degrees of freedom.
 POOLED_DEGREES = 4
 
@@ -109,17 +109,18 @@ class Illuminance:
         """Return the standard errors of `of(weights)`, (p,) in lx.
 
         The error of a point is estimated from its own half difference and, with four times the
-        weight, from the root mean square over its plane of the half differences in relation to the
-        light. The light of a point below a tenth of the mean counts as that much.
+        weight, from those of its plane: their root mean square or, if that is more, the root mean
+        square of their ratios to the light, times the light of the point. So points in a shadow,
+        which get the noise of indirect light alone, are not taken to be too certain.
         """
         values, halves = self.of(weights), self._mix(self.half_differences, weights)
         errors = np.zeros(len(values))
         for part in self._slices.values():
-            light = floored(values[part])
+            light, own = floored(values[part]), halves[part] ** 2
             if light.any():
-                pooled = light**2 * np.mean((halves[part] / light) ** 2)
-                squares = POOLED_DEGREES * pooled + halves[part] ** 2
-                errors[part] = np.sqrt(squares / (POOLED_DEGREES + 1))
+                pooled = np.maximum(own.mean(), light**2 * np.mean(own / light**2))
+                squares = (POOLED_DEGREES * pooled + own) / (POOLED_DEGREES + 1)
+                errors[part] = np.sqrt(squares)
         return errors
 
     def reading(self, plane: str, weights: Doubles) -> PlaneReading:

@@ -53,9 +53,9 @@ def measure_illuminance(
         planes: From `read_planes`.
         spp: Samples per point; by default as many as `error` needs, at most 65,536.
         error: Largest half width of the 95 % interval of a plane's mean, and standard error of its
-            points, both relative and with the lights of `weights`. A point with less than a
-            tenth of the mean, or a plane with less than a thousandth of the light of the brightest,
-            counts as one with that much.
+            points, both relative and with the lights of `weights`. A point with less than 0.3 of
+            the mean, or a plane with less than a thousandth of the light of the brightest, counts
+            as one with that much.
         cd_per_unit: cd/m² of a radiance of 1 in the scene.
         weights: Weights of the lights, (n, 3), with which errors are judged; by default those of
             the scene as it is now.
