@@ -5,7 +5,7 @@ least what is asked, no point is below a share of the mean, or above a limit, an
 least a share of another plane's. So is the power of all lamps, which a budget limits.
 
 A has noise. A wish is met by the lower end of a 95 % interval: what a point or a mean gives counts
-for less by 1.96 relative standard errors, and for more where there is a limit from above.
+for less by as much as it is uncertain, and for more where there is a limit from above.
 """
 
 from collections.abc import Sequence
@@ -147,9 +147,9 @@ def _add_wishes(
     matrix, reading = illuminance.matrix[part], illuminance.reading(name, weights)
     mean = matrix.mean(axis=0, keepdims=True)
     values, errors = illuminance.of(weights)[part], illuminance.standard_errors(weights)[part]
-    point_error = NORMAL_95 * _relative(errors, values)
-    mean_error = reading.mean_error / reading.mean if reading.mean > 0 else 0.0
-    sure_mean = mean * (1 - NORMAL_95 * min(mean_error, LARGEST_ERROR))
+    point_error = NORMAL_95 * _relative(errors, values)[:, None, None]
+    mean_error = reading.mean_interval / reading.mean if reading.mean > 0 else 0.0
+    sure_mean = mean * (1 - min(mean_error, NORMAL_95 * LARGEST_ERROR))
     size = wishes.mean or max(reading.mean, 1e-9)
     if wishes.mean is not None:
         rows.add("mean", name, wishes.mean, sure_mean, wishes.mean, size=wishes.mean)
@@ -266,10 +266,11 @@ def check_powers(reduction: Reduction, names: Sequence[str], purpose: str) -> No
         )
 
 
-def _relative(errors: Doubles, values: Doubles) -> float:
-    """Return the relative error of points, which all have the same."""
-    lit = values > 0
-    return float(min((errors[lit] / values[lit]).max(initial=0), LARGEST_ERROR))
+def _relative(errors: Doubles, values: Doubles) -> Doubles:
+    """Return the relative errors of points, (p,), as far as a margin allows for them."""
+    relative = np.full(len(values), LARGEST_ERROR)
+    np.divide(errors, values, out=relative, where=values > 0)
+    return np.minimum(relative, LARGEST_ERROR)
 
 
 def _other_plane(illuminance: Illuminance, plane: MeasuringPlane, to: str) -> slice:
