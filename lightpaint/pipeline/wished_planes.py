@@ -7,7 +7,6 @@ import numpy as np
 
 from lightpaint.arrays import Doubles
 from lightpaint.basis.lights import Lights
-from lightpaint.errors import LightpaintError
 from lightpaint.lighting.analysis.appearance.display_difference import PaintComparison
 from lightpaint.lighting.problem import Problem
 from lightpaint.lighting.solution import Solution
@@ -21,10 +20,10 @@ from lightpaint.photometry.measure import measure_illuminance
 from lightpaint.photometry.measuring_plane import PowerBudget
 from lightpaint.photometry.planes_file import PlanesFile, read_planes
 from lightpaint.pipeline.job.job import Job
+from lightpaint.pipeline.job.job_checks import check_scale_of_planes
 from lightpaint.pipeline.job.settings import Settings
 from lightpaint.progress import Listener
 from lightpaint.scene.scene import Scene
-from lightpaint.sentences import Hint
 
 #: Largest error of a plane's mean, at 95 %, unless the settings say another.
 MEAN_ERROR = 0.02
@@ -67,13 +66,9 @@ def measure_planes(
     cd_per_unit: of the lights file or the settings. Raises LightpaintError if nothing says what a
     radiance of 1 stands for.
     """
+    check_scale_of_planes(path, cd_per_unit)
+    assert cd_per_unit is not None
     file = read_planes(path, scene)
-    if cd_per_unit is None:
-        raise LightpaintError(
-            f"{path} asks for lux, and nothing says how many cd/m² a radiance of 1 is: pass ",
-            Hint("cd_per_unit", 1),
-            ", or cd_per_unit in the lights file",
-        )
     illuminance = measure_illuminance(
         scene,
         file.planes,

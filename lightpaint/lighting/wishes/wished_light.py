@@ -270,7 +270,7 @@ def _relative(errors: Doubles, values: Doubles) -> Doubles:
     """Return the relative errors of points, (p,), as far as a margin allows for them."""
     relative = np.full(len(values), LARGEST_ERROR)
     np.divide(errors, values, out=relative, where=values > 0)
-    return np.minimum(relative, LARGEST_ERROR)
+    return np.asarray(np.minimum(relative, LARGEST_ERROR))
 
 
 def _other_plane(illuminance: Illuminance, plane: MeasuringPlane, to: str) -> slice:

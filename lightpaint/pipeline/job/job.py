@@ -28,11 +28,13 @@ from lightpaint.lighting.constraints.constraints import Constraints
 from lightpaint.lighting.constraints.constraints_file import constraints_of
 from lightpaint.lighting.fit import resolve_for_targets
 from lightpaint.lighting.unknowns.reduction import reduce_to
+from lightpaint.lighting.wishes.wished_light import check_powers
 from lightpaint.pipeline.job.job_checks import (
     check_animation,
     check_inputs,
     check_painting_is_no_light,
     check_places,
+    check_scale_of_planes,
     rigging_for,
     sky_for_sun,
     wanted_sun,
@@ -198,7 +200,11 @@ class Job:
         # Reports impossible constraints before rendering.
         lights = self._lights(scenes, bases)
         all_constraints = with_scale(all_constraints, lights)
-        reduce_to(all_constraints, lights)
+        reduction = reduce_to(all_constraints, lights)
+        if self.settings.watts is not None:
+            check_powers(reduction, [light.name for light in lights], "a limit of power")
+        if self.settings.planes is not None:
+            check_scale_of_planes(self.settings.planes, all_constraints.cd_per_unit)
         if scenes and (count := wanted_sun(self.settings, scenes)):
             sky_for_sun(scenes[0], count)
         if self.settings.suggest:
