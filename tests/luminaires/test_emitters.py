@@ -1,7 +1,6 @@
 """The emitters of luminaires against closed forms, and against Radiance."""
 
 import gc
-import math
 from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
@@ -9,7 +8,7 @@ from typing import Any
 import numpy as np
 import pytest
 from radiance import illuminance
-from webs import Distribution, batwing, cosine, ies_text, street, trough, write_web
+from webs import Distribution, batwing, ies_text, street, trough, write_web
 
 from lightpaint.arrays import Doubles
 from lightpaint.luminaires.web import turned
@@ -90,7 +89,9 @@ def test_c0_is_to_the_right_and_c90_up_as_seen_from_the_lamp(tmp_path: Path) -> 
     view = mi.ScalarTransform4f().look_at([1, 2, 3], [4, 1, 1], [0, 0, 1])
     axes = world_from_web(np.array(view.matrix)[:3, :3])
     c0, c90, up_of_web = axes.T
-    assert c0 == pytest.approx(-np.array(view.matrix)[:3, 0], abs=1e-6)  # Mitsuba's x is to the left
+    assert c0 == pytest.approx(
+        -np.array(view.matrix)[:3, 0], abs=1e-6
+    )  # Mitsuba's x is to the left
     assert c90 == pytest.approx(np.array(view.matrix)[:3, 1], abs=1e-6)
     assert up_of_web == pytest.approx(-np.array(view.matrix)[:3, 2], abs=1e-6)
 
