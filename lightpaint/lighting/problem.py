@@ -189,7 +189,9 @@ class Problem(LinearProblem):
             raise ConstraintError(
                 f"the constraints are a {type(constraints).__name__}: give Constraints.of(...)"
             )
-        all_constraints = constraints_of(bases[0].requests).and_then(constraints or Constraints())
+        all_constraints = constraints_of(bases[0].requests)
+        if constraints is not None:
+            all_constraints = all_constraints.and_then(constraints)
         all_constraints = with_scale(all_constraints, bases[0].lights)
         whole, parts = joint_basis([held_at_start(x, all_constraints.start) for x in bases])
         views, fit = _resolve_views(parts, targets, fit or Fit(), resize=resize)

@@ -85,7 +85,10 @@ def make_subject(
     others are those of `Subject`. Raises LightpaintError if the source cannot be painted, or its
     lights cannot meet the constraints.
     """
-    settings, constraints = settings or Settings(), constraints or Constraints()
+    settings, constraints = (
+        settings or Settings(),
+        Constraints() if constraints is None else constraints,
+    )
     if layers is not None:
         if view_count > 1:
             raise PaintError(f"{layers} has the layers of one view: open that view alone")

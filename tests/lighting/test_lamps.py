@@ -146,6 +146,12 @@ def test_candelas_and_lumens_are_of_the_scale(make_basis):
         assert lamp.columns @ [0.2126, 0.7152, 0.0722] == pytest.approx([level], rel=1e-3)
 
 
+def test_a_scale_alone_is_kept(make_basis):
+    basis, target, _ = _case(make_basis, 0, a={})
+    answer = solve(basis, target, constraints=Constraints.of(cd_per_unit=1000)).lighting
+    assert answer.cd_per_unit == 1000
+
+
 def test_a_narrow_spectrum_has_the_colour_of_its_wavelength(make_basis):
     emitters = [{"name": "laser", "spectrum": [[519, 0], [520, 1], [521, 0]], "Y": 1}]
     basis, target, constraints = _case(make_basis, 1, par={"emitters": emitters})

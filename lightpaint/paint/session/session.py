@@ -110,7 +110,7 @@ class Session:
             self.views.live,
             requests,
             settings=settings,
-            constraints=constraints or Constraints(),
+            constraints=Constraints() if constraints is None else constraints,
             transform=transform,
             lights_of=lambda session_requests: self._moved_lights.lights(session_requests.placed),
         )

@@ -317,7 +317,7 @@ def _with_panel(
     turned = {key: x for key, x in numbers.items() if key not in ("turn", "tilt")}
     lines = luminaire_lines(
         AREA_PLUGIN,
-        hung.name,
+        "",
         file,
         turned,
         _level(parsed, node),
