@@ -15,7 +15,9 @@ from lightpaint.lighting.analysis.analysis import analyse
 from lightpaint.lighting.answer.lighting_file import read_lighting, write_lighting
 from lightpaint.lighting.constraints.constraints import Constraints
 from lightpaint.lighting.constraints.constraints_file import read_constraints
+from lightpaint.lighting.constraints.light_patterns import constraints_by_light
 from lightpaint.lighting.solve import solve
+from lightpaint.lighting.unknowns.reduction import reduce_to
 from lightpaint.target.target import Target
 
 SIZE = (5, 4)
@@ -112,6 +114,20 @@ def test_a_colour_is_mixed_as_bright_as_the_emitters_can(make_basis):
     assert light.lamp is not None
     assert max(light.drives.values()) == pytest.approx(1)
     assert np.allclose(light.lamp.mix(np.array([*light.drives.values()])), light.emission)
+
+
+def test_lamps_of_one_pattern_are_read_once(make_basis):
+    """A rig has hundreds of them."""
+    lights = {f"par {k}": {} for k in range(4)}
+    basis, _, _ = _case(make_basis, 1, **lights)
+    more = {"par 3": {"limits": {"max": 2.0}}}
+    constraints = Constraints.of({"par *": {"emitters": RGBW}} | more)
+    by_light = constraints_by_light(constraints, basis.lights)
+    assert by_light[0] is by_light[1] is by_light[2]
+    assert by_light[3].most is not None
+    lamps = reduce_to(constraints, basis.lights).lamps
+    assert lamps[0] is lamps[1] is lamps[2]
+    assert lamps[3] == lamps[0]
 
 
 def test_preferences_change_the_drives_and_not_the_picture(make_basis):

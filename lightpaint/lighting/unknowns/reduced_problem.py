@@ -460,11 +460,16 @@ def _block_matrix(M: Doubles, block: Block) -> Doubles:
         return np.asarray(M[c][lights[:, None], lights])
     made = np.zeros((block.unknowns.size, block.unknowns.size))
     for c, e in zip(block.channels, block.entries, strict=True):
-        part = M[c][e.lights[:, None], e.lights] * e.values[:, None] * e.values
+        part = M[c].take(e.lights, 0).take(e.lights, 1)
+        part *= e.values[:, None]
+        part *= e.values
         if e.lights.size > e.columns.size:
             # Most columns are of one light: the sum over those of several is a short one.
             part = np.add.reduceat(np.add.reduceat(part, e.first, 0), e.first, 1)
-        made[e.columns[:, None], e.columns] += part
+        if e.columns.size == len(made):  # which rise
+            made += part
+        else:
+            made[e.columns[:, None], e.columns] += part
     return made
 
 
