@@ -99,6 +99,7 @@ def test_public_names_and_options_that_are_named_are_there(document: Path):
     assert sorted(options - _options()) == []
 
 
+@pytest.mark.nightly
 @pytest.mark.long
 @pytest.mark.usefixtures("short_search")
 def test_snippets_of_python_run_one_after_the_other(

@@ -107,6 +107,7 @@ def test_the_demo_does_not_write_over_what_is_there(tmp_path: Path):
     assert "cannot write" in run(tmp_path, "demo", "-o", "file").stderr
 
 
+@pytest.mark.nightly
 @pytest.mark.long
 def test_the_demo_has_lamps_that_somebody_could_hang(tmp_path: Path):
     """No pink sun, no cyan cove: no lamp is green or magenta, and none lacks a channel."""

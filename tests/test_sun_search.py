@@ -184,7 +184,7 @@ def mixes_of_palette(colors: np.ndarray) -> np.ndarray:
     [
         nightly({"limits": {"max": 10}}, "free"),
         ({"limits": {"max": 10}}, "gentle"),
-        ({"kelvin": [3000, 12000]}, "free"),
+        nightly({"kelvin": [3000, 12000]}, "free"),
         nightly({"primaries": list(PALETTE)}, "free"),
     ],
 )

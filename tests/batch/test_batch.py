@@ -126,6 +126,7 @@ def is_derived(name: str) -> bool:
     return "warmer" in name or "dusk" in name
 
 
+@pytest.mark.nightly
 def test_a_project_that_was_moved_is_done_still(batch_folder: Path) -> None:
     run_item(batch_folder)
     moved_folder = batch_folder.parent / f"{batch_folder.name}-moved"
@@ -326,6 +327,7 @@ def test_one_look_is_not_several(batch_folder: Path) -> None:
     assert "1 look was done earlier and is unchanged" in completed.stderr
 
 
+@pytest.mark.nightly
 def test_a_basis_that_takes_too_much_memory_fails_its_looks_alone(
     batch_folder: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -341,6 +343,7 @@ def test_a_basis_that_takes_too_much_memory_fails_its_looks_alone(
     succeed(batch_folder, "batch", "looks.toml", "-o", "out")
 
 
+@pytest.mark.nightly
 def test_a_disk_that_is_really_full(batch_folder: Path) -> None:
     disk = batch_folder / "disk"
     disk.mkdir()
@@ -380,6 +383,7 @@ def test_an_interrupt_says_how_to_go_on(
     assert contents(batch_folder / "out") == reference_batch[1]
 
 
+@pytest.mark.nightly
 def test_workers_that_are_all_gone_are_no_look_s_failure(
     batch_folder: Path, reference_batch: tuple[Path, dict[str, bytes]]
 ) -> None:

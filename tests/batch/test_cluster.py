@@ -348,6 +348,7 @@ def test_a_worker_that_hangs_and_one_without_memory_are_replaced(
     assert listener.starts["third: answer"] >= 2
 
 
+@pytest.mark.nightly
 def test_a_batch_that_was_killed_goes_on_with_the_parts_that_it_has(
     workers: Workers, reference_batch: tuple[Path, dict[str, bytes]]
 ) -> None:

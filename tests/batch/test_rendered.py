@@ -161,6 +161,7 @@ def test_relit_scenes_load_in_plain_mitsuba_with_their_lights(
     assert preset == read_lighting(batch_folder / "preset.json").emission
 
 
+@pytest.mark.nightly
 def test_other_samples_of_a_final_render_render_it_alone_again(
     batch_folder: Path, batch_record: dict[str, Any]
 ) -> None:

@@ -512,12 +512,13 @@ def test_the_cache_is_listed_and_cleared(tmp_path: Path) -> None:
         assert completed.returncode == 0, completed.stderr
         return completed.stdout
 
-    call("basis", CORNELL, "--spp", "2", "--no-cache")
-    assert "scene.xml" not in call("cache")
-    call("basis", CORNELL, "--spp", "2")
-    assert "scene.xml" in call("cache", "list")
+    room = write_room(tmp_path)
+    call("basis", room, "--spp", "2", "--no-cache")
+    assert "room.xml" not in call("cache")
+    call("basis", room, "--spp", "2")
+    assert "room.xml" in call("cache", "list")
     assert "1 deleted" in call("cache", "clear")
-    assert "scene.xml" not in call("cache")
+    assert "room.xml" not in call("cache")
 
 
 CHECKERS = """<shape type="rectangle" id="screen"><transform name="to_world"><scale value="0.4"/>
@@ -657,6 +658,7 @@ def test_solved_small_and_verified_large(tmp_path: Path) -> None:
     succeed(tmp_path, *small, "-o", "small")
 
 
+@pytest.mark.nightly
 def test_a_tampered_scene_is_told_from_a_small_prediction_too(tmp_path: Path) -> None:
     succeed(tmp_path, "solve", CORNELL, WARM, "--resolution", "1/4", "--spp", 64)
     relit = tmp_path / "warm" / "relit.xml"
@@ -707,6 +709,7 @@ def test_budgets_that_contradict_each_other_are_refused(basis_file: Path, tmp_pa
         assert f"{option[0]} cannot change a saved basis" in refusal
 
 
+@pytest.mark.nightly
 def test_a_film_that_no_blocks_fit_into_is_solved_small_and_verified_whole(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ):

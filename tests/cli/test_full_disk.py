@@ -59,6 +59,7 @@ def contents(folder: Path) -> dict[str, bytes]:
     }
 
 
+@pytest.mark.nightly
 def test_a_full_cache_costs_no_answer(small_disk: tuple[Path, str], tmp_path: Path) -> None:
     disk, before = small_disk
     arguments: tuple[object, ...] = ("solve", CORNELL, WARM, "--spp", 4, "--no-verify")

@@ -93,7 +93,7 @@ def uninterrupted(
 @pytest.mark.parametrize(
     "signals",
     [
-        (signal.SIGINT, signal.SIGKILL),
+        nightly((signal.SIGINT, signal.SIGKILL)),
         nightly((signal.SIGKILL,)),
         nightly((signal.SIGKILL, signal.SIGINT)),
         nightly((signal.SIGINT,) * 2),
@@ -150,8 +150,8 @@ def test_stopped_and_gone_on_is_as_if_never_stopped(
     [
         (ONE_PASS, signal.SIGINT, 0),
         (ONE_PASS, signal.SIGTERM, 0.1),
-        (ONE_PASS, signal.SIGHUP, 0.1),
-        (SEPARATE, signal.SIGINT, 0.1),
+        nightly(ONE_PASS, signal.SIGHUP, 0.1),
+        nightly(SEPARATE, signal.SIGINT, 0.1),
         nightly(ONE_PASS, signal.SIGINT, 0.1),
         nightly(SEPARATE, signal.SIGINT, 0),
         nightly(SEPARATE, signal.SIGTERM, 0.1),

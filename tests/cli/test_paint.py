@@ -271,6 +271,7 @@ def test_a_program_connects_by_one_line_or_by_a_file_of_its_owner(work_folder: P
         assert file.exists() == (ends == signal.SIGKILL)
 
 
+@pytest.mark.nightly
 def test_the_observer_of_the_document_hears_the_state(work_folder: Path) -> None:
     text = (Path(__file__).parents[2] / "docs" / "protocol.md").read_text(encoding="utf-8")
     [code] = re.findall(r"```python\n(.*?)```", text, re.DOTALL)
@@ -287,6 +288,7 @@ def test_the_observer_of_the_document_hears_the_state(work_folder: Path) -> None
                 observer.kill()
 
 
+@pytest.mark.nightly
 @pytest.mark.parametrize("second", [signal.SIGINT, nightly(signal.SIGTERM)])
 def test_who_asks_twice_for_the_end_gets_one(work_folder: Path, second: signal.Signals) -> None:
     with start_painting(work_folder, "room.basis.exr") as (process, url), connect_page(url):
@@ -373,7 +375,7 @@ def test_a_message_that_no_page_would_send_costs_its_sender_the_connection(
     ("host", "open_to"),
     [
         ("127.0.0.2", "programs of this machine, and nobody else, can reach"),
-        ("0.0.0.0", "other machines can reach the painter at every address of this one"),
+        nightly("0.0.0.0", "other machines can reach the painter at every address of this one"),
     ],
 )
 def test_a_host_is_told_what_it_means_and_a_closed_terminal_ends_it(

@@ -151,6 +151,7 @@ def test_the_same_seed_gives_the_same_light(lacking: tuple[Scene, Basis], missin
     assert first.position == suggestions[0].position
 
 
+@pytest.mark.nightly
 def test_the_ring_is_where_the_light_is_seen(tmp_path: Path, missing: Any):
     """A small bright ball at the place of the light is brightest at that pixel."""
     first = missing()[-1][0]

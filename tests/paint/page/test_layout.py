@@ -8,6 +8,7 @@ from nightly import nightly
 from painter_page import Painter
 
 
+@pytest.mark.nightly
 def test_a_button_that_is_on_is_seen_under_the_pointer(painter: Painter) -> None:
     opener = painter.button("Solve settings")
     opener.click()  # the pointer stays on it
@@ -184,6 +185,7 @@ def test_a_look_is_kept_from_anywhere(new_painter: Any, query: str) -> None:
     assert kept_looks() == 4
 
 
+@pytest.mark.nightly
 def test_a_window_is_open_before_the_next_key(new_painter: Any) -> None:
     """An Escape that comes at once closes it, and is not lost."""
     painter = new_painter()
@@ -235,6 +237,7 @@ def test_windows_lie_over_it(new_painter: Any) -> None:
     assert window["height"] > 300
 
 
+@pytest.mark.nightly
 def test_a_space_is_typed_beside_it(new_painter: Any) -> None:
     """Where the pointer rests on the pictures meanwhile."""
     painter = new_painter("shadow")
@@ -375,6 +378,7 @@ def test_what_has_to_be_known_does_not_lie_over_a_name(
     assert name["y"] + name["height"] <= top
 
 
+@pytest.mark.nightly
 def test_panels_leave_the_pictures_of_a_narrow_column_their_room(new_painter: Any) -> None:
     painter = new_painter(viewport={"width": 690, "height": 560})
     stage, side = painter.page.locator(".stage"), painter.page.locator(".side")
@@ -426,6 +430,7 @@ def test_axe_finds_nothing(new_painter: Any, axe: str, state: str) -> None:
     assert violations(painter.page, ".lightpaint") == []
 
 
+@pytest.mark.nightly
 def test_a_picture_at_the_right_edge_is_named_on_one_line(painter: Painter) -> None:
     """In the wipe the name of the right picture ends where the window does."""
     painter.button("Wipe").click()
@@ -435,6 +440,7 @@ def test_a_picture_at_the_right_edge_is_named_on_one_line(painter: Painter) -> N
     assert right["height"] == left["height"]
 
 
+@pytest.mark.nightly
 def test_every_comparison_shows_the_two_pictures_that_it_names(new_painter: Any) -> None:
     painter = new_painter("lights=5")
     choice = painter.page.get_by_role("combobox", name="Compare", exact=True)
@@ -446,6 +452,7 @@ def test_every_comparison_shows_the_two_pictures_that_it_names(new_painter: Any)
         assert painter.page.locator(".stage .tag").all_inner_texts() == name.split(" | ")
 
 
+@pytest.mark.nightly
 def test_two_fingers_zoom_by_as_much_as_they_spread(painter: Painter) -> None:
     """Though both move within one frame, and each alone is told to the page."""
     zoom = painter.page.evaluate(

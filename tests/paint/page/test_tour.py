@@ -62,6 +62,7 @@ def test_one_paints_below_it_and_escape_ends_it(new_painter: Any) -> None:
     assert painter.page.locator(BUBBLE).count() == 0
 
 
+@pytest.mark.nightly
 def test_it_folds_again_what_it_unfolded(new_painter: Any) -> None:
     painter: Painter = new_painter("tour")
     painter.page.locator(BUBBLE).wait_for()
@@ -75,6 +76,7 @@ def test_it_folds_again_what_it_unfolded(new_painter: Any) -> None:
     assert not fields.is_visible()
 
 
+@pytest.mark.nightly
 def test_by_keyboard_alone(new_painter: Any) -> None:
     painter: Painter = new_painter("tour")
     bubble = painter.page.locator(BUBBLE)
@@ -95,6 +97,7 @@ def test_by_keyboard_alone(new_painter: Any) -> None:
     assert painter.ui("tool") == "brush"
 
 
+@pytest.mark.nightly
 def test_it_is_called_again_from_settings_and_shortcuts(new_painter: Any) -> None:
     painter: Painter = new_painter()
     assert painter.page.locator(BUBBLE).count() == 0  # nobody asked for it
