@@ -1,4 +1,4 @@
-"""What a lighting gives on measuring planes, in words and in rows of tables."""
+"""Measuring planes of an answer in words, and in rows of tables."""
 
 import math
 from collections.abc import Iterator
