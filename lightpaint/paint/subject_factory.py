@@ -11,7 +11,7 @@ from lightpaint.colour.display.view_transform import TransformChoice
 from lightpaint.errors import PaintError, SceneError
 from lightpaint.file_reading import file_length
 from lightpaint.files import scene_name
-from lightpaint.lighting.constraints.absolute_scale import with_scale
+from lightpaint.lighting.constraints.absolute_scale import with_sure_scale
 from lightpaint.lighting.constraints.constraints import Constraints, LightConstraint, is_pattern
 from lightpaint.lighting.constraints.constraints_file import constraints_of
 from lightpaint.lighting.joined_views import check_same_lights
@@ -158,7 +158,7 @@ def _check_size(basis: Basis, name: str) -> None:
 def _check_constraints(lights: Lights, constraints: Constraints, check_lamps: CheckLamps) -> None:
     """Raise ConstraintError unless lights can meet these constraints and their lights file's."""
     all_constraints = constraints_of(lights.requests).and_then(constraints)
-    reduction = reduce_to(with_scale(all_constraints, lights), lights)
+    reduction = reduce_to(with_sure_scale(all_constraints, lights), lights)
     check_lamps({lights[k].name: lamp.names for k, lamp in reduction.lamps.items()})
 
 

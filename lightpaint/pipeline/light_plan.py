@@ -6,7 +6,7 @@ from pathlib import Path
 from lightpaint.basis.render.render_origin import basis_lights
 from lightpaint.keywords import keywords
 from lightpaint.lighting.answer.lighting import Lighting
-from lightpaint.lighting.constraints.absolute_scale import with_scale
+from lightpaint.lighting.constraints.absolute_scale import with_sure_scale
 from lightpaint.lighting.constraints.constraints import Constraints
 from lightpaint.lighting.constraints.constraints_file import constraints_of
 from lightpaint.lighting.unknowns.reduction import Reduction, reduce_to
@@ -63,7 +63,7 @@ def plan_lighting(
     every = constraints_of(scene.requests).and_then(constraints or Constraints())
     every = every.and_then(Constraints(cd_per_unit=settings.cd_per_unit))
     lights = basis_lights(scene)
-    every = with_scale(every, lights)
+    every = with_sure_scale(every, lights)
     reduction = reduce_to(every, lights)
     check_powers(reduction, [light.name for light in lights], "the least power")
     measured = measure_planes(scene, planes, settings, every.cd_per_unit, listen)

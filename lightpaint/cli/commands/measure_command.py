@@ -12,7 +12,7 @@ from lightpaint.cli.output.lines import CommandOutcome
 from lightpaint.errors import OutputError, SceneError
 from lightpaint.files import check_files, check_writable
 from lightpaint.lighting.answer.lighting_file import read_lighting
-from lightpaint.lighting.constraints.absolute_scale import with_scale
+from lightpaint.lighting.constraints.absolute_scale import with_sure_scale
 from lightpaint.lighting.constraints.constraints_file import constraints_of
 from lightpaint.photometry.illuminance import Illuminance
 from lightpaint.photometry.measure import measure_illuminance
@@ -90,7 +90,7 @@ def _lit_scene(
     Raises SceneError if nothing says the last.
     """
     scene, emission = source.content, None
-    own = with_scale(constraints_of(scene.requests), basis_lights(scene)).cd_per_unit
+    own = with_sure_scale(constraints_of(scene.requests), basis_lights(scene)).cd_per_unit
     if lighting is not None:
         finish(lighting.parent)
         answer = read_lighting(lighting)

@@ -14,11 +14,20 @@ from lightpaint.sentences import Hint
 def with_scale(constraints: Constraints, lights: Sequence[BasisLight]) -> Constraints:
     """Return constraints whose scale is 1 cd/m² for a radiance of 1, if there are luminaires among
     the lights, and if nothing says another.
-
-    Raises ConstraintError if another light is not in candela or lumens: its brightness beside them
-    would be a guess.
     """
     if constraints.cd_per_unit is not None or not any(map(_is_luminaire, lights)):
+        return constraints
+    return replace(constraints, cd_per_unit=1.0)
+
+
+def with_sure_scale(constraints: Constraints, lights: Sequence[BasisLight]) -> Constraints:
+    """Return constraints as `with_scale` does.
+
+    Raises ConstraintError if nothing says the scale, and a light beside luminaires is not in
+    candela or lumens: its brightness would be a guess.
+    """
+    scaled = with_scale(constraints, lights)
+    if scaled is constraints:
         return constraints
     for light, constraint in zip(lights, constraints_by_light(constraints, lights), strict=True):
         if not (_is_luminaire(light) or _is_absolute(constraint)):
@@ -28,7 +37,7 @@ def with_scale(constraints: Constraints, lights: Sequence[BasisLight]) -> Constr
                 Hint("cd_per_unit", 1),
                 " or by cd_per_unit = 1 in the lights file",
             )
-    return replace(constraints, cd_per_unit=1.0)
+    return scaled
 
 
 def _is_luminaire(light: BasisLight) -> bool:

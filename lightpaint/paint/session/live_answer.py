@@ -9,7 +9,7 @@ from lightpaint.basis.basis import Basis
 from lightpaint.basis.lights import Lights
 from lightpaint.colour.display.view_transform import ViewTransform
 from lightpaint.colour.lamp import Lamp
-from lightpaint.lighting.constraints.absolute_scale import with_scale
+from lightpaint.lighting.constraints.absolute_scale import with_sure_scale
 from lightpaint.lighting.constraints.constraints import Constraints
 from lightpaint.lighting.constraints.constraints_file import constraints_of
 from lightpaint.lighting.fit import resolve_fit
@@ -144,7 +144,7 @@ class LiveAnswer:
 
     def _constraints(self, requests: SessionRequests) -> Constraints:
         constraints = constraints_of(self._basis.requests).and_then(self._base_constraints)
-        return with_scale(constraints.and_then(requests.constraints()), self._basis.lights)
+        return with_sure_scale(constraints.and_then(requests.constraints()), self._basis.lights)
 
 
 def weights_by_name(weights: Doubles, names: Sequence[str], lights: Lights) -> Doubles:

@@ -23,7 +23,7 @@ from lightpaint.errors import ConstraintError, LightpaintError, TargetError
 from lightpaint.files import check_writable
 from lightpaint.images.pixel_blocks import whole_factor
 from lightpaint.keywords import keywords
-from lightpaint.lighting.constraints.absolute_scale import agreed_scale, with_scale
+from lightpaint.lighting.constraints.absolute_scale import agreed_scale, with_sure_scale
 from lightpaint.lighting.constraints.constraints import Constraints
 from lightpaint.lighting.constraints.constraints_file import constraints_of
 from lightpaint.lighting.fit import resolve_for_targets
@@ -199,7 +199,7 @@ class Job:
         check_animation(self.settings, all_constraints, len(self.painted_frames))
         # Reports impossible constraints before rendering.
         lights = self._lights(scenes, bases)
-        all_constraints = with_scale(all_constraints, lights)
+        all_constraints = with_sure_scale(all_constraints, lights)
         reduction = reduce_to(all_constraints, lights)
         if self.settings.watts is not None:
             check_powers(reduction, [light.name for light in lights], "a limit of power")
