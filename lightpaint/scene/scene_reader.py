@@ -77,7 +77,7 @@ def load_scene(
         lights_file: TOML file with lights and groups, used instead of the one beside the scene.
             `lights` replaces its list; `groups` are added to its groups, or replace those with the
             same names, and without `lights` are adjusted as well.
-        use_lights_file: False to ignore the lights file beside the scene.
+        use_lights_file: False to ignore the lights file beside the scene, but for luminaires.
         group_alike: Whether more than 24 similar emitters without names become one light, unless
             they are selected by their generated names. The lights file can disable this.
         integrator: Integrator to render with instead of the scene's own, such as `path`, `direct`

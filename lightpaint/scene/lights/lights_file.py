@@ -14,7 +14,12 @@ from lightpaint.display_text import known_keys
 from lightpaint.errors import SceneError
 from lightpaint.file_reading import read_text
 from lightpaint.files import one_line
-from lightpaint.luminaires.luminaire_request import PHOTOMETRY, LuminaireRequest, luminaires_in
+from lightpaint.luminaires.luminaire_request import (
+    LUMINAIRE_KEYS,
+    PHOTOMETRY,
+    LuminaireRequest,
+    luminaires_in,
+)
 from lightpaint.scene.lights.texels.image_domains import GridSize
 from lightpaint.scene.lights.texels.texel import image_of, parse_size
 from lightpaint.scene.lights.texels.texel_layout import TexelLayout
@@ -199,11 +204,38 @@ def lights_file_beside(scene: Path) -> Path:
 def lights_file_for(
     scene: Path, path_given: str | Path | None, *, beside_scene: bool
 ) -> LightsFile:
-    """Return the content of `path_given`, or else of the file beside `scene` if permitted."""
+    """Return the content of `path_given`, or else of the file beside `scene`; where that is not
+    permitted, its luminaires alone.
+    """
     if path_given is not None:
         return read_lights_file(Path(path_given))
     path = lights_file_beside(scene)
-    return read_lights_file(path) if beside_scene and path.is_file() else LightsFile()
+    if not path.is_file():
+        return LightsFile()
+    return read_lights_file(path) if beside_scene else _luminaires_alone(path)
+
+
+def _luminaires_alone(path: Path) -> LightsFile:
+    """Return what a lights file says of luminaires, which are lamps of the scene, and no choice;
+    nothing of one that cannot be read.
+    """
+    try:
+        file = read_lights_file(path)
+        names = file.requests.luminaires
+    except SceneError:
+        return LightsFile()
+    if not names:
+        return LightsFile()
+    tables = {
+        name: {
+            key: x for key, x in file.requests.keys["light"][name].items() if key in LUMINAIRE_KEYS
+        }
+        for name in names
+    }
+    keys: dict[str, Any] = {"light": tables}
+    if "cd_per_unit" in file.requests.keys:
+        keys["cd_per_unit"] = file.requests.keys["cd_per_unit"]
+    return LightsFile(path, groups=file.groups, requests=SceneRequests(keys, file.requests.source))
 
 
 def read_lights_file(path: Path) -> LightsFile:
