@@ -42,7 +42,19 @@ def mean_of(folder: Path, plane: str = "spots") -> float:
 def test_a_table_and_files(folder: Path) -> None:
     output = succeed(folder, "measure", "lit.xml", "--unit", "4")
     head, desk, spots, *rest = output.splitlines()
-    assert head.split() == "plane points Em lx ± U0 ± least lx most lx".split()
+    assert head.split() == [
+        "plane",
+        "points",
+        "Em",
+        "lx",
+        "±",
+        "U0",
+        "±",
+        "least",
+        "lx",
+        "most",
+        "lx",
+    ]
     assert desk.split()[:2] == ["desk", "16"]
     distance = np.array([2, np.hypot(2, 0.8)])
     expected = 4 * 100 * 2 / distance**3
