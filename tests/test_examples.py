@@ -36,6 +36,8 @@ def desk(tmp_path_factory: pytest.TempPathFactory) -> Path:
         lighting = lighting.with_emission(name, emission)
     lp.write_lighting(folder / "lighting.json", lighting)
     (folder / "hall.lights.toml").write_text("[light.bulb]\noff = true\n", "utf-8")
+    planes_text = '[plane.desk]\nshape = "floor"\nheight = 0.7\n'
+    (folder / "room.planes.toml").write_text(planes_text, "utf-8")
     groups = zip(("fill", "key", "rim"), pictures(), strict=True)
     layers = {f"RGBA_{name}": image for name, image in groups}
     for name in ("groups", "shot.0001", "shot.0002"):

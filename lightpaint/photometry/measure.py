@@ -66,6 +66,13 @@ def measure_illuminance(
     Raises:
         SceneError: If the scene cannot be rendered in one pass, or an argument is invalid.
         Interrupted: On Ctrl-C, which keeps the samples so far.
+
+    Examples:
+        >>> scene = lp.load_scene("room.xml")
+        >>> planes = lp.read_planes("room.planes.toml", scene).planes
+        >>> found = lp.measure_illuminance(scene, planes, cd_per_unit=1000)
+        >>> round(found.reading("desk", found.lights.current_weights).mean, -3)
+        1000.0
     """
     _check("error", error, between(1e-6, 1, "a relative error"))
     _check("cd_per_unit", cd_per_unit, number("cd/m²"))

@@ -80,6 +80,11 @@ def read_planes(path: str | Path, scene: Scene) -> PlanesFile:
     Raises:
         SceneError: For an invalid file, for a shape that the scene does not have, and for a plane
             without a point.
+
+    Examples:
+        >>> [desk] = lp.read_planes("room.planes.toml", lp.load_scene("room.xml")).planes
+        >>> desk
+        MeasuringPlane('desk', 36 points, 4.00 m²)
     """
     path = Path(path)
     requests, power, cases = _parse(path)
