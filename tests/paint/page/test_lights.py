@@ -90,6 +90,11 @@ def test_a_lamp_of_emitters_shows_a_bar_for_each_drive(painter: Painter) -> None
         "bars => bars.map(x => x.style.getPropertyValue('--drive'))"
     )
     assert widths == ["0.25", "1"]
+    # They follow the brush; lights without emitters have none.
+    painter.tell(kind="answer", version=9, exact=False, drives=[[0.5, 0.125], None])
+    assert drives.get_attribute("aria-label") == "Drives: red 50 %, white 13 %"
+    painter.tell(kind="answer", version=10, exact=False)
+    assert drives.get_attribute("aria-label") == "Drives: red 50 %, white 13 %"
 
 
 def test_a_blackout_of_the_console_takes_two_presses(painter: Painter) -> None:

@@ -777,7 +777,8 @@ export interface SessionState {
  * version: grows with every change of the session. stroke: number of the last stroke that arrived.
  * exact: whether it equals the answer of `lightpaint solve`. mode: space in which it was found
  * under the brush.
- * weights: (lights, 3) float64.
+ * weights: (lights, 3) float64. drives: of the emitters of each lamp in the order of the lights,
+ * null for other lights; some answers under the brush have them, exact ones have them in `lights`.
  */
 export interface AnswerUpdate {
   kind: 'answer';
@@ -809,6 +810,7 @@ export interface AnswerUpdate {
   stroke: number;
   exact: boolean;
   mode: string;
+  drives?: (number[] | null)[];
   arrays: { weights: Picture };
 }
 
