@@ -53,6 +53,7 @@ def test_a_lamp_is_found_where_the_painting_has_it(room: Scene) -> None:
     assert site.position == pytest.approx(placement.moves[0].new.position, rel=1e-6)
 
 
+@pytest.mark.nightly
 def test_a_search_that_is_enough_ends_with_the_best_so_far(room: Scene) -> None:
     """After a few trials of the first light, which nothing but those has come nearer by."""
     painted = room.moved({"bulb": lp.Pose(position=(0.3, 1.3, 0.2))})

@@ -435,7 +435,7 @@ def test_depth_of_integrators_that_nobody_told(tmp_path: Path) -> None:
 @pytest.mark.parametrize(
     ("plugin", "lights", "options"),
     [
-        ("volpath", LIGHTS["bulb"] + LIGHTS["sky"], {}),
+        nightly("volpath", LIGHTS["bulb"] + LIGHTS["sky"], {}),
         ("volpath", "".join(LIGHTS.values()), {"max_depth": 3, "rr_depth": 1}),
         ("direct", SEVERAL, {}),
     ],

@@ -108,7 +108,7 @@ def test_view_transforms_are_those_of_the_library(
 
 
 @pytest.mark.parametrize(
-    "overlay", [None, "missed", *map(nightly, ["beyond", "importance"]), "falsecolor"]
+    "overlay", [None, *map(nightly, ["missed", "beyond", "importance"]), "falsecolor"]
 )
 def test_views_agree(page: Any, pictures: Any, overlay: str | None):
     params = {"overlay": overlay, "stops": 0.4}
