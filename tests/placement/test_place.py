@@ -108,6 +108,7 @@ def test_an_area_light_of_another_shape_stays(tmp_path: Path) -> None:
         placed(room, room, {"panel": lp.Freedom(within=1)})
 
 
+@pytest.mark.nightly
 def test_a_spot_is_turned_to_where_the_painting_has_its_beam(room: Scene) -> None:
     painted = room.moved({"beam": lp.Pose(target=(-0.6, 0, -0.3))})
     placement = placed(room, painted, {"beam": lp.Freedom(aim=True)})
