@@ -5,6 +5,7 @@ import re
 import tomllib
 from argparse import ArgumentParser
 from dataclasses import replace
+from functools import cache
 from importlib import import_module
 from pathlib import Path
 from typing import Any
@@ -134,6 +135,7 @@ def _parsers() -> list[ArgumentParser]:
     return list(commands.choices.values())
 
 
+@cache
 def _options() -> set[str]:
     return {
         option

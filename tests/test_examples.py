@@ -54,6 +54,7 @@ def namespace(desk: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> di
     return {"lp": lp, "np": np, "basis": basis, "target": lp.read_target("painting.exr")}
 
 
+@pytest.mark.usefixtures("short_search")
 @pytest.mark.parametrize("name", NAMES)
 def test_examples_run(name: str, namespace: dict[str, Any]):
     member = getattr(lp, name)

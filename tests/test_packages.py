@@ -88,6 +88,7 @@ def test_source_distribution_has_all_that_the_checks_want(built: Path):
     assert all(x.isfile() for x in members.values())  # what was a link is a file
 
 
+@pytest.mark.nightly
 @pytest.mark.long
 def test_wheel_has_no_more_than_it_needs(built: Path):
     [wheel] = built.glob("*.whl")

@@ -154,6 +154,7 @@ def test_a_damaged_journal_is_said_and_its_look_done_again(batch_folder: Path) -
     assert "journal" not in run(batch_folder, *command).stderr
 
 
+@pytest.mark.nightly
 def test_only_some(batch_folder: Path) -> None:
     partial_plan = plan(batch_folder / "looks.toml", batch_folder / "out").select("dusk-1")
     outcome = run_batch(partial_plan)
@@ -273,6 +274,7 @@ def test_a_plan_names_paintings_from_the_current_folder(batch_folder: Path) -> N
     assert look.split()[-1] == "p0.exr"
 
 
+@pytest.mark.nightly
 def test_what_fails_is_tried_again_as_often_as_is_asked(
     batch_folder: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -473,6 +475,7 @@ def _first_process(processes: Processes) -> int:
     return next(pid for pool in processes._pools.values() for pid in pool._processes)
 
 
+@pytest.mark.nightly
 def test_a_step_that_takes_too_long_fails_in_words_and_costs_nothing_else(
     batch_folder: Path, reference_batch: tuple[Path, dict[str, bytes]]
 ) -> None:

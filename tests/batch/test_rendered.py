@@ -246,6 +246,7 @@ settings = {{ spp = 8{more} }}
 """
 
 
+@pytest.mark.nightly
 def test_the_cache_decides_no_answer(batch_folder: Path, tmp_path: Path) -> None:
     """A batch of 8 samples took 352 that a killed run had left."""
     cache = str(tmp_path / "cache")

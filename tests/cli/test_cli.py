@@ -15,6 +15,7 @@ import numpy as np
 import OpenEXR
 import pytest
 from command import run, run_refused, spawn, succeed
+from nightly import nightly
 from PIL import Image
 from renderer import LIGHTS, REPOSITORY, write_room
 
@@ -447,14 +448,23 @@ def test_nothing_is_printed_but_one_line_for_mistakes(basis_file: Path, tmp_path
     assert "no such lighting" in run_refused(folder, "relight", CORNELL, "gone.json")
     assert "not a JSON" in run_refused(folder, "relight", CORNELL, "bad/file")
     assert "not a result folder" in run_refused(folder, "verify", "bad")
-    # Another variant, nothing but parsing, and a scene that is loaded: by processes of their own.
-    for arguments, words in (
-        (("lights", CORNELL, "-m", "llvm_ad_nonsense_rgb"), "no variant"),
+
+
+@pytest.mark.parametrize(
+    ("arguments", "words"),
+    [
+        nightly(("lights", CORNELL, "-m", "llvm_ad_nonsense_rgb"), "no variant"),
         (("lights", CORNELL, "-m", "scalar_spectral"), "not supported"),
-        (("basis", CORNELL, "--spp", "1"), "spp"),
-        (("solve", CORNELL, "bad/nan.exr"), "NaN or Inf in every pixel"),
-    ):
-        assert words in run_refused(folder, *arguments, by=spawn)
+        nightly(("basis", CORNELL, "--spp", "1"), "spp"),
+        nightly(("solve", CORNELL, "nan.exr"), "NaN or Inf in every pixel"),
+    ],
+)
+def test_nothing_else_is_printed_by_a_process_of_its_own(
+    tmp_path: Path, arguments: tuple[str, ...], words: str
+) -> None:
+    """Of another variant, of nothing but parsing, and of a scene that is loaded."""
+    write_rgb(tmp_path / "nan.exr", np.full((128, 128, 3), np.nan, np.float32))
+    assert words in run_refused(tmp_path, *arguments, by=spawn)
 
 
 def test_deep_images_are_refused_by_name(tmp_path: Path) -> None:

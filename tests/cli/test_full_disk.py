@@ -113,6 +113,7 @@ def test_a_full_disk_leaves_earlier_results_as_they_were(
     assert list(disk.rglob(".*")) == []
 
 
+@pytest.mark.nightly
 def test_a_full_disk_leaves_an_earlier_basis(small_disk: tuple[Path, str], tmp_path: Path) -> None:
     disk, before = small_disk
     path = disk / "room.basis.exr"

@@ -149,7 +149,7 @@ def test_stopped_and_gone_on_is_as_if_never_stopped(
     ("method", "number", "delay_s"),
     [
         (ONE_PASS, signal.SIGINT, 0),
-        (ONE_PASS, signal.SIGTERM, 0.1),
+        nightly(ONE_PASS, signal.SIGTERM, 0.1),
         nightly(ONE_PASS, signal.SIGHUP, 0.1),
         nightly(SEPARATE, signal.SIGINT, 0.1),
         nightly(ONE_PASS, signal.SIGINT, 0.1),

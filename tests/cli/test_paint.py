@@ -355,6 +355,7 @@ def test_what_was_answered_is_there_after_a_kill(work_folder: Path) -> None:
         assert greet(socket)["history"]["undo"] == ["mine"]
 
 
+@pytest.mark.nightly
 def test_a_message_that_no_page_would_send_costs_its_sender_the_connection(
     work_folder: Path,
 ) -> None:

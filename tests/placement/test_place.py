@@ -53,6 +53,7 @@ def test_a_lamp_is_found_where_the_painting_has_it(room: Scene) -> None:
     assert site.position == pytest.approx(placement.moves[0].new.position, rel=1e-6)
 
 
+@pytest.mark.nightly
 def test_a_search_that_is_enough_ends_with_the_best_so_far(room: Scene) -> None:
     """After a few trials of the first light, which nothing but those has come nearer by."""
     painted = room.moved({"bulb": lp.Pose(position=(0.3, 1.3, 0.2))})
@@ -107,6 +108,7 @@ def test_an_area_light_of_another_shape_stays(tmp_path: Path) -> None:
         placed(room, room, {"panel": lp.Freedom(within=1)})
 
 
+@pytest.mark.nightly
 def test_a_spot_is_turned_to_where_the_painting_has_its_beam(room: Scene) -> None:
     painted = room.moved({"beam": lp.Pose(target=(-0.6, 0, -0.3))})
     placement = placed(room, painted, {"beam": lp.Freedom(aim=True)})

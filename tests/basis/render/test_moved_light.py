@@ -9,6 +9,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from nightly import nightly
 from renderer import LIGHTS, render_in_parts, same_basis, write_room
 
 from lightpaint.basis.basis import Basis
@@ -231,6 +232,7 @@ def test_edits_of_colour_and_name_render_nothing(tmp_path: Path, rendered_lights
     assert {"panel"} ^ {*second.objects.names} == {"lid"} ^ {*third.objects.names}
 
 
+@pytest.mark.nightly
 def test_lamps_that_come_and_go(tmp_path: Path, rendered_lights: Rendered) -> None:
     lights = LIGHTS["panel"] + LIGHTS["bulb"]
     first = obtain_basis(room(tmp_path, lights=lights), spp=32)
@@ -334,7 +336,7 @@ def test_exactly_what_is_asked_for_is_rendered_as_a_whole(
     assert not obtain_basis(scene, spp=16).origin.is_composed
 
 
-@pytest.mark.parametrize("other", [{"seed": 1}, {"half": True}, {"sensor": True}])
+@pytest.mark.parametrize("other", [{"seed": 1}, *map(nightly, [{"half": True}, {"sensor": True}])])
 def test_nothing_of_another_view_size_or_seed_is_taken(
     tmp_path: Path, rendered_lights: Rendered, other: dict[str, Any]
 ) -> None:

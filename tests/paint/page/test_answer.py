@@ -59,6 +59,7 @@ def test_an_answer_to_what_was_undone_says_nothing(painter: Painter) -> None:
     assert (painter.ui("constraints"), painter.ui("history")) == (constraints, history)
 
 
+@pytest.mark.nightly
 def test_overlays_by_their_key_say_what_their_colours_mean(painter: Painter) -> None:
     legend, press = painter.page.locator(".legend"), painter.page.keyboard.press
     painter.page.locator(".stage").focus()

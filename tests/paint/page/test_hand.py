@@ -20,6 +20,7 @@ def test_a_stroke_goes_to_the_engine_and_the_hint_goes_away(new_painter: Any) ->
     assert painter.page.get_by_text("Close to what was painted").is_visible()
 
 
+@pytest.mark.nightly
 def test_keys_of_paint_programs(painter: Painter) -> None:
     press = painter.page.keyboard.press
     tools = {"e": "eraser", "w": "weight", "i": "pick", "g": "fill", "l": "line", "a": "adjust"}
@@ -93,6 +94,7 @@ def test_mouse_with_modifiers(painter: Painter) -> None:
     assert painter.ui("display")["zoom"] == pytest.approx(2, rel=1e-6)
 
 
+@pytest.mark.nightly
 def test_escape_leaves_a_stroke(painter: Painter) -> None:
     painter.give_up()
     assert painter.calls("cancel")

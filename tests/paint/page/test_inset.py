@@ -87,6 +87,7 @@ def test_it_is_swapped_by_key_by_press_and_moved_by_drag(new_painter: Any) -> No
     assert painter.page.locator(".inset-frame").count() == 0
 
 
+@pytest.mark.nightly
 def test_the_large_picture_takes_paint_and_zoom(new_painter: Any) -> None:
     """Also the answer; a stroke that goes on over the small one stays in the large one."""
     painter = new_painter(viewport=LAPTOP)

@@ -109,6 +109,7 @@ def test_a_page_that_is_loaded_anew_goes_on_and_so_does_a_second_tab(
     assert third.url == server.address.url
 
 
+@pytest.mark.nightly
 def test_the_address_that_a_browser_was_started_with_is_good_once(
     server: Server, open_tab: Any
 ) -> None:

@@ -203,6 +203,7 @@ def painter(new_painter: Any) -> Painter:
     return opened
 
 
+@pytest.mark.nightly
 def test_another_language_replaces_all_texts(painter: Painter) -> None:
     painter.page.evaluate("() => { window.first = window.painter.store.value; }")
     found = {}

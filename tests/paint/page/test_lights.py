@@ -476,6 +476,7 @@ def test_a_light_is_held_at_a_white(painter: Painter) -> None:
     np.testing.assert_allclose(lock / lock[0], np.array(white) / white[0], rtol=1e-9)
 
 
+@pytest.mark.nightly
 def test_solo_and_mute_ask_nothing_of_the_solve(painter: Painter) -> None:
     solo, tag = painter.button("Solo: show pendant"), painter.page.locator(".tag.is-part")
     before = solo.bounding_box()

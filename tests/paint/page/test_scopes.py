@@ -197,7 +197,7 @@ def test_axe_finds_nothing_in_scopes(new_painter: Any, axe: str, kind: str) -> N
     assert violations(painter.page, ".side") == []
 
 
-@pytest.mark.parametrize("kind", ["painting", "solution", nightly("present")])
+@pytest.mark.parametrize("kind", ["painting", *map(nightly, ["solution", "present"])])
 def test_codes_are_those_of_the_pictures(new_painter: Any, kind: str) -> None:
     """Of the engine that ships, at the exposure of the display."""
     painter = new_painter("engine&view=cpu")

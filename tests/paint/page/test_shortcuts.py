@@ -78,6 +78,7 @@ def test_the_document_lists_the_keys_of_the_page(new_painter: Any) -> None:
     assert table.splitlines() == rows
 
 
+@pytest.mark.nightly
 def test_a_key_is_changed_shown_kept_and_reset(new_painter: Any, axe: str) -> None:
     painter: Painter = new_painter(axe=axe)
     open_keys(painter)
