@@ -109,7 +109,9 @@ def run(job: Job, progress: Progress = silent, *, bases: list[Basis] | None = No
             for view, analysis in zip(job.views, found.analyses, strict=True)
         ]
         if found.planes is not None and scene is not None:
-            write_planes(answer.path, found.planes, f"{scene.path.name} lit by {LIGHTING}")
+            origin = f"{scene.path.name} lit by {LIGHTING}"
+            illuminance = found.planes.wished.illuminance
+            write_planes(answer.path, illuminance, found.planes.weights, origin)
     return [_reloaded(look) for look in looks] if answer.has_moved_paths else looks
 
 

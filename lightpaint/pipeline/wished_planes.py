@@ -1,20 +1,29 @@
 """Planes on which a job wishes for illuminance: measured before the solve, and read after it."""
 
+from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
 
 from lightpaint.arrays import Doubles
+from lightpaint.basis.render.render_origin import basis_lights
 from lightpaint.errors import LightpaintError
 from lightpaint.lighting.analysis.appearance.display_difference import PaintComparison
+from lightpaint.lighting.constraints.constraints import Constraints
+from lightpaint.lighting.constraints.constraints_file import constraints_of
 from lightpaint.lighting.problem import Problem
 from lightpaint.lighting.solution import Solution
 from lightpaint.lighting.solve import solution_of
-from lightpaint.lighting.unknowns.reduction import Reduction
+from lightpaint.lighting.unknowns.reduction import Reduction, reduce_to
 from lightpaint.lighting.wishes.planes_answer import PlanesAnswer, planes_answer
 from lightpaint.lighting.wishes.required_problem import RequiredProblem, with_wishes, without_wishes
-from lightpaint.lighting.wishes.wished_light import WishedLight, wished_light
+from lightpaint.lighting.wishes.wished_light import (
+    WishedLight,
+    check_powers,
+    watts_allowed,
+    wished_light,
+)
 from lightpaint.photometry.illuminance import Illuminance
 from lightpaint.photometry.measure import measure_illuminance
 from lightpaint.photometry.planes_file import PlanesFile, read_planes
@@ -60,13 +69,7 @@ def measure_planes(
     cd_per_unit: of the lights file or the settings. Raises LightpaintError if nothing says what a
     radiance of 1 stands for.
     """
-    file = read_planes(path, scene)
-    if cd_per_unit is None:
-        raise LightpaintError(
-            f"{path} asks for lux, and nothing says how many cd/m² a radiance of 1 is: pass ",
-            Hint("cd_per_unit", 1),
-            ", or cd_per_unit in the lights file",
-        )
+    file, cd_per_unit = read_planes(path, scene), _checked_scale(path, cd_per_unit)
     illuminance = measure_illuminance(
         scene,
         file.planes,
@@ -79,6 +82,44 @@ def measure_planes(
     points = sum(len(plane) for plane in file.planes)
     listen.note(f"illuminance measured at {points} points of {len(file.planes)} planes")
     return MeasuredPlanes(file, illuminance, _floor_area(file, scene))
+
+
+def _checked_scale(path: str | Path, cd_per_unit: float | None) -> float:
+    """Return cd/m² of a radiance of 1. Raises LightpaintError if nothing says it."""
+    if cd_per_unit is None:
+        raise LightpaintError(
+            f"{path} asks for lux, and nothing says how many cd/m² a radiance of 1 is: pass ",
+            Hint("cd_per_unit", 1),
+            ", or cd_per_unit in the lights file",
+        )
+    return cd_per_unit
+
+
+def constraints_for_planes(
+    scene: Scene, constraints: Constraints, settings: Settings
+) -> Constraints:
+    """Return all constraints on the lights of a scene, with what a radiance of 1 stands for."""
+    every = constraints_of(scene.requests).and_then(constraints)
+    return every.and_then(Constraints(cd_per_unit=settings.cd_per_unit))
+
+
+def check_planes(
+    scene: Scene,
+    path: str | Path,
+    constraints: Constraints,
+    *,
+    read: Callable[[str | Path, Scene], PlanesFile] = read_planes,
+) -> None:
+    """Raise LightpaintError unless planes of a file can be measured in a scene, and its lamps have
+    what wishes for their power need. Nothing is rendered.
+
+    constraints: as `constraints_for_planes` returns them. read: reads the file.
+    """
+    _checked_scale(path, constraints.cd_per_unit)
+    file, lights = read(path, scene), basis_lights(scene)
+    if watts_allowed(file.power, _floor_area(file, scene)) is not None:
+        reduction = reduce_to(constraints, lights)
+        check_powers(reduction, [light.name for light in lights], "a limit of power")
 
 
 def planes_of_job(job: Job, listen: Listener) -> MeasuredPlanes | None:

@@ -111,6 +111,14 @@ def check_animation(settings: Settings, constraints: Constraints, views: int) ->
             " needs paintings of two frames of a shot, like 'shot.####.exr': there is "
             f"{views or 'none'}",
         )
+    if settings.planes is not None:
+        raise LightpaintError(
+            "wishes for planes are met by one lighting, not by lights that change: leave ",
+            Hint("planes"),
+            " or ",
+            Hint("animate", True),
+            " out",
+        )
     if constraints.sparse is not None:
         raise ConstraintError(
             "sparse chooses the lights of one lighting, not of every frame apart: leave it or ",

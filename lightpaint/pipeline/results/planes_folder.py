@@ -2,7 +2,8 @@
 
 from pathlib import Path
 
-from lightpaint.lighting.wishes.planes_answer import PlanesAnswer
+from lightpaint.arrays import Doubles
+from lightpaint.photometry.illuminance import Illuminance
 from lightpaint.photometry.planes_file import plane_names
 from lightpaint.photometry.readings_file import readings_files, write_readings
 
@@ -15,7 +16,7 @@ def files_of_planes(folder: Path, planes: str | Path) -> list[Path]:
     return [folder / FOLDER / name for name in readings_files(plane_names(planes))]
 
 
-def write_planes(folder: Path, answer: PlanesAnswer, origin: str) -> None:
-    """Write what an answer gives on planes. origin: of the light, in words."""
+def write_planes(folder: Path, illuminance: Illuminance, weights: Doubles, origin: str) -> None:
+    """Write what weights (n, 3) give on planes. origin: of the light, in words."""
     (folder / FOLDER).mkdir(exist_ok=True)
-    write_readings(folder / FOLDER, answer.wished.illuminance, answer.weights, origin)
+    write_readings(folder / FOLDER, illuminance, weights, origin)
