@@ -22,6 +22,7 @@ from lightpaint.errors import LOOK_ERRORS, LightpaintError, OutputError
 from lightpaint.lighting.answer.lighting import Lighting
 from lightpaint.pipeline.job.job import Job
 from lightpaint.pipeline.results.result_folder import ResultFolder
+from lightpaint.progress import Listener
 from lightpaint.sentences import Hint, Sentence
 
 
@@ -44,11 +45,13 @@ class LookSet:
     entries: list[LookEntry] = field(default_factory=list)
     shifted_looks: list[dict[str, Any]] = field(default_factory=list)
 
-    def finish_look(self, job: Job, lighting: Lighting, bases: Sequence[Basis]) -> None:
+    def finish_look(
+        self, job: Job, lighting: Lighting, bases: Sequence[Basis], listen: Listener
+    ) -> None:
         """Write the variations that are computed from an answer."""
         self._enter(job)
         for word, place in self.derived_folders.get(job.folder, {}).items():
-            publish_shifted(job, word, place, lighting, bases)
+            publish_shifted(job, word, place, lighting, bases, listen)
             self.entries.append(entry_of(job, place.folder, word))
             files = [file for file in place.files if file.is_file()]
             relation = {"variation": word, "of": str(job.folder)}

@@ -6,9 +6,7 @@ from pathlib import Path
 from lightpaint.basis.render.render_origin import basis_lights
 from lightpaint.keywords import keywords
 from lightpaint.lighting.answer.lighting import Lighting
-from lightpaint.lighting.constraints.absolute_scale import with_sure_scale
 from lightpaint.lighting.constraints.constraints import Constraints
-from lightpaint.lighting.constraints.constraints_file import constraints_of
 from lightpaint.lighting.unknowns.reduction import Reduction, reduce_to
 from lightpaint.lighting.wishes.linear_programs import least_watts
 from lightpaint.lighting.wishes.planes_answer import PlanesAnswer, planes_answer
@@ -17,7 +15,11 @@ from lightpaint.pipeline.job.settings import Settings
 from lightpaint.pipeline.results.answer_folder import answer_files
 from lightpaint.pipeline.results.planes_folder import files_of_planes
 from lightpaint.pipeline.results.result_folder import ResultFolder
-from lightpaint.pipeline.wished_planes import MeasuredPlanes, measure_planes
+from lightpaint.pipeline.wished_planes import (
+    MeasuredPlanes,
+    constraints_for_planes,
+    measure_planes,
+)
 from lightpaint.progress import Progress, listener, silent
 from lightpaint.scene.scene import Scene
 
@@ -60,10 +62,8 @@ def plan_lighting(
         SceneError: For an invalid planes file.
     """
     settings, listen = settings or Settings(), listener(progress)
-    every = constraints_of(scene.requests).and_then(constraints or Constraints())
-    every = every.and_then(Constraints(cd_per_unit=settings.cd_per_unit))
+    every = constraints_for_planes(scene, constraints or Constraints(), settings)
     lights = basis_lights(scene)
-    every = with_sure_scale(every, lights)
     reduction = reduce_to(every, lights)
     check_powers(reduction, [light.name for light in lights], "the least power")
     measured = measure_planes(scene, planes, settings, every.cd_per_unit, listen)

@@ -249,7 +249,8 @@ def _finish_view(
         if view is job.views[0]:
             _remark_on_parameters(relit, listen)
             if rig.planes is not None and settings.planes is not None:
-                write_planes(answer.path, rig.planes, f"{scene.path.name} lit by {LIGHTING}")
+                origin, measured = f"{scene.path.name} lit by {LIGHTING}", rig.planes.wished
+                write_planes(answer.path, measured.illuminance, rig.planes.weights_by_case, origin)
     _write_prediction(folder, predicted, basis, budget, relit)
     if budget is not None and settings.verify:
         verification = _verify(settings, predicted, budget, solution, listen)

@@ -1,5 +1,6 @@
 """Planes on which a job wishes for illuminance: measured before the solve, and read after it."""
 
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
 from pathlib import Path
 
@@ -7,20 +8,30 @@ import numpy as np
 
 from lightpaint.arrays import Doubles
 from lightpaint.basis.lights import Lights
+from lightpaint.basis.render.render_origin import basis_lights
 from lightpaint.lighting.analysis.appearance.display_difference import PaintComparison
+from lightpaint.lighting.constraints.absolute_scale import with_sure_scale
+from lightpaint.lighting.constraints.constraints import Constraints
+from lightpaint.lighting.constraints.constraints_file import constraints_of
 from lightpaint.lighting.problem import Problem
 from lightpaint.lighting.solution import Solution
 from lightpaint.lighting.solve import solution_of
-from lightpaint.lighting.unknowns.reduction import Reduction
+from lightpaint.lighting.unknowns.reduction import Reduction, reduce_to
 from lightpaint.lighting.wishes.planes_answer import PlanesAnswer, planes_answer
 from lightpaint.lighting.wishes.required_problem import RequiredProblem, with_wishes, without_wishes
-from lightpaint.lighting.wishes.wished_light import WishedLight, wished_light
+from lightpaint.lighting.wishes.wished_light import (
+    LitCase,
+    WishedLight,
+    check_powers,
+    watts_allowed,
+    wished_light,
+)
 from lightpaint.photometry.illuminance import Illuminance
 from lightpaint.photometry.measure import measure_illuminance
 from lightpaint.photometry.measuring_plane import PowerBudget
 from lightpaint.photometry.planes_file import PlanesFile, read_planes
 from lightpaint.pipeline.job.job import Job
-from lightpaint.pipeline.job.job_checks import check_scale_of_planes
+from lightpaint.pipeline.job.job_checks import checked_scale
 from lightpaint.pipeline.job.settings import Settings
 from lightpaint.progress import Listener
 from lightpaint.scene.scene import Scene
@@ -42,6 +53,12 @@ class MeasuredPlanes:
     file: PlanesFile
     illuminance: Illuminance
     floor_m2: float
+
+    def weights_by_case(self, weights: Doubles) -> Mapping[str, Doubles]:
+        """Return the weights (n, 3) of each case; of the light of the scene as "" without cases."""
+        lights = self.illuminance.lights
+        cases = (LitCase.of(case, lights) for case in self.file.cases)
+        return {case.name: case.applied_to(weights) for case in cases} or {"": weights}
 
     def wished_of(self, reduction: Reduction) -> WishedLight:
         """Return the wishes as requirements of the lights of `reduction`."""
@@ -66,9 +83,7 @@ def measure_planes(
     cd_per_unit: of the lights file or the settings. Raises LightpaintError if nothing says what a
     radiance of 1 stands for.
     """
-    check_scale_of_planes(path, cd_per_unit)
-    assert cd_per_unit is not None
-    file = read_planes(path, scene)
+    file, cd_per_unit = read_planes(path, scene), checked_scale(path, cd_per_unit)
     illuminance = measure_illuminance(
         scene,
         file.planes,
@@ -91,6 +106,34 @@ def limited_power(watts: float, lights: Lights) -> MeasuredPlanes:
     nothing = np.zeros((0, len(lights), 3))
     illuminance = Illuminance((), lights, nothing, nothing, 1.0)
     return MeasuredPlanes(PlanesFile(Path(), (), PowerBudget(watts)), illuminance, 0.0)
+
+
+def constraints_for_planes(
+    scene: Scene, constraints: Constraints, settings: Settings
+) -> Constraints:
+    """Return all constraints on the lights of a scene, with what a radiance of 1 stands for."""
+    every = constraints_of(scene.requests).and_then(constraints)
+    every = every.and_then(Constraints(cd_per_unit=settings.cd_per_unit))
+    return with_sure_scale(every, basis_lights(scene))
+
+
+def check_planes(
+    scene: Scene,
+    path: str | Path,
+    constraints: Constraints,
+    *,
+    read: Callable[[str | Path, Scene], PlanesFile] = read_planes,
+) -> None:
+    """Raise LightpaintError unless planes of a file can be measured in a scene, and its lamps have
+    what wishes for their power need. Nothing is rendered.
+
+    constraints: as `constraints_for_planes` returns them. read: reads the file.
+    """
+    checked_scale(path, constraints.cd_per_unit)
+    file, lights = read(path, scene), basis_lights(scene)
+    if watts_allowed(file.power, _floor_area(file, scene)) is not None:
+        reduction = reduce_to(constraints, lights)
+        check_powers(reduction, [light.name for light in lights], "a limit of power")
 
 
 def planes_of_job(job: Job, lights: Lights, listen: Listener) -> MeasuredPlanes | None:

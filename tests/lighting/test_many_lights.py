@@ -1,11 +1,13 @@
 """Rounds that move some of many lights come to the answer that all of them have."""
 
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
 import pytest
 
 from lightpaint.lighting.constraints.constraints import Constraints
+from lightpaint.lighting.constraints.requirements import Requirements
 from lightpaint.lighting.fit import Fit, resolve_for_targets
 from lightpaint.lighting.live import live as live_module
 from lightpaint.lighting.live import many_lights
@@ -37,7 +39,9 @@ def _basis(make_basis: Any) -> Any:
     return make_basis(images=planes, emission=rng.uniform(0.2, 1, (LIGHTS, 3)))
 
 
-def _painted(make_basis: Any, fit: Fit, **constraints: Any) -> tuple[LiveSolver, Target, Any]:
+def _painted(
+    make_basis: Any, fit: Fit, required: Requirements | None = None, **constraints: Any
+) -> tuple[LiveSolver, Target, Any]:
     """Return a live solver of a painting that makes some places brighter and others darker."""
     basis = _basis(make_basis)
     image, importance = basis.current_look.copy(), np.zeros(SIZE, np.float32)
@@ -48,8 +52,9 @@ def _painted(make_basis: Any, fit: Fit, **constraints: Any) -> tuple[LiveSolver,
     view = LiveView(basis, image, importance)
     target = Target("t", image, importance, False, through_view=True, over_look=True)
     resolved = resolve_for_targets(fit, [target])
-    live = LiveSolver([view], fit=resolved, constraints=Constraints.of(**constraints))
-    problem = Problem.of(basis, target, constraints=Constraints.of(**constraints), fit=resolved)
+    every = replace(Constraints.of(**constraints), requirements=required)
+    live = LiveSolver([view], fit=resolved, constraints=every)
+    problem = Problem.of(basis, target, constraints=every, fit=resolved)
     return live, target, problem
 
 
@@ -81,6 +86,25 @@ def test_rounds_of_some_lights_come_to_the_answer_of_all(
     assert np.all(np.diff(losses) <= 1e-4 * losses[0])
     if "light" in constraints:
         np.testing.assert_allclose(answer[1], problem.basis.current_weights[1], rtol=1e-12)
+
+
+@pytest.mark.usefixtures("moves_some")
+@pytest.mark.parametrize("space", ["display", "linear"])
+def test_no_round_breaks_a_requirement(make_basis: Any, space: Any) -> None:
+    """A desk that the painting darkens needs its light, and all lights together have a limit."""
+    rng = np.random.default_rng(5)
+    rows = np.stack([rng.uniform(0.2, 1, (LIGHTS, 3)), np.full((LIGHTS, 3), -1.0)])
+    current = _basis(make_basis).current_weights
+    now = np.einsum("mnc,nc->m", rows, current)
+    required = Requirements(rows, np.zeros(2), np.array([1.1 * now[0], 1.3 * now[1]]))
+    live, _, problem = _painted(make_basis, Fit(space=space, hold=1.0), required=required)
+    answer, losses = current, []
+    for _ in range(30):
+        answer = live.answer(answer)
+        # Solves end within 1e-9 of a row's size.
+        assert np.all(np.einsum("mnc,nc->m", rows, answer) >= required.least - 1e-6 * np.abs(now))
+        losses.append(float(problem.objective(answer).sum()))
+    assert losses[-1] < losses[0]
 
 
 @pytest.mark.usefixtures("moves_some")

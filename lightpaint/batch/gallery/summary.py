@@ -29,6 +29,8 @@ from lightpaint.images.denoiser import denoised
 from lightpaint.images.estimate import read_estimate
 from lightpaint.images.pixel_blocks import block_mean, fitting_factor
 from lightpaint.lighting.answer.lighting_file import read_lighting
+from lightpaint.photometry.readings_file import PLANES
+from lightpaint.pipeline.results.planes_folder import FOLDER as PLANES_FOLDER
 from lightpaint.pipeline.results.result_folder import RECORD
 from lightpaint.relit.export.exports import plain_cell
 from lightpaint.storage.json_records import strict_json
@@ -59,6 +61,10 @@ COLUMNS = (
 #: Suffixes of a light's columns: luminance, emission, kelvin.
 LIGHT_COLUMNS = ("", " R", " G", " B", " K")
 
+#: Columns of a plane: its mean illuminance, and the ratio of its least to that. And the column of
+#: the power of all lamps, in watts.
+PLANE_COLUMNS, POWER_COLUMN = (" Em lx", " U0"), "W"
+
 State = Literal["done", "failed", "waiting"]
 
 
@@ -81,6 +87,15 @@ class LightRow:
 
 
 @dataclass(frozen=True)
+class PlaneRow:
+    """The illuminance on a measuring plane in a look. uniformity: the least over the mean."""
+
+    name: str
+    mean_lx: float
+    uniformity: float
+
+
+@dataclass(frozen=True)
 class SummaryRow:
     """A look, or one view of it.
 
@@ -88,6 +103,8 @@ class SummaryRow:
     None if nothing was painted. agrees: whether a render confirms it; None if there was none.
     spp: samples per pixel of its basis; None if nothing was rendered. fingerprint: hash of its
     request and of the files that it reads, as in the journal.
+    planes: on which illuminance was measured. watts: power of all lamps; None if that of one is
+    unknown, or without planes.
     files: to open. picture: small, relative to the batch's folder; "" where there is none.
     """
 
@@ -110,6 +127,8 @@ class SummaryRow:
     size: tuple[int, int] = field(default=(4, 3))
     spp: float | None = None
     fingerprint: str = ""
+    planes: tuple[PlaneRow, ...] = ()
+    watts: float | None = None
 
 
 def rows_of(plan: Plan, lines: Mapping[tuple[str, Kind], JournalLine]) -> list[SummaryRow]:
@@ -169,6 +188,7 @@ def _row(plan: Plan, look: PlannedLook, folder: Path, state: State, reason: str)
     names = ("report.html", "comparison.png", "relit.png", "relit.exr", "lighting.json")
     places = dict.fromkeys((folder, look.folder))
     result_files = [place / x for place in places for x in names if (place / x).is_file()]
+    planes = planes_of_answer(look.folder) if state == "done" else ()
     if any(step.task.kind == "export" for step in look.steps):
         result_files += sorted(x for x in (look.folder / EXPORT).glob("*") if x.name != RECORD)
     return SummaryRow(
@@ -190,6 +210,8 @@ def _row(plan: Plan, look: PlannedLook, folder: Path, state: State, reason: str)
         if state == "done"
         else (),
         spp=basis.get("spp"),
+        planes=planes,
+        watts=watts_of_answer(look.folder) if planes else None,
     )
 
 
@@ -208,6 +230,33 @@ def lights_of_answer(folder: Path, report: Mapping[str, Any]) -> tuple[LightRow,
             rows.append(LightRow(light.name, measures.y, *values, share=shares.get(k)))
         return tuple(rows)
     return ()
+
+
+def planes_of_answer(folder: Path) -> tuple[PlaneRow, ...]:
+    """Return what an answer in a folder gives on measuring planes; nothing without any."""
+    planes = _json(folder / PLANES_FOLDER / PLANES).get("planes")
+    if not isinstance(planes, dict):
+        return ()
+    with suppress(AttributeError, KeyError, TypeError, ValueError):
+        return tuple(
+            PlaneRow(name, float(plane["mean"]), float(plane["uniformity"]))
+            for name, plane in planes.items()
+        )
+    return ()
+
+
+def watts_of_answer(folder: Path) -> float | None:
+    """Return the power of all lamps of an answer in a folder; None if that of one is unknown."""
+    with suppress(LightpaintError):
+        lights = read_lighting(folder / "lighting.json").lights
+        watts = [
+            None if light.lamp is None else light.lamp.watts_for(np.array(light.emission))
+            for light in lights
+            if light.lamp is not None or not light.is_fixed
+        ]
+        known = [x for x in watts if x is not None]
+        return sum(known) if len(known) == len(watts) > 0 else None
+    return None
 
 
 def _json(path: Path) -> dict[str, Any]:
@@ -287,28 +336,41 @@ def summary_csv(rows: list[SummaryRow]) -> str:
     """Return summary.csv: a line for each row, and five columns for each light.
 
     These are the luminance of its emission, under its name, the emission in R, G and B, and its
-    colour temperature in kelvin, if it has one.
+    colour temperature in kelvin, if it has one. Where illuminance was measured, two columns for
+    each plane come before them, and one for the power of all lamps.
     """
     names = list(dict.fromkeys(light.name for row in rows for light in row.lights))
+    planes = list(dict.fromkeys(plane.name for row in rows for plane in row.planes))
     text = io.StringIO()
     table = csv.writer(text, lineterminator="\n")
-    columns = _light_columns(names)
-    table.writerow([*COLUMNS, *map(plain_cell, columns)])
+    measured = [f"{name}{ending}" for name in planes for ending in PLANE_COLUMNS]
+    measured += [POWER_COLUMN] if planes else []
+    columns = _light_columns(names, taken={*COLUMNS, *measured})
+    table.writerow([*COLUMNS, *map(plain_cell, measured), *map(plain_cell, columns)])
     for row in rows:
         lights = {light.name: _light_cells(light) for light in row.lights}
         cells = [_cell(getattr(row, column)) for column in COLUMNS]
+        cells += _measured_cells(row, planes)
         empty_cells = [""] * len(LIGHT_COLUMNS)
         table.writerow([*cells, *(x for name in names for x in lights.get(name, empty_cells))])
     return text.getvalue()
 
 
-def _light_columns(names: Sequence[str]) -> list[str]:
+def _measured_cells(row: SummaryRow, planes: Sequence[str]) -> list[str]:
+    """Return the cells of all planes and of the power; none if no row has a plane."""
+    by_name = {plane.name: [plane.mean_lx, plane.uniformity] for plane in row.planes}
+    values = [x for name in planes for x in by_name.get(name, [None] * len(PLANE_COLUMNS))]
+    return [_cell(x) for x in [*values, row.watts]] if planes else []
+
+
+def _light_columns(names: Sequence[str], taken: set[str]) -> list[str]:
     """Return the headings of five columns for each light, no two of them equal.
 
+    taken: the other columns.
     They begin with its name; with `light` before it where that would be the heading of another
     column, as for lights called `state`, or `key` beside `key R`.
     """
-    taken, headings = set(COLUMNS), list[str]()
+    taken, headings = set(taken), list[str]()
     for name in sorted(names, key=len):
         own = name
         while taken & {f"{own}{ending}" for ending in LIGHT_COLUMNS}:

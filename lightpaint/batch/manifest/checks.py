@@ -100,7 +100,7 @@ def check_by_sums(mistakes: Mistakes, table: Table) -> None:
     settings = look.get("settings", {})
     if settings.get("literal") is not True and "settings" not in table.unclear_keys:
         mistakes.add(label, "want has 'lights': settings need literal = true, or images are needed")
-    for key in ("time_s", "error", "noise_correction", "refine", "suggest"):
+    for key in ("time_s", "error", "noise_correction", "refine", "suggest", "planes"):
         if settings.get(key):
             mistakes.add(label, f"want has 'lights', and {key} needs images: leave it out")
 
@@ -169,8 +169,11 @@ def check_sequence(mistakes: Mistakes, table: Table) -> None:
         mistakes.add(label, "sensors has one: a path goes through two or more")
 
 
-def settings_of(mistakes: Mistakes, label: str, look: Mapping[str, Any]) -> Settings:
+def settings_of(manifest: Manifest, label: str, look: Mapping[str, Any]) -> Settings:
+    mistakes = manifest.mistakes
     values = mistakes.settings(look.get("settings", {}), label)
+    if "planes" in values:
+        values["planes"] = str(manifest.folder / values["planes"])
     steps = look.get("want", SOLVE_STEPS)
     if "scene" in look and values.get("sun"):
         mistakes.add(

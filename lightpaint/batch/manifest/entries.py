@@ -204,7 +204,7 @@ def _table_looks(
         look.get("name", ""),
         label,
         constraints=constraints_of(manifest, label, look),
-        settings=settings_of(mistakes, label, look),
+        settings=settings_of(manifest, label, look),
         want=tuple(look.get("want", GIVEN_LIGHTING_STEPS if is_given else SOLVE_STEPS)),
         final=mistakes.final(look.get("render", {}), label),
         handover=mistakes.handover(look.get("export", {}), label, manifest.folder),

@@ -40,11 +40,13 @@ from lightpaint.lighting.constraints.constraints import Constraints
 from lightpaint.lighting.constraints.start_lighting import start_weights
 from lightpaint.lighting.linear_problem import reason_against_sums
 from lightpaint.lighting.unknowns.reduction import reduce_to
+from lightpaint.photometry.planes_file import PlanesFile, read_planes
 from lightpaint.pipeline.job.job import Job
 from lightpaint.pipeline.job.settings import Settings
 from lightpaint.pipeline.job.sources import check_nothing_unused, content
 from lightpaint.pipeline.results.result_folder import is_as_written
 from lightpaint.pipeline.results.results import view_names
+from lightpaint.pipeline.wished_planes import check_planes, constraints_for_planes
 from lightpaint.relit.relight import scene_of
 from lightpaint.scene.quality_presets import on_film
 from lightpaint.scene.scene import Scene
@@ -117,6 +119,7 @@ class _Planner:
         self._looks_with_moves: list[str] = []
         self.groups: dict[str, PlaceGroup] = {}
         self.costs: dict[str, Cost] = {}
+        self._planes: dict[tuple[str, str], PlanesFile] = {}
 
     def plan_looks(self, entries: Sequence[LookEntry]) -> tuple[PlannedLook, ...]:
         """Return the plan of each look, with those whose lights hang at shared places.
@@ -234,6 +237,8 @@ class _Planner:
                 entry.variation, options, constraints, adjusted_light_count(job)
             )
             job = self._job(entry, scenes, basis, settings, constraints)
+        if scenes:
+            self._check_planes(scenes[0].content, constraints, settings)
         if entry.is_by_sums:
             _check_by_sums(job)
         elif job.all_rigging and entry.basis is None:
@@ -249,6 +254,19 @@ class _Planner:
         source_files = tuple(dict.fromkeys(job.results.reads))
         entry = replace(entry, settings=settings, constraints=constraints)
         return entry, source_files, (*job.remarks, *_remarks_on_suns(job))
+
+    def _check_planes(self, scene: Scene, constraints: Constraints, settings: Settings) -> None:
+        """Check the planes that settings name, if any; each file is read once for a scene."""
+
+        def read(path: str | Path, scene: Scene) -> PlanesFile:
+            key = str(path), scene.identity
+            if key not in self._planes:
+                self._planes[key] = read_planes(path, scene)
+            return self._planes[key]
+
+        if settings.planes is not None:
+            every = constraints_for_planes(scene, constraints, settings)
+            check_planes(scene, settings.planes, every, read=read)
 
     def _job(
         self,
@@ -273,10 +291,15 @@ class _Planner:
         source_files = _files_of_lighting_look(entry, scene, groups)
         if entry.lighting:
             _check_given_lighting(entry, scene, basis)
+        if scene is not None:
+            self._check_planes(scene, entry.constraints, entry.settings)
+        elif entry.settings.planes is not None:
+            raise BatchError("settings.planes needs the scene: give scene = ...")
         folders = [str(self._folders[name] / "lighting.json") for name in entry.combined_looks]
         lightings = tuple([entry.lighting] if entry.lighting else folders)
         views = view_names(scenes) if entry.by_sensor else [""]
         options: dict[str, Any] = {"views": views, "groups": groups, "force": self._force}
+        options["planes"] = entry.settings.planes
         derived_folder(self._folders[entry.name], scene, lightings, **options).check()
         settings = entry.settings
         films = [
@@ -384,6 +407,8 @@ def _files_of_lighting_look(
         files += tuple(groups.files)
     elif entry.basis is not None:
         files += (Path(entry.basis.path),)
+    if entry.settings.planes is not None:
+        files += (Path(entry.settings.planes),)
     return (*files, Path(entry.lighting)) if entry.lighting else files
 
 

@@ -10,10 +10,16 @@ from lightpaint.basis.lightgroups.light_groups import LightGroups
 from lightpaint.batch.manifest.variations import SHIFTED_WORDS, SOLVED_WORDS, shift, vary
 from lightpaint.lighting.answer.combination import combine
 from lightpaint.lighting.answer.lighting import Lighting
+from lightpaint.lighting.constraints.constraints import Constraints
 from lightpaint.pipeline.job.job import Job
-from lightpaint.pipeline.results.answer_folder import answer_files, new_answer
+from lightpaint.pipeline.job.settings import Settings
+from lightpaint.pipeline.results.answer_folder import LIGHTING, answer_files, new_answer
+from lightpaint.pipeline.results.planes_folder import files_of_planes, write_planes
 from lightpaint.pipeline.results.result_folder import ResultFolder
 from lightpaint.pipeline.results.results import write_predicted
+from lightpaint.pipeline.wished_planes import MeasuredPlanes, constraints_for_planes, measure_planes
+from lightpaint.progress import Listener
+from lightpaint.relit.relight import scene_of
 from lightpaint.scene.scene import Scene
 
 
@@ -24,9 +30,13 @@ def derived_folder(
     *,
     views: Sequence[str] = ("",),
     groups: LightGroups | None = None,
+    planes: str | None = None,
     force: bool = False,
 ) -> ResultFolder:
-    """Return the result folder of a derived answer. views: folders in it, one for each picture."""
+    """Return the result folder of a derived answer. views: folders in it, one for each picture.
+
+    planes: path of a planes file, if illuminance is measured.
+    """
     input_files = tuple(map(Path, lightings))
     files = answer_files(folder, scene=scene, groups=groups)
     files += [folder / view / "predicted.exr" for view in views]
@@ -34,6 +44,9 @@ def derived_folder(
         input_files += scene.read_files
     if groups is not None:
         input_files += tuple(groups.files)
+    if planes is not None:
+        input_files += (Path(planes),)
+        files += files_of_planes(folder, planes)
     answers = tuple(map(Path, lightings))
     return ResultFolder(folder, tuple(files), input_files, answers, force=force)
 
@@ -47,11 +60,12 @@ def publish_derived(
     scene: Scene | None = None,
     groups: LightGroups | None = None,
     spp: int | None = None,
+    planes: MeasuredPlanes | None = None,
 ) -> None:
     """Write lighting.json, its pictures from `bases`, and the relit scene.
 
     views: folder of each picture. groups: light groups that the basis was read from; the answer is
-    also written for their programs. spp: of a verification.
+    also written for their programs. spp: of a verification. planes: as measured.
     """
     results.check()
     with new_answer(results, lighting, scene=scene, groups=groups) as answer:
@@ -60,6 +74,29 @@ def publish_derived(
             predicted, origin = combine(basis, lighting), basis.origin
             path, spp_ = answer.path / view / "predicted.exr", spp or origin.spp
             write_predicted(path, predicted, origin=origin, spp=spp_, scene=answer.relit)
+        if planes is not None and scene is not None:
+            weights = lighting.weights_for(planes.illuminance.lights)
+            words = f"{scene.path.name} lit by {LIGHTING}"
+            lit = planes.weights_by_case(weights)
+            write_planes(answer.path, planes.illuminance, lit, words)
+
+
+def measure_derived(
+    scene: Scene | None,
+    lighting: Lighting,
+    constraints: Constraints,
+    settings: Settings,
+    listen: Listener,
+) -> MeasuredPlanes | None:
+    """Return the planes that settings name, measured; None without any.
+
+    The lights are where the lighting has them.
+    """
+    if settings.planes is None or scene is None:
+        return None
+    scale = constraints_for_planes(scene, constraints, settings).cd_per_unit
+    placed = scene_of(scene, lighting)
+    return measure_planes(placed, settings.planes, settings, scale, listen)
 
 
 def dimmer_lights(basis: Basis) -> set[str]:
@@ -100,6 +137,7 @@ def shifted_folders(job: Job, words: Sequence[str]) -> dict[str, ResultFolder]:
             (str(job.folder / "lighting.json"),),
             views=_views(job),
             groups=job.groups,
+            planes=job.settings.planes,
             force=job.settings.force,
         )
         for word in words
@@ -108,16 +146,25 @@ def shifted_folders(job: Job, words: Sequence[str]) -> dict[str, ResultFolder]:
 
 
 def publish_shifted(
-    job: Job, word: str, results: ResultFolder, lighting: Lighting, bases: Sequence[Basis]
+    job: Job,
+    word: str,
+    results: ResultFolder,
+    lighting: Lighting,
+    bases: Sequence[Basis],
+    listen: Listener,
 ) -> None:
     """Write a variation of the answer of `job`. bases: of its views."""
     shifted_lighting = shift(lighting, SHIFTED_WORDS[word], dimmer_lights(bases[0])).for_target(
         results.folder.name
     )
+    scene = job.views[0].scene
     options: dict[str, Any] = {
-        "scene": job.views[0].scene,
+        "scene": scene,
         "groups": job.groups,
         "spp": job.settings.spp,
+        "illuminance": measure_derived(
+            scene, shifted_lighting, job.constraints, job.settings, listen
+        ),
     }
     publish_derived(results, shifted_lighting, bases, views=_views(job), **options)
 

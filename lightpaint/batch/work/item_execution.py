@@ -15,7 +15,12 @@ from lightpaint.basis.render.one_pass_basis import basis_of_sums
 from lightpaint.batch.manifest.keys import Space, as_key
 from lightpaint.batch.manifest.sequence import interpolate
 from lightpaint.batch.manifest.variations import shift
-from lightpaint.batch.work.derived_looks import derived_folder, dimmer_lights, publish_derived
+from lightpaint.batch.work.derived_looks import (
+    derived_folder,
+    dimmer_lights,
+    measure_derived,
+    publish_derived,
+)
 from lightpaint.batch.work.task import EXPORT, Task
 from lightpaint.batch.work.work_items import (
     GuideTraining,
@@ -136,7 +141,7 @@ def _answer(task: Task, cache: WorkerCache, listen: Listener) -> None:
     for key, file, former_look_file in zip(task.bases, task.files, former_look_files, strict=True):
         cache.load(key, file, former_look_file)
     if task.lightings:
-        _derive_answer(task, fields, cache)
+        _derive_answer(task, fields, cache, listen)
         return
     job = Job(**fields)
     bases = None
@@ -148,7 +153,9 @@ def _answer(task: Task, cache: WorkerCache, listen: Listener) -> None:
     run(job, listen, bases=bases)
 
 
-def _derive_answer(task: Task, fields: dict[str, Any], cache: WorkerCache) -> None:
+def _derive_answer(
+    task: Task, fields: dict[str, Any], cache: WorkerCache, listen: Listener
+) -> None:
     """Write an answer derived from others: a lighting unchanged, warmer, or between two."""
     settings: Settings = fields["settings"]
     scenes: list[Scene] = [file.content for file in fields["scenes"]]
@@ -165,7 +172,15 @@ def _derive_answer(task: Task, fields: dict[str, Any], cache: WorkerCache) -> No
     scene = scenes[0] if scenes else None
     options: dict[str, Any] = {"views": views, "groups": groups}
     results = derived_folder(
-        fields["folder"], scene, task.lightings, **options, force=settings.force
+        fields["folder"],
+        scene,
+        task.lightings,
+        **options,
+        planes=settings.planes,
+        force=settings.force,
+    )
+    options["illuminance"] = measure_derived(
+        scene, lighting, fields["constraints"], settings, listen
     )
     publish_derived(results, lighting, bases, **options, scene=scene, spp=settings.spp)
 

@@ -49,7 +49,8 @@ def plan(
     with new_answer(results, found.lighting, scene=content) as answer:
         text = json.dumps(_numbers(found), indent=2, ensure_ascii=False, allow_nan=False)
         write_text(answer.path / PLAN, text + "\n")
-        write_planes(answer.path, found.planes, f"{content.path.name} as planned")
+        origin, illuminance = f"{content.path.name} as planned", found.planes.wished.illuminance
+        write_planes(answer.path, illuminance, found.planes.weights_by_case, origin)
     show_planes(found.planes)
     _show_lamps(found)
     terminal.write(f"results in {folder}/")

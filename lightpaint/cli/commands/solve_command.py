@@ -56,7 +56,8 @@ def solve(
                 looks = run(job, listen, bases=None if shared.bases is None else [*shared.bases])
             shared.take_from(looks)
             if look_set is not None:
-                look_set.finish_look(job, looks[0].lighting, [look.basis for look in looks])
+                bases = [look.basis for look in looks]
+                look_set.finish_look(job, looks[0].lighting, bases, listen)
         except LOOK_ERRORS as error:
             if look_set is None or not look_set.continues_after(job, error):
                 raise

@@ -5,6 +5,9 @@ the time for a thousand. So a round moves the lights whose gradients have change
 were last moved, and the others keep their weights. Each round lowers the loss or keeps it, and the
 rounds of a stroke come to the answer of all lights: block coordinate descent (Bertsekas 2016,
 Nonlinear Programming, 3.7), with the blocks chosen greedily.
+
+Requirements, like the illuminance of a desk, couple the lights. A round keeps what the lights that
+it does not move leave of them, so no round breaks one.
 """
 
 from collections.abc import Callable, Sequence
@@ -100,7 +103,7 @@ class ManyLights:
         if part_of_pull is not None:
             squares = squares + part_of_pull
         equations = equations_about(squares, start[lights], gradient[lights])
-        part, best = solve(equations, some.reduction, start[lights])
+        part, best = solve(equations, some.reduction_beside(start), start[lights])
         self.settle(lights, equations.gradient(best))
 
         def loss_at(step: Doubles) -> float:  # beyond the pull on the start

@@ -7,9 +7,11 @@ from functools import cached_property
 import numpy as np
 
 from lightpaint.arrays import Doubles, Indices
+from lightpaint.lighting.constraints.requirements import Requirements
 from lightpaint.lighting.normal_equations import NormalEquations
 from lightpaint.lighting.unknowns.gamuts import GamutsOfSome
 from lightpaint.lighting.unknowns.knobs import Knob
+from lightpaint.lighting.unknowns.lamp_powers import watts_of_fixed
 from lightpaint.lighting.unknowns.reduction import Reduction
 
 
@@ -57,6 +59,29 @@ class SomeLights:
             self.whole.is_joined,
             None if gamuts is None else GamutsOfSome(gamuts, self.lights),
         )
+
+    def reduction_beside(self, weights: Doubles) -> Reduction:
+        """Return `reduction` with what the requirements of all lights leave to these, while the
+        others keep their weights (n, 3).
+
+        Where these weights miss a requirement, none asks for more than they reach.
+        """
+        requirements = self.whole.requirements
+        if requirements is None:
+            return self.reduction
+        lamps = self.whole.lamps
+        number = {int(light): k for k, light in enumerate(self.lights)}
+        own = {number[light]: lamp for light, lamp in lamps.items() if light in number}
+        others = {light: lamp for light, lamp in lamps.items() if light not in number}
+        reached = np.einsum("mnc,nc->m", requirements.rows, weights)
+        rows, shone = requirements.rows[:, self.lights], weights[self.lights]
+        by_own = np.einsum("mnc,nc->m", rows, shone)
+        least = requirements.least - (reached - by_own)
+        if requirements.watts.any():
+            least = least - requirements.watts * watts_of_fixed(weights, others)
+            by_own = by_own + requirements.watts * watts_of_fixed(shone, own)
+        part = Requirements(rows, requirements.watts, np.minimum(least, by_own))
+        return replace(self.reduction, lamps=own).with_requirements(part)
 
     def put_back(self, part: Reduction) -> Reduction:
         """Return the reduction of all lights with the knobs of `part`, one of these lights."""

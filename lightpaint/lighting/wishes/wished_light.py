@@ -70,6 +70,20 @@ class LitCase:
     weights: Doubles
 
     @classmethod
+    def of(cls, case: LightCase, lights: Lights) -> "LitCase":
+        """Return a case on `lights`. Raises ConstraintError if it names none."""
+        found = dict[int, float]()
+        for name, factor in case.factors.items():
+            matching = [k for k, light in enumerate(lights.names) if fnmatchcase(light, name)]
+            if not matching:
+                known = with_similar_name("no light has this name", name, [*lights.names])
+                raise ConstraintError(f"case {case.name!r} sets {name!r}: {known}")
+            found |= dict.fromkeys(matching, factor)
+        places = np.array(sorted(found), np.intp)
+        factors = np.array([found[k] for k in places.tolist()]).reshape(-1, 1)
+        return cls(case.name, places, factors * lights.current_weights[places])
+
+    @classmethod
     def of_scene(cls, lights: Lights) -> "LitCase":
         """Return the case of the light as it is."""
         return cls("", np.zeros(0, np.intp), lights.current_weights[:0])
@@ -167,22 +181,14 @@ def _add_wishes(
 
 def lit_case(case: LightCase, lights: Lights, reduction: Reduction) -> LitCase:
     """Return a case on `lights`. Raises ConstraintError if it names none, or an adjusted one."""
-    weights, found = lights.current_weights, dict[int, float]()
+    lit = LitCase.of(case, lights)
     movable = {light for knob in reduction.knobs for light in knob.lights}
-    for name, factor in case.factors.items():
-        matching = [k for k, light in enumerate(lights.names) if fnmatchcase(light, name)]
-        if not matching:
-            known = with_similar_name("no light has this name", name, [*lights.names])
-            raise ConstraintError(f"case {case.name!r} sets {name!r}: {known}")
-        if adjusted := [lights.names[k] for k in matching if k in movable]:
-            raise ConstraintError(
-                f"case {case.name!r} sets {adjusted[0]!r}, which the solve adjusts: lock it in the "
-                "lights file (lock = true)"
-            )
-        found |= dict.fromkeys(matching, factor)
-    places = np.array(sorted(found), np.intp)
-    factors = np.array([found[k] for k in places.tolist()]).reshape(-1, 1)
-    return LitCase(case.name, places, factors * weights[places])
+    if adjusted := [lights.names[k] for k in lit.lights.tolist() if k in movable]:
+        raise ConstraintError(
+            f"case {case.name!r} sets {adjusted[0]!r}, which the solve adjusts: lock it in the "
+            "lights file (lock = true)"
+        )
+    return lit
 
 
 class _Rows:

@@ -34,7 +34,7 @@ from lightpaint.pipeline.job.job_checks import (
     check_inputs,
     check_painting_is_no_light,
     check_places,
-    check_scale_of_planes,
+    checked_scale,
     rigging_for,
     sky_for_sun,
     wanted_sun,
@@ -204,7 +204,7 @@ class Job:
         if self.settings.watts is not None:
             check_powers(reduction, [light.name for light in lights], "a limit of power")
         if self.settings.planes is not None:
-            check_scale_of_planes(self.settings.planes, all_constraints.cd_per_unit)
+            checked_scale(self.settings.planes, all_constraints.cd_per_unit)
         if scenes and (count := wanted_sun(self.settings, scenes)):
             sky_for_sun(scenes[0], count)
         if self.settings.suggest:

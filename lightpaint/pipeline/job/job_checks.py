@@ -74,14 +74,15 @@ def check_painting_is_no_light(basis: Any, target: Target | Painting) -> None:
         )
 
 
-def check_scale_of_planes(planes: str | Path, cd_per_unit: float | None) -> None:
-    """Raise LightpaintError if nothing says what a radiance of 1 stands for on planes."""
+def checked_scale(planes: str | Path, cd_per_unit: float | None) -> float:
+    """Return cd/m² of a radiance of 1. Raises LightpaintError if nothing says it for planes."""
     if cd_per_unit is None:
         raise LightpaintError(
             f"{planes} asks for lux, and nothing says how many cd/m² a radiance of 1 is: pass ",
             Hint("cd_per_unit", 1),
             ", or cd_per_unit in the lights file",
         )
+    return cd_per_unit
 
 
 def check_places(placement: object, scenes: Sequence[object]) -> None:
@@ -120,6 +121,14 @@ def check_animation(settings: Settings, constraints: Constraints, views: int) ->
             Hint("animate", True),
             " needs paintings of two frames of a shot, like 'shot.####.exr': there is "
             f"{views or 'none'}",
+        )
+    if settings.planes is not None:
+        raise LightpaintError(
+            "wishes for planes are met by one lighting, not by lights that change: leave ",
+            Hint("planes"),
+            " or ",
+            Hint("animate", True),
+            " out",
         )
     if constraints.sparse is not None:
         raise ConstraintError(

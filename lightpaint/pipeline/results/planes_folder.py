@@ -1,8 +1,10 @@
 """The folder with what an answer gives on measuring planes: tables and false-colour pictures."""
 
+from collections.abc import Mapping
 from pathlib import Path
 
-from lightpaint.lighting.wishes.planes_answer import PlanesAnswer
+from lightpaint.arrays import Doubles
+from lightpaint.photometry.illuminance import Illuminance
 from lightpaint.photometry.planes_file import plane_names
 from lightpaint.photometry.readings_file import readings_files, write_readings
 
@@ -17,11 +19,13 @@ def files_of_planes(folder: Path, planes: str | Path) -> list[Path]:
     return [folder / FOLDER / case / name for case in cases or ("",) for name in files]
 
 
-def write_planes(folder: Path, answer: PlanesAnswer, origin: str) -> None:
-    """Write what an answer gives on planes, in a folder for each case. origin: of the light, in
-    words.
+def write_planes(
+    folder: Path, illuminance: Illuminance, weights: Mapping[str, Doubles], origin: str
+) -> None:
+    """Write what weights (n, 3) by case give on planes, in a folder for each. origin: of the light,
+    in words.
     """
-    for case, weights in answer.weights_by_case.items():
+    for case, lit in weights.items():
         place, words = folder / FOLDER / case, f"{origin}, {case}" if case else origin
         place.mkdir(parents=True, exist_ok=True)
-        write_readings(place, answer.wished.illuminance, weights, words)
+        write_readings(place, illuminance, lit, words)

@@ -1,0 +1,143 @@
+"""A batch whose looks have to give some light on measuring planes."""
+
+import csv
+import json
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+from batches import contents
+from renderer import LIGHTS, write_room
+
+from lightpaint.basis.cache.cached_render import obtain_basis
+from lightpaint.basis.file.basis_file import write_basis
+from lightpaint.batch.cluster.parcels import FileHashes, ParcelStore, pack, pieces
+from lightpaint.batch.gallery.summary import LightRow, PlaneRow, SummaryRow, summary_csv
+from lightpaint.batch.plan.planner import plan
+from lightpaint.batch.run import run_batch
+from lightpaint.batch.run_options import RunOptions
+from lightpaint.batch.work.item_execution import run_item
+from lightpaint.batch.work.worker_storage import WorkerCache
+from lightpaint.errors import BatchError
+from lightpaint.images.formats.exr import write_rgb
+from lightpaint.progress import silent
+from lightpaint.scene.scene_reader import load_scene
+
+LAMP = 'emitters = [{ name = "white", rgb = [9, 9, 9], watts = 30 }]\n'
+LAMPS = f"cd_per_unit = 100\n[light.panel]\n{LAMP}[light.bulb]\n{LAMP}"
+
+PLANES = '[plane.floor]\nshape = "floor"\nheight = 0.1\ngrid = 0.5\nmean = 400\n'
+
+LOOKS = """
+[defaults]
+scene = "project/room.xml"
+want = ["predict"]
+settings = { spp = 4, planes = "project/floor.planes.toml" }
+
+[[look]]
+painting = "dark.exr"
+variations = ["warmer"]
+"""
+
+
+@pytest.fixture
+def folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    (tmp_path / "home" / "project").mkdir(parents=True)
+    home = tmp_path / "home"
+    write_room(home / "project", lights=LIGHTS["panel"] + LIGHTS["bulb"])
+    (home / "project" / "room.lights.toml").write_text(LAMPS, encoding="utf-8")
+    (home / "project" / "floor.planes.toml").write_text(PLANES, encoding="utf-8")
+    write_rgb(home / "dark.exr", np.full((20, 24, 3), 0.02, np.float32))
+    (home / "looks.toml").write_text(LOOKS, encoding="utf-8")
+    monkeypatch.chdir(tmp_path)  # paths are relative to the manifest, not to this
+    return home
+
+
+def run_looks(folder: Path) -> list[str]:
+    return run_batch(plan(folder / "looks.toml", folder / "out"), RunOptions()).done
+
+
+def summary_rows(folder: Path) -> list[dict[str, str]]:
+    return [*csv.DictReader((folder / "out/summary.csv").read_text("utf-8").splitlines())]
+
+
+def test_looks_give_the_light_and_another_planes_file_makes_them_stale(folder: Path) -> None:
+    assert run_looks(folder) == ["dark", "dark-warmer"]
+    row, warmer = summary_rows(folder)
+    # The painting is too dark for 400 lx; the wish counts the noise, so the mean is a bit more.
+    assert 400 <= float(row["floor Em lx"]) < 420
+    report = json.loads((folder / "out/dark/report.json").read_text("utf-8"))["planes"]
+    assert float(row["floor U0"]) == pytest.approx(
+        report["planes"]["floor"]["uniformity"],
+        rel=1e-3,  # four digits
+    )
+    assert float(row["W"]) == pytest.approx(report["watts"], rel=1e-3)
+    assert float(warmer["floor Em lx"]) > 0
+    look = json.loads((folder / "out/summary.json").read_text("utf-8"))["looks"][0]
+    assert look["planes"][0]["mean_lx"] == pytest.approx(float(row["floor Em lx"]), rel=1e-3)
+    assert run_looks(folder) == []
+    text = PLANES.replace("400", "450")
+    (folder / "project" / "floor.planes.toml").write_text(text, encoding="utf-8")
+    assert run_looks(folder) == ["dark", "dark-warmer"]
+    row, _ = summary_rows(folder)
+    assert 450 <= float(row["floor Em lx"]) < 470
+
+
+def test_a_worker_elsewhere_gets_the_planes_file_and_does_the_same(
+    folder: Path, tmp_path: Path
+) -> None:
+    run_looks(folder)
+    task = plan(folder / "looks.toml", folder / "again").looks[0].steps[0].task
+    scene = load_scene(folder / "project" / "room.xml")
+    write_basis(tmp_path / "b.basis.exr", obtain_basis(scene, spp=4))
+    task = replace(task, files=(str(tmp_path / "b.basis.exr"),))
+    parcel = pack(task, FileHashes(), run="a", is_shared=False)
+    store = ParcelStore(tmp_path / "worker")
+    for file, digest in (*parcel.files, *parcel.local_files):
+        for data, is_first, is_last in pieces(Path(file).read_bytes()):
+            store.put(digest, data, is_first=is_first, is_last=is_last)
+    outcome = store.run_parcel(parcel, lambda item: run_item(item, WorkerCache(), silent))
+    assert outcome.failure == ""
+    assert outcome.files is not None
+    expected = contents(folder / "out/dark")
+    for name in ("lighting.json", "planes/planes.csv", "planes/planes.json"):
+        assert outcome.files[name] == expected[name]
+
+
+@pytest.mark.parametrize(
+    ("lamps", "planes", "expected"),
+    [
+        (LAMPS, None, "floor.planes.toml"),
+        (LAMPS, PLANES.replace('"floor"', '"flor"'), "flor"),
+        (LAMPS.replace("cd_per_unit = 100", ""), PLANES, "settings.cd_per_unit = 1"),
+        (LAMPS.replace(", watts = 30", ""), f"{PLANES}[power]\nwatts = 9", "power of each lamp"),
+    ],
+    ids=["no file", "no shape", "no unit", "no watts"],
+)
+def test_a_plan_finds_what_planes_lack_before_anything_is_rendered(
+    folder: Path, lamps: str, planes: str | None, expected: str
+) -> None:
+    (folder / "project" / "room.lights.toml").write_text(lamps, encoding="utf-8")
+    (folder / "project" / "floor.planes.toml").unlink()
+    if planes is not None:
+        (folder / "project" / "floor.planes.toml").write_text(planes, encoding="utf-8")
+    with pytest.raises(BatchError) as error:
+        plan(folder / "looks.toml", folder / "out")
+    assert expected in str(error.value)
+    assert "look 'dark.exr'" in str(error.value)
+
+
+def test_columns_of_planes_are_those_of_no_light() -> None:
+    names = ["desk Em lx", "W", "desk"]
+    lights = tuple(LightRow(name, k + 0.5, (2.0, 3.0, 4.0)) for k, name in enumerate(names))
+    planes = (PlaneRow("desk", 500.0, 0.6),)
+    rows = [
+        SummaryRow("dusk", "done", "", "dusk", lights=lights, planes=planes, watts=70.0),
+        SummaryRow("noon", "failed", "no sun", "noon"),
+    ]
+    [heading, cells, failed] = csv.reader(summary_csv(rows).splitlines())
+    assert len(set(heading)) == len(heading) == len(cells) == len(failed)
+    table = dict(zip(heading, cells, strict=True))
+    assert (table["desk Em lx"], table["desk U0"], table["W"]) == ("500", "0.6", "70")
+    assert (table["light desk Em lx"], table["light W"], table["desk"]) == ("0.5", "1.5", "2.5")
