@@ -162,7 +162,7 @@ def publish_shifted(
         "scene": scene,
         "groups": job.groups,
         "spp": job.settings.spp,
-        "illuminance": measure_derived(
+        "planes": measure_derived(
             scene, shifted_lighting, job.constraints, job.settings, listen
         ),
     }
