@@ -14,7 +14,7 @@ from webs import batwing, cosine, ies_text, street, write_web
 from lightpaint.arrays import Doubles
 from lightpaint.basis.render.render_origin import basis_lights
 from lightpaint.errors import ConstraintError, SceneError
-from lightpaint.lighting.constraints.absolute_scale import agreed_scale, with_scale
+from lightpaint.lighting.constraints.absolute_scale import agreed_scale, with_sure_scale
 from lightpaint.lighting.constraints.constraints import Constraints
 from lightpaint.lighting.constraints.constraints_file import constraints_of
 from lightpaint.lighting.unknowns.reduction import Reduction, reduce_to
@@ -45,7 +45,7 @@ def _reduction(scene: Scene, constraints: Constraints | None = None) -> Reductio
     all_constraints = constraints_of(scene.requests)
     if constraints is not None:
         all_constraints = all_constraints.and_then(constraints)
-    return reduce_to(with_scale(all_constraints, lights), lights)
+    return reduce_to(with_sure_scale(all_constraints, lights), lights)
 
 
 def _lux(scene: Scene, name: str, points: Doubles, normal: tuple[float, float, float]) -> Doubles:
@@ -154,6 +154,22 @@ def test_emitters_in_lumens_mix_into_its_web(tmp_path: Path) -> None:
     assert luminance == pytest.approx(0.5, rel=1e-4)  # half of its 1800 lm
 
 
+@pytest.mark.parametrize("amount", ["lm = 900", "Y = 0.5"])
+def test_losses_count_once_for_emitters(tmp_path: Path, amount: str) -> None:
+    light = "[light.bulb]\nphotometry = 'lamps/lamp.ies'\n"
+    emitters = f"emitters = [{{ name = 'warm', rgb = [1, 1, 1], {amount} }}]\n"
+    levels, fluxes = [], []
+    for factor in ("", "factor = 0.7\n"):
+        scene = _room(tmp_path, light + factor + emitters, of=LIGHTS["bulb"])
+        [lamp] = _reduction(scene).lamps.values()
+        [bulb] = basis_lights(scene)
+        levels.append(lamp.emitters[0].emission[1])
+        assert bulb.unit_flux is not None
+        fluxes.append(levels[-1] * bulb.unit_flux[1])
+    assert fluxes[1] / fluxes[0] == pytest.approx(0.7, rel=1e-6)
+    assert levels[1] == pytest.approx(levels[0], rel=1e-6)
+
+
 def test_lights_beside_it_need_a_scale(tmp_path: Path) -> None:
     scene = _room(tmp_path, '[light.bulb]\nphotometry = "lamps/lamp.ies"')
     with pytest.raises(ConstraintError, match=r"'panel' is in W/\(m² sr\), beside luminaires"):
@@ -164,7 +180,7 @@ def test_lights_beside_it_need_a_scale(tmp_path: Path) -> None:
     }
     _reduction(scene, Constraints.of(others))
     constraints = constraints_of(scene.requests).and_then(Constraints.of(others))
-    assert with_scale(constraints, basis_lights(scene)).cd_per_unit == 1
+    assert with_sure_scale(constraints, basis_lights(scene)).cd_per_unit == 1
     dark = Constraints.of({"panel": {"off": True}, "beam": {"off": True}})
     _reduction(scene, dark)
 

@@ -162,9 +162,7 @@ def publish_shifted(
         "scene": scene,
         "groups": job.groups,
         "spp": job.settings.spp,
-        "planes": measure_derived(
-            scene, shifted_lighting, job.constraints, job.settings, listen
-        ),
+        "planes": measure_derived(scene, shifted_lighting, job.constraints, job.settings, listen),
     }
     publish_derived(results, shifted_lighting, bases, views=_views(job), **options)
 

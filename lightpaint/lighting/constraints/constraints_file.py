@@ -1,6 +1,6 @@
 """Constraints from a lights file, the TOML beside a scene."""
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -12,6 +12,7 @@ from lightpaint.lighting.constraints.values import check_keys, parse_primaries, 
 from lightpaint.luminaires.luminaire_request import LUMINAIRE_KEYS, PHOTOMETRY
 from lightpaint.scene.lights.lights_file import IMAGE_KEYS, MOVES, SceneRequests, read_keys
 from lightpaint.sentences import SourceKey
+from lightpaint.validation import is_number
 
 #: Characters of an error, which names the file, the light and the key before it quotes.
 MAX_MESSAGE_LENGTH = 1000
@@ -75,9 +76,29 @@ def _constraint_tables(requests: SceneRequests) -> Any:
         remaining = {key: value for key, value in table.items() if key not in _OTHER_KEYS}
         if PHOTOMETRY in table and "emitters" not in table:
             remaining = _with_own_emitter(remaining, requests.luminaires[name].watts, where)
+        elif PHOTOMETRY in table:
+            remaining = _with_losses(remaining, requests.luminaires[name].factor)
         if remaining or not table:
             tables[name] = remaining
     return tables
+
+
+def _with_losses(table: Mapping[str, Any], factor: float) -> dict[str, Any]:
+    """Return the table of a luminaire whose emitters in candela or lumens lose what it loses.
+
+    factor: of the luminaire, which its web, and so emitters in Y, have already.
+    """
+    emitters = table["emitters"]
+    if factor == 1 or not isinstance(emitters, Sequence) or isinstance(emitters, str):
+        return dict(table)
+    return {**table, "emitters": [_dimmed(x, factor) for x in emitters]}
+
+
+def _dimmed(emitter: Any, factor: float) -> Any:
+    if not isinstance(emitter, Mapping):
+        return emitter
+    amounts = {key: emitter[key] for key in ("cd", "lm") if is_number(emitter.get(key))}
+    return {**emitter, **{key: factor * x for key, x in amounts.items()}}
 
 
 def _with_own_emitter(
