@@ -23,6 +23,9 @@ from lightpaint.scene.properties.measuring_points import MeasuringPoints
 from lightpaint.scene.scene import Scene
 from lightpaint.validation import Check, between, number
 
+#: Relative error of a measurement without another; see `measure_illuminance`.
+DEFAULT_ERROR = 0.02
+
 #: Samples per point of the first round, and beyond which none are added.
 FIRST_SPP, MOST_SPP = 64, 2**16
 #: Factors by which a round increases the number of samples, and share of the squared error that
@@ -39,7 +42,7 @@ def measure_illuminance(
     planes: Sequence[MeasuringPlane],
     *,
     spp: int | None = None,
-    error: float = 0.02,
+    error: float = DEFAULT_ERROR,
     cd_per_unit: float = 1.0,
     weights: Doubles | None = None,
     seed: int = 0,
