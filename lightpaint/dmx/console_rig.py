@@ -88,6 +88,8 @@ class RigLight:
     these.
     chromaticity: places of two channels that set x and y of CIE 1931 of the sum of its emitters,
     and in their place; `dimmers` set the sum's luminance. Empty for other lights.
+    whites: places of channels that set its colour temperature, whose curves give kelvin; its
+    emitters are its coolest and its warmest white, whose drives add up to what `dimmers` set.
     """
 
     name: str
@@ -101,6 +103,7 @@ class RigLight:
     masters: tuple[int, ...] = ()
     filters: tuple[RigFilter, ...] = ()
     chromaticity: tuple[int, ...] = ()
+    whites: tuple[int, ...] = ()
 
     @property
     def is_controlled(self) -> bool:

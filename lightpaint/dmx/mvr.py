@@ -333,6 +333,7 @@ def _placed(name: str, light: ModeLight, matrix: Doubles, target: Doubles | None
         light.masters,
         light.filters,
         light.chromaticity,
+        light.whites,
     )
 
 
@@ -348,7 +349,8 @@ def _head(head: ModeHead, matrix: Doubles, lights: Sequence[RigLight]) -> RigHea
 def _uncontrolled(light: RigLight) -> RigLight:
     """Return a light without its channels."""
     emitters = tuple(replace(x, channels=()) for x in light.emitters)
-    return replace(light, emitters=emitters, dimmers=(), masters=(), filters=(), chromaticity=())
+    nothing: dict[str, Any] = {"filters": (), "chromaticity": (), "whites": ()}
+    return replace(light, emitters=emitters, dimmers=(), masters=(), **nothing)
 
 
 def _three(values: Doubles) -> Position:

@@ -169,6 +169,19 @@ def xy_of_kelvin(kelvin: float) -> Chromaticity:
     return xy_of(xyz_of(uv))
 
 
+def whites_of(own: float, ends: tuple[float, float]) -> list[EmitterColour]:
+    """Return the coolest and the warmest white of a lamp whose colour is filtered.
+
+    own: its own colour temperature, of all its light. ends: of the range, in kelvin. Filters let
+    through as much as they can: all of the channel in which the other colour has most.
+    """
+    lamp, found = rgb_of_xy(xy_of_kelvin(own)), []
+    for name, kelvin in (("cool white", max(ends)), ("warm white", min(ends))):
+        xy = xy_of_kelvin(kelvin)
+        found.append(EmitterColour(name, xy, float(1 / np.max(rgb_of_xy(xy) / lamp))))
+    return found
+
+
 @dataclass(frozen=True)
 class ColourSpace:
     """A space in which channels name colours by red, green and blue: chromaticities of these, and

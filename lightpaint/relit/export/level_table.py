@@ -20,11 +20,11 @@ FORMAT: Literal["lightpaint-dmx 1"] = "lightpaint-dmx 1"
 class LevelRow:
     """A channel that a light sets.
 
-    emitter: which it sets; `dimmer`, the name of a filter, or x or y of a chromaticity for one that
-    sets several; pan or tilt of a head that is aimed, by the first light on it. drive: of the
-    emitter, 0 to 1; None for several. universe: as the network numbers it. channels: 1 to 512, that
-    of the coarse byte first. value: of all bytes. An emitter without a channel of its own has a row
-    for its drive alone.
+    emitter: which it sets; `dimmer`, the name of a filter, x or y of a chromaticity, or `kelvin`
+    for one that sets several; pan or tilt of a head that is aimed, by the first light on it. drive:
+    of the emitter, 0 to 1; None for several. universe: as the network numbers it. channels: 1 to
+    512, that of the coarse byte first. value: of all bytes. An emitter without a channel of its own
+    has a row for its drive alone.
     """
 
     fixture_id: str
@@ -37,8 +37,8 @@ class LevelRow:
     value: int | None
 
 
-#: What stands for an emitter in the row of a dimmer.
-DIMMER = "dimmer"
+#: What stands for an emitter in the rows of a dimmer and of a colour temperature.
+DIMMER, KELVIN = "dimmer", "kelvin"
 
 
 def light_channels(light: RigLight) -> list[tuple[str, int]]:
@@ -46,6 +46,7 @@ def light_channels(light: RigLight) -> list[tuple[str, int]]:
     return [
         *((DIMMER, k) for k in (*light.masters, *light.dimmers)),
         *((name, k) for name, k in zip("xy", light.chromaticity, strict=False)),
+        *((KELVIN, k) for k in light.whites),
         *((x.name, k) for x in light.filters for k in x.channels),
         *((x.name, k) for x in light.emitters for k in x.channels),
     ]
