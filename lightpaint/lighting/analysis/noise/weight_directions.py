@@ -12,7 +12,7 @@ from typing import Self
 import numpy as np
 
 from lightpaint.arrays import Bools, Doubles, Indices
-from lightpaint.lighting.algebra.eigenvectors import eigenvectors
+from lightpaint.lighting.algebra.eigenvectors import excess_above
 from lightpaint.lighting.analysis.noise.dominant_pixels import NORMAL_95
 from lightpaint.lighting.analysis.noise.noise import (
     NULL_EIGENVALUE,
@@ -417,14 +417,9 @@ def limit_deviations(covariance: Doubles, sizes: Doubles) -> tuple[Doubles, Doub
     relative = covariance[np.ix_(moved, moved)]
     relative *= scale[:, None]
     relative *= scale
-    if _is_within(relative, MAX_DEVIATION**2):
+    if (excess := excess_above(relative, MAX_DEVIATION**2)) is None:
         return covariance, None
-    squares, axes = eigenvectors(relative)
-    beyond = squares > MAX_DEVIATION**2
-    if not beyond.any():
-        return covariance, None
-    axes = axes[:, beyond]
-    relative -= (axes * (squares[beyond] - MAX_DEVIATION**2)) @ axes.T
+    relative -= excess
     is_far = relative.diagonal() >= (MAX_DEVIATION / 2) ** 2
     relative /= scale[:, None]
     relative /= scale
@@ -433,15 +428,6 @@ def limit_deviations(covariance: Doubles, sizes: Doubles) -> tuple[Doubles, Doub
     limited[np.ix_(moved, moved)] = relative
     own[np.ix_(far, far)] = covariance[np.ix_(far, far)]
     return limited, own
-
-
-def _is_within(matrix: Doubles, limit: float) -> bool:
-    """Return whether all eigenvalues of a symmetric matrix are below a limit."""
-    try:
-        np.linalg.cholesky(limit * np.eye(len(matrix)) - matrix)
-    except np.linalg.LinAlgError:
-        return False
-    return True
 
 
 def _levels(solution: Solution) -> Doubles:
