@@ -237,6 +237,7 @@ def test_the_report_says_what_moved(answer: Path) -> None:
 LAMP = lp.NewEmitter("lamp", "point", lp.Pose(position=(0.5, 1.4, 0.6)), emission=(2.0, 1.4, 0.8))
 
 
+@pytest.mark.nightly
 def test_a_missing_lamp_is_added_with_its_constraint_and_written_behind_the_users_text(
     room: Scene, tmp_path: Path
 ) -> None:

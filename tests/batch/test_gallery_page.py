@@ -365,6 +365,7 @@ def test_a_thousand_looks_are_filtered_and_ordered(page: Any, tmp_path: Path) ->
     assert _names(page) == ["broken"]
 
 
+@pytest.mark.nightly
 def test_axe_finds_nothing(page: Any, batch: Path) -> None:
     source = axe_source()
     page.goto((batch / "index.html").as_uri())

@@ -88,6 +88,7 @@ def batch_record(batch_folder: Path) -> dict[str, Any]:
     return {**summary, "asked": requests}
 
 
+@pytest.mark.nightly
 def test_each_basis_is_obtained_once_for_all_its_looks(
     batch_folder: Path, batch_record: dict[str, Any]
 ) -> None:

@@ -91,6 +91,7 @@ def cache(tmp_path_factory: pytest.TempPathFactory) -> str:
     return str(folder / "cache")
 
 
+@pytest.mark.nightly
 @pytest.mark.parametrize("earlier", [True, nightly(False)])
 def test_a_full_disk_leaves_earlier_results_as_they_were(
     small_disk: tuple[Path, str], tmp_path: Path, cache: str, earlier: bool

@@ -224,6 +224,7 @@ def _ignoring(*numbers: signal.Signals) -> None:
         signal.signal(number, signal.SIG_IGN)
 
 
+@pytest.mark.nightly
 def test_what_a_script_starts_in_its_background_hears_ctrl_c(tmp_path: Path) -> None:
     """Its shell has it ignored; what `nohup` has ignored stays ignored."""
     room = write_room(tmp_path, lights=LIGHTS["bulb"])

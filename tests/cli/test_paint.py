@@ -372,6 +372,7 @@ def test_a_message_that_no_page_would_send_costs_its_sender_the_connection(
             assert socket.protocol.extensions == []  # nothing is compressed
 
 
+@pytest.mark.nightly
 @pytest.mark.parametrize(
     ("host", "open_to"),
     [

@@ -163,6 +163,7 @@ def test_an_added_light_moves_is_named_anew_and_goes(moving: MovingStudio) -> No
     assert names(moving) == (*before, "point_2")
 
 
+@pytest.mark.nightly
 @pytest.mark.usefixtures("without_reasons")
 def test_added_lights_are_solved_for_exported_and_verified(moving: MovingStudio) -> None:
     add_light(moving, protocol.AddLight("spot", position=AIR))

@@ -84,6 +84,7 @@ def test_a_moved_light_has_the_plane_of_its_place(moving: MovingStudio) -> None:
     assert np.array_equal(session.basis.current_look, look)
 
 
+@pytest.mark.nightly
 def test_a_drag_computes_every_few_pixels_of_a_light_and_all_of_them_once_asked(
     moving: MovingStudio,
 ) -> None:
@@ -156,6 +157,7 @@ def test_a_receiver_with_a_lock_may_change_the_session_while_it_is_sent_planes(
     moving.rendered()
 
 
+@pytest.mark.nightly
 def test_undo_looks_and_the_file_know_places(moving: MovingStudio) -> None:
     session, at_rest = moving.studio.session, moving.plane("bulb")
     moving.send(protocol.MoveLights({"bulb": {"position": POSITION}}))
@@ -445,6 +447,7 @@ def paint_moved_bulb(moving: MovingStudio, position: tuple[float, float, float])
     )
 
 
+@pytest.mark.nightly
 @pytest.mark.usefixtures("without_reasons")
 def test_a_search_ends_with_the_best_so_far_and_leaves_a_note(
     dim_room: MovingStudio, monkeypatch: pytest.MonkeyPatch

@@ -90,6 +90,7 @@ def missing(
     return suggested
 
 
+@pytest.mark.nightly
 @pytest.mark.parametrize("hidden", [HIDDEN, nightly((-0.9, 1.0, 2.5))])
 def test_a_light_that_is_missing_is_found(
     tmp_path: Path, lacking: tuple[Scene, Basis], missing: Any, hidden: Any

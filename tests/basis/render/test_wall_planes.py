@@ -132,6 +132,7 @@ def test_a_render_of_the_written_image_confirms_the_prediction(tmp_path: Path, k
     assert verify(predicted, relit, spp=256).agrees
 
 
+@pytest.mark.nightly
 def test_a_sky_a_wall_and_a_slide_in_texels_share_a_scene(tmp_path: Path) -> None:
     write_files(tmp_path)
     lights = LIGHTS["sky"] + WALLS["bitmap"] + PROJECTOR.replace('id="it"', 'id="slide"')

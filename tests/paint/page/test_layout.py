@@ -19,6 +19,7 @@ def test_a_button_that_is_on_is_seen_under_the_pointer(painter: Painter) -> None
     assert colours == ["rgb(242, 181, 92)", "rgb(29, 20, 4)"]
 
 
+@pytest.mark.nightly
 def test_by_keyboard_alone(painter: Painter) -> None:
     """All controls are reached by Tab, each says what it is, and the pictures take paint."""
     names_reached = []

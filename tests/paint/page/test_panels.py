@@ -57,6 +57,7 @@ def test_lights_are_in_view_at_1440x900(new_painter: Any) -> None:
     assert field.evaluate(hit)
 
 
+@pytest.mark.nightly
 def test_panels_are_moved_by_key_and_by_drag_and_stay_there(new_painter: Any) -> None:
     painter = new_painter(viewport=LAPTOP)
     assert titles(painter) == DEFAULT

@@ -28,6 +28,7 @@ def is_within(painter: Painter) -> bool:
     )
 
 
+@pytest.mark.nightly
 @pytest.mark.parametrize("size", [(1280, 720), nightly((820, 1180))])
 def test_five_steps_greet_a_person_once(new_painter: Any, axe: str, size: Any) -> None:
     viewport = {"width": size[0], "height": size[1]}
