@@ -30,7 +30,9 @@ uniformity = 0.6
 RADIANCE = 0.006
 
 
-def write_room(folder: Path, web: Distribution, *, turn: float = 0.0, planes: str = PLANES) -> Path:
+def write_room(
+    folder: Path, web: Distribution, *, turn: float = 0.0, planes: str = PLANES, depth: int = 8
+) -> Path:
     """Write room.xml with four luminaires, their lights file, and planes."""
     x, y, z = SIZE
     walls = {
@@ -72,7 +74,7 @@ def write_room(folder: Path, web: Distribution, *, turn: float = 0.0, planes: st
         for k, (px, py, pz) in enumerate(PLACES)
     ]
     scene = f"""<scene version="3.0.0">
-        <integrator type="path"><integer name="max_depth" value="8"/>
+        <integrator type="path"><integer name="max_depth" value="{depth}"/>
         <integer name="rr_depth" value="20"/></integrator>
         <sensor type="perspective" id="camera"><float name="fov" value="80"/>
         <transform name="to_world"><lookat origin="0.3 0.3 1.6" target="4 3 1" up="0 0 1"/>
@@ -125,6 +127,35 @@ def test_radiance_finds_what_a_plan_promises(tmp_path: Path, web: Distribution, 
     # The sure ends of both are what was asked for.
     assert promised["mean"] >= 300
     assert promised["uniformity"] >= 0.6
+
+
+def test_two_bounces_are_those_of_radiance(tmp_path: Path):
+    scene = write_room(tmp_path, street, turn=30.0, depth=4)
+    loaded = load_scene(scene)
+    [plane] = read_planes(tmp_path / "room.planes.toml", loaded).planes
+    lux = measure_illuminance(loaded, [plane], error=0.004, seed=2)
+    weights = np.array([0.2, 1.0, 0.6, 0.0])[:, None] * np.ones(3)
+    web = tmp_path / "lamp.ies"
+    flux = 4000 / _lumens(web)
+    lamps = [
+        Hung(web, place, 30.0, float(weights[k, 0]) * flux)
+        for k, place in enumerate(PLACES)
+        if weights[k].any()
+    ]
+    expected = illuminance_in_room(
+        tmp_path / "radiance",
+        SIZE,
+        REFLECTANCES,
+        lamps,
+        plane.points,
+        plane.normals,
+        bounces=2,
+        rays=2048,
+    )
+    found, errors = lux.of(weights), lux.standard_errors(weights)
+    assert found.mean() == pytest.approx(expected.mean(), rel=RADIANCE)
+    # Radiance's own points have about one percent of their indirect light.
+    assert (np.abs(found - expected) <= 3 * np.hypot(errors, 0.01 * expected)).all()
 
 
 def _lumens(web: Path) -> float:

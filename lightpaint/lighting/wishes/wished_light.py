@@ -137,7 +137,7 @@ def wished_light(
     reduction: of the lights, whose brightest setting tells how noise counts. floor_m2: the area
     that a budget per area is for. cases: in each of which the wishes hold; by default in the light
     of the scene alone. Raises ConstraintError for a budget of lamps of unknown power, a ratio to a
-    plane that is not there, and a case of lights that the solve adjusts.
+    plane that is not there, a plane without light, and a case of lights that the solve adjusts.
     """
     rows = _Rows(len(illuminance.lights))
     lit_cases = tuple(lit_case(case, illuminance.lights, reduction) for case in cases)
@@ -159,6 +159,11 @@ def _add_wishes(
     """Add the rows of a plane's wishes. weights: (n, 3), at which noise counts."""
     part, name, wishes = illuminance.points_of(plane.name), plane.name, plane.wishes
     matrix, reading = illuminance.matrix[part], illuminance.reading(name, weights)
+    if not reading.mean > 0 and (wishes.mean is not None or wishes.uniformity is not None):
+        raise ConstraintError(
+            f"plane {name!r} gets no light from any lamp, and there are wishes for it: is it "
+            "below the floor, or do its points face away?"
+        )
     mean = matrix.mean(axis=0, keepdims=True)
     values, errors = illuminance.of(weights)[part], illuminance.standard_errors(weights)[part]
     point_error = NORMAL_95 * _relative(errors, values)[:, None, None]

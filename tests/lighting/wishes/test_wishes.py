@@ -1,5 +1,6 @@
 """Wishes for illuminance and power: requirements, the least power, and what contradicts."""
 
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -167,6 +168,14 @@ def test_power_of_which_nothing_is_known_is_not_limited(make_basis):
     reduction = reduce_to(Constraints(), basis.lights)
     with pytest.raises(ConstraintError, match="that of 'light 0' and 3 more is unknown"):
         wished_light(illuminance, PowerBudget(watts=100.0), reduction)
+
+
+def test_a_plane_that_no_lamp_reaches_is_named(make_basis):
+    desk = _plane("desk", 4, mean=100.0)
+    basis, _, illuminance = _case(make_basis, [desk])
+    dark = replace(illuminance, matrix=np.zeros_like(illuminance.matrix))
+    with pytest.raises(ConstraintError, match="plane 'desk' gets no light from any lamp"):
+        wished_light(dark, PowerBudget(), reduce_to(_lamps(LAMPS), basis.lights))
 
 
 def test_a_ratio_to_no_plane_is_refused(make_basis):
