@@ -74,7 +74,7 @@ class PhotometricWeb:
 
     @property
     def is_axial(self) -> bool:
-        """Whether it is the same in all C-planes."""
+        """True if it is the same in all C-planes."""
         return len(self.planes) == 1
 
     @cached_property

@@ -19,6 +19,7 @@ from lightpaint.display_text import some_names
 from lightpaint.errors import SceneError
 from lightpaint.luminaires.luminaire_request import LuminaireRequest
 from lightpaint.luminaires.plugin_names import AREA_PLUGIN, LUMINAIRE_PLUGINS, POINT_PLUGIN
+from lightpaint.luminaires.registration import check_can_have_luminaires
 from lightpaint.luminaires.spot_sum import spots_of
 from lightpaint.luminaires.web import PhotometricWeb
 from lightpaint.luminaires.web_file import flux_remark
@@ -93,6 +94,9 @@ def hang_luminaires(
     intensity of 1.
     Raises SceneError for a name that no emitter has, and for one whose place cannot be taken.
     """
+    import mitsuba as mi
+
+    check_can_have_luminaires(mi.variant())
     chosen = _chosen(parsed, requests, groups)
     whole = {parsed.names[node] for node in chosen}
     further = {k: luminaire_of_spot(parsed.names[k]) for k in parsed.emitter_nodes}
