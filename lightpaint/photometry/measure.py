@@ -81,8 +81,12 @@ def measure_illuminance(
     _check("cd_per_unit", cd_per_unit, number("cd/m²"))
     listen, at_points = listener(progress), scene.at_points(points_of(planes))
     goal = FIRST_SPP if spp is None else spp
+
+    def report(label: str, done: int, total: int, unit: str = "passes") -> None:
+        listen("illuminance" if label == "basis" else label, done, total, unit)
+
     while True:
-        basis = obtain_basis(at_points, spp=goal, seed=seed, use_cache=use_cache, progress=listen)
+        basis = obtain_basis(at_points, spp=goal, seed=seed, use_cache=use_cache, progress=report)
         measured = illuminance_of(basis, planes, cd_per_unit)
         if spp is not None:
             return measured
