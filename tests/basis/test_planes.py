@@ -16,6 +16,7 @@ from package_source import tree_of
 
 import lightpaint
 import lightpaint as lp
+from lightpaint.basis import planes as planes_module
 from lightpaint.basis.derived_planes import BlockPlanes, JoinedRow, block_means, in_one_row
 from lightpaint.basis.file import basis_file, file_planes, lit_planes
 from lightpaint.basis.file.file_planes import FilePlanes, SpooledPlanes, spooled
@@ -213,6 +214,18 @@ def test_several_mixes_are_those_made_one_by_one(images: np.ndarray) -> None:
         np.testing.assert_allclose(
             mixes, np.einsum("nhwc,knc->khwc", planes.array(), weights), rtol=1e-6
         )
+
+
+def test_every_other_pixel_is_the_same_in_one_walk_and_plane_by_plane(
+    images: np.ndarray, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    factors = np.random.default_rng(2).random((N, 3))
+    expected = np.einsum("nhwc,nc->nhw", images[:, ::2, ::2], factors)
+    for most_bytes in (planes_module.THINNED_MAX_BYTES, 0):
+        monkeypatch.setattr(planes_module, "THINNED_MAX_BYTES", most_bytes)
+        for planes in (MemoryPlanes(images), CountedPlanes(images)):
+            found = list(planes_module.thinned(planes, 2, factors))
+            np.testing.assert_allclose(found, expected, rtol=1e-6)  # of float32
 
 
 class RoundedPlanes(MemoryPlanes):
