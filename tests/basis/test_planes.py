@@ -353,6 +353,17 @@ def test_strips_of_rows_vanish_with_their_planes(images: np.ndarray) -> None:
         gc.enable()
 
 
+def test_strips_of_planes_that_nobody_walks_along_are_released(images: np.ndarray) -> None:
+    first, *others = (CountedPlanes(images) for _ in range(1 + file_planes.WALKED_PLANES))
+    strip = weakref.ref(first.pixels(slice(0, 1)).base)
+    assert strip() is not None
+    for planes in others:
+        planes.pixels(slice(0, 1))
+    gc.collect()
+    assert strip() is None
+    np.testing.assert_array_equal(first.pixels(slice(0, 3))[:, 0], images[:, 0, 0])
+
+
 def test_sums_of_squares_made_block_by_block(
     images: np.ndarray, monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -373,12 +384,16 @@ def test_sums_of_squares_made_block_by_block(
             np.testing.assert_allclose(actual, expected, rtol=1e-12)
 
 
-def test_spooled_planes_are_made_once_and_those_in_memory_stay(images: np.ndarray) -> None:
-    planes = CountedPlanes(images)
-    on_disk = spooled(planes)
-    assert isinstance(on_disk, SpooledPlanes)
-    planes.rows = None  # type: ignore[method-assign, assignment]
-    check_alike(on_disk, images)
+def test_spooled_planes_are_made_once_and_those_in_memory_stay(
+    images: np.ndarray, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    for most_bytes, kind in ((file_planes.UNSPOOLED_MAX_BYTES, MemoryPlanes), (0, SpooledPlanes)):
+        monkeypatch.setattr(file_planes, "UNSPOOLED_MAX_BYTES", most_bytes)
+        planes = CountedPlanes(images)
+        copy = spooled(planes)
+        assert isinstance(copy, kind)
+        planes.rows = None  # type: ignore[method-assign, assignment]
+        check_alike(copy, images)
     in_memory = MemoryPlanes(images)
     assert spooled(in_memory) is in_memory
 
@@ -390,6 +405,7 @@ def test_planes_are_made_again_where_a_disk_is_full(
         raise OSError(errno.ENOSPC, "No space left on device")
 
     monkeypatch.setattr(os, "posix_fallocate", full)
+    monkeypatch.setattr(file_planes, "UNSPOOLED_MAX_BYTES", 0)
     planes = CountedPlanes(images)
     assert spooled(planes) is planes
 
