@@ -78,6 +78,7 @@ def make_subject(
     LightpaintError if the source cannot be painted, or its lights cannot meet the constraints.
     """
     settings, constraints = settings or Settings(), constraints or Constraints()
+    constraints = constraints.and_then(Constraints(cd_per_unit=settings.cd_per_unit))
     if layers is not None:
         if view_count > 1:
             raise PaintError(f"{layers} has the layers of one view: open that view alone")
@@ -116,6 +117,11 @@ def _scene_on_film(
         from lightpaint.basis.render.render_origin import basis_lights
 
         _check_constraints(basis_lights(scene), constraints)
+        if settings.planes is not None:
+            from lightpaint.pipeline.wished_planes import check_planes, constraints_for_planes
+
+            every = constraints_for_planes(scene, constraints, settings)
+            check_planes(scene, settings.planes, every)
 
     if isinstance(source, Scene):
         check(source)
@@ -126,6 +132,8 @@ def _scene_on_film(
     if scene.record is not None:
         _check_constraints(scene.record.lights, constraints)
     scene.checks.append(check)
+    if settings.planes is not None:  # mistakes in their file show before the painter opens
+        _ = scene.scene
     return scene
 
 
