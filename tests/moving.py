@@ -3,7 +3,7 @@
 import time
 from collections.abc import Callable
 from pathlib import Path
-from typing import Any
+from typing import Any, Unpack
 
 import numpy as np
 from patience import PATIENCE_S
@@ -14,7 +14,7 @@ from lightpaint.paint.protocol import Message
 from lightpaint.paint.store.store import Store
 from lightpaint.paint.studio.studio import Studio
 from lightpaint.paint.subject import Subject
-from lightpaint.pipeline.job.settings import Settings
+from lightpaint.pipeline.job.settings import Settings, SettingsByName
 from lightpaint.placement.free_space import pixels_of
 from lightpaint.scene.scene_reader import load_scene
 
@@ -22,12 +22,14 @@ from lightpaint.scene.scene_reader import load_scene
 class MovingStudio:
     """A studio of the test room, and all that it says."""
 
-    def __init__(self, folder: Path, lights: str | None = None) -> None:
+    def __init__(
+        self, folder: Path, lights: str | None = None, **settings: Unpack[SettingsByName]
+    ) -> None:
         self.folder = folder
         path = folder / "room.xml"
         self.scene = load_scene(path if path.exists() else write_room(folder, lights=lights))
         subject = Subject(
-            "room", folder, scene=self.scene, settings=Settings(spp=16, use_cache=False)
+            "room", folder, scene=self.scene, settings=Settings(spp=16, use_cache=False, **settings)
         )
         self.messages: list[Message] = []
         self.studio = Studio(

@@ -85,10 +85,9 @@ def make_subject(
     others are those of `Subject`. Raises LightpaintError if the source cannot be painted, or its
     lights cannot meet the constraints.
     """
-    settings, constraints = (
-        settings or Settings(),
-        Constraints() if constraints is None else constraints,
-    )
+    settings = settings or Settings()
+    constraints = Constraints() if constraints is None else constraints
+    constraints = constraints.and_then(Constraints(cd_per_unit=settings.cd_per_unit))
     if layers is not None:
         if view_count > 1:
             raise PaintError(f"{layers} has the layers of one view: open that view alone")
@@ -127,6 +126,11 @@ def _scene_on_film(
         from lightpaint.basis.render.render_origin import basis_lights
 
         _check_constraints(basis_lights(scene), constraints, check_lamps)
+        if settings.planes is not None:
+            from lightpaint.pipeline.wished_planes import check_planes, constraints_for_planes
+
+            every = constraints_for_planes(scene, constraints, settings)
+            check_planes(scene, settings.planes, every)
 
     if isinstance(source, Scene):
         check(source)
@@ -139,6 +143,8 @@ def _scene_on_film(
     else:
         _check_named_lamps(source, check_lamps)
     scene.checks.append(check)
+    if settings.planes is not None:  # mistakes in their file show before the painter opens
+        _ = scene.scene
     return scene
 
 

@@ -95,11 +95,12 @@ class RequiredSums:
         start: Doubles,
         *,
         multipliers: Doubles | None = None,
+        close: float = CLOSE,
         **options: Any,
     ) -> RequiredOptimum:
         """Minimise for b, (k,), from start, (k,), and the multipliers, (m,), of a similar problem.
 
-        options: of `QuadraticFamily.minimise`.
+        close: the largest miss of a sum to end at. options: of `QuadraticFamily.minimise`.
         """
         duals = np.zeros(len(self._least)) if multipliers is None else multipliers
         x, last, check = start, np.inf, cancellation_check()
@@ -115,7 +116,7 @@ class RequiredSums:
             sizes = np.where(sizes > 0, sizes, 1.0)
             miss = float((np.abs(updated - duals) / (weights * sizes)).max(initial=0))
             duals = updated
-            if miss <= CLOSE:
+            if miss <= close:
                 break
             if miss > SLOW * last:
                 self._penalty *= GROWTH

@@ -39,6 +39,7 @@ from lightpaint.lighting.unknowns.gamuts import Gamuts, PaintedLight
 from lightpaint.lighting.unknowns.reduced_problem import solve_reduced
 from lightpaint.lighting.unknowns.reduction import Reduction
 from lightpaint.lighting.unknowns.white_mixes import (
+    LastMultipliers,
     center_windows,
     clip_to_gamuts,
     snap_to_whites,
@@ -49,6 +50,9 @@ from lightpaint.threads import one_thread
 #: Answers under a moving brush for each time that wishes and gamuts are found anew: from one move
 #: to the next they hardly change.
 ANSWERS_PER_READING = 4
+
+#: Largest miss of a requirement under the brush, relative to its size: none that shows.
+MET_UNDER_BRUSH = 1e-5
 
 #: Painted blocks that determine the colours lights may take, about, and at least of each wish.
 GAMUT_BLOCKS, GAMUT_WISH_BLOCKS = 2**8, 2**5
@@ -89,6 +93,7 @@ class LiveSolver:
         self._untouched: Doubles | None = None
         self._within, self._gamuts_of = reduction, tuple[LiveView, ...]()
         self._answers_left = 0
+        self._last_multipliers = LastMultipliers(close=MET_UNDER_BRUSH)
         self._is_kept_to = False  # whether the last answer kept to the constraints
         self._many = ManyLights(len(self._basis.lights))
         self._films = None if self._start != constraints.start else self._films
@@ -179,7 +184,7 @@ class LiveSolver:
         starts = allowed(start), self._unpainted_answer()
         if self._are_many:
             self._within, weights = self._many.improve(
-                films.rows, pixels, starts, reduction, self._solve, pull, _allowed
+                films.rows, pixels, starts, reduction, self._solve_some, pull, _allowed
             )
             return weights
         return films.improve(pixels, starts, best, pull, allowed)
@@ -248,12 +253,15 @@ class LiveSolver:
 
     def _best(self, equations: NormalEquations, start: Doubles) -> Doubles:
         """Return the best weights (n, 3) under the constraints, from those to begin with."""
-        self._within, weights = self._solve(equations, self._within, start)
+        self._within, weights = solve_under_brush(
+            equations, self._within, start, method=self._fit.method, last=self._last_multipliers
+        )
         return weights
 
-    def _solve(
+    def _solve_some(
         self, equations: NormalEquations, reduction: Reduction, start: Doubles
     ) -> tuple[Reduction, Doubles]:
+        """Solve for some of many lights, whose misses of requirements would add up over rounds."""
         return solve_under_brush(equations, reduction, start, method=self._fit.method)
 
     def _weight_pull(self, views: tuple[LiveView, ...], unpainted: float) -> NormalEquations | None:

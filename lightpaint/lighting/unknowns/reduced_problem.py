@@ -218,6 +218,8 @@ def solve_reduced(
     start: Doubles,
     *,
     x: Doubles | None = None,
+    required: Doubles | None = None,
+    close: float = CLOSE,
     method: Method = "polished",
     tolerance: float = 1e-12,
     max_sweeps: int = 20_000,
@@ -226,10 +228,13 @@ def solve_reduced(
 
     start: (n, 3), weights to begin with; lights that reach nothing stay as near to them as the
     constraints allow. x: the unknowns to begin with, where they are known; else those nearest to
-    `start`. method, tolerance, max_sweeps: see `minimise`.
+    `start`. required: the multipliers of requirements, (m,), in a similar problem. close: the
+    largest miss of a requirement, relative to its size. method, tolerance, max_sweeps: see
+    `minimise`.
     """
     options: dict[str, Any] = {"tolerance": tolerance, "max_sweeps": max_sweeps}
-    return ReducedSolver(reduction, method=method).solve(equations, start, x=x, **options)
+    solver = ReducedSolver(reduction, required=required, close=close, method=method)
+    return solver.solve(equations, start, x=x, **options)
 
 
 class ReducedSolver:
@@ -243,15 +248,17 @@ class ReducedSolver:
         reduction: Reduction,
         *,
         pull: NormalEquations | None = None,
+        required: Doubles | None = None,
+        close: float = CLOSE,
         method: Method = "polished",
     ) -> None:
         self._reduction, self._pull, self._method = reduction, pull, method
+        self._required, self._close = required, close
         self._last: NormalEquations | None = None
         self._pulled: NormalEquations | None = None
         self._families: list[QuadraticFamily] = []
         self._ridged: list[QuadraticFamily] = []
         self._sums: RequiredSums | None = None
-        self._required: Doubles | None = None
 
     def solve(
         self,
@@ -374,10 +381,12 @@ class ReducedSolver:
                 method=self._method,
             )
         right, begin = block.right_side(b), x[block.unknowns]
-        found = self._sums.minimise(right, begin, multipliers=self._required, **options)
+        found = self._sums.minimise(
+            right, begin, multipliers=self._required, close=self._close, **options
+        )
         self._required = found.multipliers
         optimum = found.optimum
-        if found.miss > CLOSE:
+        if found.miss > self._close:
             residual = max(optimum.kkt_residual, found.miss)
             optimum = replace(optimum, kkt_residual=residual)
         return [optimum], found.multipliers

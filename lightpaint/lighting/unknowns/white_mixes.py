@@ -15,8 +15,9 @@ reaches the edge. The end is the same; a thousand lights have three thousand unk
 twice as many, which are determined.
 """
 
-from collections.abc import Collection, Mapping, Sequence
+from collections.abc import Callable, Collection, Mapping, Sequence
 from dataclasses import dataclass, replace
+from functools import partial
 from typing import Any
 
 import numpy as np
@@ -321,32 +322,72 @@ def move_to_best_white(knob: Knob, gradient: Doubles) -> Knob:
     return knob.with_window(knob.whites.window(float(best), 1))
 
 
+@dataclass
+class LastMultipliers:
+    """The multipliers of requirements, (m,), in the last answer under a moving brush, with which
+    the next solve begins; None before the first. Updated in place.
+
+    close: the largest miss of a requirement to end at, relative to its size.
+    """
+
+    close: float
+    required: Doubles | None = None
+
+
 def solve_under_brush(
-    equations: NormalEquations, reduction: Reduction, start: Doubles, *, method: Method
+    equations: NormalEquations,
+    reduction: Reduction,
+    start: Doubles,
+    *,
+    method: Method,
+    last: LastMultipliers | None = None,
 ) -> tuple[Reduction, Doubles]:
     """Solve as `solve_on_locus` does, in few steps from the last answer under a moving brush.
 
-    start: (n, 3). Return the reduction to continue with, and the weights (n, 3).
+    start: (n, 3). last: of the answers under this brush. Return the reduction to continue with, and
+    the weights (n, 3).
     """
+    solve = partial(_solve_from_last, equations, method=method, last=last)
     if not reduction.white_knobs:
-        return _solve_near_sides(equations, reduction, start, method=method)
+        return _solve_near_sides(equations, reduction, start, solve)
     start = snap_to_whites(reduction, start)
     wide = center_windows(reduction, start, BRUSH_WIDTH)
-    start = solve_reduced(equations, wide, start, method=method).weights
+    start = solve(wide, start).weights
     centered = center_windows(reduction, start)
     _, optimum = next_whites(equations, centered, start, steps=BRUSH_STEPS, method=method)
     return reduction, optimum.weights
 
 
+def _solve_from_last(
+    equations: NormalEquations,
+    reduction: Reduction,
+    start: Doubles,
+    *,
+    method: Method,
+    last: LastMultipliers | None,
+) -> ReducedOptimum:
+    """Solve from the last multipliers, if there are any, and keep those of this optimum."""
+    if last is None:
+        return solve_reduced(equations, reduction, start, method=method)
+    options: dict[str, Any] = {"required": last.required, "close": last.close, "method": method}
+    optimum = solve_reduced(equations, reduction, start, **options)
+    last.required = optimum.required
+    return optimum
+
+
 def _solve_near_sides(
-    equations: NormalEquations, reduction: Reduction, start: Doubles, *, method: Method
+    equations: NormalEquations,
+    reduction: Reduction,
+    start: Doubles,
+    solve: Callable[[Reduction, Doubles], ReducedOptimum],
 ) -> tuple[Reduction, Doubles]:
     """Solve with each light kept within its gamut towards the side where it would leave it.
 
-    start: (n, 3). Return the reduction with the sides that lights came to, and the weights (n, 3).
+    start: (n, 3). solve: solves the equations under a reduction, from weights. Return the reduction
+    with the sides that lights came to, and the weights (n, 3).
     """
     reduction = reduction.confined_to_sides(_repainted_sides(reduction))
-    optimum = solve_reduced(equations, reduction, start, method=method)
+    optimum = solve(reduction, start)
     for _ in range(MAX_TURNS):
         sides = _sides_outside(reduction, optimum.weights) | _next_sides(
             equations, reduction, optimum
@@ -354,7 +395,7 @@ def _solve_near_sides(
         if not sides:
             break
         reduction = reduction.confined_to_sides(sides)
-        optimum = solve_reduced(equations, reduction, optimum.weights, method=method)
+        optimum = solve(reduction, optimum.weights)
     return reduction, optimum.weights
 
 

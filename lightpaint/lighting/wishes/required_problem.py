@@ -5,7 +5,9 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from lightpaint.arrays import Doubles
+from lightpaint.lighting.constraints.requirements import Requirements
 from lightpaint.lighting.problem import Problem
+from lightpaint.lighting.unknowns.reduction import Reduction
 from lightpaint.lighting.wishes.linear_programs import shares_given_up
 from lightpaint.lighting.wishes.wished_light import WishedLight
 
@@ -29,20 +31,27 @@ def with_wishes(problem: Problem, wished: WishedLight) -> RequiredProblem:
     """
     if wished.is_empty:
         return RequiredProblem(problem, wished, np.zeros(0))
-    reduction = problem.reduction.with_requirements(wished.requirements)
-    shares = shares_given_up(wished, reduction)
-    if shares.any():
-        slack = wished.slack_of(shares) * (1 + 1e-9)
-        reduction = reduction.with_requirements(wished.requirements.lowered(slack))
-    requirements = reduction.requirements
-    assert requirements is not None
+    requirements, shares = requirements_within_reach(wished, problem.reduction)
     required = replace(
         problem,
         constraints=replace(problem.constraints, requirements=requirements),
-        reduction=reduction,
+        reduction=problem.reduction.with_requirements(requirements),
         full=problem.full.with_requirements(requirements),
     )
     return RequiredProblem(required, wished, shares)
+
+
+def requirements_within_reach(
+    wished: WishedLight, reduction: Reduction
+) -> tuple[Requirements, Doubles]:
+    """Return the requirements, as much of them as lights can reach, and the share of each wish that
+    had to be given up, (w,). reduction: of the lights, without requirements.
+    """
+    requirements = wished.requirements
+    shares = shares_given_up(wished, reduction.with_requirements(requirements))
+    if shares.any():
+        requirements = requirements.lowered(wished.slack_of(shares) * (1 + 1e-9))
+    return requirements, shares
 
 
 def without_wishes(problem: Problem) -> Problem:

@@ -24,6 +24,7 @@ import { Banner, Tips, Toasts, RunningTasks } from './ui/notices.js';
 import { dragPanel, stepPanel } from './ui/panels/panel_move.js';
 import { orderedPanels } from './ui/panels/panel_order.js';
 import { RoomPlan } from './ui/room_plan.js';
+import { PlanesPanel } from './ui/planes/planes_panel.js';
 import { ScopesPanel } from './ui/scopes/scopes_panel.js';
 import { SelectionFields } from './ui/selection/selection_fields.js';
 import { selectionUpdate } from './ui/selection/selection_settings.js';
@@ -196,6 +197,7 @@ const Watched = {
   LightList: watched(LightList),
   LightListActions: watched(LightListActions),
   RoomPlan: watched(RoomPlan),
+  PlanesPanel: watched(PlanesPanel),
   ScopesPanel: watched(ScopesPanel),
   AnalysisPanel: watched(AnalysisPanel),
 };
@@ -271,6 +273,7 @@ function Side({ ui, app }) {
       html`<${Watched.LightListActions} ui=${ui} app=${app} />`,
     )}
     ${ui.areLampsMarked && renderFold('plan', t('Plan'), html`<${Watched.RoomPlan} ui=${ui} app=${app} />`)}
+    ${ui.planes && renderFold('planes', t('Planes'), html`<${Watched.PlanesPanel} ui=${ui} app=${app} />`)}
     ${renderFold('history', t('History'), html`<${Watched.HistoryPanel} ui=${ui} app=${app} />`)}
     ${renderFold('scopes', t('Scopes'), html`<${Watched.ScopesPanel} ui=${ui} app=${app} />`)}
     ${renderFold('truth', t('Analysis'), html`<${Watched.AnalysisPanel} ui=${ui} app=${app} />`)}`;

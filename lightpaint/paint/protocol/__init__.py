@@ -15,6 +15,9 @@ from lightpaint.paint.protocol.answer_parts import (
     Closeness,
     Findings,
     LightAnswer,
+    PlaneLight,
+    PlanesReading,
+    PlaneWish,
     WishDelivery,
 )
 from lightpaint.paint.protocol.base import Event, Message, Request
@@ -65,8 +68,10 @@ from lightpaint.paint.protocol.message_parts import (
     LightInfo,
     LightPlace,
     LookInfo,
+    MeasuredPlane,
     Place,
     PlacePair,
+    PlanesInfo,
     PlanObject,
     PresetInfo,
     ReferenceInfo,

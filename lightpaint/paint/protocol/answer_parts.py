@@ -103,6 +103,52 @@ class LightAnswer:
     drives: tuple[float, ...] | None = field(default=None, metadata=OPTIONAL)
 
 
+@dataclass(frozen=True)
+class PlaneWish:
+    """A wish for a measuring plane or, as `power`, for all lamps together.
+
+    asked: in lx, in W, or as a share. reached: what came of it, at the sure end of its interval;
+    null if that is unknown. to: the other plane of a ratio; "" for none.
+    """
+
+    kind: Literal["mean", "uniformity", "max", "ratio", "power"]
+    asked: float
+    reached: float
+    is_met: bool
+    to: str = ""
+
+
+@dataclass(frozen=True)
+class PlaneLight:
+    """The illuminance on a measuring plane, in lx. mean_error: a standard error. uniformity: least
+    over mean. lux: at each of its points.
+    """
+
+    mean: float
+    mean_error: float
+    uniformity: float
+    least: float
+    most: float
+    lux: tuple[float, ...]
+    wishes: tuple[PlaneWish, ...]
+
+
+@dataclass(frozen=True)
+class PlanesReading:
+    """What an answer gives on measuring planes, under the master dimmer, in the order of the state.
+
+    watts: power of all lamps; null if that of one is unknown. power: the limit of it; null for
+    none. is_required: whether answers have to meet the wishes, as far as they can be met. is_old:
+    whether lights have been moved, added or removed since the planes were measured.
+    """
+
+    planes: tuple[PlaneLight, ...]
+    watts: float | None
+    power: PlaneWish | None
+    is_required: bool
+    is_old: bool
+
+
 @dataclass(frozen=True, kw_only=True)
 class Findings:
     """Properties of an answer; the sentences follow later than the lights.

@@ -11,7 +11,7 @@ import numpy as np
 import numpy.typing as npt
 
 from lightpaint.arrays import Doubles, Floats
-from lightpaint.paint.protocol.answer_parts import AnswerChoice, Findings
+from lightpaint.paint.protocol.answer_parts import AnswerChoice, Findings, PlanesReading
 from lightpaint.paint.protocol.base import OPTIONAL, Event
 from lightpaint.paint.protocol.message_parts import (
     Camera,
@@ -22,6 +22,7 @@ from lightpaint.paint.protocol.message_parts import (
     LightPlace,
     LookInfo,
     Place,
+    PlanesInfo,
     PlanObject,
     PresetInfo,
     ReferenceInfo,
@@ -76,6 +77,8 @@ class SessionState(EditState, Event, kind="state", is_observed=True):
     render, and not a basis alone. can_report: whether a report can be written. images: lights that
     are images. transforms: names of view transforms. transform: the one in use. basis: how many
     samples the planes have. answer: how close the last one is. console: null if there is none.
+    planes, reading: measuring planes, and what the answer gives there; null until they are
+    measured, and without any.
     """
 
     version: int
@@ -106,6 +109,8 @@ class SessionState(EditState, Event, kind="state", is_observed=True):
     choices: tuple[AnswerChoice, ...] = ()
     renders: tuple[RenderInfo, ...] = ()
     console: ConsoleInfo | None = None
+    planes: PlanesInfo | None = None
+    reading: PlanesReading | None = None
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -115,7 +120,7 @@ class AnswerUpdate(EditState, Findings, Event, kind="answer", is_observed=True):
 
     version: grows with every change of the session. stroke: number of the last stroke that arrived.
     exact: whether it equals the answer of `lightpaint solve`. mode: space in which it was found
-    under the brush.
+    under the brush. reading: what these lights give on measuring planes, if there are any.
     weights: (lights, 3) float64. drives: of the emitters of each lamp in the order of the lights,
     null for other lights; some answers under the brush have them, exact ones have them in `lights`.
     """
@@ -126,6 +131,7 @@ class AnswerUpdate(EditState, Findings, Event, kind="answer", is_observed=True):
     mode: str
     weights: Doubles
     drives: tuple[tuple[float, ...] | None, ...] | None = field(default=None, metadata=OPTIONAL)
+    reading: PlanesReading | None = field(default=None, metadata=OPTIONAL)
 
     @property
     def findings(self) -> Findings:

@@ -25,6 +25,29 @@ class ConsoleInfo:
 
 
 @dataclass(frozen=True)
+class MeasuredPlane:
+    """A plane on which illuminance is measured. size: rows and columns of a picture of it. cells:
+    row and column of each point. points: where they are, in units of the scene.
+    """
+
+    name: str
+    size: tuple[int, int]
+    cells: tuple[tuple[int, int], ...]
+    points: tuple[tuple[float, ...], ...]
+
+
+@dataclass(frozen=True)
+class PlanesInfo:
+    """The measuring planes. floor_m2: the area that power is divided by; null without one.
+    budget_watts: the most power that is allowed; null if any is.
+    """
+
+    planes: tuple[MeasuredPlane, ...]
+    floor_m2: float | None
+    budget_watts: float | None
+
+
+@dataclass(frozen=True)
 class EmitterInfo:
     """An emitter of a lamp, such as its red LEDs. swatch: its colour for a screen, as in CSS."""
 

@@ -16,8 +16,8 @@ class ProgressReport(Event, kind="progress", is_observed=True):
     """The progress of a long task. Unasked.
 
     task: `export`, `final` for a final render, `basis`, `sampling` for samples added where the
-    paint needs them, or the renderer's name for the task. done, total: steps so far, and in all.
-    unit: of these steps; "" for none.
+    paint needs them, `planes` for measuring planes, or the renderer's name for the task. done,
+    total: steps so far, and in all. unit: of these steps; "" for none.
     """
 
     task: str

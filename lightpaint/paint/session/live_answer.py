@@ -1,6 +1,8 @@
 """The requests of a session, and the answer that follows them and the brush."""
 
 from collections.abc import Callable, Mapping, Sequence
+from contextlib import suppress
+from dataclasses import replace
 
 import numpy as np
 
@@ -9,6 +11,7 @@ from lightpaint.basis.basis import Basis
 from lightpaint.basis.lights import Lights
 from lightpaint.colour.display.view_transform import ViewTransform
 from lightpaint.colour.lamp import Lamp
+from lightpaint.errors import LightpaintError
 from lightpaint.lighting.constraints.absolute_scale import with_sure_scale
 from lightpaint.lighting.constraints.constraints import Constraints
 from lightpaint.lighting.constraints.constraints_file import constraints_of
@@ -16,6 +19,8 @@ from lightpaint.lighting.fit import resolve_fit
 from lightpaint.lighting.linear_problem import reduce_lights
 from lightpaint.lighting.live.live import LiveSolver
 from lightpaint.lighting.live.live_view import LiveView
+from lightpaint.paint.protocol import PlanesReading
+from lightpaint.paint.session.session_planes import SessionPlanes, WishesInEffect
 from lightpaint.paint.store.session_requests import SessionRequests
 from lightpaint.pipeline.job.settings import Settings
 
@@ -47,6 +52,8 @@ class LiveAnswer:
         self._basis = views[0].basis
         self.weights = self._basis.current_weights
         self._settings, self._base_constraints, self._transform = settings, constraints, transform
+        self._planes: SessionPlanes | None = None
+        self._wishes: tuple[SessionRequests, tuple[str, ...], WishesInEffect | None] | None = None
         self.set_views(views)
 
     def set_views(self, views: Sequence[LiveView]) -> None:
@@ -90,7 +97,38 @@ class LiveAnswer:
 
     def constraints(self, requests: SessionRequests | None = None) -> Constraints:
         """Return the constraints of requests, combined with those of the scene."""
-        return self._base_constraints.and_then((requests or self.requests).constraints())
+        requests = requests or self.requests
+        constraints = self._base_constraints.and_then(requests.constraints())
+        wishes = self._wishes_under(requests)
+        required = None if wishes is None else wishes.requirements
+        return replace(constraints, requirements=required)
+
+    def set_planes(self, planes: SessionPlanes) -> None:
+        """Meet the wishes for planes from now on, unless requests say to ignore them.
+
+        Raises LightpaintError, and changes nothing then, if no answer can.
+        """
+        before = self._planes
+        self._planes, self._wishes = planes, None
+        try:
+            self._find_wishes(self.requests)
+        except LightpaintError:
+            self._planes = before
+            raise
+        self._live.constrain(self.fit, self._constraints(self.requests))
+
+    @property
+    def planes(self) -> SessionPlanes | None:
+        """The measured planes; None without any."""
+        return self._planes
+
+    def planes_reading(self) -> PlanesReading | None:
+        """Return what the answer gives on measuring planes; None without any."""
+        wishes = self._wishes_under(self.requests)
+        if wishes is None:
+            return None
+        shown = self.requests.output(self.weights, self._basis.is_fixed)
+        return wishes.reading(shown, self.requests.place_key)
 
     @property
     def basis(self) -> Basis:
@@ -99,7 +137,10 @@ class LiveAnswer:
 
     def check(self, requests: SessionRequests) -> None:
         """Raise LightpaintError for impossible requests, before anything is changed."""
-        reduce_lights(self._constraints(requests), self._lights_of(requests), self._fit(requests))
+        lights, fit = self._lights_of(requests), self._fit(requests)
+        reduce_lights(self._unrequired(requests), lights, fit)
+        if lights.names == self._basis.names:
+            self._find_wishes(requests)
 
     def set_requests(self, requests: SessionRequests) -> None:
         """Set the requests; a moving slider has come to rest."""
@@ -143,8 +184,40 @@ class LiveAnswer:
         )
 
     def _constraints(self, requests: SessionRequests) -> Constraints:
+        """Return all constraints, with what the wishes for planes require."""
+        wishes = self._wishes_under(requests)
+        required = None if wishes is None else wishes.requirements
+        return replace(self._unrequired(requests), requirements=required)
+
+    def _unrequired(self, requests: SessionRequests) -> Constraints:
         constraints = constraints_of(self._basis.requests).and_then(self._base_constraints)
         return with_sure_scale(constraints.and_then(requests.constraints()), self._basis.lights)
+
+    def _wishes_under(self, requests: SessionRequests) -> WishesInEffect | None:
+        """Return the wishes for planes under requests; None without any, and where limits of lamps
+        contradict them, as they may in requests from before there were any.
+        """
+        with suppress(LightpaintError):
+            return self._find_wishes(requests)
+        return None
+
+    def _find_wishes(self, requests: SessionRequests) -> WishesInEffect | None:
+        """Return the wishes for planes under requests, found once for each; None without any.
+
+        Raises LightpaintError if limits of lamps contradict them.
+        """
+        lights = self._basis.lights
+        if self._planes is None:
+            return None
+        if self._wishes is None or self._wishes[:2] != (requests, lights.names):
+            constraints = self._unrequired(requests)
+            wishes = WishesInEffect.of(
+                self._planes.for_lights(lights),
+                reduce_lights(constraints, lights, self._fit(requests)),
+                are_ignored=requests.ignores_wishes,
+            )
+            self._wishes = requests, lights.names, wishes
+        return self._wishes[2]
 
 
 def weights_by_name(weights: Doubles, names: Sequence[str], lights: Lights) -> Doubles:

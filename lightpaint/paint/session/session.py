@@ -48,6 +48,7 @@ from lightpaint.paint.session.session_messages import (
     edit_state,
     unpainted_headline,
 )
+from lightpaint.paint.session.session_planes import SessionPlanes
 from lightpaint.paint.session.snapshot import SessionSnapshot
 from lightpaint.paint.store.database import DamagedError
 from lightpaint.paint.store.history_steps import Pixels
@@ -222,9 +223,10 @@ class Session:
 
     def answer_update(self, **fields_of_answer: Any) -> AnswerUpdate:
         """Return the current weights, with further fields, while the brush is down."""
-        fields = {"stroke": self.stroke, "exact": False, "version": self.version}
+        fields: dict[str, Any] = {"stroke": self.stroke, "exact": False, "version": self.version}
         mode, weights = self.live_answer.mode, self.weights
-        return AnswerUpdate(**{**fields, "mode": mode, "weights": weights, **fields_of_answer})
+        fields |= {"mode": mode, "weights": weights, "reading": self.live_answer.planes_reading()}
+        return AnswerUpdate(**{**fields, **fields_of_answer})
 
     def accept_solution(
         self,
@@ -517,6 +519,14 @@ class Session:
         ground = self.ground
         self._update_answer()
         self.ground = ground  # pages get all pictures of new bases
+
+    def set_measured_planes(self, planes: SessionPlanes) -> None:
+        """Meet the wishes for measured planes from now on.
+
+        Raises LightpaintError, and changes nothing then, if no answer can.
+        """
+        self.live_answer.set_planes(planes)
+        self._update_answer()
 
     def renew_planes(self, names: Sequence[str]) -> None:
         """Take the planes of moved lights again after they have been rendered."""

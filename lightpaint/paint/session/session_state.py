@@ -256,6 +256,8 @@ def state_fields(
             target_spp=target_spp or basis.origin.spp,
             is_complete=target_spp is None or basis.origin.spp >= target_spp,
         ),
+        "planes": None if (planes := session.live_answer.planes) is None else planes.info,
+        "reading": session.live_answer.planes_reading(),
         "is_new": not session.store.steps,
         "stroke": session.stroke,
     }

@@ -20,6 +20,9 @@ from lightpaint.validation import is_amount, is_number
 FIT_KEYS = ("hold", "space", "colors", "literal")
 ALL_LIGHTS_KEYS = ("prefer_current", "near", "sparse")
 
+#: Whether answers need not meet the wishes for measuring planes.
+IGNORE_WISHES = "ignore_wishes"
+
 #: Strength of the pull to lamps that somebody started from, if nobody has set another.
 DEFAULT_NEAR = 0.1
 
@@ -38,6 +41,7 @@ TITLES = {
     "prefer_current": "Lights that make little difference",
     "near": "Near my lamps",
     "sparse": "Number of lights",
+    IGNORE_WISHES: "Wishes for planes",
 }
 
 
@@ -46,7 +50,8 @@ class SessionRequests:
     """Requests of a session, as plain JSON values.
 
     lights: by name of light, keys and values as of a lights file. ties: names that share a dimmer.
-    values: of FIT_KEYS and ALL_LIGHTS_KEYS, those that differ from the painting's defaults.
+    values: of FIT_KEYS, ALL_LIGHTS_KEYS and IGNORE_WISHES, those that differ from the painting's
+    defaults.
     poses: of lights that were moved, by name: position, target, cutoff and beam, as in a `Pose`.
     added: lights that the scene does not have, by name, behind all others: kind, pose, size and
     emission, as in a `NewEmitter`.
@@ -167,6 +172,11 @@ class SessionRequests:
         remaining = {name: entry for name, entry in earlier.items() if entry and name in is_held}
         return replace(self, earlier=remaining, kept=tuple(x for x in self.kept if x in is_held))
 
+    @property
+    def ignores_wishes(self) -> bool:
+        """True if answers need not meet the wishes for measuring planes."""
+        return bool(self.values.get(IGNORE_WISHES))
+
     def with_poses(self, poses: Mapping[str, Mapping[str, Any]]) -> "SessionRequests":
         """Return these requests with changed poses of lights; an empty change puts one back."""
         merged = dict(self.poses)
@@ -218,8 +228,13 @@ class SessionRequests:
 
     def with_values(self, values: Mapping[str, Any]) -> "SessionRequests":
         """Return these requests with these values, None for defaults. Raises PaintError."""
-        if unknown := [key for key in values if key not in (*FIT_KEYS, *ALL_LIGHTS_KEYS)]:
+        known = (*FIT_KEYS, *ALL_LIGHTS_KEYS, IGNORE_WISHES)
+        if unknown := [key for key in values if key not in known]:
             raise PaintError(f"nothing is called {unknown[0]!r} in what can be set")
+        if values.get(IGNORE_WISHES) not in (None, False, True):
+            raise PaintError(
+                f"{IGNORE_WISHES} is {values[IGNORE_WISHES]!r}: expected true or false"
+            )
         # Not by `in`: a hold of 0 is valid, and equals False.
         merged = {**self.values, **values}
         set_values = {k: v for k, v in merged.items() if v is not None and v is not False}
@@ -241,7 +256,8 @@ class SessionRequests:
             if tie.color is not None:
                 raise PaintError(tie.where, ": ask for the colour of each light; ties have none")
         names = tuple(tuple(lights[k].name for k in entry) for _, entry in ties.values())
-        fit_values = {key: value for key, value in values.items() if key in FIT_KEYS}
+        kept_keys = (*FIT_KEYS, IGNORE_WISHES)
+        fit_values = {key: value for key, value in values.items() if key in kept_keys}
         joint = {key: getattr(constraints, key) for key in ALL_LIGHTS_KEYS}
         return cls(by_light, names, fit_values).with_values({k: v for k, v in joint.items() if v})
 

@@ -54,6 +54,7 @@ from lightpaint.paint.studio.exact_answers import (
 )
 from lightpaint.paint.studio.file_imports import LayerImports, ReferenceImports
 from lightpaint.paint.studio.final_renders import FinalRenders
+from lightpaint.paint.studio.plane_measurements import PlaneMeasurements
 from lightpaint.paint.studio.session_bases import BackgroundSampling, PlaneDenoiser, SessionBases
 from lightpaint.paint.subject import Subject
 from lightpaint.progress import cancellable
@@ -133,6 +134,15 @@ class Studio:
             access, publisher, threads, self.subjects, self._jobs.exact_answer
         )
         self._placer = LightPlacer(access, publisher, self.rig, threads, self._hang_lights)
+        self._planes = PlaneMeasurements(
+            self.subjects,
+            access,
+            publisher,
+            threads,
+            self.rig,
+            show=self.state,
+            on_measured=self._exact_answers.notify,
+        )
 
     @property
     def on_message(self) -> Callable[[Message], None] | None:
@@ -178,6 +188,7 @@ class Studio:
         self._sampling.stop()
         self._mover.stop()
         self._comparison.stop()
+        self._planes.stop()
         self._write_retry.stop()
         with self._access.lock:
             if self._access.current is not None:
@@ -309,6 +320,7 @@ class Studio:
                 self._console.follow(session)
         if has_changed:  # a selection changes no light
             self._exact_answers.notify()
+            self._planes.follow()
         return messages
 
     def _show_moves(
@@ -354,6 +366,7 @@ class Studio:
         is_done = bool(self.publisher.publish_all_made(hang))
         if is_done:
             self._exact_answers.notify()
+            self._planes.follow()
         return is_done
 
     def load(
@@ -366,6 +379,7 @@ class Studio:
         with self._access.lock:
             messages = self._show_moves(self._access.session.load(paintings, requests, label))
         self._exact_answers.notify()
+        self._planes.follow()
         return messages
 
     def resource(self, name: str) -> npt.NDArray[Any]:
@@ -424,3 +438,4 @@ class Studio:
         self._mover.render_behind()
         self._comparison.renew()
         self._exact_answers.notify()
+        self._planes.follow()

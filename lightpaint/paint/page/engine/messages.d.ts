@@ -66,6 +66,27 @@ export interface ConsoleInfo {
 }
 
 /**
+ * A plane on which illuminance is measured. size: rows and columns of a picture of it. cells:
+ * row and column of each point. points: where they are, in units of the scene.
+ */
+export interface MeasuredPlane {
+  name: string;
+  size: [number, number];
+  cells: [number, number][];
+  points: number[][];
+}
+
+/**
+ * The measuring planes. floor_m2: the area that power is divided by; null without one.
+ * budget_watts: the most power that is allowed; null if any is.
+ */
+export interface PlanesInfo {
+  planes: MeasuredPlane[];
+  floor_m2: number | null;
+  budget_watts: number | null;
+}
+
+/**
  * An emitter of a lamp, such as its red LEDs. swatch: its colour for a screen, as in CSS.
  */
 export interface EmitterInfo {
@@ -508,6 +529,49 @@ export interface LightAnswer {
 }
 
 /**
+ * A wish for a measuring plane or, as `power`, for all lamps together.
+ *
+ * asked: in lx, in W, or as a share. reached: what came of it, at the sure end of its interval;
+ * null if that is unknown. to: the other plane of a ratio; "" for none.
+ */
+export interface PlaneWish {
+  kind: 'mean' | 'uniformity' | 'max' | 'ratio' | 'power';
+  asked: number;
+  reached: number;
+  is_met: boolean;
+  to: string;
+}
+
+/**
+ * The illuminance on a measuring plane, in lx. mean_error: a standard error. uniformity: least
+ * over mean. lux: at each of its points.
+ */
+export interface PlaneLight {
+  mean: number;
+  mean_error: number;
+  uniformity: number;
+  least: number;
+  most: number;
+  lux: number[];
+  wishes: PlaneWish[];
+}
+
+/**
+ * What an answer gives on measuring planes, under the master dimmer, in the order of the state.
+ *
+ * watts: power of all lamps; null if that of one is unknown. power: the limit of it; null for
+ * none. is_required: whether answers have to meet the wishes, as far as they can be met. is_old:
+ * whether lights have been moved, added or removed since the planes were measured.
+ */
+export interface PlanesReading {
+  planes: PlaneLight[];
+  watts: number | null;
+  power: PlaneWish | null;
+  is_required: boolean;
+  is_old: boolean;
+}
+
+/**
  * Properties of an answer; the sentences follow later than the lights.
  *
  * lights: in the order of the state. shares: of each light, by view, if there are several.
@@ -531,7 +595,7 @@ export interface Findings {
  * The progress of a long task. Unasked.
  *
  * task: `export`, `final` for a final render, `basis`, `sampling` for samples added where the
- * paint needs them, or the renderer's name for the task. done, total: steps so far, and in all.
+ * paint needs them, `planes` for measuring planes, or the renderer's name for the task. done, total: steps so far, and in all.
  * unit: of these steps; "" for none.
  */
 export interface ProgressReport {
@@ -722,6 +786,8 @@ export interface SessionPending {
  * render, and not a basis alone. can_report: whether a report can be written. images: lights that
  * are images. transforms: names of view transforms. transform: the one in use. basis: how many
  * samples the planes have. answer: how close the last one is. console: null if there is none.
+ * planes, reading: measuring planes, and what the answer gives there; null until they are
+ * measured, and without any.
  */
 export interface SessionState {
   kind: 'state';
@@ -767,6 +833,8 @@ export interface SessionState {
   choices: AnswerChoice[];
   renders: RenderInfo[];
   console: ConsoleInfo | null;
+  planes: PlanesInfo | null;
+  reading: PlanesReading | null;
   arrays: { weights: Picture };
 }
 
@@ -776,7 +844,7 @@ export interface SessionState {
  *
  * version: grows with every change of the session. stroke: number of the last stroke that arrived.
  * exact: whether it equals the answer of `lightpaint solve`. mode: space in which it was found
- * under the brush.
+ * under the brush. reading: what these lights give on measuring planes, if there are any.
  * weights: (lights, 3) float64. drives: of the emitters of each lamp in the order of the lights,
  * null for other lights; some answers under the brush have them, exact ones have them in `lights`.
  */
@@ -811,6 +879,7 @@ export interface AnswerUpdate {
   exact: boolean;
   mode: string;
   drives?: (number[] | null)[];
+  reading?: PlanesReading;
   arrays: { weights: Picture };
 }
 
@@ -1487,7 +1556,8 @@ export interface Hello {
  * Settings of the answer, as in `Fit`. Answered by `answer`.
  *
  * settings: of hold, space, colors, literal, prefer_current, near, sparse; null for the default
- * that follows from the painting.
+ * that follows from the painting. ignore_wishes: true for answers that need not meet the wishes
+ * for measuring planes.
  */
 export interface ChangeSettings {
   settings: Record<string, any>;

@@ -135,6 +135,8 @@ function runningTasks(ui, { session }) {
       stopTip: t('Stop the search: every light stays where it is'),
       stop: () => void session.placeLights(false),
     });
+  if (ui.planesProgress)
+    tasks.push({ name: t('Measuring the planes'), progress: ui.planesProgress });
   if (ui.isExplaining && !isOpen)
     tasks.push({ name: t('Finding reasons'), progress: unknownProgress });
   if (basis)

@@ -30,6 +30,7 @@ export const IDLE = {
   ...TASK_RESETS.preview,
   ...TASK_RESETS.place,
   samplingProgress: null,
+  planesProgress: null,
 };
 
 /** @param {Events["state"]} message @returns {Partial<Ui>} */
@@ -65,6 +66,8 @@ export function stateUpdate(message, /** @type {import('./ui_state.js').Ui} */ p
     choices: message.choices ?? [],
     choicesVersion: -1,
     console: message.console ?? null,
+    planes: message.planes ?? null,
+    planesReading: message.reading ?? null,
     ...rendersUpdate(message, previous),
     hint: Boolean(message.is_new),
     connection: 'open',
@@ -282,6 +285,7 @@ export function answerUpdate(message, ui) {
   if (message.master !== undefined) changes.master = message.master ?? 1;
   if (message.effective_settings) changes.effectiveSettings = message.effective_settings;
   if (message.added_lights) changes.addedLights = message.added_lights;
+  if (message.reading) changes.planesReading = message.reading;
   if (message.places !== undefined) changes.places = message.places ?? '';
   if (message.lights) Object.assign(changes, answerFields(message, ui));
   else if (!message.exact && !isSameAnswer) {
@@ -319,6 +323,8 @@ export function progressUpdate({ task, done, total, unit }, ui) {
       ? { placementProgress: estimateTime(changes, ui.placementProgress) }
       : {};
   if (task === 'final') return { renderProgress: estimateTime(changes, ui.renderProgress) };
+  if (task === 'planes')
+    return { planesProgress: done < total ? estimateTime(changes, ui.planesProgress) : null };
   // The brush interrupts it, so the remaining time is unknown.
   if (task === 'sampling') return { samplingProgress: done < total ? changes : null };
   if (/verif/i.test(task))

@@ -2,6 +2,7 @@
 
 import { INITIAL_CHOICES } from './answer_choices.js';
 import { INITIAL_CONSOLE } from './lamps/console_row.js';
+import { INITIAL_PLANES } from './planes/plane_state.js';
 import { INITIAL_IMAGES } from './images/image_state.js';
 import { INITIAL_LAMPS } from './lamps/lamp_state.js';
 import { INITIAL_RENDERS } from './exports/render_state.js';
@@ -48,7 +49,7 @@ import { initialSelection } from './selection/selection_settings.js';
  *   & import("./references/reference_state.js").ReferenceState
  *   & import("./scopes/scope_state.js").ScopeState
  *   & import("./answer_choices.js").ChoiceState
- *   & import("./lamps/console_row.js").ConsoleUi
+ *   & import("./lamps/console_row.js").ConsoleUi & import("./planes/plane_state.js").PlaneState
  *   & import("./images/image_state.js").ImageState & import("./exports/render_state.js").RenderState
  *   & BaseUi} Ui
  *
@@ -305,7 +306,7 @@ export function initialState() {
     probe: null,
     fit: null,
     mix: null,
-    open: { colour: true, lights: true, plan: true, truth: false },
+    open: { colour: true, lights: true, plan: true, planes: true, truth: false },
     side: true,
     panelNote: '',
     panel: null,
@@ -321,6 +322,7 @@ export function initialState() {
     ...INITIAL_REFERENCES,
     ...INITIAL_CHOICES,
     ...INITIAL_CONSOLE,
+    ...INITIAL_PLANES,
     ...INITIAL_SCOPES,
     ...INITIAL_RENDERS,
   };

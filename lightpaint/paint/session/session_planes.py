@@ -1,0 +1,151 @@
+"""Measuring planes of a session: what its lights give there, and what is wished for."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from functools import cached_property
+
+import numpy as np
+
+from lightpaint.arrays import Doubles
+from lightpaint.basis.lights import Lights
+from lightpaint.lighting.constraints.requirements import Requirements
+from lightpaint.lighting.unknowns.reduction import Reduction
+from lightpaint.lighting.wishes.planes_answer import WishOutcome, planes_answer
+from lightpaint.lighting.wishes.required_problem import requirements_within_reach
+from lightpaint.lighting.wishes.wished_light import WishedLight, watts_allowed, wished_light
+from lightpaint.paint.protocol import (
+    MeasuredPlane,
+    PlaneLight,
+    PlanesInfo,
+    PlanesReading,
+    PlaneWish,
+)
+from lightpaint.photometry.illuminance import Illuminance
+from lightpaint.photometry.measuring_plane import LightCase, PowerBudget, plane_title
+
+
+@dataclass(frozen=True)
+class SessionPlanes:
+    """Measured planes. place_key: of the places of all lights when they were measured.
+
+    floor_m2: the area that power is divided by; 0 without one. cases: in which wishes hold.
+    """
+
+    illuminance: Illuminance
+    budget: PowerBudget
+    floor_m2: float
+    place_key: str
+    cases: tuple[LightCase, ...] = ()
+
+    def for_lights(self, lights: Lights) -> "SessionPlanes":
+        """Return the planes as `lights` light them; those that were not measured give nothing."""
+        measured = self.illuminance
+        if measured.lights.names == lights.names:
+            return self
+        places = [k for k, name in enumerate(lights.names) if name in measured.lights.names]
+        sources = [measured.lights.names.index(lights.names[k]) for k in places]
+
+        def with_columns(values: Doubles) -> Doubles:
+            columns = np.zeros((len(values), len(lights), 3))
+            columns[:, places] = values[:, sources]
+            return columns
+
+        illuminance = replace(
+            measured,
+            lights=lights,
+            matrix=with_columns(measured.matrix),
+            half_differences=with_columns(measured.half_differences),
+        )
+        return replace(self, illuminance=illuminance)
+
+    def wished_of(self, reduction: Reduction) -> WishedLight:
+        """Return the wishes as requirements of the lights of a reduction. Raises ConstraintError
+        for a limit of power and a lamp of unknown power.
+        """
+        return wished_light(
+            self.illuminance,
+            self.budget,
+            reduction,
+            floor_m2=self.floor_m2,
+            cases=self.cases,
+        )
+
+    @cached_property
+    def info(self) -> PlanesInfo:
+        """The planes and their wishes for clients."""
+        limit = watts_allowed(self.budget, self.floor_m2)
+        return PlanesInfo(
+            tuple(
+                MeasuredPlane(
+                    name=plane_title(plane.name, case),
+                    size=plane.picture_size,
+                    cells=tuple((int(row), int(column)) for row, column in plane.cells),
+                    points=tuple(tuple(map(float, point)) for point in np.round(plane.points, 4)),
+                )
+                for case in [case.name for case in self.cases] or [""]
+                for plane in self.illuminance.planes
+            ),
+            floor_m2=self.floor_m2 or None,
+            budget_watts=limit,
+        )
+
+
+@dataclass(frozen=True)
+class WishesInEffect:
+    """The wishes for planes under the requests of a session.
+
+    planes: as the session's lights light them. reduction: their unknowns, without requirements.
+    requirements: what the answer has to reach; None if
+    wishes are ignored.
+    """
+
+    planes: SessionPlanes
+    reduction: Reduction
+    wished: WishedLight
+    requirements: Requirements | None
+
+    @classmethod
+    def of(
+        cls, planes: SessionPlanes, reduction: Reduction, *, are_ignored: bool
+    ) -> "WishesInEffect":
+        """Return the wishes in effect. Raises LightpaintError if limits of lamps contradict the
+        limit of power.
+        """
+        wished = planes.wished_of(reduction)
+        requirements = None
+        if not (are_ignored or wished.is_empty):
+            requirements, _ = requirements_within_reach(wished, reduction)
+        return cls(planes, reduction, wished, requirements)
+
+    def reading(self, weights: Doubles, place_key: str) -> PlanesReading:
+        """Return what weights (n, 3) give. place_key: of the places of the lights now."""
+        answer = planes_answer(self.wished, self.reduction, weights, floor_m2=self.planes.floor_m2)
+        measured = self.planes.illuminance
+        lux = {case: measured.of(lit) for case, lit in answer.weights_by_case.items()}
+        return PlanesReading(
+            tuple(
+                PlaneLight(
+                    mean=reading.mean,
+                    mean_error=reading.mean_error,
+                    uniformity=reading.uniformity,
+                    least=reading.least,
+                    most=reading.most,
+                    lux=tuple(np.round(lux[case][measured.points_of(name)], 1).tolist()),
+                    wishes=_wishes_of(name, case, answer.outcomes),
+                )
+                for (case, name), reading in answer.readings.items()
+            ),
+            watts=answer.watts,
+            power=next(iter(_wishes_of("", "", answer.outcomes)), None),
+            is_required=self.requirements is not None,
+            is_old=place_key != self.planes.place_key,
+        )
+
+
+def _wishes_of(plane: str, case: str, outcomes: Sequence[WishOutcome]) -> tuple[PlaneWish, ...]:
+    """Return the wishes for a plane in a case, and whether they are met; "" for the power."""
+    return tuple(
+        PlaneWish(x.wish.kind, x.wish.asked, x.reached, x.is_met, x.wish.to)
+        for x in outcomes
+        if (x.wish.plane, x.wish.case) == (plane, case)
+    )

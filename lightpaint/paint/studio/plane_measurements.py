@@ -1,0 +1,112 @@
+"""The illuminance of each light on measuring planes, measured while the brush moves."""
+
+from collections.abc import Callable, Sequence
+from functools import partial
+
+from lightpaint.errors import LightpaintError
+from lightpaint.paint.background_threads import BackgroundThreads, LatestWork, StoppedError
+from lightpaint.paint.protocol import Message, Notice, ProgressReport
+from lightpaint.paint.rig.lamp_rig import LampRig
+from lightpaint.paint.session.session_planes import SessionPlanes
+from lightpaint.paint.session_access import Publisher, SessionAccess
+from lightpaint.paint.store.session_requests import SessionRequests
+from lightpaint.paint.subject import Subject
+from lightpaint.progress import listener
+from lightpaint.scene.runtime.render_lock import MITSUBA
+
+#: The name of the task in reports of progress.
+TASK = "planes"
+
+
+class PlaneMeasurements:
+    """A thread's loop that measures the planes of one studio, again after lights have moved.
+
+    rig: has the lights at their places. show: returns the state for pages.
+    """
+
+    def __init__(
+        self,
+        subjects: Sequence[Subject],
+        access: SessionAccess,
+        publisher: Publisher,
+        threads: BackgroundThreads,
+        rig: LampRig,
+        *,
+        show: Callable[[], Message],
+        on_measured: Callable[[], None],
+    ) -> None:
+        self._subject, self._access, self._publisher = subjects[0], access, publisher
+        self._threads, self._rig, self._show = threads, rig, show
+        self._on_measured = on_measured
+        self._work = LatestWork(self._measure, publisher.publish)
+        self._place_key: str | None = None  # of the last measurement that was begun or is due
+        self.stop = self._work.stop
+
+    @property
+    def is_wanted(self) -> bool:
+        """True if the session has measuring planes."""
+        return self._subject.settings.planes is not None
+
+    def follow(self) -> None:
+        """Measure the planes, unless that was done with the lights where they are now.
+
+        While lights are dragged, nothing is measured.
+        """
+        if not self.is_wanted:
+            return
+        with self._access.lock:
+            session = self._access.current
+            if session is None or session.is_open:
+                return
+            requests = session.requests
+            if requests.place_key == self._place_key:
+                return
+            is_first, self._place_key = self._place_key is None, requests.place_key
+        if is_first:
+            self._threads.start_low_priority(self._work.run, TASK)
+        self._work.give(requests)
+
+    def _measure(self, requests: SessionRequests) -> None:
+        """Measure the planes with the lights of these requests, and publish the state with them."""
+        # Imported here: a session without planes needs no renderer.
+        from lightpaint.pipeline.wished_planes import constraints_for_planes, measure_planes
+
+        def report(label: str, done: int, total: int, unit: str = "passes") -> None:
+            del label  # rounds of samples have labels of their own
+            self._check(requests)
+            self._publisher.report_progress(TASK, done, total, unit)
+
+        settings = self._subject.settings
+        assert settings.planes is not None
+        try:
+            with MITSUBA.low_priority():
+                scene = self._rig.moved_scene(requests.placed)
+                every = constraints_for_planes(scene, self._subject.constraints, settings)
+                scale = every.cd_per_unit
+                measured = measure_planes(scene, settings.planes, settings, scale, listener(report))
+            planes = SessionPlanes(
+                measured.illuminance,
+                measured.file.power,
+                measured.floor_m2,
+                requests.place_key,
+                measured.file.cases,
+            )
+            self._publisher.publish_made(partial(self._accept, planes))
+            self._on_measured()
+        except StoppedError:
+            if not self._publisher.is_open:
+                raise
+        except LightpaintError as error:  # after the next move they are measured again
+            self._publisher.publish(Notice(text=str(error), tone="warn"))
+        finally:
+            self._publisher.publish(ProgressReport(task=TASK, done=1, total=1, unit=""))
+
+    def _check(self, requests: SessionRequests) -> None:
+        """Raise StoppedError if lights have moved since."""
+        if self._place_key != requests.place_key:
+            raise StoppedError
+
+    def _accept(self, planes: SessionPlanes) -> Message:
+        """Give the session the measured planes, and return the state with them."""
+        self._access.session.set_measured_planes(planes)
+        return self._show()
