@@ -134,8 +134,8 @@ def illuminance_of(
     return Illuminance(
         tuple(planes),
         basis.lights,
-        in_lux(basis.images),
-        in_lux(basis.half_differences),
+        in_lux(basis.planes.array()),
+        in_lux(basis.noise.array()),
         float(cd_per_unit),
     )
 

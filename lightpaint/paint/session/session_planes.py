@@ -54,7 +54,7 @@ class SessionPlanes:
             measured,
             lights=lights,
             matrix=with_columns(measured.matrix),
-            half_differences=with_columns(measured.half_differences),
+            noise=with_columns(measured.noise),
         )
         return replace(self, illuminance=illuminance)
 
