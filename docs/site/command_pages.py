@@ -12,6 +12,7 @@ GUIDES = {
     "demo": "first-look",
     "lights": "lights",
     "basis": "solving",
+    "measure": "photometry",
     "template": "targets",
     "solve": "solving",
     "paint": "painter",
