@@ -74,7 +74,7 @@ def values_of(options: Namespace, words: Sequence[str]) -> dict[str, Any]:
         case "paint":
             return _paint_arguments(options, settings, words)
         case "relight":
-            scene = scene_of(options, is_to_solve=False, use_lights_file=False)
+            scene = scene_of(options, is_to_solve=False)
             paths = list(map(Path, options.lightings))
             return {"scene": scene, "lightings": paths, "output": output, "settings": settings}
         case "verify":

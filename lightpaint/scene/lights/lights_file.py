@@ -13,7 +13,12 @@ from typing import Any
 from lightpaint.errors import SceneError
 from lightpaint.file_reading import read_text
 from lightpaint.files import one_line
-from lightpaint.luminaires.luminaire_request import PHOTOMETRY, LuminaireRequest, luminaires_in
+from lightpaint.luminaires.luminaire_request import (
+    LUMINAIRE_KEYS,
+    PHOTOMETRY,
+    LuminaireRequest,
+    luminaires_in,
+)
 from lightpaint.scene.lights.texels.image_domains import GridSize
 from lightpaint.scene.lights.texels.texel import image_of, parse_size
 from lightpaint.scene.lights.texels.texel_layout import TexelLayout
@@ -114,6 +119,17 @@ class SceneRequests:
                 )
         return luminaires
 
+    def only_luminaires(self) -> "SceneRequests":
+        """Return the requests for luminaires, without constraints on them, and their scale."""
+        if not (luminaires := self.luminaires):
+            return SceneRequests()
+        tables = {
+            name: {key: x for key, x in self.keys["light"][name].items() if key in LUMINAIRE_KEYS}
+            for name in luminaires
+        }
+        scale = {key: self.keys[key] for key in ("cd_per_unit",) if key in self.keys}
+        return SceneRequests({"light": tables, **scale}, self.source)
+
     @property
     def symmetric(self) -> frozenset[str]:
         """Names of the lights whose images are symmetric."""
@@ -181,6 +197,11 @@ class LightsFile:
             # A group given as an argument is meant to be adjusted.
             lights = (*self.lights, *groups)
         return replace(self, lights=lights, groups={**self.groups, **groups})
+
+    def only_luminaires(self) -> "LightsFile":
+        """Return the content without anything but its luminaires, and their scale."""
+        requests = self.requests.only_luminaires()
+        return LightsFile(self.path, requests=requests) if requests.keys else LightsFile()
 
     def without_groups_of(self, images: Collection[str]) -> "LightsFile":
         """Return the content without the pairs of texels of images that are not split."""
