@@ -137,6 +137,7 @@ def answer_job(
     with stage("solving", listen, SOLVE_ADVICE):
         problem = problem_of(job, bases)
         bases.clear()
+        release_freed_memory()
         if job.settings.report:
             for basis in problem.views.bases:
                 make_ahead(basis, prepare_page)
