@@ -155,6 +155,7 @@ def answer_job(
         bases.clear()
         required = None if planes is None else require(problem, planes, listen)
         problem = problem if required is None else required.problem
+        release_freed_memory()
         if job.settings.report:
             for basis in problem.views.bases:
                 make_ahead(basis, prepare_page)

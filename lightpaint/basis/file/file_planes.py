@@ -25,7 +25,7 @@ from lightpaint.threads import parallel_map
 
 #: Bytes of recently read strips of rows of some planes that are kept, and the number of these
 #: strips, so that each thread can walk along one of them.
-STRIP_CACHE_BYTES, STRIP_CACHE_COUNT = 2**27, (os.cpu_count() or 1) + 2
+STRIP_CACHE_BYTES, STRIP_CACHE_COUNT = 2**26, (os.cpu_count() or 1) + 2
 
 #: Number of planes of which strips are kept: walks go along images and their noise, and one at a
 #: time along something else.
