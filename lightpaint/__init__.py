@@ -16,6 +16,7 @@ The method of "Painting with Light" (Schoeneman, Dorsey, Smits, Arvo, Greenberg,
     combine                     Basis, Lighting → Estimate           what will it look like?
     relight                     Scene, Lighting → relit Scene        write it into the scene
     verify                      Estimate, relit Scene → Verification does it look like that?
+    measure_illuminance         Scene, planes → Illuminance          how many lux does each give?
 
 The examples below are tested: `lp` is this package, `np` NumPy, `basis` one of the scene room.xml,
 whose lights are a panel and a bulb, and `target` a painting of it.
@@ -74,6 +75,10 @@ if TYPE_CHECKING:
     from lightpaint.lighting.solution import Solution as Solution
     from lightpaint.lighting.solve import solve as solve
     from lightpaint.paint.notebook.widget import Painter as Painter
+    from lightpaint.photometry.illuminance import Illuminance as Illuminance
+    from lightpaint.photometry.measure import measure_illuminance as measure_illuminance
+    from lightpaint.photometry.measuring_plane import MeasuringPlane as MeasuringPlane
+    from lightpaint.photometry.planes_file import read_planes as read_planes
     from lightpaint.pipeline.frame_pictures import relight_frames as relight_frames
     from lightpaint.pipeline.job.job import Job as Job
     from lightpaint.pipeline.job.settings import Settings as Settings
@@ -122,11 +127,13 @@ _HOMES = {
     "Fit": "lighting.fit",
     "FrameSequence": "basis.lightgroups.frame_sequence",
     "Freedom": "placement.freedom",
+    "Illuminance": "photometry.illuminance",
     "Job": "pipeline.job.job",
     "LightGroups": "basis.lightgroups.light_groups",
     "Lighting": "lighting.answer.lighting",
     "LightpaintError": "errors",
     "Look": "pipeline.results.results",
+    "MeasuringPlane": "photometry.measuring_plane",
     "MirroredPair": "placement.new_lights",
     "Move": "placement.placement",
     "NewEmitter": "scene.lights.new_emitter",
@@ -156,12 +163,14 @@ _HOMES = {
     "error_bars": "lighting.analysis.noise.uncertainty",
     "find_frames": "basis.lightgroups.frame_sequence",
     "load_scene": "scene.scene_reader",
+    "measure_illuminance": "photometry.measure",
     "paint_with_light": "pipeline.one_call",
     "place": "placement.place",
     "read_basis": "basis.file.basis_file",
     "read_constraints": "lighting.constraints.constraints_file",
     "read_light_groups": "basis.lightgroups.light_groups",
     "read_lighting": "lighting.answer.lighting_file",
+    "read_planes": "photometry.planes_file",
     "read_target": "target.target_reader",
     "refine": "lighting.analysis.noise.refinement",
     "relight": "relit.relight",

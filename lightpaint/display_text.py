@@ -50,6 +50,16 @@ def some_of(texts: Sequence[str], joint: str = ", ", room: int = MAX_LIST_LENGTH
     return text_so_far
 
 
+def known_keys(key: str, known: Iterable[str]) -> str:
+    """Return `known are lock, limits; did you mean 'limits'?` for a key that is not known.
+
+    Without the question if none resembles it.
+    """
+    names = list(known)
+    near = difflib.get_close_matches(key[:MAX_LENGTH_IN_MESSAGE], names, n=1)
+    return f"known are {', '.join(names)}" + (f"; did you mean {near[0]!r}?" if near else "")
+
+
 def with_similar_name(listing: str, name: str, names: Sequence[str]) -> str:
     """Return `did you mean 'beam'? There are beam, bulb` for the listing `there are beam, bulb`.
 

@@ -210,9 +210,12 @@ class Canvas:
         alpha = self.weight[..., None]
         _write_exr(path, {"RGBA": np.concatenate([self.image * alpha, alpha], axis=-1)})
 
-    def write_png(self, path: str | Path) -> None:
-        """The picture alone, in 8 bits of sRGB; what is brighter than white is white."""
-        linear = np.clip(self.image, 0, 1)
+    def write_png(self, path: str | Path, *, stops: float = 0.0) -> None:
+        """The picture alone, in 8 bits of sRGB; what is brighter than white is white.
+
+        stops: exposure, as template.json has it for scenes in cd/m2.
+        """
+        linear = np.clip(self.image * 2.0**stops, 0, 1)
         shown = np.where(linear <= 0.0031308, 12.92 * linear, 1.055 * linear ** (1 / 2.4) - 0.055)
         Image.fromarray(np.rint(255 * shown).astype(np.uint8)).save(path, optimize=True)
 

@@ -18,7 +18,7 @@ from damage_readers import Reader, contents, contents_of_json
 from damaged_files import Case, attempt, flip_bit, is_legible, outcomes, wrong_outcomes
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from nightly import FIFTHS, examples, fifth_of
+from nightly import FIFTHS, examples, fifth_of, nightly
 
 from lightpaint.colour.display.view_transform import ViewTransform
 from lightpaint.errors import LightingError, LightpaintError, SceneError, TargetError
@@ -132,7 +132,7 @@ def _bent(content: bytes, file: str) -> Iterator[Case]:
 
 
 @pytest.mark.parametrize("fifth", FIFTHS)
-@pytest.mark.parametrize("kind", ["lighting", "lights", "template"])
+@pytest.mark.parametrize("kind", ["lights", *map(nightly, ["lighting", "template"])])
 def test_damage(tmp_path: Path, lighting: Path, lights: Path, kind: str, fifth: int) -> None:
     source = {"lighting": lighting, "lights": lights}.get(kind) or _write_template(tmp_path)
     content = source.read_bytes()

@@ -5,6 +5,7 @@ import re
 import tomllib
 from argparse import ArgumentParser
 from dataclasses import replace
+from functools import cache
 from importlib import import_module
 from pathlib import Path
 from typing import Any
@@ -28,6 +29,7 @@ from lightpaint.paint.server.address import DEFAULT_PORT
 from lightpaint.paint.server.client import MAX_QUEUED, MAX_QUEUED_BYTES
 from lightpaint.paint.server.http_server import MAX_UNAUTHENTICATED
 from lightpaint.paint.server.session_clients import MAX_PAGES
+from lightpaint.photometry.measure import DEFAULT_ERROR
 from lightpaint.scene.lights.light_choice import MAX_SEPARATE
 from lightpaint.scene.quality_presets import PRESETS
 from lightpaint.scene.scene_reader import load_scene
@@ -99,6 +101,7 @@ def test_public_names_and_options_that_are_named_are_there(document: Path):
     assert sorted(options - _options()) == []
 
 
+@pytest.mark.nightly
 @pytest.mark.long
 @pytest.mark.usefixtures("short_search")
 def test_snippets_of_python_run_one_after_the_other(
@@ -133,6 +136,7 @@ def _parsers() -> list[ArgumentParser]:
     return list(commands.choices.values())
 
 
+@cache
 def _options() -> set[str]:
     return {
         option
@@ -147,6 +151,7 @@ DEFAULTS = {
     "--hold": f"{DEFAULT_HOLD:g} if the current look was painted over, else 0",
     "--port": f"{DEFAULT_PORT}, or any free one if that is taken",
     "--exposure": "0",
+    "--error": f"{DEFAULT_ERROR:.0%}",
     "--space": "8 or 16 bits",
     "--priority": f"{PRIORITY}, below the {USUAL_PRIORITY} of consoles, which win",
     "--interface": f"{LOOPBACK}, for programs of this machine",

@@ -8,7 +8,6 @@ from types import ModuleType
 from typing import Any
 
 import pytest
-from nightly import nightly
 from renderer import REPOSITORY
 
 NOTEBOOKS = sorted((REPOSITORY / "notebooks").glob("*.ipynb"))
@@ -35,12 +34,9 @@ def script() -> ModuleType:
     return module
 
 
+@pytest.mark.nightly
 @pytest.mark.long
-@pytest.mark.parametrize(
-    "path",
-    [nightly(path) if path.stem == "03_gradient_descent" else path for path in NOTEBOOKS],
-    ids=lambda path: path.stem,
-)
+@pytest.mark.parametrize("path", NOTEBOOKS, ids=lambda path: path.stem)
 def test_outputs_that_are_kept_are_those_of_a_fresh_run(path: Path, script: ModuleType) -> None:
     """Else run `python notebooks/run.py`, which writes them, and look at what has changed."""
     kept = script.nbformat.read(path, as_version=4)

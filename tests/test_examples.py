@@ -36,6 +36,8 @@ def desk(tmp_path_factory: pytest.TempPathFactory) -> Path:
         lighting = lighting.with_emission(name, emission)
     lp.write_lighting(folder / "lighting.json", lighting)
     (folder / "hall.lights.toml").write_text("[light.bulb]\noff = true\n", "utf-8")
+    planes_text = '[plane.desk]\nshape = "floor"\nheight = 0.7\n'
+    (folder / "room.planes.toml").write_text(planes_text, "utf-8")
     groups = zip(("fill", "key", "rim"), pictures(), strict=True)
     layers = {f"RGBA_{name}": image for name, image in groups}
     for name in ("groups", "shot.0001", "shot.0002"):
@@ -52,6 +54,7 @@ def namespace(desk: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> di
     return {"lp": lp, "np": np, "basis": basis, "target": lp.read_target("painting.exr")}
 
 
+@pytest.mark.usefixtures("short_search")
 @pytest.mark.parametrize("name", NAMES)
 def test_examples_run(name: str, namespace: dict[str, Any]):
     member = getattr(lp, name)

@@ -88,6 +88,7 @@ def test_source_distribution_has_all_that_the_checks_want(built: Path):
     assert all(x.isfile() for x in members.values())  # what was a link is a file
 
 
+@pytest.mark.nightly
 @pytest.mark.long
 def test_wheel_has_no_more_than_it_needs(built: Path):
     [wheel] = built.glob("*.whl")
@@ -107,6 +108,7 @@ def test_the_demo_does_not_write_over_what_is_there(tmp_path: Path):
     assert "cannot write" in run(tmp_path, "demo", "-o", "file").stderr
 
 
+@pytest.mark.nightly
 @pytest.mark.long
 def test_the_demo_has_lamps_that_somebody_could_hang(tmp_path: Path):
     """No pink sun, no cyan cove: no lamp is green or magenta, and none lacks a channel."""

@@ -122,9 +122,11 @@ def test_no_move_leaves_all_where_it_is(room: Scene, painted: lp.Target, tmp_pat
 @pytest.mark.parametrize(
     ("rigging", "count", "words"),
     [
-        (lp.Rigging.of({"bulb": {"move": 0.5}}), 1, "no light is moved: "),
+        nightly(lp.Rigging.of({"bulb": {"move": 0.5}}), 1, "no light is moved: "),
         nightly(lp.Rigging.of(new=[{"kind": "point"}]), 1, "no light is added: "),
-        (lp.Rigging.of({"bulb": {"move": 0.5}}, new=[{"kind": "point"}]), 2, "moved or added: "),
+        nightly(
+            lp.Rigging.of({"bulb": {"move": 0.5}}, new=[{"kind": "point"}]), 2, "moved or added: "
+        ),
     ],
 )
 def test_where_nothing_moves_a_second_view_is_advised(
@@ -235,6 +237,7 @@ def test_the_report_says_what_moved(answer: Path) -> None:
 LAMP = lp.NewEmitter("lamp", "point", lp.Pose(position=(0.5, 1.4, 0.6)), emission=(2.0, 1.4, 0.8))
 
 
+@pytest.mark.nightly
 def test_a_missing_lamp_is_added_with_its_constraint_and_written_behind_the_users_text(
     room: Scene, tmp_path: Path
 ) -> None:
@@ -284,6 +287,7 @@ SIDE = """<sensor type="perspective" id="side"><float name="fov" value="60"/>
     <integer name="height" value="20"/></film></sensor>"""
 
 
+@pytest.mark.nightly
 def test_two_views_place_a_light_together(tmp_path: Path) -> None:
     path = write_room(tmp_path, sensors=SIDE)
     scenes = [load_scene(path, sensor=name) for name in ("camera", "side")]
@@ -322,6 +326,7 @@ def test_lights_that_cannot_be_added_say_so_before_a_sample(
         lp.Job((room,), (target,), tmp_path / "a", rigging=lp.Rigging.of(new=[new]))
 
 
+@pytest.mark.nightly
 def test_a_suggestion_is_a_turn_with_its_picture_and_the_line_to_paste(
     room: Scene, painted: lp.Target, tmp_path: Path
 ) -> None:

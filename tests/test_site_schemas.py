@@ -9,6 +9,7 @@ from pathlib import Path
 from typing import Any
 
 import pytest
+from nightly import nightly
 from renderer import REPOSITORY
 
 import lightpaint as lp
@@ -139,7 +140,7 @@ def test_the_manifest_that_is_explained_fits_its_schema() -> None:
     assert not fits({**manifest, "looks": []}, "manifest")
 
 
-@pytest.mark.parametrize("options", [{}, {"space": "display", "hold": 1.0}])
+@pytest.mark.parametrize("options", [nightly({}), {"space": "display", "hold": 1.0}])
 def test_a_report_that_is_written_fits_its_schema(tmp_path: Path, options: Any) -> None:
     folder, scene = tmp_path / "out", REPOSITORY / "scenes/cornell/scene.xml"
     target = lp.read_target(REPOSITORY / "targets/cornell/warm.exr")

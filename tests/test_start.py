@@ -81,6 +81,7 @@ def test_what_there_is_none_of():
         _ = lp.relit_scene
 
 
+@pytest.mark.nightly
 def test_imports_in_order_of_the_alphabet_render_as_fast_as_others() -> None:
     """Dr.Jit takes the LLVM of the system when it is imported, which may be too old."""
     code = "import lightpaint as lp, mitsuba; print(lp.use_variant().variant)"

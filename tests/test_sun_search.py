@@ -183,8 +183,8 @@ def mixes_of_palette(colors: np.ndarray) -> np.ndarray:
     ("values", "colors"),
     [
         nightly({"limits": {"max": 10}}, "free"),
-        ({"limits": {"max": 10}}, "gentle"),
-        ({"kelvin": [3000, 12000]}, "free"),
+        nightly({"limits": {"max": 10}}, "gentle"),
+        nightly({"kelvin": [3000, 12000]}, "free"),
         nightly({"primaries": list(PALETTE)}, "free"),
     ],
 )

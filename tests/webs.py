@@ -31,7 +31,8 @@ def trough(plane: Doubles, gamma: Doubles) -> Doubles:
 
 def street(plane: Doubles, gamma: Doubles) -> Doubles:
     """A lamp without any symmetry, brightest towards C65, with some light upwards."""
-    towards = 1 + 0.7 * np.cos(np.radians(plane - 65)) + 0.2 * np.cos(2 * np.radians(plane - 20))
+    aside = 0.7 * np.cos(np.radians(plane - 65)) + 0.2 * np.cos(2 * np.radians(plane - 20))
+    towards = 1 + np.sin(np.radians(gamma)) * aside
     return 500 * towards * (0.05 + np.maximum(np.cos(np.radians(0.8 * gamma)), 0) ** 2)
 
 

@@ -90,6 +90,11 @@ GROUPS: dict[str, tuple[str, str, tuple[str, ...]]] = {
             "write_exports",
         ),
     ),
+    "measuring": (
+        "Lux on planes",
+        "Say where to measure, and measure the illuminance that each light gives there.",
+        ("read_planes", "MeasuringPlane", "measure_illuminance", "Illuminance"),
+    ),
     "placing": (
         "Lights at other places",
         "Let the search move lights, or add some.",
@@ -146,6 +151,9 @@ PARTS: dict[str, tuple[str, ...]] = {
     "lighting.analysis.diagnosis": ("Place",),
     "placement.suggestion": ("MoveSuggestion",),
     "placement.new_lights": ("Mirror",),
+    "photometry.measuring_plane": ("Wishes", "Ratio", "PowerBudget"),
+    "photometry.planes_file": ("PlanesFile",),
+    "photometry.illuminance": ("PlaneReading",),
     "progress": ("Progress",),
 }
 

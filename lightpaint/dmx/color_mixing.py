@@ -1,18 +1,25 @@
-"""Lights that mix a colour otherwise than by adding emitters: by filters, or by naming x and y.
+"""Lights that mix a colour otherwise than by adding emitters: by filters, or by naming it.
 
-Their emitters are red, green and blue of Rec.709, which add up to all their light. A drive is the
-share of that light which is left.
+Emitters of lights with filters, or with x and y, are red, green and blue of Rec.709, which add up
+to all their light. A drive is the share of that light which is left. Emitters of lights with a
+colour temperature are the two ends of its range; between them light is taken to change evenly.
 """
 
 from collections.abc import Sequence
+from functools import lru_cache
 
 import numpy as np
 
 from lightpaint.arrays import Doubles
+from lightpaint.colour.color import cct_and_duv
+from lightpaint.colour.primaries import REC709, rgb_to_xyz
 from lightpaint.dmx.console_rig import RigLight
 
 #: Least share of light that counts as more than none.
 _DARK = 1e-6
+
+#: Steps between two whites.
+WHITE_STEPS = 65
 
 #: Condition number up to which three filters set red, green and blue.
 MAX_CONDITION = 50.0
@@ -74,6 +81,36 @@ def drives_of_xy(light: RigLight, level: float, xy: Sequence[float]) -> list[flo
         return [0.0] * 3
     xyz = level * columns[1].sum() * np.array([x / y, 1.0, (1 - x - y) / y])
     return [float(d) for d in np.clip(np.linalg.solve(columns, xyz), 0.0, 1.0)]
+
+
+def white_for_drives(light: RigLight, drives: Sequence[float]) -> tuple[float, float]:
+    """Return the dimmer and the colour temperature in kelvin for drives of both whites.
+
+    Two whites mix a colour on the line between them, which is a little more purple than the black
+    body of its temperature. Drives of more than 1 together are clipped.
+    """
+    level, (shares, kelvins) = sum(drives), _whites(light)
+    if level <= _DARK:
+        return 0.0, float(kelvins[0])
+    return min(level, 1.0), float(np.interp(drives[1] / level, shares, kelvins))
+
+
+def drives_of_white(light: RigLight, level: float, kelvin: float) -> list[float]:
+    """Return the drives of both whites for a dimmer and a colour temperature."""
+    shares, kelvins = _whites(light)
+    share = float(np.interp(kelvin, kelvins[::-1], shares[::-1]))
+    return [level * (1 - share), level * share]
+
+
+@lru_cache(256)
+def _whites(light: RigLight) -> tuple[Doubles, Doubles]:
+    """Return shares of the warmer white, rising, and kelvin of their mixes, falling, (k,)."""
+    shares, (cool, warm) = np.linspace(0.0, 1.0, WHITE_STEPS), _tristimulus(light).T
+    mixes = cool + shares[:, None] * (warm - cool)
+    known = [cct_and_duv(rgb) for rgb in np.linalg.solve(rgb_to_xyz(REC709), mixes.T).T]
+    assert None not in known  # both are whites, and what lies between them is nearly one
+    kelvins = np.array([x[0] for x in known if x is not None])
+    return shares, np.minimum.accumulate(kelvins)
 
 
 def _tristimulus(light: RigLight) -> Doubles:

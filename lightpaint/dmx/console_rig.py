@@ -7,6 +7,8 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 from functools import cached_property
 
+import numpy as np
+
 from lightpaint.arrays import RGB, Position
 from lightpaint.display_text import some_names
 from lightpaint.errors import RigError
@@ -86,6 +88,8 @@ class RigLight:
     these.
     chromaticity: places of two channels that set x and y of CIE 1931 of the sum of its emitters,
     and in their place; `dimmers` set the sum's luminance. Empty for other lights.
+    whites: places of channels that set its colour temperature, whose curves give kelvin; its
+    emitters are its coolest and its warmest white, whose drives add up to what `dimmers` set.
     """
 
     name: str
@@ -99,6 +103,7 @@ class RigLight:
     masters: tuple[int, ...] = ()
     filters: tuple[RigFilter, ...] = ()
     chromaticity: tuple[int, ...] = ()
+    whites: tuple[int, ...] = ()
 
     @property
     def is_controlled(self) -> bool:
@@ -110,11 +115,50 @@ class RigLight:
 
 
 @dataclass(frozen=True)
+class RigAxis:
+    """An axis about which a channel turns a head.
+
+    name: pan or tilt. channel: its place among those of the fixture. axis: in the scene, of length
+    1, while all angles are 0; turns about it are right-handed. levels, degrees: the ends of the
+    channel's range, and the angles there.
+    """
+
+    name: str
+    channel: int
+    axis: Position
+    levels: tuple[int, int]
+    degrees: tuple[float, float]
+
+    def degrees_at(self, level: int) -> float:
+        """Return the angle at a level."""
+        return float(np.interp(level, self.levels, self.degrees))
+
+    def level_of(self, degrees: float) -> int:
+        """Return the level of an angle in its range."""
+        (first, last), (start, end) = self.levels, self.degrees
+        return first + round((degrees - start) / (end - start) * (last - first))
+
+
+@dataclass(frozen=True)
+class RigHead:
+    """A part of a fixture that pan and tilt turn.
+
+    axes: one or two, the outer one first, which turns the other. direction: of its beams in the
+    scene while all angles are 0, of length 1. lights: names of the lights on it.
+    """
+
+    axes: tuple[RigAxis, ...]
+    direction: Position
+    lights: tuple[str, ...]
+
+
+@dataclass(frozen=True)
 class RigFixture:
     """A fixture at an address of a console.
 
     fixture_id, name: as the console shows them. kind, mode: its GDTF type and its mode.
     addresses: the absolute address of each break, from 1; 513 is channel 1 of universe 2.
+    heads: what turns. is_aimed: whether the axes of these rest where lights are to point.
     """
 
     fixture_id: str
@@ -124,6 +168,8 @@ class RigFixture:
     addresses: Mapping[int, int]
     channels: tuple[DmxChannel, ...]
     lights: tuple[RigLight, ...]
+    heads: tuple[RigHead, ...] = ()
+    is_aimed: bool = False
 
     def places(self, channel: DmxChannel) -> list[tuple[int, int]]:
         """Return the universe and the index, 0 to 511, of each byte of a channel."""

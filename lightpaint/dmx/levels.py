@@ -11,8 +11,10 @@ import numpy as np
 
 from lightpaint.dmx.color_mixing import (
     drives_of_filters,
+    drives_of_white,
     drives_of_xy,
     filters_for_drives,
+    white_for_drives,
     xy_for_drives,
 )
 from lightpaint.dmx.console_rig import (
@@ -66,6 +68,10 @@ def _levels_of(fixture: RigFixture, light: RigLight, drives: Drives) -> dict[int
         dimmer, xy = xy_for_drives(light, wanted)
         levels |= {k: _level(v, channels[k]) for k, v in zip(light.chromaticity, xy, strict=True)}
         return levels | {k: _level(dimmer, channels[k]) for k in light.dimmers[:1]}
+    if light.whites:
+        dimmer, kelvin = white_for_drives(light, wanted)
+        levels |= {k: _level(kelvin, channels[k]) for k in light.whites}
+        return levels | {k: _level(dimmer, channels[k]) for k in light.dimmers[:1]}
     top = 1.0
     for k in light.dimmers[:1]:
         # Emitters make up for a dimmer that is rounded up; they could not for one rounded down.
@@ -97,6 +103,8 @@ def _drives_of(
         found = drives_of_filters(light, dimmer, [mean(x.channels) for x in light.filters])
     elif light.chromaticity:
         found = drives_of_xy(light, dimmer, [share(k) for k in light.chromaticity])
+    elif light.whites:
+        found = drives_of_white(light, dimmer, mean(light.whites))
     else:
         found = [dimmer * _forward(x.curve, mean(x.channels)) for x in light.emitters]
     return dict(zip(names, found, strict=True))

@@ -15,8 +15,9 @@ import numpy as np
 
 from lightpaint.arrays import Doubles, Position
 from lightpaint.display_text import some_names
-from lightpaint.dmx.console_rig import ConsoleRig, RigFixture, RigLight
+from lightpaint.dmx.console_rig import ConsoleRig, RigAxis, RigFixture, RigHead, RigLight
 from lightpaint.dmx.gdtf.fixture_type import FixtureType
+from lightpaint.dmx.gdtf.mode_heads import ModeHead
 from lightpaint.dmx.gdtf.mode_lights import FixtureMode, ModeLight
 from lightpaint.dmx.rig_archive import RigArchive, library, reading
 from lightpaint.errors import RigError
@@ -244,14 +245,16 @@ class _ShowReader:
             kind = self.types[fixture.data.gdtf_spec].name
             label = fixture.data.name or kind
             channels = mode.channels
+            turned = [_head(x, fixture.node.matrix, lights) for x in mode.heads]
             if not addresses:
                 left.setdefault(_UNPATCHED, []).append(fixture.name)
-                lights, channels = tuple(map(_uncontrolled, lights)), ()
+                lights, channels, turned = tuple(map(_uncontrolled, lights)), (), []
             fixtures.append(
                 RigFixture(
                     *(_id_of(fixture.data), label, kind, mode.name, addresses),
                     channels,
                     lights,
+                    tuple(turned),
                 )
             )
             modes.append(mode)
@@ -330,13 +333,24 @@ def _placed(name: str, light: ModeLight, matrix: Doubles, target: Doubles | None
         light.masters,
         light.filters,
         light.chromaticity,
+        light.whites,
     )
+
+
+def _head(head: ModeHead, matrix: Doubles, lights: Sequence[RigLight]) -> RigHead:
+    """Return a head of a mode in the world. lights: of its fixture."""
+    turn = matrix[:3, :3]
+    axes = tuple(
+        RigAxis(x.name, x.channel, unit(turn @ x.axis), x.levels, x.degrees) for x in head.axes
+    )
+    return RigHead(axes, unit(turn @ head.direction), tuple(lights[k].name for k in head.lights))
 
 
 def _uncontrolled(light: RigLight) -> RigLight:
     """Return a light without its channels."""
     emitters = tuple(replace(x, channels=()) for x in light.emitters)
-    return replace(light, emitters=emitters, dimmers=(), masters=(), filters=(), chromaticity=())
+    nothing: dict[str, Any] = {"filters": (), "chromaticity": (), "whites": ()}
+    return replace(light, emitters=emitters, dimmers=(), masters=(), **nothing)
 
 
 def _three(values: Doubles) -> Position:

@@ -1,6 +1,6 @@
 """Drives of all lights of a rig: from an answer, checked against a rig, and on their way."""
 
-from collections.abc import Mapping
+from collections.abc import Collection, Mapping
 from dataclasses import dataclass
 
 from lightpaint.display_text import some_names
@@ -31,7 +31,7 @@ def check_drives(rig: ConsoleRig, drives: RigDrives) -> None:
     if unknown := [name for name in drives if name not in emitters]:
         raise RigError(
             f"{rig.name} has no light {some_names(unknown)}: it has "
-            f"{some_names(emitters) or 'none'}; give the rig that the lighting is of"
+            f"{some_names(emitters) or 'none'}; give the rig that the scene was made from"
         )
     for light, values in drives.items():
         if other := [name for name in values if name not in emitters[light]]:
@@ -42,6 +42,18 @@ def check_drives(rig: ConsoleRig, drives: RigDrives) -> None:
         for emitter, drive in values.items():
             if not -ROUNDING <= drive <= 1 + ROUNDING:
                 raise RigError(f"{emitter!r} of {light!r} has the drive {drive:g}: expected 0 to 1")
+
+
+def check_lamps(rig: ConsoleRig, lamps: Mapping[str, Collection[str]]) -> None:
+    """Raise RigError for lamps, the names of their emitters by light, that a rig lacks, and if
+    there are none.
+    """
+    if not lamps:
+        raise RigError(
+            f"none of the lights has emitters, so that nothing could be sent to {rig.name}: paint "
+            "in a scene that was made from it"
+        )
+    check_drives(rig, {light: dict.fromkeys(names, 0.0) for light, names in lamps.items()})
 
 
 @dataclass(frozen=True)

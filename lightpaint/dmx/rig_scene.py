@@ -93,6 +93,8 @@ def lights_text(rig: ConsoleRig, unit: float) -> str:
             lines += ["", f"[light.{_quoted(light.name)}]", "emitters = ["]
             lines += [f"    {_emitter(x, light, fixture)}," for x in light.emitters]
             lines += ["]"]
+            if light.whites:  # which share the light of one lamp
+                lines += [f"power_share = {1 / len(light.emitters):g}"]
     return "\n".join([*lines, ""])
 
 
@@ -102,7 +104,9 @@ def lights_of(rig: ConsoleRig) -> list[RigLight]:
 
 
 def _candela(light: RigLight) -> float:
-    return sum(x.candela for x in light.emitters)
+    amounts = [x.candela for x in light.emitters]
+    # Of two whites that share their light, each is all of it.
+    return max(amounts) if light.whites else sum(amounts)
 
 
 def _emitter(emitter: RigEmitter, light: RigLight, fixture: RigFixture) -> str:

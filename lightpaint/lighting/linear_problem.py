@@ -17,6 +17,7 @@ from lightpaint.basis.lights import Lights
 from lightpaint.colour.display.view_transform import ViewTransform
 from lightpaint.display_text import short_repr
 from lightpaint.errors import TargetError
+from lightpaint.lighting.constraints.absolute_scale import with_scale
 from lightpaint.lighting.constraints.color_restrictions import (
     WhiteLimits,
     keep_own_colors,
@@ -315,6 +316,7 @@ def summed_problem(
             Hint("emitters", Word("count")),
         )
     all_constraints, fit = constraints_of(lights.requests).and_then(constraints), resolve_fit(fit)
+    all_constraints = with_scale(all_constraints, lights)
     reduction = reduce_lights(all_constraints, lights, fit)
     return SummedProblem(
         name=name,

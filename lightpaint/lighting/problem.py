@@ -16,6 +16,7 @@ from lightpaint.colour.display.view_transform import ViewTransform
 from lightpaint.display_text import short_repr
 from lightpaint.errors import BasisError, ConstraintError, TargetError
 from lightpaint.keywords import keywords
+from lightpaint.lighting.constraints.absolute_scale import with_scale
 from lightpaint.lighting.constraints.color_restrictions import WhiteLimits, painted_whites
 from lightpaint.lighting.constraints.constraints import Constraints
 from lightpaint.lighting.constraints.constraints_file import constraints_of
@@ -188,7 +189,10 @@ class Problem(LinearProblem):
             raise ConstraintError(
                 f"the constraints are a {type(constraints).__name__}: give Constraints.of(...)"
             )
-        all_constraints = constraints_of(bases[0].requests).and_then(constraints or Constraints())
+        all_constraints = constraints_of(bases[0].requests)
+        if constraints is not None:
+            all_constraints = all_constraints.and_then(constraints)
+        all_constraints = with_scale(all_constraints, bases[0].lights)
         whole, parts = joint_basis([held_at_start(x, all_constraints.start) for x in bases])
         views, fit = _resolve_views(parts, targets, fit or Fit(), resize=resize)
         squares = joint_squares(views, unpainted=unpainted_weight_of(views, fit))

@@ -10,7 +10,9 @@ from lightpaint.arrays import Bools, Doubles
 from lightpaint.basis.basis import Basis
 from lightpaint.keywords import keywords
 from lightpaint.lighting.answer.lighting import Lighting
+from lightpaint.lighting.constraints.absolute_scale import with_sure_scale
 from lightpaint.lighting.constraints.constraints import Constraints
+from lightpaint.lighting.constraints.constraints_file import constraints_of
 from lightpaint.lighting.fit import Fit
 from lightpaint.lighting.linear_solve import (
     LinearAnswer,
@@ -97,6 +99,8 @@ def solve(
     """
     options = Fit(**fit)
     problem = Problem.of(basis, target, constraints=constraints, fit=options, resize=resize)
+    given = constraints_of(problem.lights.requests).and_then(constraints or Constraints())
+    with_sure_scale(given, problem.lights)
     begin = problem.start if start is None else start.weights_for(problem.basis)
     return solution_of(replace(problem, start=begin))
 

@@ -4,10 +4,6 @@ import importlib
 import sys
 from typing import Any
 
-#: Plugins that this package adds to Mitsuba: a point and a flat shape.
-POINT_PLUGIN, AREA_PLUGIN = "ies", "iesarea"
-LUMINAIRE_PLUGINS = frozenset({POINT_PLUGIN, AREA_PLUGIN})
-
 _MODULE = "lightpaint.luminaires.emitter_plugins"
 
 

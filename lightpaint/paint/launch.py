@@ -16,14 +16,11 @@ from lightpaint.files import check_writable, replacing
 from lightpaint.paint.server.address import BoundSocket, listen
 from lightpaint.paint.server.server import Server, check_installed
 from lightpaint.paint.session_file import SessionFile
-from lightpaint.paint.store.database import set_aside
+from lightpaint.paint.store.database import SESSION_FILE, set_aside
 from lightpaint.paint.studio.console_switch import Console
 from lightpaint.paint.studio.studio import Studio
 from lightpaint.paint.subject import Subject
 from lightpaint.signals import interruptible_between_pieces
-
-#: Name of the session file, in its folder.
-SESSION_FILE = "session.db"
 
 #: Name of the file by which programs find a running painter, in the same folder.
 CONNECTION_FILE = "painter.json"

@@ -11,7 +11,8 @@ from lightpaint.colour.display.view_transform import TransformChoice
 from lightpaint.errors import PaintError, SceneError
 from lightpaint.file_reading import file_length
 from lightpaint.files import scene_name
-from lightpaint.lighting.constraints.constraints import Constraints
+from lightpaint.lighting.constraints.absolute_scale import with_sure_scale
+from lightpaint.lighting.constraints.constraints import Constraints, LightConstraint, is_pattern
 from lightpaint.lighting.constraints.constraints_file import constraints_of
 from lightpaint.lighting.joined_views import check_same_lights
 from lightpaint.lighting.unknowns.reduction import reduce_to
@@ -27,12 +28,16 @@ from lightpaint.pipeline.job.sources import (
     check_nothing_unused,
     content,
 )
+from lightpaint.scene.lights.lights_file import lights_file_for
 from lightpaint.scene.quality_presets import on_film
 from lightpaint.scene.scene import Scene
 from lightpaint.sentences import Hint
 
 #: Maximum number of bytes of half floats that a page can hold, for all planes of a view.
 MAX_PAGE_BYTES = 2**31
+
+#: Checks the names of emitters, by light.
+CheckLamps = Callable[[Mapping[str, Sequence[str]]], None]
 
 #: Types that can be painted: files, which are read when they are needed, and loaded objects.
 Paintable = SceneFile | BasisFile | GroupsFile | Scene | Basis | LightGroups
@@ -71,27 +76,31 @@ def make_subject(
     command: Callable[[Mapping[str, str], SessionRequests], str] = lambda paintings, requests: "",
     view_count: int = 1,
     layers: Path | None = None,
+    check_lamps: CheckLamps = lambda _: None,
 ) -> Subject:
     """Return one view to be painted, checked as far as possible without a renderer.
 
-    folder: by default one that is named after the source. The others are those of `Subject`. Raises
-    LightpaintError if the source cannot be painted, or its lights cannot meet the constraints.
+    folder: by default one that is named after the source. check_lamps: is called with the names of
+    emitters by light, as soon as they are known, and raises if these cannot be painted with. The
+    others are those of `Subject`. Raises LightpaintError if the source cannot be painted, or its
+    lights cannot meet the constraints.
     """
-    settings, constraints = settings or Settings(), constraints or Constraints()
+    settings = settings or Settings()
+    constraints = Constraints() if constraints is None else constraints
     constraints = constraints.and_then(Constraints(cd_per_unit=settings.cd_per_unit))
     if layers is not None:
         if view_count > 1:
             raise PaintError(f"{layers} has the layers of one view: open that view alone")
         check_kind(layers)
     if isinstance(source, SceneFile | Scene):
-        scene = _scene_on_film(source, settings, constraints)
+        scene = _scene_on_film(source, settings, constraints, check_lamps)
         fields: dict[str, Any] = {"scene": scene}
     else:
         check_nothing_unused(settings, source)
         loaded = content(source)
         basis = loaded.basis if isinstance(loaded, LightGroups) else loaded
         _check_size(basis, _name_of(source))
-        _check_constraints(basis.lights, constraints)
+        _check_constraints(basis.lights, constraints, check_lamps)
         groups = loaded if isinstance(loaded, LightGroups) else None
         fields = {"basis": basis, "groups": groups}
     name = _name_of(source)
@@ -109,14 +118,14 @@ def make_subject(
 
 
 def _scene_on_film(
-    source: SceneFile | Scene, settings: Settings, constraints: Constraints
+    source: SceneFile | Scene, settings: Settings, constraints: Constraints, check_lamps: CheckLamps
 ) -> Scene | LazyScene:
     """Return a scene on the film of its basis, or one that is loaded when it is needed."""
 
     def check(scene: Scene) -> None:
         from lightpaint.basis.render.render_origin import basis_lights
 
-        _check_constraints(basis_lights(scene), constraints)
+        _check_constraints(basis_lights(scene), constraints, check_lamps)
         if settings.planes is not None:
             from lightpaint.pipeline.wished_planes import check_planes, constraints_for_planes
 
@@ -130,7 +139,9 @@ def _scene_on_film(
     file_length(Path(source.path), "scene file", SceneError)
     scene = LazyScene(source, settings)
     if scene.record is not None:
-        _check_constraints(scene.record.lights, constraints)
+        _check_constraints(scene.record.lights, constraints, check_lamps)
+    else:
+        _check_named_lamps(source, check_lamps)
     scene.checks.append(check)
     if settings.planes is not None:  # mistakes in their file show before the painter opens
         _ = scene.scene
@@ -150,9 +161,27 @@ def _check_size(basis: Basis, name: str) -> None:
         )
 
 
-def _check_constraints(lights: Lights, constraints: Constraints) -> None:
+def _check_constraints(lights: Lights, constraints: Constraints, check_lamps: CheckLamps) -> None:
     """Raise ConstraintError unless lights can meet these constraints and their lights file's."""
-    reduce_to(constraints_of(lights.requests).and_then(constraints), lights)
+    all_constraints = constraints_of(lights.requests).and_then(constraints)
+    reduction = reduce_to(with_sure_scale(all_constraints, lights), lights)
+    check_lamps({lights[k].name: lamp.names for k, lamp in reduction.lamps.items()})
+
+
+def _check_named_lamps(source: SceneFile, check_lamps: CheckLamps) -> None:
+    """Check the lamps that the lights file of a scene names, before the scene is loaded; those of
+    patterns are known only then.
+    """
+    file = lights_file_for(
+        Path(source.path), source.lights_file, beside_scene=source.use_lights_file
+    )
+    named = {
+        name: [x.name for x in LightConstraint.of(table, where=where).emitters]
+        for name, table, where in constraints_of(file.requests).lights
+        if "emitters" in table
+    }
+    if named and not any(is_pattern(name) for name in named):
+        check_lamps(named)
 
 
 def _name_of(source: Paintable) -> str:

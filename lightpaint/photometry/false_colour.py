@@ -6,6 +6,7 @@ from collections.abc import Sequence
 import numpy as np
 import numpy.typing as npt
 from PIL import Image, ImageDraw, ImageFont
+from scipy.ndimage import distance_transform_edt
 
 from lightpaint.arrays import Doubles
 from lightpaint.display_text import visible
@@ -63,19 +64,19 @@ def false_colours(plane: MeasuringPlane, values: Doubles, title: str) -> npt.NDA
 def _painted(cells: Doubles, side: int, levels: Sequence[float]) -> npt.NDArray[np.uint8]:
     """Return the colours of interpolated cells, with lines at levels, (h, w, 3)."""
     rows, columns = cells.shape
-    light = _interpolated(cells, (np.arange(rows * side) + 0.5) / side - 0.5, axis=0)
-    light = _interpolated(light, (np.arange(columns * side) + 0.5) / side - 0.5, axis=1)
-    own = np.kron(cells, np.ones((side, side)))
-    # At the edges of a ragged plane an interpolation lacks a neighbour.
-    light = np.where(np.isnan(light), own, light)
-    light[np.isnan(own)] = np.nan
-    band = np.searchsorted(levels, np.nan_to_num(light), side="right") - 1
-    picture = colours_of(np.nan_to_num(light) / levels[-1])
+    is_empty = np.isnan(cells)
+    # Towards a cell without a point, the light is taken to go on as in the nearest cell with one.
+    nearest = distance_transform_edt(is_empty, return_distances=False, return_indices=True)
+    light = cells[tuple(nearest)]
+    for axis, count in enumerate((rows, columns)):
+        light = _interpolated(light, (np.arange(count * side) + 0.5) / side - 0.5, axis=axis)
+    band = np.searchsorted(levels, light, side="right") - 1
+    picture = colours_of(light / levels[-1])
     is_line = np.zeros(light.shape, bool)
     for axis in (0, 1):
         is_line |= np.diff(band, axis=axis, prepend=np.take(band, [0], axis=axis)) != 0
     picture[is_line] *= LINE
-    picture[np.isnan(light)] = GROUND
+    picture[np.kron(is_empty, np.ones((side, side), bool))] = GROUND
     return np.round(picture).astype(np.uint8)
 
 

@@ -19,10 +19,11 @@ from lightpaint.arrays import Doubles
 from lightpaint.basis.lights import Lights
 from lightpaint.display_text import some_names
 from lightpaint.errors import SceneError
+from lightpaint.keywords import keywords
 from lightpaint.photometry.measuring_plane import MeasuringPlane, slices_of
 
-#: Share of a plane's mean below which the error of a point is taken to be as large as there.
-DARK_SHARE = 0.1
+#: Share of a plane's mean that a point has at least, where errors are related to its light.
+DARK_SHARE = 0.3
 #: Weight of a plane's mean square error against a point's own, in degrees of freedom.
 POOLED_DEGREES = 4
 
@@ -62,13 +63,26 @@ class PlaneReading:
         return float(stdtrit(self.points, 0.975)) * self.uniformity_error
 
 
+@keywords()
 @dataclass(frozen=True)
 class Illuminance:
     """The illuminance at the points of planes, per light.
 
-    planes: whose points follow each other. lights: the lights, in the order of `matrix`. matrix:
-    (p, n, 3), lx at each point per unit weight of a light in a channel. half_differences: (p, n,
-    3), half the difference of two halves of the samples. cd_per_unit: cd/m² of a radiance of 1.
+    Attributes:
+        planes: The planes, whose points follow each other.
+        lights: The n lights, in the order of `matrix`.
+        matrix: (p, n, 3), lx at each point per unit weight of a light in a channel.
+        half_differences: (p, n, 3), half the difference of two halves of the samples.
+        cd_per_unit: cd/m² of a radiance of 1.
+
+    Examples:
+        >>> scene = lp.load_scene("room.xml")
+        >>> planes = lp.read_planes("room.planes.toml", scene).planes
+        >>> found = lp.measure_illuminance(scene, planes, spp=64, cd_per_unit=1000)
+        >>> found
+        Illuminance(36 points of desk from 2 lights)
+        >>> found.of(found.lights.current_weights).shape
+        (36,)
     """
 
     planes: tuple[MeasuringPlane, ...]
@@ -95,33 +109,38 @@ class Illuminance:
     def _slices(self) -> dict[str, slice]:
         return slices_of(self.planes)
 
+    @keywords()
     def points_of(self, plane: str) -> slice:
         """Return where the points of a plane lie among all. Raises SceneError without it."""
         if plane not in self._slices:
             raise SceneError(f"no plane {plane!r}: there is {some_names(self._slices)}")
         return self._slices[plane]
 
+    @keywords()
     def of(self, weights: Doubles) -> Doubles:
         """Return the illuminance in lx at all points, (p,). weights: (n, 3)."""
         return self._mix(self.matrix, weights)
 
+    @keywords()
     def standard_errors(self, weights: Doubles) -> Doubles:
         """Return the standard errors of `of(weights)`, (p,) in lx.
 
         The error of a point is estimated from its own half difference and, with four times the
-        weight, from the root mean square over its plane of the half differences in relation to the
-        light. The light of a point below a tenth of the mean counts as that much.
+        weight, from those of its plane: their root mean square or, if that is more, the root mean
+        square of their ratios to the light, times the light of the point. So points in a shadow,
+        which get the noise of indirect light alone, are not taken to be too certain.
         """
         values, halves = self.of(weights), self._mix(self.half_differences, weights)
         errors = np.zeros(len(values))
         for part in self._slices.values():
-            light = floored(values[part])
+            light, own = floored(values[part]), halves[part] ** 2
             if light.any():
-                pooled = light**2 * np.mean((halves[part] / light) ** 2)
-                squares = POOLED_DEGREES * pooled + halves[part] ** 2
-                errors[part] = np.sqrt(squares / (POOLED_DEGREES + 1))
+                pooled = np.maximum(own.mean(), light**2 * np.mean(own / light**2))
+                squares = (POOLED_DEGREES * pooled + own) / (POOLED_DEGREES + 1)
+                errors[part] = np.sqrt(squares)
         return errors
 
+    @keywords()
     def reading(self, plane: str, weights: Doubles) -> PlaneReading:
         """Return the illuminance on a plane. weights: (n, 3). Raises SceneError without it."""
         part = self.points_of(plane)
@@ -145,6 +164,7 @@ class Illuminance:
             least_bias=_bias_bound(values, errors),
         )
 
+    @keywords()
     def readings(self, weights: Doubles) -> dict[str, PlaneReading]:
         """Return the illuminance on all planes, by name. weights: (n, 3)."""
         return {plane.name: self.reading(plane.name, weights) for plane in self.planes}
@@ -154,7 +174,7 @@ class Illuminance:
         shape, expected = np.shape(weights), self.matrix.shape[1:]
         if shape != expected:
             raise SceneError(f"weights of the shape {shape}: expected {expected}, a row per light")
-        return np.asarray(matrix.reshape(len(matrix), -1) @ np.asarray(weights).reshape(-1))
+        return np.asarray(matrix.reshape(len(matrix), np.size(weights)) @ np.ravel(weights))
 
 
 def floored(values: Doubles) -> Doubles:

@@ -23,6 +23,9 @@ from lightpaint.scene.properties.measuring_points import MeasuringPoints
 from lightpaint.scene.scene import Scene
 from lightpaint.validation import Check, between, number
 
+#: Relative error of a measurement without another; see `measure_illuminance`.
+DEFAULT_ERROR = 0.02
+
 #: Samples per point of the first round, and beyond which none are added.
 FIRST_SPP, MOST_SPP = 64, 2**16
 #: Factors by which a round increases the number of samples, and share of the squared error that
@@ -39,7 +42,7 @@ def measure_illuminance(
     planes: Sequence[MeasuringPlane],
     *,
     spp: int | None = None,
-    error: float = 0.02,
+    error: float = DEFAULT_ERROR,
     cd_per_unit: float = 1.0,
     weights: Doubles | None = None,
     seed: int = 0,
@@ -53,9 +56,9 @@ def measure_illuminance(
         planes: From `read_planes`.
         spp: Samples per point; by default as many as `error` needs, at most 65,536.
         error: Largest half width of the 95 % interval of a plane's mean, and standard error of its
-            points, both relative and with the lights of `weights`. A point with less than a
-            tenth of the mean, or a plane with less than a thousandth of the light of the brightest,
-            counts as one with that much.
+            points, both relative and with the lights of `weights`. A point with less than 0.3 of
+            the mean, or a plane with less than a thousandth of the light of the brightest, counts
+            as one with that much.
         cd_per_unit: cd/m² of a radiance of 1 in the scene.
         weights: Weights of the lights, (n, 3), with which errors are judged; by default those of
             the scene as it is now.
@@ -66,6 +69,13 @@ def measure_illuminance(
     Raises:
         SceneError: If the scene cannot be rendered in one pass, or an argument is invalid.
         Interrupted: On Ctrl-C, which keeps the samples so far.
+
+    Examples:
+        >>> scene = lp.load_scene("room.xml")
+        >>> planes = lp.read_planes("room.planes.toml", scene).planes
+        >>> found = lp.measure_illuminance(scene, planes, cd_per_unit=1000)
+        >>> round(found.reading("desk", found.lights.current_weights).mean, -3)
+        1000.0
     """
     _check("error", error, between(1e-6, 1, "a relative error"))
     _check("cd_per_unit", cd_per_unit, number("cd/m²"))

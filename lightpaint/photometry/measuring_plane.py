@@ -1,13 +1,15 @@
 """Measuring planes: points at which illuminance is measured, and what is wished for there."""
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
 
 import numpy as np
 
 from lightpaint.arrays import Doubles, Indices
+from lightpaint.display_text import brief
 from lightpaint.errors import SceneError
+from lightpaint.keywords import keywords
 
 
 @dataclass(frozen=True)
@@ -53,15 +55,39 @@ class PowerBudget:
 
 
 @dataclass(frozen=True)
+class LightCase:
+    """A case in which all wishes have to hold, such as a clear noon, or night.
+
+    factors: emission of lights that stay as they are, by name or pattern, relative to now.
+    """
+
+    name: str
+    factors: Mapping[str, float]
+
+
+@keywords()
+@dataclass(frozen=True)
 class MeasuringPlane:
     """Points on a plane or on surfaces, and the directions in which illuminance is measured there.
 
-    points: (p, 3) in scene units, which are metres. normals: (p, 3), unit vectors. spacing:
-    distance of neighbours in metres; 0 for listed points. area_m2: area that the points stand for;
-    0 for listed points. shape: rows and columns of the grid; None if its outline is ragged, or for
-    listed points. cells: (p, 2), row and column of each point in a picture of the plane.
-    is_cylindrical: whether cylindrical illuminance around the normals is measured, the mean over
-    all directions perpendicular to them.
+    Attributes:
+        name: Its name in the planes file, and that of its picture.
+        points: (p, 3) in scene units, which are metres.
+        normals: (p, 3), unit vectors.
+        spacing: Distance of neighbours in metres; 0 for listed points.
+        area_m2: Area that the points stand for; 0 for listed points.
+        shape: Rows and columns of the grid; None if its outline is ragged, or for listed points.
+        cells: (p, 2), row and column of each point in a picture of the plane; rows go upwards.
+        wishes: The wishes for it.
+        is_cylindrical: Whether cylindrical illuminance around the normals is measured, the mean
+            over all directions perpendicular to them.
+
+    Examples:
+        >>> up = np.array([[0.0, 1, 0], [0, 1, 0]])
+        >>> cells = np.array([[0, 0], [0, 1]])
+        >>> points = np.array([[0, 0.8, 0], [0.5, 0.8, 0]])
+        >>> lp.MeasuringPlane("desk", points, up, 0.5, 0.5, (1, 2), cells)
+        MeasuringPlane('desk', 2 points, 0.50 m²)
     """
 
     name: str
@@ -75,6 +101,14 @@ class MeasuringPlane:
     is_cylindrical: bool = False
 
     def __post_init__(self) -> None:
+        if not isinstance(self.name, str):
+            raise SceneError(f"a plane has the name {brief(self.name)}: expected a text")
+        for values in (self.points, self.normals, self.cells):
+            if not isinstance(values, np.ndarray):
+                raise SceneError(
+                    f"plane {self.name!r} has {brief(values)}: expected arrays of points, normals "
+                    "and cells"
+                )
         count = len(self.points)
         if not count or self.points.shape != (count, 3) or self.normals.shape != (count, 3):
             raise SceneError(
@@ -86,6 +120,9 @@ class MeasuringPlane:
 
     def __len__(self) -> int:
         return len(self.points)
+
+    def __repr__(self) -> str:
+        return f"MeasuringPlane({self.name!r}, {len(self)} points, {self.area_m2:.2f} m²)"
 
     @cached_property
     def picture_size(self) -> tuple[int, int]:

@@ -33,8 +33,8 @@ FACING_RAYS = 256
 #: Distance in metres above a shape at which rays towards it start.
 STEP_M = 0.01
 
-#: Normals that are within this cosine of up are those of a floor, not of a wall.
-UPRIGHT = 1e-3
+#: Cosine of normal and up below which a plane is upright, and sine below which it is level.
+UPRIGHT, LEVEL_SINE = 1e-3, 0.01
 
 CYLINDRICAL = "cylindrical"
 
@@ -63,7 +63,7 @@ class PlaneRequest:
 
 
 @dataclass(frozen=True)
-class _Grid:
+class _Cells:
     """Cells of a rectangle or a quadrilateral.
 
     points: (p, 3), their centres. normals: (p, 3). cells: (p, 2), row and column. spacing, area:
@@ -76,9 +76,9 @@ class _Grid:
     spacing: float
     area: float
 
-    def only(self, is_kept: Bools) -> "_Grid":
+    def only(self, is_kept: Bools) -> "_Cells":
         """Return the cells that are kept."""
-        return _Grid(
+        return _Cells(
             self.points[is_kept],
             self.normals[is_kept],
             self.cells[is_kept],
@@ -137,15 +137,15 @@ def cell_counts(sides: tuple[float, float], grid: float | None) -> tuple[int, in
     return first, second
 
 
-def _listed(points: Doubles, room: RoomRays) -> _Grid:
+def _listed(points: Doubles, room: RoomRays) -> _Cells:
     """Return listed points, which are measured from above."""
     cells = np.stack([np.zeros(len(points), int), np.arange(len(points))], axis=1)
-    return _Grid(points, np.tile(room.up, (len(points), 1)), cells, 0.0, 0.0)
+    return _Cells(points, np.tile(room.up, (len(points), 1)), cells, 0.0, 0.0)
 
 
 def _rectangle(
     request: PlaneRequest, corner: Doubles, across: Doubles, along: Doubles, normal: Doubles
-) -> _Grid:
+) -> _Cells:
     """Return the cells of a parallelogram. corner: of it. across, along: its sides."""
     sides = float(np.linalg.norm(across)), float(np.linalg.norm(along))
     columns, rows = cell_counts(sides, request.grid)
@@ -160,10 +160,10 @@ def _rectangle(
     area = float(np.linalg.norm(np.cross(across, along))) / (rows * columns)
     spacing = max(sides[0] / columns, sides[1] / rows)
     cells = np.stack([row, column], axis=1)
-    return _Grid(points, np.tile(normal, (len(points), 1)), cells, spacing, area)
+    return _Cells(points, np.tile(normal, (len(points), 1)), cells, spacing, area)
 
 
-def _between_corners(request: PlaneRequest, room: RoomRays) -> _Grid:
+def _between_corners(request: PlaneRequest, room: RoomRays) -> _Cells:
     """Return the grid of a parallelogram or a quadrilateral."""
     assert request.corners is not None
     a, b, c = request.corners[:3]
@@ -187,7 +187,7 @@ def _between_corners(request: PlaneRequest, room: RoomRays) -> _Grid:
         + np.outer((1 - u) * v, d)
     )
     area = 0.5 * float(np.linalg.norm(np.cross(c - a, d - b))) / len(points)
-    return _Grid(points, grid.normals, grid.cells, grid.spacing, area)
+    return _Cells(points, grid.normals, grid.cells, grid.spacing, area)
 
 
 def _turned(normal: Doubles, middle: Doubles, room: RoomRays) -> Doubles:
@@ -197,17 +197,17 @@ def _turned(normal: Doubles, middle: Doubles, room: RoomRays) -> Doubles:
     return normal if side >= 0 else -normal
 
 
-def _over_floor(request: PlaneRequest, room: RoomRays) -> _Grid:
+def _over_floor(request: PlaneRequest, room: RoomRays) -> _Cells:
     """Return the grid over the upper sides of shapes, as far as these are there."""
     shapes = [k for name in request.shapes for k in _shapes_named(request, "shape", name, room)]
     grid = _on_surface(request, shapes, room.up, room)
     lifted = grid.points + request.height * room.up
     _check_height(request, grid.points, lifted, room)
-    grid = _Grid(lifted, grid.normals, grid.cells, grid.spacing, grid.area)
+    grid = _Cells(lifted, grid.normals, grid.cells, grid.spacing, grid.area)
     return _kept_from_walls(request, grid, room)
 
 
-def _on_wall(request: PlaneRequest, name: str, room: RoomRays) -> _Grid:
+def _on_wall(request: PlaneRequest, name: str, room: RoomRays) -> _Cells:
     """Return the grid on a surface, on the side that the camera is on."""
     shapes = _shapes_named(request, "walls", name, room)
     low, high = room.box(shapes)
@@ -232,7 +232,7 @@ def _facing(shapes: Sequence[int], room: RoomRays) -> Doubles:
 
 def _on_surface(
     request: PlaneRequest, shapes: Sequence[int], normal: Doubles, room: RoomRays
-) -> _Grid:
+) -> _Cells:
     """Return the points of a grid on the side of shapes that faces `normal`."""
     across, along = _sides(normal, room.up)
     low, high = room.box(shapes)
@@ -254,21 +254,23 @@ def _on_surface(
         for angle in 2 * np.pi * np.arange(WALL_DIRECTIONS) / WALL_DIRECTIONS:
             offset = 0.999 * margin * (math.cos(angle) * across + math.sin(angle) * along)
             is_hit &= room.hits_of(shapes, grid.points + offset, -normal)[0]
-    return _Grid(places, grid.normals, grid.cells, grid.spacing, grid.area).only(is_hit)
+    return _Cells(places, grid.normals, grid.cells, grid.spacing, grid.area).only(is_hit)
 
 
 def _sides(normal: Doubles, up: Doubles) -> tuple[Doubles, Doubles]:
-    """Return the horizontal and the other side of a plane, as unit vectors, (3,) each."""
-    across = np.cross(up, normal)
-    if float(np.linalg.norm(across)) < UPRIGHT * 10:
-        # On a floor, along the axes of the scene.
-        across = np.roll(np.abs(up).round(), 1) if np.abs(up).max() > 0.999 else np.eye(3)[0]
-        across = across - (across @ normal) * normal
-    across = across / np.linalg.norm(across)
-    return across, np.cross(normal, across)
+    """Return the directions to the right and upwards in a picture of a plane, (3,) each.
+
+    It is seen from the side of its normal: a wall as it stands, a floor along the scene's axes.
+    """
+    right = np.cross(up, normal)
+    if float(np.linalg.norm(right)) < LEVEL_SINE:
+        right = np.eye(3)[1 if abs(up[0]) > LEVEL_SINE else 0]
+        right = right - (right @ normal) * normal
+    right = right / np.linalg.norm(right)
+    return right, np.cross(normal, right)
 
 
-def _kept_from_walls(request: PlaneRequest, grid: _Grid, room: RoomRays) -> _Grid:
+def _kept_from_walls(request: PlaneRequest, grid: _Cells, room: RoomRays) -> _Cells:
     """Return the points that are `margin` away from walls: upright parts of shapes that are at
     least `WALL_M` high.
     """
@@ -288,7 +290,7 @@ def _kept_from_walls(request: PlaneRequest, grid: _Grid, room: RoomRays) -> _Gri
     return grid.only(is_far)
 
 
-def _without_covered(grid: _Grid, room: RoomRays) -> _Grid:
+def _without_covered(grid: _Cells, room: RoomRays) -> _Cells:
     """Return the points of a surface that nothing covers closely."""
     if not len(grid.points):
         return grid
@@ -310,7 +312,7 @@ def _check_height(request: PlaneRequest, surface: Doubles, lifted: Doubles, room
         )
 
 
-def _without_solids(request: PlaneRequest, grid: _Grid, room: RoomRays) -> _Grid:
+def _without_solids(request: PlaneRequest, grid: _Cells, room: RoomRays) -> _Cells:
     """Return the points that lie in no solid. Raises SceneError if none is left."""
     if not len(grid.points):
         raise SceneError(
@@ -337,14 +339,14 @@ def _directions_of(request: PlaneRequest, normals: Doubles, room: RoomRays) -> t
     return np.tile(direction / np.linalg.norm(direction), (len(normals), 1)), False
 
 
-def _side_by_side(grids: Sequence[_Grid]) -> _Grid:
+def _side_by_side(grids: Sequence[_Cells]) -> _Cells:
     """Return several grids as one, with their cells beside each other and a gap between."""
     column, cells = 0, []
     for grid in grids:
         cells.append(grid.cells + np.array([0, column]))
         column = int(cells[-1][:, 1].max(initial=column)) + 2
     areas = [np.full(len(grid.points), grid.area) for grid in grids]
-    return _Grid(
+    return _Cells(
         np.concatenate([grid.points for grid in grids]),
         np.concatenate([grid.normals for grid in grids]),
         np.concatenate(cells),

@@ -16,7 +16,13 @@ from lightpaint.errors import SceneError
 from lightpaint.file_reading import read_text
 from lightpaint.files import is_name, one_line
 from lightpaint.keywords import keywords
-from lightpaint.photometry.measuring_plane import MeasuringPlane, PowerBudget, Ratio, Wishes
+from lightpaint.photometry.measuring_plane import (
+    LightCase,
+    MeasuringPlane,
+    PowerBudget,
+    Ratio,
+    Wishes,
+)
 from lightpaint.photometry.plane_placement import CYLINDRICAL, PlaneRequest, place_plane
 from lightpaint.photometry.room_rays import RoomRays
 from lightpaint.photometry.wish_presets import PRESETS
@@ -44,6 +50,8 @@ WISHES = ("preset", "mean", "uniformity", "max", "ratio")
 PLANE_KEYS = (*PLACES, "height", "margin", "grid", "n", *WISHES)
 #: Largest illuminance, distance and power in a file.
 MOST_LUX, MOST_METRES, MOST_WATTS = 1e6, 1e4, 1e9
+#: Most cases, and largest emission of a light in one, relative to now.
+MAX_CASES, MOST_FACTOR = 100, 1e6
 
 
 @dataclass(frozen=True)
@@ -53,6 +61,7 @@ class PlanesFile:
     path: Path
     planes: tuple[MeasuringPlane, ...]
     power: PowerBudget = field(default_factory=PowerBudget)
+    cases: tuple[LightCase, ...] = ()
 
 
 def planes_file_beside(scene: Path) -> Path:
@@ -71,9 +80,14 @@ def read_planes(path: str | Path, scene: Scene) -> PlanesFile:
     Raises:
         SceneError: For an invalid file, for a shape that the scene does not have, and for a plane
             without a point.
+
+    Examples:
+        >>> [desk] = lp.read_planes("room.planes.toml", lp.load_scene("room.xml")).planes
+        >>> desk
+        MeasuringPlane('desk', 36 points, 4.00 m²)
     """
     path = Path(path)
-    requests, power = _parse(path)
+    requests, power, cases = _parse(path)
     if not use_variant().is_jit:
         raise SceneError(
             f"the variant is {use_variant().variant}, which cannot measure at points: use a "
@@ -84,23 +98,26 @@ def read_planes(path: str | Path, scene: Scene) -> PlanesFile:
         room = RoomRays(scene, loaded)
         return tuple(place_plane(request, room) for request in requests)
 
-    return PlanesFile(path, scene.while_loaded(place), power)
+    return PlanesFile(path, scene.while_loaded(place), power, cases)
 
 
-def plane_names(path: str | Path) -> tuple[str, ...]:
-    """Return the names of the planes of a file, without a scene. Raises SceneError."""
-    requests, _ = _parse(Path(path))
-    return tuple(request.name for request in requests)
+def plane_names(path: str | Path) -> tuple[tuple[str, ...], tuple[str, ...]]:
+    """Return the names of the planes and of the cases of a file, without a scene.
+
+    Raises SceneError.
+    """
+    requests, _, cases = _parse(Path(path))
+    return tuple(request.name for request in requests), tuple(case.name for case in cases)
 
 
-def _parse(path: Path) -> tuple[list[PlaneRequest], PowerBudget]:
-    """Return the planes and the power of a planes file, without a scene."""
+def _parse(path: Path) -> tuple[list[PlaneRequest], PowerBudget, tuple[LightCase, ...]]:
+    """Return the planes, the power and the cases of a planes file, without a scene."""
     text = read_text(path, "planes file", SceneError, limit=MAX_BYTES)
     try:
         data = strict_toml(text)
     except ValueError as error:
         raise SceneError(f"{path} is not TOML: {one_line(str(error))}") from None
-    _check_known(data, ("plane", "power"), str(path), "[plane.desk]")
+    _check_known(data, ("plane", "power", "case"), str(path), "[plane.desk]")
     tables = data.get("plane", {})
     if not isinstance(tables, dict) or not tables:
         raise SceneError(f'{path} has no plane: expected a table like [plane.desk] shape = "floor"')
@@ -113,7 +130,8 @@ def _parse(path: Path) -> tuple[list[PlaneRequest], PowerBudget]:
         _request(name, table, SourceKey(str(path), "plane", one_line(name)), tables)
         for name, table in tables.items()
     ]
-    return requests, _power(data.get("power", {}), SourceKey(str(path), "power"))
+    power = _power(data.get("power", {}), SourceKey(str(path), "power"))
+    return requests, power, _cases(data.get("case", {}), SourceKey(str(path), "case"))
 
 
 def _check_known(table: Any, known: Iterable[str], where: str, example: str) -> None:
@@ -256,6 +274,30 @@ def _ratio(name: str, table: Any, where: SourceKey, planes: Mapping[str, Any]) -
         listing = with_similar_name(known, to, others)
         raise SceneError(f"{where / 'to'} is no other plane, {one_line(repr(to))}: {listing}")
     return Ratio(to, at_least)
+
+
+def _cases(tables: Any, where: SourceKey) -> tuple[LightCase, ...]:
+    """Return the cases in which all wishes have to hold."""
+    example = "[case.night] sky = 0"
+    if not isinstance(tables, dict) or len(tables) > MAX_CASES:
+        raise SceneError(f"{where} is {one_line(repr(tables))}: expected tables like {example}")
+    cases = []
+    for name, table in tables.items():
+        if not is_name(name):
+            raise SceneError(
+                f"{where} has {one_line(repr(name))}, which cannot name a folder: choose another"
+            )
+        if not isinstance(table, dict) or not table:
+            raise SceneError(
+                f"{where / one_line(name)} is {one_line(repr(table))}: expected lights with their "
+                f"emission relative to now, {example}"
+            )
+        factors = {
+            light: _number(table, light, where / one_line(name), 0, MOST_FACTOR, may_be_least=True)
+            for light in table
+        }
+        cases.append(LightCase(name, {light: x or 0.0 for light, x in factors.items()}))
+    return tuple(cases)
 
 
 def _power(table: Any, where: SourceKey) -> PowerBudget:

@@ -108,7 +108,7 @@ def paint_with_light(
         # These scenes have the films of their bases already.
         basis, settings = None, settings | {"resolution": "1/1"}
     read = {"mask": mask and str(mask), "layer": layer, "find": find}
-    requests = constraints or Constraints(), rigging or Rigging()
+    requests = Constraints() if constraints is None else constraints, rigging or Rigging()
     job = _job(
         (scene, options), (target, read), Path(folder), basis, requests, Settings(**settings)
     )

@@ -97,29 +97,26 @@ def run(job: Job, progress: Progress = silent, *, bases: list[Basis] | None = No
     job, obtained = find_suns(job, obtained, listen)
     if job.settings.error is not None:
         obtained = add_needed_samples(job, obtained, listen)
-    planes = planes_of_job(job, listen)
+    planes = planes_of_job(job, obtained[0].lights, listen)
     found = answer_job(job, obtained, listen, placement=placement, planes=planes)
-    rig = _suggest(job, found.solution, placement, listen)
+    rig = _suggest(job, found, placement, listen)
     lighting, scene = found.lighting, job.views[0].scene
     with new_answer(job.results, lighting, scene=scene, groups=job.groups) as answer:
         looks = [
-            _finish_view(
-                job, answer, view, analysis, rig, found.planes, view_listener(job, view, listen)
-            )
+            _finish_view(job, answer, view, analysis, rig, view_listener(job, view, listen))
             for view, analysis in zip(job.views, found.analyses, strict=True)
         ]
-        if found.planes is not None and scene is not None:
-            origin = f"{scene.path.name} lit by {LIGHTING}"
-            illuminance = found.planes.wished.illuminance
-            write_planes(answer.path, illuminance, found.planes.weights, origin)
     return [_reloaded(look) for look in looks] if answer.has_moved_paths else looks
 
 
 @dataclass(frozen=True)
 class _RigFindings:
-    """The places found for lights, and suggestions of others; all views count in them."""
+    """The places found for lights, suggestions of others, and what the answer gives on measuring
+    planes; all views count in them.
+    """
 
     placement: Placement | None
+    planes: PlanesAnswer | None
     suggestions: tuple[Suggestion, ...] | None = None
     move: MoveSuggestion | None = None
 
@@ -235,7 +232,6 @@ def _finish_view(
     view: PaintedView,
     analysis: Analysis,
     rig: _RigFindings,
-    planes: PlanesAnswer | None,
     listen: Listener,
 ) -> Look:
     """Predict, verify and report a view; return its look."""
@@ -252,6 +248,9 @@ def _finish_view(
         budget = _budget(settings, basis, relit)
         if view is job.views[0]:
             _remark_on_parameters(relit, listen)
+            if rig.planes is not None and settings.planes is not None:
+                origin, measured = f"{scene.path.name} lit by {LIGHTING}", rig.planes.wished
+                write_planes(answer.path, measured.illuminance, rig.planes.weights_by_case, origin)
     _write_prediction(folder, predicted, basis, budget, relit)
     if budget is not None and settings.verify:
         verification = _verify(settings, predicted, budget, solution, listen)
@@ -267,7 +266,7 @@ def _finish_view(
         suggestions=rig.suggestions,
         placement=rig.placement,
         move_suggestion=rig.move,
-        planes=planes,
+        planes=rig.planes,
     )
     # The files of the relit scene come to its final folder together with the report.
     with stage("report", listen, Sentence(" (", Hint("report", False), " skips it)")):
@@ -301,13 +300,13 @@ def _remark_on_parameters(relit: Scene, listen: Listener) -> None:
 
 
 def _suggest(
-    job: Job, solution: Solution, placement: Placement | None, listen: Listener
+    job: Job, found: JobAnswer, placement: Placement | None, listen: Listener
 ) -> _RigFindings:
     """Suggest lights to add, and a move unless the job has searched for moves itself."""
-    settings = job.settings
+    settings, solution = job.settings, found.solution
     scenes = [view.scene for view in job.views if view.scene is not None]
     if not settings.suggest or not scenes:
-        return _RigFindings(placement)
+        return _RigFindings(placement, found.planes)
     suggestions = suggest_lights(
         scenes,
         solution.problem.views.bases,
@@ -318,7 +317,7 @@ def _suggest(
     )
     move = None if job.all_rigging else suggest_move(job, solution, listen)
     listen.note("lights suggested")
-    return _RigFindings(placement, suggestions, move)
+    return _RigFindings(placement, found.planes, suggestions, move)
 
 
 def _verify(

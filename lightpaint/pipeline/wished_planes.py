@@ -1,15 +1,16 @@
 """Planes on which a job wishes for illuminance: measured before the solve, and read after it."""
 
-from collections.abc import Callable
-from dataclasses import dataclass
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
 
 from lightpaint.arrays import Doubles
+from lightpaint.basis.lights import Lights
 from lightpaint.basis.render.render_origin import basis_lights
-from lightpaint.errors import LightpaintError
 from lightpaint.lighting.analysis.appearance.display_difference import PaintComparison
+from lightpaint.lighting.constraints.absolute_scale import with_sure_scale
 from lightpaint.lighting.constraints.constraints import Constraints
 from lightpaint.lighting.constraints.constraints_file import constraints_of
 from lightpaint.lighting.problem import Problem
@@ -19,6 +20,7 @@ from lightpaint.lighting.unknowns.reduction import Reduction, reduce_to
 from lightpaint.lighting.wishes.planes_answer import PlanesAnswer, planes_answer
 from lightpaint.lighting.wishes.required_problem import RequiredProblem, with_wishes, without_wishes
 from lightpaint.lighting.wishes.wished_light import (
+    LitCase,
     WishedLight,
     check_powers,
     watts_allowed,
@@ -26,12 +28,13 @@ from lightpaint.lighting.wishes.wished_light import (
 )
 from lightpaint.photometry.illuminance import Illuminance
 from lightpaint.photometry.measure import measure_illuminance
+from lightpaint.photometry.measuring_plane import PowerBudget
 from lightpaint.photometry.planes_file import PlanesFile, read_planes
 from lightpaint.pipeline.job.job import Job
+from lightpaint.pipeline.job.job_checks import checked_scale
 from lightpaint.pipeline.job.settings import Settings
 from lightpaint.progress import Listener
 from lightpaint.scene.scene import Scene
-from lightpaint.sentences import Hint
 
 #: Largest error of a plane's mean, at 95 %, unless the settings say another.
 MEAN_ERROR = 0.02
@@ -51,10 +54,21 @@ class MeasuredPlanes:
     illuminance: Illuminance
     floor_m2: float
 
+    def weights_by_case(self, weights: Doubles) -> Mapping[str, Doubles]:
+        """Return the weights (n, 3) of each case; of the light of the scene as "" without cases."""
+        lights = self.illuminance.lights
+        cases = (LitCase.of(case, lights) for case in self.file.cases)
+        return {case.name: case.applied_to(weights) for case in cases} or {"": weights}
+
     def wished_of(self, reduction: Reduction) -> WishedLight:
         """Return the wishes as requirements of the lights of `reduction`."""
-        budget = self.file.power
-        return wished_light(self.illuminance, budget, reduction, floor_m2=self.floor_m2)
+        return wished_light(
+            self.illuminance,
+            self.file.power,
+            reduction,
+            floor_m2=self.floor_m2,
+            cases=self.file.cases,
+        )
 
 
 def measure_planes(
@@ -69,7 +83,7 @@ def measure_planes(
     cd_per_unit: of the lights file or the settings. Raises LightpaintError if nothing says what a
     radiance of 1 stands for.
     """
-    file, cd_per_unit = read_planes(path, scene), _checked_scale(path, cd_per_unit)
+    file, cd_per_unit = read_planes(path, scene), checked_scale(path, cd_per_unit)
     illuminance = measure_illuminance(
         scene,
         file.planes,
@@ -81,18 +95,17 @@ def measure_planes(
     )
     points = sum(len(plane) for plane in file.planes)
     listen.note(f"illuminance measured at {points} points of {len(file.planes)} planes")
-    return MeasuredPlanes(file, illuminance, _floor_area(file, scene))
+    floor_m2 = _floor_area(file, scene)
+    if settings.watts is not None:
+        file = replace(file, power=PowerBudget(settings.watts))
+    return MeasuredPlanes(file, illuminance, floor_m2)
 
 
-def _checked_scale(path: str | Path, cd_per_unit: float | None) -> float:
-    """Return cd/m² of a radiance of 1. Raises LightpaintError if nothing says it."""
-    if cd_per_unit is None:
-        raise LightpaintError(
-            f"{path} asks for lux, and nothing says how many cd/m² a radiance of 1 is: pass ",
-            Hint("cd_per_unit", 1),
-            ", or cd_per_unit in the lights file",
-        )
-    return cd_per_unit
+def limited_power(watts: float, lights: Lights) -> MeasuredPlanes:
+    """Return no planes, and a limit of the power of all lamps."""
+    nothing = np.zeros((0, len(lights), 3))
+    illuminance = Illuminance((), lights, nothing, nothing, 1.0)
+    return MeasuredPlanes(PlanesFile(Path(), (), PowerBudget(watts)), illuminance, 0.0)
 
 
 def constraints_for_planes(
@@ -100,7 +113,8 @@ def constraints_for_planes(
 ) -> Constraints:
     """Return all constraints on the lights of a scene, with what a radiance of 1 stands for."""
     every = constraints_of(scene.requests).and_then(constraints)
-    return every.and_then(Constraints(cd_per_unit=settings.cd_per_unit))
+    every = every.and_then(Constraints(cd_per_unit=settings.cd_per_unit))
+    return with_sure_scale(every, basis_lights(scene))
 
 
 def check_planes(
@@ -115,21 +129,22 @@ def check_planes(
 
     constraints: as `constraints_for_planes` returns them. read: reads the file.
     """
-    _checked_scale(path, constraints.cd_per_unit)
+    checked_scale(path, constraints.cd_per_unit)
     file, lights = read(path, scene), basis_lights(scene)
     if watts_allowed(file.power, _floor_area(file, scene)) is not None:
         reduction = reduce_to(constraints, lights)
         check_powers(reduction, [light.name for light in lights], "a limit of power")
 
 
-def planes_of_job(job: Job, listen: Listener) -> MeasuredPlanes | None:
-    """Return the planes that a job wishes for, measured; None without any."""
-    if job.settings.planes is None:
-        return None
-    scene = job.views[0].scene
-    assert scene is not None
+def planes_of_job(job: Job, lights: Lights, listen: Listener) -> MeasuredPlanes | None:
+    """Return the planes that a job wishes for, measured, and its limit of power; None without
+    either.
+    """
+    settings, scene = job.settings, job.views[0].scene
+    if settings.planes is None or scene is None:
+        return None if settings.watts is None else limited_power(settings.watts, lights)
     scale = job.all_constraints.cd_per_unit
-    return measure_planes(scene, job.settings.planes, job.settings, scale, listen)
+    return measure_planes(scene, settings.planes, settings, scale, listen)
 
 
 def require(problem: Problem, planes: MeasuredPlanes, listen: Listener) -> RequiredProblem:

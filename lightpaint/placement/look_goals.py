@@ -143,7 +143,9 @@ def goal_of(
         for listed, image in zip((images, weights, noises), reduced, strict=True):
             whole = np.broadcast_to(image, (*image.shape[:-1], 3))
             listed[view] = whole.reshape(-1, 3)
-    all_constraints = solution.problem.constraints.and_then(constraints or Constraints())
+    all_constraints = solution.problem.constraints.and_then(
+        Constraints() if constraints is None else constraints
+    )
     return LookGoal(
         np.concatenate(images),
         np.concatenate(weights),

@@ -18,6 +18,7 @@ from lightpaint.basis.lightgroups.light_groups import LightGroups
 from lightpaint.colour.photometry import photometry
 from lightpaint.errors import LightpaintError
 from lightpaint.lighting.answer.lighting import Lighting
+from lightpaint.luminaires.plugin_names import FULL
 from lightpaint.progress import Listener
 from lightpaint.relit.emission_xml import safe_name
 from lightpaint.relit.export.nuke import NukeLight, RigKind
@@ -62,7 +63,7 @@ def emitters_of(scene: Scene, lighting: Lighting) -> list[tuple[str, str, RGB]]:
 
 def _quantity(emitter: Emitter, rgb: RGB) -> tuple[str, RGB]:
     kind = emitter.kind
-    if kind is None or kind.scaling is not Scaling.COLOUR:
+    if kind is None or kind.scaling is not Scaling.COLOUR or kind.unit == FULL:
         return "", rgb
     if emitter.plugin != "projector":
         return kind.parameter, rgb

@@ -20,6 +20,7 @@ from lightpaint.files import write_bytes
 from lightpaint.images.formats.exr import write_rgb
 from lightpaint.keywords import keywords
 from lightpaint.lighting.answer.lighting import Lighting
+from lightpaint.relit.luminaire_xml import written_emission
 from lightpaint.relit.relit_files import relit_files, settings_of
 from lightpaint.scene.checks.tokens import tag
 from lightpaint.scene.lights.image_split import with_split
@@ -78,8 +79,9 @@ def relight(scene: Scene, lighting: Lighting, path: str | Path) -> Scene:
     for emitter, new_emission in settings_of(scene, lighting.emission):
         if emitter.texel or emitter.kind is None or emitter.kind.scaling is not Scaling.COLOUR:
             continue  # a factor of 1 means as authored there, and texels are in an image
+        written = written_emission(scene, emitter, new_emission)
         if not np.array_equal(
-            np.asarray(new_emission, np.float32), np.asarray(emissions[emitter.name], np.float32)
+            np.asarray(written, np.float32), np.asarray(emissions[emitter.name], np.float32)
         ):
             raise SceneError(path, f" did not take the emission of light {emitter.name!r}")
     return relit

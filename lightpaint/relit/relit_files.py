@@ -10,6 +10,7 @@ import numpy as np
 from lightpaint.arrays import RGB, Floats
 from lightpaint.errors import OutputError, SceneError
 from lightpaint.relit.emission_xml import Changes, set_emission, set_image
+from lightpaint.relit.luminaire_xml import luminaire_of, luminaire_xml
 from lightpaint.relit.xml_edit import XmlFile
 from lightpaint.scene.checks.tokens import tag
 from lightpaint.scene.lights.emitters import Emitter
@@ -34,7 +35,7 @@ class _Edits:
     by byte offset.
     integrators: replacements of elements, by byte offset; None for an addition.
     moved: child elements to set in the elements of moved lights, by byte offset, as XML by name.
-    added: lines of the elements of new lights.
+    added: lines of the elements of new lights. removed: byte offsets of elements to leave out.
     """
 
     original: Path
@@ -43,6 +44,7 @@ class _Edits:
     integrators: dict[int | None, str] = field(default_factory=dict)
     moved: dict[int, Mapping[str, str]] = field(default_factory=dict)
     added: list[str] = field(default_factory=list)
+    removed: list[int] = field(default_factory=list)
 
 
 def relit_files(
@@ -85,8 +87,16 @@ def _edits_of(scene: Scene, emission: Mapping[str, RGB]) -> dict[Path, _Edits]:
     unchanged = [emitter for emitter in unchanged if emitter.name not in added]
     _edit_images(scene, edits, settings, sampled)
     settings = {emitter: rgb for emitter, rgb in settings.items() if emitter.texel is None}
+    # Luminaires are written even if they stay as they are: the file has other emitters there.
+    kept = {x: x.emission for x in unchanged if luminaire_of(scene, x) is not None}
+    sampled = {*sampled, *(x for x in kept if x.sampling_weight)}
+    unchanged = [emitter for emitter in unchanged if emitter not in kept]
+    settings |= kept
     _edit_emitters(scene, edits, settings, unchanged, sampled)
     _edit_integrators(scene, edits)
+    for index, offset in (x for hung in scene.luminaires for x in hung.further):
+        file = scene.files[index]
+        edits.setdefault(file.resolve(), _Edits(file)).removed.append(offset)
     for file, offset, children in scene.moved_elements:
         edits.setdefault(file.resolve(), _Edits(file)).moved[offset] = children
     return edits
@@ -241,8 +251,15 @@ def _edit(edit: _Edits, folder: Path, scene: Scene, stem: str) -> tuple[bytes, d
     for at, text in edit.integrators.items():
         if at is not None:
             xml.replace(xml.element_at(at), text)
+    for at in edit.removed:
+        xml.remove(xml.element_at(at))
     images: dict[str, Floats] = {}
     for offset in sorted({*edit.settings, *edit.texel_images, *edit.moved}):
+        if offset in edit.settings and luminaire_of(scene, edit.settings[offset][0]) is not None:
+            # It has the place that it was moved to.
+            lines = luminaire_xml(scene, *edit.settings[offset])
+            xml.replace_by_lines(xml.element_at(offset), lines)
+            continue
         changes = Changes(xml, xml.element_at(offset))
         for name, text in edit.moved.get(offset, {}).items():
             changes.set_element(name, text)

@@ -45,6 +45,7 @@ from lightpaint.relit.verification import (
     largest_difference,
     limit_of_tests,
 )
+from lightpaint.scene.lights.hung_luminaires import luminaire_of_spot
 from lightpaint.scene.lights.texels.texel import image_of
 from lightpaint.scene.scene import Scene
 from lightpaint.scene.scene_render import (
@@ -161,15 +162,18 @@ def shares_of_emitters(
 ) -> dict[str, float]:
     """Return the share of each emitter of `relit` in the light. shares: by name of the light.
 
-    The emitters of a light have equal parts of it; texels are one emitter, the image.
+    The emitters of a light have equal parts of it, as have the spots of a luminaire; texels are one
+    emitter, the image.
     """
     names = {emitter.name for emitter in relit.emitters}
     of_emitters: dict[str, float] = {}
     for light in lighting.lights:
         for member in light.members if light.name in shares else ():
             name = member if member in names else image_of(member)
-            part = shares[light.name] / len(light.members)
-            of_emitters[name] = of_emitters.get(name, 0.0) + part
+            parts = [x for x in names if x == name or luminaire_of_spot(x) == name] or [name]
+            for part_name in parts:
+                part = shares[light.name] / len(light.members) / len(parts)
+                of_emitters[part_name] = of_emitters.get(part_name, 0.0) + part
     return of_emitters
 
 

@@ -5,7 +5,7 @@ written in its own encoding.
 """
 
 import re
-from collections.abc import Collection, Mapping
+from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 
@@ -88,6 +88,20 @@ class XmlFile:
     def replace(self, element: Element, text: str) -> None:
         """Replace `element` by `text`."""
         self._edits.append((element.start, element.end, text.encode()))
+
+    def replace_by_lines(self, element: Element, lines: Sequence[str]) -> None:
+        """Replace `element` by `lines`, indented as it is."""
+        indent = _indent_before(self.text, element.start)
+        self.replace(element, f"{self._newline}{indent}".join(lines))
+
+    def remove(self, element: Element) -> None:
+        """Leave out `element`, and its line if nothing else is on it."""
+        start, end = element.start, element.end
+        line = self.text.rfind(b"\n", 0, start) + 1
+        stop = self.text.find(b"\n", end)
+        if stop >= 0 and not (self.text[line:start] + self.text[end:stop]).strip():
+            start, end = line, stop + 1
+        self._edits.append((start, end, b""))
 
     def set_attribute(self, element: Element, name: str, value: str) -> None:
         """Set an attribute of `element` that it has. value: text without special characters."""

@@ -1,4 +1,4 @@
-"""What a lighting gives on measuring planes, in words and in rows of tables."""
+"""Measuring planes of an answer in words, and in rows of tables."""
 
 import math
 from collections.abc import Iterator
@@ -24,17 +24,22 @@ LEAST_COST = 0.05
 
 def plane_rows(answer: PlanesAnswer) -> Iterator[tuple[str, ...]]:
     """Yield a row for each plane, in the order of `HEADINGS`."""
-    for plane in answer.wished.illuminance.planes:
-        reading = answer.readings[plane.name]
+    planes = {plane.name: plane for plane in answer.wished.illuminance.planes}
+    for (case, name), reading in answer.readings.items():
         yield (
-            plane.name,
+            plane_title(name, case),
             f"{reading.mean:.0f} ± {NORMAL_95 * reading.mean_error:.1g}",
             f"{reading.uniformity:.2f} ± {NORMAL_95 * reading.uniformity_error:.1g}",
             f"{reading.least:.0f}",
             f"{reading.most:.0f}",
-            wishes_text(plane),
+            wishes_text(planes[name]),
             _density(answer, reading),
         )
+
+
+def plane_title(plane: str, case: str) -> str:
+    """Return the name of a plane in a case."""
+    return f"{plane}, {case}" if case else plane
 
 
 def wishes_text(plane: MeasuringPlane) -> str:
@@ -51,7 +56,8 @@ def planes_sentences(answer: PlanesAnswer) -> list[str]:
     """Return what is missed, what the power is, and what the wishes cost."""
     sentences = [_missed(answer, outcome) for outcome in answer.missed]
     if not answer.missed and answer.outcomes:
-        sentences.append("All wishes for the planes are met.")
+        what = "All wishes for the planes are" if answer.readings else "The limit of power is"
+        sentences.append(f"{what} met.")
     if answer.watts is not None:
         power = f"The lamps take {answer.watts:.4g} W"
         if answer.floor_m2:
@@ -68,8 +74,8 @@ def planes_sentences(answer: PlanesAnswer) -> list[str]:
 def planes_numbers(answer: PlanesAnswer) -> dict[str, Any]:
     """Return the planes as numbers of report.json."""
     planes = {}
-    for name, reading in answer.readings.items():
-        planes[name] = {
+    for (case, name), reading in answer.readings.items():
+        planes[plane_title(name, case)] = {
             "mean_lx": reading.mean,
             "mean_error_lx": reading.mean_error,
             "uniformity": reading.uniformity,
@@ -77,7 +83,11 @@ def planes_numbers(answer: PlanesAnswer) -> dict[str, Any]:
             "least_lx": reading.least,
             "most_lx": reading.most,
             "points": reading.points,
-            "wishes": [_outcome_numbers(x) for x in answer.outcomes if x.wish.plane == name],
+            "wishes": [
+                _outcome_numbers(x)
+                for x in answer.outcomes
+                if (x.wish.case, x.wish.plane) == (case, name)
+            ],
         }
     budget = [x.wish.asked for x in answer.outcomes if x.wish.kind == "power"]
     return {
@@ -110,8 +120,9 @@ def _density(answer: PlanesAnswer, reading: PlaneReading) -> str:
 
 def _missed(answer: PlanesAnswer, outcome: WishOutcome) -> str:
     wish, reached = outcome.wish, outcome.reached
+    title = plane_title(wish.plane, wish.case)
     if wish.kind == "mean":
-        text = f"{wish.plane}: {reached:.0f} of {wish.asked:g} lx"
+        text = f"{title}: {reached:.0f} of {wish.asked:g} lx"
         if not answer.all_at_full:
             return f"{text}, as much as the other wishes leave."
         count = len(answer.wished.illuminance.lights)
@@ -119,19 +130,20 @@ def _missed(answer: PlanesAnswer, outcome: WishOutcome) -> str:
         advice = f"; about {more} more lamps like these {count} would do" if more else ""
         return f"{text}: all lamps are at full{advice}."
     if wish.kind == "uniformity":
-        return f"{wish.plane}: a uniformity of {reached:.2f}, wished for {wish.asked:g}."
+        return f"{title}: a uniformity of {reached:.2f}, wished for {wish.asked:g}."
     if wish.kind == "max":
-        return f"{wish.plane}: up to {reached:.0f} lx, wished for at most {wish.asked:g}."
+        return f"{title}: up to {reached:.0f} lx, wished for at most {wish.asked:g}."
     if wish.kind == "ratio":
-        return f"{wish.plane}: {reached:.2f} of the mean of {wish.to}, wished for {wish.asked:g}."
+        return f"{title}: {reached:.2f} of the mean of {wish.to}, wished for {wish.asked:g}."
     return f"The lamps take {reached:.4g} W, where {wish.asked:g} W are allowed."
 
 
 def _prices(answer: PlanesAnswer) -> Iterator[str]:
     """Yield what the last steps of wishes cost, where they cost power."""
     for outcome in answer.outcomes:
-        if outcome.price is None or outcome.wish.kind not in STEPS:
+        if outcome.price is None or outcome.wish.kind not in STEPS or not outcome.is_met:
             continue
         step, text = STEPS[outcome.wish.kind]
         if (watts := step * outcome.price) >= LEAST_PRICE:
-            yield f"The {text} {outcome.wish.plane} cost {watts:.2g} W."
+            title = plane_title(outcome.wish.plane, outcome.wish.case)
+            yield f"The {text} {title} cost {watts:.2g} W."

@@ -15,7 +15,9 @@ from typing import Any, TypeVar
 from lightpaint.arrays import RGB, Floats, Position
 from lightpaint.display_text import Listed, Shown, some_of
 from lightpaint.keywords import keywords
+from lightpaint.luminaires.plugin_names import LUMINAIRE_PLUGINS
 from lightpaint.scene.lights.emitters import Emitter, find_emitters
+from lightpaint.scene.lights.hung_luminaires import HungLuminaire
 from lightpaint.scene.lights.image_split import with_split
 from lightpaint.scene.lights.light import (
     Light,
@@ -353,9 +355,18 @@ class Scene(SceneFiles, Shown):
     @property
     def up(self) -> Position:
         """The up axis of the scene, estimated from its camera and its lights."""
-        node = self.parsed.state.nodes[self.parsed.sensor_nodes[self.sensor]]
-        shining = [x.site.direction for x in self.emitters if x.site.direction is not None]
-        return upward_axis(node.props, shining)
+        return up_of(self.parsed, self.sensor, self.emitters)
+
+    @property
+    def luminaires(self) -> tuple[HungLuminaire, ...]:
+        """The luminaires of the lights file that hang in it."""
+        return tuple(self.parsed.luminaires.values())
+
+    @property
+    def cd_per_unit(self) -> float | None:
+        """Candelas of an intensity of 1, which a scene with luminaires has; None without any."""
+        is_absolute = any(x.plugin in LUMINAIRE_PLUGINS for x in self.emitters)
+        return self.requests.cd_per_unit if is_absolute else None
 
     def relocated(self, old: Path, new: Path) -> "Scene":
         """Return this scene after its folder `old` was moved to `new`."""
@@ -397,6 +408,13 @@ class Scene(SceneFiles, Shown):
         finally:
             del loaded
             gc.collect()
+
+
+def up_of(parsed: ParsedScene, sensor: int, emitters: Sequence[Emitter]) -> Position:
+    """Return the up axis of a scene, estimated from a sensor and its lights."""
+    node = parsed.state.nodes[parsed.sensor_nodes[sensor]]
+    shining = [x.site.direction for x in emitters if x.site.direction is not None]
+    return upward_axis(node.props, shining)
 
 
 def inspect_scene(parsed: ParsedScene, sensor: int) -> dict[str, Any]:

@@ -11,6 +11,7 @@ from lightpaint.file_reading import file_length
 from lightpaint.keywords import keywords
 from lightpaint.scene.checks.xml_checks import MAX_XML
 from lightpaint.scene.lights.emitters import Emitter, check_emitters
+from lightpaint.scene.lights.hung_luminaires import hang_luminaires
 from lightpaint.scene.lights.image_split import images_to_split, with_split
 from lightpaint.scene.lights.light import Light, lights_of
 from lightpaint.scene.lights.light_choice import choose_lights
@@ -23,7 +24,7 @@ from lightpaint.scene.properties.integrator import IntegratorChoice
 from lightpaint.scene.runtime.mitsuba_errors import explain_old_scene, mitsuba_errors
 from lightpaint.scene.runtime.render_lock import MITSUBA
 from lightpaint.scene.runtime.variant import use_variant
-from lightpaint.scene.scene import Scene, inspect_scene
+from lightpaint.scene.scene import Scene, inspect_scene, up_of
 from lightpaint.scene.scene_tree import ParsedScene
 
 #: Endings of pictures and lightings, which people give in place of a scene.
@@ -76,7 +77,7 @@ def load_scene(
         lights_file: TOML file with lights and groups, used instead of the one beside the scene.
             `lights` replaces its list; `groups` are added to its groups, or replace those with the
             same names, and without `lights` are adjusted as well.
-        use_lights_file: False to ignore the lights file beside the scene.
+        use_lights_file: False to ignore the lights file beside the scene, but for luminaires.
         group_alike: Whether more than 24 similar emitters without names become one light, unless
             they are selected by their generated names. The lights file can disable this.
         integrator: Integrator to render with instead of the scene's own, such as `path`, `direct`
@@ -116,6 +117,11 @@ def load_scene(
     sizes = _image_sizes(selection, split)
     with explain_old_scene(path), mitsuba_errors(path):
         whole = inspect_scene(parsed, index)
+        if luminaires := selection.requests.luminaires:
+            up = up_of(parsed, index, whole["emitters"])
+            scale = selection.requests.cd_per_unit
+            parsed = hang_luminaires(parsed, luminaires, selection.groups, up, scale)
+            whole = inspect_scene(parsed, index)
     sizes = images_to_split(sizes, whole["emitters"], str(path))
     mirrored = _symmetric_images(selection, symmetric, sizes)
     sizes, selection = _with_mirror_images(mirrored, sizes, selection)

@@ -83,6 +83,8 @@ class ParsedScene:
         self.names = self._name_lights()
         #: Parameters changed by `with_motions`, as XML: node → name → element.
         self.moved: dict[int, dict[str, str]] = {}
+        #: What `hang_luminaires` hung into the scene, a `HungLuminaire` by emitter node.
+        self.luminaires: dict[int, Any] = {}
 
     def _parse(self) -> Any:
         """Return the parsed form of the XML, after checking it and the files that it refers to."""

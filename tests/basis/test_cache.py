@@ -278,6 +278,7 @@ def test_exact_samples_and_a_time_go_ill_together(scene: Scene) -> None:
         Settings(time_s=1, exact_spp=True)
 
 
+@pytest.mark.nightly
 def test_a_basis_of_blocks_says_when_it_takes_more(tmp_path: Path) -> None:
     path = write_room(tmp_path, integrator='<integrator type="volpathmis"/>', lights=LIGHTS["bulb"])
     small = load_scene(path).reduced("1/3")
@@ -293,6 +294,7 @@ def test_a_basis_of_blocks_says_when_it_takes_more(tmp_path: Path) -> None:
     assert "more than the 4 requested" in _obtain_basis(small, spp=4)[1][0]
 
 
+@pytest.mark.nightly
 def test_another_scene_sensor_or_seed_is_another_basis(scene: Scene, tmp_path: Path) -> None:
     obtain_basis(scene, spp=2)
     obtain_basis(scene, spp=2, seed=1)
@@ -322,6 +324,7 @@ def test_a_damaged_one_is_made_anew(scene: Scene, damage: str) -> None:
     assert read_basis(entry.path).origin.spp == 2
 
 
+@pytest.mark.nightly
 def test_the_longest_unused_goes_first(scene: Scene, monkeypatch: pytest.MonkeyPatch) -> None:
     for seed in range(3):
         obtain_basis(scene, spp=2, seed=seed)

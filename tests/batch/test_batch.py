@@ -126,6 +126,7 @@ def is_derived(name: str) -> bool:
     return "warmer" in name or "dusk" in name
 
 
+@pytest.mark.nightly
 def test_a_project_that_was_moved_is_done_still(batch_folder: Path) -> None:
     run_item(batch_folder)
     moved_folder = batch_folder.parent / f"{batch_folder.name}-moved"
@@ -153,6 +154,7 @@ def test_a_damaged_journal_is_said_and_its_look_done_again(batch_folder: Path) -
     assert "journal" not in run(batch_folder, *command).stderr
 
 
+@pytest.mark.nightly
 def test_only_some(batch_folder: Path) -> None:
     partial_plan = plan(batch_folder / "looks.toml", batch_folder / "out").select("dusk-1")
     outcome = run_batch(partial_plan)
@@ -272,6 +274,7 @@ def test_a_plan_names_paintings_from_the_current_folder(batch_folder: Path) -> N
     assert look.split()[-1] == "p0.exr"
 
 
+@pytest.mark.nightly
 def test_what_fails_is_tried_again_as_often_as_is_asked(
     batch_folder: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -326,6 +329,7 @@ def test_one_look_is_not_several(batch_folder: Path) -> None:
     assert "1 look was done earlier and is unchanged" in completed.stderr
 
 
+@pytest.mark.nightly
 def test_a_basis_that_takes_too_much_memory_fails_its_looks_alone(
     batch_folder: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -341,6 +345,7 @@ def test_a_basis_that_takes_too_much_memory_fails_its_looks_alone(
     succeed(batch_folder, "batch", "looks.toml", "-o", "out")
 
 
+@pytest.mark.nightly
 def test_a_disk_that_is_really_full(batch_folder: Path) -> None:
     disk = batch_folder / "disk"
     disk.mkdir()
@@ -380,6 +385,7 @@ def test_an_interrupt_says_how_to_go_on(
     assert contents(batch_folder / "out") == reference_batch[1]
 
 
+@pytest.mark.nightly
 def test_workers_that_are_all_gone_are_no_look_s_failure(
     batch_folder: Path, reference_batch: tuple[Path, dict[str, bytes]]
 ) -> None:
@@ -469,6 +475,7 @@ def _first_process(processes: Processes) -> int:
     return next(pid for pool in processes._pools.values() for pid in pool._processes)
 
 
+@pytest.mark.nightly
 def test_a_step_that_takes_too_long_fails_in_words_and_costs_nothing_else(
     batch_folder: Path, reference_batch: tuple[Path, dict[str, bytes]]
 ) -> None:

@@ -251,8 +251,16 @@ def test_a_cluster_does_what_one_process_does(
     assert listener.starts["bright: render"] == 0
     assert list(listener.workers.values()) == [None, None]
     assert len({text.split()[-1] for text in listener.remarks if " begun by " in text}) == 2
-    # Again nothing is done; and on a shared disk it is the same.
+    # Again nothing is done.
     assert run_item(folder, "all", workers, listener).done == []
+
+
+@pytest.mark.nightly
+def test_on_a_shared_disk_it_is_the_same(
+    workers: Workers, reference_batch: tuple[Path, dict[str, bytes]]
+) -> None:
+    workers.await_all()
+    folder, expected = reference_batch
     run_item(folder, "shared", workers, ItemListener(), shared_fs=True)
     assert contents(folder / "shared") == expected
 
@@ -348,6 +356,7 @@ def test_a_worker_that_hangs_and_one_without_memory_are_replaced(
     assert listener.starts["third: answer"] >= 2
 
 
+@pytest.mark.nightly
 def test_a_batch_that_was_killed_goes_on_with_the_parts_that_it_has(
     workers: Workers, reference_batch: tuple[Path, dict[str, bytes]]
 ) -> None:

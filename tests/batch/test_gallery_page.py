@@ -171,6 +171,7 @@ def test_of_many_lights_those_that_do_most_have_sliders(page: Any, tmp_path: Pat
     assert page.locator(".mixer-name").first.text_content() == "lamp 20"
 
 
+@pytest.mark.nightly
 def test_an_image_is_one_row_of_the_mixer_and_one_column(page: Any, tmp_path: Path) -> None:
     small = small_basis()
     names = ["lamp", *(f"sky.x{x}.y{y}" for y in range(3) for x in range(4))]
@@ -217,6 +218,7 @@ def symmetric_sky() -> tuple[BasisLight, ...]:
     return tuple(replace(light, name=pair[0], members=tuple(pair)) for pair in pairs)
 
 
+@pytest.mark.nightly
 def test_a_symmetric_image_shows_both_halves(page: Any, tmp_path: Path) -> None:
     small, lights, key = small_basis(), symmetric_sky(), '{"view": 0}'
     images = np.repeat(small.images[:1], 6, 0)
@@ -287,6 +289,7 @@ HELD = """{
 }"""
 
 
+@pytest.mark.nightly
 def test_of_two_mixers_the_one_that_was_asked_for_last_is_shown(page: Any, tmp_path: Path) -> None:
     page.add_init_script(HELD)
     index, names = two_mixers(tmp_path)
@@ -362,6 +365,7 @@ def test_a_thousand_looks_are_filtered_and_ordered(page: Any, tmp_path: Path) ->
     assert _names(page) == ["broken"]
 
 
+@pytest.mark.nightly
 def test_axe_finds_nothing(page: Any, batch: Path) -> None:
     source = axe_source()
     page.goto((batch / "index.html").as_uri())
@@ -380,6 +384,7 @@ def test_axe_finds_nothing(page: Any, batch: Path) -> None:
     assert violations(page) == []
 
 
+@pytest.mark.nightly
 def test_several_paintings_of_solve_are_mixed_as_well(page: Any, tmp_path: Path) -> None:
     write_batch(tmp_path)
     succeed(tmp_path, "solve", "b.basis.exr", "p0.exr", "p1.exr", "-o", "out")

@@ -62,6 +62,7 @@ def run_looks(folder: Path, *arguments: Any) -> dict[str, Any]:
     )
 
 
+@pytest.mark.nightly
 def test_light_groups_stand_for_a_scene(folder: Path) -> None:
     summary = run_looks(folder, "--workers", "2")
     assert summary["failed"] == 0

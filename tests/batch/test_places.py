@@ -91,6 +91,7 @@ def directions(folder: Path) -> dict[str, np.ndarray]:
     return directions_by_name
 
 
+@pytest.mark.nightly
 def test_looks_hang_their_lights_once_and_dim_them_each(folder: Path) -> None:
     outcome, listener = run_all(folder)
     assert sorted(outcome.done) == sorted(NAMES)

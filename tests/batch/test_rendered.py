@@ -88,6 +88,7 @@ def batch_record(batch_folder: Path) -> dict[str, Any]:
     return {**summary, "asked": requests}
 
 
+@pytest.mark.nightly
 def test_each_basis_is_obtained_once_for_all_its_looks(
     batch_folder: Path, batch_record: dict[str, Any]
 ) -> None:
@@ -161,6 +162,7 @@ def test_relit_scenes_load_in_plain_mitsuba_with_their_lights(
     assert preset == read_lighting(batch_folder / "preset.json").emission
 
 
+@pytest.mark.nightly
 def test_other_samples_of_a_final_render_render_it_alone_again(
     batch_folder: Path, batch_record: dict[str, Any]
 ) -> None:
@@ -245,6 +247,7 @@ settings = {{ spp = 8{more} }}
 """
 
 
+@pytest.mark.nightly
 def test_the_cache_decides_no_answer(batch_folder: Path, tmp_path: Path) -> None:
     """A batch of 8 samples took 352 that a killed run had left."""
     cache = str(tmp_path / "cache")

@@ -84,6 +84,7 @@ def test_the_command_replaces_its_own_archives_only(tmp_path: Path) -> None:
     assert run(tmp_path, "blender", "-o", "mine.zip", "--force").returncode == 0
 
 
+@pytest.mark.nightly
 @pytest.mark.long
 def test_blender_installs_the_archive(
     blender: list[str], tmp_path: Path, variables: dict[str, str]

@@ -14,17 +14,26 @@ from hypothesis import strategies as st
 from live_server import RunningServer
 
 from lightpaint.blender_addon.lamps.group_names import group_bytes, group_name, stem
+from lightpaint.blender_addon.lamps.lamp_drives import (
+    DRIVES_KEY,
+    discard_drives,
+    forget_drives,
+    keep_drives,
+    show_drives,
+)
 from lightpaint.blender_addon.lamps.lamp_units import are_equal, scaled, scaled_colour
 from lightpaint.blender_addon.lamps.working_space import working_space
 from lightpaint.blender_addon.painter import program, socket_client
 from lightpaint.blender_addon.painter.painter_messages import (
     PROTOCOL_VERSION,
+    MessageError,
     PainterState,
     from_bytes,
     to_bytes,
 )
 from lightpaint.blender_addon.painter.program import find_program
 from lightpaint.blender_addon.shot.shot_files import ShotFolder
+from lightpaint.cli.options.parser import command_parser
 from lightpaint.colour.primaries import ACESCG, REC2020, from_rec709
 from lightpaint.paint.message_frames import from_frame, to_frame
 from lightpaint.paint.protocol import VERSION
@@ -114,6 +123,65 @@ def test_fixed_lights_are_not_dimmed_by_the_master() -> None:
     assert state.receive({"kind": "answer", "exact": False}, {"weights": (4.0,) * 6})
     assert state.factors["a"] == (2.0, 2.0, 2.0)
     assert not state.receive({"kind": "notice", "text": "soon"}, {})
+
+
+def test_drives_of_emitters_are_known_by_name_and_dimmed_by_the_master() -> None:
+    emitters = [{"name": "red", "swatch": "#f00"}, {"name": "white", "swatch": "#fff"}]
+    lights = [
+        {"name": "a", "is_fixed": False, "emitters": emitters},
+        {"name": "b", "is_fixed": False, "emitters": []},
+    ]
+    weights = {"weights": (2.0, -0.5, 0.0, 1.0, 1.0, 1.0)}
+    looks = [{"id": 1, "name": "x", "lights": ["a"], "weights": [[1.0, -0.1, 0.0]]}]
+    content: dict[str, Any] = {"kind": "state", "lights": lights, "looks": looks, "master": 0.5}
+    state = PainterState()
+    assert state.receive({**content, "answer": {"lights": [{"drives": [0.5, 1]}, {}]}}, weights)
+    assert state.drives == {"a": {"red": 0.25, "white": 0.5}}
+    # LEDs lie outside of Rec.709, which lamps in Blender do not.
+    assert state.factors["a"] == (1.0, 0.0, 0.0)
+    assert state.looks[0].factors == {"a": (1.0, 0.0, 0.0)}
+    # Under the brush some answers have them, and others leave them as they are.
+    assert state.receive({"kind": "answer", "drives": [[0.0, 0.25], None]}, weights)
+    assert state.receive({"kind": "answer", "master": 1.0}, weights)
+    assert state.drives == {"a": {"red": 0.0, "white": 0.25}}
+    for wrong in ([2.0, 0.0], [0.5], ["a", "b"], [float("nan"), 0.0]):
+        with pytest.raises(MessageError):
+            state.receive({"kind": "answer", "drives": [wrong, None]}, weights)
+    negative = {"weights": (1.0, 1.0, 1.0, -1.0, 1.0, 1.0)}
+    with pytest.raises(MessageError):
+        state.receive({"kind": "answer"}, negative)
+
+
+def test_drives_are_properties_of_lamps_until_they_are_discarded() -> None:
+    class Owner(dict[str, Any]):
+        """A lamp with custom properties."""
+
+    lamp, other = Owner(), Owner(own=1)
+    groups = {"a": [SimpleNamespace(owner=lamp)], "b": [SimpleNamespace(owner=other)]}
+    show_drives(groups, {"a": {"red": 0.5}})
+    assert lamp == {DRIVES_KEY: {"red": 0.5}}
+    discard_drives(groups)
+    assert lamp == {}
+    show_drives(groups, {"a": {"red": 0.25}})
+    keep_drives(groups)
+    show_drives(groups, {"a": {"red": 1.0}})
+    discard_drives(groups)
+    assert lamp[DRIVES_KEY] == {"red": 0.25}
+    # Another look, of which no drives are known, is applied.
+    show_drives(groups, {})
+    keep_drives(groups)
+    discard_drives(groups)
+    assert DRIVES_KEY not in lamp
+    forget_drives(lamp)
+    assert other == {"own": 1}
+
+
+def test_the_painter_of_a_shot_gets_its_lights_file() -> None:
+    plain = program.paint_arguments("shot.exr", "painting", ["--view", "agx"])
+    assert plain == ["paint", "--lights", "shot.exr", "-o", "painting", "--json", "--view", "agx"]
+    words = program.paint_arguments("shot.exr", "painting", [], "a.lights.toml")
+    options = command_parser().parse_args([str(x) for x in words])
+    assert options.lights_file == "a.lights.toml"
 
 
 @pytest.mark.parametrize("size", [0, 125, 126, 65535, 65536])

@@ -6,6 +6,7 @@ import pytest
 from blender import found_in_blender
 
 
+@pytest.mark.nightly
 @pytest.mark.long
 def test_a_shot_goes_where_its_file_goes(
     blender: list[str], tmp_path: Path, variables: dict[str, str]

@@ -15,6 +15,7 @@ import numpy as np
 import OpenEXR
 import pytest
 from command import run, run_refused, spawn, succeed
+from nightly import nightly
 from PIL import Image
 from renderer import LIGHTS, REPOSITORY, write_room
 
@@ -125,6 +126,7 @@ def test_verify_tells_a_tampered_scene(solved_job: tuple[Path, str], tmp_path: P
     assert "DISAGREE" in completed.stdout
 
 
+@pytest.mark.nightly
 def test_several_targets_share_one_basis(tmp_path: Path) -> None:
     completed = run(
         tmp_path,
@@ -239,16 +241,19 @@ def test_template_is_the_current_look(tmp_path: Path) -> None:
     assert (tmp_path / "t.png").is_file()
 
 
-def test_a_painting_is_not_painted_over(tmp_path: Path) -> None:
-    for output, file in (("t.exr", "t.exr"), ("t.exr", "t.png"), ("template", "template.png")):
-        command = ("template", CORNELL, "--resolution", "1/4", "--spp", 2, "-o", output)
-        succeed(tmp_path, *command, "--force")
-        painted = (tmp_path / output).parent / file if "." in output else tmp_path / output / file
-        painted.write_bytes(b"hours of work")
-        assert "may have been painted on" in run_refused(tmp_path, *command)
-        assert painted.read_bytes() == b"hours of work"
-        succeed(tmp_path, *command, "--force")
-        assert painted.read_bytes() != b"hours of work"
+@pytest.mark.parametrize(
+    ("output", "file"),
+    [nightly("t.exr", "t.exr"), nightly("t.exr", "t.png"), ("template", "template.png")],
+)
+def test_a_painting_is_not_painted_over(tmp_path: Path, output: str, file: str) -> None:
+    command = ("template", CORNELL, "--resolution", "1/4", "--spp", 2, "-o", output)
+    succeed(tmp_path, *command, "--force")
+    painted = (tmp_path / output).parent / file if "." in output else tmp_path / output / file
+    painted.write_bytes(b"hours of work")
+    assert "may have been painted on" in run_refused(tmp_path, *command)
+    assert painted.read_bytes() == b"hours of work"
+    succeed(tmp_path, *command, "--force")
+    assert painted.read_bytes() != b"hours of work"
 
 
 def test_painted_over_the_template_in_8_bits_and_solved(tmp_path: Path) -> None:
@@ -447,14 +452,23 @@ def test_nothing_is_printed_but_one_line_for_mistakes(basis_file: Path, tmp_path
     assert "no such lighting" in run_refused(folder, "relight", CORNELL, "gone.json")
     assert "not a JSON" in run_refused(folder, "relight", CORNELL, "bad/file")
     assert "not a result folder" in run_refused(folder, "verify", "bad")
-    # Another variant, nothing but parsing, and a scene that is loaded: by processes of their own.
-    for arguments, words in (
-        (("lights", CORNELL, "-m", "llvm_ad_nonsense_rgb"), "no variant"),
+
+
+@pytest.mark.parametrize(
+    ("arguments", "words"),
+    [
+        nightly(("lights", CORNELL, "-m", "llvm_ad_nonsense_rgb"), "no variant"),
         (("lights", CORNELL, "-m", "scalar_spectral"), "not supported"),
-        (("basis", CORNELL, "--spp", "1"), "spp"),
-        (("solve", CORNELL, "bad/nan.exr"), "NaN or Inf in every pixel"),
-    ):
-        assert words in run_refused(folder, *arguments, by=spawn)
+        nightly(("basis", CORNELL, "--spp", "1"), "spp"),
+        nightly(("solve", CORNELL, "nan.exr"), "NaN or Inf in every pixel"),
+    ],
+)
+def test_nothing_else_is_printed_by_a_process_of_its_own(
+    tmp_path: Path, arguments: tuple[str, ...], words: str
+) -> None:
+    """Of another variant, of nothing but parsing, and of a scene that is loaded."""
+    write_rgb(tmp_path / "nan.exr", np.full((128, 128, 3), np.nan, np.float32))
+    assert words in run_refused(tmp_path, *arguments, by=spawn)
 
 
 def test_deep_images_are_refused_by_name(tmp_path: Path) -> None:
@@ -512,12 +526,13 @@ def test_the_cache_is_listed_and_cleared(tmp_path: Path) -> None:
         assert completed.returncode == 0, completed.stderr
         return completed.stdout
 
-    call("basis", CORNELL, "--spp", "2", "--no-cache")
-    assert "scene.xml" not in call("cache")
-    call("basis", CORNELL, "--spp", "2")
-    assert "scene.xml" in call("cache", "list")
+    room = write_room(tmp_path)
+    call("basis", room, "--spp", "2", "--no-cache")
+    assert "room.xml" not in call("cache")
+    call("basis", room, "--spp", "2")
+    assert "room.xml" in call("cache", "list")
     assert "1 deleted" in call("cache", "clear")
-    assert "scene.xml" not in call("cache")
+    assert "room.xml" not in call("cache")
 
 
 CHECKERS = """<shape type="rectangle" id="screen"><transform name="to_world"><scale value="0.4"/>
@@ -657,6 +672,7 @@ def test_solved_small_and_verified_large(tmp_path: Path) -> None:
     succeed(tmp_path, *small, "-o", "small")
 
 
+@pytest.mark.nightly
 def test_a_tampered_scene_is_told_from_a_small_prediction_too(tmp_path: Path) -> None:
     succeed(tmp_path, "solve", CORNELL, WARM, "--resolution", "1/4", "--spp", 64)
     relit = tmp_path / "warm" / "relit.xml"
@@ -707,6 +723,7 @@ def test_budgets_that_contradict_each_other_are_refused(basis_file: Path, tmp_pa
         assert f"{option[0]} cannot change a saved basis" in refusal
 
 
+@pytest.mark.nightly
 def test_a_film_that_no_blocks_fit_into_is_solved_small_and_verified_whole(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ):

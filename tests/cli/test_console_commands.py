@@ -13,6 +13,7 @@ from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 import pytest
 from command import as_from_a_terminal, run, run_refused, succeed
 from console_rigs import lamp, open_port, sacn_fields, sacn_packet
@@ -24,6 +25,9 @@ from lightpaint.dmx.console_rig import ConsoleRig
 from lightpaint.dmx.levels import encode_levels
 from lightpaint.lighting.answer.lighting import Lighting, LightSetting
 from lightpaint.lighting.answer.lighting_file import write_lighting
+from lightpaint.paint.store.history_steps import Identity, StoredLook, ViewIdentity
+from lightpaint.paint.store.store import Store
+from lightpaint.scene.properties.site import EmitterPlace, unit
 
 COLORS = ("red", "green", "blue")
 RIG = ConsoleRig(
@@ -310,6 +314,37 @@ def test_an_answer_goes_by_the_file_of_a_show_and_comes_back(
     assert not any(document["lights"]["101 PAR 1"].values())
 
 
+def test_pan_and_tilt_are_sent_when_asked_for(tmp_path: Path) -> None:
+    """Of a wash that hangs turned by 90°: +y of the stage is to its right, −90° of pan."""
+    light = setting("201 Wash 1", (1.0, 0.5, 0.0))
+    place = EmitterPlace("201 Wash 1", (-2.6, 3.4, 5.1), unit((0.0, 1.0, -1.0)))
+    turned = EmitterPlace("101 PAR 1", (-3.2, -2.5, 5.1), (0.0, 0.0, 1.0))
+    lighting = Lighting(
+        (light,),
+        target="evening.png",
+        scene_identity="0" * 16,
+        places=(place, turned),
+        up=(0.0, 0.0, 1.0),
+    )
+    write_lighting(tmp_path / "lighting.json", lighting)
+    command = ("send", "lighting.json", "--rig", SHOW, "--dump", "dmx.csv", "--force")
+    succeed(tmp_path, *command)
+    assert "pan" not in (tmp_path / "dmx.csv").read_text()
+    completed = run(tmp_path, *command, "--positions")
+    assert completed.returncode == 0, completed.stderr
+    assert "'101 PAR 1' has no pan and tilt: turn it by" in completed.stderr
+    with (tmp_path / "dmx.csv").open(newline="") as file:
+        rows = {(x["light"], x["emitter"]): x for x in csv.DictReader(file)}
+    pan, tilt = (int(rows["201 Wash 1", x]["value"]) / 65535 for x in ("pan", "tilt"))
+    assert (rows["201 Wash 1", "pan"]["channels"], rows["201 Wash 1", "pan"]["drive"]) == (
+        "1 2",
+        "",
+    )
+    # Pan goes from 270° down to −270°, tilt from −130° to 130°; a level is 0.01°.
+    assert 270 - 540 * pan == pytest.approx(-90, abs=0.01)
+    assert -130 + 260 * tilt == pytest.approx(45, abs=0.01)
+
+
 #: A program with a rig of its own: `send` in a process that signals reach.
 PROGRAM = """
 import sys
@@ -371,6 +406,80 @@ def test_cues_of_several_looks(folder: Path) -> None:
     assert dimmer == pytest.approx(128 / 255, abs=0.5 / 65535)
     assert dimmer * green == pytest.approx(0.5, abs=1 / 65535)
     assert all(int(x["value"]) == 0 for x in rows[12:])
+
+
+def kept_session(folder: Path, looks: list[dict[str, Any]]) -> Path:
+    """A session of a painter with looks, in its folder."""
+    identity = Identity("hall.xml", "0", ("left", "right"), (ViewIdentity("", (2, 2)),))
+    with Store.open(folder / "hall.paint" / "session.db", identity) as store:
+        for k, fields in enumerate(looks, start=1):
+            store.put_look(StoredLook(k, fields, {"weights": np.zeros((2, 3))}))
+    return folder / "hall.paint"
+
+
+def test_each_look_of_a_session_is_a_cue(folder: Path) -> None:
+    drives = {name: dict(zip(COLORS, x, strict=True)) for name, x in DRIVES.items()}
+    dark = {"left": dict.fromkeys(COLORS, 0.0)}
+    looks = [
+        {"name": "dusk", "drives": drives},
+        {"name": "a console's", "drives": drives, "is_proposal": True},
+        {"name": "night", "drives": dark},
+    ]
+    session = kept_session(folder, looks)
+    command = ("--to", "cues", "--rig", "show.mvr", "--fade", "2s", "--force")
+    succeed(folder, "export", "hall.paint", *command)
+    with (session / "cues.csv").open(newline="") as file:
+        rows = list(csv.DictReader(file))
+    assert [(x["cue"], x["label"]) for x in rows[::8]] == [("1", "dusk"), ("2", "night")]
+    assert not any(int(x["value"]) for x in rows[8:])
+    # The same cue as of an answer with these drives.
+    succeed(folder, "export", "lighting.json", *command, "-o", "out")
+    with (folder / "out" / "cues.csv").open(newline="") as file:
+        answer = [{**x, "label": "dusk"} for x in csv.DictReader(file)]
+    assert rows[:8] == answer
+    # Sessions and answers in one list, in their order.
+    sources = ("lighting.json", "hall.paint/session.db")
+    succeed(folder, "export", *sources, *command, "-o", "out")
+    with (folder / "out" / "cues.csv").open(newline="") as file:
+        labels = [x["label"] for x in csv.DictReader(file)][::8]
+    assert labels[1:] == ["dusk", "night"]
+
+
+def test_sessions_that_make_no_cues_are_refused_in_one_line(folder: Path) -> None:
+    command = ("export", "hall.paint/session.db", "--to")
+    cues = ("cues", "--rig", "show.mvr")
+    assert "no such session: hall.paint/session.db" in run_refused(folder, *command, *cues)
+    kept_session(folder, [])
+    assert "session.db has no looks: keep some" in run_refused(folder, *command, *cues)
+    kept_session(folder, [{"name": "dusk"}])
+    refusal = run_refused(folder, *command, *cues)
+    assert "has no drives of the look 'dusk': open it in the painter once" in refusal
+    assert "csv takes a lighting.json" in run_refused(folder, *command, "csv")
+    (folder / "other.db").write_bytes(b"SQLite")
+    refusal = run_refused(folder, "export", "other.db", "--to", *cues)
+    assert "other.db is not a session of the painter" in refusal
+    with Store.open(folder / "hall.paint" / "session.db", None):
+        assert "is in use: end the painter" in run_refused(folder, *command, *cues)
+    assert not list(folder.rglob("cues.csv"))
+
+
+def test_pan_and_tilt_are_in_cues_that_have_places(tmp_path: Path) -> None:
+    pose = {"target": [-2.6, 4.4, 4.1], "position": [-2.6, 3.4, 5.1]}
+    drives = {"201 Wash 1": {"red": 0.5}}
+    look = {"name": "out", "drives": drives, "wishes": {"poses": {"201 Wash 1": pose}}}
+    kept_session(tmp_path, [look])
+    command = ("export", "hall.paint", "--to", "cues", "--rig", SHOW, "--force")
+    values = {}
+    for options in ((), ("--positions",)):
+        succeed(tmp_path, *command, *options)
+        with (tmp_path / "hall.paint" / "cues.csv").open(newline="") as file:
+            values = {(x["fixture"], x["channel"]): int(x["value"]) for x in csv.DictReader(file)}
+        assert (("201", "Pan") in values) == bool(options)
+    # Towards +y, as `send` has it.
+    assert 270 - 540 * values["201", "Pan"] / 65535 == pytest.approx(-90, abs=0.01)
+    assert -130 + 260 * values["201", "Tilt"] / 65535 == pytest.approx(45, abs=0.01)
+    line = run_refused(tmp_path, "export", "a.json", "--to", "csv", "--positions")
+    assert "--positions belongs to cues" in line
 
 
 def test_cues_go_beside_other_forms(folder: Path) -> None:

@@ -91,6 +91,7 @@ def test_a_lights_file_holds_lights_and_the_render_confirms_it(room: Path, tmp_p
     assert look.verification.agrees
 
 
+@pytest.mark.nightly
 def test_every_option_from_a_saved_basis(room: Path, tmp_path: Path) -> None:
     options = ["--lock", "panel=#ffaa66 2", "--limit", "bulb=0.1:40%", "--tie", "sun,sky"]
     options += ["--color", "beam=1,0.5,0.25", "--prefer-current", "0.01"]

@@ -3,6 +3,7 @@
 import argparse
 from collections.abc import Iterator
 from dataclasses import dataclass, fields
+from functools import cache
 from typing import Annotated, Any, Literal
 
 import pytest
@@ -27,10 +28,16 @@ WITHOUT = {
 DECLARED = [x for record in RECORDS for x in options_of(record).values()]
 
 
+@cache
+def commands() -> list[argparse.ArgumentParser]:
+    """The parsers of all commands, made once."""
+    [found] = (x for x in command_parser()._actions if isinstance(x, argparse._SubParsersAction))
+    return list(found.choices.values())
+
+
 def actions_of(field: str) -> Iterator[argparse.Action]:
     """The options of all commands that set a field."""
-    [commands] = (x for x in command_parser()._actions if isinstance(x, argparse._SubParsersAction))
-    for command in commands.choices.values():
+    for command in commands():
         yield from (x for x in command._actions if x.dest == field)
 
 

@@ -59,6 +59,7 @@ def contents(folder: Path) -> dict[str, bytes]:
     }
 
 
+@pytest.mark.nightly
 def test_a_full_cache_costs_no_answer(small_disk: tuple[Path, str], tmp_path: Path) -> None:
     disk, before = small_disk
     arguments: tuple[object, ...] = ("solve", CORNELL, WARM, "--spp", 4, "--no-verify")
@@ -90,6 +91,7 @@ def cache(tmp_path_factory: pytest.TempPathFactory) -> str:
     return str(folder / "cache")
 
 
+@pytest.mark.nightly
 @pytest.mark.parametrize("earlier", [True, nightly(False)])
 def test_a_full_disk_leaves_earlier_results_as_they_were(
     small_disk: tuple[Path, str], tmp_path: Path, cache: str, earlier: bool
@@ -112,6 +114,7 @@ def test_a_full_disk_leaves_earlier_results_as_they_were(
     assert list(disk.rglob(".*")) == []
 
 
+@pytest.mark.nightly
 def test_a_full_disk_leaves_an_earlier_basis(small_disk: tuple[Path, str], tmp_path: Path) -> None:
     disk, before = small_disk
     path = disk / "room.basis.exr"

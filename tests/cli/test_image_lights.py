@@ -89,6 +89,7 @@ def test_a_larger_map_is_what_mitsuba_interpolates(solved: Path) -> None:
     assert "the map size is 2x2: expected at least 4x3, a pixel for each texel of 'sky'" in error
 
 
+@pytest.mark.nightly
 def test_the_report_of_a_smaller_basis_reads_the_image_where_it_is(solved: Path) -> None:
     """Features of the larger film are rendered before the results are in their folder."""
     small = "--resolution", "1/2", "--spp", 8

@@ -93,7 +93,7 @@ def uninterrupted(
 @pytest.mark.parametrize(
     "signals",
     [
-        (signal.SIGINT, signal.SIGKILL),
+        nightly((signal.SIGINT, signal.SIGKILL)),
         nightly((signal.SIGKILL,)),
         nightly((signal.SIGKILL, signal.SIGINT)),
         nightly((signal.SIGINT,) * 2),
@@ -149,9 +149,9 @@ def test_stopped_and_gone_on_is_as_if_never_stopped(
     ("method", "number", "delay_s"),
     [
         (ONE_PASS, signal.SIGINT, 0),
-        (ONE_PASS, signal.SIGTERM, 0.1),
-        (ONE_PASS, signal.SIGHUP, 0.1),
-        (SEPARATE, signal.SIGINT, 0.1),
+        nightly(ONE_PASS, signal.SIGTERM, 0.1),
+        nightly(ONE_PASS, signal.SIGHUP, 0.1),
+        nightly(SEPARATE, signal.SIGINT, 0.1),
         nightly(ONE_PASS, signal.SIGINT, 0.1),
         nightly(SEPARATE, signal.SIGINT, 0),
         nightly(SEPARATE, signal.SIGTERM, 0.1),
@@ -224,6 +224,7 @@ def _ignoring(*numbers: signal.Signals) -> None:
         signal.signal(number, signal.SIG_IGN)
 
 
+@pytest.mark.nightly
 def test_what_a_script_starts_in_its_background_hears_ctrl_c(tmp_path: Path) -> None:
     """Its shell has it ignored; what `nohup` has ignored stays ignored."""
     room = write_room(tmp_path, lights=LIGHTS["bulb"])

@@ -23,7 +23,7 @@ def stage(request: pytest.FixtureRequest, tmp_path_factory: pytest.TempPathFacto
         nightly(wait_for_seconds(0.5), signal.SIGKILL),
         (wait_for_staging(0.0), signal.SIGTERM),
         nightly(wait_for_staging(0.2), signal.SIGKILL),
-        (wait_for_record, signal.SIGKILL),
+        nightly(wait_for_record, signal.SIGKILL),
     ],
 )
 def test_the_earlier_or_the_new(

@@ -23,6 +23,7 @@ from light_groups import interleaved, pictures
 from nightly import nightly
 from patience import PATIENCE_S
 from raw_message import RawMessage
+from rig_files import EXAMPLE
 from server_key import key_of, offered
 from websockets.exceptions import ConnectionClosedError
 from websockets.sync.client import ClientConnection, connect
@@ -143,6 +144,8 @@ def test_several_views_are_named_by_sensors_or_are_bases(make_basis: Any) -> Non
         ("room.basis.exr --layers none.ora", r"none\.ora"),
         ("room.basis.exr --layers room.basis.exr", "does not say what its layers mean"),
         ("room.basis.exr --port 70000", "70000"),
+        ("room.basis.exr --rig a.mvr --positions", "--positions belongs to what is sent"),
+        (f"room.basis.exr --rig {EXAMPLE}", "none of the lights has emitters, so that nothing"),
         ("room.basis.exr -o room.basis.exr", "cannot write"),
     ],
 )
@@ -268,6 +271,7 @@ def test_a_program_connects_by_one_line_or_by_a_file_of_its_owner(work_folder: P
         assert file.exists() == (ends == signal.SIGKILL)
 
 
+@pytest.mark.nightly
 def test_the_observer_of_the_document_hears_the_state(work_folder: Path) -> None:
     text = (Path(__file__).parents[2] / "docs" / "protocol.md").read_text(encoding="utf-8")
     [code] = re.findall(r"```python\n(.*?)```", text, re.DOTALL)
@@ -284,6 +288,7 @@ def test_the_observer_of_the_document_hears_the_state(work_folder: Path) -> None
                 observer.kill()
 
 
+@pytest.mark.nightly
 @pytest.mark.parametrize("second", [signal.SIGINT, nightly(signal.SIGTERM)])
 def test_who_asks_twice_for_the_end_gets_one(work_folder: Path, second: signal.Signals) -> None:
     with start_painting(work_folder, "room.basis.exr") as (process, url), connect_page(url):
@@ -350,6 +355,7 @@ def test_what_was_answered_is_there_after_a_kill(work_folder: Path) -> None:
         assert greet(socket)["history"]["undo"] == ["mine"]
 
 
+@pytest.mark.nightly
 def test_a_message_that_no_page_would_send_costs_its_sender_the_connection(
     work_folder: Path,
 ) -> None:
@@ -366,11 +372,12 @@ def test_a_message_that_no_page_would_send_costs_its_sender_the_connection(
             assert socket.protocol.extensions == []  # nothing is compressed
 
 
+@pytest.mark.nightly
 @pytest.mark.parametrize(
     ("host", "open_to"),
     [
         ("127.0.0.2", "programs of this machine, and nobody else, can reach"),
-        ("0.0.0.0", "other machines can reach the painter at every address of this one"),
+        nightly("0.0.0.0", "other machines can reach the painter at every address of this one"),
     ],
 )
 def test_a_host_is_told_what_it_means_and_a_closed_terminal_ends_it(

@@ -81,7 +81,7 @@ painting = "template/warm.png"
 """
 
 
-@pytest.mark.parametrize("source", ["light_groups = 'shot.exr'", "basis = 'b.basis.exr'"])
+@pytest.mark.parametrize("source", ["light_groups = 'shot.exr'", nightly("basis = 'b.basis.exr'")])
 def test_a_batch_takes_paintings_beside_a_template_without_optional_files(
     shot: Path, tmp_path: Path, source: str
 ):

@@ -9,6 +9,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from rig_files import channel, fixture, gdtf, layered, write_mvr
 
+from lightpaint.colour.color import cct_and_duv
 from lightpaint.dmx.color_mixing import can_invert
 from lightpaint.dmx.console_rig import (
     ConsoleRig,
@@ -18,8 +19,10 @@ from lightpaint.dmx.console_rig import (
     RigFixture,
     RigLight,
 )
+from lightpaint.dmx.gdtf.emitter_colour import rgb_of_xy, xy_of_kelvin
 from lightpaint.dmx.levels import decode_levels, encode_levels
 from lightpaint.dmx.mvr import read_rig
+from lightpaint.dmx.rig_scene import lights_text
 
 #: Half a step of 16 bits, over the steepest of the curves and filters here.
 ROUNDING = 1e-3
@@ -107,6 +110,96 @@ def test_what_emitters_mix_comes_back_through_curves_and_dimmers(
     )
     made = replace(one, channels=tuple(channels), lights=(replace(light, emitters=emitters),))
     assert np.allclose(sent(ConsoleRig("a", (made,)), drives), drives, atol=1e-4)
+
+
+def whites(tmp_path: Path, function: str, more: str = "", beam: str = "") -> ConsoleRig:
+    """A lamp of one colour with a dimmer and a colour temperature of 16 bits each."""
+    channels = channel("Dimmer", "1,2") + channel("CTO", "3,4", function=function) + more
+    geometry = (
+        '<Geometry Name="Body"><Beam Name="Beam" LuminousFlux="5000" BeamAngle="30" '
+        f'FieldAngle="45" PowerConsumption="300" ColorTemperature="6500" {beam}/></Geometry>'
+    )
+    data = gdtf(channels, geometries=geometry, described="")
+    return read_rig(write_mvr(tmp_path / "a.mvr", layered(fixture()), lamp=data))
+
+
+@pytest.mark.parametrize(
+    "function",
+    [
+        'PhysicalFrom="6500" PhysicalTo="2800"',
+        'PhysicalFrom="2800" PhysicalTo="6500"',
+        'PhysicalFrom="2800" PhysicalTo="6500" DMXInvert="Yes"',
+    ],
+)
+def test_a_colour_temperature_mixes_its_coolest_and_its_warmest_white(
+    function: str, tmp_path: Path
+) -> None:
+    rig = whites(tmp_path, function)
+    [light] = rig.fixtures[0].lights
+    assert [x.name for x in light.emitters] == ["cool white", "warm white"]
+    for emitter, kelvin in zip(light.emitters, (6500, 2800), strict=True):
+        assert np.allclose(emitter.xy, xy_of_kelvin(kelvin))
+        assert emitter.watts == 300
+    # A filter to 2800 K lets all the red through. Of 6500 K, red has 1/1.93 of what 2800 K has at
+    # equal luminance (Planck's law in Rec.709).
+    cool, warm = (x.candela for x in light.emitters)
+    reds = [rgb_of_xy(x.xy)[0] for x in light.emitters]
+    assert warm / cool == pytest.approx(reds[0] / reds[1])
+    assert 0.5 < warm / cool < 0.6
+    # Of one dimmer: drives of 1 together.
+    assert "power_share = 0.5" in lights_text(rig, 100)
+
+
+@given(total=SHARES, share=SHARES)
+def test_drives_of_whites_come_back_from_dimmer_and_temperature(
+    whites_rig: ConsoleRig, total: float, share: float
+) -> None:
+    wanted = {"cool white": total * (1 - share), "warm white": total * share}
+    levels = encode_levels(whites_rig, {"1 PAR": wanted})
+    found = decode_levels(whites_rig, levels)["1 PAR"]
+    # Steps of 16 bits, of which one of the temperature is up to 1/20000 of the mix.
+    assert np.allclose([*found.values()], [*wanted.values()], atol=2e-4)
+
+
+@pytest.fixture(scope="module")
+def whites_rig(tmp_path_factory: pytest.TempPathFactory) -> ConsoleRig:
+    return whites(tmp_path_factory.mktemp("rig"), 'PhysicalFrom="6500" PhysicalTo="2800"')
+
+
+def test_the_temperature_sent_is_that_of_the_mix(whites_rig: ConsoleRig) -> None:
+    [light] = whites_rig.fixtures[0].lights
+    for share in (0.0, 0.25, 0.6, 1.0):
+        drives = {"cool white": 0.5 * (1 - share), "warm white": 0.5 * share}
+        levels = encode_levels(whites_rig, {"1 PAR": drives})[1]
+        dimmer, place = (int.from_bytes(levels[k : k + 2], "big") / 65535 for k in (0, 2))
+        mix = sum(
+            d * x.candela * rgb_of_xy(x.xy)
+            for d, x in zip(drives.values(), light.emitters, strict=True)
+        )
+        found = cct_and_duv(mix)
+        assert found is not None
+        # In mireds, between 65 points of a table.
+        assert 1e6 / (6500 - place * 3700) == pytest.approx(1e6 / found[0], abs=0.1)
+        assert dimmer == pytest.approx(0.5, abs=1e-4)
+
+
+@pytest.mark.parametrize(
+    ("function", "more"),
+    [
+        ('PhysicalFrom="0" PhysicalTo="1"', ""),
+        ("", ""),
+        (
+            'PhysicalFrom="6500" PhysicalTo="2800"',
+            channel("ColorAdd_R", "5") + channel("ColorAdd_G", "6"),
+        ),
+    ],
+)
+def test_temperatures_without_kelvin_or_beside_emitters_rest(
+    function: str, more: str, tmp_path: Path
+) -> None:
+    [light] = whites(tmp_path, function, more).fixtures[0].lights
+    assert light.whites == ()
+    assert "cool white" not in [x.name for x in light.emitters]
 
 
 def _types() -> dict[str, bytes]:

@@ -273,6 +273,89 @@ def test_emitters_that_were_measured_at_several_levels_have_a_curve() -> None:
     assert emitter.curve == ((0.0, 0.0), (0.5, 0.75), (1.0, 1.0))
 
 
+def _named_rgb(described: str, function: str = "") -> FixtureMode:
+    channels = "".join(
+        channel(f"ColorRGB_{x}", str(k + 1), function=function.format(x))
+        for k, x in enumerate(("Red", "Green", "Blue"))
+    )
+    return read_mode(gdtf(channels, described=described))
+
+
+def _sum_of(mode: FixtureMode) -> tuple[float, float]:
+    """The chromaticity of all emitters at full."""
+    xyz = np.sum(
+        [
+            x.candela * np.array([x.xy[0], x.xy[1], 1 - sum(x.xy)]) / x.xy[1]
+            for x in mode.lights[0].emitters
+        ],
+        axis=0,
+    )
+    return float(xyz[0] / xyz.sum()), float(xyz[1] / xyz.sum())
+
+
+CUSTOM = (
+    '<{0} Mode="Custom" Red="0.68,0.32,1" Green="0.26,0.69,1" Blue="0.15,0.06,1" '
+    'WhitePoint="0.35,0.36,1"/>'
+)
+
+
+@pytest.mark.parametrize(
+    ("described", "function", "red", "white"),
+    [
+        ("", "", (0.64, 0.33), (0.3127, 0.3290)),
+        ('<ColorSpace Mode="sRGB"/>', "", (0.64, 0.33), (0.3127, 0.3290)),
+        ('<ColorSpace Mode="ProPhoto"/>', "", (0.7347, 0.2653), (0.3457, 0.3585)),
+        ('<ColorSpace Mode="ANSI"/>', "", (0.7347, 0.2653), (0.4254, 0.4044)),
+        (CUSTOM.format("ColorSpace"), "", (0.68, 0.32), (0.35, 0.36)),
+        (
+            '<ColorSpace Mode="ANSI"/><AdditionalColorSpaces>'
+            + CUSTOM.format('ColorSpace Name="own"')
+            + "</AdditionalColorSpaces>",
+            'ColorSpace="own"',
+            (0.68, 0.32),
+            (0.35, 0.36),
+        ),
+    ],
+)
+def test_named_colours_are_those_of_the_files_space(
+    described: str, function: str, red: tuple[float, float], white: tuple[float, float]
+) -> None:
+    mode = _named_rgb(described, function)
+    assert [x.name for x in mode.lights[0].emitters] == ["red", "green", "blue"]
+    assert [x.channels for x in mode.lights[0].emitters] == [(0,), (1,), (2,)]
+    assert mode.lights[0].emitters[0].xy == pytest.approx(red)
+    assert _sum_of(mode) == pytest.approx(white, abs=1e-4)  # of a blue that is moved to y = 0.002
+
+
+def test_named_colours_are_emitters_where_the_file_has_those() -> None:
+    three = "".join(
+        f'<Emitter Name="{name}" Color="{color}"/>'
+        for name, color in (
+            ("Blue", "0.14,0.05,7"),
+            ("Red", "0.7,0.29,21"),
+            ("Green", "0.17,0.7,62"),
+        )
+    )
+    space = '<ColorSpace Mode="ANSI"/>'
+    expected = [(0.7, 0.29), (0.17, 0.7), (0.14, 0.05)]
+    alone = _named_rgb(f"{space}<Emitters>{three}</Emitters>")
+    white = '<Emitter Name="White" Color="0.32,0.33,90"/>'
+    linked = _named_rgb(f"{space}<Emitters>{three}{white}</Emitters>", 'Emitter="{}"')
+    for mode in (alone, linked):
+        assert [x.xy for x in mode.lights[0].emitters] == expected
+    shares = [x.candela for x in alone.lights[0].emitters]
+    assert np.allclose(np.array(shares) / sum(shares), np.array([21, 62, 7]) / 90)
+    # Beside others, nothing says that red means the red LEDs.
+    beside = _named_rgb(f"{space}<Emitters>{RGBW}</Emitters>")
+    assert beside.lights[0].emitters[0].xy == (0.7347, 0.2653)
+
+
+def test_a_space_whose_colours_lie_on_a_line_is_one_line() -> None:
+    line = CUSTOM.format("ColorSpace").replace("0.26,0.69", "0.415,0.19")
+    with pytest.raises(RigError, match="lie on a line"):
+        _named_rgb(line)
+
+
 def test_what_changes_the_colour_and_stays_at_rest_is_named() -> None:
     more = channel("CTO", "6", default="17/1") + channel("Color1", "7") + channel("Gobo1", "8")
     mode = read_mode(gdtf(RGBW_CHANNELS + more))

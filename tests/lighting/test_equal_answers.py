@@ -52,6 +52,7 @@ def _emissions(text: bytes) -> Any:
     return np.array([light["emission"] for light in json.loads(text)["lights"].values()])
 
 
+@pytest.mark.nightly
 def test_equal_commands_have_equal_answers_and_other_kernels_nearly_so(folder: Path):
     blas, kernel = linear_algebra()
     lighting_text = _solve_apart(folder, "here")

@@ -82,6 +82,7 @@ def _live_answer(basis: Basis, target: lp.Target) -> Any:
     return live.answer(live.answer(basis.current_weights))
 
 
+@pytest.mark.nightly
 @pytest.mark.parametrize("name", [name if name == "cornell" else nightly(name) for name in FILMS])
 def test_no_answer_is_worse_than_none(name: str):
     scene = lp.load_scene(SCENES / name / "scene.xml").reduced(FILMS[name])

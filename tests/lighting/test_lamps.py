@@ -15,7 +15,9 @@ from lightpaint.lighting.analysis.analysis import analyse
 from lightpaint.lighting.answer.lighting_file import read_lighting, write_lighting
 from lightpaint.lighting.constraints.constraints import Constraints
 from lightpaint.lighting.constraints.constraints_file import read_constraints
+from lightpaint.lighting.constraints.light_patterns import constraints_by_light
 from lightpaint.lighting.solve import solve
+from lightpaint.lighting.unknowns.reduction import reduce_to
 from lightpaint.target.target import Target
 
 SIZE = (5, 4)
@@ -114,6 +116,20 @@ def test_a_colour_is_mixed_as_bright_as_the_emitters_can(make_basis):
     assert np.allclose(light.lamp.mix(np.array([*light.drives.values()])), light.emission)
 
 
+def test_lamps_of_one_pattern_are_read_once(make_basis):
+    """A rig has hundreds of them."""
+    lights = {f"par {k}": {} for k in range(4)}
+    basis, _, _ = _case(make_basis, 1, **lights)
+    more = {"par 3": {"limits": {"max": 2.0}}}
+    constraints = Constraints.of({"par *": {"emitters": RGBW}} | more)
+    by_light = constraints_by_light(constraints, basis.lights)
+    assert by_light[0] is by_light[1] is by_light[2]
+    assert by_light[3].most is not None
+    lamps = reduce_to(constraints, basis.lights).lamps
+    assert lamps[0] is lamps[1] is lamps[2]
+    assert lamps[3] == lamps[0]
+
+
 def test_preferences_change_the_drives_and_not_the_picture(make_basis):
     basis, target, constraints = _case(make_basis, 2, wash={"emitters": SIX})
     answers = {
@@ -144,6 +160,12 @@ def test_candelas_and_lumens_are_of_the_scale(make_basis):
         constraints = Constraints.of({"par": {"emitters": emitters}}, cd_per_unit=1000)
         lamp = solve(basis, target, constraints=constraints).problem.reduction.lamps[0]
         assert lamp.columns @ [0.2126, 0.7152, 0.0722] == pytest.approx([level], rel=1e-3)
+
+
+def test_a_scale_alone_is_kept(make_basis):
+    basis, target, _ = _case(make_basis, 0, a={})
+    answer = solve(basis, target, constraints=Constraints.of(cd_per_unit=1000)).lighting
+    assert answer.cd_per_unit == 1000
 
 
 def test_a_narrow_spectrum_has_the_colour_of_its_wavelength(make_basis):
@@ -215,6 +237,8 @@ WRONG = {
     "a name twice": ({"emitters": [RGBW[0], RGBW[0]]}, "two emitters named 'red'"),
     "no name": ({"emitters": [{"xy": RED, "cd": 1}]}, "has no name: give it one"),
     "unknown": ({"emitters": [{**RGBW[0], "nm": 630}]}, "has the key 'nm'"),
+    "misspelt": ({"emitters": [{**RGBW[0], "wats": 3}]}, "did you mean 'watts'"),
+    "misspelt above": ({"emiters": RGBW}, "did you mean 'emitters'"),
     "too many": (
         {"emitters": [{**RGBW[0], "name": str(k)} for k in range(11)]},
         "at most 10 can be mixed",
@@ -267,6 +291,17 @@ IMPOSSIBLE = {
         "for a light that mixes emitters",
     ),
 }
+
+
+def test_a_lock_that_is_out_of_range_says_what_the_lamp_reaches(make_basis):
+    basis, target, lamp = _case(make_basis, 1, par={"emitters": [{"name": "w", "rgb": [1, 2, 3]}]})
+    for lock, message in (
+        ([2.0, 4.0, 6.0], r"in this colour they reach 1 2 3, a level of 1\.86; lock it at that"),
+        ([1.0, 0.0, 0.0], "they have no light of this colour, and all together reach 1 2 3"),
+    ):
+        held = lamp.and_then(Constraints.of({"par": {"lock": lock}}))
+        with pytest.raises(ConstraintError, match=message):
+            solve(basis, target, constraints=held)
 
 
 @pytest.mark.parametrize("case", IMPOSSIBLE)

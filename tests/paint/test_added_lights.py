@@ -28,7 +28,7 @@ def names(moving: MovingStudio) -> tuple[str, ...]:
     return moving.studio.session.basis.names
 
 
-@pytest.mark.parametrize("kind", ["spot", nightly("point"), "panel"])
+@pytest.mark.parametrize("kind", ["spot", nightly("point"), nightly("panel")])
 def test_an_added_light_has_the_plane_of_its_place(moving: MovingStudio, kind: Any) -> None:
     """At once about, and rendered soon; the other planes and the current look stay."""
     session = moving.studio.session
@@ -55,6 +55,7 @@ def test_an_added_light_has_the_plane_of_its_place(moving: MovingStudio, kind: A
     assert 0.1 < state.answer.lights[-1].share < 0.6
 
 
+@pytest.mark.nightly
 def test_the_painting_finds_a_light_that_is_missing(moving: MovingStudio) -> None:
     """The painting is the look with one light more; the search shows what it tries."""
     new_light = lp.NewEmitter(
@@ -162,6 +163,7 @@ def test_an_added_light_moves_is_named_anew_and_goes(moving: MovingStudio) -> No
     assert names(moving) == (*before, "point_2")
 
 
+@pytest.mark.nightly
 @pytest.mark.usefixtures("without_reasons")
 def test_added_lights_are_solved_for_exported_and_verified(moving: MovingStudio) -> None:
     add_light(moving, protocol.AddLight("spot", position=AIR))
@@ -203,6 +205,7 @@ def test_lights_that_cannot_be_added_or_removed(
     assert (moving.studio.session.version, names(moving)) == (version, before)
 
 
+@pytest.mark.nightly
 @pytest.mark.usefixtures("without_reasons")
 def test_a_drag_is_answered_and_ends_a_search_which_moves_nothing(
     moving: MovingStudio,
@@ -221,6 +224,7 @@ def test_a_drag_is_answered_and_ends_a_search_which_moves_nothing(
     assert set(moving.studio.session.requests.placed) == {"bulb"}
 
 
+@pytest.mark.nightly
 def test_undo_and_removal_while_a_plane_renders(moving: MovingStudio) -> None:
     before = names(moving)
     for last in (protocol.Undo(), protocol.RemoveLight("spot_1")):

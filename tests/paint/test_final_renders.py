@@ -111,6 +111,7 @@ def test_a_page_that_opens_later_finds_the_renders_and_their_files(moving: Movin
     assert png.exists()
 
 
+@pytest.mark.nightly
 @pytest.mark.usefixtures("without_reasons")
 def test_renders_are_listed_again_by_a_painter_that_is_started_anew(
     moving: MovingStudio, tmp_path: Path

@@ -10,6 +10,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from layered_sessions import SIZES, RandomEditor, identity_of, open_session, random_mask
+from nightly import examples
 from renderer import REPOSITORY
 
 import lightpaint as lp
@@ -255,7 +256,7 @@ def test_what_no_gradient_can_be_is_refused(fields: Any, text: str) -> None:
 # A session
 
 
-@settings(max_examples=12)
+@settings(max_examples=examples(4, 12))
 @given(seed=st.integers(0, 10**6))
 def test_whatever_the_hand_did_the_target_is_that_of_the_layers_built_afresh(seed: int) -> None:
     hand = RandomEditor(seed)

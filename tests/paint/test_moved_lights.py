@@ -84,6 +84,7 @@ def test_a_moved_light_has_the_plane_of_its_place(moving: MovingStudio) -> None:
     assert np.array_equal(session.basis.current_look, look)
 
 
+@pytest.mark.nightly
 def test_a_drag_computes_every_few_pixels_of_a_light_and_all_of_them_once_asked(
     moving: MovingStudio,
 ) -> None:
@@ -115,6 +116,7 @@ def test_a_drag_computes_every_few_pixels_of_a_light_and_all_of_them_once_asked(
     assert np.abs(drag(POSITION, 1) - whole).max() < 1e-5 * scale
 
 
+@pytest.mark.nightly
 def test_a_panel_of_the_scene_is_dragged_with_its_outline(moving: MovingStudio) -> None:
     """On release its plane is rendered with its shape, which its place in the file follows."""
     site = moving.scene.light("panel").members[0].site
@@ -133,6 +135,7 @@ def test_a_panel_of_the_scene_is_dragged_with_its_outline(moving: MovingStudio) 
     assert scene.light("panel").members[0].site.position == pytest.approx(position)
 
 
+@pytest.mark.nightly
 def test_a_receiver_with_a_lock_may_change_the_session_while_it_is_sent_planes(
     moving: MovingStudio,
 ) -> None:
@@ -154,6 +157,7 @@ def test_a_receiver_with_a_lock_may_change_the_session_while_it_is_sent_planes(
     moving.rendered()
 
 
+@pytest.mark.nightly
 def test_undo_looks_and_the_file_know_places(moving: MovingStudio) -> None:
     session, at_rest = moving.studio.session, moving.plane("bulb")
     moving.send(protocol.MoveLights({"bulb": {"position": POSITION}}))
@@ -443,6 +447,7 @@ def paint_moved_bulb(moving: MovingStudio, position: tuple[float, float, float])
     )
 
 
+@pytest.mark.nightly
 @pytest.mark.usefixtures("without_reasons")
 def test_a_search_ends_with_the_best_so_far_and_leaves_a_note(
     dim_room: MovingStudio, monkeypatch: pytest.MonkeyPatch
@@ -517,6 +522,7 @@ def test_what_cannot_be_placed_is_said(moving: MovingStudio) -> None:
         moving.send(protocol.PlaceLights())
 
 
+@pytest.mark.nightly
 def test_what_comes_no_closer_to_the_eye_is_not_done(
     dim_room: MovingStudio, monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -591,6 +597,7 @@ def test_looks_with_lights_in_different_places_are_not_mixed(moving: MovingStudi
         moving.send(protocol.CompareLooks((7,)))
 
 
+@pytest.mark.nightly
 def test_a_mix_of_moved_looks_has_a_thumbnail_of_their_places(moving: MovingStudio) -> None:
     moving.send(protocol.MoveLights({"bulb": {"position": POSITION}}))
     moving.rendered()

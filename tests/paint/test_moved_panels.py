@@ -20,6 +20,7 @@ from lightpaint.scene.scene_reader import load_scene
 POSE = {"position": [-0.4, 0.6, 0.4], "target": [0.1, 0.0, 0.2]}
 
 
+@pytest.mark.nightly
 @pytest.mark.usefixtures("without_reasons")
 def test_a_moved_panel_is_solved_for_where_it_hangs(moving: MovingStudio) -> None:
     """Plain Mitsuba makes of relit.xml what is predicted, with the shadow that is new."""

@@ -5,7 +5,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from nightly import seeds
+from nightly import nightly, seeds
 
 from lightpaint.colour.display.view_transform import ViewTransform
 from lightpaint.images.object_map import Objects
@@ -74,10 +74,10 @@ def judged(session: SessionSnapshot) -> Analysis:
     return analysis
 
 
-CASES: list[tuple[str, dict[str, Any]]] = [
+CASES: list[Any] = [
     ("hold", {"hold": 30.0}),
-    ("colors", {"hold": 0.01, "colors": "white", "tint": 2.0}),
-    (
+    nightly("colors", {"hold": 0.01, "colors": "white", "tint": 2.0}),
+    nightly(
         "limits",
         {"hold": 0.01, "colors": "free", "constraints": {"left": {"limits": {"max": 0.02}}}},
     ),

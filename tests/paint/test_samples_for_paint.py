@@ -88,6 +88,7 @@ def test_paint_is_answered_as_surely_as_was_asked_for(subject: Subject):
         studio.wait()
 
 
+@pytest.mark.nightly
 def test_planes_with_added_samples_are_denoised_anew(
     subject: Subject, monkeypatch: pytest.MonkeyPatch
 ):

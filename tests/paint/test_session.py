@@ -4,6 +4,7 @@ import re
 from collections.abc import Callable
 from contextlib import suppress
 from dataclasses import replace
+from itertools import count
 from typing import Any
 
 import numpy as np
@@ -22,6 +23,7 @@ from lightpaint.lighting.answer.combination import dimmed
 from lightpaint.lighting.constraints.constraints import Constraints
 from lightpaint.lighting.fit import DEFAULT_HOLD
 from lightpaint.paint import protocol
+from lightpaint.paint.session.live_drives import LiveDrives
 from lightpaint.paint.session.look_library import LookLibrary
 from lightpaint.paint.session.picture_table import PictureTable
 from lightpaint.paint.session.session import Session
@@ -130,6 +132,30 @@ def test_lamps_of_emitters_show_their_drives(basis: lp.Basis):
     assert ((drives >= 0) & (drives <= 1)).all()
     lamp = session.live_answer.lamps[1]
     np.testing.assert_allclose(lamp.mix(drives), session.weights[1], atol=1e-5)
+
+
+def test_drives_come_during_a_stroke_and_cost_little_of_its_time(basis: lp.Basis):
+    emitters = [{"name": "red", "xy": [0.7, 0.299], "Y": 1.0}, {"name": "w", "rgb": [1, 1, 1]}]
+    keys = {"light": {basis.names[1]: {"emitters": emitters}}}
+    session = session_of(basis.with_requests(SceneRequests(keys, "hall.lights.toml")))
+    [first] = session.handle(*paint(1, (2, 9, 3, 12), 0.9, is_final=False))
+    assert isinstance(first, protocol.AnswerUpdate)
+    assert first.drives is not None
+    lamp = session.live_answer.lamps[1]
+    assert first.drives == (None, tuple(lamp.drives_for(session.weights[1])), None)
+    # An exact answer has them with all that is known of its lights.
+    [last] = session.handle(*paint(1, (2, 9, 3, 12), 0.9))
+    assert isinstance(last, protocol.AnswerUpdate)
+    assert last.drives is None
+    # Each reading of this clock takes 20 ms: that is what drives cost.
+    now = count(0.0, 0.02)
+    pace = LiveDrives(lambda: next(now))
+    lamps, weights = session.live_answer.lamps, session.weights
+    taken = [pace.take(lamps, weights) is not None for _ in range(100)]
+    assert taken[0]
+    # 20 ms of every 420 at most, and of readings between them each is 20 ms.
+    assert 1 < sum(taken) <= 100 * 0.02 / 0.4 + 1
+    assert pace.take({}, weights) is None
 
 
 def test_an_answer_is_that_of_solve(basis: lp.Basis):

@@ -150,6 +150,7 @@ def test_what_is_not_of_a_painting_is_exported_without_one(client: StudioClient,
     assert notice.fields["task"] == "export"
 
 
+@pytest.mark.nightly
 @pytest.mark.usefixtures("without_reasons")
 def test_a_named_export_replaces_no_earlier_one(client: StudioClient, tmp_path: Path):
     """Its command names the painting beside it."""
@@ -541,6 +542,7 @@ def test_why_it_is_not_closer(client: StudioClient, monkeypatch: pytest.MonkeyPa
     assert explained()[3:12, 10:15].max() > 128
 
 
+@pytest.mark.nightly
 @pytest.mark.usefixtures("without_reasons")
 def test_a_preview_shows_what_the_change_does_then(
     client: StudioClient, monkeypatch: pytest.MonkeyPatch

@@ -5,6 +5,7 @@ from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
+import pytest
 
 import lightpaint as lp
 from lightpaint.arrays import Floats
@@ -89,6 +90,7 @@ class LinePaths:
         return np.concatenate([images, 0 * images], axis=1).astype(np.float32)
 
 
+@pytest.mark.nightly
 def test_errors_of_poses_and_levels_know_the_noise_of_lights_that_stay() -> None:
     """The scatter of a pose over bases, and what it adds to that of the level."""
     lamp = np.exp(-2 * np.square(LINE - 1))[:, None] * np.ones(3)

@@ -112,6 +112,7 @@ def test_a_panel_is_hung_in_the_picture_only_on_request(
     assert seen.tolist() == ([True] if in_view else [False] * len(places))
 
 
+@pytest.mark.nightly
 def test_nothing_is_added_where_nothing_is_missed(room: Scene, basis: lp.Basis) -> None:
     placement = lp.place(room, basis, solved(basis, room), new=[lp.NewLights("point")])
     assert placement.additions == ()

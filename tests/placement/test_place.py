@@ -53,6 +53,7 @@ def test_a_lamp_is_found_where_the_painting_has_it(room: Scene) -> None:
     assert site.position == pytest.approx(placement.moves[0].new.position, rel=1e-6)
 
 
+@pytest.mark.nightly
 def test_a_search_that_is_enough_ends_with_the_best_so_far(room: Scene) -> None:
     """After a few trials of the first light, which nothing but those has come nearer by."""
     painted = room.moved({"bulb": lp.Pose(position=(0.3, 1.3, 0.2))})
@@ -107,6 +108,7 @@ def test_an_area_light_of_another_shape_stays(tmp_path: Path) -> None:
         placed(room, room, {"panel": lp.Freedom(within=1)})
 
 
+@pytest.mark.nightly
 def test_a_spot_is_turned_to_where_the_painting_has_its_beam(room: Scene) -> None:
     painted = room.moved({"beam": lp.Pose(target=(-0.6, 0, -0.3))})
     placement = placed(room, painted, {"beam": lp.Freedom(aim=True)})
@@ -119,6 +121,7 @@ def test_a_spot_is_turned_to_where_the_painting_has_its_beam(room: Scene) -> Non
     assert "turned by 10° (as far as it may)" in str(move)
 
 
+@pytest.mark.nightly
 def test_nothing_moves_where_nothing_is_missed(
     room: Scene, monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -157,6 +160,7 @@ def test_what_a_light_is_not_free_to_do(
         placed(room.reduced("1/4"), room.reduced("1/4"), {name: freedom})
 
 
+@pytest.mark.nightly
 def test_a_light_that_hangs_behind_the_wall_may_stay_there(tmp_path: Path) -> None:
     """Its own place counts as one: it is moved nowhere, and that is not an error."""
     hidden = LIGHTS["bulb"].replace('y="1" z="0.5"', 'y="1" z="-2"')
@@ -285,6 +289,7 @@ def test_a_freedom_that_ran_to_its_end_is_told(
     assert ("± 0.01 (as far as it may)" in spoken_move(move)) == is_slid_to_end
 
 
+@pytest.mark.nightly
 @pytest.mark.parametrize("edge", ["harder", nightly("softer")])
 def test_a_beam_gets_the_edge_that_the_painting_has(room: Scene, edge: str) -> None:
     """A free beam is found; one that keeps its share of the cone is not."""

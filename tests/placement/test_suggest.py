@@ -90,6 +90,7 @@ def missing(
     return suggested
 
 
+@pytest.mark.nightly
 @pytest.mark.parametrize("hidden", [HIDDEN, nightly((-0.9, 1.0, 2.5))])
 def test_a_light_that_is_missing_is_found(
     tmp_path: Path, lacking: tuple[Scene, Basis], missing: Any, hidden: Any
@@ -151,6 +152,7 @@ def test_the_same_seed_gives_the_same_light(lacking: tuple[Scene, Basis], missin
     assert first.position == suggestions[0].position
 
 
+@pytest.mark.nightly
 def test_the_ring_is_where_the_light_is_seen(tmp_path: Path, missing: Any):
     """A small bright ball at the place of the light is brightest at that pixel."""
     first = missing()[-1][0]

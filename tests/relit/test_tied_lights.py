@@ -108,6 +108,7 @@ def test_a_lighting_file_needs_no_options(scene: Scene, tmp_path: Path) -> None:
     assert a.read_bytes() == b.read_bytes()
 
 
+@pytest.mark.nightly
 def test_the_corridor_end_to_end(tmp_path: Path) -> None:
     path = write_room(tmp_path, lights=INDOORS)
     first = load_scene(path, groups={"pair": ["bulb", "twin"]}, lights=["pair"])

@@ -10,6 +10,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from nightly import nightly
 
 from lightpaint import threads
 from lightpaint.basis.basis import Basis
@@ -127,7 +128,7 @@ ASKED: list[dict[str, Any]] = [
 ]
 
 
-@pytest.mark.parametrize("options", ASKED)
+@pytest.mark.parametrize("options", [*map(nightly, ASKED[:2]), ASKED[2]])
 def test_every_number_of_the_page_stands_in_a_file(
     make_basis: Any, tmp_path: Path, options: Any
 ) -> None:

@@ -134,6 +134,7 @@ def test_a_light_that_turned_has_a_dashed_line_in_its_old_direction() -> None:
     assert marks_along(replace(light, place=narrowed), old, floor) < 0.05
 
 
+@pytest.mark.nightly
 def test_a_light_that_moved_has_a_ring_and_an_arrow() -> None:
     light = turned()
     old_site = replace(light.place.site, position=(0.0, 1.0, 1.5))
@@ -142,6 +143,7 @@ def test_a_light_that_moved_has_a_ring_and_an_arrow() -> None:
     assert marks_along(light, (0.0, 1.0, 1.5), (0.0, 3.0, 0.0)) < 0.3
 
 
+@pytest.mark.nightly
 def test_a_new_light_says_so(monkeypatch: pytest.MonkeyPatch) -> None:
     texts: list[str] = []
     draw_text = ImageDraw.ImageDraw.text

@@ -82,6 +82,7 @@ def test_alike_and_without_names_are_one_light(city: Scene) -> None:
     assert "100 similar lamps without names form one light, glass" in remarks[0]
 
 
+@pytest.mark.nightly
 def test_they_can_be_parted(city: Scene) -> None:
     separate = load_scene(city.path, group_alike=False)
     assert len(separate.lights) == 300

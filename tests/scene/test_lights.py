@@ -157,6 +157,7 @@ def test_lights_file(tmp_path: Path) -> None:
         (b"lights = []", "lights is a list"),
         (b"lights = [1]", "lights is a list"),
         (b'group = ["key"]', "unknown key 'group'; known are lights, groups"),
+        (b"gruops = 1", "did you mean 'groups'?"),
         (b"[lite.key]\nmax = 3\n", "unknown key 'lite'"),
         (b'groups = ["key"]', "groups is a table"),
         (b'[groups]\na = "key"', "groups.a is a list"),

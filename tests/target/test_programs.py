@@ -99,6 +99,7 @@ def lights(basis: lp.Basis, target: lp.Target) -> np.ndarray:
     return np.array(list(solution.lighting.emission.values()), np.float64)
 
 
+@pytest.mark.nightly
 def test_gimp(folder: Path, basis: lp.Basis) -> None:
     gimp = needs("gimp-console-2.10", "GIMP 2.10")
     script = folder / "gimp.scm"

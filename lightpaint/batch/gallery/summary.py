@@ -33,6 +33,7 @@ from lightpaint.photometry.readings_file import PLANES
 from lightpaint.pipeline.results.planes_folder import FOLDER as PLANES_FOLDER
 from lightpaint.pipeline.results.result_folder import RECORD
 from lightpaint.relit.export.exports import plain_cell
+from lightpaint.report.planes_text import plane_title
 from lightpaint.storage.json_records import strict_json
 from lightpaint.version import __version__
 
@@ -234,15 +235,18 @@ def lights_of_answer(folder: Path, report: Mapping[str, Any]) -> tuple[LightRow,
 
 def planes_of_answer(folder: Path) -> tuple[PlaneRow, ...]:
     """Return what an answer in a folder gives on measuring planes; nothing without any."""
-    planes = _json(folder / PLANES_FOLDER / PLANES).get("planes")
-    if not isinstance(planes, dict):
-        return ()
-    with suppress(AttributeError, KeyError, TypeError, ValueError):
-        return tuple(
-            PlaneRow(name, float(plane["mean"]), float(plane["uniformity"]))
-            for name, plane in planes.items()
-        )
-    return ()
+    base = folder / PLANES_FOLDER
+    rows = list[PlaneRow]()
+    # Each case has a folder.
+    for file in sorted(base.glob(f"**/{PLANES}")):
+        case = "" if file.parent == base else file.parent.name
+        planes = _json(file).get("planes")
+        with suppress(AttributeError, KeyError, TypeError, ValueError):
+            rows += [
+                PlaneRow(plane_title(name, case), float(x["mean"]), float(x["uniformity"]))
+                for name, x in (planes or {}).items()
+            ]
+    return tuple(rows)
 
 
 def watts_of_answer(folder: Path) -> float | None:

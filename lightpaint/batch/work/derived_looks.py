@@ -11,14 +11,13 @@ from lightpaint.batch.manifest.variations import SHIFTED_WORDS, SOLVED_WORDS, sh
 from lightpaint.lighting.answer.combination import combine
 from lightpaint.lighting.answer.lighting import Lighting
 from lightpaint.lighting.constraints.constraints import Constraints
-from lightpaint.photometry.illuminance import Illuminance
 from lightpaint.pipeline.job.job import Job
 from lightpaint.pipeline.job.settings import Settings
 from lightpaint.pipeline.results.answer_folder import LIGHTING, answer_files, new_answer
 from lightpaint.pipeline.results.planes_folder import files_of_planes, write_planes
 from lightpaint.pipeline.results.result_folder import ResultFolder
 from lightpaint.pipeline.results.results import write_predicted
-from lightpaint.pipeline.wished_planes import constraints_for_planes, measure_planes
+from lightpaint.pipeline.wished_planes import MeasuredPlanes, constraints_for_planes, measure_planes
 from lightpaint.progress import Listener
 from lightpaint.relit.relight import scene_of
 from lightpaint.scene.scene import Scene
@@ -61,12 +60,12 @@ def publish_derived(
     scene: Scene | None = None,
     groups: LightGroups | None = None,
     spp: int | None = None,
-    illuminance: Illuminance | None = None,
+    planes: MeasuredPlanes | None = None,
 ) -> None:
     """Write lighting.json, its pictures from `bases`, and the relit scene.
 
     views: folder of each picture. groups: light groups that the basis was read from; the answer is
-    also written for their programs. spp: of a verification. illuminance: of each light on planes.
+    also written for their programs. spp: of a verification. planes: as measured.
     """
     results.check()
     with new_answer(results, lighting, scene=scene, groups=groups) as answer:
@@ -75,9 +74,11 @@ def publish_derived(
             predicted, origin = combine(basis, lighting), basis.origin
             path, spp_ = answer.path / view / "predicted.exr", spp or origin.spp
             write_predicted(path, predicted, origin=origin, spp=spp_, scene=answer.relit)
-        if illuminance is not None and scene is not None:
-            weights = lighting.weights_for(illuminance.lights)
-            write_planes(answer.path, illuminance, weights, f"{scene.path.name} lit by {LIGHTING}")
+        if planes is not None and scene is not None:
+            weights = lighting.weights_for(planes.illuminance.lights)
+            words = f"{scene.path.name} lit by {LIGHTING}"
+            lit = planes.weights_by_case(weights)
+            write_planes(answer.path, planes.illuminance, lit, words)
 
 
 def measure_derived(
@@ -86,8 +87,8 @@ def measure_derived(
     constraints: Constraints,
     settings: Settings,
     listen: Listener,
-) -> Illuminance | None:
-    """Return the illuminance on the planes that settings name; None without any.
+) -> MeasuredPlanes | None:
+    """Return the planes that settings name, measured; None without any.
 
     The lights are where the lighting has them.
     """
@@ -95,7 +96,7 @@ def measure_derived(
         return None
     scale = constraints_for_planes(scene, constraints, settings).cd_per_unit
     placed = scene_of(scene, lighting)
-    return measure_planes(placed, settings.planes, settings, scale, listen).illuminance
+    return measure_planes(placed, settings.planes, settings, scale, listen)
 
 
 def dimmer_lights(basis: Basis) -> set[str]:
@@ -161,9 +162,7 @@ def publish_shifted(
         "scene": scene,
         "groups": job.groups,
         "spp": job.settings.spp,
-        "illuminance": measure_derived(
-            scene, shifted_lighting, job.constraints, job.settings, listen
-        ),
+        "planes": measure_derived(scene, shifted_lighting, job.constraints, job.settings, listen),
     }
     publish_derived(results, shifted_lighting, bases, views=_views(job), **options)
 

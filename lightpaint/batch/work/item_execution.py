@@ -179,9 +179,7 @@ def _derive_answer(
         planes=settings.planes,
         force=settings.force,
     )
-    options["illuminance"] = measure_derived(
-        scene, lighting, fields["constraints"], settings, listen
-    )
+    options["planes"] = measure_derived(scene, lighting, fields["constraints"], settings, listen)
     publish_derived(results, lighting, bases, **options, scene=scene, spp=settings.spp)
 
 

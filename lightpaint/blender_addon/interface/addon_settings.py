@@ -35,6 +35,11 @@ class LightpaintSceneSettings(bpy.types.PropertyGroup):
         description="Folder for the shot's render and painting; empty for one beside the .blend",
         subtype="DIR_PATH",
     )
+    lights_file: bpy.props.StringProperty(
+        name="Lights File",
+        description="What lamps are made of (.lights.toml), so that they get drives; may be empty",
+        subtype="FILE_PATH",
+    )
     grouping: bpy.props.EnumProperty(
         name="Groups",
         description="What becomes one light group, and so one light in the painter",

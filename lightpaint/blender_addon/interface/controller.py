@@ -13,6 +13,7 @@ from typing import Any
 import bpy
 from bpy.app.handlers import persistent
 
+from ..lamps.lamp_drives import discard_drives
 from ..lamps.lamp_levels import PREVIEWS, discard_levels, grouped_places
 from ..lamps.memory import recall, remember
 from ..painter.program import find_program
@@ -63,7 +64,9 @@ class Controller:
         self.end_paint()
         self.session = LiveSession(shot_folder(scene), scene, view_layer)
         view, variables = view_options(scene, ocio_path())
-        self.session.start(program, view, variables, plain_options(scene) if variables else None)
+        fallback = plain_options(scene) if variables else None
+        lights_file = bpy.path.abspath(scene.lightpaint_settings.lights_file)
+        self.session.start(program, view, variables, fallback, lights_file)
         self.say("")
         start_timer()
 
@@ -246,7 +249,9 @@ def discard_preview(scene):
     if scene.library is not None or not memory.get(PREVIEWS):
         return False
     for view_layer in scene.view_layers:
-        discard_levels(grouped_places(scene, view_layer))
+        groups = grouped_places(scene, view_layer)
+        discard_levels(groups)
+        discard_drives(groups)
     remember(scene, {**memory, PREVIEWS: False})
     return True
 

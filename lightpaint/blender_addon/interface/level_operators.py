@@ -3,6 +3,7 @@
 
 import bpy
 
+from ..lamps.lamp_drives import keep_drives, show_drives
 from ..lamps.lamp_levels import PREVIEWS, grouped_places, keep_levels, key_levels, show_factors
 from ..lamps.memory import MEMORY_KEY, recall, remember
 from ..lamps.working_space import working_space
@@ -22,7 +23,9 @@ def known_looks(scene):
 
 def apply_levels(scene, view_layer):
     """Make the levels that are shown the scene's own."""
-    keep_levels(grouped_places(scene, view_layer))
+    groups = grouped_places(scene, view_layer)
+    keep_levels(groups)
+    keep_drives(groups)
     remember(scene, {**recall(scene), PREVIEWS: False})
 
 
@@ -99,6 +102,7 @@ class LIGHTPAINT_OT_apply_look(LookOperator):
         name, factors = self.look(context)
         groups = grouped_places(context.scene, context.view_layer)
         show_factors(groups, factors, working_space(bpy.data))
+        show_drives(groups, {})
         apply_levels(context.scene, context.view_layer)
         return f"the lamps are set to {name}"
 
@@ -112,6 +116,7 @@ class LIGHTPAINT_OT_key_look(LookOperator):
         name, factors = self.look(context)
         groups = grouped_places(context.scene, context.view_layer)
         show_factors(groups, factors, working_space(bpy.data))
+        show_drives(groups, {})
         key_levels(groups, context.scene.frame_current)
         apply_levels(context.scene, context.view_layer)
         return f"{name} is keyed at frame {context.scene.frame_current}"

@@ -9,6 +9,7 @@ import json
 
 import bpy
 
+from ..lamps.lamp_drives import show_drives
 from ..lamps.lamp_levels import (
     PREVIEWS,
     grouped_places,
@@ -57,16 +58,19 @@ class LiveSession:
         self._run: ProgramRun | None = None
         self._link: PainterLink | None = None
         self._program, self._view, self._fallback, self._environment = "", [], None, {}
+        self._lights_file = ""
         self._looks_known = None
         self._places: list[tuple[str, str, str, str]] | None = None
         self.has_moved_lamps, self._is_on_hold, self._discarded = False, False, None
 
-    def start(self, program, view, environment, fallback):
+    def start(self, program, view, environment, fallback, lights_file=""):
         """Start the painter, or connect to the one that serves this shot already.
 
         view: options of its view transform, with variables of its environment; fallback: options
-        to try if lightpaint is there without what these need. Raises OSError.
+        to try if lightpaint is there without what these need. lights_file: what its lamps are made
+        of, "" for none. Raises OSError.
         """
+        self._lights_file = lights_file
         self._program, self._view, self._environment = program, view, environment
         self._fallback = fallback
         if found := running_painter(self.folder.session):
@@ -144,7 +148,11 @@ class LiveSession:
         shown = self.state.factors if factors is None else factors
         if not recall(scene).get(PREVIEWS) and self.state.is_new and are_one(shown):
             return 0  # nothing is painted yet
-        return show_preview(scene, view_layer, shown, self._groups(scene, view_layer))
+        groups = self._groups(scene, view_layer)
+        changed = show_preview(scene, view_layer, shown, groups)
+        if factors is None:
+            show_drives(groups, self.state.drives)
+        return changed
 
     def forget_places(self):
         """Look for the lamps anew at the next answer."""
@@ -199,7 +207,9 @@ class LiveSession:
         return True
 
     def _start_program(self):
-        arguments = paint_arguments(self.folder.render, self.folder.session, self._view)
+        arguments = paint_arguments(
+            self.folder.render, self.folder.session, self._view, self._lights_file
+        )
         self._link, self._run = None, ProgramRun(self._program, arguments, self._environment)
 
     def _after_end(self):

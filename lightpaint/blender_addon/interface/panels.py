@@ -96,6 +96,7 @@ class ShotPanel:
         layout, settings = self.layout, context.scene.lightpaint_settings
         layout.use_property_split = True
         layout.prop(settings, "grouping")
+        layout.prop(settings, "lights_file")
         layout.prop(settings, "folder")
         draw_text(layout, context, str(shot_folder(context.scene).path), icon="FILE_FOLDER")
 

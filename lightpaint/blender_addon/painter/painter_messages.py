@@ -88,7 +88,8 @@ class PainterState:
     """State of a session, as far as an observer knows it.
 
     closing: why the painter has closed the connection, if it said so. factors: multipliers of the
-    current answer by name of light group; 1 is the light as rendered.
+    current answer by name of light group; 1 is the light as rendered. drives: of the emitters of
+    light groups that have some, by both names, under the master dimmer.
     """
 
     lights: list = field(default_factory=list)
@@ -103,7 +104,10 @@ class PainterState:
     closing: str = ""
     is_open: bool = False
     is_new: bool = True
+    drives: dict = field(default_factory=dict)
     _weights: tuple = ()
+    _emitters: dict = field(default_factory=dict)
+    _undimmed: dict = field(default_factory=dict)
 
     def receive(self, content, buffers):
         """Take in one message. Return whether the lamps may have changed.
@@ -124,6 +128,11 @@ class PainterState:
         if kind == "state":
             self.lights = [_text(light["name"]) for light in content["lights"]]
             self.is_fixed = {light["name"]: light["is_fixed"] for light in content["lights"]}
+            self._emitters = {
+                light["name"]: [_text(x["name"]) for x in light.get("emitters", ())]
+                for light in content["lights"]
+            }
+            self._undimmed = {}
             self.is_open, self.is_new = True, content.get("is_new", False)
             self._set_looks(content["looks"])
         elif kind == "looks":
@@ -149,27 +158,55 @@ class PainterState:
         weights = buffers.get("weights", self._weights)
         if len(weights) != 3 * len(self.lights):
             raise MessageError(f"{len(weights)} weights for {len(self.lights)} lights")
-        each = [checked_factor(weights[i : i + 3]) for i in range(0, len(weights), 3)]
+        each = [
+            checked_factor(self._shown(name, weights[3 * k : 3 * k + 3]))
+            for k, name in enumerate(self.lights)
+        ]
         self.is_exact = content.get("exact", True) is True
         self.master = self.master if master is None else float(master)
         self._weights = weights
         self.factors = {
             name: self._factor(name, weight) for name, weight in zip(self.lights, each, strict=True)
         }
+        self._set_drives(content.get("answer") or {} if kind == "state" else content)
         return True
+
+    def _set_drives(self, answer):
+        """Take the drives of an answer, which some under the brush do not have."""
+        listed = answer.get("drives")
+        if answer.get("lights"):
+            listed = [light.get("drives") for light in answer["lights"]]
+        for name, values in zip(self.lights, listed or (), strict=False):
+            if values is not None:
+                self._undimmed[name] = _named_drives(self._emitters.get(name, ()), values)
+        self.drives = {
+            name: {emitter: self.master * drive for emitter, drive in drives.items()}
+            for name, drives in self._undimmed.items()
+        }
 
     def _factor(self, name, weight):
         """Return the multipliers of a light; the master dimmer leaves fixed lights as they are."""
         level = 1.0 if self.is_fixed.get(name) else self.master
         return tuple(level * value for value in weight)
 
+    def _shown(self, name, weight):
+        """Return a weight as a lamp here can have it: LEDs mix colours outside of Rec.709."""
+        return [max(x, 0.0) for x in weight] if self._emitters.get(name) else weight
+
     def _set_looks(self, looks):
-        self.looks = [
-            SessionLook(
-                look["id"], _text(look["name"]), look_factors(look["lights"], look["weights"])
-            )
-            for look in looks
-        ]
+        self.looks = []
+        for look in looks:
+            pairs = zip(look["lights"], look["weights"], strict=True)
+            weights = [self._shown(name, weight) for name, weight in pairs]
+            factors = look_factors(look["lights"], weights)
+            self.looks.append(SessionLook(look["id"], _text(look["name"]), factors))
+
+
+def _named_drives(emitters, values):
+    """Return drives by name of emitter. Raises MessageError for others than from 0 to 1."""
+    if not all(type(x) in (int, float) and 0 <= x <= 1 for x in values):
+        raise MessageError(f"the drives {str(values)[:60]}")
+    return dict(zip(emitters, map(float, values), strict=True))
 
 
 def look_factors(lights, weights):

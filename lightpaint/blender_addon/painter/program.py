@@ -125,9 +125,10 @@ class ProgramRun:
             del self.lines[:-MAX_LINES]
 
 
-def paint_arguments(shot, session, view):
-    """Return the arguments that open the painter on a shot."""
-    return ["paint", "--lights", shot, "-o", session, "--json", *view]
+def paint_arguments(shot, session, view, lights_file=""):
+    """Return the arguments that open the painter on a shot. lights_file: "" for none."""
+    constraints = ["--lights-file", lights_file] if lights_file else []
+    return ["paint", "--lights", shot, "-o", session, "--json", *constraints, *view]
 
 
 def running_painter(session):

@@ -4,6 +4,7 @@
 import bpy
 
 from ..lamps.grouping import assign_groups, clear_others, plan_groups
+from ..lamps.lamp_drives import forget_drives
 from ..lamps.lamp_levels import put_back_levels, remove_keys
 from ..lamps.memory import forget, owners_with_memory, recall, remember
 
@@ -53,6 +54,7 @@ def revert(scene):
                 _put_back_scene(owner, memory)
         except (AttributeError, RuntimeError, TypeError, KeyError) as error:
             problems.append(f"{owner.name}: {error}")
+        forget_drives(owner)
         forget(owner)
     return problems
 

@@ -89,10 +89,11 @@ def show_look(look: Look, folder: Path, *, table: Table = "short") -> None:
 
 def show_planes(answer: PlanesAnswer) -> None:
     """Print what an answer gives on measuring planes."""
-    table = terminal.table(*HEADINGS)
-    for row in plane_rows(answer):
-        table.row(*row)
-    terminal.print_table(table)
+    if answer.readings:
+        table = terminal.table(*HEADINGS)
+        for row in plane_rows(answer):
+            table.row(*row)
+        terminal.print_table(table)
     for sentence in planes_sentences(answer):
         terminal.tell(sentence)
     terminal.write("")

@@ -14,9 +14,11 @@ from lightpaint.dmx.console_rig import ConsoleRig
 from lightpaint.dmx.network.console_link import PRIORITY, ConsoleLink
 from lightpaint.dmx.network.console_receiver import LOOPBACK, ConsoleReceiver
 from lightpaint.dmx.network.console_target import PROTOCOLS, network_universes
+from lightpaint.dmx.pan_tilt import aimed_rig, directions_of
 from lightpaint.dmx.rig_drives import RigDrives, check_drives, drives_of
 from lightpaint.errors import ConsoleError, LightingError, OutputError
 from lightpaint.files import check_files, check_writable, write_text
+from lightpaint.lighting.answer.lighting import Lighting
 from lightpaint.lighting.answer.lighting_file import read_lighting
 from lightpaint.relit.export.level_table import (
     LevelRow,
@@ -42,16 +44,18 @@ def read_rig_file(rig: RigFile) -> ConsoleRig:
     return read_rig(rig.path, gdtf_folder=rig.gdtf, pixels=rig.pixels)
 
 
-def read_drives(lighting: Path) -> RigDrives:
-    """Return the drives of a lighting. Raises LightingError if none of its lights has emitters."""
-    finish(lighting.parent)
-    drives = drives_of(read_lighting(lighting))
+def read_answer(path: Path) -> tuple[Lighting, RigDrives]:
+    """Return a lighting and its drives. Raises LightingError if none of its lights has
+    emitters."""
+    finish(path.parent)
+    lighting = read_lighting(path)
+    drives = drives_of(lighting)
     if not drives:
         raise LightingError(
-            f"{lighting} has no drives: none of its lights has emitters, as those of a scene that "
-            "was made from a rig"
+            f"{path} has no drives: none of its lights has emitters, as those of a scene that was "
+            "made from a rig"
         )
-    return drives
+    return lighting, drives
 
 
 def send(
@@ -60,8 +64,12 @@ def send(
     """Run `lightpaint send lighting.json --rig show.mvr --to TARGET`."""
     if dump is not None:
         _check_dump(dump, [lighting, rig.path], force=force)
-    drives, fixtures = read_drives(lighting), read_rig_file(rig)
+    (answer, drives), fixtures = read_answer(lighting), read_rig_file(rig)
     check_drives(fixtures, drives)
+    if sending.positions:
+        fixtures, remarks = aimed_rig(fixtures, directions_of(answer))
+        for remark in remarks:
+            terminal.say(remark)
     universes = _universes_of(fixtures, sending)
     if dark := [light for light in fixtures.owners if light not in drives]:
         terminal.say(f"{lighting} has no drives for {some_names(dark)}, which stay dark")

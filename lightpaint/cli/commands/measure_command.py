@@ -12,9 +12,10 @@ from lightpaint.cli.output.lines import CommandOutcome
 from lightpaint.errors import OutputError, SceneError
 from lightpaint.files import check_files, check_writable
 from lightpaint.lighting.answer.lighting_file import read_lighting
+from lightpaint.lighting.constraints.absolute_scale import with_sure_scale
 from lightpaint.lighting.constraints.constraints_file import constraints_of
 from lightpaint.photometry.illuminance import Illuminance
-from lightpaint.photometry.measure import measure_illuminance
+from lightpaint.photometry.measure import DEFAULT_ERROR, measure_illuminance
 from lightpaint.photometry.planes_file import planes_file_beside, read_planes
 from lightpaint.photometry.readings_file import (
     POINTS,
@@ -33,9 +34,6 @@ from lightpaint.scene.scene import Scene
 from lightpaint.sentences import Hint
 from lightpaint.storage.staging import finish, staged
 
-#: Error of a measurement, if neither an error nor samples are given.
-DEFAULT_ERROR = 0.02
-
 
 def measure(
     *,
@@ -51,8 +49,7 @@ def measure(
     if planes is None and not planes_path.is_file():
         raise SceneError(
             f"{planes_path} does not exist: write where to measure into it (docs/photometry.md), "
-            "or name another file with ",
-            Hint("planes"),
+            "or name another file with --planes"
         )
     with terminal.TerminalListener() as listen, stage("placing the points", listen):
         found = read_planes(planes_path, content)
@@ -89,7 +86,7 @@ def _lit_scene(
     Raises SceneError if nothing says the last.
     """
     scene, emission = source.content, None
-    own = constraints_of(scene.requests).cd_per_unit
+    own = with_sure_scale(constraints_of(scene.requests), basis_lights(scene)).cd_per_unit
     if lighting is not None:
         finish(lighting.parent)
         answer = read_lighting(lighting)

@@ -25,7 +25,7 @@ from lightpaint.pipeline.job.settings import Settings
 from lightpaint.pipeline.job.sources import BasisFile, GroupsFile, SceneFile
 
 if TYPE_CHECKING:
-    from lightpaint.cli.options.console_options import RigFile
+    from lightpaint.dmx.console_rig import ConsoleRig
     from lightpaint.dmx.network.console_target import ConsoleTarget
     from lightpaint.paint.server.server import Server
     from lightpaint.paint.store.session_requests import SessionRequests
@@ -63,7 +63,7 @@ def paint(
 ) -> CommandOutcome:
     """Run `lightpaint paint SCENE|BASIS|LIGHTS`, for one view or several.
 
-    console: the arguments of `_console`.
+    console: the file of a rig, and the arguments of `_console`.
     """
     # The server and the session file import much that no other command needs.
     from lightpaint.paint.server.server import check_installed
@@ -80,6 +80,12 @@ def paint(
             words += ("--planes", quote(settings.planes))
         return from_any_folder(command_for_paintings(sources[0].path, paintings, words, requests))
 
+    fixtures = None
+    if console is not None:
+        from lightpaint.cli.commands.console_commands import read_rig_file
+        from lightpaint.dmx.rig_drives import check_lamps
+
+        fixtures = read_rig_file(console["rig"])
     subjects = make_subjects(
         sources,
         folder,
@@ -87,36 +93,38 @@ def paint(
         constraints=constraints,
         choice=choice,
         layers=layers,
+        **({} if fixtures is None else {"check_lamps": partial(check_lamps, fixtures)}),
         # `solve` takes only one basis, which has one view.
         **({} if len(sources) > 1 and isinstance(sources[0], BasisFile) else {"command": command}),
     )
     if (groups := subjects[0].groups) is not None:
         for remark in groups.remarks:
             terminal.say(remark)
-    link = None if console is None else _console(**console)
+    link = None
+    if console is not None and fixtures is not None:
+        link = _console(fixtures, **{k: v for k, v in console.items() if k != "rig"})
     return _serve(subjects, new=new, host=host, port=port, with_browser=with_browser, console=link)
 
 
 def _console(
+    fixtures: "ConsoleRig",
     *,
-    rig: "RigFile",
     target: "ConsoleTarget | None",
     universes: dict[int, int],
     priority: int | None,
+    positions: bool,
 ) -> "Console":
     """Return the console of a rig, and say what it will send to. Nothing is sent yet."""
-    from lightpaint.cli.commands.console_commands import read_rig_file
     from lightpaint.dmx.network.console_link import PRIORITY, ConsoleLink, link_address
     from lightpaint.paint.studio.console_switch import Console
 
-    fixtures = read_rig_file(rig)
     if target is None:
         return Console(fixtures)
     chosen = PRIORITY if priority is None else priority
     address = link_address(target, fixtures, universes=universes, priority=chosen)
     terminal.say(f"console: {address}; nothing is sent before it is switched on in the page")
     open_link = partial(ConsoleLink.open, target, fixtures, universes=universes, priority=chosen)
-    return Console(fixtures, open_link, address)
+    return Console(fixtures, open_link, address, has_positions=positions)
 
 
 def _serve(

@@ -4,14 +4,15 @@ import io
 import shutil
 import sysconfig
 import zipfile
-from collections.abc import Sequence
-from functools import partial
+from collections.abc import Callable, Sequence
 from importlib.resources import files
 from importlib.resources.abc import Traversable
 from pathlib import Path
 
+from lightpaint.arrays import Floats
 from lightpaint.basis.lightgroups.frame_sequence import find_frames, is_pattern
 from lightpaint.basis.lightgroups.light_groups import LightGroups, first_frame
+from lightpaint.cli.commands.cues import cue_list, is_session
 from lightpaint.cli.options.console_options import RigFile
 from lightpaint.cli.output import documents, terminal
 from lightpaint.cli.output.lines import CommandOutcome
@@ -35,6 +36,7 @@ def export(
     forms: Sequence[str],
     rig: RigFile | None,
     fade_s: float,
+    positions: bool,
     scene: SceneFile | None,
     groups: GroupsFile | None,
     stage: Path | None,
@@ -43,21 +45,33 @@ def export(
 ) -> CommandOutcome:
     """Run `lightpaint export lighting.json --to FORM,FORM -o DIR`."""
     lighting, others = lightings[0], [form for form in forms if form != CUES]
+    if others and (sessions := [path for path in lightings if is_session(path)]):
+        raise LightpaintError(
+            f"{others[0]} takes a lighting.json, and {sessions[0]} is a session, which cues take"
+        )
     if len(lightings) > 1 and others:
         raise LightpaintError(
             f"{others[0]} takes one lighting, not {len(lightings)}; cues take all"
         )
     if CUES in forms and rig is None:
         raise LightpaintError("cues need the rig of their fixtures: give --rig show.mvr")
-    finish(lighting.parent)
-    answer, folder = read_lighting(lighting), output or lighting.parent
-    light_groups, listen = _light_groups(groups, answer), terminal.TerminalListener()
-    show = None if rig is None or (CUES in forms and "mvr" not in forms) else rig.path
-    source = Source(content(scene), light_groups, stage, show)
-    names = names_of_forms(others, source)
-    writers, remark = writers_of(names, answer, source, folder, listen)
+    if positions and CUES not in forms:
+        raise LightpaintError("--positions belongs to cues: leave it out, or add cues to --to")
+    folder = output or (lighting if lighting.is_dir() else lighting.parent)
+    listen = terminal.TerminalListener()
+    writers, remark, source = dict[str, Callable[[], str | bytes | Floats]](), "", Source()
+    if others:
+        finish(lighting.parent)
+        answer = read_lighting(lighting)
+        show = None if rig is None or (CUES in forms and "mvr" not in forms) else rig.path
+        source = Source(content(scene), _light_groups(groups, answer), stage, show)
+        names = names_of_forms(others, source)
+        writers, remark = writers_of(names, answer, source, folder, listen)
     if CUES in forms and rig is not None:
-        writers[CUE_FILE] = partial(_cue_list, lightings, rig, fade_s)
+        text, remarks = cue_list(lightings, rig, fade_s=fade_s, positions=positions)
+        writers[CUE_FILE] = lambda: text
+        for one in remarks:
+            listen.say(one)
     file_writers = {folder / name: make for name, make in writers.items()}
     inputs = [*lightings, *source.files, *([] if rig is None else [rig.path])]
     check_files(list(file_writers), inputs)
@@ -90,21 +104,6 @@ def _light_groups(groups: GroupsFile | None, answer: Lighting) -> LightGroups | 
         return groups.content
     has_rest = any(light.plugin == "rest" for light in answer.lights)
     return first_frame(find_frames(groups.path), groups.pattern, has_rest=has_rest)
-
-
-def _cue_list(lightings: Sequence[Path], rig: RigFile, fade_s: float) -> str:
-    """Return a cue for each lighting, in their order."""
-    from lightpaint.cli.commands.console_commands import read_drives, read_rig_file
-    from lightpaint.relit.export.cue_list import Cue, cue_list_csv
-
-    cues = [Cue(_label_of(path), fade_s, read_drives(path)) for path in lightings]
-    return cue_list_csv(read_rig_file(rig), cues)
-
-
-def _label_of(lighting: Path) -> str:
-    """Return the name of a look: its file's, or its folder's where all files are called alike."""
-    path = lighting.absolute()
-    return path.parent.name if path.stem == "lighting" else path.stem
 
 
 #: Folder in the archive: the add-on's name in Blender before 4.2. The library is called otherwise.

@@ -19,6 +19,7 @@ from lightpaint.demo import write_demo
 from lightpaint.errors import BackendError, OutputError
 from lightpaint.files import check_files, check_name, check_writable
 from lightpaint.lighting.answer.lighting_file import read_lighting
+from lightpaint.lighting.constraints.absolute_scale import agreed_scale
 from lightpaint.pipeline.job.job import Job
 from lightpaint.pipeline.job.remarks import remarks_of_film, remarks_of_memory, remarks_of_scene
 from lightpaint.pipeline.job.settings import Settings
@@ -71,6 +72,7 @@ def lights(
     sheet that cannot be written is not an error.
     """
     content = scene.content
+    cd_per_unit = agreed_scale(content.cd_per_unit, cd_per_unit)
     if sheet is not None and is_named:
         check_sheet(content, sheet, force=force)
     note_scene(content)

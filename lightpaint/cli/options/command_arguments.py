@@ -145,6 +145,7 @@ def _export_arguments(options: Namespace, output: Path | None) -> dict[str, Any]
         "forms": options.to,
         "rig": rig_file(options),
         "fade_s": options.fade_s,
+        "positions": options.positions,
         "scene": scene_to_export(options),
         "groups": GroupsFile(options.groups, options.pattern) if options.groups else None,
         "stage": Path(options.stage) if options.stage else None,
@@ -239,7 +240,7 @@ def _paint_arguments(
     [folder] = folders_of(options.output and Path(options.output), [session_name])
     # The command that the page shows for exported paintings has only options that `solve` knows.
     excluded = ["output", "new", "layers", "host", "port", "with_browser", "view", "exposure"]
-    excluded += ["rig", "gdtf", "pixels", "target", "universes", "priority", "planes"]
+    excluded += ["rig", "gdtf", "pixels", "target", "universes", "priority", "positions", "planes"]
     excluded += ["as_json", "is_quiet", "is_verbose", "json_progress"]
     excluded += ["lights"] * isinstance(source, GroupsFile) + ["sensors"] * (len(sources) > 1)
     return {
@@ -265,4 +266,10 @@ def _console_arguments(options: Namespace) -> dict[str, Any] | None:
         return None
     rig, target = named
     universes = dict(options.universes)
-    return {"rig": rig, "target": target, "universes": universes, "priority": options.priority}
+    return {
+        "rig": rig,
+        "target": target,
+        "universes": universes,
+        "priority": options.priority,
+        "positions": options.positions,
+    }

@@ -46,6 +46,7 @@ class Sending:
     until: Until
     blackout: bool
     interface: str
+    positions: bool
 
 
 def add_rig(parser: argparse.ArgumentParser, *, required: bool, purpose: str = "") -> None:
@@ -80,6 +81,17 @@ def add_console(parser: argparse.ArgumentParser) -> None:
     _add_target(parser, "(default: none)")
     _add_universes(parser)
     _add_priority(parser)
+    add_positions(parser)
+
+
+def add_positions(parser: argparse.ArgumentParser, *, purpose: str = "") -> None:
+    """Add the option for pan and tilt. purpose: what needs it, if not all does."""
+    parser.add_argument(
+        "--positions",
+        action="store_true",
+        help=f"{purpose}set pan and tilt so that fixtures point where their lights do (default: "
+        "they rest)",
+    )
 
 
 def _add_target(parser: argparse.ArgumentParser, default: str) -> None:
@@ -105,10 +117,12 @@ def _add_priority(parser: argparse.ArgumentParser) -> None:
 def console_of(options: argparse.Namespace) -> tuple[RigFile, ConsoleTarget | None] | None:
     """Return the rig of a painter and the target of its console, if the options name them.
 
-    Raises ConsoleError for a target without a rig, for what is not a target, and for a priority
-    that its protocol lacks.
+    Raises ConsoleError for a target without a rig, for positions without a target, for what is not
+    a target, and for a priority that its protocol lacks.
     """
     rig, target = rig_file(options), _target_of(options)
+    if options.positions and target is None:
+        raise ConsoleError("--positions belongs to what is sent: add --to, or leave it out")
     if rig is None:
         if target is not None:
             raise ConsoleError(f"--to {target} sends to the fixtures of a rig: add --rig")
@@ -123,6 +137,7 @@ def add_send(parser: argparse.ArgumentParser) -> None:
     _add_target(parser, "(default: send nothing, and print the levels)")
     _add_universes(parser)
     _add_priority(parser)
+    add_positions(parser)
     parser.add_argument(
         "--fps",
         type=arguments.at_least(1, maximum=60),
@@ -173,6 +188,7 @@ def sending_of(options: argparse.Namespace) -> Sending:
         options.until,
         options.blackout,
         options.interface or "",
+        options.positions,
     )
 
 

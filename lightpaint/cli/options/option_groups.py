@@ -321,7 +321,8 @@ OTHER_OPTIONS: dict[Theme, str] = {
     "Shots, looks and advice": "--frames --variations --keep-going",
     "Looks": "--init --only --dry-run",
     "Machines": "--export --log",
-    "Console": "--from --universe --priority --fps --fade --until --blackout --interface --seconds",
+    "Console": "--from --universe --priority --fps --fade --until --blackout --interface --seconds "
+    "--positions",
     "Page": "--host --port --no-browser --new",
     "Results": "--to --dump --output --table --map-size --no-sheet --json --quiet --verbose "
     "--json-progress --help",

@@ -23,6 +23,7 @@ from lightpaint.cli.options.console_options import (
     add_console,
     add_fade,
     add_listen,
+    add_positions,
     add_rig,
     add_send,
 )
@@ -184,7 +185,7 @@ def _solve(parser: argparse.ArgumentParser) -> None:
     add_verification(parser)
     add_fields(parser, Settings, "report")
     add_tolerances(parser)
-    add_fields(parser, Settings, "cd_per_unit", "planes")
+    add_fields(parser, Settings, "cd_per_unit", "planes", "watts")
     add_lights(parser)
     add_split(parser)
     add_map_size(parser)
@@ -231,7 +232,8 @@ def _export(parser: argparse.ArgumentParser) -> None:
         "lightings",
         metavar="lighting.json",
         nargs="+",
-        help="file that solve wrote; several, in their order, for cues",
+        help="file that solve wrote; several, in their order, for cues, or the session.db of a "
+        "painter, whose looks become cues",
     )
     parser.add_argument(
         "--to",
@@ -266,6 +268,7 @@ def _export(parser: argparse.ArgumentParser) -> None:
     )
     add_rig(parser, required=False, purpose="for mvr and cues: ")
     add_fade(parser, "for cues: the time of each (default: none)")
+    add_positions(parser, purpose="for cues: ")
     add_map_size(parser)
     add_view(parser)
     add_output(parser, "DIR", "folder for the files (default: that of lighting.json)")
@@ -333,7 +336,7 @@ def _plan(parser: argparse.ArgumentParser) -> None:
     add_lights(parser)
     add_split(parser)
     add_constraints(parser)
-    add_fields(parser, Settings, "error", "seed", "cd_per_unit")
+    add_fields(parser, Settings, "watts", "error", "seed", "cd_per_unit")
     add_cache(parser)
     add_output(parser, "DIR", "result folder (default: named after the scene)")
     add_fields(parser, Settings, "force")

@@ -29,7 +29,6 @@ _OTHER_OPTIONS = {
     "parameters": "-D",
     "pattern": "--pattern",
     "placement": "--places",
-    "planes": "--planes",
     "port": "--port",
     "rig": "--rig",
     "scene": "--scene",

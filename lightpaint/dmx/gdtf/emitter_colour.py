@@ -9,7 +9,6 @@ from xml.etree.ElementTree import Element
 import numpy as np
 
 from lightpaint.arrays import RGB, Doubles, as_rgb
-from lightpaint.colour.color import luminance
 from lightpaint.colour.planckian_locus import uv_of_black_body, xy_of, xy_of_spectrum, xyz_of
 from lightpaint.colour.primaries import REC709, rgb_to_xyz
 from lightpaint.dmx.gdtf.mode_channels import Curve
@@ -20,6 +19,9 @@ Chromaticity = tuple[float, float]
 
 #: Least y of a chromaticity, and least share of light that a filter lets through.
 LEAST_Y, LEAST_TRANSMISSION = 0.002, 0.002
+
+#: Least area of the triangle of three colours in the diagram of chromaticities, times two.
+LEAST_AREA = 1e-4
 
 #: Name of an emitter, its usual chromaticity and its usual share of a fixture's luminance, by what
 #: follows `ColorAdd_`. Some programs write A and L.
@@ -167,16 +169,84 @@ def xy_of_kelvin(kelvin: float) -> Chromaticity:
     return xy_of(xyz_of(uv))
 
 
-def primaries_of(xy: Chromaticity) -> list[EmitterColour]:
-    """Return red, green and blue of Rec.709, whose sum is light of a chromaticity."""
-    light = np.maximum(rgb_of_xy(xy), 1e-3)
-    shares = light * luminance(np.eye(3)) / float(luminance(light))
-    corners = np.reshape(REC709[:6], (3, 2)).tolist()
-    names = ("red", "green", "blue")
+def whites_of(own: float, ends: tuple[float, float]) -> list[EmitterColour]:
+    """Return the coolest and the warmest white of a lamp whose colour is filtered.
+
+    own: its own colour temperature, of all its light. ends: of the range, in kelvin. Filters let
+    through as much as they can: all of the channel in which the other colour has most.
+    """
+    lamp, found = rgb_of_xy(xy_of_kelvin(own)), []
+    for name, kelvin in (("cool white", max(ends)), ("warm white", min(ends))):
+        xy = xy_of_kelvin(kelvin)
+        found.append(EmitterColour(name, xy, float(1 / np.max(rgb_of_xy(xy) / lamp))))
+    return found
+
+
+@dataclass(frozen=True)
+class ColourSpace:
+    """A space in which channels name colours by red, green and blue: chromaticities of these, and
+    of all three at full.
+    """
+
+    corners: tuple[Chromaticity, Chromaticity, Chromaticity]
+    white: Chromaticity
+
+
+#: Spaces by the names that the standard gives them (DIN SPEC 15800, `ColorSpace`).
+SPACES: Mapping[str, ColourSpace] = {
+    "sRGB": ColourSpace(((0.64, 0.33), (0.30, 0.60), (0.15, 0.06)), (0.3127, 0.3290)),
+    "ProPhoto": ColourSpace(
+        ((0.7347, 0.2653), (0.1596, 0.8404), (0.0366, 0.0001)), (0.3457, 0.3585)
+    ),
+    "ANSI": ColourSpace(((0.7347, 0.2653), (0.1596, 0.8404), (0.0366, 0.001)), (0.4254, 0.4044)),
+}
+
+
+def primaries_of(space: ColourSpace) -> list[EmitterColour]:
+    """Return red, green and blue of a space, whose sum is its white."""
+    corners = [_bounded(xy) for xy in space.corners]
+    columns = np.array([(x / y, 1.0, (1 - x - y) / y) for x, y in corners]).T
+    (x, y), names = space.white, ("red", "green", "blue")
+    shares = np.maximum(np.linalg.solve(columns, [x / y, 1.0, (1 - x - y) / y]), 1e-5)
     return [
-        EmitterColour(name, (x, y), float(share))
-        for name, (x, y), share in zip(names, corners, shares, strict=True)
+        EmitterColour(name, xy, float(share))
+        for name, xy, share in zip(names, corners, shares / shares.sum(), strict=True)
     ]
+
+
+def colour_space(name: str | None, main: Sequence[Element], more: Sequence[Element]) -> ColourSpace:
+    """Return the space in which a channel names colours, that of Rec.709 if the file has none.
+
+    name: that the channel gives, of one of `more`. main: the space of the file, if it has one.
+    """
+    named = [x for x in more if name and x.get("Name") == name]
+    element = next(iter((*named, *main)), None)
+    if element is None:
+        return SPACES["sRGB"]
+    colours = [_parsed(element.get(key)) for key in ("Red", "Green", "Blue", "WhitePoint")]
+    if element.get("Mode") != "Custom" or None in colours:
+        return SPACES.get(element.get("Mode", "sRGB"), SPACES["sRGB"])
+    red, green, blue, white = (x[0] for x in colours if x is not None)
+    if abs(np.linalg.det([(*xy, 1.0) for xy in (red, green, blue)])) < LEAST_AREA:
+        raise ValueError("a ColorSpace whose colours lie on a line")
+    return ColourSpace((red, green, blue), white)
+
+
+def rgb_emitters(links: Sequence[str | None], emitters: Sequence[Element]) -> list[EmitterColour]:
+    """Return the emitters that channels of red, green and blue dim; none if they name colours of a
+    space.
+
+    links: names of emitters that the channels give. emitters: of the file; three called red, green
+    and blue, and no other, count without links.
+    """
+    names = [(x.get("Name") or "").casefold() for x in emitters]
+    if not all(links) and sorted(names) != ["blue", "green", "red"]:
+        return []
+    found = [
+        emitter_colour(suffix, link, emitters) for suffix, link in zip("RGB", links, strict=True)
+    ]
+    is_known = not any(x.is_usual for x in found) and len({x.name for x in found}) == 3
+    return found if is_known else []
 
 
 def density_of(suffix: str, filters: Sequence[Element], link: str | None) -> tuple[RGB, bool]:

@@ -43,15 +43,22 @@ class ChannelFunction:
     physical: tuple[float, float]
     element: Element
 
+    @property
+    def ends(self) -> tuple[float, float]:
+        """The values at its first and its last level, also if it is inverted."""
+        start, end = self.physical
+        return (end, start) if self.element.get("DMXInvert") == "Yes" else (start, end)
+
     def value_at(self, level: int) -> float:
         """Return what it does at a level."""
         span = max(self.last - self.first, 1)
         share = min(max((level - self.first) / span, 0.0), 1.0)
-        return self.physical[0] + share * (self.physical[1] - self.physical[0])
+        start, end = self.ends
+        return start + share * (end - start)
 
     def level_of(self, value: float) -> int:
         """Return the level at which it does `value`, or what is closest to that."""
-        start, end = self.physical
+        start, end = self.ends
         share = (value - start) / (end - start) if end != start else 0.0
         return self.first + round(min(max(share, 0.0), 1.0) * (self.last - self.first))
 

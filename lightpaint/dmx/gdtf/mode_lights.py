@@ -18,15 +18,20 @@ from lightpaint.arrays import Doubles
 from lightpaint.dmx.color_mixing import can_invert
 from lightpaint.dmx.console_rig import DmxChannel, RigEmitter, RigFilter
 from lightpaint.dmx.gdtf.emitter_colour import (
+    SPACES,
     USUAL_FILTERS,
     EmitterColour,
+    colour_space,
     density_of,
     emitter_colour,
     primaries_of,
+    rgb_emitters,
+    whites_of,
     xy_of_kelvin,
 )
 from lightpaint.dmx.gdtf.geometry_tree import Placed
 from lightpaint.dmx.gdtf.mode_channels import ChannelFunction, Curve, ModeChannel, curve_of
+from lightpaint.dmx.gdtf.mode_heads import ModeHead, mode_heads
 from lightpaint.dmx.spot_cone import solid_angle
 from lightpaint.sentences import Hint, Sentence
 
@@ -56,6 +61,10 @@ _PLACEHOLDER = Sentence(
     Hint("gdtf_folder"),
 )
 
+#: Channels of the colour temperature, and the kelvin that they can mean.
+_WARMTH = re.compile(r"CT[OBC]")
+LEAST_KELVIN, MOST_KELVIN = 1000.0, 25_000.0
+
 #: Channels that change the colour, and stay at rest.
 _RESTING = re.compile(r"CT[OBC]|Color\d+|ColorMacro\d*|HSB_\w+|Color(Add|Sub|RGB)_\w+|Tint")
 
@@ -78,17 +87,21 @@ class ModeLight:
     masters: tuple[int, ...] = ()
     filters: tuple[RigFilter, ...] = ()
     chromaticity: tuple[int, ...] = ()
+    whites: tuple[int, ...] = ()
 
 
 @dataclass(frozen=True)
 class FixtureMode:
-    """A mode: its channels, its lights, where its emission comes from, and what to know of it."""
+    """A mode: its channels, its lights, where its emission comes from, what to know of it, and what
+    turns.
+    """
 
     name: str
     channels: tuple[DmxChannel, ...]
     lights: tuple[ModeLight, ...]
     emission: str
     remarks: tuple[str, ...] = ()
+    heads: tuple[ModeHead, ...] = ()
 
 
 @dataclass(frozen=True)
@@ -99,9 +112,13 @@ class _Beam:
     placed: Placed
     flux: float | None
     watts: float | None
-    xy: tuple[float, float]
+    kelvin: float
     beam_angle: float
     field_angle: float
+
+    @property
+    def xy(self) -> tuple[float, float]:
+        return xy_of_kelvin(self.kelvin)
 
     @property
     def solid_angle(self) -> float:
@@ -126,6 +143,7 @@ class ModeReader:
     ) -> None:
         self.name, self.tree, self.channels = name, tree, list(channels)
         self.emitters, self.filters = elements("Emitters/Emitter"), elements("Filters/Filter")
+        self.spaces = elements("ColorSpace"), elements("AdditionalColorSpaces/ColorSpace")
         self.profiles = {x.get("Name", ""): x for x in elements("DMXProfiles/DMXProfile")}
         self.remarks: list[str] = []
         self.dmx = [x.dmx for x in self.channels]
@@ -134,16 +152,18 @@ class ModeReader:
         self._with_attribute, self._shape = cache(self._find_attribute), cache(self._set_curve)
         self.beams = self._beams(zoom)
         self.way = self._way()
+        self.whites: list[int] = []
 
     def read(self, *, pixels: bool) -> FixtureMode:
         """Return the mode. pixels: True for a light for each beam that has channels of its own."""
         groups = self._groups(pixels=pixels)
+        self.whites = self._white_channels() if len(groups) == 1 else []
         candelas, emission = self._candelas()
         if self._is_placeholder():
             lone = self._lone_light(groups[0], candelas)
             remarks = (_PLACEHOLDER, *self.remarks)
             return FixtureMode(self.name, tuple(self.dmx), (lone,), emission, remarks)
-        lights = []
+        lights, beams = [], []
         dimmers = [[self._dimmers(beam) for beam in group] for group in groups]
         counts = Counter(k for own in dimmers for k in set().union(*own))
         shared = {k for k, count in counts.items() if count > 1}
@@ -152,10 +172,13 @@ class ModeReader:
             light = self._light(number, group, own, shared, candelas)
             if light is not None:
                 lights.append(light)
+                beams.append([beam.placed for beam in group])
         if not lights:
             self._remark("no channel of it dims light, so it is left out")
         self._remark_resting(lights)
-        return FixtureMode(self.name, tuple(self.dmx), tuple(lights), emission, tuple(self.remarks))
+        heads = mode_heads(self.tree, self.channels, beams)
+        remarks = tuple(self.remarks)
+        return FixtureMode(self.name, tuple(self.dmx), tuple(lights), emission, remarks, heads)
 
     def _is_placeholder(self) -> bool:
         """Return whether the file stands for a type that a program does not know: no beam, and all
@@ -194,8 +217,7 @@ class ModeReader:
                 f"no beam in its GDTF: {USUAL_BEAM:g}° at 50 % and {USUAL_FIELD:g}° at 10 %"
             )
             root = self.tree[0] if self.tree else Placed("", "", np.eye(4), (0,))
-            usual = xy_of_kelvin(USUAL_KELVIN)
-            return [_Beam(0, root, None, None, usual, USUAL_BEAM, USUAL_FIELD)]
+            return [_Beam(0, root, None, None, USUAL_KELVIN, USUAL_BEAM, USUAL_FIELD)]
         return [self._beam(k, self.tree[k], zoom) for k in found]
 
     def _beam(self, node: int, placed: Placed, zoom: float | None) -> _Beam:
@@ -207,8 +229,7 @@ class ModeReader:
         field = min(max(beam.field_angle, angle), WIDEST)
         if (zoomed := self._zoomed(node, zoom)) is not None:
             angle, field = zoomed, min(zoomed * field / angle, WIDEST)
-        xy = xy_of_kelvin(beam.color_temperature)
-        return _Beam(node, placed, flux, watts, xy, angle, field)
+        return _Beam(node, placed, flux, watts, beam.color_temperature, angle, field)
 
     def _zoomed(self, node: int, zoom: float | None) -> float | None:
         """Return the beam angle that a zoom gives, and set it; None without a zoom."""
@@ -287,7 +308,7 @@ class ModeReader:
             self._shape(k, _DIMMER)
         emitters = self._emitters(beams, candelas)
         filters, chromaticity = self._filters(beams), self._chromaticity(beams)
-        is_plain = not (filters or chromaticity or any(x.channels for x in emitters))
+        is_plain = not (filters or chromaticity or self.whites or any(x.channels for x in emitters))
         if is_plain and not own:
             if not parts:
                 return None
@@ -306,6 +327,7 @@ class ModeReader:
             tuple(masters),
             filters,
             chromaticity,
+            tuple(self.whites),
         )
 
     def _lone_light(
@@ -351,7 +373,8 @@ class ModeReader:
                 added = candelas[beam.node, colour.name]
                 totals[colour.name] = totals.get(colour.name, 0.0) + added
         watts = [x.watts for x in beams if x.watts is not None]
-        share = sum(watts) / len(colours) if len(watts) == len(beams) else None
+        parts = 1 if self.whites else len(colours)
+        share = sum(watts) / parts if len(watts) == len(beams) else None
         return [
             RigEmitter(name, x.xy, totals[name], tuple(sorted(channels[name])), x.curve, share)
             for name, x in colours.items()
@@ -372,14 +395,61 @@ class ModeReader:
                 colours.append((colour, places))
             return colours
         if self.way is _NAMED_RGB and found:
-            # Emitters of Rec.709, which such modes name unless they say otherwise.
-            for places in found.values():
-                for k in places:
-                    self._shape(k, _NAMED_RGB)
-            return [(x, found[x.name.capitalize()]) for x in primaries_of((0.3127, 0.3290))]
+            return self._named_rgb([found[name] for name in ("Red", "Green", "Blue")])
         if found and (self.way is _XY or self._filters([beam])):
-            return [(x, []) for x in primaries_of(beam.xy)]
+            space = replace(SPACES["sRGB"], white=beam.xy)
+            return [(x, []) for x in primaries_of(space)]
+        if self.whites:
+            return [(x, []) for x in whites_of(beam.kelvin, self._white_range())]
         return [(EmitterColour("white", beam.xy, 1.0), [])]
+
+    def _white_channels(self) -> list[int]:
+        """Return the places of the channels that set the colour temperature of all beams, for a
+        lamp that mixes no other colours and can be dimmed.
+        """
+        own = set.intersection(*(self._dimmers(beam) for beam in self.beams))
+        if self.way is not None or not own or self._is_placeholder():
+            return []
+        for k, _ in self._with_attribute(_WARMTH):
+            function = self._warmth_of(k)
+            ends = [] if function is None else sorted(function.ends)
+            is_range = bool(ends) and LEAST_KELVIN <= ends[0] < ends[1] <= MOST_KELVIN
+            above = all(self.channels[k].node in beam.placed.ancestry for beam in self.beams)
+            if function is not None and is_range and above:
+                levels = (function.first, function.last)
+                pairs = zip(levels, function.ends, strict=True)
+                curve: Curve = tuple(
+                    sorted(((n / self.dmx[k].highest, x) for n, x in pairs), key=lambda p: p[1])
+                )
+                self.dmx[k] = replace(self.dmx[k], curve=curve)
+                return [k]
+        return []
+
+    def _warmth_of(self, place: int) -> ChannelFunction | None:
+        """Return the function by which a channel sets a colour temperature."""
+        channel = self.channels[place]
+        found = (channel.function(x.attribute) for x in channel.functions)
+        return next((x for x in found if x and _WARMTH.fullmatch(x.attribute)), None)
+
+    def _white_range(self) -> tuple[float, float]:
+        """Return the ends of the range of whites, in kelvin."""
+        function = self._warmth_of(self.whites[0])
+        assert function is not None
+        return function.ends
+
+    def _named_rgb(self, channels: Sequence[list[int]]) -> list[tuple[EmitterColour, list[int]]]:
+        """Return red, green and blue with the places of their channels: emitters of the file, or
+        colours of a space.
+        """
+        elements = []
+        for places in channels:
+            elements.append(self._shape(places[0], _NAMED_RGB).element)
+            for k in places[1:]:
+                self._shape(k, _NAMED_RGB)
+        emitters = rgb_emitters([x.get("Emitter") for x in elements], self.emitters)
+        if not emitters:
+            emitters = primaries_of(colour_space(elements[0].get("ColorSpace"), *self.spaces))
+        return [*zip(emitters, channels, strict=True)]
 
     def _filters(self, beams: Sequence[_Beam]) -> tuple[RigFilter, ...]:
         """Return the filters of some beams together; none if they cannot set all colours."""
@@ -418,7 +488,7 @@ class ModeReader:
 
     def _remark_resting(self, lights: Sequence[ModeLight]) -> None:
         """Remark on channels that change the colour, but rest."""
-        used = {k for light in lights for k in light.chromaticity}
+        used = {k for light in lights for k in (*light.chromaticity, *light.whites)}
         for light in lights:
             used |= {k for x in light.emitters for k in x.channels}
             used |= {k for x in light.filters for k in x.channels}
@@ -458,7 +528,8 @@ class ModeReader:
         candelas = {}
         for beam in self.beams:
             flux = USUAL_LUMENS / len(self.beams) if known is None else beam.flux or 0.0
-            total = sum(x.share for x in by_beam[beam.node])
+            # Two whites are all the light of one lamp in turn.
+            total = 1.0 if self.whites else sum(x.share for x in by_beam[beam.node])
             for x in by_beam[beam.node]:
                 candelas[beam.node, x.name] = flux * x.share / total / angles[beam.node]
         return candelas, "LuminousFlux" if known is not None else f"{USUAL_LUMENS:g} lm"

@@ -132,11 +132,14 @@ class ConsoleLink:
         with self._changed:
             return not self._is_moving() and self._schedule.is_settled
 
-    def show(self, drives: RigDrives, *, fade_s: float = 0.0) -> None:
+    def show(
+        self, drives: RigDrives, *, fade_s: float = 0.0, rig: ConsoleRig | None = None
+    ) -> None:
         """Show drives instead of what is shown now, at once or in a fade from there.
 
         drives: by light and emitter, 0 to 1; all others go to 0. Before the first time all are at
-        0. Raises RigError for drives that do not fit the rig, ConsoleError once it is closed.
+        0. rig: the same rig whose channels rest at other levels from now on, without a fade. Raises
+        RigError for drives that do not fit the rig, ConsoleError once it is closed.
         """
         check_drives(self._rig, drives)
         kept = {light: dict(values) for light, values in drives.items()}
@@ -144,6 +147,7 @@ class ConsoleLink:
             if self._is_closing:
                 raise ConsoleError(f"the link to {self.target} is closed: open it again")
             now_s = time.monotonic()
+            self._rig = rig or self._rig
             start: RigDrives = {} if self._fade is None else self._fade.at(now_s)
             self._fade, self._is_new = DriveFade(start, kept, now_s, fade_s), True
             self._changed.notify()

@@ -5,17 +5,14 @@ bounds are nearly the same. A factor of those that were free serves the others b
 held unknown is a constraint on the step, and a released one a further row.
 """
 
-from functools import cache
-from typing import Any
-
 import numpy as np
 
 from lightpaint.arrays import Bools, Doubles, Indices
 from lightpaint.lighting.algebra.clipped_newton import RIDGE, solve_ridged
+from lightpaint.lighting.algebra.lapack import large_libraries
 from lightpaint.lighting.algebra.nearest_optimum import SUSPECT_PIVOT
 from lightpaint.lighting.algebra.quadratic import Quadratic, kkt_residual
 from lightpaint.progress import cancellation_check
-from lightpaint.threads import find_loaded_libraries
 
 #: Unknowns that may differ from those of the factor, as a share of these: with more, a new factor
 #: is as quick.
@@ -26,22 +23,11 @@ MAX_CHANGED_SHARE = 1 / 6
 MAX_STEPS, KEPT_PROMISE, SHORTEST_PART = 100, 1e-4, 2.0**-12
 
 
-@cache
-def _libraries() -> tuple[Any, Any]:
-    """Return SciPy's LAPACK and BLAS, loaded where unknowns are many; `one_thread` limits them
-    from then on.
-    """
-    from scipy.linalg import blas, lapack
-
-    find_loaded_libraries()
-    return lapack, blas
-
-
 class FreeFactor:
     """The steps of problems with one M, scaled to a unit diagonal, (n, n)."""
 
     def __init__(self, M: Doubles) -> None:
-        _libraries()
+        large_libraries()
         self._M, self._counts = M, M.diagonal() > 0
         self._rows = np.zeros(0, np.intp)  # the unknowns of the factor
         self._factor: Doubles | None = None  # None if it is singular, or nearly so
@@ -74,7 +60,7 @@ class FreeFactor:
 
     def _factored(self, rows: Indices, right: Doubles) -> Doubles:
         """Factor the matrix of some unknowns, and solve it."""
-        lapack, _ = _libraries()
+        lapack, _ = large_libraries()
         matrix = self._M[np.ix_(rows, rows)]
         matrix.flat[:: rows.size + 1] += RIDGE * rows.size**0.5
         # The transpose is the same matrix in the order of LAPACK, which needs no copy of it.
@@ -96,7 +82,7 @@ class FreeFactor:
 
         held: places among the factor's unknowns; added: unknowns.
         """
-        (_, blas), rows, factor = _libraries(), self._rows, self._factor
+        (_, blas), rows, factor = large_libraries(), self._rows, self._factor
         assert factor is not None
         half = blas.dtrsv(factor, -gradient[rows], lower=1)
         if held.size or added.size:

@@ -196,7 +196,8 @@ def scaled(
     scale = np.where(counts, 1 / np.sqrt(np.where(counts, power, 1)), 1.0)
     inward = np.where(counts, scale, 0.0)
     # Not multiplied by the product of two scales, which could overflow.
-    M = (M * inward[:, None]) * inward
+    M = M * inward[:, None]
+    M *= inward
     b = b * inward
     low, high = low / scale, high / scale
     A, cap_lower, cap_upper, cap_scale, groups = _scaled_caps(caps, scale, low, high)

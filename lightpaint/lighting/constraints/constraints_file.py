@@ -1,16 +1,18 @@
 """Constraints from a lights file, the TOML beside a scene."""
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
 from lightpaint.errors import ConstraintError
 from lightpaint.files import one_line
 from lightpaint.keywords import keywords
-from lightpaint.lighting.constraints.constraints import LIGHT_KEYS, Constraints
-from lightpaint.lighting.constraints.values import check_keys, parse_strength
+from lightpaint.lighting.constraints.constraints import COLOR_KEYS, LIGHT_KEYS, Constraints
+from lightpaint.lighting.constraints.values import check_keys, parse_primaries, parse_strength
+from lightpaint.luminaires.luminaire_request import LUMINAIRE_KEYS, PHOTOMETRY
 from lightpaint.scene.lights.lights_file import IMAGE_KEYS, MOVES, SceneRequests, read_keys
 from lightpaint.sentences import SourceKey
+from lightpaint.validation import is_number
 
 #: Characters of an error, which names the file, the light and the key before it quotes.
 MAX_MESSAGE_LENGTH = 1000
@@ -41,7 +43,7 @@ def constraints_of(requests: SceneRequests) -> Constraints:
     try:
         strength = _pull_strength(keys, requests.source)
         return Constraints.of(
-            _without_moves(keys.get("light"), requests.source),
+            _constraint_tables(requests),
             tie=keys.get("tie", ()),
             prefer_current=strength,
             sparse=keys.get("sparse"),
@@ -56,17 +58,70 @@ def constraints_of(requests: SceneRequests) -> Constraints:
         raise ConstraintError(one_line(error.sentence, limit=MAX_MESSAGE_LENGTH)) from None
 
 
-def _without_moves(light: Any, source: str) -> Any:
-    """Return tables of lights without the keys for moves and images, which are not constraints."""
+#: Keys of a light that are no constraints.
+_OTHER_KEYS = (*MOVES, *IMAGE_KEYS, *LUMINAIRE_KEYS)
+
+
+def _constraint_tables(requests: SceneRequests) -> Any:
+    """Return tables of lights without the keys for moves, images and luminaires, which are not
+    constraints. A luminaire without emitters has one.
+    """
+    light = requests.keys.get("light")
     if not isinstance(light, Mapping):
         return light
     tables = {}
     for name, table in light.items():
-        check_keys(table, (*LIGHT_KEYS, *MOVES, *IMAGE_KEYS), SourceKey(source, "light", name))
-        remaining = {key: value for key, value in table.items() if key not in (*MOVES, *IMAGE_KEYS)}
+        where = SourceKey(requests.source, "light", name)
+        check_keys(table, (*LIGHT_KEYS, *_OTHER_KEYS), where)
+        remaining = {key: value for key, value in table.items() if key not in _OTHER_KEYS}
+        if PHOTOMETRY in table and "emitters" not in table:
+            remaining = _with_own_emitter(remaining, requests.luminaires[name].watts, where)
+        elif PHOTOMETRY in table:
+            remaining = _with_losses(remaining, requests.luminaires[name].factor)
         if remaining or not table:
             tables[name] = remaining
     return tables
+
+
+def _with_losses(table: Mapping[str, Any], factor: float) -> dict[str, Any]:
+    """Return the table of a luminaire whose emitters in candela or lumens lose what it loses.
+
+    factor: of the luminaire, which its web, and so emitters in Y, have already.
+    """
+    emitters = table["emitters"]
+    if factor == 1 or not isinstance(emitters, Sequence) or isinstance(emitters, str):
+        return dict(table)
+    return {**table, "emitters": [_dimmed(x, factor) for x in emitters]}
+
+
+def _dimmed(emitter: Any, factor: float) -> Any:
+    if not isinstance(emitter, Mapping):
+        return emitter
+    amounts = {key: emitter[key] for key in ("cd", "lm") if is_number(emitter.get(key))}
+    return {**emitter, **{key: factor * x for key, x in amounts.items()}}
+
+
+def _with_own_emitter(
+    table: Mapping[str, Any], watts: float | None, where: SourceKey
+) -> dict[str, Any]:
+    """Return the table of a luminaire with its only emitter, of the luminaire's colour.
+
+    watts: of the luminaire at full, if known.
+    """
+    colors = parse_primaries(table, where) or ((1.0, 1.0, 1.0),)
+    if len(colors) > 1:
+        raise ConstraintError(
+            where,
+            f" has {PHOTOMETRY} and {'kelvin' if 'kelvin' in table else 'primaries'}, and without "
+            "emitters a luminaire has one colour: list its emitters, or give one colour",
+        )
+    emitter = {"name": "lamp", "rgb": list(colors[0]), "Y": 1.0}
+    emitter |= {} if watts is None else {"watts": watts}
+    # The colour is the emitter's now.
+    return {
+        **{key: x for key, x in table.items() if key not in (*COLOR_KEYS, "duv")},
+        "emitters": [emitter],
+    }
 
 
 def _pull_strength(keys: Mapping[str, Any], source: str) -> Any:

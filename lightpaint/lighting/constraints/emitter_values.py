@@ -16,6 +16,7 @@ from lightpaint.colour.primaries import REC709, colour_science, rgb_to_xyz
 from lightpaint.errors import ConstraintError
 from lightpaint.files import one_line
 from lightpaint.lighting.constraints.values import check_keys
+from lightpaint.luminaires.plugin_names import FULL
 from lightpaint.sentences import Hint, SourceKey
 from lightpaint.validation import BRIGHTEST, MAX_NAME, is_number
 
@@ -54,10 +55,13 @@ class EmitterRequest:
         nothing about this light.
         """
         level = self.amount
+        # What is said of a luminaire holds for each of a group.
+        count = len(light.members) if light.unit == FULL else 1
         if self.per != "Y":
-            level /= self._amount_of_one(light, cd_per_unit)
+            level *= count / self._amount_of_one(light, cd_per_unit)
         emission = as_rgb(level * np.array(self.color))
-        return LampEmitter(self.name, emission, self.most, self.bits, self.watts)
+        watts = None if self.watts is None else count * self.watts
+        return LampEmitter(self.name, emission, self.most, self.bits, watts)
 
     def _amount_of_one(self, light: BasisLight, cd_per_unit: float | None) -> float:
         """Return the candelas or lumens of an emission of luminance 1."""

@@ -22,20 +22,29 @@ def constraints_by_light(
     constraints: Constraints, lights: Sequence[BasisLight]
 ) -> list[LightConstraint | None]:
     """Return the constraint on each light, None without one; names win over patterns."""
-    return [
-        LightConstraint.of(table, where=where) if table else None
-        for table, where in tables_by_light(constraints, lights)
-    ]
+    made: dict[tuple[int, str], LightConstraint] = {}
+    tables = tables_by_light(constraints, lights)
+    for table, where in tables:
+        if table and (id(table), where) not in made:
+            made[id(table), where] = LightConstraint.of(table, where=where)
+    return [made.get((id(table), where)) for table, where in tables]
 
 
 def tables_by_light(
     constraints: Constraints, lights: Sequence[BasisLight]
 ) -> list[tuple[dict[str, Any], str]]:
-    """Return the merged keys and values for each light, and the source of the last of them."""
-    tables: list[tuple[dict[str, Any], str]] = [({}, "") for _ in lights]
+    """Return the merged keys and values for each light, and the source of the last of them.
+
+    Lights of the same entries share their table.
+    """
+    tables: list[tuple[dict[str, Any], str]] = [({}, "")] * len(lights)
     for name, wish, origin in constraints.lights:
+        merged: dict[int, dict[str, Any]] = {}
         for k in _match_lights(name, lights, origin, only_keeps=wish == {"lock": True}):
-            tables[k] = merge_tables(tables[k][0], wish), origin
+            below = tables[k][0]
+            if id(below) not in merged:
+                merged[id(below)] = merge_tables(below, wish)
+            tables[k] = merged[id(below)], origin
     return tables
 
 

@@ -10,6 +10,7 @@ from lightpaint.arrays import RGB, as_rgb
 from lightpaint.colour.color import hex_to_rgb, kelvin_to_rgb, luminance
 from lightpaint.colour.emitter_preference import Preference
 from lightpaint.colour.white_range import WhiteRange, white_range
+from lightpaint.display_text import known_keys
 from lightpaint.errors import ColorError, ConstraintError
 from lightpaint.files import one_line
 from lightpaint.sentences import SourceKey
@@ -49,8 +50,9 @@ def check_keys(table: Any, known: Iterable[str], where: SourceKey) -> None:
     if not isinstance(table, Mapping):
         raise ConstraintError(where, f" is {table!r}: expected keys like lock = true")
     if unknown := [key for key in table if key not in known]:
+        key = unknown[0]
         raise ConstraintError(
-            where, f" has the key {one_line(repr(unknown[0]))}: known are {', '.join(known)}"
+            where, f" has the key {one_line(repr(key))}: {known_keys(str(key), known)}"
         )
 
 

@@ -368,10 +368,29 @@ def fixed_emission(
     if lamp is not None and not lamp.can_mix(emission):
         raise ConstraintError(
             constraint.where,
-            f" holds {light.name!r} at {' '.join(f'{x:.4g}' for x in emission)}, which its "
-            f"emitters {', '.join(lamp.names)} cannot mix: lock it at another level or colour",
+            f" holds {light.name!r} at {_numbers(emission)}, which its emitters "
+            f"{', '.join(lamp.names)} cannot mix: {_range_of(lamp, emission)}",
         )
     return emission
+
+
+def _range_of(lamp: Lamp, emission: Doubles) -> str:
+    """Return what a lamp can mix instead of an emission (3,), and what to do."""
+    if (most := lamp.brightest(emission)) > 0:
+        return (
+            f"in this colour they reach {_numbers(most * emission)}, a level of "
+            f"{luminance(most * emission):.4g}; lock it at that at most"
+        )
+    full = lamp.mix(lamp.most)
+    full = min(lamp.brightest(full), 1.0) * full
+    return (
+        f"they have no light of this colour, and all together reach {_numbers(full)}; lock it at "
+        "another colour"
+    )
+
+
+def _numbers(emission: Doubles) -> str:
+    return " ".join(f"{x:.4g}" for x in emission)
 
 
 def locked_emission(light: BasisLight, lock: Lock, where: SourceKey) -> Doubles:

@@ -347,7 +347,7 @@ class ReducedSolver:
 
         def solve(job: tuple[Block, QuadraticFamily, QuadraticFamily | None]) -> Optimum:
             block, family, ridged = job
-            right, begin = _block_right_side(b, block), x[block.unknowns]
+            right, begin = block.right_side(b), x[block.unknowns]
             if ridged is not None:
                 begin = ridged.minimise(right, begin, **options).x
             return family.minimise(right, begin, **options)
@@ -380,7 +380,7 @@ class ReducedSolver:
                 caps=p.caps,
                 method=self._method,
             )
-        right, begin = _block_right_side(b, block), x[block.unknowns]
+        right, begin = block.right_side(b), x[block.unknowns]
         found = self._sums.minimise(
             right, begin, multipliers=self._required, close=self._close, **options
         )
@@ -446,50 +446,11 @@ def _block_problems(
     problems = []
     for block in reduction.blocks:
         lower, upper = reduction.lower[block.unknowns], reduction.upper[block.unknowns]
-        M, b = _block_matrix(sides[0], block), _block_right_side(sides[1], block)
-        if coupling is not None:
-            p = block.pairs
-            np.add.at(
-                M,
-                (p.column, p.other_column),
-                p.value * coupling[p.light, p.channel, p.other_channel],
-            )
+        M, b = block.matrix(sides[0], coupling), block.right_side(sides[1])
         problems.append(
             ReducedProblem(block.channels, block.unknowns, M, b, lower, upper, block.caps)
         )
     return problems
-
-
-def _block_matrix(M: Doubles, block: Block) -> Doubles:
-    """Return M' in the unknowns of a block."""
-    if block.is_plain:
-        [c], lights = block.channels, block.entries[0].lights
-        if block.is_in_order and lights.size == M.shape[1]:
-            return np.asarray(M[c])
-        return np.asarray(M[c][lights[:, None], lights])
-    made = np.zeros((block.unknowns.size, block.unknowns.size))
-    for c, e in zip(block.channels, block.entries, strict=True):
-        part = M[c][e.lights[:, None], e.lights] * e.values[:, None] * e.values
-        if e.lights.size > e.columns.size:
-            # Most columns are of one light: the sum over those of several is a short one.
-            part = np.add.reduceat(np.add.reduceat(part, e.first, 0), e.first, 1)
-        made[e.columns[:, None], e.columns] += part
-    return made
-
-
-def _block_right_side(b: Doubles, block: Block) -> Doubles:
-    """Return b' in the unknowns of a block."""
-    if block.is_plain:
-        [c], lights = block.channels, block.entries[0].lights
-        is_whole = block.is_in_order and lights.size == b.shape[1]
-        return np.asarray(b[c] if is_whole else b[c, lights])
-    made = np.zeros(block.unknowns.size)
-    for c, e in zip(block.channels, block.entries, strict=True):
-        right = b[c, e.lights] * e.values
-        if e.lights.size > e.columns.size:
-            right = np.add.reduceat(right, e.first)
-        made[e.columns] += right
-    return made
 
 
 def _without_dark_channels(

@@ -7,7 +7,7 @@ convex quadratic under all constraints; with ranges of white it is one for each 
 neighbouring whites (white_mixes.py).
 """
 
-from collections.abc import Collection, Mapping, Sequence
+from collections.abc import Collection, Hashable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 from itertools import pairwise
@@ -19,7 +19,7 @@ from lightpaint.basis.lights import BasisLight
 from lightpaint.colour.lamp import Lamp
 from lightpaint.errors import ConstraintError
 from lightpaint.lighting.algebra.quadratic import Cap
-from lightpaint.lighting.constraints.constraints import Constraints
+from lightpaint.lighting.constraints.constraints import Constraints, LightConstraint
 from lightpaint.lighting.constraints.light_patterns import constraints_by_light, tied_lights
 from lightpaint.lighting.constraints.requirements import Requirements
 from lightpaint.lighting.unknowns.gamuts import Gamuts
@@ -337,6 +337,25 @@ def only_knobs(reduction: Reduction, chosen: Collection[int]) -> Reduction:
     return replace(reduction, labels=tuple(labels), knobs=tuple(knobs))
 
 
+def _lamps(
+    constraints: Constraints,
+    lights: Sequence[BasisLight],
+    by_light: Sequence[LightConstraint | None],
+) -> dict[int, Lamp]:
+    """Return the lamps that mix lights, by the lights' indices; alike lights share one."""
+    scale, prefer = constraints.cd_per_unit, constraints.prefer_emitters
+    made: dict[Hashable, Lamp | None] = {}
+    lamps = {}
+    for k, (light, constraint) in enumerate(zip(lights, by_light, strict=True)):
+        quantity = light.plugin, light.unit, light.unit_flux
+        kind = id(constraint), quantity, light.is_fixed, light.is_scalar
+        if kind not in made:
+            made[kind] = lamp_of(light, constraint, scale, prefer)
+        if (lamp := made[kind]) is not None:
+            lamps[k] = lamp
+    return lamps
+
+
 def reduce_to(constraints: Constraints, lights: Sequence[BasisLight]) -> Reduction:
     """Return the unknowns that `constraints` leave among `lights`.
 
@@ -347,9 +366,7 @@ def reduce_to(constraints: Constraints, lights: Sequence[BasisLight]) -> Reducti
     by_light = constraints_by_light(constraints, lights)
     labels = ["" if constraint is None else constraint.label for constraint in by_light]
     tied, fixed, knobs = tied_lights(constraints, lights), np.zeros((len(lights), 3)), []
-    scale, prefer = constraints.cd_per_unit, constraints.prefer_emitters
-    made = (lamp_of(light, x, scale, prefer) for light, x in zip(lights, by_light, strict=True))
-    lamps = {k: lamp for k, lamp in enumerate(made) if lamp is not None}
+    lamps = _lamps(constraints, lights, by_light)
     for k, (light, constraint) in enumerate(zip(lights, by_light, strict=True)):
         if light.is_fixed:
             fixed[k] = 1

@@ -1,12 +1,13 @@
 """The unknowns sorted for the arithmetic: by the channels they couple, by size, by their limits."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
+from typing import Any
 
 import numpy as np
 
-from lightpaint.arrays import Doubles, Indices
+from lightpaint.arrays import Bools, Doubles, Indices
 from lightpaint.lighting.algebra.quadratic import Cap
 from lightpaint.lighting.unknowns.knobs import Knob
 
@@ -28,6 +29,38 @@ class Entries:
     def counts(self) -> Indices:
         """(j,), the number of entries of each column."""
         return np.diff(self.first, append=self.lights.size)
+
+    @cached_property
+    def are_ones(self) -> bool:
+        """True if all values are 1."""
+        return bool((self.values == 1).all())
+
+    def place(self, other: "Entries") -> Any:
+        """Return the index of the rows of these columns and the columns of `other` in a matrix of
+        all unknowns.
+        """
+        rows, columns = _as_range(self.columns), _as_range(other.columns)
+        if isinstance(rows, slice) and isinstance(columns, slice):
+            return rows, columns
+        return np.ix_(self.columns, other.columns)
+
+    def between(self, M: Doubles, other: "Entries") -> Doubles:
+        """Return C_cᵀ M C_d, (j, j'), of a matrix (n, n) between this channel and that of
+        `other`.
+        """
+        rows, columns = _as_range(self.lights), _as_range(other.lights)
+        are_ranges = isinstance(rows, slice) and isinstance(columns, slice)
+        part = M[rows, columns] if are_ranges else M[np.ix_(self.lights, other.lights)]
+        if not self.are_ones:
+            part = part * self.values[:, None]
+        if not other.are_ones:
+            part = part * other.values
+        # Most columns are of one light: the sum over those of several is a short one.
+        if self.lights.size > self.columns.size:
+            part = np.add.reduceat(part, self.first, 0)
+        if other.lights.size > other.columns.size:
+            part = np.add.reduceat(part, other.first, 1)
+        return part
 
 
 @dataclass(frozen=True)
@@ -64,9 +97,82 @@ class Block:
     def is_plain(self) -> bool:
         """True if its unknowns are the weights of lights in one channel."""
         [first, *more] = self.entries
-        return (
-            not more and bool((first.values == 1).all()) and first.lights.size == self.unknowns.size
+        return not more and first.are_ones and first.lights.size == self.unknowns.size
+
+    def right_side(self, b: Doubles) -> Doubles:
+        """Return Cᵀ b, (k,), of b (3, n)."""
+        if self.is_plain:
+            [c], lights = self.channels, self.entries[0].lights
+            is_whole = self.is_in_order and lights.size == b.shape[1]
+            return np.asarray(b[c] if is_whole else b[c, lights])
+        made = np.zeros(self.unknowns.size)
+        for c, e in zip(self.channels, self.entries, strict=True):
+            right = b[c, e.lights] * e.values
+            if e.lights.size > e.columns.size:
+                right = np.add.reduceat(right, e.first)
+            made[e.columns] += right
+        return made
+
+    def matrix(self, M: Doubles, coupling: Doubles | None = None) -> Doubles:
+        """Return Cᵀ M C, (k, k), of M (3, n, n) and the coupling of channels, as in
+        `NormalEquations`.
+        """
+        if self.is_plain:
+            [c], e = self.channels, self.entries[0]
+            return e.between(M[c], e)
+        made = np.zeros((self.unknowns.size, self.unknowns.size))
+        for c, e in zip(self.channels, self.entries, strict=True):
+            made[e.place(e)] += e.between(M[c], e)
+        if coupling is not None:
+            p = self.pairs
+            values = p.value * coupling[p.light, p.channel, p.other_channel]
+            np.add.at(made, (p.column, p.other_column), values)
+        return made
+
+    def covariance(self, C: Doubles) -> Doubles:
+        """Return Cᵀ Q C, (k, k), of a covariance Q of all channels, (3, n, 3, n)."""
+        made = np.zeros((self.unknowns.size, self.unknowns.size))
+        for c, e in zip(self.channels, self.entries, strict=True):
+            for d, f in zip(self.channels, self.entries, strict=True):
+                made[e.place(f)] += e.between(C[c, :, d], f)
+        return made
+
+    def variances(self, covariance: Doubles, n: int) -> Doubles:
+        """Return the variance of each weight, (n, 3), by a covariance of the unknowns, (k, k)."""
+        variances = np.zeros((n, 3))
+        for c, e in zip(self.channels, self.entries, strict=True):
+            order = np.argsort(e.lights, kind="stable")
+            columns = np.repeat(e.columns, e.counts)[order]
+            lights, values = e.lights[order], e.values[order]
+            # Entries of the same light follow each other.
+            for apart in range(lights.size):
+                first = np.flatnonzero(lights[: lights.size - apart] == lights[apart:])
+                if not first.size:
+                    break
+                second, times = first + apart, 2 if apart else 1
+                terms = covariance[columns[first], columns[second]] * values[first] * values[second]
+                variances[:, c] += times * np.bincount(lights[first], terms, n)
+        return variances
+
+    def effects(self, x: Doubles, n: int) -> Doubles:
+        """Return the effect C x of unknowns, (k, m), on the weights, (3, n, m)."""
+        weights = np.zeros((3, n, x.shape[1]))
+        for c, e in zip(self.channels, self.entries, strict=True):
+            rows = e.values[:, None] * x[np.repeat(e.columns, e.counts)]
+            np.add.at(weights[c], e.lights, rows)
+        return weights
+
+    def masked(self, lit: Bools) -> "Block":
+        """Return the block without effect on channels where a light reaches nothing. lit: (n,
+        3).
+        """
+        if lit.all():
+            return self
+        entries = (
+            replace(e, values=e.values * lit[e.lights, c])
+            for c, e in zip(self.channels, self.entries, strict=True)
         )
+        return replace(self, entries=tuple(entries))
 
     @cached_property
     def pairs(self) -> Pairs:
@@ -177,3 +283,11 @@ class LimitedKnobs:
             np.array([limit[1] for _, limit in limited]),
             np.array([limit[2] for _, limit in limited]),
         )
+
+
+def _as_range(places: Indices) -> slice | Indices:
+    """Return places at equal distances as a slice, which needs no copy, and others unchanged."""
+    step = int(places[1] - places[0]) if places.size > 1 else 1
+    if step < 1 or not places.size or (np.diff(places) != step).any():
+        return places
+    return slice(int(places[0]), int(places[-1]) + 1, step)

@@ -5,12 +5,13 @@ those that its answer misses are added until none is missed (Kelley's cutting pl
 each program, through SciPy.
 """
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
 from lightpaint.arrays import Doubles, Indices
 from lightpaint.errors import LightpaintError
+from lightpaint.lighting.algebra.required_sums import RequiredSums
 from lightpaint.lighting.unknowns.lamp_powers import watts_of_fixed, watts_of_unknowns
 from lightpaint.lighting.unknowns.reduction import Reduction
 from lightpaint.lighting.wishes.wished_light import WishedLight
@@ -22,6 +23,9 @@ ADDED_ROWS, CLOSE, MAX_ROUNDS = 40, 1e-9, 200
 
 #: Weight of the power where as much as possible of all wishes is sought: of the brightest answer.
 SECOND = 1e-6
+
+#: Share of the least power that may be spent on lamps that share the light evenly.
+EVEN = 0.01
 
 #: A share of a wish below this is round-off.
 LEAST_SHARE = 1e-7
@@ -42,13 +46,37 @@ class Program:
 
 
 def least_watts(wished: WishedLight, reduction: Reduction) -> Program:
-    """Return the unknowns that meet all wishes with the least power.
+    """Return the unknowns that meet all wishes with the least power, up to a percent of it.
 
-    Wishes that nothing meets are met as far as possible first.
+    A corner of all that meets the wishes has some lamps at full beside others that are off. With
+    `EVEN` more than the least power lamps share the light as evenly as they can. Wishes that
+    nothing meets are met as far as possible first.
     """
     shares = shares_given_up(wished, reduction)
     watts = watts_of_unknowns(reduction.knobs, reduction.lamps)
-    return _solve(wished, reduction, watts, wished.slack_of(shares), shares)
+    slack = wished.slack_of(shares)
+    program = _solve(wished, reduction, watts, slack, shares)
+    return replace(program, x=_evened(reduction, program, watts, slack))
+
+
+def _evened(reduction: Reduction, program: Program, watts: Doubles, slack: Doubles) -> Doubles:
+    """Return unknowns, (k,), near the least power whose drives are as even as they can be."""
+    rows, least = reduction.required
+    power = float(watts @ program.x)
+    lower, upper = reduction.lower, reduction.upper
+    if not power or not np.isfinite(upper).all():
+        return program.x
+    sizes = np.where(upper > 0, upper, 1.0)
+    sums = RequiredSums(
+        np.diag(1 / np.square(sizes)),
+        np.vstack([rows, -watts]),
+        np.append(least - slack, -(1 + EVEN) * power),
+        lower=lower,
+        upper=upper,
+        caps=reduction.caps,
+    )
+    found = sums.minimise(np.zeros(len(watts)), program.x)
+    return found.optimum.x if found.converged else program.x
 
 
 def shares_given_up(wished: WishedLight, reduction: Reduction) -> Doubles:

@@ -1,4 +1,4 @@
-"""What a lighting gives on measuring planes, beside what was wished for there."""
+"""The illuminance that a lighting gives on measuring planes, beside what was wished for."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass
@@ -10,7 +10,7 @@ from lightpaint.arrays import Doubles
 from lightpaint.errors import ConstraintError
 from lightpaint.lighting.unknowns.lamp_powers import watts_of_fixed
 from lightpaint.lighting.unknowns.reduction import Reduction
-from lightpaint.lighting.wishes.wished_light import Wish, WishedLight, check_powers
+from lightpaint.lighting.wishes.wished_light import PlaneWish, WishedLight, check_powers
 from lightpaint.photometry.illuminance import PlaneReading
 
 #: Relative shortfall from which a wish is not met: rows are met up to round-off.
@@ -28,7 +28,7 @@ class WishOutcome:
     the least power in watts with each unit that is asked; None where a painting was solved for.
     """
 
-    wish: Wish
+    wish: PlaneWish
     reached: float
     price: float | None = None
 
@@ -60,9 +60,19 @@ class PlanesAnswer:
     cost_delta_e: float | None = None
 
     @cached_property
-    def readings(self) -> Mapping[str, PlaneReading]:
-        """The illuminance on each plane, by its name."""
-        return self.wished.illuminance.readings(self.weights)
+    def readings(self) -> Mapping[tuple[str, str], PlaneReading]:
+        """The illuminance on each plane, by case, "" for the light of the scene, and plane."""
+        return {
+            (case, plane): reading
+            for case, weights in self.weights_by_case.items()
+            for plane, reading in self.wished.illuminance.readings(weights).items()
+        }
+
+    @property
+    def weights_by_case(self) -> Mapping[str, Doubles]:
+        """The weights (n, 3) of each case; of the light of the scene as "" without cases."""
+        lit = {case.name: case.applied_to(self.weights) for case in self.wished.cases}
+        return lit or {"": self.weights}
 
     @property
     def missed(self) -> tuple[WishOutcome, ...]:
@@ -98,18 +108,19 @@ def planes_answer(
 
 
 def _reached(
-    wished: WishedLight, wish: Wish, rows: Doubles, weights: Doubles, watts: float | None
+    wished: WishedLight, wish: PlaneWish, sums: Doubles, weights: Doubles, watts: float | None
 ) -> float:
     """Return what came of a wish, at the sure end of its interval."""
     if wish.kind == "power":
         return float("nan") if watts is None else watts
-    values, illuminance = rows[wish.rows], wished.illuminance
-    if wish.kind == "mean":
-        return float(values.min())
-    if wish.kind == "max":
-        return -float(values.min())
-    base = illuminance.reading(wish.to or wish.plane, weights).mean
-    return wish.asked + float(values.min()) / base if base > 0 else 0.0
+    # What the rows reach beyond what is asked of them.
+    beyond = float((sums - wished.requirements.least)[wish.rows].min())
+    if wish.kind in ("mean", "max"):
+        return wish.asked + beyond if wish.kind == "mean" else wish.asked - beyond
+    case = next((x for x in wished.cases if x.name == wish.case), None)
+    lit = weights if case is None else case.applied_to(weights)
+    base = wished.illuminance.reading(wish.to or wish.plane, lit).mean
+    return wish.asked + beyond / base if base > 0 else 0.0
 
 
 def _power(reduction: Reduction, wished: WishedLight, weights: Doubles) -> float | None:

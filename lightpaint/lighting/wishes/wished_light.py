@@ -5,22 +5,25 @@ least what is asked, no point is below a share of the mean, or above a limit, an
 least a share of another plane's. So is the power of all lamps, which a budget limits.
 
 A has noise. A wish is met by the lower end of a 95 % interval: what a point or a mean gives counts
-for less by 1.96 relative standard errors, and for more where there is a limit from above.
+for less by as much as it is uncertain, and for more where there is a limit from above.
 """
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from fnmatch import fnmatchcase
 from functools import cached_property
 from typing import Literal
 
 import numpy as np
 
-from lightpaint.arrays import Doubles
+from lightpaint.arrays import Doubles, Indices
+from lightpaint.basis.lights import Lights
+from lightpaint.display_text import with_similar_name
 from lightpaint.errors import ConstraintError
 from lightpaint.lighting.constraints.requirements import Requirements
 from lightpaint.lighting.unknowns.reduction import Reduction
 from lightpaint.photometry.illuminance import Illuminance
-from lightpaint.photometry.measuring_plane import MeasuringPlane, PowerBudget
+from lightpaint.photometry.measuring_plane import LightCase, MeasuringPlane, PowerBudget
 
 #: What a wish is about.
 Kind = Literal["mean", "uniformity", "max", "ratio", "power"]
@@ -33,11 +36,12 @@ LARGEST_ERROR = 0.25
 
 
 @dataclass(frozen=True)
-class Wish:
+class PlaneWish:
     """A wish for a plane, or for the power of all lamps.
 
     plane: its name; "" for power. asked: in lx, watts, or a share. to: the other plane of a ratio.
-    rows: its rows of the requirements. size: what its rows miss if nothing of it is met.
+    rows: its rows of the requirements. size: what its rows miss if nothing of it is met. case: the
+    case in which it holds; "" for that of the scene.
     """
 
     kind: Kind
@@ -46,6 +50,7 @@ class Wish:
     rows: slice
     size: float
     to: str = ""
+    case: str = ""
 
     @property
     def is_hard(self) -> bool:
@@ -54,15 +59,53 @@ class Wish:
 
 
 @dataclass(frozen=True)
+class LitCase:
+    """A case on the lights of a solve.
+
+    lights: (c,), the lights by number that it sets. weights: (c, 3), of these.
+    """
+
+    name: str
+    lights: Indices
+    weights: Doubles
+
+    @classmethod
+    def of(cls, case: LightCase, lights: Lights) -> "LitCase":
+        """Return a case on `lights`. Raises ConstraintError if it names none."""
+        found = dict[int, float]()
+        for name, factor in case.factors.items():
+            matching = [k for k, light in enumerate(lights.names) if fnmatchcase(light, name)]
+            if not matching:
+                known = with_similar_name("no light has this name", name, [*lights.names])
+                raise ConstraintError(f"case {case.name!r} sets {name!r}: {known}")
+            found |= dict.fromkeys(matching, factor)
+        places = np.array(sorted(found), np.intp)
+        factors = np.array([found[k] for k in places.tolist()]).reshape(-1, 1)
+        return cls(case.name, places, factors * lights.current_weights[places])
+
+    @classmethod
+    def of_scene(cls, lights: Lights) -> "LitCase":
+        """Return the case of the light as it is."""
+        return cls("", np.zeros(0, np.intp), lights.current_weights[:0])
+
+    def applied_to(self, weights: Doubles) -> Doubles:
+        """Return weights (n, 3) with those of this case."""
+        weights = weights.copy()
+        weights[self.lights] = self.weights
+        return weights
+
+
+@dataclass(frozen=True)
 class WishedLight:
     """All wishes, with the requirements that they make.
 
-    illuminance: that is wished for.
+    illuminance: that is wished for. cases: in which it is; none for the light of the scene alone.
     """
 
     illuminance: Illuminance
-    wishes: tuple[Wish, ...]
+    wishes: tuple[PlaneWish, ...]
     requirements: Requirements
+    cases: tuple[LitCase, ...] = ()
 
     @cached_property
     def is_empty(self) -> bool:
@@ -82,67 +125,119 @@ class WishedLight:
 
 
 def wished_light(
-    illuminance: Illuminance, budget: PowerBudget, reduction: Reduction, *, floor_m2: float = 0.0
+    illuminance: Illuminance,
+    budget: PowerBudget,
+    reduction: Reduction,
+    *,
+    floor_m2: float = 0.0,
+    cases: Sequence[LightCase] = (),
 ) -> WishedLight:
     """Return the wishes for the planes of `illuminance`, and the budget.
 
     reduction: of the lights, whose brightest setting tells how noise counts. floor_m2: the area
-    that a budget per area is for. Raises ConstraintError
-    for a budget of lamps of unknown power, and a ratio to a plane that is not there.
+    that a budget per area is for. cases: in each of which the wishes hold; by default in the light
+    of the scene alone. Raises ConstraintError for a budget of lamps of unknown power, a ratio to a
+    plane that is not there, a plane without light, and a case of lights that the solve adjusts.
     """
-    rows, least = list[Doubles](), list[Doubles]()
-    wishes = list[Wish]()
-    weights = brightest(reduction, illuminance)
-
-    def add(
-        kind: Kind, plane: str, asked: float, matrix: Doubles, size: float, to: str = ""
-    ) -> None:
-        begin = sum(len(x) for x in rows)
-        wishes.append(Wish(kind, plane, asked, slice(begin, begin + len(matrix)), size, to))
-        rows.append(matrix)
-
-    for plane in illuminance.planes:
-        part = illuminance.points_of(plane.name)
-        matrix, reading = illuminance.matrix[part], illuminance.reading(plane.name, weights)
-        mean = matrix.mean(axis=0, keepdims=True)
-        point_error = _relative(
-            illuminance.standard_errors(weights)[part], illuminance.of(weights)[part]
-        )
-        mean_error = reading.mean_error / reading.mean if reading.mean > 0 else 0.0
-        sure_mean = mean * (1 - NORMAL_95 * min(mean_error, LARGEST_ERROR))
-        sure_points = matrix * (1 - NORMAL_95 * point_error)
-        wish, size = plane.wishes, plane.wishes.mean or max(reading.mean, 1e-9)
-        if wish.mean is not None:
-            add("mean", plane.name, wish.mean, sure_mean, wish.mean)
-            least.append(np.array([wish.mean]))
-        if wish.uniformity is not None:
-            add(
-                "uniformity",
-                plane.name,
-                wish.uniformity,
-                sure_points - wish.uniformity * mean,
-                size,
-            )
-            least.append(np.zeros(len(matrix)))
-        if wish.most is not None:
-            add("max", plane.name, wish.most, -matrix * (1 + NORMAL_95 * point_error), wish.most)
-            least.append(np.full(len(matrix), -wish.most))
-        for ratio in wish.ratios:
-            other = illuminance.matrix[_other_plane(illuminance, plane, ratio.to)]
-            row = sure_mean - ratio.at_least * other.mean(axis=0, keepdims=True)
-            add("ratio", plane.name, ratio.at_least, row, size, ratio.to)
-            least.append(np.zeros(1))
-    watts = np.zeros(sum(len(x) for x in rows))
+    rows = _Rows(len(illuminance.lights))
+    lit_cases = tuple(lit_case(case, illuminance.lights, reduction) for case in cases)
+    at_full = brightest(reduction, illuminance)
+    for case in lit_cases or (LitCase.of_scene(illuminance.lights),):
+        rows.case = case
+        for plane in illuminance.planes:
+            _add_wishes(rows, plane, illuminance, case.applied_to(at_full))
     if (limit := watts_allowed(budget, floor_m2)) is not None:
         check_powers(reduction, illuminance.lights.names, "a limit of power")
-        add("power", "", limit, np.zeros((1, len(illuminance.lights), 3)), limit)
-        least.append(np.array([-limit]))
-        watts = np.append(watts, -1.0)
-    empty = np.zeros((0, len(illuminance.lights), 3))
-    requirements = Requirements(
-        np.concatenate([empty, *rows]), watts, np.concatenate([np.zeros(0), *least])
-    )
-    return WishedLight(illuminance, tuple(wishes), requirements)
+        rows.case = LitCase.of_scene(illuminance.lights)
+        rows.add("power", "", limit, np.zeros((1, *rows.shape)), -limit, size=limit, watts=-1.0)
+    return WishedLight(illuminance, tuple(rows.wishes), rows.requirements(), lit_cases)
+
+
+def _add_wishes(
+    rows: "_Rows", plane: MeasuringPlane, illuminance: Illuminance, weights: Doubles
+) -> None:
+    """Add the rows of a plane's wishes. weights: (n, 3), at which noise counts."""
+    part, name, wishes = illuminance.points_of(plane.name), plane.name, plane.wishes
+    matrix, reading = illuminance.matrix[part], illuminance.reading(name, weights)
+    if not reading.mean > 0 and (wishes.mean is not None or wishes.uniformity is not None):
+        raise ConstraintError(
+            f"plane {name!r} gets no light from any lamp, and there are wishes for it: is it "
+            "below the floor, or do its points face away?"
+        )
+    mean = matrix.mean(axis=0, keepdims=True)
+    values, errors = illuminance.of(weights)[part], illuminance.standard_errors(weights)[part]
+    point_error = NORMAL_95 * _relative(errors, values)[:, None, None]
+    mean_error = reading.mean_interval / reading.mean if reading.mean > 0 else 0.0
+    sure_mean = mean * (1 - min(mean_error, NORMAL_95 * LARGEST_ERROR))
+    size = wishes.mean or max(reading.mean, 1e-9)
+    if wishes.mean is not None:
+        rows.add("mean", name, wishes.mean, sure_mean, wishes.mean, size=wishes.mean)
+    if wishes.uniformity is not None:
+        above = matrix * (1 - point_error) - wishes.uniformity * mean
+        rows.add("uniformity", name, wishes.uniformity, above, 0.0, size=size)
+    if wishes.most is not None:
+        below = -matrix * (1 + point_error)
+        rows.add("max", name, wishes.most, below, -wishes.most, size=wishes.most)
+    for ratio in wishes.ratios:
+        other = illuminance.matrix[_other_plane(illuminance, plane, ratio.to)]
+        above = sure_mean - ratio.at_least * other.mean(axis=0, keepdims=True)
+        rows.add("ratio", name, ratio.at_least, above, 0.0, size=size, to=ratio.to)
+
+
+def lit_case(case: LightCase, lights: Lights, reduction: Reduction) -> LitCase:
+    """Return a case on `lights`. Raises ConstraintError if it names none, or an adjusted one."""
+    lit = LitCase.of(case, lights)
+    movable = {light for knob in reduction.knobs for light in knob.lights}
+    if adjusted := [lights.names[k] for k in lit.lights.tolist() if k in movable]:
+        raise ConstraintError(
+            f"case {case.name!r} sets {adjusted[0]!r}, which the solve adjusts: lock it in the "
+            "lights file (lock = true)"
+        )
+    return lit
+
+
+class _Rows:
+    """Rows of requirements that are being gathered, with the wishes that they are of."""
+
+    def __init__(self, lights: int) -> None:
+        self.shape = (lights, 3)
+        self.wishes: list[PlaneWish] = []
+        self.case: LitCase
+        self._rows: list[Doubles] = [np.zeros((0, *self.shape))]
+        self._least: list[Doubles] = [np.zeros(0)]
+        self._watts: list[Doubles] = [np.zeros(0)]
+        self._count = 0
+
+    def add(
+        self,
+        kind: Kind,
+        plane: str,
+        asked: float,
+        rows: Doubles,
+        least: float,
+        *,
+        size: float,
+        to: str = "",
+        watts: float = 0.0,
+    ) -> None:
+        """Add the rows (r, n, 3) of a wish in the case, each of which reaches `least`."""
+        count, case = len(rows), self.case
+        # The light of the case is not that of the answer.
+        given = np.einsum("rlc,lc->r", rows[:, case.lights], case.weights)
+        rows = rows.copy()
+        rows[:, case.lights] = 0
+        place = slice(self._count, self._count + count)
+        self.wishes.append(PlaneWish(kind, plane, asked, place, size, to, case.name))
+        self._rows.append(rows)
+        self._least.append(least - given)
+        self._watts.append(np.full(count, watts))
+        self._count += count
+
+    def requirements(self) -> Requirements:
+        """Return all rows."""
+        parts = self._rows, self._watts, self._least
+        rows, watts, least = (np.concatenate(part) for part in parts)
+        return Requirements(rows, watts, least)
 
 
 def brightest(reduction: Reduction, illuminance: Illuminance) -> Doubles:
@@ -182,10 +277,11 @@ def check_powers(reduction: Reduction, names: Sequence[str], purpose: str) -> No
         )
 
 
-def _relative(errors: Doubles, values: Doubles) -> float:
-    """Return the relative error of points, which all have the same."""
-    lit = values > 0
-    return float(min((errors[lit] / values[lit]).max(initial=0), LARGEST_ERROR))
+def _relative(errors: Doubles, values: Doubles) -> Doubles:
+    """Return the relative errors of points, (p,), as far as a margin allows for them."""
+    relative = np.full(len(values), LARGEST_ERROR)
+    np.divide(errors, values, out=relative, where=values > 0)
+    return np.asarray(np.minimum(relative, LARGEST_ERROR))
 
 
 def _other_plane(illuminance: Illuminance, plane: MeasuringPlane, to: str) -> slice:

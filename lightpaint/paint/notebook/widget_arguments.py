@@ -170,7 +170,9 @@ def load_constraints(session: Session, constraints: Any) -> LoadArguments:
         kind = type(constraints).__name__
         raise PaintError(f"painter.constraints is a lp.Constraints or None, not {kind}")
     lights, values = session.basis.lights, session.requests.values
-    requests = SessionRequests.from_constraints(constraints or Constraints(), lights, values)
+    requests = SessionRequests.from_constraints(
+        Constraints() if constraints is None else constraints, lights, values
+    )
     return {}, requests.with_master(session.requests.master), "constraints from a cell"
 
 

@@ -11,7 +11,7 @@ from lightpaint.arrays import Bools, Doubles, Floats, Indices
 from lightpaint.paint.presets.view_areas import Mask
 
 #: Kinds of emitters that always are hard light, always soft light, and light of the sky or the sun.
-HARD_KINDS = frozenset({"spot", "point", "directional", "projector", "directionalarea"})
+HARD_KINDS = frozenset({"spot", "point", "directional", "projector", "directionalarea", "ies"})
 SOFT_KINDS = frozenset({"constant"})
 DAYLIGHT_KINDS = frozenset({"constant", "directional", "envmap", "sunsky", "sky", "sun"})
 

@@ -104,7 +104,7 @@ class LightAnswer:
 
 
 @dataclass(frozen=True)
-class PlaneWish:
+class WishReading:
     """A wish for a measuring plane or, as `power`, for all lamps together.
 
     asked: in lx, in W, or as a share. reached: what came of it, at the sure end of its interval;
@@ -130,7 +130,7 @@ class PlaneLight:
     least: float
     most: float
     lux: tuple[float, ...]
-    wishes: tuple[PlaneWish, ...]
+    wishes: tuple[WishReading, ...]
 
 
 @dataclass(frozen=True)
@@ -144,7 +144,7 @@ class PlanesReading:
 
     planes: tuple[PlaneLight, ...]
     watts: float | None
-    power: PlaneWish | None
+    power: WishReading | None
     is_required: bool
     is_old: bool
 

@@ -121,7 +121,8 @@ class AnswerUpdate(EditState, Findings, Event, kind="answer", is_observed=True):
     version: grows with every change of the session. stroke: number of the last stroke that arrived.
     exact: whether it equals the answer of `lightpaint solve`. mode: space in which it was found
     under the brush. reading: what these lights give on measuring planes, if there are any.
-    weights: (lights, 3) float64.
+    weights: (lights, 3) float64. drives: of the emitters of each lamp in the order of the lights,
+    null for other lights; some answers under the brush have them, exact ones have them in `lights`.
     """
 
     version: int
@@ -129,6 +130,7 @@ class AnswerUpdate(EditState, Findings, Event, kind="answer", is_observed=True):
     exact: bool
     mode: str
     weights: Doubles
+    drives: tuple[tuple[float, ...] | None, ...] | None = field(default=None, metadata=OPTIONAL)
     reading: PlanesReading | None = field(default=None, metadata=OPTIONAL)
 
     @property

@@ -10,7 +10,7 @@ from typing import Any
 
 import numpy as np
 
-from lightpaint.arrays import Doubles, Floats
+from lightpaint.arrays import Doubles, Floats, Position
 from lightpaint.basis.basis import Basis
 from lightpaint.basis.lights import Lights
 from lightpaint.errors import PaintError, SceneError
@@ -232,6 +232,19 @@ class LampRig:
         if values:
             site = motion_of(name, light.plugin, site, _pose(name, values)).site
         return panel_site(self.scene, light, site) if is_panel(light) else site
+
+    def directions(self, placed: Placed) -> dict[str, Position]:
+        """Return where the lights of the scene point, by name; only of those that point somewhere.
+
+        Of a group, this is where its first emitter does.
+        """
+        found = {}
+        for light in self.scene.lights:
+            values = placed.get(light.name)
+            site = self.site(light.name, values) if values else light.members[0].site
+            if site.direction is not None:
+                found[light.name] = site.direction
+        return found
 
     def moved_scene(self, placed: Placed, view: int = 0) -> Scene:
         """Return the scene of a view with lights moved and added."""

@@ -12,6 +12,7 @@ from lightpaint.basis.lights import Lights
 from lightpaint.colour.display.view_transform import ViewTransform
 from lightpaint.colour.lamp import Lamp
 from lightpaint.errors import LightpaintError
+from lightpaint.lighting.constraints.absolute_scale import with_sure_scale
 from lightpaint.lighting.constraints.constraints import Constraints
 from lightpaint.lighting.constraints.constraints_file import constraints_of
 from lightpaint.lighting.fit import resolve_fit
@@ -190,7 +191,7 @@ class LiveAnswer:
 
     def _unrequired(self, requests: SessionRequests) -> Constraints:
         constraints = constraints_of(self._basis.requests).and_then(self._base_constraints)
-        return constraints.and_then(requests.constraints())
+        return with_sure_scale(constraints.and_then(requests.constraints()), self._basis.lights)
 
     def _wishes_under(self, requests: SessionRequests) -> WishesInEffect | None:
         """Return the wishes for planes under requests; None without any, and where limits of lamps

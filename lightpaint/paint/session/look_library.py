@@ -67,6 +67,7 @@ class LookLibrary:
             session.store.recover()
         for look in session.store.looks():
             self._offer_thumbnails(look)
+            self._renew_drives(look)
 
     def infos(self) -> tuple[LookInfo, ...]:
         """Return the descriptions of looks for clients."""
@@ -254,6 +255,8 @@ class LookLibrary:
         weights: npt.NDArray[Any],
     ) -> StoredLook:
         fields = {"name": name, "stamp": time.time(), "wishes": requests.as_json()}
+        if drives := self._drives_of(np.asarray(weights, np.float64), requests):
+            fields["drives"] = drives
         arrays: dict[str, npt.NDArray[Any]] = {"weights": weights}
         pictures = self._light_of(weights, requests)
         for view, picture, (image, importance, marks) in zip(
@@ -268,6 +271,24 @@ class LookLibrary:
                 arrays_of_view[MARKS_ARRAY] = marks.view(np.uint8)
             arrays |= {name_in_view(key, view.view): value for key, value in arrays_of_view.items()}
         return StoredLook(self._next_id(), fields, arrays)
+
+    def _renew_drives(self, look: StoredLook) -> None:
+        """Keep the drives of a look if they are others, as after its lamps were measured anew."""
+        weights = np.asarray(look.arrays["weights"], np.float64)
+        drives = self._drives_of(weights, _requests(look))
+        if drives != look.fields.get("drives", {}):
+            fields = {**look.fields, "drives": drives}
+            self._session.store.put_look(StoredLook(look.id, fields, look.arrays))
+
+    def _drives_of(
+        self, weights: Doubles, requests: SessionRequests
+    ) -> dict[str, dict[str, float]]:
+        """Return the drives of the lamps of emitters, by name, of lights with these weights."""
+        names, output = self._session.bases[0].names, self._output_of(weights, requests)
+        return {
+            names[k]: dict(zip(lamp.names, lamp.drives_for(output[k]).tolist(), strict=True))
+            for k, lamp in self._session.live_answer.lamps.items()
+        }
 
     def _store(self, look: StoredLook) -> None:
         self._session.store.put_look(look)

@@ -33,6 +33,7 @@ from lightpaint.paint.references.likeness_layers import open_request
 from lightpaint.paint.references.reference_table import ReferenceTable
 from lightpaint.paint.session.history import Changes, History, Travel, restore
 from lightpaint.paint.session.live_answer import LiveAnswer, weights_by_name
+from lightpaint.paint.session.live_drives import LiveDrives
 from lightpaint.paint.session.moved_lights import MovedLights, NoPlaneSource, Placed, PlaneSource
 from lightpaint.paint.session.request_changes import (
     RequestChange,
@@ -111,10 +112,11 @@ class Session:
             self.views.live,
             requests,
             settings=settings,
-            constraints=constraints or Constraints(),
+            constraints=Constraints() if constraints is None else constraints,
             transform=transform,
             lights_of=lambda session_requests: self._moved_lights.lights(session_requests.placed),
         )
+        self._live_drives = LiveDrives()
         self.history = History(store, self.views, self.live_answer)
         self.references = ReferenceTable(store, transform)
         self._update_answer()
@@ -265,7 +267,10 @@ class Session:
 
     def _answer_to_edit(self, *, is_final: bool) -> Message:
         """Return the answer to paint or a change of layers, with the steps once it is one."""
-        return self.answer_update(**(self.edit_state if is_final else {}))
+        if is_final:
+            return self.answer_update(**self.edit_state)
+        drives = self._live_drives.take(self.live_answer.lamps, self.weights)
+        return self.answer_update(**({} if drives is None else {"drives": drives}))
 
     def _patch_messages(self, regions: Changes) -> list[Message]:
         """Return the pixels of changed regions: a message per view, or one if there are none."""

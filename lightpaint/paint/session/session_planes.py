@@ -18,23 +18,26 @@ from lightpaint.paint.protocol import (
     PlaneLight,
     PlanesInfo,
     PlanesReading,
-    PlaneWish,
+    WishReading,
 )
 from lightpaint.photometry.illuminance import Illuminance
-from lightpaint.photometry.measuring_plane import PowerBudget
+from lightpaint.photometry.measuring_plane import LightCase, PowerBudget
+from lightpaint.report.planes_text import plane_title
 
 
 @dataclass(frozen=True)
 class SessionPlanes:
     """Measured planes. place_key: of the places of all lights when they were measured.
 
-    floor_m2: the area that power is divided by; 0 without one.
+    floor_m2: the area that power is divided by; 0 without one. cases: in each of which wishes hold;
+    none for the light of the scene alone.
     """
 
     illuminance: Illuminance
     budget: PowerBudget
     floor_m2: float
     place_key: str
+    cases: tuple[LightCase, ...] = ()
 
     def for_lights(self, lights: Lights) -> "SessionPlanes":
         """Return the planes as `lights` light them; those that were not measured give nothing."""
@@ -61,20 +64,27 @@ class SessionPlanes:
         """Return the wishes as requirements of the lights of a reduction. Raises ConstraintError
         for a limit of power and a lamp of unknown power.
         """
-        return wished_light(self.illuminance, self.budget, reduction, floor_m2=self.floor_m2)
+        return wished_light(
+            self.illuminance,
+            self.budget,
+            reduction,
+            floor_m2=self.floor_m2,
+            cases=self.cases,
+        )
 
     @cached_property
     def info(self) -> PlanesInfo:
-        """The planes and their wishes for clients."""
-        limit = watts_allowed(self.budget, self.floor_m2)
+        """The planes in each case, for clients."""
+        limit, cases = watts_allowed(self.budget, self.floor_m2), [x.name for x in self.cases]
         return PlanesInfo(
             tuple(
                 MeasuredPlane(
-                    name=plane.name,
+                    name=plane_title(plane.name, case),
                     size=plane.picture_size,
                     cells=tuple((int(row), int(column)) for row, column in plane.cells),
                     points=tuple(tuple(map(float, point)) for point in np.round(plane.points, 4)),
                 )
+                for case in cases or [""]
                 for plane in self.illuminance.planes
             ),
             floor_m2=self.floor_m2 or None,
@@ -112,8 +122,8 @@ class WishesInEffect:
     def reading(self, weights: Doubles, place_key: str) -> PlanesReading:
         """Return what weights (n, 3) give. place_key: of the places of the lights now."""
         answer = planes_answer(self.wished, self.reduction, weights, floor_m2=self.planes.floor_m2)
-        lux = self.planes.illuminance.of(weights)
-        parts = self.planes.illuminance.points_of
+        illuminance, lit = self.planes.illuminance, answer.weights_by_case
+        lux = {case: illuminance.of(lit_weights) for case, lit_weights in lit.items()}
         return PlanesReading(
             tuple(
                 PlaneLight(
@@ -122,22 +132,22 @@ class WishesInEffect:
                     uniformity=reading.uniformity,
                     least=reading.least,
                     most=reading.most,
-                    lux=tuple(np.round(lux[parts(name)], 1).tolist()),
-                    wishes=_wishes_of(name, answer.outcomes),
+                    lux=tuple(np.round(lux[case][illuminance.points_of(name)], 1).tolist()),
+                    wishes=_wishes_of(name, case, answer.outcomes),
                 )
-                for name, reading in answer.readings.items()
+                for (case, name), reading in answer.readings.items()
             ),
             watts=answer.watts,
-            power=next(iter(_wishes_of("", answer.outcomes)), None),
+            power=next(iter(_wishes_of("", "", answer.outcomes)), None),
             is_required=self.requirements is not None,
             is_old=place_key != self.planes.place_key,
         )
 
 
-def _wishes_of(plane: str, outcomes: Sequence[WishOutcome]) -> tuple[PlaneWish, ...]:
-    """Return the wishes for a plane, and whether they are met; "" for the power."""
+def _wishes_of(plane: str, case: str, outcomes: Sequence[WishOutcome]) -> tuple[WishReading, ...]:
+    """Return the wishes for a plane in a case, and whether they are met; "" for the power."""
     return tuple(
-        PlaneWish(x.wish.kind, x.wish.asked, x.reached, x.is_met, x.wish.to)
+        WishReading(x.wish.kind, x.wish.asked, x.reached, x.is_met, x.wish.to)
         for x in outcomes
-        if x.wish.plane == plane
+        if (x.wish.plane, x.wish.case) == (plane, case)
     )

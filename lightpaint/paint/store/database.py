@@ -24,6 +24,9 @@ from lightpaint.paint.store.history_steps import Identity, ViewIdentity
 from lightpaint.sentences import Hint, Remedy, Sentence
 from lightpaint.storage.json_records import read_record, strict_json
 
+#: Name of a session's file, in its folder.
+SESSION_FILE = "session.db"
+
 #: "lpnt", which marks a file as a session, and the version of its tables.
 APPLICATION, VERSION = 0x6C706E74, 3
 
@@ -215,9 +218,15 @@ def damaged_error(path: Path | None, error: Exception) -> DamagedError:
     return DamagedError(f"{path} is damaged ({first_line(error)}): ", START_AFRESH)
 
 
+def is_in_use(error: sqlite3.Error) -> bool:
+    """Return whether an error says that another process has the file open."""
+    code = getattr(error, "sqlite_errorcode", 0) & 0xFF
+    return code in (sqlite3.SQLITE_BUSY, sqlite3.SQLITE_LOCKED)
+
+
 def _sqlite_error(path: Path | None, error: sqlite3.Error) -> LightpaintError:
     code = getattr(error, "sqlite_errorcode", 0) & 0xFF
-    if code in (sqlite3.SQLITE_BUSY, sqlite3.SQLITE_LOCKED):
+    if is_in_use(error):
         return InUseError(
             f"{path} is in use: another lightpaint paints there; end that one, or ", OTHER_FOLDER
         )

@@ -128,10 +128,10 @@ class Step:
 class StoredLook:
     """A named look. id: a number that no other look of the session has.
 
-    fields: its name, when it was kept (`stamp`, seconds since 1970), the requests and, where there
-    are several, the layers, as JSON. arrays: weights, and of each view image, importance,
-    `at_least` (uint8, if any mark is set), thumbnail and the pixels of layers, named by
-    `name_in_view`.
+    fields: its name, when it was kept (`stamp`, seconds since 1970), the requests, the drives of
+    lamps of emitters and, where there are several, the layers, as JSON. arrays: weights, and of
+    each view image, importance, `at_least` (uint8, if any mark is set), thumbnail and the pixels of
+    layers, named by `name_in_view`.
     """
 
     id: int

@@ -1,11 +1,13 @@
 """The switch by which a console follows the brush."""
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Collection, Mapping
 from contextlib import suppress
 from dataclasses import dataclass
 
+from lightpaint.arrays import Position
 from lightpaint.dmx.console_rig import ConsoleRig, address_text
 from lightpaint.dmx.network.console_link import ConsoleLink
+from lightpaint.dmx.pan_tilt import aimed_rig
 from lightpaint.dmx.rig_drives import RigDrives
 from lightpaint.errors import PaintError
 from lightpaint.paint.protocol import BlackOut, ConsoleInfo, ConsoleState, Message, SwitchConsole
@@ -17,12 +19,14 @@ class Console:
     """A console that a session may send to.
 
     rig: its fixtures. open_link: opens a link to it; None if there is no target. address: the
-    target, and how it is sent to, in words; "" if there is none.
+    target, and how it is sent to, in words; "" if there is none. has_positions: whether pan and
+    tilt follow lights that move.
     """
 
     rig: ConsoleRig
     open_link: Callable[[], ConsoleLink] | None = None
     address: str = ""
+    has_positions: bool = False
 
     @property
     def addresses(self) -> Mapping[str, str]:
@@ -41,10 +45,25 @@ class ConsoleSwitch:
     sends the last one at its own rate.
     """
 
-    def __init__(self, console: Console | None) -> None:
+    def __init__(
+        self,
+        console: Console | None,
+        *,
+        find_directions: Callable[[Session], Mapping[str, Position]] | None = None,
+        warn: Callable[[str], None] = lambda _: None,
+    ) -> None:
+        """Start switched off.
+
+        find_directions: returns where the lights of a session point, by name; None if none can
+        move. warn: receives what a fixture cannot do.
+        """
         self.console = console
+        self._find_directions, self._warn = find_directions, warn
         self._link: ConsoleLink | None = None
         self._is_dark = False
+        self._directions: Mapping[str, Position] | None = None
+        self._aimed: ConsoleRig | None = None
+        self._remarks: Collection[str] = ()
 
     @property
     def addresses(self) -> Mapping[str, str]:
@@ -92,7 +111,7 @@ class ConsoleSwitch:
         if self._link is None:
             link = open_link()
             try:
-                link.show(drives_of_session(session))
+                self._show(link, session)
             except BaseException:
                 link.close()
                 raise
@@ -103,7 +122,22 @@ class ConsoleSwitch:
     def follow(self, session: Session) -> None:
         """Show the session's answer, unless it is off or dark."""
         if self._link is not None and not self._is_dark:
-            self._link.show(drives_of_session(session))
+            self._show(self._link, session)
+
+    def _show(self, link: ConsoleLink, session: Session) -> None:
+        drives = drives_of_session(session)
+        if self.console is None or not self.console.has_positions or self._find_directions is None:
+            link.show(drives)
+            return
+        directions = self._find_directions(session)
+        if self._aimed is None or directions != self._directions:
+            # From where the heads are, so that they go the shortest way.
+            self._aimed, remarks = aimed_rig(self._aimed or self.console.rig, directions)
+            for remark in remarks:
+                if remark not in self._remarks:
+                    self._warn(remark)
+            self._directions, self._remarks = directions, remarks
+        link.show(drives, rig=self._aimed)
 
     def close(self) -> None:
         """End the stream; what receivers show then is theirs to decide."""

@@ -85,7 +85,11 @@ class PlaneMeasurements:
                 scale = every.cd_per_unit
                 measured = measure_planes(scene, settings.planes, settings, scale, listener(report))
             planes = SessionPlanes(
-                measured.illuminance, measured.file.power, measured.floor_m2, requests.place_key
+                measured.illuminance,
+                measured.file.power,
+                measured.floor_m2,
+                requests.place_key,
+                measured.file.cases,
             )
             self._publisher.publish_made(partial(self._accept, planes))
             self._on_measured()

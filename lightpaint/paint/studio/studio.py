@@ -12,6 +12,7 @@ from typing import Any
 
 import numpy.typing as npt
 
+from lightpaint.arrays import Position
 from lightpaint.lighting.answer.lighting import Lighting
 from lightpaint.lighting.solution import Solution
 from lightpaint.paint import protocol
@@ -116,7 +117,11 @@ class Studio:
         self._sampling = BackgroundSampling(self.subjects, access, self._bases, publisher)
         self._choices = ChoiceSolver(access, publisher, denoiser.clean_planes)
         self._exact_answers = ExactAnswers(access, publisher, self._follow_exact)
-        self._console = ConsoleSwitch(console)
+        self._console = ConsoleSwitch(
+            console,
+            find_directions=self._directions if self.has_scenes else None,
+            warn=lambda text: publisher.publish(Notice(text=text, tone="warn")),
+        )
         self._write_retry = UnsavedRetry(lambda: self.store, self._publish_save_state)
         self._comparison = LookComparison(access, publisher, self._mover, threads)
         self._jobs = BackgroundJobs(
@@ -162,6 +167,10 @@ class Studio:
     def has_scenes(self) -> bool:
         """True if there are scenes, and not only bases."""
         return self.subjects[0].scene is not None
+
+    def _directions(self, session: Session) -> Mapping[str, Position]:
+        """Return where the lights of a session point, by name."""
+        return self.rig.directions(session.requests.placed)
 
     def start(self) -> None:
         """Start to obtain the bases."""

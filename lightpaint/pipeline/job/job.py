@@ -23,15 +23,18 @@ from lightpaint.errors import ConstraintError, LightpaintError, TargetError
 from lightpaint.files import check_writable
 from lightpaint.images.pixel_blocks import whole_factor
 from lightpaint.keywords import keywords
+from lightpaint.lighting.constraints.absolute_scale import agreed_scale, with_sure_scale
 from lightpaint.lighting.constraints.constraints import Constraints
 from lightpaint.lighting.constraints.constraints_file import constraints_of
 from lightpaint.lighting.fit import resolve_for_targets
 from lightpaint.lighting.unknowns.reduction import reduce_to
+from lightpaint.lighting.wishes.wished_light import check_powers
 from lightpaint.pipeline.job.job_checks import (
     check_animation,
     check_inputs,
     check_painting_is_no_light,
     check_places,
+    checked_scale,
     rigging_for,
     sky_for_sun,
     wanted_sun,
@@ -68,6 +71,7 @@ from lightpaint.placement.placement import PlacementRecord
 from lightpaint.placement.rigging import Rigging
 from lightpaint.placement.suggested_lights import check_suggestible
 from lightpaint.relit.export.nuke import spoken_unreadable
+from lightpaint.relit.luminaire_xml import plugin_remark
 from lightpaint.scene.quality_presets import on_film
 from lightpaint.scene.scene import Scene
 from lightpaint.sentences import Hint, Sentence
@@ -185,6 +189,8 @@ class Job:
         if isinstance(source, Scene | Basis):
             all_constraints = constraints_of(source.requests).and_then(all_constraints)
         _check_one_scale(all_constraints, self.settings)
+        for scene in scenes:
+            agreed_scale(scene.cd_per_unit, self.settings.cd_per_unit)
         scale = Constraints(cd_per_unit=self.settings.cd_per_unit)
         all_constraints = all_constraints.and_then(scale)
         if scenes and bases:
@@ -192,7 +198,13 @@ class Job:
         check_places(self.placement, scenes)
         check_animation(self.settings, all_constraints, len(self.painted_frames))
         # Reports impossible constraints before rendering.
-        reduce_to(all_constraints, self._lights(scenes, bases))
+        lights = self._lights(scenes, bases)
+        all_constraints = with_sure_scale(all_constraints, lights)
+        reduction = reduce_to(all_constraints, lights)
+        if self.settings.watts is not None:
+            check_powers(reduction, [light.name for light in lights], "a limit of power")
+        if self.settings.planes is not None:
+            checked_scale(self.settings.planes, all_constraints.cd_per_unit)
         if scenes and (count := wanted_sun(self.settings, scenes)):
             sky_for_sun(scenes[0], count)
         if self.settings.suggest:
@@ -341,6 +353,7 @@ class Job:
         rendered_scenes = [] if self.basis is not None else [x.scene for x in self.views if x.scene]
         if (first := self.views[0].scene) is not None:
             remarks += remarks_of_scene(first, is_rendered=bool(rendered_scenes))
+            remarks += filter(None, [plugin_remark(first)])
         films = [scene.size for scene in scenes] if rendered_scenes else [None] * len(targets)
         for target, view, film in zip(targets, self.views, films, strict=True):
             remarks += remarks_of_target(target, view.target.size, view.scene, self.fit, film=film)

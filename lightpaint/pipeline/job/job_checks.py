@@ -74,6 +74,17 @@ def check_painting_is_no_light(basis: Any, target: Target | Painting) -> None:
         )
 
 
+def checked_scale(planes: str | Path, cd_per_unit: float | None) -> float:
+    """Return cd/m² of a radiance of 1. Raises LightpaintError if nothing says it for planes."""
+    if cd_per_unit is None:
+        raise LightpaintError(
+            f"{planes} asks for lux, and nothing says how many cd/m² a radiance of 1 is: pass ",
+            Hint("cd_per_unit", 1),
+            ", or cd_per_unit in the lights file",
+        )
+    return cd_per_unit
+
+
 def check_places(placement: object, scenes: Sequence[object]) -> None:
     """Raise LightpaintError if lights are to hang elsewhere in a scene that is not given."""
     if placement is not None and not scenes:

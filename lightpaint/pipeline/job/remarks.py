@@ -32,6 +32,8 @@ def remarks_of_scene(scene: Scene, *, is_rendered: bool = True) -> list[str]:
         for x in scene.lights
         if x.is_found
     ]
+    # Many hang in a room, and few kinds of them.
+    remarks += dict.fromkeys(text for x in scene.luminaires for text in x.remarks())
     if scene.integrator_choice is not None:
         remarks.append(
             f"rendered with {scene.integrator_choice} instead of the scene's own integrator"

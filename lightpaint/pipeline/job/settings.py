@@ -66,6 +66,7 @@ class Settings(Fit):
         cd_per_unit: cd/m² that a radiance of 1 stands for, for luminous quantities in the results.
         planes: Path of a planes file, with wishes for illuminance: the answer meets
             these, and comes as close to the painting as it then can. Needs a scene.
+        watts: Largest power of all lamps together, in place of that of the planes file.
         verify: Whether to render the relit scene and compare it with the prediction, with at most
             as many samples as the basis, so that it takes no longer.
         verify_spp: Samples per pixel of the verification on the whole film, instead of that limit.
@@ -250,6 +251,16 @@ class Settings(Fit):
             theme="Lights",
         ),
     ] = None
+    watts: Annotated[
+        float | None,
+        number("W"),
+        Option(
+            "--watts W",
+            "largest power of all lamps together, whose emitters have watts in the lights file",
+            default="no limit, or that of the planes file",
+            theme="Lights",
+        ),
+    ] = None
     verify: Annotated[
         bool,
         Option(
@@ -372,6 +383,7 @@ class SettingsByName(TypedDict, total=False):
     animate: bool
     cd_per_unit: float | None
     planes: str | None
+    watts: float | None
     verify: bool
     verify_spp: int | None
     report: bool

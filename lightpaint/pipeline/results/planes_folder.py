@@ -1,5 +1,6 @@
 """The folder with what an answer gives on measuring planes: tables and false-colour pictures."""
 
+from collections.abc import Mapping
 from pathlib import Path
 
 from lightpaint.arrays import Doubles
@@ -13,10 +14,18 @@ FOLDER = "planes"
 
 def files_of_planes(folder: Path, planes: str | Path) -> list[Path]:
     """Return the files of measured planes in a result folder. planes: the path of their file."""
-    return [folder / FOLDER / name for name in readings_files(plane_names(planes))]
+    names, cases = plane_names(planes)
+    files = readings_files(names)
+    return [folder / FOLDER / case / name for case in cases or ("",) for name in files]
 
 
-def write_planes(folder: Path, illuminance: Illuminance, weights: Doubles, origin: str) -> None:
-    """Write what weights (n, 3) give on planes. origin: of the light, in words."""
-    (folder / FOLDER).mkdir(exist_ok=True)
-    write_readings(folder / FOLDER, illuminance, weights, origin)
+def write_planes(
+    folder: Path, illuminance: Illuminance, weights: Mapping[str, Doubles], origin: str
+) -> None:
+    """Write what weights (n, 3) by case give on planes, in a folder for each. origin: of the light,
+    in words.
+    """
+    for case, lit in weights.items():
+        place, words = folder / FOLDER / case, f"{origin}, {case}" if case else origin
+        place.mkdir(parents=True, exist_ok=True)
+        write_readings(place, illuminance, lit, words)

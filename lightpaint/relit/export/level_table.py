@@ -20,10 +20,11 @@ FORMAT: Literal["lightpaint-dmx 1"] = "lightpaint-dmx 1"
 class LevelRow:
     """A channel that a light sets.
 
-    emitter: which it sets; `dimmer`, the name of a filter, or x or y of a chromaticity for one that
-    sets several. drive: of the emitter, 0 to 1; None for several. universe: as the network numbers
-    it. channels: 1 to 512, that of the coarse byte first. value: of all bytes. An emitter without a
-    channel of its own has a row for its drive alone.
+    emitter: which it sets; `dimmer`, the name of a filter, x or y of a chromaticity, or `kelvin`
+    for one that sets several; pan or tilt of a head that is aimed, by the first light on it. drive:
+    of the emitter, 0 to 1; None for several. universe: as the network numbers it. channels: 1 to
+    512, that of the coarse byte first. value: of all bytes. An emitter without a channel of its own
+    has a row for its drive alone.
     """
 
     fixture_id: str
@@ -36,8 +37,8 @@ class LevelRow:
     value: int | None
 
 
-#: What stands for an emitter in the row of a dimmer.
-DIMMER = "dimmer"
+#: What stands for an emitter in the rows of a dimmer and of a colour temperature.
+DIMMER, KELVIN = "dimmer", "kelvin"
 
 
 def light_channels(light: RigLight) -> list[tuple[str, int]]:
@@ -45,6 +46,7 @@ def light_channels(light: RigLight) -> list[tuple[str, int]]:
     return [
         *((DIMMER, k) for k in (*light.masters, *light.dimmers)),
         *((name, k) for name, k in zip("xy", light.chromaticity, strict=False)),
+        *((KELVIN, k) for k in light.whites),
         *((x.name, k) for x in light.filters for k in x.channels),
         *((x.name, k) for x in light.emitters for k in x.channels),
     ]
@@ -69,15 +71,28 @@ def _rows(
         of_light = {x.name: drives.get(light.name, {}).get(x.name, 0.0) for x in light.emitters}
         named, set_by = (fixture.fixture_id, fixture.name, light.name), light_channels(light)
         for name, k in set_by:
-            where = fixture.places(fixture.channels[k])
-            yield LevelRow(
-                *(*named, name, of_light.get(name)),
-                universes[where[0][0]],
-                tuple(index + 1 for _, index in where),
-                channel_level(fixture, fixture.channels[k], levels),
-            )
+            drive, setting = of_light.get(name), _setting(fixture, k, levels, universes)
+            yield LevelRow(*named, name, drive, *setting)
         for name in sorted(of_light.keys() - {name for name, _ in set_by}):
             yield LevelRow(*named, name, of_light[name], None, (), None)
+        for name, k in _aim_channels(fixture, light):
+            yield LevelRow(*named, name, None, *_setting(fixture, k, levels, universes))
+
+
+def _aim_channels(fixture: RigFixture, light: RigLight) -> list[tuple[str, int]]:
+    """Return pan and tilt of the head of which a light is the first one, if it is aimed."""
+    heads = [x for x in fixture.heads if fixture.is_aimed and x.lights[0] == light.name]
+    return [(axis.name, axis.channel) for head in heads for axis in head.axes]
+
+
+def _setting(
+    fixture: RigFixture, place: int, levels: Mapping[int, bytes], universes: Mapping[int, int]
+) -> tuple[int, tuple[int, ...], int]:
+    """Return universe, channels and value of a row."""
+    channel = fixture.channels[place]
+    where = fixture.places(channel)
+    numbers = tuple(index + 1 for _, index in where)
+    return universes[where[0][0]], numbers, channel_level(fixture, channel, levels)
 
 
 def channel_level(fixture: RigFixture, channel: DmxChannel, levels: Mapping[int, bytes]) -> int:

@@ -8,7 +8,7 @@ from lightpaint.lighting.wishes.planes_answer import PlanesAnswer
 from lightpaint.photometry.false_colour import false_colours
 from lightpaint.report.page.figures import data_uri
 from lightpaint.report.page.html import html
-from lightpaint.report.planes_text import HEADINGS, plane_rows, planes_sentences
+from lightpaint.report.planes_text import HEADINGS, plane_rows, plane_title, planes_sentences
 
 
 def planes_section(answer: PlanesAnswer | None) -> Markup:
@@ -27,10 +27,12 @@ def planes_section(answer: PlanesAnswer | None) -> Markup:
 def _pictures(answer: PlanesAnswer) -> list[dict[str, Any]]:
     """Return false colours of the illuminance on each plane."""
     illuminance, pictures = answer.wished.illuminance, []
-    values = illuminance.of(answer.weights)
-    for plane in illuminance.planes:
-        pixels = false_colours(plane, values[illuminance.points_of(plane.name)], plane.name)
-        height, width = pixels.shape[:2]
-        source = data_uri(pixels)
-        pictures.append({"name": plane.name, "width": width, "height": height, "source": source})
+    for case, weights in answer.weights_by_case.items():
+        values = illuminance.of(weights)
+        for plane in illuminance.planes:
+            title = plane_title(plane.name, case)
+            pixels = false_colours(plane, values[illuminance.points_of(plane.name)], title)
+            height, width = pixels.shape[:2]
+            source = data_uri(pixels)
+            pictures.append({"name": title, "width": width, "height": height, "source": source})
     return pictures

@@ -12,6 +12,7 @@ from lightpaint.arrays import RGB
 from lightpaint.colour.color import luminance
 from lightpaint.colour.photometry import lambertian_flux, point_flux, spot_flux
 from lightpaint.errors import SceneError
+from lightpaint.luminaires.plugin_names import LUMINAIRE_PLUGINS
 from lightpaint.scene.lights.texels.texel import Texel
 from lightpaint.scene.plane_identity import EmitterDigest, SceneHasher
 from lightpaint.scene.properties.emission import (
@@ -187,6 +188,8 @@ def flux_of_unit(emitter: Any, plugin: str, kind: EmissionKind | None) -> float 
 
     if kind is None or kind.scaling is not Scaling.COLOUR:
         return None
+    if plugin in LUMINAIRE_PLUGINS:
+        return float(emitter.flux)
     if plugin == "area":
         return lambertian_flux(float(np.array(emitter.get_shape().surface_area()).ravel()[0]))
     if plugin == "point":

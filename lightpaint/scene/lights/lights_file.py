@@ -10,14 +10,21 @@ from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
 
+from lightpaint.display_text import known_keys
 from lightpaint.errors import SceneError
 from lightpaint.file_reading import read_text
 from lightpaint.files import one_line
+from lightpaint.luminaires.luminaire_request import (
+    LUMINAIRE_KEYS,
+    PHOTOMETRY,
+    LuminaireRequest,
+    luminaires_in,
+)
 from lightpaint.scene.lights.texels.image_domains import GridSize
 from lightpaint.scene.lights.texels.texel import image_of, parse_size
 from lightpaint.scene.lights.texels.texel_layout import TexelLayout
 from lightpaint.storage.json_records import strict_toml
-from lightpaint.validation import MAX_LISTED, MAX_NAME
+from lightpaint.validation import BRIGHTEST, MAX_LISTED, MAX_NAME, is_number
 
 SUFFIX = ".lights.toml"
 #: Keys of constraints for the solve.
@@ -76,8 +83,42 @@ class SceneRequests:
         lights = self.keys.get("light")
         tables = lights.items() if isinstance(lights, dict) else ()
         return tuple(
-            name for name, table in tables if isinstance(table, dict) and "emitters" in table
+            name
+            for name, table in tables
+            if isinstance(table, dict) and ("emitters" in table or PHOTOMETRY in table)
         )
+
+    @property
+    def cd_per_unit(self) -> float:
+        """Candelas of an intensity of 1 in a scene with luminaires: 1 unless the file says it.
+
+        Raises SceneError for an invalid value.
+        """
+        value = self.keys.get("cd_per_unit", 1.0)
+        if not (is_number(value) and 0 < value <= BRIGHTEST):
+            raise SceneError(
+                f"{self.source}: cd_per_unit is {one_line(repr(value))}: expected candelas of an "
+                "intensity of 1 in the scene, like 1"
+            )
+        return float(value)
+
+    @property
+    def luminaires(self) -> dict[str, LuminaireRequest]:
+        """Luminaires, by name or pattern of the lights whose places they take.
+
+        Raises SceneError for an invalid value, and for keys that a luminaire cannot have.
+        """
+        lights = self.keys.get("light")
+        luminaires = luminaires_in(lights, self.source)
+        for name in luminaires:
+            assert isinstance(lights, Mapping)
+            if refused := [key for key in (*IMAGE_KEYS, *MOVES) if key in lights[name]]:
+                reason = "shows no picture" if refused[0] in IMAGE_KEYS else "stays where it is"
+                raise SceneError(
+                    f"{self.source}: light.{one_line(name)} has {PHOTOMETRY} and {refused[0]}, and "
+                    f"a luminaire {reason}: leave one out"
+                )
+        return luminaires
 
     @property
     def symmetric(self) -> frozenset[str]:
@@ -163,11 +204,38 @@ def lights_file_beside(scene: Path) -> Path:
 def lights_file_for(
     scene: Path, path_given: str | Path | None, *, beside_scene: bool
 ) -> LightsFile:
-    """Return the content of `path_given`, or else of the file beside `scene` if permitted."""
+    """Return the content of `path_given`, or else of the file beside `scene`; where that is not
+    permitted, its luminaires alone.
+    """
     if path_given is not None:
         return read_lights_file(Path(path_given))
     path = lights_file_beside(scene)
-    return read_lights_file(path) if beside_scene and path.is_file() else LightsFile()
+    if not path.is_file():
+        return LightsFile()
+    return read_lights_file(path) if beside_scene else _luminaires_alone(path)
+
+
+def _luminaires_alone(path: Path) -> LightsFile:
+    """Return what a lights file says of luminaires, which are lamps of the scene, and no choice;
+    nothing of one that cannot be read.
+    """
+    try:
+        file = read_lights_file(path)
+        names = file.requests.luminaires
+    except SceneError:
+        return LightsFile()
+    if not names:
+        return LightsFile()
+    tables = {
+        name: {
+            key: x for key, x in file.requests.keys["light"][name].items() if key in LUMINAIRE_KEYS
+        }
+        for name in names
+    }
+    keys: dict[str, Any] = {"light": tables}
+    if "cd_per_unit" in file.requests.keys:
+        keys["cd_per_unit"] = file.requests.keys["cd_per_unit"]
+    return LightsFile(path, groups=file.groups, requests=SceneRequests(keys, file.requests.source))
 
 
 def read_lights_file(path: Path) -> LightsFile:
@@ -204,8 +272,9 @@ def read_keys(path: Path) -> dict[str, Any]:
         reason = one_line(str(error).replace("at end of document", end))
         raise SceneError(f"{path} is not TOML: {reason}") from None
     if unknown := [key for key in data if key not in (*KNOWN_KEYS, *OLDER)]:
+        key = unknown[0]
         raise SceneError(
-            f"{path}: unknown key {one_line(repr(unknown[0]))}; known are {', '.join(KNOWN_KEYS)}"
+            f"{path}: unknown key {one_line(repr(key))}; {known_keys(key, KNOWN_KEYS)}"
         )
     if any(not -(2**63) <= number < 2**63 for number in _integers(data)):
         raise SceneError(f"{path} is not TOML: it has an integer of more than 64 bits")

@@ -9,6 +9,7 @@ import numpy as np
 
 from lightpaint.arrays import RGB, Floats
 from lightpaint.errors import SceneError
+from lightpaint.luminaires.plugin_names import FULL, LUMINAIRE_PLUGINS, POINT_PLUGIN
 
 #: The emission of an unchanged light if the unit is a multiple of that in the scene.
 AS_AUTHORED: RGB = (1.0, 1.0, 1.0)
@@ -54,6 +55,7 @@ PLUGINS = {
     "constant": ("radiance", "W/(m² sr)"),
     "directional": ("irradiance", "W/m²"),
     "envmap": ("radiance", "W/(m² sr)"),
+    **dict.fromkeys(sorted(LUMINAIRE_PLUGINS), ("intensity", FULL)),
     "point": ("intensity", "W/sr"),
     "projector": ("irradiance", "W/m²"),
     "spot": ("intensity", "W/sr"),
@@ -61,7 +63,7 @@ PLUGINS = {
 }
 
 #: Emitters that have no surface which a ray could hit, so that only sampling finds them.
-ONLY_SAMPLED = ("directional", "point", "projector", "spot")
+ONLY_SAMPLED = ("directional", "point", "projector", "spot", POINT_PLUGIN)
 
 #: Integrators that begin at the emitters, so that only sampling finds any.
 FROM_EMITTERS = ("ptracer",)

@@ -15,6 +15,7 @@ from lightpaint.arrays import Doubles, Position
 from lightpaint.display_text import brief
 from lightpaint.errors import SceneError
 from lightpaint.keywords import keywords
+from lightpaint.luminaires.plugin_names import POINT_PLUGIN
 from lightpaint.scene.checks.tokens import tag
 from lightpaint.scene.properties.emission import ENVIRONMENTS
 from lightpaint.scene.properties.site import Site as Site
@@ -84,7 +85,10 @@ def pose_of(site: Site) -> Pose:
 
 
 #: Plugins that have a direction, and shapes that give one to an area light.
-_AIMED, _AIMED_SHAPES = ("spot", "directional", "projector"), ("rectangle", "disk")
+_AIMED, _AIMED_SHAPES = (
+    ("spot", "directional", "projector", POINT_PLUGIN),
+    (*("rectangle", "disk"),),
+)
 
 
 def site_of(emitter: Any, plugin: str, shape_plugin: str) -> Site:

@@ -17,7 +17,8 @@ from typing import Any
 
 from lightpaint.errors import BackendError
 from lightpaint.files import one_line
-from lightpaint.luminaires.registration import LUMINAIRE_PLUGINS, can_have_luminaires
+from lightpaint.luminaires.plugin_names import LUMINAIRE_PLUGINS
+from lightpaint.luminaires.registration import can_have_luminaires
 from lightpaint.scene.checks.tokens import place_of_node
 
 #: Environment variable that names a folder with the user's own plugins.

@@ -9,6 +9,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from nightly import nightly
 from renderer import LIGHTS, render_in_parts, same_basis, write_room
 
 from lightpaint.basis.basis import Basis
@@ -146,6 +147,7 @@ def test_a_stray_pixel_does_not_make_a_light_noisy(make_basis: Any) -> None:
     np.testing.assert_allclose(expected, 0.01 / (7 / 3), rtol=0.2)  # E[(1 + u)²] is 7/3
 
 
+@pytest.mark.nightly
 def test_a_moved_lamp_takes_samples_until_it_is_as_clean_as_the_others(tmp_path: Path) -> None:
     """Shadow rays to it alone bring less noise than those that are shared, so these are fewer."""
     rendered: list[int] = []
@@ -230,6 +232,7 @@ def test_edits_of_colour_and_name_render_nothing(tmp_path: Path, rendered_lights
     assert {"panel"} ^ {*second.objects.names} == {"lid"} ^ {*third.objects.names}
 
 
+@pytest.mark.nightly
 def test_lamps_that_come_and_go(tmp_path: Path, rendered_lights: Rendered) -> None:
     lights = LIGHTS["panel"] + LIGHTS["bulb"]
     first = obtain_basis(room(tmp_path, lights=lights), spp=32)
@@ -245,6 +248,7 @@ def test_lamps_that_come_and_go(tmp_path: Path, rendered_lights: Rendered) -> No
     assert_agrees(fewer, render_basis(scene, spp=32, seed=5))
 
 
+@pytest.mark.nightly
 def test_an_area_lamp_that_moves_is_another_room(tmp_path: Path, rendered_lights: Rendered) -> None:
     obtain_basis(room(tmp_path), spp=4)
     obtain_basis(room(tmp_path, ('<translate y="1.9"/>', '<translate y="1.7"/>')), spp=4)
@@ -332,7 +336,7 @@ def test_exactly_what_is_asked_for_is_rendered_as_a_whole(
     assert not obtain_basis(scene, spp=16).origin.is_composed
 
 
-@pytest.mark.parametrize("other", [{"seed": 1}, {"half": True}, {"sensor": True}])
+@pytest.mark.parametrize("other", [{"seed": 1}, *map(nightly, [{"half": True}, {"sensor": True}])])
 def test_nothing_of_another_view_size_or_seed_is_taken(
     tmp_path: Path, rendered_lights: Rendered, other: dict[str, Any]
 ) -> None:
@@ -346,6 +350,7 @@ def test_nothing_of_another_view_size_or_seed_is_taken(
     assert [record[0] for record in rendered_lights] == [NAMES] * 2
 
 
+@pytest.mark.nightly
 def test_a_reduced_film_has_planes_of_its_own(tmp_path: Path, rendered_lights: Rendered) -> None:
     first = obtain_basis(room(tmp_path).reduced("1/3"), spp=36)
     scene = room(tmp_path, MOVED).reduced("1/3")

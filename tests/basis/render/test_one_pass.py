@@ -275,7 +275,7 @@ def test_second_sensor_and_crop_window(tmp_path: Path) -> None:
     ("integrator", "reason"),
     [
         ('<integrator type="volpathmis"/>', "volpathmis"),
-        ('<integrator type="ptracer"/>', "ptracer"),
+        nightly('<integrator type="ptracer"/>', "ptracer"),
     ],
 )
 def test_what_one_pass_cannot_serve_is_rendered_separately(
@@ -435,7 +435,7 @@ def test_depth_of_integrators_that_nobody_told(tmp_path: Path) -> None:
 @pytest.mark.parametrize(
     ("plugin", "lights", "options"),
     [
-        ("volpath", LIGHTS["bulb"] + LIGHTS["sky"], {}),
+        nightly("volpath", LIGHTS["bulb"] + LIGHTS["sky"], {}),
         ("volpath", "".join(LIGHTS.values()), {"max_depth": 3, "rr_depth": 1}),
         ("direct", SEVERAL, {}),
     ],
@@ -462,7 +462,7 @@ def test_integrators_that_take_other_samples_have_the_same_mean(
 @pytest.mark.parametrize(
     ("name", "size"),
     [
-        ("cornell", "1/4"),
+        nightly("cornell", "1/4"),
         nightly("stage", "1/10"),
         nightly("gallery", "1/10"),
         nightly("table", "1/10"),

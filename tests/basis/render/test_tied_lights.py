@@ -73,6 +73,7 @@ def test_what_cannot_be_scaled_is_rendered_as_it_is(tmp_path: Path, integrator: 
         np.testing.assert_allclose(plane.mean(), image.mean(), rtol=0.08, err_msg=name)
 
 
+@pytest.mark.nightly
 def test_rest_of_separate_renders_is_the_present_render_of_the_others(tmp_path: Path) -> None:
     path = write_room(tmp_path, lights=ROOM, integrator=SLOW)
     basis = render_basis(load_scene(path, groups=TIED, lights=["mix"]), spp=64)

@@ -143,6 +143,7 @@ def plane_deviations(scene: Scene, basis: Basis) -> Doubles:
     )
 
 
+@pytest.mark.nightly
 @pytest.mark.parametrize(
     "kind", [kind if kind == "every kind" else nightly(kind) for kind in ROOMS]
 )

@@ -69,7 +69,7 @@ def predicted_by(planes: np.ndarray, scene: Scene, emission: dict[str, tuple[flo
     return np.einsum("nc,nhwc->hwc", weights, planes)
 
 
-@pytest.mark.parametrize("kind", WALLS)
+@pytest.mark.parametrize("kind", [kind if kind == "colour" else nightly(kind) for kind in WALLS])
 def test_a_wall_in_view_looks_as_mitsuba_shows_the_written_image(tmp_path: Path, kind: str) -> None:
     scene = split_room(tmp_path, WALLS[kind], integrator=SHORT)
     lighting = painted(scene)
@@ -80,7 +80,7 @@ def test_a_wall_in_view_looks_as_mitsuba_shows_the_written_image(tmp_path: Path,
     np.testing.assert_allclose(predicted, shown, atol=1e-5)
 
 
-@pytest.mark.parametrize("kind", ["bitmap", "flipped", "mesh"])
+@pytest.mark.parametrize("kind", ["bitmap", *map(nightly, ["flipped", "mesh"])])
 def test_a_wall_with_a_texel_for_each_pixel_is_as_it_was(tmp_path: Path, kind: str) -> None:
     scene = split_room(tmp_path, WALLS[kind], size="32x16", integrator=SHORT)
     now = {light.name: light.emission for light in scene.lights}
@@ -104,6 +104,7 @@ def test_the_first_row_of_a_rectangle_is_its_top(tmp_path: Path) -> None:
     assert places["it.x0.y0"][1] < places["it.x0.y1"][1]
 
 
+@pytest.mark.nightly
 def test_a_projector_shines_as_mitsuba_projects_the_written_slide(tmp_path: Path) -> None:
     scene = split_room(tmp_path, PROJECTOR)
     lighting = painted(scene)
@@ -131,6 +132,7 @@ def test_a_render_of_the_written_image_confirms_the_prediction(tmp_path: Path, k
     assert verify(predicted, relit, spp=256).agrees
 
 
+@pytest.mark.nightly
 def test_a_sky_a_wall_and_a_slide_in_texels_share_a_scene(tmp_path: Path) -> None:
     write_files(tmp_path)
     lights = LIGHTS["sky"] + WALLS["bitmap"] + PROJECTOR.replace('id="it"', 'id="slide"')
@@ -141,6 +143,7 @@ def test_a_sky_a_wall_and_a_slide_in_texels_share_a_scene(tmp_path: Path) -> Non
     assert verify(predicted, relight(scene, lighting, tmp_path / "relit.xml"), spp=256).agrees
 
 
+@pytest.mark.nightly
 def test_texels_that_are_not_adjusted_stay_in_the_written_image(tmp_path: Path) -> None:
     write_files(tmp_path)
     path = write_room(tmp_path, lights=WALLS["bitmap"])

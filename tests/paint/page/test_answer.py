@@ -59,6 +59,7 @@ def test_an_answer_to_what_was_undone_says_nothing(painter: Painter) -> None:
     assert (painter.ui("constraints"), painter.ui("history")) == (constraints, history)
 
 
+@pytest.mark.nightly
 def test_overlays_by_their_key_say_what_their_colours_mean(painter: Painter) -> None:
     legend, press = painter.page.locator(".legend"), painter.page.keyboard.press
     painter.page.locator(".stage").focus()
@@ -146,6 +147,7 @@ def test_truth(painter: Painter) -> None:
     assert painter.ui("display")["wipe"] == pytest.approx(0.52)
 
 
+@pytest.mark.nightly
 def test_how_pictures_are_shown(painter: Painter) -> None:
     painter.choose("Compare", "present solution")
     painter.choose("View", "agx")
@@ -264,6 +266,7 @@ def test_what_is_said_while_looks_are_compared_is_of_the_answer(painter: Painter
     assert (badge.count(), caption.count()) == (0, 0)
 
 
+@pytest.mark.nightly
 def test_a_render_of_before_is_offered_again(painter: Painter) -> None:
     render = painter.button("Answer | Render")
     painter.button("Analysis").click()
@@ -324,6 +327,7 @@ def test_pictures_stay_as_large_whatever_is_done_with_looks(
     assert "saves painting and answer" in strip.inner_text()
 
 
+@pytest.mark.nightly
 def test_in_a_low_painter_an_empty_strip_gives_pictures_its_room(new_painter: Any) -> None:
     painter = new_painter(viewport={"width": 1280, "height": 300})
     assert not painter.page.locator(".looks").is_visible()
@@ -332,6 +336,7 @@ def test_in_a_low_painter_an_empty_strip_gives_pictures_its_room(new_painter: An
     assert painter.page.locator(".looks").bounding_box()["height"] <= 36
 
 
+@pytest.mark.nightly
 def test_what_lies_between_two_looks_is_kept_under_a_name_that_says_so(painter: Painter) -> None:
     painter.page.keyboard.press("Control+s")
     painter.stroke()
@@ -384,6 +389,7 @@ def test_the_look_that_is_seen_is_marked(painter: Painter) -> None:
     assert marked() == []
 
 
+@pytest.mark.nightly
 def test_a_key_that_is_held_down_keeps_one_look(painter: Painter) -> None:
     painter.page.keyboard.down("Control")
     for _ in range(4):
@@ -424,6 +430,7 @@ def test_files_are_written_and_their_command_shown(painter: Painter) -> None:
     assert painter.requests("export")[-1]["outputs"][-1] == "layers"
 
 
+@pytest.mark.nightly
 def test_an_export_has_the_name_of_the_look_that_equals_the_answer(painter: Painter) -> None:
     painter.stroke()
     painter.page.keyboard.press("Control+s")
@@ -468,6 +475,7 @@ def test_settings(painter: Painter) -> None:
     assert painter.requests("change_settings")[-1]["settings"]["prefer_current"] is None
 
 
+@pytest.mark.nightly
 def test_settings_leave_the_pictures_seen_and_the_keys_alone(painter: Painter) -> None:
     stage, panel = painter.page.locator(".stage"), painter.page.locator(".settings")
     opener = painter.button("Solve settings")
@@ -497,6 +505,7 @@ def test_settings_leave_the_pictures_seen_and_the_keys_alone(painter: Painter) -
     assert painter.page.locator(".side").is_visible()
 
 
+@pytest.mark.nightly
 def test_settings_typed_into_are_closed_by_escape(painter: Painter) -> None:
     painter.button("Solve settings").click()
     painter.page.get_by_role("textbox", name="At most").focus()
@@ -504,6 +513,7 @@ def test_settings_typed_into_are_closed_by_escape(painter: Painter) -> None:
     painter.page.locator(".settings").wait_for(state="detached")
 
 
+@pytest.mark.nightly
 def test_escape_gives_up_the_stroke_before_it_closes_anything(painter: Painter) -> None:
     painter.button("Solve settings").click()
     painter.give_up()
@@ -575,6 +585,7 @@ def test_what_is_advised_is_seen_before_it_is_done(
     assert dialog.count() == 0
 
 
+@pytest.mark.nightly
 def test_a_preview_of_before_is_none(painter: Painter) -> None:
     answer = {"kind": "answer", "exact": True, "lights": [], "delta_e": 11.2, "version": 2}
     help_ = {"kind": "hold", "names": [], "hold": 0.8, "gain": 0.35}
@@ -606,6 +617,7 @@ def test_what_cannot_be_let_go_here_has_no_button(painter: Painter, help_: dict[
     assert painter.page.locator(".answer .help").count() == 0
 
 
+@pytest.mark.nightly
 def test_a_render_of_what_was_there_before_is_said_to_be(painter: Painter) -> None:
     """Somebody has painted on while it was made."""
     painter.button("Analysis").click()
@@ -629,6 +641,7 @@ def test_a_render_of_what_was_there_before_is_said_to_be(painter: Painter) -> No
     assert "earlier" not in painter.page.locator(".verified").inner_text()
 
 
+@pytest.mark.nightly
 def test_what_another_page_has_done_is_no_look_of_this_one(painter: Painter) -> None:
     painter.page.keyboard.press("Control+s")
     painter.button("Analysis").click()
@@ -647,6 +660,7 @@ def test_what_another_page_has_done_is_no_look_of_this_one(painter: Painter) -> 
     assert painter.ui("reasons") == []
 
 
+@pytest.mark.nightly
 def test_looks_that_are_kept_at_once_have_names_of_their_own(painter: Painter) -> None:
     """And what was typed before is in them."""
     painter.page.evaluate("() => { void painter.session.lockLight(1, [1, 1, 1], true); }")
@@ -660,6 +674,7 @@ def test_looks_that_are_kept_at_once_have_names_of_their_own(painter: Painter) -
     assert kinds.index("constrain_light") < kinds.index("save_look")
 
 
+@pytest.mark.nightly
 def test_what_is_half_typed_is_given_up_by_escape(painter: Painter) -> None:
     painter.button("Solve settings").click()
     painter.page.get_by_role("textbox", name="At most").focus()
@@ -683,6 +698,7 @@ def test_where_a_page_may_not_copy_it_says_so(new_painter: Any) -> None:
     painter.page.get_by_text("select the text instead").wait_for()
 
 
+@pytest.mark.nightly
 def test_a_double_click_begins_no_render(painter: Painter) -> None:
     """The panel comes to lie under its second click."""
     painter.button("Analysis").click()
@@ -692,6 +708,7 @@ def test_a_double_click_begins_no_render(painter: Painter) -> None:
     assert painter.requests("verify")
 
 
+@pytest.mark.nightly
 def test_a_bar_on_the_row_of_a_layer_says_how_much_of_its_wish_came(painter: Painter) -> None:
     """On that of a group too; while somebody paints they are those of the last answer."""
     painter.page.evaluate(

@@ -104,6 +104,7 @@ def test_a_click_on_a_picture_is_one_request(painter: Painter) -> None:
     assert asked == [{"colors": "free"}, {"colors": "own"}]
 
 
+@pytest.mark.nightly
 def test_pictures_of_an_earlier_answer_are_dimmed(painter: Painter) -> None:
     painter.stroke()
     painter.still()
@@ -117,6 +118,7 @@ def test_pictures_of_an_earlier_answer_are_dimmed(painter: Painter) -> None:
     assert "is-old" not in group.get_attribute("class")
 
 
+@pytest.mark.nightly
 def test_a_share_that_nothing_was_asked_of_is_a_dash(painter: Painter) -> None:
     painter.stroke()
     painter.still()
@@ -134,6 +136,7 @@ def test_a_share_that_nothing_was_asked_of_is_a_dash(painter: Painter) -> None:
         assert button.get_attribute("aria-label") == said
 
 
+@pytest.mark.nightly
 @pytest.mark.parametrize(
     "viewport", [(1240, 720), *map(nightly, [(1440, 900), (1920, 1080)])], ids=str
 )

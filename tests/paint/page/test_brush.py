@@ -5,6 +5,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from nightly import nightly
 
 H, W = 64, 80
 
@@ -128,7 +129,7 @@ def test_the_eraser_brings_the_present_look_back(page: Any):
     np.testing.assert_array_equal(image[importance == 0], 0.25)
 
 
-@pytest.mark.parametrize("mired", [0, 60])
+@pytest.mark.parametrize("mired", [nightly(0), 60])
 def test_on_a_whole_that_was_asked_for_the_eraser_brings_that_back(page: Any, mired: int):
     """And no daylight into a night."""
     all_ = f"hand.adjustArea(canvas, {{ stops: -2, mired: {mired}, object: null }});"
@@ -141,6 +142,7 @@ def test_on_a_whole_that_was_asked_for_the_eraser_brings_that_back(page: Any, mi
     assert counts.min() == 1
 
 
+@pytest.mark.nightly
 def test_a_whole_stays_one_though_some_of_it_counts_less(page: Any):
     all_ = "hand.adjustArea(canvas, { stops: -2, mired: 0, object: null });"
     weight_script = "{" + stroke_script("tool: 'weight', importance: 0.5", place_script(5, 5)) + "}"
@@ -152,6 +154,7 @@ def test_a_whole_stays_one_though_some_of_it_counts_less(page: Any):
     assert (importance[40, 60], importance[30, 30]) == (1, 10)
 
 
+@pytest.mark.nightly
 def test_on_a_patchwork_the_eraser_brings_the_present_look_back(page: Any):
     """All is painted, but not alike: nothing lies below it."""
     objects = np.tile(np.arange(W) // 10, (H, 1))
@@ -194,6 +197,7 @@ def test_the_importance_brush_goes_by_what_counts_already(page: Any):
     assert image[30, 40, 0] == 1
 
 
+@pytest.mark.nightly
 def test_what_counts_less_is_never_more(page: Any):
     """Not at the soft end of a stroke either, of which hardly anything is left."""
     soft = stroke_script("rgb: [1, 1, 1], size: 40, hardness: 0, flow: 0.02", place_script(40, 32))
@@ -241,6 +245,7 @@ def test_a_drag_asks_for_stops_and_keeps_luminance(page: Any):
     assert left[40, 40, 0] < left[40, 40, 2]
 
 
+@pytest.mark.nightly
 def test_asking_by_numbers_is_exact_in_an_object(page: Any):
     objects = np.zeros((H, W), int)
     objects[:, 40:] = 1
@@ -275,6 +280,7 @@ def test_strokes_over_what_was_asked_of_all_count_more_than_it(page: Any):
     assert run_brush(page, path, light=0.5)[1].max() == 1
 
 
+@pytest.mark.nightly
 def test_strokes_before_all_is_asked_stay_accents(page: Any):
     """The rest had counted three times what they did, as it was held; so it does now."""
     path = stroke_script("rgb: [1, 1, 1], size: 16", place_script(30, 30), place_script(50, 30))

@@ -68,6 +68,7 @@ def test_a_final_render_is_asked_for_and_shows_where_its_files_are(painter: Pain
     assert row.count() == 0
 
 
+@pytest.mark.nightly
 def test_a_file_of_a_render_is_saved_by_the_browser(painter: Painter, tmp_path: Path) -> None:
     dialog = open_dialog(painter)
     begin(dialog)
@@ -85,6 +86,7 @@ def test_a_file_of_a_render_is_saved_by_the_browser(painter: Painter, tmp_path: 
     assert (tmp_path / "a").read_text() == "render_file/1/render.png"
 
 
+@pytest.mark.nightly
 def test_renders_outlive_the_dialog_and_the_page(painter: Painter) -> None:
     dialog = open_dialog(painter)
     begin(dialog)
@@ -114,6 +116,7 @@ def test_renders_outlive_the_dialog_and_the_page(painter: Painter) -> None:
     assert "Stopped; no file was written" in open_dialog(painter).inner_text()
 
 
+@pytest.mark.nightly
 def test_without_a_scene_it_says_why_there_is_none(painter: Painter) -> None:
     painter.page.evaluate("() => host.tell({ ...host.state(), can_render: false })")
     painter.still()

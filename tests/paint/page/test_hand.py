@@ -20,6 +20,7 @@ def test_a_stroke_goes_to_the_engine_and_the_hint_goes_away(new_painter: Any) ->
     assert painter.page.get_by_text("Close to what was painted").is_visible()
 
 
+@pytest.mark.nightly
 def test_keys_of_paint_programs(painter: Painter) -> None:
     press = painter.page.keyboard.press
     tools = {"e": "eraser", "w": "weight", "i": "pick", "g": "fill", "l": "line", "a": "adjust"}
@@ -59,6 +60,7 @@ def test_keys_of_paint_programs(painter: Painter) -> None:
     assert painter.ui("display")["zoom"] == 1
 
 
+@pytest.mark.nightly
 def test_every_key_of_the_overlay_is_there(painter: Painter) -> None:
     painter.page.keyboard.press("?")
     dialog = painter.page.get_by_role("dialog", name="Keyboard shortcuts")
@@ -92,6 +94,7 @@ def test_mouse_with_modifiers(painter: Painter) -> None:
     assert painter.ui("display")["zoom"] == pytest.approx(2, rel=1e-6)
 
 
+@pytest.mark.nightly
 def test_escape_leaves_a_stroke(painter: Painter) -> None:
     painter.give_up()
     assert painter.calls("cancel")
@@ -99,6 +102,7 @@ def test_escape_leaves_a_stroke(painter: Painter) -> None:
     assert painter.requests("drop_stroke")
 
 
+@pytest.mark.nightly
 def test_one_finger_paints_and_two_move_and_zoom(new_painter: Any) -> None:
     size = {"width": 1024, "height": 768}
     painter = new_painter(viewport=size, has_touch=True, is_mobile=True)
@@ -162,6 +166,7 @@ def test_hints_are_of_the_tool_and_of_fingers(new_painter: Any) -> None:
         assert "lick" not in status.text_content()
 
 
+@pytest.mark.nightly
 def test_lines_by_keys_and_no_ask(painter: Painter) -> None:
     painter.page.locator(".stage").focus()
     press = painter.page.keyboard.press
@@ -324,6 +329,7 @@ def test_what_was_used_in_painters_beside_each_other_is_remembered(painter: Pain
     assert [name.split(": ")[1] for name in names] == ["#778899", "#112233", "#445566"]
 
 
+@pytest.mark.nightly
 def test_warm_is_right(painter: Painter) -> None:
     """On the slider, among the swatches, and where somebody asks by a drag."""
 
@@ -354,6 +360,7 @@ def test_warm_is_right(painter: Painter) -> None:
     painter.page.mouse.up()
 
 
+@pytest.mark.nightly
 def test_asking_in_numbers(painter: Painter) -> None:
     lights = painter.page.get_by_role("region", name="Lights")
     before = lights.bounding_box()
@@ -369,6 +376,7 @@ def test_asking_in_numbers(painter: Painter) -> None:
     assert painter.calls("begin")[-1][1] == "adjust"
 
 
+@pytest.mark.nightly
 def test_importance_is_seen_while_it_is_painted(painter: Painter) -> None:
     painter.page.keyboard.press("w")
     painter.still()
@@ -382,6 +390,7 @@ def test_importance_is_seen_while_it_is_painted(painter: Painter) -> None:
     assert painter.page.evaluate("() => window.engine.shown.overlay") == "missed"
 
 
+@pytest.mark.nightly
 def test_importance_is_hidden_with_its_brush(painter: Painter) -> None:
     painter.page.keyboard.press("w")
     painter.page.keyboard.press("b")
@@ -389,6 +398,7 @@ def test_importance_is_hidden_with_its_brush(painter: Painter) -> None:
     assert painter.page.evaluate("() => window.engine.shown.overlay") is None
 
 
+@pytest.mark.nightly
 def test_space_is_not_held_in_a_window_that_is_left(painter: Painter) -> None:
     painter.page.mouse.move(*painter.place())
     painter.page.keyboard.down("Space")
@@ -399,6 +409,7 @@ def test_space_is_not_held_in_a_window_that_is_left(painter: Painter) -> None:
     assert painter.calls("begin")
 
 
+@pytest.mark.nightly
 def test_what_is_picked_has_its_brightness_in_stops(painter: Painter) -> None:
     """As its panel, and what stands beside the pointer, have it."""
     for light, stops, colour in (
@@ -412,6 +423,7 @@ def test_what_is_picked_has_its_brightness_in_stops(painter: Painter) -> None:
         assert painter.ui("colour") == pytest.approx(colour)
 
 
+@pytest.mark.nightly
 def test_what_is_under_a_pointer_that_rests_is_that_of_the_last_answer(painter: Painter) -> None:
     painter.page.mouse.move(*painter.place())
     painter.page.locator(".here", has_text="back wall").wait_for()
@@ -428,6 +440,7 @@ def test_what_is_under_a_pointer_that_rests_is_that_of_the_last_answer(painter: 
     assert shares[1] < 1
 
 
+@pytest.mark.nightly
 def test_what_is_under_the_pointer(painter: Painter) -> None:
     painter.page.mouse.move(*painter.place())
     painter.page.locator(".here", has_text="back wall").wait_for()
@@ -448,6 +461,7 @@ def test_what_is_under_the_pointer(painter: Painter) -> None:
     assert painter.page.locator(".share.is-here").count() == 7
 
 
+@pytest.mark.nightly
 def test_a_pointer_that_has_left_is_over_nothing(painter: Painter) -> None:
     """Also where it moved and left within one frame, and where it moved twice."""
     move_script = """([[x, y], [to, across], leaves]) => {
@@ -565,6 +579,7 @@ def test_numbers_that_were_typed_stay_while_other_panels_are_open(painter: Paint
     assert area_box.evaluate("(one) => one.selectedOptions[0].text") == "red ball: not in this view"
 
 
+@pytest.mark.nightly
 def test_keys_among_numbers_are_none_of_the_pictures(painter: Painter) -> None:
     page = painter.page
     page.keyboard.press("a")
@@ -628,6 +643,7 @@ OUTLINE = """(object) => {
 }"""
 
 
+@pytest.mark.nightly
 @pytest.mark.parametrize("engine", ["", nightly("engine")], ids=["made up", "real"])
 def test_the_object_that_would_be_filled_has_an_outline(new_painter: Any, engine: str) -> None:
     painter = new_painter(engine, is_fresh=True)
@@ -690,6 +706,7 @@ def test_the_object_that_would_be_filled_has_an_outline(new_painter: Any, engine
     )
 
 
+@pytest.mark.nightly
 def test_fill_has_a_flow_of_its_own(painter: Painter) -> None:
     def flows() -> tuple[float, float]:
         return painter.page.evaluate("() => engine.tool.flow"), painter.ui("flow")

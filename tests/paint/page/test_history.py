@@ -164,6 +164,7 @@ def test_the_original_scene_shows_while_a_key_or_button_is_held(painter: Painter
         assert "Original scene" not in names.all_inner_texts()
 
 
+@pytest.mark.nightly
 def test_the_original_scene_shows_in_blink_and_ends_with_the_window(painter: Painter) -> None:
     page = painter.page
     page.locator(".stage").focus()

@@ -74,6 +74,7 @@ def test_an_image_is_one_row_with_its_map(painter: Painter) -> None:
     assert page.locator(".light").count() == 1
 
 
+@pytest.mark.nightly
 def test_the_slider_scales_all_texels_in_one_step(painter: Painter) -> None:
     before = weights(painter)
     painter.type("sky, level", "+1")
@@ -186,6 +187,7 @@ def test_constraints_of_an_image_hold_for_each_texel(painter: Painter) -> None:
     }
 
 
+@pytest.mark.nightly
 def test_an_image_that_is_locked_offers_no_constraints(painter: Painter) -> None:
     unfold(painter)
     panel = painter.page.get_by_role("group", name="Constraints on sky")
@@ -195,6 +197,7 @@ def test_an_image_that_is_locked_offers_no_constraints(painter: Painter) -> None
     assert panel.count() == 0
 
 
+@pytest.mark.nightly
 def test_escape_on_the_map_leaves_the_selection_of_lights(painter: Painter) -> None:
     unfold(painter)
     painter.page.evaluate("() => painter.store.set({ selectedLights: [0, 1] })")
@@ -205,6 +208,7 @@ def test_escape_on_the_map_leaves_the_selection_of_lights(painter: Painter) -> N
     assert painter.ui("selectedLights") == []
 
 
+@pytest.mark.nightly
 def test_a_texel_gives_its_light_as_paint(painter: Painter) -> None:
     unfold(painter)
     drag(painter, (1, 0), modifier="Alt")
@@ -213,6 +217,7 @@ def test_a_texel_gives_its_light_as_paint(painter: Painter) -> None:
     np.testing.assert_allclose(weights(painter)[10], weights(painter)[1], rtol=1e-6)
 
 
+@pytest.mark.nightly
 def test_keys_reach_each_texel_and_readers_hear_of_it(new_painter: Any, axe: str) -> None:
     painter = new_painter(QUERY, axe=axe)
     unfold(painter)
@@ -229,6 +234,7 @@ def test_keys_reach_each_texel_and_readers_hear_of_it(new_painter: Any, axe: str
     assert violations(page, ".light.is-image") == []
 
 
+@pytest.mark.nightly
 def test_in_a_symmetric_image_two_texels_are_one_light(painter: Painter) -> None:
     """Of the left and the right column, and of the two between them."""
     painter.page.evaluate(
@@ -245,6 +251,7 @@ def test_in_a_symmetric_image_two_texels_are_one_light(painter: Painter) -> None
     assert painter.page.locator(".texel-lock").count() == 2
 
 
+@pytest.mark.nightly
 def test_lists_of_lights_have_an_image_once(painter: Painter) -> None:
     page = painter.page
     page.evaluate(
@@ -271,6 +278,7 @@ def test_lists_of_lights_have_an_image_once(painter: Painter) -> None:
     assert len(rows) == 4
 
 
+@pytest.mark.nightly
 def test_a_notebook_paints_texels_too(new_painter: Any) -> None:
     painter = new_painter(f"{QUERY}&model")
     unfold(painter)
@@ -279,6 +287,7 @@ def test_a_notebook_paints_texels_too(new_painter: Any) -> None:
     assert painter.page.locator(".texel-lock").count() == 1
 
 
+@pytest.mark.nightly
 def test_finer_texels_of_a_sun_are_painted_and_locked_each_by_itself(new_painter: Any) -> None:
     """A texel among 4 by 3 is split again: the map has the places of the finer ones, 12 by 7."""
     painter = new_painter("lights=39&image=4x3&finer=1,1")

@@ -56,6 +56,7 @@ def test_the_small_picture_is_whole_and_in_its_corner(
     assert [pane["kind"] for pane in swapped] == ["painting", "solution"]
 
 
+@pytest.mark.nightly
 def test_it_is_swapped_by_key_by_press_and_moved_by_drag(new_painter: Any) -> None:
     painter = new_painter(viewport=LAPTOP)
     assert [pane["kind"] for pane in choose_inset(painter)] == ["solution", "painting"]
@@ -86,6 +87,7 @@ def test_it_is_swapped_by_key_by_press_and_moved_by_drag(new_painter: Any) -> No
     assert painter.page.locator(".inset-frame").count() == 0
 
 
+@pytest.mark.nightly
 def test_the_large_picture_takes_paint_and_zoom(new_painter: Any) -> None:
     """Also the answer; a stroke that goes on over the small one stays in the large one."""
     painter = new_painter(viewport=LAPTOP)
@@ -139,6 +141,7 @@ def test_both_pictures_are_drawn(new_painter: Any) -> None:
     assert np.abs(np.subtract(large, small)).max() > 20
 
 
+@pytest.mark.nightly
 def test_what_is_drawn_over_the_large_picture_stays_around_the_small_one(new_painter: Any) -> None:
     painter = new_painter(viewport=LAPTOP)
     _, small = choose_inset(painter)
@@ -149,6 +152,7 @@ def test_what_is_drawn_over_the_large_picture_stays_around_the_small_one(new_pai
     assert f"{small['x']:.0f}"[:4] in path
 
 
+@pytest.mark.nightly
 def test_axe_finds_nothing_with_an_inset(new_painter: Any, axe: str) -> None:
     painter = new_painter("lights=12", axe=axe)
     choose_inset(painter)

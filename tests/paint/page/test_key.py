@@ -86,6 +86,7 @@ def test_a_neighbour_that_is_visited_gets_nothing_that_opens_the_session(
     has_painter(page)
 
 
+@pytest.mark.nightly
 def test_a_page_that_is_loaded_anew_goes_on_and_so_does_a_second_tab(
     server: Server, open_tab: Any
 ) -> None:
@@ -108,6 +109,7 @@ def test_a_page_that_is_loaded_anew_goes_on_and_so_does_a_second_tab(
     assert third.url == server.address.url
 
 
+@pytest.mark.nightly
 def test_the_address_that_a_browser_was_started_with_is_good_once(
     server: Server, open_tab: Any
 ) -> None:

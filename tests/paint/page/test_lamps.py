@@ -149,6 +149,7 @@ def test_a_mark_follows_the_pointer_before_the_answer_comes(room: PaintedRoom) -
     mouse.up()
 
 
+@pytest.mark.nightly
 def test_a_drag_begins_with_a_few_pixels_and_escape_takes_it_back(room: PaintedRoom) -> None:
     page, session, start = room.page, room.studio.session, room.mark("bulb")
     room.drag(start, 2, 1)
@@ -173,6 +174,7 @@ def test_a_drag_begins_with_a_few_pixels_and_escape_takes_it_back(room: PaintedR
     wait_until(lambda: room.poses["bulb"]["position"][1] > 1)
 
 
+@pytest.mark.nightly
 def test_a_drag_in_the_plan_ignores_that_the_plan_shifts(room: PaintedRoom) -> None:
     """The end of a search brings back a button above or below it."""
     page = room.page
@@ -191,6 +193,7 @@ def test_a_drag_in_the_plan_ignores_that_the_plan_shifts(room: PaintedRoom) -> N
     assert position[1:] == pytest.approx([1, 0.5], abs=1e-6)
 
 
+@pytest.mark.nightly
 def test_what_cannot_be_taken_is_said(room: PaintedRoom) -> None:
     page, session = room.page, room.studio.session
     row = page.locator('[data-light="beam"]')
@@ -311,6 +314,7 @@ def test_a_spot_is_pointed_by_clicks_and_by_numbers(room: PaintedRoom, axe: str)
     wait_until(lambda: room.poses == {})
 
 
+@pytest.mark.nightly
 def test_a_light_is_added_by_a_click_dragged_and_removed(room: PaintedRoom) -> None:
     page, session = room.page, room.studio.session
     page.get_by_role("button", name="Add a light").click()

@@ -203,6 +203,7 @@ def painter(new_painter: Any) -> Painter:
     return opened
 
 
+@pytest.mark.nightly
 def test_another_language_replaces_all_texts(painter: Painter) -> None:
     painter.page.evaluate("() => { window.first = window.painter.store.value; }")
     found = {}
@@ -224,6 +225,7 @@ def test_a_language_is_chosen_in_the_settings(painter: Painter) -> None:
     assert painter.page.evaluate(kept) == "en"
 
 
+@pytest.mark.nightly
 def test_a_translation_has_its_own_forms_and_may_lack_sentences(new_painter: Any) -> None:
     painter = in_language(new_painter, "pl", POLISH)
     texts = painter.page.evaluate(

@@ -176,6 +176,7 @@ def wishes(me: Person) -> Person:
     return me.press("g").drag((5, 5), (5, 5))
 
 
+@pytest.mark.nightly
 @pytest.mark.long
 def test_layers_are_made_hidden_weakened_ordered_grouped_and_deleted(wishes: Person) -> None:
     me = wishes

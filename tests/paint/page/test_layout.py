@@ -8,6 +8,7 @@ from nightly import nightly
 from painter_page import Painter
 
 
+@pytest.mark.nightly
 def test_a_button_that_is_on_is_seen_under_the_pointer(painter: Painter) -> None:
     opener = painter.button("Solve settings")
     opener.click()  # the pointer stays on it
@@ -18,6 +19,7 @@ def test_a_button_that_is_on_is_seen_under_the_pointer(painter: Painter) -> None
     assert colours == ["rgb(242, 181, 92)", "rgb(29, 20, 4)"]
 
 
+@pytest.mark.nightly
 def test_by_keyboard_alone(painter: Painter) -> None:
     """All controls are reached by Tab, each says what it is, and the pictures take paint."""
     names_reached = []
@@ -184,6 +186,7 @@ def test_a_look_is_kept_from_anywhere(new_painter: Any, query: str) -> None:
     assert kept_looks() == 4
 
 
+@pytest.mark.nightly
 def test_a_window_is_open_before_the_next_key(new_painter: Any) -> None:
     """An Escape that comes at once closes it, and is not lost."""
     painter = new_painter()
@@ -235,6 +238,7 @@ def test_windows_lie_over_it(new_painter: Any) -> None:
     assert window["height"] > 300
 
 
+@pytest.mark.nightly
 def test_a_space_is_typed_beside_it(new_painter: Any) -> None:
     """Where the pointer rests on the pictures meanwhile."""
     painter = new_painter("shadow")
@@ -247,19 +251,17 @@ def test_a_space_is_typed_beside_it(new_painter: Any) -> None:
     assert painter.page.locator("p[contenteditable]").inner_text() == "a b"
 
 
-#: Windows, and columns of notebooks: the usual and the smallest of each kind by day.
-SIZES = [(1280, 720), *map(nightly, [(1920, 1080), (1100, 900), (1024, 768)]), (900, 600)]
+#: Windows, and columns of notebooks: one of each kind by day.
+SIZES = [(1280, 720), *map(nightly, [(1920, 1080), (1100, 900), (1024, 768), (900, 600)])]
 
 
 COLUMNS = [
-    *map(nightly, [(970, 640), (780, 600)]),
-    (760, 600),
-    *map(nightly, [(690, 560), (584, 560)]),
+    *map(nightly, [(970, 640), (780, 600), (760, 600), (690, 560), (584, 560)]),
     (480, 640),
 ]
 
 
-LOW = [(1280, 300), *map(nightly, [(970, 260), (780, 300), (690, 300)]), (584, 260), (480, 300)]
+LOW = [*map(nightly, [(1280, 300), (970, 260), (780, 300), (690, 300), (480, 300)]), (584, 260)]
 
 
 #: A long one.
@@ -331,7 +333,7 @@ def test_numbers_show_all_their_digits(new_painter: Any, size: tuple[int, int]) 
 
 
 @pytest.mark.parametrize(
-    "size", [(853, 480), *map(nightly, [(1024, 768), (1280, 720)]), (1600, 900)]
+    "size", [(853, 480), *map(nightly, [(1024, 768), (1280, 720), (1600, 900)])]
 )
 def test_without_panels_pictures_have_all_there_is(new_painter: Any, size: tuple[int, int]) -> None:
     painter = new_painter(viewport=dict(zip(("width", "height"), size, strict=True)))
@@ -375,6 +377,7 @@ def test_what_has_to_be_known_does_not_lie_over_a_name(
     assert name["y"] + name["height"] <= top
 
 
+@pytest.mark.nightly
 def test_panels_leave_the_pictures_of_a_narrow_column_their_room(new_painter: Any) -> None:
     painter = new_painter(viewport={"width": 690, "height": 560})
     stage, side = painter.page.locator(".stage"), painter.page.locator(".side")
@@ -393,7 +396,7 @@ def test_panels_leave_the_pictures_of_a_narrow_column_their_room(new_painter: An
         )
 
 
-@pytest.mark.parametrize("state", ["first", "busy", *map(nightly, ["keys", "export", "settings"])])
+@pytest.mark.parametrize("state", ["busy", *map(nightly, ["first", "keys", "export", "settings"])])
 def test_axe_finds_nothing(new_painter: Any, axe: str, state: str) -> None:
     painter = new_painter("first&lights=12", axe=axe)
     if state == "busy":
@@ -426,6 +429,7 @@ def test_axe_finds_nothing(new_painter: Any, axe: str, state: str) -> None:
     assert violations(painter.page, ".lightpaint") == []
 
 
+@pytest.mark.nightly
 def test_a_picture_at_the_right_edge_is_named_on_one_line(painter: Painter) -> None:
     """In the wipe the name of the right picture ends where the window does."""
     painter.button("Wipe").click()
@@ -435,6 +439,7 @@ def test_a_picture_at_the_right_edge_is_named_on_one_line(painter: Painter) -> N
     assert right["height"] == left["height"]
 
 
+@pytest.mark.nightly
 def test_every_comparison_shows_the_two_pictures_that_it_names(new_painter: Any) -> None:
     painter = new_painter("lights=5")
     choice = painter.page.get_by_role("combobox", name="Compare", exact=True)
@@ -446,6 +451,7 @@ def test_every_comparison_shows_the_two_pictures_that_it_names(new_painter: Any)
         assert painter.page.locator(".stage .tag").all_inner_texts() == name.split(" | ")
 
 
+@pytest.mark.nightly
 def test_two_fingers_zoom_by_as_much_as_they_spread(painter: Painter) -> None:
     """Though both move within one frame, and each alone is told to the page."""
     zoom = painter.page.evaluate(

@@ -32,6 +32,7 @@ def test_a_light_is_moved_by_hand_and_freed(painter: Painter) -> None:
     assert newest_constraints(painter) == {"lock": [0, 0, 0]}
 
 
+@pytest.mark.nightly
 def test_a_moved_light_says_why_it_stays_and_a_press_releases_it(painter: Painter) -> None:
     row = painter.page.locator('[data-light="key"]')
     assert row.locator(".kept").count() == 0
@@ -47,6 +48,7 @@ def test_a_moved_light_says_why_it_stays_and_a_press_releases_it(painter: Painte
     assert row.locator(".kept").count() == 0
 
 
+@pytest.mark.nightly
 def test_the_solve_starts_from_lamps_that_were_set(painter: Painter) -> None:
     lamps = painter.page.locator(".start-lamps")
     assert lamps.count() == 0  # nothing was set by hand
@@ -88,6 +90,11 @@ def test_a_lamp_of_emitters_shows_a_bar_for_each_drive(painter: Painter) -> None
         "bars => bars.map(x => x.style.getPropertyValue('--drive'))"
     )
     assert widths == ["0.25", "1"]
+    # They follow the brush; lights without emitters have none.
+    painter.tell(kind="answer", version=9, exact=False, drives=[[0.5, 0.125], None])
+    assert drives.get_attribute("aria-label") == "Drives: red 50 %, white 13 %"
+    painter.tell(kind="answer", version=10, exact=False)
+    assert drives.get_attribute("aria-label") == "Drives: red 50 %, white 13 %"
 
 
 def test_a_blackout_of_the_console_takes_two_presses(painter: Painter) -> None:
@@ -171,6 +178,7 @@ def test_a_light_is_held_at_what_is_typed_in_any_unit(painter: Painter) -> None:
         assert lock == pytest.approx([factor * x for x in current], rel=1e-6)
 
 
+@pytest.mark.nightly
 def test_of_a_light_that_is_off_there_are_no_percent(painter: Painter) -> None:
     painter.type("cove, level", "80 %")
     assert "cove is off now" in painter.ui("toasts")[-1]["text"]
@@ -179,6 +187,7 @@ def test_of_a_light_that_is_off_there_are_no_percent(painter: Painter) -> None:
     assert newest_constraints(painter) == {"lock": [0, 0, 0]}
 
 
+@pytest.mark.nightly
 def test_limits_that_leave_nothing_are_not_sent(painter: Painter) -> None:
     painter.page.get_by_role("button", name="key", exact=True).click()
     painter.type("Max", "150")
@@ -230,6 +239,7 @@ def test_what_is_asked_of_a_level_stands_in_one_row(
     in_a_row("Locked at", "Unit")
 
 
+@pytest.mark.nightly
 def test_a_long_name_of_a_dimmer_has_one_line(painter: Painter) -> None:
     painter.page.evaluate(
         """() => {
@@ -271,6 +281,7 @@ def test_what_was_asked_of_a_light_is_known_until_it_is_free(painter: Painter, w
     assert newest_constraints(painter) == limits
 
 
+@pytest.mark.nightly
 def test_limits_of_a_locked_light_are_known_after_a_reload(painter: Painter) -> None:
     """The session remembers what a page that is gone has replaced by a lock."""
     limits = {"limits": {"max": "150%"}}
@@ -331,6 +342,7 @@ def test_what_a_light_may_do(painter: Painter) -> None:
     assert painter.requests("tie")[-1]["ties"] == []
 
 
+@pytest.mark.nightly
 def test_who_holds_a_light_holds_its_dimmer(painter: Painter) -> None:
     painter.page.evaluate("() => painter.session.tie('key', 'cove')")
     painter.still()
@@ -350,6 +362,7 @@ def test_who_holds_a_light_holds_its_dimmer(painter: Painter) -> None:
     key.get_by_role("button", name="Lock key as it is").wait_for()
 
 
+@pytest.mark.nightly
 def test_a_light_is_said_to_be_held_back_by_what_is_asked_of_it_alone(painter: Painter) -> None:
     badge = painter.page.locator(".badge")
     hold_script = (
@@ -369,6 +382,7 @@ def test_a_light_is_said_to_be_held_back_by_what_is_asked_of_it_alone(painter: P
     assert badge.all_inner_texts() == ["locked"]
 
 
+@pytest.mark.nightly
 def test_names_that_differ_at_their_end_are_told_apart(new_painter: Any) -> None:
     """On a tablet, whose buttons need most of a row."""
     painter = new_painter(has_touch=True)
@@ -392,6 +406,7 @@ def test_names_that_differ_at_their_end_are_told_apart(new_painter: Any) -> None
     assert painter.page.get_by_role("button", name="key", exact=True).inner_text() == "key"
 
 
+@pytest.mark.nightly
 def test_a_light_says_its_unit_in_its_tip_and_keeps_its_height_while_it_is_sought(
     new_painter: Any,
 ) -> None:
@@ -407,6 +422,7 @@ def test_a_light_says_its_unit_in_its_tip_and_keeps_its_height_while_it_is_sough
     assert row.bounding_box() == before
 
 
+@pytest.mark.nightly
 def test_a_light_that_hardly_shines_is_turned_up_in_its_own_colour(painter: Painter) -> None:
     """Nobody has seen the blue that the solve has left it."""
     current = painter.page.evaluate("() => window.painter.store.value.lights[0].present")
@@ -421,6 +437,7 @@ def test_a_light_that_hardly_shines_is_turned_up_in_its_own_colour(painter: Pain
     assert blue > current[2]
 
 
+@pytest.mark.nightly
 def test_on_its_way_through_the_dark_a_light_keeps_its_colour(painter: Painter) -> None:
     painter.page.evaluate(
         "() => painter.store.set(({ weights }) => ({ weights: [[1, 0.5, 0.25],"
@@ -441,6 +458,7 @@ def test_on_its_way_through_the_dark_a_light_keeps_its_colour(painter: Painter) 
     assert [green / red, blue / red] == pytest.approx([0.5, 0.25])
 
 
+@pytest.mark.nightly
 def test_a_light_is_held_at_a_white(painter: Painter) -> None:
     painter.button("key", exact=True).click()
     painter.button("Locked", exact=True).click()
@@ -458,6 +476,7 @@ def test_a_light_is_held_at_a_white(painter: Painter) -> None:
     np.testing.assert_allclose(lock / lock[0], np.array(white) / white[0], rtol=1e-9)
 
 
+@pytest.mark.nightly
 def test_solo_and_mute_ask_nothing_of_the_solve(painter: Painter) -> None:
     solo, tag = painter.button("Solo: show pendant"), painter.page.locator(".tag.is-part")
     before = solo.bounding_box()
@@ -520,6 +539,7 @@ def test_64_lights_are_found_sorted_and_folded(new_painter: Any) -> None:
     assert sole_shares == sorted(sole_shares, reverse=True)
 
 
+@pytest.mark.nightly
 def test_a_number_is_taken_as_it_is_shown(painter: Painter) -> None:
     painter.button("Solve settings").click()
     painter.type("At most", "1.5")
@@ -579,6 +599,7 @@ def open_key_panel(painter: Painter) -> Any:
     return painter.page.get_by_role("group", name="Constraints on key")
 
 
+@pytest.mark.nightly
 def test_what_is_off_is_not_turned_up_by_turning_it_down(painter: Painter) -> None:
     panel = open_key_panel(painter)
     panel.get_by_role("button", name="Locked", exact=True).click()
@@ -595,6 +616,7 @@ def test_what_is_off_is_not_turned_up_by_turning_it_down(painter: Painter) -> No
     assert lock == pytest.approx([x * 2**-7.9 for x in current], rel=1e-6)
 
 
+@pytest.mark.nightly
 def test_levels_far_below_one_are_not_off(painter: Painter) -> None:
     panel = open_key_panel(painter)
     panel.get_by_role("button", name="Locked", exact=True).click()
@@ -645,6 +667,7 @@ def test_limits_of_a_lights_file_are_shown_in_one_unit(
             assert limits_asked[key] == pytest.approx(end * current, rel=1e-3)
 
 
+@pytest.mark.nightly
 def test_all_lights_are_let_go_of_in_one_step(painter: Painter) -> None:
     """Each has again what was asked of it before; as after a look that holds all of them."""
     painter.page.evaluate("() => painter.session.constrainLight(0, { limits: { max: '150%' } })")
@@ -663,6 +686,7 @@ def test_all_lights_are_let_go_of_in_one_step(painter: Painter) -> None:
     assert painter.page.locator(".dimmer.is-held").count() == 0
 
 
+@pytest.mark.nightly
 def test_a_white_that_is_green_or_pink_is_said_to_be(painter: Painter) -> None:
     def tint_text(rgb: list[float]) -> str:
         painter.page.evaluate("(rgb) => painter.session.lockLight(0, rgb, true)", rgb)

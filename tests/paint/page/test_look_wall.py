@@ -99,6 +99,7 @@ def test_pictures_are_as_large_as_there_is_room(
     assert cut == []
 
 
+@pytest.mark.nightly
 def test_more_than_four_cannot_be_marked(open_looks: Any) -> None:
     painter = open_looks()
     painter.button("Save look").click()
@@ -122,6 +123,7 @@ def test_a_click_takes_one(open_looks: Any) -> None:
     assert painter.calls("showLooks")[-1][1] == 0  # the pictures are back
 
 
+@pytest.mark.nightly
 def test_by_keyboard_alone(open_looks: Any) -> None:
     painter = open_looks()
     open_wall(painter, "Look 1", "Look 2", "Look 3", "Look 4")
@@ -221,6 +223,7 @@ def test_pictures_are_those_of_the_engine(open_looks: Any) -> None:
     assert len(painter.page.evaluate("() => engine.panes()")) == 2
 
 
+@pytest.mark.nightly
 def test_a_deleted_look_ends_it(open_looks: Any) -> None:
     painter = open_looks()
     open_wall(painter, "Look 1", "Look 2", "Look 3")

@@ -6,6 +6,7 @@ import pytest
 from painter_page import Painter
 
 
+@pytest.mark.nightly
 def test_a_tab_that_comes_second_says_where_the_painter_is(new_painter: Any) -> None:
     painter = new_painter("elsewhere", until=".lightpaint .banner")
     notice = painter.page.get_by_role("alert")
@@ -51,6 +52,7 @@ THUMBS = (
 )
 
 
+@pytest.mark.nightly
 def test_a_place_that_has_lost_the_painter_gets_its_pictures_when_it_has_it_again(
     new_painter: Any,
 ) -> None:
@@ -76,6 +78,7 @@ def fail_next_request(painter: Painter) -> None:
     painter.page.evaluate("() => { host.fails = 'That cannot be done.'; }")
 
 
+@pytest.mark.nightly
 def test_what_is_refused_is_shown_no_longer(painter: Painter) -> None:
     """Nor does it go along with what is asked next."""
     painter.page.get_by_role("button", name="key", exact=True).click()
@@ -105,6 +108,7 @@ def test_what_is_refused_is_shown_no_longer(painter: Painter) -> None:
         assert {name: painter.ui(name) for name in before} == before
 
 
+@pytest.mark.nightly
 def test_what_is_refused_leaves_what_is_on_its_way(painter: Painter) -> None:
     painter.page.evaluate(
         """() => {
@@ -123,6 +127,7 @@ def alert_text(painter: Painter) -> str:
     return " ".join(painter.page.get_by_role("alert").all_inner_texts())
 
 
+@pytest.mark.nightly
 def test_a_kernel_that_does_not_answer_is_said_to_until_it_does(new_painter: Any) -> None:
     painter = new_painter("model", is_fresh=True)
     painter.page.clock.install(time=0)
@@ -191,6 +196,7 @@ def ask_for_all(painter: Painter) -> None:
 LOST = "Promise.reject(new Error('there is no connection to the painter'))"
 
 
+@pytest.mark.nightly
 def test_what_could_not_be_asked_for_is_not_under_way(painter: Painter) -> None:
     painter.page.evaluate(f"() => {{ host.send = () => {LOST}; }}")
     ask_for_all(painter)
@@ -208,6 +214,7 @@ def test_what_could_not_be_asked_for_is_not_under_way(painter: Painter) -> None:
     painter.page.wait_for_function("() => painter.store.value.display.overlay === null")
 
 
+@pytest.mark.nightly
 def test_what_fails_is_under_way_no_more_and_the_rest_is(painter: Painter) -> None:
     painter.page.evaluate("() => { host.send = () => new Promise(() => {}); }")
     ask_for_all(painter)
@@ -221,6 +228,7 @@ def test_what_fails_is_under_way_no_more_and_the_rest_is(painter: Painter) -> No
         assert task not in running_tasks(painter)
 
 
+@pytest.mark.nightly
 def test_what_ended_while_the_connection_was_lost_is_not_waited_for(painter: Painter) -> None:
     painter.page.evaluate("() => { host.send = () => new Promise(() => {}); }")
     ask_for_all(painter)

@@ -96,6 +96,7 @@ def test_selected_lights_are_dimmed_in_one_step_and_keep_their_ratio(painter: Pa
     assert painter.ui("toasts")[-1]["text"] == "3 lights off: switch on first."
 
 
+@pytest.mark.nightly
 def test_a_drag_of_the_dimmer_begins_at_the_answer_and_is_one_step(painter: Painter) -> None:
     select(painter, "key", "sun")
     before = weights(painter)
@@ -116,6 +117,7 @@ def test_a_drag_of_the_dimmer_begins_at_the_answer_and_is_one_step(painter: Pain
     assert painter.ui("history")["count"] == 1
 
 
+@pytest.mark.nightly
 def test_warmth_keeps_the_level_and_moves_by_mireds(painter: Painter) -> None:
     select(painter, "window left", "sun")
     before = weights(painter)
@@ -130,6 +132,7 @@ def test_warmth_keeps_the_level_and_moves_by_mireds(painter: Painter) -> None:
     np.testing.assert_allclose(locks["sun"] @ LUMINANCE, before[5] @ LUMINANCE, rtol=1e-9)
 
 
+@pytest.mark.nightly
 def test_tied_lights_move_by_their_dimmer_and_keep_their_colours(painter: Painter) -> None:
     select(painter, "key", "pendant")
     painter.button("Tie", exact=True).click()
@@ -150,6 +153,7 @@ def test_tied_lights_move_by_their_dimmer_and_keep_their_colours(painter: Painte
     assert painter.requests("tie")[-1]["ties"] == []
 
 
+@pytest.mark.nightly
 def test_selected_lights_are_locked_switched_off_and_let_go(painter: Painter) -> None:
     painter.page.evaluate("() => painter.session.constrainLight(0, { limits: { max: '150%' } })")
     select(painter, "key", "sun")
@@ -172,6 +176,7 @@ def test_selected_lights_are_locked_switched_off_and_let_go(painter: Painter) ->
     assert painter.ui("history")["count"] == 4
 
 
+@pytest.mark.nightly
 def test_a_gel_is_put_on_by_its_number_with_its_loss_and_taken_off(painter: Painter) -> None:
     select(painter, "key", "sun")
     before = weights(painter)
@@ -262,6 +267,7 @@ def test_published_colours_of_gels_come_out_on_the_light_they_were_measured_with
     assert (gels["known"], gels["none"]) == (gels["codes"][1], None)
 
 
+@pytest.mark.nightly
 def test_the_master_dims_pictures_and_no_level(painter: Painter) -> None:
     before = weights(painter)
     painter.type("Master", "70")
@@ -397,6 +403,7 @@ def test_of_a_thousand_lights_groups_come_first_and_rows_in_view_exist(
     assert page.locator(".light-rows .light").count() == 10
 
 
+@pytest.mark.nightly
 def test_the_keyboard_reaches_all_rows_of_a_long_list(new_painter: Any) -> None:
     painter = new_painter("lights=300&size=32x18")
     page = painter.page
@@ -418,6 +425,7 @@ def test_the_keyboard_reaches_all_rows_of_a_long_list(new_painter: Any) -> None:
     assert page.locator('[data-light="row 140"]').count() == 0
 
 
+@pytest.mark.nightly
 def test_a_light_of_a_long_list_is_unfolded_though_its_row_was_not_there(new_painter: Any) -> None:
     painter = new_painter("lights=300&size=32x18")
     page = painter.page

@@ -147,6 +147,7 @@ def test_sliders_solo_and_mute_show_the_sum_of_the_planes(make_basis: Any, open_
     check(page, codes(basis, answer, transform))
 
 
+@pytest.mark.nightly
 def test_selected_lights_are_dimmed_together_and_the_master_dims_all(
     make_basis: Any, open_file: Any
 ) -> None:
@@ -259,6 +260,7 @@ def test_a_finger_scrolls_past_sliders(make_basis: Any, open_file: Any, browser:
     context.close()
 
 
+@pytest.mark.nightly
 def test_on_a_phone_nothing_parts_lights_and_buttons(make_basis: Any, open_file: Any) -> None:
     """But what is said of a copy, while it is; and nothing is wider than the phone."""
     page = open_file(report(light_basis(make_basis, 4)))
@@ -336,6 +338,7 @@ def test_of_hundreds_of_lights_the_rest_is_one(make_basis: Any, open_file: Any) 
     check(page, codes(basis, weights, transform))
 
 
+@pytest.mark.nightly
 def test_an_image_is_one_row_with_its_map(make_basis: Any, open_file: Any) -> None:
     names = ["bulb", *(f"sky.x{x}.y{y}" for y in range(3) for x in range(4))]
     basis = light_basis(make_basis, 13, names=names)

@@ -50,6 +50,7 @@ def test_light_of_one_colour_has_no_tint(page: Any, colour: list[float]) -> None
     assert tint_of(page, [colour] * 4) is None
 
 
+@pytest.mark.nightly
 def test_only_a_disc_is_sampled(page: Any) -> None:
     """Of a fiftieth of the height, cut at the edge of the picture."""
     height, width = 200, 300
@@ -114,6 +115,7 @@ def test_a_press_makes_a_layer_over_the_whole_picture(new_painter: Any) -> None:
     assert [step["label"] for step in steps] == ["Whole picture, neutral at Back wall"]
 
 
+@pytest.mark.nightly
 def test_black_cannot_become_neutral(new_painter: Any) -> None:
     painter = open_shipped(new_painter)
     painter.page.evaluate("() => engine.mirror.drawnPainting.image.fill(0)")
@@ -122,6 +124,7 @@ def test_black_cannot_become_neutral(new_painter: Any) -> None:
     assert painter.requests("paint") == []
 
 
+@pytest.mark.nightly
 def test_the_tool_is_used_by_keys_and_on_either_picture(new_painter: Any) -> None:
     painter = new_painter()
     painter.page.keyboard.press("u")

@@ -222,6 +222,7 @@ def has_painting(folder: Path) -> bool:
     return path.exists() and "lighting True" in path.read_text()
 
 
+@pytest.mark.nightly
 @pytest.mark.skipif(find_spec("jupyterlab") is None, reason="JupyterLab")
 def test_in_jupyterlab(browser: Any, folder: Path) -> None:
     def cell(k: int, text: str) -> dict[str, Any]:

@@ -37,6 +37,7 @@ def visible_lights(painter: Painter) -> list[str]:
     return names
 
 
+@pytest.mark.nightly
 def test_lights_are_in_view_at_1440x900(new_painter: Any) -> None:
     """As the page opens; and with ten layers, one of them unfolded, a selection and a history."""
     painter = new_painter("lights=12", viewport=LAPTOP)
@@ -56,6 +57,7 @@ def test_lights_are_in_view_at_1440x900(new_painter: Any) -> None:
     assert field.evaluate(hit)
 
 
+@pytest.mark.nightly
 def test_panels_are_moved_by_key_and_by_drag_and_stay_there(new_painter: Any) -> None:
     painter = new_painter(viewport=LAPTOP)
     assert titles(painter) == DEFAULT
@@ -93,6 +95,7 @@ def test_panels_are_moved_by_key_and_by_drag_and_stay_there(new_painter: Any) ->
     assert titles(painter) == DEFAULT
 
 
+@pytest.mark.nightly
 def test_escape_ends_the_drag_of_a_panel(new_painter: Any) -> None:
     painter = new_painter(viewport=LAPTOP)
     head = painter.page.locator(".is-truth .fold-head h2").bounding_box()
@@ -138,6 +141,7 @@ def test_hidden_panels_keep_their_place(page: Any) -> None:
     assert steps == [None, list("bac")]
 
 
+@pytest.mark.nightly
 def test_axe_finds_nothing_in_panels_with_grips(new_painter: Any, axe: str) -> None:
     painter = new_painter(axe=axe, viewport=LAPTOP)
     painter.page.locator(".is-history .fold-head").hover()

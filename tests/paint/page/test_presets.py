@@ -2,6 +2,7 @@
 
 from typing import Any
 
+import pytest
 from axe import violations
 from painter_page import Painter
 
@@ -25,6 +26,7 @@ def test_a_click_asks_for_a_preset_about_the_chosen_object(new_painter: Any, axe
     assert painter.ui("open")["layers"]
 
 
+@pytest.mark.nightly
 def test_pictures_that_come_move_nothing(painter: Painter) -> None:
     painter.page.evaluate(
         """() => {

@@ -474,6 +474,7 @@ def test_a_pen_paints_with_its_pressure_and_fingers_paint_and_zoom(
     np.testing.assert_allclose(user.seen(30, 27), user.code(user.paint), atol=1)
 
 
+@pytest.mark.nightly
 def test_strokes_outlive_their_connection(served_painter: ServedPainter, open_page: Any) -> None:
     user = open_page(served_painter).ready()
     lost_notice = user.page.get_by_text("The connection is lost")
@@ -756,6 +757,7 @@ class Folder(type(Path())):  # type: ignore[misc]
     events: tuple[threading.Event, ...]
 
 
+@pytest.mark.nightly
 def test_one_waits_for_the_first_picture_and_paints_while_it_gets_better(
     basis: lp.Basis, tmp_path: Path, open_page: Any
 ) -> None:

@@ -93,6 +93,7 @@ def test_references_come_by_file_drop_and_clipboard_and_one_is_shown(room: Paint
     assert page.locator(".reference-pane").count() == 0
 
 
+@pytest.mark.nightly
 def test_the_pictures_make_room_for_the_references(room: Painter) -> None:
     page = room.page
     before = page.locator(".stage").bounding_box()["width"]
@@ -107,6 +108,7 @@ def test_the_pictures_make_room_for_the_references(room: Painter) -> None:
     assert page.locator(".reference-pane").bounding_box()["width"] <= 300
 
 
+@pytest.mark.nightly
 def test_a_dropped_exr_may_be_a_reference_or_layers(room: Painter) -> None:
     page = room.page
     give(page, "drop", "sky.exr", b"light")
@@ -121,6 +123,7 @@ def test_a_dropped_exr_may_be_a_reference_or_layers(room: Painter) -> None:
     assert [one["name"] for one in room.requests("import_layers")] == ["layers.exr"]
 
 
+@pytest.mark.nightly
 def test_a_paste_into_a_field_is_no_reference(room: Painter) -> None:
     room.page.get_by_role("searchbox").first.focus()
     give(room.page, "paste", "image.png", b"clip", "input[type=search]")
@@ -175,6 +178,7 @@ def test_pairs_of_places_are_pressed_listed_and_removed(room: Painter) -> None:
     assert page.locator(".pair-list li").count() == 1
 
 
+@pytest.mark.nightly
 def test_places_are_pressed_by_keyboard(room: Painter) -> None:
     page = room.page
     give(page, "drop", "dusk.png", png())

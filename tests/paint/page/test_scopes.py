@@ -43,6 +43,7 @@ def trace(page: Any, call: str, *given: Any) -> Any:
     return np.array(found["counts"]).reshape(found["height"], found["width"])
 
 
+@pytest.mark.nightly
 def test_the_waveform_of_a_ramp_is_a_diagonal(page: Any) -> None:
     """100 % is on top; each column has its one level, as often as there are rows."""
     ramp = np.repeat(np.arange(256)[None, :, None], 3, axis=-1).repeat(5, axis=0)
@@ -77,6 +78,7 @@ def test_the_histogram_of_a_ramp_is_even(page: Any) -> None:
     np.testing.assert_allclose(found, [100 * 127 / 255, 100, 1 / 256, 1 / 256])
 
 
+@pytest.mark.nightly
 def test_greys_lie_in_the_middle_of_a_vectorscope(page: Any) -> None:
     for level in (0, 77, 255):
         counts = trace(page, "vectorscope", flat((level,) * 3), 201)
@@ -120,6 +122,7 @@ def open_scopes(painter: Painter) -> None:
     painter.still()
 
 
+@pytest.mark.nightly
 def test_scopes_cost_nothing_while_they_are_folded(new_painter: Any) -> None:
     """Open, they follow the picture that is chosen."""
     painter = new_painter()
@@ -138,6 +141,7 @@ def test_scopes_cost_nothing_while_they_are_folded(new_painter: Any) -> None:
     assert len(painter.calls("displayedCodes")) == count
 
 
+@pytest.mark.nightly
 def test_scopes_are_rare_under_a_brush(new_painter: Any) -> None:
     """A tenth of the time at most, by a clock that the test sets."""
     painter = new_painter(is_fresh=True)
@@ -175,6 +179,7 @@ def test_a_scope_says_its_levels(new_painter: Any) -> None:
     assert painter.page.get_by_role("img", name=name).count() == 1
 
 
+@pytest.mark.nightly
 @pytest.mark.parametrize(
     "kind", ["Waveform", *map(nightly, ["Histogram", "Parade", "Vectorscope"])]
 )
@@ -192,7 +197,7 @@ def test_axe_finds_nothing_in_scopes(new_painter: Any, axe: str, kind: str) -> N
     assert violations(painter.page, ".side") == []
 
 
-@pytest.mark.parametrize("kind", ["painting", "solution", nightly("present")])
+@pytest.mark.parametrize("kind", ["painting", *map(nightly, ["solution", "present"])])
 def test_codes_are_those_of_the_pictures(new_painter: Any, kind: str) -> None:
     """Of the engine that ships, at the exposure of the display."""
     painter = new_painter("engine&view=cpu")

@@ -37,6 +37,7 @@ def painter(new_painter: Any, axe: str) -> Painter:
     return opened
 
 
+@pytest.mark.nightly
 def test_it_says_how_long_it_takes_before_it_starts(painter: Painter) -> None:
     dialog = painter.page.get_by_role("dialog")
     painter.button("Let lights move").click()
@@ -60,6 +61,7 @@ def test_it_says_how_long_it_takes_before_it_starts(painter: Painter) -> None:
     assert dialog.count() == 0
 
 
+@pytest.mark.nightly
 def test_where_a_light_of_its_own_is_missing_its_fields_come_into_view(painter: Painter) -> None:
     lights = painter.page.evaluate("() => host.exact().lights")
     advice = {"kind": "light", "names": [], "gain": None, "hold": None}
@@ -91,6 +93,7 @@ def test_it_stops_with_the_best_so_far_or_with_nothing(painter: Painter) -> None
     assert chip.count() == 0
 
 
+@pytest.mark.nightly
 def test_a_search_leaves_its_trace_beside_the_steps(painter: Painter) -> None:
     painter.button("History").click()
     search = {

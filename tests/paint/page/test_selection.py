@@ -78,6 +78,7 @@ def test_a_drag_selects_and_shift_and_alt_say_how_it_joins(painter: Painter) -> 
     assert len(painter.calls("select")) == count
 
 
+@pytest.mark.nightly
 def test_keys_select_all_and_nothing_and_draw_a_shape_from_corner_to_corner(
     painter: Painter,
 ) -> None:
@@ -209,6 +210,7 @@ def add_gradient(painter: Painter) -> None:
     painter.still()
 
 
+@pytest.mark.nightly
 def test_a_gradient_is_drawn_by_key_and_its_ends_are_moved(painter: Painter) -> None:
     painter.page.keyboard.press("r")
     assert painter.ui("tool") == "gradient"

@@ -141,7 +141,7 @@ def test_colours_brightness_and_light_are_selected_as_they_are_seen(page: Any) -
 
 
 @pytest.mark.parametrize(
-    "tool", ["brush", "fill", "adjust", *map(nightly, ["eraser", "weight", "line"])]
+    "tool", ["brush", *map(nightly, ["fill", "adjust", "eraser", "weight", "line"])]
 )
 def test_no_stroke_changes_a_pixel_outside_of_what_is_selected(page: Any, tool: str) -> None:
     mask = random_mask(3)

@@ -78,6 +78,7 @@ def test_the_document_lists_the_keys_of_the_page(new_painter: Any) -> None:
     assert table.splitlines() == rows
 
 
+@pytest.mark.nightly
 def test_a_key_is_changed_shown_kept_and_reset(new_painter: Any, axe: str) -> None:
     painter: Painter = new_painter(axe=axe)
     open_keys(painter)
@@ -106,6 +107,7 @@ def test_a_key_is_changed_shown_kept_and_reset(new_painter: Any, axe: str) -> No
     assert painter.button("Reset all keys").is_disabled()
 
 
+@pytest.mark.nightly
 def test_a_conflict_is_named_and_chosen(new_painter: Any) -> None:
     painter: Painter = new_painter()
     open_keys(painter)
@@ -156,6 +158,7 @@ def test_escape_ends_the_change_and_not_the_dialog(new_painter: Any) -> None:
     assert not painter.requests("undo")
 
 
+@pytest.mark.nightly
 def test_a_held_key_may_be_another(new_painter: Any) -> None:
     """The answer before the last step is there while the key is down, whichever it is."""
     painter: Painter = new_painter()

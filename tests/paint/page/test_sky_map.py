@@ -186,6 +186,7 @@ def map_pixels(painter: Painter) -> Any:
     return np.array(data).reshape(ROWS, COLUMNS, 4)[..., :3]
 
 
+@pytest.mark.nightly
 def test_the_map_keeps_its_exposure(painter: Painter) -> None:
     """A place that is painted much brighter leaves the rest of the map as bright as it was."""
     unfold(painter)
@@ -229,6 +230,7 @@ def test_a_gradient_is_one_step_and_escape_takes_it_back(painter: Painter) -> No
     assert painter.ui("history")["count"] == 1
 
 
+@pytest.mark.nightly
 def test_a_fill_takes_the_half_above_or_below_the_horizon(painter: Painter) -> None:
     """The row at the horizon is above it."""
     unfold(painter)
@@ -243,6 +245,7 @@ def test_a_fill_takes_the_half_above_or_below_the_horizon(painter: Painter) -> N
     assert painter.ui("history")["count"] == 2
 
 
+@pytest.mark.nightly
 def test_a_sun_is_added_in_one_step(painter: Painter) -> None:
     """On top of what shines there; other texels stay free."""
     unfold(painter)
@@ -259,6 +262,7 @@ def test_a_sun_is_added_in_one_step(painter: Painter) -> None:
     assert painter.page.get_by_role("slider", name="Diameter").is_visible()
 
 
+@pytest.mark.nightly
 def test_marks_say_where_the_camera_looks(painter: Painter) -> None:
     """Along −z is the left edge of the map; a quarter further it is right of the view."""
     unfold(painter)
@@ -285,6 +289,7 @@ def test_marks_say_where_the_camera_looks(painter: Painter) -> None:
     assert "113° right of the view, 45° up" in text.inner_text()
 
 
+@pytest.mark.nightly
 def test_a_gradient_is_drawn_by_keys(painter: Painter) -> None:
     unfold(painter)
     choose(painter, "Gradient")
@@ -301,6 +306,7 @@ def test_a_gradient_is_drawn_by_keys(painter: Painter) -> None:
     np.testing.assert_allclose(levels[4] / levels[0], 2)
 
 
+@pytest.mark.nightly
 def test_axe_finds_nothing_on_a_map_with_marks(new_painter: Any, axe: str) -> None:
     painter = new_painter(QUERY, axe=axe)
     unfold(painter)

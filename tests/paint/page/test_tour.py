@@ -28,6 +28,7 @@ def is_within(painter: Painter) -> bool:
     )
 
 
+@pytest.mark.nightly
 @pytest.mark.parametrize("size", [(1280, 720), nightly((820, 1180))])
 def test_five_steps_greet_a_person_once(new_painter: Any, axe: str, size: Any) -> None:
     viewport = {"width": size[0], "height": size[1]}
@@ -62,6 +63,7 @@ def test_one_paints_below_it_and_escape_ends_it(new_painter: Any) -> None:
     assert painter.page.locator(BUBBLE).count() == 0
 
 
+@pytest.mark.nightly
 def test_it_folds_again_what_it_unfolded(new_painter: Any) -> None:
     painter: Painter = new_painter("tour")
     painter.page.locator(BUBBLE).wait_for()
@@ -75,6 +77,7 @@ def test_it_folds_again_what_it_unfolded(new_painter: Any) -> None:
     assert not fields.is_visible()
 
 
+@pytest.mark.nightly
 def test_by_keyboard_alone(new_painter: Any) -> None:
     painter: Painter = new_painter("tour")
     bubble = painter.page.locator(BUBBLE)
@@ -95,6 +98,7 @@ def test_by_keyboard_alone(new_painter: Any) -> None:
     assert painter.ui("tool") == "brush"
 
 
+@pytest.mark.nightly
 def test_it_is_called_again_from_settings_and_shortcuts(new_painter: Any) -> None:
     painter: Painter = new_painter()
     assert painter.page.locator(BUBBLE).count() == 0  # nobody asked for it

@@ -13,6 +13,7 @@ def progress(painter: Painter, task: str, steps_done: int, total: int = 16) -> N
     painter.tell(kind="progress", task=task, done=steps_done, total=total, unit="passes")
 
 
+@pytest.mark.nightly
 def test_files_that_are_written_are_seen_when_their_window_is_closed(painter: Painter) -> None:
     page = painter.page
     page.evaluate("() => { host.isWriting = true; }")
@@ -43,6 +44,7 @@ def test_files_that_are_written_are_seen_when_their_window_is_closed(painter: Pa
     assert page.get_by_role("dialog").get_by_text("answer/report.html", exact=True).is_visible()
 
 
+@pytest.mark.nightly
 def test_reasons_that_are_sought_are_said_to_be(painter: Painter) -> None:
     painter.page.evaluate("() => { host.explain = () => ({ kind: 'started', task: 'explain' }); }")
     painter.button("Analysis").click()
@@ -83,6 +85,7 @@ def test_all_that_goes_on_is_counted_alike(new_painter: Any) -> None:
     page.locator(".working").get_by_text("Loading the images of the lights: 25 %").wait_for()
 
 
+@pytest.mark.nightly
 def test_samples_that_are_added_are_said_to_be(painter: Painter) -> None:
     chip = painter.page.locator(".working")
     progress(painter, "sampling", 4)
@@ -96,6 +99,7 @@ def test_samples_that_are_added_are_said_to_be(painter: Painter) -> None:
     assert chip.count() == 1
 
 
+@pytest.mark.nightly
 def test_nothing_to_undo_is_no_mistake(painter: Painter) -> None:
     painter.page.locator(".stage").focus()
     painter.page.keyboard.press("Control+z")
@@ -126,6 +130,7 @@ def test_until_a_look_is_there_no_picture_is_called_its_own(painter: Painter, pi
     assert tag.inner_text() == picture
 
 
+@pytest.mark.nightly
 def test_an_answer_without_some_of_its_lights_says_so(new_painter: Any) -> None:
     painter = new_painter()
     tag = painter.page.locator(".tag").last
@@ -136,6 +141,7 @@ def test_an_answer_without_some_of_its_lights_says_so(new_painter: Any) -> None:
     assert tag.inner_text() == "Answer"  # they are there, and get cleaner
 
 
+@pytest.mark.nightly
 def test_a_small_picture_is_of_what_it_stands_for(painter: Painter) -> None:
     """Not of what stood there before, while its own is on its way."""
     page = painter.page

@@ -196,6 +196,7 @@ def test_no_panel_has_anything_cut(painter: Painter, panel: Callable[[Painter], 
     assert clipped_elements(painter) == []
 
 
+@pytest.mark.nightly
 def test_no_light_has_anything_cut(painter: Painter) -> None:
     """Folded, and with all that can be asked of it."""
     for k in (*range(7), 40):

@@ -7,6 +7,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from blender import has_working_spaces, in_blender
+from nightly import nightly
 
 from lightpaint.colour.primaries import ACESCG, REC709, REC2020, from_rec709
 from lightpaint.relit.export.exports import scene_script
@@ -15,7 +16,7 @@ from lightpaint.relit.export.exports import scene_script
 NOISE = 0.01
 
 
-@pytest.mark.parametrize("space", ["", "ACEScg", "Linear Rec.2020"])
+@pytest.mark.parametrize("space", ["", *map(nightly, ["ACEScg", "Linear Rec.2020"])])
 def test_a_floor_in_blender_is_lit_as_in_the_scene(
     tmp_path: Path, new_blender: list[str], space: str
 ) -> None:

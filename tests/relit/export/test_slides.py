@@ -64,6 +64,7 @@ def floor_in_mitsuba(scene: Scene, folder: Path, lighting: Lighting) -> Any:
     return (np.array(light) * cosine / np.pi).T.reshape(PIXELS, PIXELS, 3)
 
 
+@pytest.mark.nightly
 @pytest.mark.parametrize("before", ["new", nightly("AREA"), nightly("SPOT")])
 def test_a_slide_in_blender_lights_a_floor_the_same(
     tmp_path: Path, new_blender: list[str], before: str

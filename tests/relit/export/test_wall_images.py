@@ -62,6 +62,7 @@ def seen_in_mitsuba(scene: Scene, folder: Path, lighting: Lighting) -> Any:
     return np.array(hit.emitter(loaded).eval(hit)).T.reshape(ROWS, COLUMNS, 3)
 
 
+@pytest.mark.nightly
 @pytest.mark.parametrize("mesh", ["plane", nightly("wall.obj"), nightly("wall.ply")])
 def test_a_wall_in_blender_shows_the_same_picture(
     tmp_path: Path, blender: list[str], mesh: str

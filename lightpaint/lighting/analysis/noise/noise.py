@@ -19,7 +19,8 @@ import numpy as np
 
 from lightpaint.arrays import Bools, Doubles, Floats, Indices
 from lightpaint.basis.planes import BLOCK_PIXELS, FEW_LIGHTS, Planes, as_slice, block_of
-from lightpaint.lighting.algebra.eigenvectors import eigenvectors
+from lightpaint.lighting.algebra.eigenvectors import SMALL_MATRIX, eigenvectors, excess_above
+from lightpaint.lighting.algebra.lapack import large_libraries
 from lightpaint.lighting.analysis.noise.dominant_pixels import Peaks, t_ratios
 from lightpaint.lighting.analysis.noise.pixel_gradients import PixelGradients
 from lightpaint.lighting.analysis.noise.residuals import Residuals, channel_grain
@@ -45,9 +46,6 @@ MIN_PAINTING_NOISE = 0.02
 
 #: Parts of the pixels that are summed in parallel.
 PARTS = 4
-
-#: Maximum number of rows of a matrix for which several threads only wait for each other.
-SMALL_MATRIX = 256
 
 #: Eigenvalues of M, scaled to a unit diagonal, below which a direction changes no pixel.
 NULL_EIGENVALUE = 1e-12
@@ -378,11 +376,12 @@ def denoised_matrix(equations: NormalEquations, power: Doubles) -> Doubles:
     M.
     """
     denoised = np.empty_like(equations.M)
-    for c in range(3):
-        root, inverse = _roots(equations.M[c])
-        values, vectors = eigh(inverse @ power[c] @ inverse.T)
-        values = np.clip(values, 0, MAX_NOISE_SHARE)
-        denoised[c] = equations.M[c] - root @ ((vectors * values) @ vectors.T) @ root.T
+    for c, M in enumerate(equations.M):
+        root, inverse = _roots(M)
+        noise = inverse @ power[c] @ inverse.T
+        with one_thread() if len(M) <= SMALL_MATRIX else nullcontext():
+            excess = excess_above(noise, MAX_NOISE_SHARE)
+        denoised[c] = M - root @ (noise if excess is None else noise - excess) @ root.T
     return denoised
 
 
@@ -396,25 +395,8 @@ def pseudo_inverse(M: Doubles) -> Doubles:
     """Return the pseudo-inverse of a positive semidefinite matrix, whatever the scales of its
     unknowns.
     """
-    if len(M) > SMALL_MATRIX and (regular_inverse := _inverse(M)) is not None:
-        return regular_inverse
     _, inverse = _roots(M)
     return np.asarray(inverse.T @ inverse)
-
-
-def _inverse(M: Doubles) -> Doubles | None:
-    """Return the inverse of a matrix that is well regular, in a third of the time; else None."""
-    diagonal = np.diag(M)
-    if not (diagonal > 0).all():
-        return None
-    scale = np.sqrt(diagonal)
-    scaled = M / scale[:, None] / scale
-    try:
-        np.linalg.cholesky(scaled - REGULAR_EIGENVALUE * np.eye(len(M)))
-    except np.linalg.LinAlgError:
-        return None
-    inverse = np.linalg.inv(scaled) / scale[:, None] / scale
-    return np.asarray((inverse + inverse.T) / 2)
 
 
 def _roots(M: Doubles) -> tuple[Doubles, Doubles]:
@@ -422,8 +404,28 @@ def _roots(M: Doubles) -> tuple[Doubles, Doubles]:
     # Less the power of its noise, that of a very dim light may be negative.
     scale = np.sqrt(np.maximum(np.diag(M), 0))
     safe = np.where(scale > 0, scale, 1)
-    values, vectors = eigh(M / safe[:, None] / safe)
+    scaled = M / safe[:, None] / safe
+    if len(M) > SMALL_MATRIX and (factor := _regular_factor(scaled)) is not None:
+        root, inverse = factor
+        return safe[:, None] * root, inverse / safe
+    values, vectors = eigh(scaled)
     is_regular = values > NULL_EIGENVALUE * values.max(initial=0)
     root = np.sqrt(values[is_regular])
     inverse = (vectors[:, is_regular] / root).T / safe
     return np.asarray(safe[:, None] * vectors[:, is_regular] * root), np.asarray(inverse)
+
+
+def _regular_factor(M: Doubles) -> tuple[Doubles, Doubles] | None:
+    """Return the Cholesky factor of a matrix that is well regular, and its inverse, in a part of
+    the time of eigenvectors; else None.
+    """
+    lapack, _ = large_libraries()
+    # The transpose is the same matrix in the order of LAPACK.
+    factor, failed = lapack.dpotrf(M.T, lower=1, clean=1)
+    if failed:
+        return None
+    inverse, failed = lapack.dtrtri(factor, lower=1)
+    # The sum of squares is at least 1 over the least eigenvalue.
+    if failed or np.vdot(inverse, inverse) > 1 / REGULAR_EIGENVALUE:
+        return None
+    return np.asarray(factor), np.asarray(inverse)

@@ -30,7 +30,7 @@ from lightpaint.lighting.analysis.noise.noise import (
     painting_covariance,
     pseudo_inverse,
 )
-from lightpaint.lighting.analysis.noise.weight_directions import solve_for, weight_spread
+from lightpaint.lighting.analysis.noise.weight_directions import WeightResponse, solve_for
 from lightpaint.lighting.answer.lighting import LightSetting
 from lightpaint.lighting.normal_equations import NormalEquations
 from lightpaint.lighting.solution import Solution
@@ -220,14 +220,13 @@ def error_bars(
     # the noisy M leaves a part; the unbiased answer, which determines the interval, has the scatter
     # of its own M.
     scatters = problem.solved if problem.refinement is None else unbiased
-    spread = weight_spread(solution, noise, scatters, unbiased, weights + bias)
+    response = WeightResponse(solution, scatters, unbiased, weights + bias)
+    spread = response.spread(noise.full_covariance)
     by_painting, moved = np.zeros((2, *weights.shape))
-    covariance = painting_covariance(solution) if with_painting else None
-    if covariance is not None:
-        of_painting = replace(noise, gradient=covariance, hidden=np.zeros_like(noise.hidden))
-        by_painting = weight_spread(
-            solution, of_painting, scatters, unbiased, weights + bias
-        ).inside
+    of_painting = painting_covariance(solution) if with_painting else None
+    if of_painting is not None:
+        by_painting = response.spread(of_painting).inside
+    del response, of_painting  # of many lights they are large
     unsteady = np.zeros_like(weights)
     if noise.doubt.any():
         bent = replace(unbiased, b=unbiased.b - noise.doubt)
@@ -239,8 +238,8 @@ def error_bars(
         is_refined = problem.refinement is not None
         weak_equations = step.equations(weak) if is_refined else replace(unbiased, M=weak)
         far = solve_for(solution, weak_equations)
-        weak_spread = weight_spread(solution, noise, weak_equations, weak_equations, far)
-        spread = spread.mixed_with(weak_spread, doubts)
+        response = WeightResponse(solution, weak_equations, weak_equations, far)
+        spread = spread.mixed_with(response.spread(noise.full_covariance), doubts)
         moved = far - weights - bias
     by_poses = _scatter_by_poses(solution, level_errors)
     sides, wide = (
@@ -301,9 +300,7 @@ class _GradientStep:
 
 def _excess_by_channel(excess: Doubles, bias: Doubles, M: Doubles) -> Doubles:
     """Return the expected excess of the objective by scatter and bias, (3,)."""
-    by_channel = excess.reshape(3, -1).sum(axis=1)
-    by_channel += np.einsum("ic,cij,jc->c", bias, M, bias)
-    return np.asarray(by_channel)
+    return np.asarray(excess + np.einsum("ic,cij,jc->c", bias, M, bias))
 
 
 def _root(*parts: Doubles) -> Doubles:

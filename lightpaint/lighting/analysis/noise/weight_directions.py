@@ -7,15 +7,15 @@ import math
 from collections.abc import Iterator
 from dataclasses import dataclass
 from statistics import NormalDist
+from typing import Self
 
 import numpy as np
 
 from lightpaint.arrays import Bools, Doubles, Indices
-from lightpaint.lighting.algebra.eigenvectors import eigenvectors
+from lightpaint.lighting.algebra.eigenvectors import excess_above
 from lightpaint.lighting.analysis.noise.dominant_pixels import NORMAL_95
 from lightpaint.lighting.analysis.noise.noise import (
     NULL_EIGENVALUE,
-    Noise,
     noise_sums,
     pseudo_inverse,
 )
@@ -23,6 +23,7 @@ from lightpaint.lighting.normal_equations import NormalEquations
 from lightpaint.lighting.solution import Solution
 from lightpaint.lighting.unknowns.reduced_problem import ReducedOptimum, solve_reduced
 from lightpaint.lighting.unknowns.reduction import Reduction
+from lightpaint.lighting.unknowns.unknown_blocks import Block
 
 #: Relative distance at which a sum counts as at its limit.
 AT_LIMIT = 1e-9
@@ -45,26 +46,93 @@ FAR_DEVIATIONS = 30.0
 
 
 @dataclass(frozen=True)
+class Directions:
+    """Directions D of k unknowns, (k, m): first those along single unknowns, then others.
+
+    unknowns, signs: (s,), of the single ones. others: (k, m - s). Most are single ones, which need
+    no products.
+    """
+
+    unknowns: Indices
+    signs: Doubles
+    others: Doubles
+
+    @property
+    def count(self) -> int:
+        """Number of directions, m."""
+        return int(self.unknowns.size + self.others.shape[1])
+
+    def times(self, M: Doubles) -> Doubles:
+        """Return M D, (i, m), of M (i, k)."""
+        single = M[:, self.unknowns]
+        single *= self.signs
+        return np.hstack([single, M @ self.others]) if self.others.shape[1] else single
+
+    def dot(self, x: Doubles) -> Doubles:
+        """Return Dᵀ x, (m, j) or (m,), of x (k, j) or (k,)."""
+        return np.asarray(self.times(np.atleast_2d(x.T)).T.reshape(self.count, *x.shape[1:]))
+
+    def within(self, M: Doubles) -> Doubles:
+        """Return Dᵀ M D, (m, m), of a symmetric M (k, k)."""
+        return self.between(M, self)
+
+    def between(self, M: Doubles, other: "Directions") -> Doubles:
+        """Return Dᵀ M D', (m, m'), of a symmetric M (k, k)."""
+        if self.others.shape[1] or other.others.shape[1]:
+            return self.dot(other.times(M))
+        part = M[np.ix_(self.unknowns, other.unknowns)]
+        part *= self.signs[:, None]
+        part *= other.signs
+        return part
+
+    def effect(self, steps: Doubles) -> Doubles:
+        """Return D y, (k, j) or (k,), of steps y, (m, j) or (m,)."""
+        single = self.unknowns.size
+        moved = self.others @ steps[single:]
+        moved[self.unknowns] += (self.signs * steps[:single].T).T
+        return np.asarray(moved)
+
+    def joined(self, more: "Directions") -> tuple["Directions", Indices | None]:
+        """Return these and more directions, and their places if all of these came before those;
+        None if they do.
+        """
+        unknowns = np.concatenate([self.unknowns, more.unknowns])
+        signs = np.concatenate([self.signs, more.signs])
+        joint = Directions(unknowns, signs, np.hstack([self.others, more.others]))
+        if not self.others.shape[1]:
+            return joint, None
+        places = np.arange(self.count + more.count)
+        ends = [self.unknowns.size, self.count, self.count + more.unknowns.size]
+        singles, others, more_singles, more_others = np.split(places, ends)
+        return joint, np.concatenate([singles, more_singles, others, more_others])
+
+    def chosen(self, which: Bools) -> "Directions":
+        """Return some of the directions. which: (m,)."""
+        single = self.unknowns.size
+        is_chosen, others = which[:single], self.others[:, which[single:]]
+        return Directions(self.unknowns[is_chosen], self.signs[is_chosen], others)
+
+
+@dataclass(frozen=True)
 class ActiveLimits:
     """The active bounds of a block's unknowns, then its active caps.
 
     exits: (k, h), for each a direction that leaves it, and no other, by one unit. distances: (h,),
-    the largest step along it. bound_unknowns: (b,), the unknowns of the first b. sums: (h - b, k),
-    coefficients of the others.
+    the largest step along it. bound_unknowns: (b,), the unknowns of the first b; sides: (b,), 1 at
+    the lower, -1 at the upper bound. sums: (h - b, k), coefficients of the others.
     """
 
-    exits: Doubles
+    exits: Directions
     distances: Doubles
     bound_unknowns: Indices
+    sides: Doubles
     sums: Doubles
 
     @property
-    def own_exits(self) -> Doubles:
+    def own_exits(self) -> Directions:
         """(k, h), the effects of the directions on their own unknowns."""
-        is_own = np.zeros(self.exits.shape, dtype=bool)
-        is_own[self.bound_unknowns, np.arange(self.bound_unknowns.size)] = True
-        is_own[:, self.bound_unknowns.size :] = self.sums.T != 0
-        return np.where(is_own, self.exits, 0)
+        of_caps = self.exits.others[:, self.exits.others.shape[1] - len(self.sums) :]
+        return Directions(self.bound_unknowns, self.sides, np.where(self.sums.T != 0, of_caps, 0))
 
     def constrained(self, covariance: Doubles) -> Doubles:
         """Return a covariance of the unknowns, (k, k), under the active bounds and caps."""
@@ -82,13 +150,13 @@ class ActiveLimits:
 class BlockFreedom:
     """The freedom of the unknowns of one block around an answer.
 
-    columns: (3 n, k), the effect of each on the weights, 0 where a light reaches nothing. emitted:
+    block: the unknowns, whose effect on the weights is 0 where a light reaches nothing. emitted:
     the same including such lights. free: (k, m), directions without active bounds and caps.
     """
 
-    columns: Doubles
-    emitted: Doubles
-    free: Doubles
+    block: Block
+    emitted: Block
+    free: Directions
     active: ActiveLimits
 
 
@@ -100,30 +168,29 @@ def block_freedoms(solution: Solution, equations: NormalEquations) -> Iterator[B
     reduction, lit = solution.problem.local_reduction, solution.equations.reached
     optimum = solve_reduced(equations, reduction, solution.weights)
     x, (rows, distances) = optimum.x, _active_sums(reduction, optimum)
-    for block in reduction.blocks:
-        unknowns = block.unknowns
-        columns = _columns(reduction, unknowns, lit)
+    for emitted in reduction.blocks:
+        block, unknowns = emitted.masked(lit), emitted.unknowns
+        has_effect = np.zeros(unknowns.size, bool)
+        for e in block.entries:
+            has_effect[np.repeat(e.columns, e.counts)[e.values != 0]] = True
         lower, upper = reduction.lower[unknowns], reduction.upper[unknowns]
-        is_movable = (lower < upper) & columns.any(axis=0)
+        is_movable = (lower < upper) & has_effect
         side = np.where(x[unknowns] <= lower, 1, np.where(x[unknowns] >= upper, -1, 0)) * is_movable
         inside, bound = np.flatnonzero(is_movable & (side == 0)), np.flatnonzero(side)
         caps_here = rows[:, unknowns].any(axis=1)
         sums = rows[caps_here][:, unknowns]
         free, lowering = _keep_sums(sums, inside)
-        limits = _active_limits(
-            sums,
-            lowering,
-            bound,
-            side,
-            np.concatenate([(upper - lower)[bound], distances[caps_here]]),
-        )
-        yield BlockFreedom(columns, _columns(reduction, unknowns, np.ones_like(lit)), free, limits)
+        limits = _active_limits(sums, lowering, bound, side, upper - lower, distances[caps_here])
+        yield BlockFreedom(block, emitted, free, limits)
 
 
 def free_directions(solution: Solution) -> list[Doubles]:
     """Return the free directions around the answer, (3 n, k), for each independent problem."""
-    solved = solution.problem.with_pull(solution.problem.solved)
-    return [freedom.columns @ freedom.free for freedom in block_freedoms(solution, solved)]
+    solved, n = solution.problem.with_pull(solution.problem.solved), len(solution.weights)
+    return [
+        room.block.effects(room.free.effect(np.eye(room.free.count)), n).reshape(3 * n, -1)
+        for room in block_freedoms(solution, solved)
+    ]
 
 
 def solve_for(solution: Solution, equations: NormalEquations) -> Doubles:
@@ -151,18 +218,6 @@ def all_columns(solution: Solution) -> Iterator[Doubles]:
         yield flat.reshape(len(flat), -1)
     else:
         yield from (flat[:, c] for c in range(3))
-
-
-def _columns(reduction: Reduction, unknowns: Indices, lit: Bools) -> Doubles:
-    """Return C of these unknowns, (3 n, k), 0 where a light reaches nothing."""
-    place = np.full(len(reduction.unknowns), -1)
-    place[unknowns] = np.arange(unknowns.size)
-    unknown, light, rgb = reduction.columns
-    is_chosen = place[unknown] >= 0
-    columns = np.zeros((3, len(lit), unknowns.size))
-    for c in range(3):
-        columns[c, light[is_chosen], place[unknown[is_chosen]]] = rgb[is_chosen, c]
-    return (columns * lit.T[:, :, None]).reshape(3 * len(lit), unknowns.size)
 
 
 def _active_sums(reduction: Reduction, optimum: ReducedOptimum) -> tuple[Doubles, Doubles]:
@@ -193,41 +248,56 @@ def _active_caps(reduction: Reduction, x: Doubles) -> tuple[Doubles, Doubles]:
     return np.array(rows).reshape(len(rows), x.size), np.array(room)
 
 
-def _keep_sums(rows: Doubles, inside: Indices) -> tuple[Doubles, Doubles]:
+def _keep_sums(rows: Doubles, inside: Indices) -> tuple[Directions, Doubles]:
     """Return the effects of unknowns inside their bounds on the sums `rows`, (j, k).
 
-    Returns (k, m), directions that keep the sums, and (k, j), for each sum a direction that lowers
-    it by one and keeps the others; NaN if there is none.
+    Returns m directions that keep the sums, and (k, j), for each sum a direction that lowers it by
+    one and keeps the others; NaN if there is none.
     """
-    free = np.eye(rows.shape[1])[:, inside]
+    k = rows.shape[1]
+    is_summed = rows[:, inside].any(axis=0)
+    single, summed = inside[~is_summed], inside[is_summed]
     if not len(rows):
-        return free, np.zeros((rows.shape[1], 0))
-    left, sizes, right = np.linalg.svd(rows[:, inside])
+        return Directions(single, np.ones(single.size), np.zeros((k, 0))), np.zeros((k, 0))
+    left, sizes, right = np.linalg.svd(rows[:, summed])
     rank = int((sizes > AT_LIMIT * sizes.max(initial=0)).sum())
     inverse = right[:rank].T @ (left[:, :rank] / sizes[:rank]).T
-    lost = np.abs(rows[:, inside] @ inverse - np.eye(len(rows))).max(axis=0) > AT_LIMIT
-    lowering = np.where(lost, np.nan, -free @ inverse)
-    return np.asarray(free @ right[rank:].T), np.asarray(lowering)
+    lost = np.abs(rows[:, summed] @ inverse - np.eye(len(rows))).max(axis=0, initial=0) > AT_LIMIT
+    others, lowering = np.zeros((k, summed.size - rank)), np.zeros(rows.T.shape)
+    others[summed], lowering[summed] = right[rank:].T, -inverse
+    return Directions(single, np.ones(single.size), others), np.where(lost, np.nan, lowering)
 
 
 def _active_limits(
-    rows: Doubles, lowering: Doubles, bound: Indices, side: Indices, room: Doubles
+    rows: Doubles,
+    lowering: Doubles,
+    bound: Indices,
+    side: Indices,
+    ranges: Doubles,
+    distances: Doubles,
 ) -> ActiveLimits:
     """Return the bounds and caps of a block that can be left one by one.
 
     rows, lowering: of the sums, (j, k) and (k, j), see `_keep_sums`. bound: (b,), unknowns at a
-    bound. side: (k,), 1 at the lower, -1 at the upper one. room: (b + j,).
+    bound. side: (k,), 1 at the lower, -1 at the upper one. ranges: (k,), between both; distances:
+    (j,), of caps from their other limits.
     """
-    exits = np.eye(len(side))[:, bound] * side[bound]
-    pushes = rows @ exits
-    for j, b in np.argwhere(pushes != 0):
-        # Unknowns inside their bounds compensate the effect on the sum.
-        exits[:, b] += lowering[:, j] * pushes[j, b]
+    pushes = rows[:, bound] * side[bound]
+    is_single = ~pushes.any(axis=0)
+    alone, pushing = bound[is_single], bound[~is_single]
+    exits = np.zeros((len(side), pushing.size))
+    exits[pushing, np.arange(pushing.size)] = side[pushing]
+    # Unknowns inside their bounds compensate the effect on the sums.
+    for j, b in np.argwhere(pushes[:, ~is_single] != 0):
+        exits[:, b] += lowering[:, j] * (rows[j, pushing[b]] * side[pushing[b]])
     can_leave = np.isfinite(exits).all(axis=0), np.isfinite(lowering).all(axis=0)
+    others = np.hstack([exits[:, can_leave[0]], lowering[:, can_leave[1]]])
+    bound = np.concatenate([alone, pushing[can_leave[0]]])
     return ActiveLimits(
-        np.hstack([exits[:, can_leave[0]], lowering[:, can_leave[1]]]),
-        room[np.concatenate(can_leave)],
-        bound[can_leave[0]],
+        Directions(alone, side[alone].astype(np.float64), others),
+        np.concatenate([ranges[bound], distances[can_leave[1]]]),
+        bound,
+        side[bound].astype(np.float64),
         rows[can_leave[1]],
     )
 
@@ -236,8 +306,8 @@ def _active_limits(
 class WeightSpread:
     """The standard deviations of weights, (n, 3) each.
 
-    inside: within bounds. exits: below and above, when they leave a bound or cap. excess: (3 n,),
-    of the objective. is_far: (n,), lights that scatter further than their own level.
+    inside: within bounds. exits: below and above, when they leave a bound or cap. excess: (3,), of
+    the objective. is_far: (n,), lights that scatter further than their own level.
     """
 
     inside: Doubles
@@ -258,76 +328,116 @@ class WeightSpread:
         return WeightSpread(inside, (below, above), self.excess, self.is_far | weak.is_far)
 
 
-def weight_spread(
-    solution: Solution,
-    noise: Noise,
-    scatters: NormalEquations,
-    unbiased: NormalEquations,
-    weights: Doubles,
-) -> WeightSpread:
-    """Return the spread of the weights.
+class WeightResponse:
+    """The response of the weights to noise of the gradient.
 
-    scatters: the equations by which the noise of the gradient moves the weights. unbiased,
-    weights: the equations and weights, (n, 3), whose gradient tells how firmly bounds hold.
+    The work on the equations serves the noise of the basis and that of the painting.
     """
-    problem = solution.problem
-    gradient = problem.with_pull(unbiased).gradient(weights).T.ravel()
-    pulled, missed = problem.with_pull(scatters), problem.equations.full_matrix
-    M, C = pulled.full_matrix, noise.full_covariance.reshape(gradient.size, -1)
-    free, below, above, excess = (np.zeros(gradient.size) for _ in range(4))
-    levels, is_far = _levels(solution), np.zeros(gradient.size, bool)
-    for room in block_freedoms(solution, pulled):
-        # Unknowns of one channel move a third of the weights.
-        moved = np.flatnonzero(room.emitted.any(axis=1))
-        columns, emitted, active = room.columns[moved], room.emitted[moved], room.active
-        of_moved = np.ix_(moved, moved)
-        steps, covariance = _propagate(
-            columns.T @ M[of_moved] @ columns,
-            columns.T @ C[of_moved] @ columns,
-            room,
-            columns.T @ gradient[moved],
-        )
-        sizes = np.abs(emitted / levels[moved, None]).max(axis=0, initial=0)
-        covariance, own = limit_deviations(covariance, np.where(sizes > 0, sizes, 1))
-        excess[moved] += np.einsum("pq,qp->p", missed[of_moved], columns @ covariance @ columns.T)
-        limited, whole = (
-            ((emitted @ active.constrained(x)) * emitted).sum(axis=1) for x in (covariance, own)
-        )
-        free[moved] += np.maximum(limited, whole)
-        is_far[moved] |= whole > 0
-        own_steps = emitted @ (active.own_exits * steps)
-        below[moved] += np.square(np.minimum(own_steps, 0)).sum(axis=1)
-        above[moved] += np.square(np.maximum(own_steps, 0)).sum(axis=1)
-    inside, down, up = (np.sqrt(np.maximum(x, 0)).reshape(3, -1).T for x in (free, below, above))
-    lights_far = np.asarray(is_far.reshape(3, -1).any(axis=0))
-    return WeightSpread(inside, (down, up), excess, lights_far)
+
+    def __init__(
+        self,
+        solution: Solution,
+        scatters: NormalEquations,
+        unbiased: NormalEquations,
+        weights: Doubles,
+    ) -> None:
+        """Prepare the response.
+
+        scatters: the equations by which the noise of the gradient moves the weights. unbiased,
+        weights: the equations and weights, (n, 3), whose gradient tells how firmly bounds hold.
+        """
+        problem = solution.problem
+        gradient = problem.with_pull(unbiased).gradient(weights).T
+        pulled = problem.with_pull(scatters)
+        self._missed, self._levels = problem.equations.M, _levels(solution)
+        self._blocks = [
+            BlockResponse.of(room, pulled, gradient) for room in block_freedoms(solution, pulled)
+        ]
+
+    def spread(self, covariance: Doubles) -> WeightSpread:
+        """Return the spread of the weights. covariance: (3, n, 3, n), of the gradient."""
+        n, missed = len(self._levels), self._missed
+        free, below, above = np.zeros((3, n, 3))
+        excess, is_far = np.zeros(3), np.zeros(n, bool)
+        for response in self._blocks:
+            block, emitted = response.room.block, response.room.emitted
+            active = response.room.active
+            ends, of_unknowns = response.propagate(block.covariance(covariance))
+            sizes = np.zeros(emitted.unknowns.size)
+            for e in emitted.entries:
+                change = np.abs(e.values) / self._levels[e.lights]
+                np.maximum.at(sizes, np.repeat(e.columns, e.counts), change)
+            limited, own = limit_deviations(of_unknowns, np.where(sizes > 0, sizes, 1))
+            for e, c in zip(block.entries, block.channels, strict=True):
+                excess[c] += np.vdot(e.between(missed[c], e), limited[e.place(e)])
+            variances = emitted.variances(active.constrained(limited), n)
+            if own is not None:
+                whole = emitted.variances(active.constrained(own), n)
+                variances = np.maximum(variances, whole)
+                is_far |= (whole > 0).any(axis=1)
+            free += variances
+            down, up = _exit_squares(emitted, active.own_exits, ends, n)
+            below += down
+            above += up
+        inside, down, up = (np.sqrt(np.maximum(x, 0)) for x in (free, below, above))
+        return WeightSpread(inside, (down, up), excess, is_far)
 
 
-def limit_deviations(covariance: Doubles, sizes: Doubles) -> tuple[Doubles, Doubles]:
+def _exit_squares(
+    emitted: Block, exits: Directions, ends: Doubles, n: int
+) -> tuple[Doubles, Doubles]:
+    """Return the sums of squares of the steps of weights, (n, 3), below and above, with the
+    unknowns that leave their limits. ends: (h,), how far.
+    """
+    single = exits.unknowns.size
+    steps = np.zeros(emitted.unknowns.size)
+    steps[exits.unknowns] = exits.signs * ends[:single]
+    down, up = np.zeros((2, n, 3))
+    for e, c in zip(emitted.entries, emitted.channels, strict=True):
+        moved = e.values * steps[np.repeat(e.columns, e.counts)]
+        for total, part in ((down, np.minimum(moved, 0)), (up, np.maximum(moved, 0))):
+            total[:, c] += np.bincount(e.lights, np.square(part), n)
+    if exits.others.shape[1]:
+        by_sums = emitted.effects(exits.others * ends[single:], n)
+        down += np.square(np.minimum(by_sums, 0)).sum(axis=2).T
+        up += np.square(np.maximum(by_sums, 0)).sum(axis=2).T
+    return down, up
+
+
+def limit_deviations(covariance: Doubles, sizes: Doubles) -> tuple[Doubles, Doubles | None]:
     """Return the covariance (k, k) of unknowns with no light deviating further than its own level,
-    and the whole one of those that do.
+    and the whole one of those that do; None if none does.
 
     sizes: (k,), the change of a light, relative to its level, with each unknown. Axes of the
     covariance longer than MAX_DEVIATION are shortened to that: a light that is hardly seen is then
     undetermined alone, and lights that look alike are so together.
     """
-    scale = np.outer(sizes, sizes)
-    squares, axes = eigenvectors(covariance * scale)
-    if squares.max(initial=0) <= MAX_DEVIATION**2:
-        return covariance, np.zeros_like(covariance)
-    relative = (axes * np.minimum(squares, MAX_DEVIATION**2)) @ axes.T
-    is_far = np.diag(relative) >= (MAX_DEVIATION / 2) ** 2
-    return relative / scale, np.where(np.outer(is_far, is_far), covariance, 0)
+    moved = np.flatnonzero(covariance.diagonal() > 0)
+    scale = sizes[moved]
+    relative = covariance[np.ix_(moved, moved)]
+    relative *= scale[:, None]
+    relative *= scale
+    if (excess := excess_above(relative, MAX_DEVIATION**2)) is None:
+        return covariance, None
+    relative -= excess
+    is_far = relative.diagonal() >= (MAX_DEVIATION / 2) ** 2
+    relative /= scale[:, None]
+    relative /= scale
+    far = moved[is_far]
+    limited, own = np.zeros((2, *covariance.shape))
+    limited[np.ix_(moved, moved)] = relative
+    own[np.ix_(far, far)] = covariance[np.ix_(far, far)]
+    return limited, own
 
 
 def _levels(solution: Solution) -> Doubles:
-    """Return the levels of lights to which deviations are relative, (3 n,), channel by channel."""
+    """Return the levels of lights to which deviations are relative, (n,)."""
     basis = solution.basis
     sizes = np.sqrt(basis.power.sum(axis=1))
     levels = np.maximum(solution.weights, basis.current_weights).max(axis=1)
     brightness = levels * sizes
     faint = FAINT * brightness.mean() / np.where(sizes > 0, sizes, np.inf)
-    return np.tile(np.where(levels > faint, levels, np.where(faint > 0, faint, 1)), 3)
+    return np.where(levels > faint, levels, np.where(faint > 0, faint, 1))
 
 
 def gradient_response(solution: Solution) -> Doubles:
@@ -336,56 +446,101 @@ def gradient_response(solution: Solution) -> Doubles:
     It is the matrix whose product with the covariance of the gradient on both sides makes the
     scatter of `error_bars`, but for bounds that hold.
     """
-    noise = noise_sums(solution)
+    noise, n = noise_sums(solution), len(solution.weights)
     pulled = solution.problem.with_pull(solution.problem.solved)
-    gradient = pulled.gradient(solution.weights).T.ravel()
-    M, C = pulled.full_matrix, noise.full_covariance.reshape(gradient.size, -1)
-    response = np.zeros_like(M)
+    gradient, covariance = pulled.gradient(solution.weights).T, noise.full_covariance
+    whole = np.zeros((3 * n, 3 * n))
     for room in block_freedoms(solution, pulled):
-        to = room.columns
-        _, free = _movable(to.T @ M @ to, to.T @ C @ to, room, to.T @ gradient)
-        along = to @ free
-        response += along @ pseudo_inverse(along.T @ M @ along) @ along.T
-    return response
+        response = BlockResponse.of(room, pulled, gradient)
+        _, inverse = response.movable_inverse(room.block.covariance(covariance))
+        moves = room.block.effects(inverse, n).reshape(3 * n, -1)
+        whole += room.block.effects(np.ascontiguousarray(moves.T), n).reshape(3 * n, -1)
+    return whole
 
 
-def _propagate(
-    M: Doubles, C: Doubles, room: BlockFreedom, gradient: Doubles
-) -> tuple[Doubles, Doubles]:
-    """Return how far the active bounds may be left, (h,), and the covariance of all unknowns, (k,
-    k).
+@dataclass(frozen=True)
+class BlockResponse:
+    """The response of the unknowns of a block to noise of the gradient.
 
-    M: (k, k); C: (k, k), covariance of the noise of the gradient, (k,). Cov(x) = M⁻¹ C M⁻¹ over
-    the directions of `_movable`.
+    inverse: (m, m), of the matrix of the free directions. adapted: (m, h), how far these go where
+    a bound or cap is left by one unit. stiffness: (h, h), the matrix of the exits with that;
+    counts: (h,), those that no other lights can replace. pushed: (h,), the distances beyond the
+    limits at which these exits would end without them.
     """
-    ends, free = _movable(M, C, room, gradient)
-    inverse = free @ pseudo_inverse(free.T @ M @ free) @ free.T
-    return ends, inverse @ C @ inverse
 
+    room: BlockFreedom
+    inverse: Doubles
+    adapted: Doubles
+    stiffness: Doubles
+    counts: Bools
+    pushed: Doubles
 
-def _movable(
-    M: Doubles, C: Doubles, room: BlockFreedom, gradient: Doubles
-) -> tuple[Doubles, Doubles]:
-    """Return how far the active bounds may be left, (h,), and what noise may move, (k, m).
+    @classmethod
+    def of(cls, room: BlockFreedom, equations: NormalEquations, gradient: Doubles) -> Self:
+        """Return the response under some equations, with the pull. gradient: (3, n)."""
+        free, exits = room.free, room.active.exits
+        M, push = (
+            room.block.matrix(equations.M, equations.coupling),
+            room.block.right_side(gradient),
+        )
+        inverse, across = pseudo_inverse(free.within(M)), free.between(M, exits)
+        adapted, alone = inverse @ across, exits.within(M)
+        stiffness = alone - across.T @ adapted
+        counts = stiffness.diagonal() > NULL_EIGENVALUE * alone.diagonal()
+        onwards = np.maximum(exits.dot(push) - adapted.T @ free.dot(push), 0)
+        pushed = np.where(counts, onwards, 0) / np.where(counts, stiffness.diagonal(), 1)
+        return cls(room, inverse, adapted, stiffness, counts, pushed)
 
-    These are the free directions, and those of bounds that noise alone may have activated.
-    Arguments: as of `_propagate`.
-    """
-    free = room.free
-    # Directions that leave a bound while the free unknowns adapt.
-    ways = room.active.exits - free @ (
-        pseudo_inverse(free.T @ M @ free) @ (free.T @ M @ room.active.exits)
-    )
-    stiffness, alone = (((M @ w) * w).sum(axis=0) for w in (ways, room.active.exits))
-    # Other lights can replace those without stiffness.
-    counts = stiffness > NULL_EIGENVALUE * alone
-    safe = np.where(counts, stiffness, 1)
-    pushed = np.where(counts, np.maximum(ways.T @ gradient, 0), 0) / safe
-    noise = np.maximum(((C @ ways) * ways).sum(axis=0), 0)
-    spread = np.where(counts, np.sqrt(noise), 0) / safe
-    ends = [_one_sided(u, s) for u, s in zip(pushed.tolist(), spread.tolist(), strict=True)]
-    free = np.hstack([free, ways[:, pushed < NORMAL_95 * spread]])
-    return np.minimum(ends, room.active.distances) / NORMAL_95, free
+    def movable_inverse(self, C: Doubles) -> tuple[Doubles, Doubles]:
+        """Return how far the active bounds may be left, (h,), and the inverse of the matrix, (k,
+        k), over all that noise may move.
+
+        C: (k, k), covariance of the noise of the gradient. Noise moves the free directions, and
+        those of bounds that noise alone may have activated.
+        """
+        ends, moved, inverse = self._inverse_of_moved(C)
+        return ends, moved.effect(np.ascontiguousarray(moved.effect(inverse).T))
+
+    def propagate(self, C: Doubles) -> tuple[Doubles, Doubles]:
+        """Return how far the active bounds may be left, (h,), and the covariance of all unknowns,
+        (k, k): Cov(x) = M⁻¹ C M⁻¹ over all that noise may move. C: as in `movable_inverse`.
+        """
+        ends, moved, inverse = self._inverse_of_moved(C)
+        covariance = inverse @ moved.within(C) @ inverse
+        if moved.others.shape[1]:
+            return ends, moved.effect(np.ascontiguousarray(moved.effect(covariance).T))
+        whole = np.zeros(C.shape)
+        whole[np.ix_(moved.unknowns, moved.unknowns)] = (
+            covariance * moved.signs * moved.signs[:, None]
+        )
+        return ends, whole
+
+    def _inverse_of_moved(self, C: Doubles) -> tuple[Doubles, Directions, Doubles]:
+        """Return the ends of `movable_inverse`, what noise may move, (k, m'), and the inverse of
+        its matrix, (m', m').
+        """
+        free, exits, adapted = self.room.free, self.room.active.exits, self.adapted
+        counts, pushed = self.counts, self.pushed
+        # Of directions that leave a limit while the free unknowns adapt.
+        across = free.between(C, exits)
+        noise = ((free.within(C) @ adapted - 2 * across) * adapted).sum(axis=0)
+        noise = np.maximum(noise + exits.within(C).diagonal(), 0)
+        spread = np.where(counts, np.sqrt(noise), 0) / np.where(
+            counts, self.stiffness.diagonal(), 1
+        )
+        alone = [_one_sided(u, s) for u, s in zip(pushed.tolist(), spread.tolist(), strict=True)]
+        is_moved = pushed < NORMAL_95 * spread
+        ends = np.minimum(alone, self.room.active.distances) / NORMAL_95
+        if not is_moved.any():
+            return ends, free, self.inverse
+        # The inverse of the free directions is a part of the whole, by its blocks.
+        adapted, chosen = adapted[:, is_moved], exits.chosen(is_moved)
+        stiff = pseudo_inverse(self.stiffness[np.ix_(is_moved, is_moved)])
+        across = -adapted @ stiff
+        own = self.inverse - across @ adapted.T
+        moved, order = free.joined(chosen)
+        whole = np.block([[own, across], [across.T, stiff]])
+        return ends, moved, whole if order is None else whole[np.ix_(order, order)]
 
 
 def _one_sided(pushed: float, spread: float) -> float:

@@ -66,8 +66,10 @@ export interface ConsoleInfo {
 }
 
 /**
- * A plane on which illuminance is measured. size: rows and columns of a picture of it. cells:
- * row and column of each point. points: where they are, in units of the scene.
+ * A plane on which illuminance is measured, in one of the cases if there are several.
+ *
+ * size: rows and columns of a picture of it. cells: row and column of each point. points: where
+ * they are, in units of the scene.
  */
 export interface MeasuredPlane {
   name: string;
@@ -534,7 +536,7 @@ export interface LightAnswer {
  * asked: in lx, in W, or as a share. reached: what came of it, at the sure end of its interval;
  * null if that is unknown. to: the other plane of a ratio; "" for none.
  */
-export interface PlaneWish {
+export interface WishReading {
   kind: 'mean' | 'uniformity' | 'max' | 'ratio' | 'power';
   asked: number;
   reached: number;
@@ -553,7 +555,7 @@ export interface PlaneLight {
   least: number;
   most: number;
   lux: number[];
-  wishes: PlaneWish[];
+  wishes: WishReading[];
 }
 
 /**
@@ -566,7 +568,7 @@ export interface PlaneLight {
 export interface PlanesReading {
   planes: PlaneLight[];
   watts: number | null;
-  power: PlaneWish | null;
+  power: WishReading | null;
   is_required: boolean;
   is_old: boolean;
 }
@@ -595,8 +597,8 @@ export interface Findings {
  * The progress of a long task. Unasked.
  *
  * task: `export`, `final` for a final render, `basis`, `sampling` for samples added where the
- * paint needs them, `planes` for measuring planes, or the renderer's name for the task. done, total: steps so far, and in all.
- * unit: of these steps; "" for none.
+ * paint needs them, `planes` for measuring planes, or the renderer's name for the task. done,
+ * total: steps so far, and in all. unit: of these steps; "" for none.
  */
 export interface ProgressReport {
   kind: 'progress';
@@ -845,7 +847,8 @@ export interface SessionState {
  * version: grows with every change of the session. stroke: number of the last stroke that arrived.
  * exact: whether it equals the answer of `lightpaint solve`. mode: space in which it was found
  * under the brush. reading: what these lights give on measuring planes, if there are any.
- * weights: (lights, 3) float64.
+ * weights: (lights, 3) float64. drives: of the emitters of each lamp in the order of the lights,
+ * null for other lights; some answers under the brush have them, exact ones have them in `lights`.
  */
 export interface AnswerUpdate {
   kind: 'answer';
@@ -877,6 +880,7 @@ export interface AnswerUpdate {
   stroke: number;
   exact: boolean;
   mode: string;
+  drives?: (number[] | null)[];
   reading?: PlanesReading;
   arrays: { weights: Picture };
 }

@@ -291,6 +291,7 @@ export function answerUpdate(message, ui) {
   else if (!message.exact && !isSameAnswer) {
     changes.isLive = true;
     changes.isJudgementCurrent = false;
+    if (message.drives) changes.lightAnswers = withDrives(ui.lightAnswers, message.drives);
     // Earlier statements no longer hold once something is painted.
     if (ui.deltaE === null) changes.headline = '';
   }
@@ -306,6 +307,11 @@ export function answerUpdate(message, ui) {
   if (changes.isLive && ui.reasons.length) changes.reasons = [];
   return changes;
 }
+
+/** The answers with drives of emitters that are known under the brush.
+ * @param {Ui["lightAnswers"]} answers @param {readonly (number[] | null)[]} drives */
+const withDrives = (answers, drives) =>
+  answers.map((answer, k) => (drives[k] ? { ...answer, drives: drives[k] } : answer));
 
 /** @param {Events["progress"]} message @param {Ui} ui @returns {Partial<Ui>} */
 export function progressUpdate({ task, done, total, unit }, ui) {

@@ -1,0 +1,127 @@
+"""The emitters of luminaires against closed forms, and against Radiance."""
+
+import gc
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from radiance import illuminance
+from webs import Distribution, batwing, ies_text, street, trough, write_web
+
+from lightpaint.arrays import Doubles
+from lightpaint.luminaires.web import turned
+from lightpaint.luminaires.web_file import read_web
+from lightpaint.luminaires.web_frame import hanging_frame, world_from_web
+from lightpaint.scene.runtime.variant import use_variant
+
+#: The renderer's numbers are float32; angles near the axis lose half of their digits.
+SINGLE = 2e-4
+
+#: Of Radiance: its tables hold six digits, and it rounds angles.
+RADIANCE = 0.005
+
+
+@pytest.fixture(autouse=True)
+def _renderer() -> Iterator[None]:
+    use_variant()
+    yield
+    gc.collect()
+
+
+def _emitter(web: Path, *, plugin: str = "ies", **parameters: Any) -> Any:
+    """An emitter in the middle, which shines straight down with C0 at +x and C90 at +y."""
+    import mitsuba as mi
+
+    down = mi.ScalarTransform4f().look_at([0, 0, 0], [0, 0, -1], [0, 1, 0])
+    return mi.load_dict({"type": plugin, "filename": str(web), "to_world": down, **parameters})
+
+
+def _lux(emitter: Any, points: Doubles, normals: Doubles) -> Doubles:
+    """The illuminance (n,) of an emitter at points, without what is in between."""
+    import drjit as dr
+    import mitsuba as mi
+
+    it = dr.zeros(mi.SurfaceInteraction3f, len(points))
+    it.p = mi.Point3f(points.T.astype(np.float32))
+    ds, arriving = emitter.sample_direction(it, mi.Point2f(0.5))
+    cosine_there = dr.maximum(dr.dot(ds.d, mi.Vector3f(normals.T.astype(np.float32))), 0)
+    return np.array(arriving.y * cosine_there, np.float64)
+
+
+def _around(count: int) -> tuple[Doubles, Doubles]:
+    """Points on a floor and on walls around the origin, and normals towards the inside."""
+    numbers = np.random.default_rng(5)
+    floor = np.column_stack([numbers.uniform(-3, 3, (count, 2)), np.full(count, -2.0)])
+    wall = np.column_stack([np.full(count, 3.0), numbers.uniform(-2, 2, (count, 2))])
+    points = np.vstack([floor, wall, wall * [-1, 1, 1], wall[:, [1, 0, 2]]])
+    inward = np.repeat([[0, 0, 1], [-1, 0, 0], [1, 0, 0], [0, -1, 0]], count, axis=0)
+    return points, inward.astype(float)
+
+
+def test_a_point_over_a_plane(tmp_path: Path) -> None:
+    web = write_web(tmp_path / "lamp.ies", ies_text(batwing))
+    angles = np.radians([0.001, 10, 25, 47.5, 80])
+    points = np.column_stack([2 * np.tan(angles), 0 * angles, np.full(5, -2.0)])
+    intensity = np.interp(np.degrees(angles), read_web(web).gammas, read_web(web).profile())
+    expected = intensity * np.cos(angles) ** 3 / 2**2
+    found = _lux(_emitter(web), points, np.tile([0.0, 0, 1], (5, 1)))
+    assert found == pytest.approx(expected, rel=SINGLE)
+
+
+@pytest.mark.parametrize(("turn", "tilt"), [(0, 0), (30, 0), (-75, 20)])
+def test_every_direction_is_that_of_the_web(tmp_path: Path, turn: float, tilt: float) -> None:
+    text = ies_text(street, np.arange(0, 361, 15).tolist(), np.arange(0, 180.1, 5))
+    path = write_web(tmp_path / "lamp.ies", text)
+    points = np.random.default_rng(2).normal(size=(500, 3))
+    away = points / np.linalg.norm(points, axis=1, keepdims=True)
+    # Where the web is turned away from, seen from it.
+    in_web = turned(np.eye(3), turn=turn, tilt=tilt)
+    expected = read_web(path).candela(away @ in_web.T) / (points**2).sum(axis=1)
+    found = _lux(_emitter(path, turn=float(turn), tilt=float(tilt)), points, -away)
+    assert found == pytest.approx(expected, rel=SINGLE)
+
+
+def test_c0_is_to_the_right_and_c90_up_as_seen_from_the_lamp(tmp_path: Path) -> None:
+    import mitsuba as mi
+
+    view = mi.ScalarTransform4f().look_at([1, 2, 3], [4, 1, 1], [0, 0, 1])
+    axes = world_from_web(np.array(view.matrix)[:3, :3])
+    c0, c90, up_of_web = axes.T
+    assert c0 == pytest.approx(
+        -np.array(view.matrix)[:3, 0], abs=1e-6
+    )  # Mitsuba's x is to the left
+    assert c90 == pytest.approx(np.array(view.matrix)[:3, 1], abs=1e-6)
+    assert up_of_web == pytest.approx(-np.array(view.matrix)[:3, 2], abs=1e-6)
+
+
+@pytest.mark.parametrize(
+    ("up", "c90"), [((0, 0, 1), (0, 1, 0)), ((0, 1, 0), (0, 0, -1)), ((1, 0, 0), (0, 0, 1))]
+)
+def test_a_lamp_that_hangs(up: tuple[float, float, float], c90: tuple[float, float, float]) -> None:
+    axes = world_from_web(hanging_frame(up))
+    assert axes[:, 1] == pytest.approx(c90)
+    assert axes[:, 2] == pytest.approx(up)
+    assert np.linalg.det(axes) == pytest.approx(1)
+
+
+@pytest.mark.parametrize("turn", [0, 30])
+@pytest.mark.parametrize(
+    ("light", "planes"),
+    [
+        (batwing, [0]),
+        (trough, np.arange(0, 91, 15).tolist()),
+        (street, np.arange(0, 361, 15).tolist()),
+    ],
+)
+def test_illuminance_is_that_of_radiance(
+    tmp_path: Path, light: Distribution, planes: list[float], turn: float
+) -> None:
+    # Radiance wants to be told that it is dark above.
+    web = write_web(tmp_path / "lamp.ies", ies_text(light, planes, np.arange(0, 180.1, 5)))
+    points, normals = _around(20)
+    expected = illuminance(web, points, normals, (0, 0, 0), turn=turn)
+    found = _lux(_emitter(web, turn=float(turn)), points, normals)
+    assert found.mean() == pytest.approx(expected.mean(), rel=RADIANCE)
+    assert found == pytest.approx(expected, rel=RADIANCE, abs=1e-4 * expected.max())

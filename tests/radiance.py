@@ -1,0 +1,112 @@
+"""Radiance 6, which pyradiance brings: luminaires in empty space, and in rooms."""
+
+import subprocess
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from lightpaint.arrays import Doubles
+
+#: Lumens per watt by which Radiance divides, and weights of its channels in photometric sums.
+EFFICACY, WEIGHTS = 179.0, (0.265, 0.670, 0.065)
+
+
+def illuminance(
+    web: Path, points: Doubles, normals: Doubles, place: tuple[float, float, float], *, turn: float
+) -> Doubles:
+    """The lux (n,) of a luminaire that hangs at `place`, turned by degrees about its axis.
+
+    web: an IES file. points, normals: (n, 3).
+    """
+    programs = _programs()
+    folder = web.parent / f"radiance {web.stem} {turn:g}"
+    folder.mkdir()
+    _run([programs / "ies2rad", "-dm", "-o", "lamp", web], folder)
+    hung = ["-rz", f"{turn:.9g}", "-t", *(f"{x:.9g}" for x in place)]
+    (folder / "scene.rad").write_bytes(_run([programs / "xform", *hung, "lamp.rad"], folder))
+    (folder / "scene.oct").write_bytes(_run([programs / "oconv", "scene.rad"], folder))
+    rows = "\n".join(" ".join(f"{x:.9g}" for x in row) for row in np.hstack([points, normals]))
+    direct = ["-I", "-h", "-ab", "0", "-dj", "0", "-ds", "0"]
+    found = _run([programs / "rtrace", *direct, "scene.oct"], folder, rows)
+    return EFFICACY * np.array(found.split(), float).reshape(-1, 3) @ WEIGHTS
+
+
+@dataclass(frozen=True)
+class Hung:
+    """A luminaire: its IES file, its place, degrees about its axis, and its drive."""
+
+    web: Path
+    place: tuple[float, float, float]
+    turn: float
+    drive: float
+
+
+def illuminance_in_room(
+    folder: Path,
+    size: tuple[float, float, float],
+    reflectances: tuple[float, float, float],
+    lamps: Sequence[Hung],
+    points: Doubles,
+    normals: Doubles,
+    *,
+    bounces: int,
+    rays: int,
+) -> Doubles:
+    """The lux (n,) of luminaires in a room from (0, 0, 0) to `size` with diffuse walls.
+
+    reflectances: of floor, walls and ceiling. bounces: reflections that are followed, with so many
+    rays at the first.
+    """
+    programs = _programs()
+    folder.mkdir()
+    parts = [_room(size, reflectances).encode()]
+    for k, lamp in enumerate(lamps):
+        scaled = ["-m", f"{lamp.drive:.9g}"]
+        _run([programs / "ies2rad", "-dm", *scaled, "-o", f"lamp{k}", lamp.web], folder)
+        hung = ["-rz", f"{lamp.turn:.9g}", "-t", *(f"{x:.9g}" for x in lamp.place)]
+        parts.append(_run([programs / "xform", *hung, f"lamp{k}.rad"], folder))
+    (folder / "scene.rad").write_bytes(b"\n".join(parts))
+    (folder / "scene.oct").write_bytes(_run([programs / "oconv", "scene.rad"], folder))
+    rows = "\n".join(" ".join(f"{x:.9g}" for x in row) for row in np.hstack([points, normals]))
+    options = ["-I", "-h", "-ab", bounces, "-ad", rays, "-aa", "0", "-lw", "1e-6", "-lr", "0"]
+    found = _run([programs / "rtrace", *options, "-dj", "0", "-ds", "0", "scene.oct"], folder, rows)
+    return EFFICACY * np.array(found.split(), float).reshape(-1, 3) @ WEIGHTS
+
+
+def _room(size: tuple[float, float, float], reflectances: tuple[float, float, float]) -> str:
+    """Polygons of a room."""
+    x, y, z = size
+    names = ("floor", "wall", "ceiling")
+    materials = [
+        f"void plastic {name} 0 0 5 {value} {value} {value} 0 0"
+        for name, value in zip(names, reflectances, strict=True)
+    ]
+    corners = {
+        "floor floor": [(0, 0, 0), (x, 0, 0), (x, y, 0), (0, y, 0)],
+        "ceiling ceiling": [(0, 0, z), (0, y, z), (x, y, z), (x, 0, z)],
+        "wall south": [(0, 0, 0), (0, 0, z), (x, 0, z), (x, 0, 0)],
+        "wall north": [(0, y, 0), (x, y, 0), (x, y, z), (0, y, z)],
+        "wall west": [(0, 0, 0), (0, y, 0), (0, y, z), (0, 0, z)],
+        "wall east": [(x, 0, 0), (x, 0, z), (x, y, z), (x, y, 0)],
+    }
+    polygons = [
+        f"{name.split()[0]} polygon {name.split()[1]} 0 0 12 "
+        + " ".join(f"{value:g}" for corner in places for value in corner)
+        for name, places in corners.items()
+    ]
+    return "\n".join([*materials, *polygons])
+
+
+def _programs() -> Path:
+    return Path(pytest.importorskip("pyradiance").__file__).parent / "bin"
+
+
+def _run(command: list[object], folder: Path, given: str = "") -> bytes:
+    texts = [str(part) for part in command]
+    library = {"RAYPATH": f".:{Path(texts[0]).parent.parent / 'lib'}"}
+    return subprocess.run(
+        texts, cwd=folder, input=given.encode(), capture_output=True, check=True, env=library
+    ).stdout
