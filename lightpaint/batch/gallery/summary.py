@@ -89,7 +89,11 @@ class LightRow:
 
 @dataclass(frozen=True)
 class PlaneRow:
-    """The illuminance on a measuring plane in a look. uniformity: the least over the mean."""
+    """The illuminance on a measuring plane in a look.
+
+    name: of the plane and its case. mean_lx: the mean illuminance in lx. uniformity: the least over
+    the mean.
+    """
 
     name: str
     mean_lx: float

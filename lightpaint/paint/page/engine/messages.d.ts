@@ -559,9 +559,9 @@ export interface PlaneLight {
 }
 
 /**
- * What an answer gives on measuring planes, under the master dimmer, in the order of the state.
+ * The illuminance on measuring planes under an answer and the master dimmer.
  *
- * watts: power of all lamps; null if that of one is unknown. power: the limit of it; null for
+ * planes: in the order of the state. watts: power of all lamps; null if that of one is unknown. power: the limit of it; null for
  * none. is_required: whether answers have to meet the wishes, as far as they can be met. is_old:
  * whether lights have been moved, added or removed since the planes were measured.
  */
@@ -1558,8 +1558,8 @@ export interface Hello {
  * Settings of the answer, as in `Fit`. Answered by `answer`.
  *
  * settings: of hold, space, colors, literal, prefer_current, near, sparse; null for the default
- * that follows from the painting. ignore_wishes: true for answers that need not meet the wishes
- * for measuring planes.
+ * that follows from the painting. With `ignore_wishes` true, answers need not meet the wishes for
+ * measuring planes.
  */
 export interface ChangeSettings {
   settings: Record<string, any>;
