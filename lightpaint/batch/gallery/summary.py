@@ -108,8 +108,8 @@ class SummaryRow:
     None if nothing was painted. agrees: whether a render confirms it; None if there was none.
     spp: samples per pixel of its basis; None if nothing was rendered. fingerprint: hash of its
     request and of the files that it reads, as in the journal.
-    planes: on which illuminance was measured. watts: power of all lamps; None if that of one is
-    unknown, or without planes.
+    planes: on which illuminance was measured. watts: power of all lamps, where there are planes and
+    the power of each lamp is known.
     files: to open. picture: small, relative to the batch's folder; "" where there is none.
     """
 
