@@ -51,7 +51,7 @@ def main() -> None:
 
     weights = weights_on(found.lights)
     reading = found.reading("floor", weights)
-    each = np.einsum("pnc,nc->pn", found.half_differences, weights)
+    each = np.einsum("pnc,nc->pn", found.noise, weights)
     light = np.einsum("pnc,nc->n", found.matrix, weights)
     errors = np.sqrt((each**2).sum(axis=0)) / np.maximum(light, 1e-12)
     points = found.standard_errors(weights) / found.of(weights)

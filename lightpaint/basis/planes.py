@@ -23,6 +23,9 @@ BLOCK_PIXELS = 2**13
 #: Number of lights up to which the product of a block is too small for BLAS to use threads.
 FEW_LIGHTS = 256
 
+#: Rows of a strip of which some pixels are collected, and the maximum number of bytes of these.
+THINNED_ROWS, THINNED_MAX_BYTES = 8, 2**27
+
 #: A function from some pixels and their light, (n, p, 3), to weights, (p, 1) or (p, 3), and an
 #: image, (p, 3).
 SquaresOfLight = Callable[[slice | Indices, Floats], tuple[Floats, Floats]]
@@ -288,6 +291,26 @@ def power_and_totals(planes: Planes, mask: Bools) -> tuple[Doubles, Doubles]:
             totals[:, c] += lit @ np.ones_like(weights)
             power[:, c] += np.square(lit) @ weights
     return power, totals
+
+
+def thinned(planes: Planes, step: int, factors: Doubles) -> Iterator[Floats]:
+    """Yield Σ_c factors Φ_i of every `step`-th pixel along each side of each plane, (h', w').
+
+    factors: (n, 3), of channels. Few such pixels are collected in one walk along the rows: a single
+    plane of many lights takes as long as many rows of it.
+    """
+    (height, width), n, single = planes.size, planes.count, factors.astype(np.float32)
+    rows = -(-THINNED_ROWS // step) * step
+    if 4 * n * -(-height // step) * -(-width // step) > THINNED_MAX_BYTES:
+        for plane, one in zip(planes, single, strict=True):
+            yield plane[::step, ::step] @ one
+        return
+    parts = []
+    for top in with_progress(range(0, height, rows)):
+        strip = planes.pixels(slice(top * width, min(top + rows, height) * width))
+        picked = strip.reshape(n, -1, width, 3)[:, ::step, ::step]
+        parts.append(sum(picked[..., c] * single[:, c, None, None] for c in range(3)))
+    yield from np.concatenate(parts, axis=1)
 
 
 def block_of(planes: "Planes | PlanesBase") -> tuple[int, Any]:

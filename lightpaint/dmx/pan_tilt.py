@@ -48,7 +48,8 @@ def aimed_rig(
 
 def _aimed(fixture: RigFixture, wanted: Mapping[str, Position]) -> tuple[RigFixture, str]:
     """Return a fixture whose heads rest in directions, by light, and a remark or ""."""
-    channels, missed, known = list(fixture.channels), dict[float, str](), dict[int, float]()
+    channels, known = list(fixture.channels), dict[int, float]()
+    missed: list[tuple[float, str]] = []
     for head in fixture.heads:
         rest = [axis.degrees_at(channels[axis.channel].default) for axis in head.axes]
         direction = np.sum([unit(wanted[name]) for name in head.lights], axis=0)
@@ -60,16 +61,15 @@ def _aimed(fixture: RigFixture, wanted: Mapping[str, Position]) -> tuple[RigFixt
                 level = axis.level_of(degrees)
                 channels[axis.channel] = replace(channels[axis.channel], default=level)
                 known[axis.channel] = degrees
-        missed[_degrees_between(turned(head, angles), direction)] = " and ".join(
+        off = _degrees_between(turned(head, angles), direction)
+        ranges = " and ".join(
             f"{x.name} goes from {min(x.degrees):g}° to {max(x.degrees):g}°" for x in head.axes
         )
+        missed += [(off, f"{head.lights[0]!r} cannot point where its light does: its {ranges}")]
     aimed = replace(fixture, channels=tuple(channels), is_aimed=bool(fixture.heads))
-    off = max(missed, default=0.0)
+    off, reason = max(missed, default=(0.0, ""))
     if off > UNNOTICED:
-        return aimed, (
-            f"{fixture.lights[0].name!r} cannot point where its light does: its {missed[off]}, so "
-            f"it misses by {off:.3g}°"
-        )
+        return aimed, f"{reason}, so it misses by {off:.3g}°"
     on_heads = {name for head in fixture.heads for name in head.lights}
     fixed = [x for x in fixture.lights if x.name not in on_heads and fixture.channels]
     off = max((_degrees_between(np.array(x.direction), wanted[x.name]) for x in fixed), default=0.0)

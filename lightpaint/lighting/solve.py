@@ -6,7 +6,7 @@ from typing import Any
 
 import numpy as np
 
-from lightpaint.arrays import Bools, Doubles
+from lightpaint.arrays import Bools, Doubles, release_freed_memory
 from lightpaint.basis.basis import Basis
 from lightpaint.keywords import keywords
 from lightpaint.lighting.answer.lighting import Lighting
@@ -119,6 +119,8 @@ def solution_of(problem: Problem, *, start: Doubles | None = None) -> Solution:
     first = _solve_squares(replace(all_lights, loss=problem.squares), begin)
     reached = first.reached
     all_lights = all_lights.with_whites(first.problem.reduction)
+    if len(begin) >= MANY_LIGHTS:
+        release_freed_memory()
     solution = _descend(all_lights, first.weights, reached, blocks)
     if problem.constraints.sparse is not None:
         # The lights are chosen at the optimum of all lights.
@@ -291,6 +293,8 @@ def _least_loss(
         descent = descend_from(current)
         reached_loss = loss_at(descent.weights)
     optimum = solver.solve(descent.equations, descent.reweighting.at)
+    if len(start) >= MANY_LIGHTS:
+        release_freed_memory()
     pulled = descent.equations if pull is None else descent.equations + pull
     return _LeastLoss(descent, optimum, reached_loss, pulled)
 

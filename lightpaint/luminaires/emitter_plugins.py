@@ -35,9 +35,9 @@ SPHERE = 4 * math.pi
 def web_of(props: Any) -> tuple[PhotometricWeb, float]:
     """Return the web of an emitter with these properties, and the factor of its candela.
 
-    filename: of an IES or EULUMDAT file. lumens: its flux at full, instead of that of the file.
-    factor: for maintenance, or whatever else dims it. cd_per_unit: candelas of an intensity of 1 in
-    the scene.
+    It has the `filename` of an IES or EULUMDAT file. It may have `lumens`, its flux at full instead
+    of the file's; a `factor` for maintenance and whatever else dims it; and `cd_per_unit`, candelas
+    of an intensity of 1 in the scene.
     """
     web = read_web(Path(str(mi.file_resolver().resolve(props["filename"]))))
     scale = float(props.get("factor", 1.0)) / float(props.get("cd_per_unit", 1.0))

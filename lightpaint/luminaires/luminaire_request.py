@@ -1,4 +1,4 @@
-"""What a lights file says of a luminaire: its photometric file, and how it hangs and dims."""
+"""Luminaires of a lights file: their photometric files, and how they hang and dim."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass

@@ -24,7 +24,7 @@ class Numbers:
 
     @property
     def left(self) -> int:
-        """How many texts were not read yet."""
+        """Number of texts that were not read yet."""
         return len(self._texts) - self._next
 
     def one(self, what: str) -> float:

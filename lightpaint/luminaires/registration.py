@@ -4,12 +4,22 @@ import importlib
 import sys
 from typing import Any
 
+from lightpaint.errors import BackendError
+
 _MODULE = "lightpaint.luminaires.emitter_plugins"
 
 
 def can_have_luminaires(variant: str) -> bool:
     """Return whether a variant of Mitsuba runs these emitters at full speed: those of Dr.Jit do."""
     return variant.endswith("_rgb") and not variant.startswith("scalar")
+
+
+def check_can_have_luminaires(variant: str) -> None:
+    """Raise BackendError unless a variant has these emitters."""
+    if not can_have_luminaires(variant):
+        raise BackendError(
+            f"luminaires need a variant of Dr.Jit, such as llvm_ad_rgb, and this is {variant}"
+        )
 
 
 def register_luminaires() -> None:

@@ -23,8 +23,8 @@ Symmetry = Literal["axial", "quadrants", "C0-C180", "C90-C270", "none"]
 SAME_ANGLE = 1e-4
 #: The steps of an even grid are multiples of this, in degrees.
 GRID_UNIT = 1e-3
-#: Intervals of an even grid between 0 and 180 degrees at most, and between 0 and 360.
-MAX_STEPS = 3600
+#: Intervals of an even grid at most: of gammas, and of C-planes.
+MAX_STEPS, MAX_PLANES = 1800, 720
 
 
 @dataclass(frozen=True)
@@ -74,7 +74,7 @@ class PhotometricWeb:
 
     @property
     def is_axial(self) -> bool:
-        """Whether it is the same in all C-planes."""
+        """True if it is the same in all C-planes."""
         return len(self.planes) == 1
 
     @cached_property
@@ -130,7 +130,7 @@ class PhotometricWeb:
         rows = np.array([np.interp(gammas, self.gammas, row) for row in self.table])
         if self.is_axial:
             return rows
-        planes = _even(self.planes, MAX_STEPS // 5)
+        planes = _even(self.planes, MAX_PLANES)
         return np.array([np.interp(planes, self.planes, column) for column in rows.T]).T
 
 

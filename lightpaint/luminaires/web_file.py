@@ -8,6 +8,7 @@ from lightpaint.file_reading import read_bytes
 from lightpaint.luminaires.eulumdat import parse_eulumdat
 from lightpaint.luminaires.lm63 import parse_lm63
 from lightpaint.luminaires.web import PhotometricWeb
+from lightpaint.validation import BRIGHTEST
 
 #: Longest file in bytes.
 MAX_BYTES = 2**24
@@ -37,6 +38,8 @@ def _parsed(path: Path, data: bytes) -> PhotometricWeb:
     try:
         # EULUMDAT is in ISO 8859-1; LM-63 is in ASCII, and names in it often are not.
         web = parse(data.decode("latin-1"))
+        if not web.peak <= BRIGHTEST:
+            raise SceneError(f"its intensities are up to {web.peak:.3g} cd: that is no light")
         if not web.flux > 0:
             raise SceneError("it is dark: all its intensities are 0")
     except SceneError as error:

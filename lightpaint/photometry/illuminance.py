@@ -72,7 +72,7 @@ class Illuminance:
         planes: The planes, whose points follow each other.
         lights: The n lights, in the order of `matrix`.
         matrix: (p, n, 3), lx at each point per unit weight of a light in a channel.
-        half_differences: (p, n, 3), half the difference of two halves of the samples.
+        noise: (p, n, 3), half the difference of two halves of the samples.
         cd_per_unit: cd/m² of a radiance of 1.
 
     Examples:
@@ -88,14 +88,14 @@ class Illuminance:
     planes: tuple[MeasuringPlane, ...]
     lights: Lights
     matrix: Doubles
-    half_differences: Doubles
+    noise: Doubles
     cd_per_unit: float
 
     def __post_init__(self) -> None:
         expected = sum(len(plane) for plane in self.planes), len(self.lights), 3
         for name, values in (
             ("matrix", self.matrix),
-            ("half_differences", self.half_differences),
+            ("noise", self.noise),
         ):
             if values.shape != expected:
                 raise SceneError(f"{name} has the shape {values.shape}: expected {expected}")
@@ -130,7 +130,7 @@ class Illuminance:
         square of their ratios to the light, times the light of the point. So points in a shadow,
         which get the noise of indirect light alone, are not taken to be too certain.
         """
-        values, halves = self.of(weights), self._mix(self.half_differences, weights)
+        values, halves = self.of(weights), self._mix(self.noise, weights)
         errors = np.zeros(len(values))
         for part in self._slices.values():
             light, own = floored(values[part]), halves[part] ** 2
@@ -145,7 +145,7 @@ class Illuminance:
         """Return the illuminance on a plane. weights: (n, 3). Raises SceneError without it."""
         part = self.points_of(plane)
         values, errors = self.of(weights)[part], self.standard_errors(weights)[part]
-        halves = self._mix(self.half_differences[part], weights)
+        halves = self._mix(self.noise[part], weights)
         mean, least = float(values.mean()), float(values.min())
         # The points are independent, so their own half differences give the error of the mean.
         mean_error = float(np.sqrt((halves**2).sum())) / len(values)

@@ -81,8 +81,12 @@ def measure_illuminance(
     _check("cd_per_unit", cd_per_unit, number("cd/m²"))
     listen, at_points = listener(progress), scene.at_points(points_of(planes))
     goal = FIRST_SPP if spp is None else spp
+
+    def report(label: str, done: int, total: int, unit: str = "passes") -> None:
+        listen("illuminance" if label == "basis" else label, done, total, unit)
+
     while True:
-        basis = obtain_basis(at_points, spp=goal, seed=seed, use_cache=use_cache, progress=listen)
+        basis = obtain_basis(at_points, spp=goal, seed=seed, use_cache=use_cache, progress=report)
         measured = illuminance_of(basis, planes, cd_per_unit)
         if spp is not None:
             return measured
@@ -130,8 +134,8 @@ def illuminance_of(
     return Illuminance(
         tuple(planes),
         basis.lights,
-        in_lux(basis.images),
-        in_lux(basis.half_differences),
+        in_lux(basis.planes.array()),
+        in_lux(basis.noise.array()),
         float(cd_per_unit),
     )
 

@@ -137,6 +137,11 @@ class MeasuringPlane:
         return picture
 
 
+def plane_title(plane: str, case: str) -> str:
+    """Return the name of a plane in a case; "" is the light of the scene."""
+    return f"{plane}, {case}" if case else plane
+
+
 def slices_of(planes: Sequence[MeasuringPlane]) -> dict[str, slice]:
     """Return where the points of each plane lie among the points of all, by name of the plane."""
     ends = np.cumsum([len(plane) for plane in planes]).tolist()

@@ -97,13 +97,13 @@ def place_plane(request: PlaneRequest, room: RoomRays) -> MeasuringPlane:
         grid = _over_floor(request, room)
     else:
         grid = _side_by_side([_on_wall(request, name, room) for name in request.walls])
-    grid = _without_solids(request, grid, room)
-    count = len(grid.points)
-    if count > MAX_POINTS:
+    if (count := len(grid.points)) > MAX_POINTS:
         raise SceneError(
             f"{request.where} has {count} points: expected at most {MAX_POINTS}; give it a wider "
             "grid"
         )
+    grid = _without_solids(request, grid, room)
+    count = len(grid.points)
     cells = grid.cells - grid.cells.min(axis=0)
     rows, columns = (int(v) + 1 for v in cells.max(axis=0))
     normals, is_cylindrical = _directions_of(request, grid.normals, room)
@@ -172,9 +172,11 @@ def _between_corners(request: PlaneRequest, room: RoomRays) -> _Cells:
     if not (length := float(np.linalg.norm(normal))) > 1e-9:
         raise SceneError(f"{request.where}.corners lie on one line: expected corners of an area")
     normal = _turned(normal / length, (a + b + c + d) / 4, room)
+    # The lines between the middles of opposite sides are as long as these in the mean.
+    across, along = (b + c - a - d) / 2, (c + d - a - b) / 2
     if abs((d - a) @ normal) + abs((c - a) @ normal) > 1e-3 * float(np.linalg.norm(c - a)):
         raise SceneError(f"{request.where}.corners do not lie in one plane")
-    grid = _rectangle(request, a, b - a, d - a, normal)
+    grid = _rectangle(request, a, across, along, normal)
     if len(request.corners) == 3:
         return grid
     # The cells of the square that is mapped to the corners, with the cells' mean area.
@@ -211,7 +213,8 @@ def _on_wall(request: PlaneRequest, name: str, room: RoomRays) -> _Cells:
     """Return the grid on a surface, on the side that the camera is on."""
     shapes = _shapes_named(request, "walls", name, room)
     low, high = room.box(shapes)
-    normal = _turned(_facing(shapes, room), (low + high) / 2, room)
+    normal = _facing(shapes, room)
+    normal = normal if (room.eye - (low + high) / 2) @ normal >= 0 else -normal
     grid = _on_surface(request, shapes, normal, room)
     return _without_covered(grid, room)
 

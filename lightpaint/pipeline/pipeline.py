@@ -5,7 +5,7 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
-from lightpaint.arrays import as_rgb
+from lightpaint.arrays import as_rgb, release_freed_memory
 from lightpaint.basis.basis import Basis
 from lightpaint.images.estimate import Estimate, write_estimate
 from lightpaint.keywords import keywords
@@ -155,12 +155,14 @@ def answer_job(
         bases.clear()
         required = None if planes is None else require(problem, planes, listen)
         problem = problem if required is None else required.problem
+        release_freed_memory()
         if job.settings.report:
             for basis in problem.views.bases:
                 make_ahead(basis, prepare_page)
         solution = solution_of(problem)
     solution = _reduce_noise(job, solution, listen)
     del problem  # some of its arrays are as large as the pictures
+    release_freed_memory()
     level_errors = () if placement is None else placement.level_errors
     with stage("analysis", listen, SOLVE_ADVICE):
         analyses = analyse(solution, level_errors=level_errors)

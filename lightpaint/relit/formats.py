@@ -63,6 +63,7 @@ class BlenderFormat(ExportFormat):
             skies={one.name: one.file for one in maps if isinstance(one, SkyMap)},
             walls={one.name: one.file for one in maps if isinstance(one, WallImage)},
             slides={one.name: (one.file, one.position, one.axes, one.half_size) for one in slides},
+            drives={x: light.drives for light in lighting.lights for x in _drive_owners(light)},
         )
 
     def of_groups(self, export: ExportContext) -> Writer:
@@ -112,6 +113,11 @@ class UsdFormat(ExportFormat):
     def of_groups(self, export: ExportContext) -> Writer:
         """Return the writer of a layer with multipliers."""
         return lambda: _layer_of_groups(export)
+
+
+def _drive_owners(light: LightSetting) -> tuple[str, ...]:
+    """Return the names of the emitters of a light that has drives; none of another light."""
+    return light.members if light.drives else ()
 
 
 def _layer(

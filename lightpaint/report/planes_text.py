@@ -7,7 +7,7 @@ from typing import Any
 from lightpaint.lighting.wishes.planes_answer import PlanesAnswer, WishOutcome
 from lightpaint.lighting.wishes.wished_light import NORMAL_95
 from lightpaint.photometry.illuminance import PlaneReading
-from lightpaint.photometry.measuring_plane import MeasuringPlane
+from lightpaint.photometry.measuring_plane import MeasuringPlane, plane_title
 
 #: Headings of a table of planes.
 HEADINGS = ("plane", "Em lx", "U0", "least lx", "most lx", "wished for", "W/m² per 100 lx")
@@ -35,11 +35,6 @@ def plane_rows(answer: PlanesAnswer) -> Iterator[tuple[str, ...]]:
             wishes_text(planes[name]),
             _density(answer, reading),
         )
-
-
-def plane_title(plane: str, case: str) -> str:
-    """Return the name of a plane in a case."""
-    return f"{plane}, {case}" if case else plane
 
 
 def wishes_text(plane: MeasuringPlane) -> str:

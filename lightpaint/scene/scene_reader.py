@@ -58,6 +58,7 @@ def load_scene(
     groups: Mapping[str, Iterable[str]] | None = None,
     lights_file: str | Path | None = None,
     use_lights_file: bool = True,
+    only_luminaires: bool = False,
     group_alike: bool = True,
     integrator: str | None = None,
     split: Mapping[str, object] | None = None,
@@ -77,7 +78,9 @@ def load_scene(
         lights_file: TOML file with lights and groups, used instead of the one beside the scene.
             `lights` replaces its list; `groups` are added to its groups, or replace those with the
             same names, and without `lights` are adjusted as well.
-        use_lights_file: False to ignore the lights file beside the scene, but for luminaires.
+        use_lights_file: False to ignore the lights file beside the scene.
+        only_luminaires: Whether to read only the luminaires of the lights file, which belong to
+            the scene, and to adjust all lights.
         group_alike: Whether more than 24 similar emitters without names become one light, unless
             they are selected by their generated names. The lights file can disable this.
         integrator: Integrator to render with instead of the scene's own, such as `path`, `direct`
@@ -114,13 +117,16 @@ def load_scene(
     index = sensor_index(sensor, parsed.sensor_names, path)
     selection = lights_file_for(path, lights_file, beside_scene=use_lights_file)
     selection = selection.with_more(lights, groups)
+    named_groups = selection.groups
+    if only_luminaires:
+        selection = selection.only_luminaires()
     sizes = _image_sizes(selection, split)
     with explain_old_scene(path), mitsuba_errors(path):
         whole = inspect_scene(parsed, index)
         if luminaires := selection.requests.luminaires:
             up = up_of(parsed, index, whole["emitters"])
             scale = selection.requests.cd_per_unit
-            parsed = hang_luminaires(parsed, luminaires, selection.groups, up, scale)
+            parsed = hang_luminaires(parsed, luminaires, named_groups, up, scale)
             whole = inspect_scene(parsed, index)
     sizes = images_to_split(sizes, whole["emitters"], str(path))
     mirrored = _symmetric_images(selection, symmetric, sizes)

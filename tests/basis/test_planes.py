@@ -16,6 +16,7 @@ from package_source import tree_of
 
 import lightpaint
 import lightpaint as lp
+from lightpaint.basis import planes as planes_module
 from lightpaint.basis.derived_planes import BlockPlanes, JoinedRow, block_means, in_one_row
 from lightpaint.basis.file import basis_file, file_planes, lit_planes
 from lightpaint.basis.file.file_planes import FilePlanes, SpooledPlanes, spooled
@@ -215,6 +216,18 @@ def test_several_mixes_are_those_made_one_by_one(images: np.ndarray) -> None:
         )
 
 
+def test_every_other_pixel_is_the_same_in_one_walk_and_plane_by_plane(
+    images: np.ndarray, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    factors = np.random.default_rng(2).random((N, 3))
+    expected = np.einsum("nhwc,nc->nhw", images[:, ::2, ::2], factors)
+    for most_bytes in (planes_module.THINNED_MAX_BYTES, 0):
+        monkeypatch.setattr(planes_module, "THINNED_MAX_BYTES", most_bytes)
+        for planes in (MemoryPlanes(images), CountedPlanes(images)):
+            found = list(planes_module.thinned(planes, 2, factors))
+            np.testing.assert_allclose(found, expected, rtol=1e-6)  # of float32
+
+
 class RoundedPlanes(MemoryPlanes):
     """Planes that come from half floats."""
 
@@ -340,6 +353,17 @@ def test_strips_of_rows_vanish_with_their_planes(images: np.ndarray) -> None:
         gc.enable()
 
 
+def test_strips_of_planes_that_nobody_walks_along_are_released(images: np.ndarray) -> None:
+    first, *others = (CountedPlanes(images) for _ in range(1 + file_planes.WALKED_PLANES))
+    strip = weakref.ref(first.pixels(slice(0, 1)).base)
+    assert strip() is not None
+    for planes in others:
+        planes.pixels(slice(0, 1))
+    gc.collect()
+    assert strip() is None
+    np.testing.assert_array_equal(first.pixels(slice(0, 3))[:, 0], images[:, 0, 0])
+
+
 def test_sums_of_squares_made_block_by_block(
     images: np.ndarray, monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -360,12 +384,16 @@ def test_sums_of_squares_made_block_by_block(
             np.testing.assert_allclose(actual, expected, rtol=1e-12)
 
 
-def test_spooled_planes_are_made_once_and_those_in_memory_stay(images: np.ndarray) -> None:
-    planes = CountedPlanes(images)
-    on_disk = spooled(planes)
-    assert isinstance(on_disk, SpooledPlanes)
-    planes.rows = None  # type: ignore[method-assign, assignment]
-    check_alike(on_disk, images)
+def test_spooled_planes_are_made_once_and_those_in_memory_stay(
+    images: np.ndarray, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    for most_bytes, kind in ((file_planes.UNSPOOLED_MAX_BYTES, MemoryPlanes), (0, SpooledPlanes)):
+        monkeypatch.setattr(file_planes, "UNSPOOLED_MAX_BYTES", most_bytes)
+        planes = CountedPlanes(images)
+        copy = spooled(planes)
+        assert isinstance(copy, kind)
+        planes.rows = None  # type: ignore[method-assign, assignment]
+        check_alike(copy, images)
     in_memory = MemoryPlanes(images)
     assert spooled(in_memory) is in_memory
 
@@ -377,6 +405,7 @@ def test_planes_are_made_again_where_a_disk_is_full(
         raise OSError(errno.ENOSPC, "No space left on device")
 
     monkeypatch.setattr(os, "posix_fallocate", full)
+    monkeypatch.setattr(file_planes, "UNSPOOLED_MAX_BYTES", 0)
     planes = CountedPlanes(images)
     assert spooled(planes) is planes
 

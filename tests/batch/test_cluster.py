@@ -314,7 +314,7 @@ def test_of_four_workers_two_are_killed_in_the_middle_of_a_basis(
     assert list(spool.iterdir()) == []
 
 
-@pytest.mark.nightly  # by day, one is killed in the middle of a basis
+@pytest.mark.nightly
 def test_a_worker_killed_in_the_middle_of_a_look_costs_one_try(
     workers: Workers, reference_batch: tuple[Path, dict[str, bytes]]
 ) -> None:

@@ -238,3 +238,33 @@ def test_an_inverted_channel_turns_the_other_way(tmp_path: Path) -> None:
         for rig in (plain, inverted)
     ]
     assert [65535 - x for x in levels[0][:2]] == pytest.approx(levels[1][:2], abs=1)
+
+
+def test_heads_on_one_yoke_share_its_pan(tmp_path: Path) -> None:
+    """The first head decides pan, the second tilts as close as that lets it."""
+    heads = "".join(
+        f'<Axis Name="Head{k}">{BEAM.replace("Beam", f"Beam{k}", 2).replace(f"<Beam{k}", "<Beam")}'
+        "</Axis>"
+        for k in (1, 2)
+    )
+    ends = 'PhysicalFrom="{}" PhysicalTo="{}"'.format
+    data = gdtf(
+        channel("Pan", "1,2", geometry="Yoke", default="32768/2", function=ends(*PAN))
+        + "".join(
+            channel("Tilt", f"{2 * k + 1},{2 * k + 2}", geometry=f"Head{k}", function=ends(*TILT))
+            + channel("ColorAdd_W", str(6 + k), geometry=f"Beam{k}")
+            for k in (1, 2)
+        ),
+        geometries=f'<Geometry Name="Body"><Axis Name="Yoke">{heads}</Axis></Geometry>',
+    )
+    hung = layered(fixture("Duo", matrix=UPRIGHT + "{0,0,5000}"))
+    rig = read_rig(write_mvr(tmp_path / "a.mvr", hung, lamp=data), pixels=True)
+    assert [x.lights for x in rig.fixtures[0].heads] == [("1 Duo px1",), ("1 Duo px2",)]
+    for second, off in (((0, -1, -1), 0.0), ((1, 0, 0), 90.0)):
+        wanted = {"1 Duo px1": unit((0, 1, -1)), "1 Duo px2": unit(second)}
+        aimed, remarks = aimed_rig(rig, wanted)
+        pan, *_ = degrees_of(aimed.fixtures[0])
+        assert pan == pytest.approx(0, abs=LEVEL)
+        assert len(remarks) == (off > 0)
+        assert all(x.startswith("'1 Duo px2' cannot") for x in remarks)
+        assert all(x.endswith("so it misses by 90°") for x in remarks)

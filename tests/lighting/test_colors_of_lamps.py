@@ -5,6 +5,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from nightly import nightly
 
 import lightpaint as lp
 from lightpaint.basis.render.basis_render import render_basis
@@ -54,7 +55,7 @@ def _paint_over_look(basis: lp.Basis, painted: dict[tuple[float, ...], Any]) -> 
     )
 
 
-@pytest.mark.parametrize("space", ["display", "linear"])
+@pytest.mark.parametrize("space", ["display", nightly("linear")])
 def test_warm_light_on_the_vase_and_none_in_the_annex(gallery: lp.Basis, space: Any) -> None:
     bright = 2 * float(gallery.current_look.mean())
     vase, annex = (0.5, 0.63, 0.77, 0.83), (0.35, 0.6, 0.65, 0.75)

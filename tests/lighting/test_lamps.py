@@ -10,6 +10,7 @@ from least_squares import stack_rows
 from nightly import seeds
 from scipy.optimize import lsq_linear
 
+from lightpaint.colour.color import cct_and_duv, kelvin_to_rgb
 from lightpaint.errors import ConstraintError, LightingError
 from lightpaint.lighting.analysis.analysis import analyse
 from lightpaint.lighting.answer.lighting_file import read_lighting, write_lighting
@@ -114,6 +115,44 @@ def test_a_colour_is_mixed_as_bright_as_the_emitters_can(make_basis):
     assert light.lamp is not None
     assert max(light.drives.values()) == pytest.approx(1)
     assert np.allclose(light.lamp.mix(np.array([*light.drives.values()])), light.emission)
+
+
+@pytest.mark.parametrize("gain", [0.3, 3.0, 50.0])
+@pytest.mark.parametrize("share", [None, 0.3])
+@pytest.mark.parametrize("seed", list(seeds(2, 12)))
+def test_a_range_of_white_is_the_best_white_that_the_emitters_mix(make_basis, seed, share, gain):
+    """Against whites of a fine grid, each as bright as is best and as the lamp can be."""
+    limit = {} if share is None else {"power_share": share}
+    table = {"emitters": RGBW, "kelvin": [2700, 6500], **limit}
+    basis, target, constraints = _case(make_basis, seed, par=table)
+    bright = replace(target, image=target.image * gain)
+    solution = solve(basis, bright, constraints=constraints, literal=True)
+    [light] = solution.lighting.lights
+    assert light.lamp is not None
+    objective = solution.problem.objective
+    best = np.inf
+    for mired in np.linspace(1e6 / 6500, 1e6 / 2700, 400):
+        color = kelvin_to_rgb(1e6 / mired)
+        most = light.lamp.brightest(color)
+        zero, one, two = (float(objective(y * color[None]).sum()) for y in (0.0, 1.0, 2.0))
+        curve = (two - 2 * one + zero) / 2  # a parabola in the brightness
+        y = min(max(-(one - zero - curve) / (2 * curve), 0.0), most)
+        best = min(best, float(objective(y * color[None]).sum()))
+    found = float(objective(solution.weights).sum())
+    # Between whites 8 mireds apart the brightest mix is taken to be straight.
+    assert found <= best * (1 + 1e-4)
+    assert light.lamp.can_mix(np.array(light.emission))
+    white = cct_and_duv(np.array(light.emission))
+    assert white is not None
+    assert 2699 < white[0] < 6501
+    assert abs(white[1]) < 1e-4
+    power = np.array([*light.drives.values()]) @ light.lamp.powers
+    assert power <= (share or 1.0) + 1e-6
+    if gain == 50.0:
+        assert light.is_active
+    if seed == 0:
+        analysed = analyse(solution)[0].solution.lighting["par"]
+        assert np.allclose([*analysed.drives.values()], [*light.drives.values()])
 
 
 def test_lamps_of_one_pattern_are_read_once(make_basis):
@@ -255,9 +294,9 @@ WRONG = {
         {"emitters": RGBW, "primaries": ["#f00", "#00f"]},
         "emitters and 'primaries', and",
     ),
-    "a range of white": (
-        {"emitters": RGBW, "kelvin": [2700, 6500]},
-        "emitters and 'kelvin', and its",
+    "a range of white and limits": (
+        {"emitters": RGBW, "kelvin": [2700, 6500], "limits": {"max": 2}},
+        "emitters, a range of kelvin and limits: leave limits out",
     ),
     "a share of nothing": ({"power_share": 0.5}, "without the emitters that share it"),
     "share": ({"emitters": RGBW, "power_share": 2}, "expected a share of full power"),
@@ -281,6 +320,10 @@ IMPOSSIBLE = {
     "a colour it cannot mix": (
         {"emitters": RGBW[3:], "color": "#0000ff"},
         "its emitters white cannot mix",
+    ),
+    "whites it cannot mix": (
+        {"emitters": [{"name": "w", "xy": WHITE, "Y": 5}, RGBW[0]], "kelvin": [2700, 6500]},
+        "the emitters of 'par', w, red, cannot mix .* K: narrow the range",
     ),
     "a lock it cannot mix": (
         {"emitters": RGBW, "lock": "#ffffff 900"},

@@ -1,6 +1,8 @@
 """The emitters of luminaires against closed forms, and against Radiance."""
 
 import gc
+import subprocess
+import sys
 from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
@@ -8,9 +10,11 @@ from typing import Any
 import numpy as np
 import pytest
 from radiance import illuminance
-from webs import Distribution, batwing, ies_text, street, trough, write_web
+from webs import Distribution, batwing, cosine, ies_text, street, trough, write_web
 
 from lightpaint.arrays import Doubles
+from lightpaint.errors import BackendError
+from lightpaint.luminaires.registration import check_can_have_luminaires
 from lightpaint.luminaires.web import turned
 from lightpaint.luminaires.web_file import read_web
 from lightpaint.luminaires.web_frame import hanging_frame, world_from_web
@@ -125,3 +129,88 @@ def test_illuminance_is_that_of_radiance(
     found = _lux(_emitter(web, turn=float(turn)), points, normals)
     assert found.mean() == pytest.approx(expected.mean(), rel=RADIANCE)
     assert found == pytest.approx(expected, rel=RADIANCE, abs=1e-4 * expected.max())
+
+
+def test_a_panel_of_a_cosine_web_is_an_area_light(tmp_path: Path) -> None:
+    import mitsuba as mi
+
+    web = write_web(tmp_path / "lamp.ies", ies_text(cosine, gammas=np.linspace(0, 90, 361)))
+    down = mi.ScalarTransform4f().look_at([0, 0, 0], [0, 0, -1], [0, 1, 0])
+    sides = mi.ScalarTransform4f().scale([0.6, 0.15, 1])
+    radiance = {"type": "rgb", "value": 1000 / (4 * 0.6 * 0.15)}
+    points, normals = _around(50)
+    found = []
+    for emitter in (
+        {"type": "iesarea", "filename": str(web)},
+        {"type": "area", "radiance": radiance},
+    ):
+        panel = mi.load_dict({"type": "rectangle", "to_world": down @ sides, "emitter": emitter})
+        found.append(_lux(panel.emitter(), points, normals))
+    # The chords of a cosine in steps of 0.25 degrees, and grazing light.
+    assert found[0] == pytest.approx(found[1], rel=1e-4, abs=1e-5 * found[1].max())
+
+
+def test_a_panel_has_its_web_from_afar_and_shows_it_to_the_camera(tmp_path: Path) -> None:
+    import drjit as dr
+    import mitsuba as mi
+
+    text = ies_text(street, np.arange(0, 361, 15).tolist(), np.arange(0, 180.1, 5))
+    web = write_web(tmp_path / "lamp.ies", text)
+    down = mi.ScalarTransform4f().look_at([0, 0, 0], [0, 0, -1], [0, 1, 0])
+    shape = {"type": "rectangle", "to_world": down @ mi.ScalarTransform4f().scale([0.6, 0.15, 1])}
+    scene = mi.load_dict(
+        {"type": "scene", "lamp": {**shape, "emitter": {"type": "iesarea", "filename": str(web)}}}
+    )
+    away = np.random.default_rng(4).normal(size=(300, 3))
+    away /= np.linalg.norm(away, axis=1, keepdims=True)
+    expected = read_web(web).candela(away)
+    lux = _lux(scene.emitters()[0], 1000 * away, -away)
+    assert lux * 1000**2 == pytest.approx(expected, rel=2e-3, abs=1e-3 * expected.max())
+    ray = mi.Ray3f(mi.Point3f((3 * away).T), mi.Vector3f(-away.T))
+    si = scene.ray_intersect(ray)
+    radiance = np.array(si.emitter(scene).eval(si).y, float)
+    seen = np.array(dr.isfinite(si.t)) & (np.abs(away[:, 2]) > 0.1)
+    area = 4 * 0.6 * 0.15 * np.abs(away[:, 2])
+    assert radiance[seen] == pytest.approx((expected / area)[seen], rel=SINGLE)
+
+
+@pytest.mark.parametrize("plugin", ["ies", "iesarea"])
+def test_light_traced_from_it_carries_its_flux(tmp_path: Path, plugin: str) -> None:
+    import mitsuba as mi
+
+    text = ies_text(street, np.arange(0, 361, 15).tolist(), np.arange(0, 180.1, 5))
+    web = write_web(tmp_path / "lamp.ies", text)
+    emitter = {"type": plugin, "filename": str(web), "lumens": 800.0}
+    scene = mi.load_dict(
+        {"type": "scene", "x": emitter}
+        if plugin == "ies"
+        else {"type": "scene", "x": {"type": "rectangle", "emitter": emitter}}
+    )
+    numbers = mi.load_dict({"type": "independent"})
+    numbers.seed(1, 100_000)
+    draws = numbers.next_1d(), numbers.next_2d(), numbers.next_2d()
+    _, weight = scene.emitters()[0].sample_ray(0.0, *draws)
+    carried = np.array(weight.y, float)
+    error = carried.std() / np.sqrt(carried.size)
+    assert carried.mean() == pytest.approx(800, abs=4 * error)
+    assert error < 5
+
+
+def test_plain_mitsuba_has_them_after_an_import(tmp_path: Path) -> None:
+    web = write_web(tmp_path / "lamp.ies", ies_text(batwing))
+    script = f"""
+import lightpaint.mitsuba
+import mitsuba as mi
+for variant in ("scalar_rgb", "llvm_ad_rgb"):
+    mi.set_variant(variant)
+emitter = mi.load_dict({{"type": "ies", "filename": {str(web)!r}}})
+print(type(emitter).__name__, round(emitter.flux))
+"""
+    found = subprocess.run([sys.executable, "-c", script], capture_output=True, text=True)
+    assert found.stdout.split() == ["LuminairePoint", f"{read_web(web).flux:.0f}"], found.stderr
+
+
+def test_variants_without_dr_jit_are_refused() -> None:
+    check_can_have_luminaires("cuda_ad_rgb")
+    with pytest.raises(BackendError, match="such as llvm_ad_rgb, and this is scalar_rgb"):
+        check_can_have_luminaires("scalar_rgb")

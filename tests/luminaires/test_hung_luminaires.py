@@ -19,6 +19,7 @@ from lightpaint.lighting.constraints.constraints import Constraints
 from lightpaint.lighting.constraints.constraints_file import constraints_of
 from lightpaint.lighting.unknowns.reduction import Reduction, reduce_to
 from lightpaint.luminaires.web_file import read_web
+from lightpaint.placement.lights_to_place import why_not_searched
 from lightpaint.scene.scene import Scene
 from lightpaint.scene.scene_reader import load_scene
 
@@ -219,6 +220,22 @@ def test_refused_luminaires(tmp_path: Path, toml: str, reason: str) -> None:
         _room(tmp_path, toml, of=lights)
     assert reason in str(refusal.value)
     assert "\n" not in str(refusal.value)
+
+
+def test_a_web_needs_a_flat_shape(tmp_path: Path) -> None:
+    ball = """<shape type="sphere" id="ball_light"><emitter type="iesarea">
+        <string name="filename" value="lamps/lamp.ies"/></emitter></shape>"""
+    with pytest.raises(SceneError, match="is an iesarea on sphere: expected a rectangle or a disk"):
+        _room(tmp_path, "", of=ball)
+    flat = ball.replace("sphere", "disk")
+    assert _room(tmp_path, "", of=flat).light("ball_light").unit == "× at full"
+
+
+def test_luminaires_stay_where_they_are(tmp_path: Path) -> None:
+    toml = '[light."*"]\nphotometry = "lamps/lamp.ies"'
+    reasons = {x.name: why_not_searched(x) for x in _room(tmp_path, toml).lights}
+    assert reasons["bulb"].startswith("is of the kind ies")
+    assert reasons["panel"].startswith("is of the kind iesarea")
 
 
 def test_kelvin_ranges_need_emitters(tmp_path: Path) -> None:

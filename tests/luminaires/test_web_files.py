@@ -194,6 +194,7 @@ def test_turns_and_tilts() -> None:
         (ies_text(cosine)[:400], "it is cut off"),
         (ies_text(cosine).replace(" 37 ", " nan "), "'nan' is not a number"),
         (ies_text(cosine).replace(" 37 ", " 99999999 "), "expected a whole number from 1 to"),
+        (ies_text(cosine, multiplier=1e29), "its intensities are up to 1e+32 cd"),
         ("hello", "it has no line TILT="),
     ],
 )

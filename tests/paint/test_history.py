@@ -25,6 +25,7 @@ def listed(session: Any, count: int = 100) -> protocol.StepList:
     return steps
 
 
+@pytest.mark.nightly
 @given(st.integers(0, 2**32 - 1))
 def test_any_step_is_reached_in_one_jump_to_the_bit(seed: int) -> None:
     editor = RandomEditor(seed)

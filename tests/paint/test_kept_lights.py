@@ -69,6 +69,7 @@ def test_a_session_file_remembers_it():
     assert SessionRequests.of({"lights": {}}).kept == ()
 
 
+@pytest.mark.nightly
 @pytest.mark.usefixtures("without_reasons")
 def test_a_moved_lamp_stays_on_until_a_click_releases_it(moving: MovingStudio):
     """One step of undo takes back its place and its level."""

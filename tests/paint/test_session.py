@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from nightly import examples
+from nightly import examples, nightly
 from renderer import REPOSITORY
 
 import lightpaint as lp
@@ -195,7 +195,7 @@ def test_under_the_brush_it_is_near_the_exact_answer(basis: lp.Basis, space: Any
     assert error.max() < (1e-6 if space == "linear" else 2e-2) * size.max()
 
 
-@pytest.mark.parametrize("space", ["linear", "display"])
+@pytest.mark.parametrize("space", [nightly("linear"), "display"])
 def test_what_is_asked_is_kept_to_at_once(basis: lp.Basis, space: Any):
     """Though what was before, which is not allowed any more, looks more like the painting."""
     session = session_of(basis, space=space)

@@ -17,11 +17,14 @@ from lit_planes import (
     plane_of,
 )
 
+from lightpaint.basis.render import render_budget
 from lightpaint.basis.render.basis_render import render_basis
 from lightpaint.colour.color import LUMINANCE
 from lightpaint.errors import SceneError
 from lightpaint.photometry.illuminance import Illuminance
 from lightpaint.photometry.measure import error_excess, measure_illuminance, weights_on
+from lightpaint.progress import Interrupted
+from lightpaint.scene.properties.pose import Pose
 from lightpaint.scene.scene import Scene
 
 POINTS = [(0, 0, 0), (0.8, 0, 0), (-0.5, 0, 1.1), (0.2, 0.7, -0.4)]
@@ -143,8 +146,7 @@ def film(width: int) -> str:
 def test_white_discs_in_plain_mitsuba_have_the_same_light(tmp_path: Path) -> None:
     """E = π L of small white discs, one under each radiancemeter of a batch.
 
-    A disc shades what is below it, by less than its size: the tolerance is the noise of both, and
-    half a percent for the discs.
+    The tolerance is the noise of both, and half a percent for the light that discs reflect.
     """
     import mitsuba as mi
 
@@ -175,9 +177,9 @@ def test_white_discs_in_plain_mitsuba_have_the_same_light(tmp_path: Path) -> Non
     gc.collect()
     plain = np.mean(halves, axis=0) @ LUMINANCE
     noise = np.sqrt(np.mean(((halves[0] - halves[1]) @ LUMINANCE / 2 / plain) ** 2)) * plain
-    errors = np.hypot(found.standard_errors(weights), noise)
-    assert (np.abs(found.of(weights) - plain) < SURE * errors + 0.005 * plain).all()
-    assert (errors < 0.02 * plain).all()
+    # At so many samples the standard error of a measured point is half a percent, also in shadow.
+    assert (np.abs(found.of(weights) - plain) < SURE * noise + (SURE + 1) * 0.005 * plain).all()
+    assert (noise < 0.01 * plain).all()
 
 
 def test_mitsubas_irradiancemeter_has_no_light_of_a_point(tmp_path: Path) -> None:
@@ -249,8 +251,6 @@ def test_points_leave_the_picture_of_the_scene_alone(tmp_path: Path) -> None:
 
 
 def test_lights_that_move_are_measured_where_they_are(tmp_path: Path) -> None:
-    from lightpaint.scene.properties.pose import Pose
-
     scene = lit_scene(tmp_path, BULB)
     moved = scene.moved({"bulb": Pose(position=(0, 4, 0))})
     plane = plane_of([(0, 0, 0)])
@@ -269,3 +269,39 @@ def test_what_cannot_be_measured_is_one_line(tmp_path: Path) -> None:
         measure_illuminance(scene, [plane], error=2)
     with pytest.raises(SceneError, match="light at points is only measured where"):
         measured(lit_scene(tmp_path, BULB, integrator="ptracer"), plane)
+
+
+def test_ctrl_c_keeps_samples_that_the_next_measurement_continues(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setenv("LIGHTPAINT_CACHE", str(tmp_path / "cache"))
+    monkeypatch.setattr(render_budget, "largest_pass", lambda *_, **__: 16)
+    scene, plane = lit_scene(tmp_path, ROOM), plane_of(POINTS)
+    whole = measured(scene, plane, spp=64)
+
+    def interrupt(label: str, done: int, total: int, unit: str = "passes") -> None:
+        if done == 1:
+            raise KeyboardInterrupt
+
+    with pytest.raises(Interrupted, match="32 of 64 samples per pixel are kept"):
+        measured(scene, plane, spp=64, use_cache=True, progress=interrupt)
+    seen: list[int] = []
+
+    def note(label: str, done: int, total: int, unit: str = "passes") -> None:
+        seen.append(total)
+
+    continued = measured(scene, plane, spp=64, use_cache=True, progress=note)
+    assert max(seen) == 1  # of two passes
+    np.testing.assert_array_equal(continued.matrix, whole.matrix)
+
+
+def test_a_moved_light_alone_is_measured_again(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setenv("LIGHTPAINT_CACHE", str(tmp_path / "cache"))
+    scene, plane = lit_scene(tmp_path, BULB + DISC), plane_of(POINTS)
+    first = measured(scene, plane, use_cache=True)
+    moved = scene.moved({"bulb": Pose(position=(1.5, 3, 0))})
+    again = measured(moved, plane, use_cache=True)
+    np.testing.assert_array_equal(lux(again, "disc"), lux(first, "disc"))
+    assert lux(again, "bulb")[0] == pytest.approx(100 * 3 / np.hypot(1.5, 3) ** 3, rel=1e-3)

@@ -112,6 +112,29 @@ def test_points_on_walls_face_the_room(tmp_path: Path, room: Scene) -> None:
     assert found.picture_size == (4, 9)
 
 
+def test_a_ceiling_is_measured_from_below(tmp_path: Path, room: Scene) -> None:
+    found = plane(tmp_path, 'walls = ["ceiling"]\ngrid = 1.0', room)
+    assert len(found) == 16
+    np.testing.assert_allclose(found.normals, np.tile((0, -1, 0), (16, 1)), atol=1e-6)
+
+
+def test_listed_points_need_no_shape(tmp_path: Path) -> None:
+    found = plane(tmp_path, "points = [[0, 1, 0]]", lit_scene(tmp_path, BULB))
+    np.testing.assert_allclose(found.points, [(0, 1, 0)])
+
+
+def test_a_floor_that_is_an_instance(tmp_path: Path) -> None:
+    group = f'<shape type="shapegroup" id="group">{rectangle("tile", 2, "")}</shape>'
+    floor_of_tiles = (
+        '<shape type="instance" id="floor"><ref id="group"/><transform name="to_world">'
+        '<rotate x="1" angle="-90"/></transform></shape>'
+    )
+    scene = lit_scene(tmp_path, BULB + group + floor_of_tiles)
+    found = plane(tmp_path, 'shape = "floor"\ngrid = 1.0', scene)
+    assert found.shape == (2, 2)
+    np.testing.assert_allclose(found.points[:, 1], 0, atol=1e-6)
+
+
 def test_three_corners_are_a_parallelogram_and_four_a_quadrilateral(
     tmp_path: Path, room: Scene
 ) -> None:
@@ -125,6 +148,8 @@ def test_three_corners_are_a_parallelogram_and_four_a_quadrilateral(
     inside = np.abs(four.points[:, 0]) <= 0.5 + 0.5 * four.points[:, 2]
     assert inside.all()
     np.testing.assert_allclose(four.normals[0], (0, 1, 0), atol=1e-6)
+    triangle = "[[-1, 1, 1], [-1, 1, 1], [1, 1, 1], [-1, 1, 0]]"
+    assert plane(tmp_path, f"corners = {triangle}", room).area_m2 == pytest.approx(1)
     upright = plane(tmp_path, "corners = [[-1, 1, 0], [1, 1, 0], [1, 2, 0]]", room)
     np.testing.assert_allclose(upright.normals[0], (0, 0, 1), atol=1e-6)  # towards the camera
 

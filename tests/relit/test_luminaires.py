@@ -7,6 +7,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from command import run
 from renderer import LIGHTS, write_room
 from webs import Distribution, batwing, cosine, ies_text, street, write_web
 
@@ -15,6 +16,8 @@ from lightpaint.basis.basis import Basis
 from lightpaint.basis.render.basis_render import render_basis
 from lightpaint.lighting.answer.combination import combine
 from lightpaint.lighting.answer.lighting import Lighting
+from lightpaint.lighting.answer.lighting_file import write_lighting
+from lightpaint.lighting.constraints.constraints_file import constraints_of
 from lightpaint.luminaires.spot_sum import TOLERANCE, spots_of
 from lightpaint.luminaires.web import PhotometricWeb
 from lightpaint.relit.luminaire_xml import plugin_remark
@@ -163,6 +166,40 @@ def test_a_relit_scene_is_read_again_with_its_lights_file(tmp_path: Path) -> Non
     _, second = _answer(again)
     twice = relight(again, second, tmp_path / "twice" / "relit.xml")
     assert len(twice.emitters) == len(load_scene(path, use_lights_file=False).emitters)
+
+
+def test_only_luminaires_are_read_to_relight(tmp_path: Path) -> None:
+    whole = f'lights = ["panel"]\n{TOML}off = true\n'
+    scene = _scene(tmp_path, whole, only_luminaires=True)
+    assert [(x.name, x.plugin) for x in scene.lights] == [
+        ("panel", "iesarea"),
+        ("bulb", "ies"),
+        ("beam", "ies"),
+    ]
+    assert constraints_of(_scene(tmp_path, whole).requests).lights[-1][1]["off"]
+    without = _scene(tmp_path, 'lights = ["panel"]\n', only_luminaires=True)
+    assert [x.plugin for x in without.lights] == ["area", "point", "spot"]
+    assert without.lights_file is None
+
+
+def test_commands_relight_and_export_them(tmp_path: Path) -> None:
+    scene = _scene(tmp_path)
+    _, lighting = _answer(scene)
+    write_lighting(tmp_path / "lighting.json", lighting)
+    relit = run(tmp_path, "relight", "room.xml", "lighting.json", "-o", "here", "--spp", "2")
+    assert relit.returncode == 0, relit.stderr
+    exported = run(
+        tmp_path, *("export", "lighting.json", "--scene", "room.xml"), *("--to", "csv,mitsuba")
+    )
+    assert exported.returncode == 0, exported.stderr
+    patch = (tmp_path / "relit.patch").read_text(encoding="utf-8")
+    assert '<emitter type="ies" id="beam">' in patch
+    (tmp_path / "room.lights.toml").rename(tmp_path / "else.toml")
+    words = ("relight", "room.xml", "lighting.json", "-o", "there", "--spp", "2")
+    assert run(tmp_path, *words).returncode == 2  # its lights are in another unit
+    assert run(tmp_path, *words, "--lights-file", "else.toml").returncode == 0
+    texts = [(tmp_path / x / "relit.xml").read_bytes() for x in ("here", "there")]
+    assert texts[0] == texts[1]
 
 
 def test_spots_share_the_samples_of_their_luminaire(tmp_path: Path) -> None:

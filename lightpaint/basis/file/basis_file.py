@@ -12,6 +12,7 @@ from pathlib import Path
 
 import numpy as np
 
+from lightpaint.arrays import release_freed_memory
 from lightpaint.basis.basis import Basis, Origin
 from lightpaint.basis.file.file_parts import (
     CHECKSUMS_KEY,
@@ -234,7 +235,11 @@ def read_basis(path: str | Path) -> Basis:
             return replace(large_basis, source=str(path))
         parts = _read_by_lights(path) or read_parts(path)
         head = _head(p.attributes for p in parts)
-        return replace(leave_indirect(_basis_of_parts(parts, head), path), source=str(path))
+        basis = replace(leave_indirect(_basis_of_parts(parts, head), path), source=str(path))
+        del parts
+        if path.stat().st_size > QUICK_MAX_BYTES:
+            release_freed_memory()
+        return basis
     except BasisError as error:
         raise BasisError(path, " ", error) from error
     except _HEADER_ERRORS as error:

@@ -12,6 +12,8 @@ from concurrent.futures import Future
 from contextlib import suppress
 from functools import cached_property
 from threading import Lock
+from typing import ClassVar
+from weakref import ref
 
 import numpy as np
 import numpy.typing as npt
@@ -21,9 +23,16 @@ from lightpaint.basis.planes import MemoryPlanes, Planes, PlanesBase, mix
 from lightpaint.images.formats.exr_rows import PartLayout, RowFile
 from lightpaint.threads import parallel_map
 
-#: Bytes of recently read strips of rows that are kept, for all planes together; and the number of
-#: these strips, so that each thread can walk along one of them.
-STRIP_CACHE_BYTES, STRIP_CACHE_COUNT = 2**27, (os.cpu_count() or 1) + 2
+#: Bytes of recently read strips of rows of some planes that are kept, and the number of these
+#: strips, so that each thread can walk along one of them.
+STRIP_CACHE_BYTES, STRIP_CACHE_COUNT = 2**26, (os.cpu_count() or 1) + 2
+
+#: Number of planes of which strips are kept: walks go along images and their noise, and one at a
+#: time along something else.
+WALKED_PLANES = 3
+
+#: Maximum size in bytes of planes of which a copy is in memory rather than in a temporary file.
+UNSPOOLED_MAX_BYTES = 2**28
 
 #: Maximum size in bytes of picked pixels that are copied into memory.
 PICKED_MAX_BYTES = 2**27
@@ -119,15 +128,34 @@ class RowPlanes(PlanesBase):
 class _StripCache:
     """The strips of rows that were read last.
 
-    It does not know the planes, so that both vanish with the last reference to these.
+    It does not know the planes, so that both vanish with the last reference to these. Caches that
+    were used long ago lose their strips to others.
     """
+
+    #: The caches, the one that was used last at the end.
+    _used: ClassVar["OrderedDict[int, ref[_StripCache]]"] = OrderedDict()
+    _used_lock = Lock()
 
     def __init__(self) -> None:
         self._strips: OrderedDict[int, Future[Floats]] = OrderedDict()
         self._lock = Lock()
 
+    def _release_others(self) -> None:
+        """Forget the strips of all but the caches that were used last."""
+        with self._used_lock:
+            self._used[id(self)] = ref(self)
+            self._used.move_to_end(id(self))
+            unused = []
+            while len(self._used) > WALKED_PLANES:
+                unused.append(self._used.popitem(last=False)[1]())
+        for cache in unused:
+            if cache is not None:
+                with cache._lock:
+                    cache._strips.clear()
+
     def get(self, k: int, read: Callable[[int], Floats]) -> Floats:
         """Return the k-th strip, which `read(k)` reads; wait for a thread that is about it."""
+        self._release_others()
         with self._lock:
             strip = self._strips.get(k)
             is_mine = strip is None
@@ -296,29 +324,43 @@ def joined_pixels(parts: Sequence[Floats]) -> Floats:
 
 
 def spooled(planes: Planes) -> Planes:
-    """Return planes in memory unchanged, and others copied to a temporary file.
+    """Return planes in memory unchanged, and others copied: small ones into memory, large ones to a
+    temporary file.
 
     If the file does not fit on the disk, planes are returned unchanged and computed on each
     request.
     """
-    if isinstance(planes, RowPlanes):
-        with suppress(OSError):
-            return SpooledPlanes(planes)
+    if not isinstance(planes, RowPlanes):
+        return planes
+    if 12 * planes.count * planes.size[0] * planes.size[1] <= UNSPOOLED_MAX_BYTES:
+        channels = np.empty((planes.count, 3, *planes.size), np.float32)
+        fill_channels(planes, channels)
+        return MemoryPlanes(channels.transpose(0, 2, 3, 1))
+    with suppress(OSError):
+        return SpooledPlanes(planes)
     return planes
+
+
+def fill_channels(
+    planes: RowPlanes, into: Floats, written: Callable[[], None] = lambda: None
+) -> None:
+    """Copy planes strip by strip `into` an array, (n, 3, h, w), channels first: so they are summed.
+
+    written: called after each strip.
+    """
+    step = planes.strip_rows
+    for top in range(0, planes.size[0], step):
+        rows = planes.rows(top, min(top + step, planes.size[0]))
+        into[:, :, top : top + step] = rows.transpose(0, 3, 1, 2)
+        written()
 
 
 class SpooledPlanes(RowPlanes):
     """A copy of planes in a temporary file. Raises OSError if the disk is full."""
 
     def __init__(self, planes: RowPlanes) -> None:
-        height, width = planes.size
-        # Channels first, which is how they are summed.
-        self._file = TemporaryArray((planes.count, 3, height, width))
-        step = planes.strip_rows
-        for top in range(0, height, step):
-            rows = planes.rows(top, min(top + step, height))
-            self._file.array[:, :, top : top + step] = rows.transpose(0, 3, 1, 2)
-            self._file.release()
+        self._file = TemporaryArray((planes.count, 3, *planes.size))
+        fill_channels(planes, self._file.array, self._file.release)
 
     @property
     def count(self) -> int:

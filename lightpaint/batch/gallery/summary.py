@@ -29,11 +29,11 @@ from lightpaint.images.denoiser import denoised
 from lightpaint.images.estimate import read_estimate
 from lightpaint.images.pixel_blocks import block_mean, fitting_factor
 from lightpaint.lighting.answer.lighting_file import read_lighting
+from lightpaint.photometry.measuring_plane import plane_title
 from lightpaint.photometry.readings_file import PLANES
 from lightpaint.pipeline.results.planes_folder import FOLDER as PLANES_FOLDER
 from lightpaint.pipeline.results.result_folder import RECORD
 from lightpaint.relit.export.exports import plain_cell
-from lightpaint.report.planes_text import plane_title
 from lightpaint.storage.json_records import strict_json
 from lightpaint.version import __version__
 

@@ -84,7 +84,7 @@ def values_of(options: Namespace, words: Sequence[str]) -> dict[str, Any]:
         case "paint":
             return _paint_arguments(options, settings, words)
         case "relight":
-            scene = scene_of(options, is_to_solve=False, use_lights_file=False)
+            scene = scene_of(options, is_to_solve=False)
             paths = list(map(Path, options.lightings))
             return {"scene": scene, "lightings": paths, "output": output, "settings": settings}
         case "verify":
@@ -116,7 +116,7 @@ def _measure_arguments(options: Namespace, output: Path, settings: Settings) -> 
     """Return the arguments of `measure`. A lighting says how its lights are grouped."""
     scene = scene_of(options)
     if options.lighting:
-        scene = scene_of(options, is_to_solve=False, use_lights_file=False)
+        scene = scene_of(options, is_to_solve=False)
     return {
         "scene": scene,
         "planes": Path(options.planes) if options.planes else None,

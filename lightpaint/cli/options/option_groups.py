@@ -96,6 +96,16 @@ def add_lights(parser: argparse.ArgumentParser) -> None:
     )
 
 
+def add_luminaires(parser: argparse.ArgumentParser) -> None:
+    """Add the option for the luminaires of a scene."""
+    parser.add_argument(
+        "--lights-file",
+        metavar="F.toml",
+        help="file with the scene's luminaires (default: <scene>.lights.toml if it exists); all "
+        "else in it is left out",
+    )
+
+
 def add_split(parser: argparse.ArgumentParser) -> None:
     """Add the option for lights that are images in texels."""
     parser.add_argument(

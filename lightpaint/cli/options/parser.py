@@ -32,6 +32,7 @@ from lightpaint.cli.options.option_groups import (
     add_cache,
     add_fields,
     add_lights,
+    add_luminaires,
     add_map_size,
     add_output,
     add_output_mode,
@@ -252,6 +253,7 @@ def _export(parser: argparse.ArgumentParser) -> None:
     source_group.add_argument(
         "--scene", metavar="SCENE.xml", help="scene that the lighting was solved for"
     )
+    add_luminaires(parser)
     source_group.add_argument(
         "--lights",
         dest="groups",
@@ -313,6 +315,7 @@ def _relight(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "lightings", metavar="lighting.json", nargs="+", help="files that solve wrote"
     )
+    add_luminaires(parser)
     add_sampling(parser)
     add_map_size(parser)
     add_output(parser, "DIR", "result folder (default: named after the lighting's target)")

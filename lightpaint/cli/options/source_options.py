@@ -58,12 +58,12 @@ def scene_of(options: Namespace, *, is_to_solve: bool = True, **fields: Any) -> 
         fields |= {
             "lights": options.lights,
             "groups": _groups(options.groups),
-            "lights_file": options.lights_file,
             "use_lights_file": options.use_lights_file,
             "group_alike": options.group_alike,
             "split": _split_of(options),
             "symmetric": getattr(options, "symmetric", None),
         }
+    fields |= {"lights_file": options.lights_file, "only_luminaires": not is_to_solve}
     loading = {"sensor": options.sensor, "variant": options.variant, **fields}
     loading["integrator"] = options.integrator
     loading["map_size"] = getattr(options, "map_size", None)
@@ -83,8 +83,8 @@ def scene_to_export(options: Namespace) -> SceneFile | None:
         return None
     parameters = dict(options.parameters)
     fields: dict[str, Any] = {"sensor": options.sensor, "variant": options.variant}
-    fields["map_size"] = options.map_size
-    return SceneFile(options.scene, parameters=parameters, use_lights_file=False, **fields)
+    fields |= {"map_size": options.map_size, "lights_file": options.lights_file}
+    return SceneFile(options.scene, parameters=parameters, only_luminaires=True, **fields)
 
 
 def painted_of(options: Namespace) -> list[SceneFile | BasisFile | GroupsFile]:

@@ -1,4 +1,4 @@
-"""Eigenvectors of symmetric matrices; an interrupt need not wait for those of large ones."""
+"""Eigenvectors and products of symmetric matrices; an interrupt need not wait for large ones."""
 
 import numpy as np
 
@@ -41,6 +41,15 @@ def _eigenvectors_above(M: Doubles, limit: float) -> tuple[Doubles, Doubles]:
 
     values, vectors = eigh(M, subset_by_value=(limit, np.inf), check_finite=False)
     return values, vectors
+
+
+def sandwich(A: Doubles, B: Doubles) -> Doubles:
+    """Return A B A, of matrices (n, n)."""
+    return _sandwich(A, B) if len(A) <= QUICK_MATRIX else run_apart(_sandwich, A, B)
+
+
+def _sandwich(A: Doubles, B: Doubles) -> Doubles:
+    return np.asarray(A @ B @ A)
 
 
 def _is_below(M: Doubles, limit: float) -> bool:

@@ -131,7 +131,13 @@ def _check_emitters(
         if "power_share" in table:
             raise ConstraintError(where, " has power_share without the emitters that share it")
         return
-    if primaries is not None and len(primaries) > 1:
+    if "kelvin" in table and "limits" in table and len(primaries or ()) > 1:
+        raise ConstraintError(
+            where,
+            " has emitters, a range of kelvin and limits: leave limits out, or lower the largest "
+            "drives with max",
+        )
+    if "primaries" in table and len(primaries or ()) > 1:
         raise ConstraintError(
             where,
             f" has emitters and {_first_key(table, COLOR_KEYS)!r}, and its emitters already say "

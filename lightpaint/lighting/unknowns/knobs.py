@@ -2,7 +2,7 @@
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
-from functools import cached_property
+from functools import cached_property, lru_cache
 from typing import Any
 
 import numpy as np
@@ -138,7 +138,8 @@ class Knob:
 
     limit: coefficients, minimum and maximum of a limited sum over its unknowns.
     whites: the range of white of a light that keeps to one. window: the two of these
-    that its two unknowns currently mix (white_mixes.py).
+    that its two unknowns currently mix (white_mixes.py). lamp: what mixes these whites from
+    emitters, if it does; an unknown of 1 is then as bright as the lamp can be in that white.
     gamut: the gamut that confines the light, if it would leave it otherwise: all of it, or the part
     towards one `side` (white_mixes.py).
     """
@@ -150,6 +151,7 @@ class Knob:
     window: tuple[int, int] = (0, 0)
     gamut: ColorHull | None = None
     side: int | None = None
+    lamp: Lamp | None = None
 
     @cached_property
     def is_free(self) -> bool:
@@ -168,12 +170,21 @@ class Knob:
     def with_window(self, window: tuple[int, int]) -> "Knob":
         """Return the knob as a mix of two other whites of its range."""
         assert self.whites is not None
-        return self._mixing(self.whites.colors[list(window)], window)
+        colors = self.whites.colors[list(window)]
+        if self.lamp is not None:
+            colors = colors * brightest_whites(self.lamp, self.whites)[list(window), None]
+        return self._mixing(colors, window)
 
     def along_tangent(self, reach: float) -> "Knob":
         """Return the knob on the straight line of its window, drawn out by `reach` mireds."""
         assert self.whites is not None
-        return self._mixing(self.whites.tangent(self.window, reach), self.window)
+        colors = self.whites.tangent(self.window, reach)
+        if self.lamp is not None:
+            # Beside the locus a lamp may mix nothing: there the window's own brightness serves.
+            own = brightest_whites(self.lamp, self.whites)[list(self.window)]
+            found = np.array([self.lamp.brightest(color) for color in colors])
+            colors = colors * np.where(found > 0, found, own)[:, None]
+        return self._mixing(colors, self.window)
 
     def confined(self, gamut: ColorHull, side: int | None = None) -> "Knob":
         """Return the knob as a mix of the primaries of a gamut. side: of the part towards it."""
@@ -198,6 +209,35 @@ class Knob:
         """Make the knob of a light without constraints."""
         colours = np.ones((1, 3)) if is_scalar else np.eye(3)
         return cls((light,), tuple(Unknown(((light, rgb),)) for rgb in colours))
+
+
+@lru_cache(64)
+def brightest_whites(lamp: Lamp, whites: WhiteRange) -> Doubles:
+    """Return the luminance, (m,), with which a lamp mixes each white of a range at most."""
+    found = np.array([lamp.brightest(color) for color in whites.colors])
+    found.setflags(write=False)
+    return found
+
+
+def white_lamp_knob(k: int, light: BasisLight, constraint: LightConstraint, lamp: Lamp) -> Knob:
+    """Make the knob of a lamp of emitters that keeps to a range of white.
+
+    What a lamp can mix is convex: between two whites it is at least as bright as the line between
+    those of its brightest mixes.
+    """
+    whites = constraint.whites
+    assert whites is not None
+    brightest = brightest_whites(lamp, whites)
+    if not brightest.all():
+        kelvin = 1e6 / float(whites.mireds[np.argmin(brightest)])
+        raise ConstraintError(
+            constraint.where / "kelvin",
+            f" goes from {whites.low:g} to {whites.high:g} K, and the emitters of {light.name!r}, "
+            f"{', '.join(lamp.names)}, cannot mix {kelvin:.0f} K: narrow the range",
+        )
+    unknowns = tuple(Unknown(((k, color),)) for color in whites.colors[[0, -1]])
+    window = (0, whites.last)
+    return Knob((k,), unknowns, ((1.0, 1.0), 0.0, 1.0), whites, lamp=lamp).with_window(window)
 
 
 def mixing_knob(k: int, light: BasisLight, constraint: LightConstraint) -> Knob:

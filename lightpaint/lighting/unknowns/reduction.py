@@ -32,6 +32,7 @@ from lightpaint.lighting.unknowns.knobs import (
     lamp_of,
     mixing_knob,
     tied_knob,
+    white_lamp_knob,
 )
 from lightpaint.lighting.unknowns.lamp_powers import watts_of_fixed, watts_of_unknowns
 from lightpaint.lighting.unknowns.unknown_blocks import (
@@ -394,6 +395,8 @@ def reduce_to(constraints: Constraints, lights: Sequence[BasisLight]) -> Reducti
             constraint.primaries is not None and len(constraint.primaries) == 1
         ):
             knobs.append(dimmer_knob(k, light, constraint, lamps.get(k)))
+        elif k in lamps and constraint.whites is not None:
+            knobs.append(white_lamp_knob(k, light, constraint, lamps[k]))
         elif k in lamps:
             knobs.append(lamp_knob(k, light, constraint, lamps[k]))
         else:

@@ -24,10 +24,11 @@ import numpy as np
 
 from lightpaint.arrays import Doubles, Indices
 from lightpaint.colour.color_hull import ColorHull
+from lightpaint.colour.lamp import Lamp
 from lightpaint.colour.white_range import WhiteRange
 from lightpaint.lighting.algebra.method import Method
 from lightpaint.lighting.normal_equations import NormalEquations
-from lightpaint.lighting.unknowns.knobs import Knob
+from lightpaint.lighting.unknowns.knobs import Knob, brightest_whites
 from lightpaint.lighting.unknowns.reduced_problem import ReducedOptimum, solve_reduced
 from lightpaint.lighting.unknowns.reduction import Reduction
 
@@ -59,7 +60,8 @@ BRUSH_WIDTH = 8
 class _WhiteLights:
     """Lights that share a range of white. knobs: (k,), places in the reduction; lights: (k,).
 
-    least, most: (k,), limits of their luminances.
+    least: (k, 1), most: (k, m), limits of their luminances in the m whites. unit: (m,), the
+    luminance of an unknown of 1, which is that of the brightest mix of a lamp of emitters.
     """
 
     whites: WhiteRange
@@ -67,6 +69,7 @@ class _WhiteLights:
     lights: Indices
     least: Doubles
     most: Doubles
+    unit: Doubles
 
 
 def solve_on_locus(
@@ -180,21 +183,24 @@ def clip_to_gamuts(reduction: Reduction, weights: Doubles) -> Doubles:
 
 def _groups(reduction: Reduction, only: Collection[int] | None = None) -> list[_WhiteLights]:
     """Group lights by their ranges. only: the knobs, by their places, if not all count."""
-    by_range: dict[WhiteRange, list[int]] = {}
+    by_range: dict[tuple[WhiteRange, Lamp | None], list[int]] = {}
     for k in reduction.white_knobs if only is None else only:
-        whites = reduction.knobs[k].whites
-        assert whites is not None
-        by_range.setdefault(whites, []).append(k)
+        knob = reduction.knobs[k]
+        assert knob.whites is not None
+        by_range.setdefault((knob.whites, knob.lamp), []).append(k)
     groups = []
-    for whites, places in by_range.items():
+    for (whites, lamp), places in by_range.items():
+        unit = np.ones(1 + whites.last) if lamp is None else brightest_whites(lamp, whites)
         limits = [reduction.knobs[k].limit for k in places]
+        most = np.array([np.inf if limit is None else limit[2] for limit in limits])
         groups.append(
             _WhiteLights(
                 whites,
                 np.array(places, dtype=np.intp),
                 np.array([reduction.knobs[k].lights[0] for k in places], dtype=np.intp),
-                np.array([0.0 if limit is None else limit[1] for limit in limits]),
-                np.array([np.inf if limit is None else limit[2] for limit in limits]),
+                np.array([0.0 if limit is None else limit[1] for limit in limits])[:, None],
+                most[:, None] * unit,
+                unit,
             )
         )
     return groups
@@ -242,11 +248,12 @@ def _better_windows(
     tolerances = ROUND_OFF * root * size
     windows: dict[int, tuple[int, int]] = {}
     for group in groups:
-        slopes = gradient[group.lights] @ group.whites.colors.T
+        slopes = gradient[group.lights] @ group.whites.colors.T * group.unit
         for j, k in enumerate(group.knobs.tolist()):
             window = reduction.knobs[k].window
             x = optimum.x[list(reduction.places[k])]
-            next_window = _next_window(slopes[j], window, x, float(tolerances[group.lights[j]]))
+            tolerance = float(tolerances[group.lights[j]] * group.unit.max())
+            next_window = _next_window(slopes[j], window, x, tolerance)
             if next_window != window:
                 windows[k] = next_window
     return windows or _distant_window(equations, reduction, groups, optimum, gradient)
@@ -287,9 +294,7 @@ def _distant_window(
         now = np.einsum("ic,icd,id->i", w, own_matrix, w) - 2 * (w * right).sum(axis=1)
         q, r = np.einsum("kc,icd,kd->ik", colors, own_matrix, colors), right @ colors.T
         lit = q > 0
-        Y = np.clip(
-            np.where(lit, r / np.where(lit, q, 1), 0), group.least[:, None], group.most[:, None]
-        )
+        Y = np.clip(np.where(lit, r / np.where(lit, q, 1), 0), group.least, group.most)
         gains = np.where(lit, now[:, None] - (np.square(Y) * q - 2 * Y * r), 0)
         j, k = np.unravel_index(int(np.argmax(gains)), gains.shape)
         knob, white = int(group.knobs[j]), int(k)
@@ -318,7 +323,10 @@ def move_to_best_white(knob: Knob, gradient: Doubles) -> Knob:
     """Return a knob that is off at the white of its range that helps most. gradient: (n, 3)."""
     if knob.whites is None:
         return knob
-    best = int(np.argmin(knob.whites.colors @ gradient[knob.lights[0]]))
+    slopes = knob.whites.colors @ gradient[knob.lights[0]]
+    if knob.lamp is not None:
+        slopes = slopes * brightest_whites(knob.lamp, knob.whites)
+    best = int(np.argmin(slopes))
     return knob.with_window(knob.whites.window(float(best), 1))
 
 

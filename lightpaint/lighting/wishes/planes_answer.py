@@ -10,7 +10,7 @@ from lightpaint.arrays import Doubles
 from lightpaint.errors import ConstraintError
 from lightpaint.lighting.unknowns.lamp_powers import watts_of_fixed
 from lightpaint.lighting.unknowns.reduction import Reduction
-from lightpaint.lighting.wishes.wished_light import PlaneWish, WishedLight, check_powers
+from lightpaint.lighting.wishes.wished_light import LightWish, WishedLight, check_powers
 from lightpaint.photometry.illuminance import PlaneReading
 
 #: Relative shortfall from which a wish is not met: rows are met up to round-off.
@@ -28,7 +28,7 @@ class WishOutcome:
     the least power in watts with each unit that is asked; None where a painting was solved for.
     """
 
-    wish: PlaneWish
+    wish: LightWish
     reached: float
     price: float | None = None
 
@@ -108,7 +108,7 @@ def planes_answer(
 
 
 def _reached(
-    wished: WishedLight, wish: PlaneWish, sums: Doubles, weights: Doubles, watts: float | None
+    wished: WishedLight, wish: LightWish, sums: Doubles, weights: Doubles, watts: float | None
 ) -> float:
     """Return what came of a wish, at the sure end of its interval."""
     if wish.kind == "power":

@@ -36,7 +36,7 @@ LARGEST_ERROR = 0.25
 
 
 @dataclass(frozen=True)
-class PlaneWish:
+class LightWish:
     """A wish for a plane, or for the power of all lamps.
 
     plane: its name; "" for power. asked: in lx, watts, or a share. to: the other plane of a ratio.
@@ -103,7 +103,7 @@ class WishedLight:
     """
 
     illuminance: Illuminance
-    wishes: tuple[PlaneWish, ...]
+    wishes: tuple[LightWish, ...]
     requirements: Requirements
     cases: tuple[LitCase, ...] = ()
 
@@ -201,7 +201,7 @@ class _Rows:
 
     def __init__(self, lights: int) -> None:
         self.shape = (lights, 3)
-        self.wishes: list[PlaneWish] = []
+        self.wishes: list[LightWish] = []
         self.case: LitCase
         self._rows: list[Doubles] = [np.zeros((0, *self.shape))]
         self._least: list[Doubles] = [np.zeros(0)]
@@ -227,7 +227,7 @@ class _Rows:
         rows = rows.copy()
         rows[:, case.lights] = 0
         place = slice(self._count, self._count + count)
-        self.wishes.append(PlaneWish(kind, plane, asked, place, size, to, case.name))
+        self.wishes.append(LightWish(kind, plane, asked, place, size, to, case.name))
         self._rows.append(rows)
         self._least.append(least - given)
         self._watts.append(np.full(count, watts))

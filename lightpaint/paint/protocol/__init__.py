@@ -17,8 +17,8 @@ from lightpaint.paint.protocol.answer_parts import (
     LightAnswer,
     PlaneLight,
     PlanesReading,
+    PlaneWish,
     WishDelivery,
-    WishReading,
 )
 from lightpaint.paint.protocol.base import Event, Message, Request
 from lightpaint.paint.protocol.events import (

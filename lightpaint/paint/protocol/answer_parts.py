@@ -104,7 +104,7 @@ class LightAnswer:
 
 
 @dataclass(frozen=True)
-class WishReading:
+class PlaneWish:
     """A wish for a measuring plane or, as `power`, for all lamps together.
 
     asked: in lx, in W, or as a share. reached: what came of it, at the sure end of its interval;
@@ -130,7 +130,7 @@ class PlaneLight:
     least: float
     most: float
     lux: tuple[float, ...]
-    wishes: tuple[WishReading, ...]
+    wishes: tuple[PlaneWish, ...]
 
 
 @dataclass(frozen=True)
@@ -145,7 +145,7 @@ class PlanesReading:
 
     planes: tuple[PlaneLight, ...]
     watts: float | None
-    power: WishReading | None
+    power: PlaneWish | None
     is_required: bool
     is_old: bool
 

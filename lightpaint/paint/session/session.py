@@ -223,10 +223,10 @@ class Session:
 
     def answer_update(self, **fields_of_answer: Any) -> AnswerUpdate:
         """Return the current weights, with further fields, while the brush is down."""
-        answer = self.live_answer
-        fields = {"stroke": self.stroke, "exact": False, "version": self.version}
-        lit = {"mode": answer.mode, "weights": self.weights, "reading": answer.planes_reading()}
-        return AnswerUpdate(**{**fields, **lit, **fields_of_answer})
+        fields: dict[str, Any] = {"stroke": self.stroke, "exact": False, "version": self.version}
+        mode, weights = self.live_answer.mode, self.weights
+        fields |= {"mode": mode, "weights": weights, "reading": self.live_answer.planes_reading()}
+        return AnswerUpdate(**{**fields, **fields_of_answer})
 
     def accept_solution(
         self,

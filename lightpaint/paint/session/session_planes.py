@@ -18,19 +18,17 @@ from lightpaint.paint.protocol import (
     PlaneLight,
     PlanesInfo,
     PlanesReading,
-    WishReading,
+    PlaneWish,
 )
 from lightpaint.photometry.illuminance import Illuminance
-from lightpaint.photometry.measuring_plane import LightCase, PowerBudget
-from lightpaint.report.planes_text import plane_title
+from lightpaint.photometry.measuring_plane import LightCase, PowerBudget, plane_title
 
 
 @dataclass(frozen=True)
 class SessionPlanes:
     """Measured planes. place_key: of the places of all lights when they were measured.
 
-    floor_m2: the area that power is divided by; 0 without one. cases: in each of which wishes hold;
-    none for the light of the scene alone.
+    floor_m2: the area that power is divided by; 0 without one. cases: in which wishes hold.
     """
 
     illuminance: Illuminance
@@ -56,7 +54,7 @@ class SessionPlanes:
             measured,
             lights=lights,
             matrix=with_columns(measured.matrix),
-            half_differences=with_columns(measured.half_differences),
+            noise=with_columns(measured.noise),
         )
         return replace(self, illuminance=illuminance)
 
@@ -74,8 +72,8 @@ class SessionPlanes:
 
     @cached_property
     def info(self) -> PlanesInfo:
-        """The planes in each case, for clients."""
-        limit, cases = watts_allowed(self.budget, self.floor_m2), [x.name for x in self.cases]
+        """The planes and their wishes for clients."""
+        limit = watts_allowed(self.budget, self.floor_m2)
         return PlanesInfo(
             tuple(
                 MeasuredPlane(
@@ -84,7 +82,7 @@ class SessionPlanes:
                     cells=tuple((int(row), int(column)) for row, column in plane.cells),
                     points=tuple(tuple(map(float, point)) for point in np.round(plane.points, 4)),
                 )
-                for case in cases or [""]
+                for case in [case.name for case in self.cases] or [""]
                 for plane in self.illuminance.planes
             ),
             floor_m2=self.floor_m2 or None,
@@ -122,8 +120,8 @@ class WishesInEffect:
     def reading(self, weights: Doubles, place_key: str) -> PlanesReading:
         """Return what weights (n, 3) give. place_key: of the places of the lights now."""
         answer = planes_answer(self.wished, self.reduction, weights, floor_m2=self.planes.floor_m2)
-        illuminance, lit = self.planes.illuminance, answer.weights_by_case
-        lux = {case: illuminance.of(lit_weights) for case, lit_weights in lit.items()}
+        measured = self.planes.illuminance
+        lux = {case: measured.of(lit) for case, lit in answer.weights_by_case.items()}
         return PlanesReading(
             tuple(
                 PlaneLight(
@@ -132,7 +130,7 @@ class WishesInEffect:
                     uniformity=reading.uniformity,
                     least=reading.least,
                     most=reading.most,
-                    lux=tuple(np.round(lux[case][illuminance.points_of(name)], 1).tolist()),
+                    lux=tuple(np.round(lux[case][measured.points_of(name)], 1).tolist()),
                     wishes=_wishes_of(name, case, answer.outcomes),
                 )
                 for (case, name), reading in answer.readings.items()
@@ -144,10 +142,10 @@ class WishesInEffect:
         )
 
 
-def _wishes_of(plane: str, case: str, outcomes: Sequence[WishOutcome]) -> tuple[WishReading, ...]:
+def _wishes_of(plane: str, case: str, outcomes: Sequence[WishOutcome]) -> tuple[PlaneWish, ...]:
     """Return the wishes for a plane in a case, and whether they are met; "" for the power."""
     return tuple(
-        WishReading(x.wish.kind, x.wish.asked, x.reached, x.is_met, x.wish.to)
+        PlaneWish(x.wish.kind, x.wish.asked, x.reached, x.is_met, x.wish.to)
         for x in outcomes
         if (x.wish.plane, x.wish.case) == (plane, case)
     )

@@ -60,7 +60,8 @@ class SceneFile(ReadOnce):
         lights: Names or patterns of the lights to adjust.
         groups: Emitters that form one light, by its name.
         lights_file: TOML to read instead of the one beside the scene.
-        use_lights_file: False to ignore that one, but for its luminaires.
+        use_lights_file: False to ignore that one.
+        only_luminaires: Whether to read only the luminaires of it.
         group_alike: False to adjust similar emitters without names one by one.
         integrator: Integrator to use instead of the scene's own.
         split: Columns and rows of lights that are images, `16x8`, by name, or layouts of texels.
@@ -80,6 +81,7 @@ class SceneFile(ReadOnce):
     groups: Mapping[str, Sequence[str]] | None = None
     lights_file: str | None = None
     use_lights_file: bool = True
+    only_luminaires: bool = False
     group_alike: bool = True
     integrator: str | None = None
     split: Mapping[str, str] | None = None

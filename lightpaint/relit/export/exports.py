@@ -64,13 +64,15 @@ def scene_script(
     skies: Mapping[str, str] = MappingProxyType({}),
     walls: Mapping[str, str] = MappingProxyType({}),
     slides: Mapping[str, tuple[Any, ...]] = MappingProxyType({}),
+    drives: Mapping[str, Mapping[str, float]] = MappingProxyType({}),
 ) -> str:
     """Return the script, which leaves emitters without a plain colour, such as a sky, to the user.
 
     emitters: name, Mitsuba's parameter and emission of each adjusted emitter. places: places of all
     emitters in the answer. up: the scene's up axis. skies, walls: file of the map of each sky, and
     of the image of each wall, by its name. slides: by name of a projector, file of its slide,
-    position, rows of its axes, and half the width and height of the slide at distance 1.
+    position, rows of its axes, and half the width and height of the slide at distance 1. drives: of
+    the emitters that mix a light, 0 to 1, by name of the light.
     """
     rows, unset_names = [], []
     for name, parameter, emission in emitters:
@@ -88,6 +90,7 @@ def scene_script(
         skies=_table(skies),
         walls=_table(walls),
         slides=_table(slides),
+        drives=_table(drives),
         sky_axes=repr(np.round(blender_axes(up), 12).tolist()),
         **_placed(places, up),
     )

@@ -6,9 +6,10 @@ from markupsafe import Markup
 
 from lightpaint.lighting.wishes.planes_answer import PlanesAnswer
 from lightpaint.photometry.false_colour import false_colours
+from lightpaint.photometry.measuring_plane import plane_title
 from lightpaint.report.page.figures import data_uri
 from lightpaint.report.page.html import html
-from lightpaint.report.planes_text import HEADINGS, plane_rows, plane_title, planes_sentences
+from lightpaint.report.planes_text import HEADINGS, plane_rows, planes_sentences
 
 
 def planes_section(answer: PlanesAnswer | None) -> Markup:

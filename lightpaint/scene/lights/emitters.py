@@ -12,7 +12,7 @@ from lightpaint.arrays import RGB
 from lightpaint.colour.color import luminance
 from lightpaint.colour.photometry import lambertian_flux, point_flux, spot_flux
 from lightpaint.errors import SceneError
-from lightpaint.luminaires.plugin_names import LUMINAIRE_PLUGINS
+from lightpaint.luminaires.plugin_names import AREA_PLUGIN, LUMINAIRE_PLUGINS
 from lightpaint.scene.lights.texels.texel import Texel
 from lightpaint.scene.plane_identity import EmitterDigest, SceneHasher
 from lightpaint.scene.properties.emission import (
@@ -24,7 +24,7 @@ from lightpaint.scene.properties.emission import (
     read_emission,
     why_not_adjusted,
 )
-from lightpaint.scene.properties.pose import Site, site_of
+from lightpaint.scene.properties.pose import FLAT_SHAPES, Site, site_of
 from lightpaint.scene.scene_tree import GENERATED_ID, ParsedScene
 from lightpaint.validation import MAX_NAME
 
@@ -101,6 +101,7 @@ def find_emitters(parsed: ParsedScene, loaded: Any, hasher: SceneHasher) -> tupl
             )
         node = parsed.state.nodes[node_of[name]]
         plugin = node.props.plugin_name()
+        check_flat(plugin, parsed.shape_plugin(node_of[name]), name)
         kind = emission_kind(emitter, plugin)
         if kind is None:
             check_rendered(emitter, plugin, name, integrator)
@@ -139,6 +140,15 @@ def check_emitters(path: Path, emitters: Sequence[Emitter]) -> None:
         raise SceneError(f"{path} has no lights: add at least one emitter")
     if max(len(emitter.name) for emitter in emitters) > MAX_NAME:
         raise SceneError(f"{path} has an emitter whose name has more than {MAX_NAME} characters")
+
+
+def check_flat(plugin: str, shape: str, name: str) -> None:
+    """Raise SceneError for a panel with a photometric web on a shape that is not flat."""
+    if plugin == AREA_PLUGIN and shape not in FLAT_SHAPES:
+        raise SceneError(
+            f"light {name!r} is an {plugin} on {shape or 'no shape'}: expected a "
+            f"{' or a '.join(FLAT_SHAPES)}"
+        )
 
 
 def check_site(site: Site, plugin: str, name: str) -> None:

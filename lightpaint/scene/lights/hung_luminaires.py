@@ -19,12 +19,14 @@ from lightpaint.display_text import some_names
 from lightpaint.errors import SceneError
 from lightpaint.luminaires.luminaire_request import LuminaireRequest
 from lightpaint.luminaires.plugin_names import AREA_PLUGIN, LUMINAIRE_PLUGINS, POINT_PLUGIN
+from lightpaint.luminaires.registration import check_can_have_luminaires
 from lightpaint.luminaires.spot_sum import spots_of
 from lightpaint.luminaires.web import PhotometricWeb
 from lightpaint.luminaires.web_file import flux_remark
 from lightpaint.luminaires.web_frame import EMITTER_FROM_WEB, hanging_frame, world_from_web
 from lightpaint.scene.checks.tokens import tag
 from lightpaint.scene.properties.emission import child_named
+from lightpaint.scene.properties.pose import FLAT_SHAPES
 from lightpaint.scene.runtime.kernel_threads import kernels
 from lightpaint.scene.scene_tree import ParsedScene, with_elements, without_emitters
 
@@ -36,8 +38,8 @@ DIRECTIONS, LEAST_INTENSITY = 1024, 0.01
 #: Least size of a panel in scene units.
 THIN = 1e-3
 
-#: Kinds of emitters whose place a luminaire can take, and shapes of the last of them.
-_POINTS, _SHAPES = ("point", "spot", POINT_PLUGIN), ("rectangle", "disk")
+#: Emitters without a shape whose place a luminaire can take.
+_POINTS = ("point", "spot", POINT_PLUGIN)
 
 #: What follows the name of a luminaire in the names of further spots that form its light.
 SPOT_MARK = ".spot"
@@ -93,11 +95,14 @@ def hang_luminaires(
     intensity of 1.
     Raises SceneError for a name that no emitter has, and for one whose place cannot be taken.
     """
+    import mitsuba as mi
+
+    check_can_have_luminaires(mi.variant())
     chosen = _chosen(parsed, requests, groups)
     whole = {parsed.names[node] for node in chosen}
     further = {k: luminaire_of_spot(parsed.names[k]) for k in parsed.emitter_nodes}
     further = {k: name for k, name in further.items() if name in whole}
-    parsed = without_emitters(parsed, further.keys()) if further else copied(parsed)
+    parsed = without_emitters(parsed, further.keys()) if further else _copied(parsed)
     distances = _distances(parsed, chosen, up)
     for node, request in chosen.items():
         name = parsed.names[node]
@@ -129,7 +134,7 @@ def _element(parsed: ParsedScene, node: int) -> tuple[int, int]:
     return parsed.state.nodes[node].file_index, int(parsed.state.nodes[node].offset) - 1
 
 
-def copied(parsed: ParsedScene) -> ParsedScene:
+def _copied(parsed: ParsedScene) -> ParsedScene:
     """Return a copy of a scene whose nodes may be changed."""
     import mitsuba as mi
 
@@ -183,7 +188,7 @@ def _check_place(parsed: ParsedScene, node: int) -> None:
     """Raise SceneError unless a luminaire can take the place of an emitter."""
     props = parsed.state.nodes[node].props
     plugin, shape = str(props.plugin_name()), parsed.shape_plugin(node)
-    is_flat = plugin in ("area", AREA_PLUGIN) and shape in _SHAPES
+    is_flat = plugin in ("area", AREA_PLUGIN) and shape in FLAT_SHAPES
     pictures = ("texture", "radiance")
     is_picture = any(child_named(parsed.state, node, x) is not None for x in pictures)
     if (is_flat or plugin in _POINTS) and not is_picture:

@@ -120,6 +120,17 @@ class SceneRequests:
                 )
         return luminaires
 
+    def only_luminaires(self) -> "SceneRequests":
+        """Return the requests for luminaires, without constraints on them, and their scale."""
+        if not (luminaires := self.luminaires):
+            return SceneRequests()
+        tables = {
+            name: {key: x for key, x in self.keys["light"][name].items() if key in LUMINAIRE_KEYS}
+            for name in luminaires
+        }
+        scale = {key: self.keys[key] for key in ("cd_per_unit",) if key in self.keys}
+        return SceneRequests({"light": tables, **scale}, self.source)
+
     @property
     def symmetric(self) -> frozenset[str]:
         """Names of the lights whose images are symmetric."""
@@ -188,6 +199,11 @@ class LightsFile:
             lights = (*self.lights, *groups)
         return replace(self, lights=lights, groups={**self.groups, **groups})
 
+    def only_luminaires(self) -> "LightsFile":
+        """Return the content without anything but its luminaires, and their scale."""
+        requests = self.requests.only_luminaires()
+        return LightsFile(self.path, requests=requests) if requests.keys else LightsFile()
+
     def without_groups_of(self, images: Collection[str]) -> "LightsFile":
         """Return the content without the pairs of texels of images that are not split."""
         groups = {
@@ -204,38 +220,11 @@ def lights_file_beside(scene: Path) -> Path:
 def lights_file_for(
     scene: Path, path_given: str | Path | None, *, beside_scene: bool
 ) -> LightsFile:
-    """Return the content of `path_given`, or else of the file beside `scene`; where that is not
-    permitted, its luminaires alone.
-    """
+    """Return the content of `path_given`, or else of the file beside `scene` if permitted."""
     if path_given is not None:
         return read_lights_file(Path(path_given))
     path = lights_file_beside(scene)
-    if not path.is_file():
-        return LightsFile()
-    return read_lights_file(path) if beside_scene else _luminaires_alone(path)
-
-
-def _luminaires_alone(path: Path) -> LightsFile:
-    """Return what a lights file says of luminaires, which are lamps of the scene, and no choice;
-    nothing of one that cannot be read.
-    """
-    try:
-        file = read_lights_file(path)
-        names = file.requests.luminaires
-    except SceneError:
-        return LightsFile()
-    if not names:
-        return LightsFile()
-    tables = {
-        name: {
-            key: x for key, x in file.requests.keys["light"][name].items() if key in LUMINAIRE_KEYS
-        }
-        for name in names
-    }
-    keys: dict[str, Any] = {"light": tables}
-    if "cd_per_unit" in file.requests.keys:
-        keys["cd_per_unit"] = file.requests.keys["cd_per_unit"]
-    return LightsFile(path, groups=file.groups, requests=SceneRequests(keys, file.requests.source))
+    return read_lights_file(path) if beside_scene and path.is_file() else LightsFile()
 
 
 def read_lights_file(path: Path) -> LightsFile:

@@ -84,11 +84,11 @@ def pose_of(site: Site) -> Pose:
     return Pose(position=site.position, target=site.target, cutoff=site.cutoff, beam=site.beam)
 
 
-#: Plugins that have a direction, and shapes that give one to an area light.
-_AIMED, _AIMED_SHAPES = (
-    ("spot", "directional", "projector", POINT_PLUGIN),
-    (*("rectangle", "disk"),),
-)
+#: Plugins that have a direction.
+_AIMED = ("spot", "directional", "projector", POINT_PLUGIN)
+
+#: Shapes that give a direction to an area light.
+FLAT_SHAPES = ("rectangle", "disk")
 
 
 def site_of(emitter: Any, plugin: str, shape_plugin: str) -> Site:
@@ -100,7 +100,7 @@ def site_of(emitter: Any, plugin: str, shape_plugin: str) -> Site:
     shape = emitter.get_shape()
     if shape is not None:
         middle = _three(shape.bbox().center())
-        if shape_plugin not in _AIMED_SHAPES:
+        if shape_plugin not in FLAT_SHAPES:
             return Site(middle)
         # Normals transform by the inverse transpose; the matrix includes any flip.
         return Site(middle, unit(np.linalg.inv(_matrix(mi.traverse(shape)))[2, :3]))

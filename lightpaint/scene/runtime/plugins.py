@@ -18,7 +18,7 @@ from typing import Any
 from lightpaint.errors import BackendError
 from lightpaint.files import one_line
 from lightpaint.luminaires.plugin_names import LUMINAIRE_PLUGINS
-from lightpaint.luminaires.registration import can_have_luminaires
+from lightpaint.luminaires.registration import check_can_have_luminaires
 from lightpaint.scene.checks.tokens import place_of_node
 
 #: Environment variable that names a folder with the user's own plugins.
@@ -86,11 +86,8 @@ def check_plugins(state: Any, resolver: Any) -> None:
             continue
         kind = str(node.type).rpartition(".")[2].lower()
         prefix = f"{place_of_node(state, node)}Mitsuba has no {kind} plugin {one_line(repr(name))}"
-        if name in LUMINAIRE_PLUGINS and not can_have_luminaires(mi.variant()):
-            raise UnknownPluginError(
-                f"{place_of_node(state, node)}the {kind} {name!r} needs a variant of Dr.Jit, such "
-                f"as llvm_ad_rgb, and this is {mi.variant()}"
-            )
+        if name in LUMINAIRE_PLUGINS:
+            check_can_have_luminaires(mi.variant())
         if name in IN_PYTHON:
             if file := _shadowing_file(name, resolver):
                 raise UnknownPluginError(

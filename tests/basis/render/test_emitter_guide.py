@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
+from nightly import nightly
 from renderer import REPOSITORY, assert_equal_bits, write_room
 
 from lightpaint.basis.file.basis_file import read_basis, write_basis
@@ -70,7 +71,7 @@ def test_a_light_is_asked_where_it_matters_however_faint_it_is() -> None:
     np.testing.assert_allclose(probability_table, [[sure, 1 - sure], [1 - sure, sure]], atol=2e-6)
 
 
-@pytest.mark.parametrize("samples", [(2**10,), (2**16, 2**18)])
+@pytest.mark.parametrize("samples", [nightly((2**10,)), (2**16, 2**18)])
 def test_guided_planes_are_those_of_separate_renders_within_noise(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, samples: tuple[int, ...]
 ) -> None:

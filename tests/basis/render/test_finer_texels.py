@@ -36,6 +36,7 @@ def finer_room(folder: Path, **options: str) -> Scene:
     return with_layout(scene, "sky", TexelLayout((6, 4), SPLITS))
 
 
+@pytest.mark.nightly
 def test_a_sky_in_view_looks_as_mitsuba_shows_the_written_image(tmp_path: Path) -> None:
     scene = finer_room(tmp_path, integrator=SHORT)
     predicted, shown = predicted_and_shown(scene, tmp_path)

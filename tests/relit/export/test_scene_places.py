@@ -186,3 +186,12 @@ def test_half_a_turn_is_a_turn(monkeypatch: pytest.MonkeyPatch) -> None:
     spot = hung_in(modules)["spot"]
     assert_hangs(spot, OLD.position, (0.0, 1.0, 0.0))
     assert spot["cone"] == list(CONE)
+
+
+def test_lamps_get_their_drives_as_custom_properties(monkeypatch: pytest.MonkeyPatch) -> None:
+    drives = {"spot": {"red": 0.25, "white": 1.0}, "gone": {"red": 1.0}}
+    text = scene_script("evening", "hall.xml", [("spot", "intensity", RGB)], drives=drives)
+    modules = fake_with(monkeypatch, lamps())
+    run_in(modules, text, monkeypatch)
+    found = {x.name: x.data.get("lightpaint_drives") for x in modules[0].data.objects.values()}
+    assert found == {"spot": {"red": 0.25, "white": 1.0}, "bulb": None, "sun": None}

@@ -14,7 +14,8 @@ import numpy.typing as npt
 
 from lightpaint.arrays import Bools, Doubles, Floats, Indices
 from lightpaint.basis.basis import Basis
-from lightpaint.colour.color import luminance
+from lightpaint.basis.planes import thinned
+from lightpaint.colour.color import LUMINANCE, luminance
 from lightpaint.images.object_map import Objects
 from lightpaint.lighting.analysis.appearance.error_place import NO_NAME, object_with_most
 
@@ -136,11 +137,12 @@ class _Pixels:
     def lights(self, basis: Basis) -> Iterator[_Light]:
         """Return the shares of each adjustable light that shines in the part."""
         count = 1 + (0 if basis.objects is None else len(basis.objects.names))
-        for k, plane in enumerate(basis.planes):
+        current = basis.current_weights
+        factors = LUMINANCE * np.where(current.any(axis=1, keepdims=True), current, 1)
+        for k, light in enumerate(thinned(basis.planes, STEP, factors)):
             if basis.is_fixed[k]:
                 continue
-            strength = basis.current_weights[k] if basis.current_weights[k].any() else 1.0
-            share = luminance(_every_other(plane)[self.counts] * strength) / self.now
+            share = light[self.counts] / self.now
             inside = float(np.average(share, weights=self.area))
             if inside > 0:
                 outside = float(np.average(share, weights=self.rest))

@@ -7,7 +7,8 @@ import numpy as np
 
 from lightpaint.arrays import Doubles, Indices, as_rgb
 from lightpaint.basis.light_images import light_images
-from lightpaint.colour.color import luminance
+from lightpaint.basis.planes import thinned
+from lightpaint.colour.color import LUMINANCE, luminance
 from lightpaint.colour.color_difference import ciede2000
 from lightpaint.images.object_map import Objects
 from lightpaint.lighting.analysis.appearance.display_difference import PaintComparison
@@ -165,9 +166,7 @@ def lights_at(solution: Solution, place: Place) -> tuple[tuple[str, ...], bool]:
             part[image.lights] = part[image.lights].sum()
     else:
         part, enough = np.where(basis.is_fixed, 0, luminance(local_light)), GETS_THERE
-        # One light at a time: the brightness of all lights would take half of the memory of their
-        # pictures.
-        brightness = (luminance(x[::STEP, ::STEP]) for x in basis.planes)
+        brightness = thinned(basis.planes, STEP, np.tile(LUMINANCE, (len(part), 1)))
         whole = np.array([np.percentile(x, 99) for x in brightness])
     share = np.where(whole > 0, part / np.where(whole > 0, whole, 1), 0)
     names = (basis.names[k] for k in np.argsort(-share, kind="stable") if share[k] > enough)

@@ -19,7 +19,11 @@ from lightpaint.lighting.analysis.appearance.constraint_kinds import (
 )
 from lightpaint.lighting.analysis.appearance.display_difference import PaintComparison
 from lightpaint.lighting.analysis.appearance.error_place import NOTICED
-from lightpaint.lighting.analysis.appearance.pixel_sample import LimitGroup, PixelSample
+from lightpaint.lighting.analysis.appearance.pixel_sample import (
+    LimitGroup,
+    PixelSample,
+    limit_groups,
+)
 from lightpaint.lighting.analysis.appearance.unpainted_change import (
     UnpaintedChange,
     change_from_scene,
@@ -134,9 +138,11 @@ def reasons_of(solution: Solution, area: Floats | None = None) -> tuple[Reason, 
     the gain of all, they are joint: first the one without which the others gain least. area:
     (h, w) from 0 to 1, the part of the paint whose error counts; None for all paint.
     """
+    if not limit_groups((solution.whole or solution).problem):
+        return ()
     sample = PixelSample.of(solution, area)
     look = _comparison(solution, area)
-    if not sample.groups or sample.current_error <= 0:
+    if sample.current_error <= 0:
         return ()
     everything = sample.share(sample.groups)
     if everything < MIN_SHARE:

@@ -40,6 +40,22 @@ LimitGroup = Literal["hold", "colors", "constraints", "views"]
 SAMPLE_PIXELS = 2**11
 
 
+def limit_groups(problem: Problem) -> tuple[LimitGroup, ...]:
+    """Return the groups of reasons besides the painting that are in force, in all views.
+
+    Of many lights the choice of colours is left out: a solve with each in any colour would take as
+    long as the answer.
+    """
+    fit = problem.fit
+    on: dict[LimitGroup, bool] = {
+        "hold": bool(fit.hold or fit.unpainted),
+        "colors": fit.colors != "free" and len(problem.lights) <= MAX_COLORED_LIGHTS,
+        "constraints": bool(problem.constraints),
+        "views": len(problem.views) > 1,
+    }
+    return tuple(name for name, is_on in on.items() if is_on)
+
+
 @dataclass(frozen=True)
 class PixelSample:
     """A sample of the pixels of all views, each view in one row.
@@ -109,19 +125,8 @@ class PixelSample:
 
     @property
     def groups(self) -> tuple[LimitGroup, ...]:
-        """The groups of reasons besides the painting that are in force.
-
-        Of many lights the choice of colours is left out: a solve with each in any colour would take
-        as long as the answer.
-        """
-        fit, lights = self.problem.fit, self.problem.basis.lights
-        on: dict[LimitGroup, bool] = {
-            "hold": bool(fit.hold or fit.unpainted),
-            "colors": fit.colors != "free" and len(lights) <= MAX_COLORED_LIGHTS,
-            "constraints": bool(self.problem.constraints),
-            "views": bool(self.other_views),
-        }
-        return tuple(name for name, is_on in on.items() if is_on)
+        """The groups of reasons besides the painting that are in force."""
+        return limit_groups(self.problem)
 
     @cached_property
     def by_light(self) -> ConstraintsByLight:

@@ -5,7 +5,6 @@ a few pixels dominate a light, their noise is estimated with the uncertainty of 
 (docs/method.md, "How sure").
 """
 
-from collections.abc import Sequence
 from dataclasses import dataclass, field
 
 import numpy as np
@@ -58,15 +57,11 @@ class Peaks:
         if light.size:
             self.candidates.append((light, u2[light, pixel], np.square(push[light, pixel])))
 
-    @classmethod
-    def merged(cls, parts: Sequence["Peaks"]) -> "Peaks":
-        """Merge several into one."""
-        first = cls.empty(parts[0].total.size)
-        for part in parts:
-            first.total += part.total
-            first.pushed += part.pushed
-            first.candidates += part.candidates
-        return first
+    def merge(self, more: "Peaks") -> None:
+        """Include the pixels that others collected."""
+        self.total += more.total
+        self.pushed += more.pushed
+        self.candidates += more.candidates
 
     def hidden(self) -> Doubles:
         """Return the variance that few pixels may have beyond their half differences, (n,).

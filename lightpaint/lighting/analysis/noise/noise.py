@@ -153,28 +153,30 @@ def noise_sums(solution: Solution, *, removed: float | None = None) -> Noise:
     # The same parts on every machine, added in order, give the same bits.
     length = BLOCK_PIXELS * max(1, -(-counted.size // (BLOCK_PIXELS * PARTS)))
     parts = [counted[k : k + length] for k in range(0, counted.size, length)]
-    sums = [_Sums.zeros(len(weights))] + (
+    sums = _Sums.zeros(len(weights))
+    for of_part in (
         parallel_map(lambda x: pixels.sums(x, is_coupled=is_coupled), parts, unit="parts")
         if len(weights) <= FEW_LIGHTS
-        else [pixels.sums(x, is_coupled=is_coupled) for x in with_progress(parts, "parts")]
-    )
+        else (pixels.sums(x, is_coupled=is_coupled) for x in with_progress(parts, "parts"))
+    ):
+        sums.add(of_part)
+        del of_part  # of many lights, the next one needs its room
     error, noise = np.zeros((2, 3))
     for start in with_progress(range(0, len(weight), BLOCK_PIXELS)):
         part = slice(start, start + BLOCK_PIXELS)
         mixed = residuals.noise(part)
         error += np.square(weight[part] * residuals.residual(part) * mixed).sum(axis=0)
         noise += (weight[part] * np.square(mixed)).sum(axis=0)
-    gradient, fourth = (sum(x.gradient for x in sums), sum(x.fourth for x in sums))
-    second = np.einsum("cici->ci", gradient)
+    second = np.einsum("cici->ci", sums.gradient)
     return Noise(
-        power=np.asarray(sum(x.power for x in sums)),
-        target_noise=np.asarray(sum(x.target_noise for x in sums)),
-        doubt=np.asarray(sum(x.doubt for x in sums)),
-        gradient=np.asarray(gradient),
+        power=sums.power,
+        target_noise=sums.target_noise,
+        doubt=sums.doubt,
+        gradient=sums.gradient,
         objective_error=2 * np.sqrt(error),
         objective_noise=noise,
-        hidden=np.array([Peaks.merged([x.peaks[c] for x in sums]).hidden() for c in range(3)]),
-        freedom=np.square(second) / np.where(fourth > 0, fourth, np.nan),
+        hidden=np.array([peaks.hidden() for peaks in sums.peaks]),
+        freedom=np.square(second) / np.where(sums.fourth > 0, sums.fourth, np.nan),
     )
 
 
@@ -242,6 +244,14 @@ class _Sums:
         gradient, fourth = np.zeros((3, n, 3, n)), np.zeros((3, n))
         power, (target_noise, doubt) = np.zeros((3, n, n)), np.zeros((2, 3, n))
         return cls(power, target_noise, doubt, gradient, fourth, peaks)
+
+    def add(self, part: "_Sums") -> None:
+        """Add the sums over other pixels."""
+        for name in ("power", "target_noise", "doubt", "gradient", "fourth"):
+            total = getattr(self, name)
+            total += getattr(part, name)
+        for peaks, more in zip(self.peaks, part.peaks, strict=True):
+            peaks.merge(more)
 
 
 @dataclass(frozen=True)

@@ -16,8 +16,8 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from lightpaint.arrays import RGB, Bools, Doubles, Floats, as_rgb
-from lightpaint.basis.planes import BLOCK_PIXELS
+from lightpaint.arrays import RGB, Bools, Doubles, Floats, as_rgb, release_freed_memory
+from lightpaint.basis.planes import BLOCK_PIXELS, FEW_LIGHTS
 from lightpaint.colour.color import LUMINANCE
 from lightpaint.display_text import short_repr
 from lightpaint.keywords import keywords
@@ -212,6 +212,8 @@ def error_bars(
     if not problem.basis.knows_noise:
         return None
     noise = noise_sums(solution)
+    if len(weights) > FEW_LIGHTS:
+        release_freed_memory()
     step = _GradientStep.of(solution, noise)
     unbiased = step.equations(denoised_matrix(problem.equations, noise.power))
     bias = np.asarray(solve_for(solution, unbiased) - weights)

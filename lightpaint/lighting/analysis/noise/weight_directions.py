@@ -12,7 +12,7 @@ from typing import Self
 import numpy as np
 
 from lightpaint.arrays import Bools, Doubles, Indices
-from lightpaint.lighting.algebra.eigenvectors import excess_above
+from lightpaint.lighting.algebra.eigenvectors import excess_above, sandwich
 from lightpaint.lighting.analysis.noise.dominant_pixels import NORMAL_95
 from lightpaint.lighting.analysis.noise.noise import (
     NULL_EIGENVALUE,
@@ -506,7 +506,7 @@ class BlockResponse:
         (k, k): Cov(x) = M⁻¹ C M⁻¹ over all that noise may move. C: as in `movable_inverse`.
         """
         ends, moved, inverse = self._inverse_of_moved(C)
-        covariance = inverse @ moved.within(C) @ inverse
+        covariance = sandwich(inverse, moved.within(C))
         if moved.others.shape[1]:
             return ends, moved.effect(np.ascontiguousarray(moved.effect(covariance).T))
         whole = np.zeros(C.shape)

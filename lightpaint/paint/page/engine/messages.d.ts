@@ -536,7 +536,7 @@ export interface LightAnswer {
  * asked: in lx, in W, or as a share. reached: what came of it, at the sure end of its interval;
  * null if that is unknown. to: the other plane of a ratio; "" for none.
  */
-export interface WishReading {
+export interface PlaneWish {
   kind: 'mean' | 'uniformity' | 'max' | 'ratio' | 'power';
   asked: number;
   reached: number;
@@ -555,7 +555,7 @@ export interface PlaneLight {
   least: number;
   most: number;
   lux: number[];
-  wishes: WishReading[];
+  wishes: PlaneWish[];
 }
 
 /**
@@ -569,7 +569,7 @@ export interface PlaneLight {
 export interface PlanesReading {
   planes: PlaneLight[];
   watts: number | null;
-  power: WishReading | null;
+  power: PlaneWish | null;
   is_required: boolean;
   is_old: boolean;
 }

@@ -10,7 +10,7 @@ import { drawPlane } from './plane_picture.js';
 /** @typedef {import("../shortcuts.js").App} App */
 /** @typedef {import("../../engine/messages.js").MeasuredPlane} MeasuredPlane */
 /** @typedef {import("../../engine/messages.js").PlaneLight} PlaneLight */
-/** @typedef {import("../../engine/messages.js").WishReading} WishReading */
+/** @typedef {import("../../engine/messages.js").PlaneWish} PlaneWish */
 
 /** Standard errors of the ends of a 95 % interval. */
 const NORMAL_95 = 1.96;
@@ -66,14 +66,14 @@ function PlaneRow({ plane, light, most }) {
 }
 
 /** A wish, and whether it is met: by word and sign, and not by colour alone.
- * @param {{wish: WishReading}} props */
+ * @param {{wish: PlaneWish}} props */
 function Wish({ wish }) {
   const text = wish.is_met ? t('met') : t('missed');
   return html`<span class=${`plane-wish ${wish.is_met ? 'is-met' : 'is-missed'}`}>
     <i aria-hidden="true">${wish.is_met ? '✓' : '✕'}</i> ${wishText(wish)} <span>${text}</span></span>`;
 }
 
-/** Return what is wished for. @param {WishReading} wish */
+/** Return what is wished for. @param {PlaneWish} wish */
 function wishText({ kind, asked, to }) {
   if (kind === 'mean') return t('{lux} or more', { lux: luxText(asked) });
   if (kind === 'uniformity') return t('U0 {share} or more', { share: shareText(asked) });
@@ -82,7 +82,7 @@ function wishText({ kind, asked, to }) {
   return t('{share} of {name} or more', { share: shareText(asked), name: to });
 }
 
-/** The power of all lamps. @param {{watts: number, area: number | null, limit: WishReading | null}} props */
+/** The power of all lamps. @param {{watts: number, area: number | null, limit: PlaneWish | null}} props */
 function Power({ watts, area, limit }) {
   const power = t('{watts} W', { watts: numberText(watts) });
   const density = area ? t('{value} W/m²', { value: numberText(watts / area, 2) }) : '';
