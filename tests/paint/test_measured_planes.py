@@ -21,7 +21,12 @@ from lightpaint.paint.session.session_planes import SessionPlanes
 from lightpaint.paint.store.history_steps import Identity
 from lightpaint.paint.store.store import MemoryStore
 from lightpaint.photometry.illuminance import Illuminance
-from lightpaint.photometry.measuring_plane import MeasuringPlane, PowerBudget, Wishes
+from lightpaint.photometry.measuring_plane import (
+    LightCase,
+    MeasuringPlane,
+    PowerBudget,
+    Wishes,
+)
 from lightpaint.pipeline.job.settings import Settings
 
 LUMINANCE = np.array([0.2126, 0.7152, 0.0722])
@@ -140,6 +145,24 @@ def test_lights_that_were_not_measured_give_nothing(make_basis: Any) -> None:
     planes = SessionPlanes(desk(Lights(basis.lights[:2])), PowerBudget(), 6.0, "")
     lux = planes.for_lights(basis.lights).illuminance.of(np.ones((3, 3)))
     np.testing.assert_array_equal(lux, planes.illuminance.of(np.ones((2, 3))))
+
+
+def test_wishes_hold_in_each_case(basis: Basis) -> None:
+    """The first light is locked, and off at night: the others give what is wished for then."""
+    session = measured_session(basis, mean=200.0)
+    session.handle(protocol.ConstrainLight(0, {"lock": True}), {})
+    cases = LightCase("night", {basis.names[0]: 0.0}), LightCase("noon", {basis.names[0]: 1.0})
+    illuminance = desk(basis.lights, mean=200.0)
+    session.set_measured_planes(SessionPlanes(illuminance, PowerBudget(), 6.0, "", cases))
+    planes, reading = session.live_answer.planes, session.answer_update().reading
+    assert planes is not None
+    assert reading is not None
+    assert [plane.name for plane in planes.info.planes] == ["desk, night", "desk, noon"]
+    night, noon = reading.planes
+    assert night.mean >= 200 * (1 - MET)
+    given = noon.mean - night.mean
+    alone = illuminance.of(basis.current_weights * [[1], [0], [0]])
+    assert given == pytest.approx(alone.mean())
 
 
 def test_planes_are_measured_at_the_start_and_after_a_move(tmp_path: Path) -> None:
