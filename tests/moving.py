@@ -3,7 +3,7 @@
 import time
 from collections.abc import Callable
 from pathlib import Path
-from typing import Any, Unpack
+from typing import Any
 
 import numpy as np
 from patience import PATIENCE_S
@@ -14,7 +14,7 @@ from lightpaint.paint.protocol import Message
 from lightpaint.paint.store.store import Store
 from lightpaint.paint.studio.studio import Studio
 from lightpaint.paint.subject import Subject
-from lightpaint.pipeline.job.settings import Settings, SettingsByName
+from lightpaint.pipeline.job.settings import Settings
 from lightpaint.placement.free_space import pixels_of
 from lightpaint.scene.scene_reader import load_scene
 
@@ -23,14 +23,13 @@ class MovingStudio:
     """A studio of the test room, and all that it says."""
 
     def __init__(
-        self, folder: Path, lights: str | None = None, **settings: Unpack[SettingsByName]
+        self, folder: Path, lights: str | None = None, settings: Settings | None = None
     ) -> None:
         self.folder = folder
         path = folder / "room.xml"
         self.scene = load_scene(path if path.exists() else write_room(folder, lights=lights))
-        subject = Subject(
-            "room", folder, scene=self.scene, settings=Settings(spp=16, use_cache=False, **settings)
-        )
+        settings = settings or Settings(spp=16, use_cache=False)
+        subject = Subject("room", folder, scene=self.scene, settings=settings)
         self.messages: list[Message] = []
         self.studio = Studio(
             [subject], lambda identity: Store.open(folder / "session.db", identity)

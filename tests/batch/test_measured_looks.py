@@ -13,7 +13,13 @@ from renderer import LIGHTS, write_room
 from lightpaint.basis.cache.cached_render import obtain_basis
 from lightpaint.basis.file.basis_file import write_basis
 from lightpaint.batch.cluster.parcels import FileHashes, ParcelStore, pack, pieces
-from lightpaint.batch.gallery.summary import LightRow, PlaneRow, SummaryRow, summary_csv
+from lightpaint.batch.gallery.summary import (
+    LightRow,
+    PlaneRow,
+    SummaryRow,
+    planes_of_answer,
+    summary_csv,
+)
 from lightpaint.batch.plan.planner import plan
 from lightpaint.batch.run import run_batch
 from lightpaint.batch.run_options import RunOptions
@@ -126,6 +132,18 @@ def test_a_plan_finds_what_planes_lack_before_anything_is_rendered(
         plan(folder / "looks.toml", folder / "out")
     assert expected in str(error.value)
     assert "look 'dark.exr'" in str(error.value)
+
+
+def test_each_case_has_columns_of_its_own(tmp_path: Path) -> None:
+    for case, mean in (("night", 300.0), ("noon", 900.0)):
+        folder = tmp_path / "planes" / case
+        folder.mkdir(parents=True)
+        planes = {"desk": {"mean": mean, "uniformity": 0.5}}
+        (folder / "planes.json").write_text(json.dumps({"planes": planes}), encoding="utf-8")
+    assert planes_of_answer(tmp_path) == (
+        PlaneRow("desk, night", 300.0, 0.5),
+        PlaneRow("desk, noon", 900.0, 0.5),
+    )
 
 
 def test_columns_of_planes_are_those_of_no_light() -> None:

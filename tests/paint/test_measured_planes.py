@@ -1,5 +1,6 @@
 """Measuring planes in the painter: answers meet their wishes, live and exact, unless ignored."""
 
+from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
@@ -14,12 +15,18 @@ from lightpaint.colour.display.view_transform import ViewTransform
 from lightpaint.errors import LightpaintError
 from lightpaint.lighting.constraints.constraints import Constraints
 from lightpaint.paint import protocol
+from lightpaint.paint.protocol import Message
 from lightpaint.paint.session.session import Session
 from lightpaint.paint.session.session_planes import SessionPlanes
 from lightpaint.paint.store.history_steps import Identity
 from lightpaint.paint.store.store import MemoryStore
 from lightpaint.photometry.illuminance import Illuminance
-from lightpaint.photometry.measuring_plane import MeasuringPlane, PowerBudget, Wishes
+from lightpaint.photometry.measuring_plane import (
+    LightCase,
+    MeasuringPlane,
+    PowerBudget,
+    Wishes,
+)
 from lightpaint.pipeline.job.settings import Settings
 
 LUMINANCE = np.array([0.2126, 0.7152, 0.0722])
@@ -69,6 +76,12 @@ def darken(session: Session, number: int = 1) -> protocol.AnswerUpdate:
     return message
 
 
+def readings(messages: Sequence[Message]) -> list[protocol.PlanesReading]:
+    """Return what messages say of planes."""
+    parts = (getattr(message, "reading", None) for message in messages)
+    return [part for part in parts if part is not None]
+
+
 @pytest.fixture
 def basis(make_basis: Any) -> Basis:
     y, x = np.mgrid[: SIZE[0], : SIZE[1]] / SIZE[0]
@@ -112,6 +125,7 @@ def test_readings_are_under_the_master_dimmer(basis: Basis) -> None:
     assert full is not None
     assert half is not None
     assert half.planes[0].mean == pytest.approx(full.planes[0].mean / 2)
+    assert full.watts is not None
     assert half.watts == pytest.approx(full.watts / 2)
     assert not half.planes[0].wishes[0].is_met
 
@@ -133,12 +147,31 @@ def test_lights_that_were_not_measured_give_nothing(make_basis: Any) -> None:
     np.testing.assert_array_equal(lux, planes.illuminance.of(np.ones((2, 3))))
 
 
+def test_wishes_hold_in_each_case(basis: Basis) -> None:
+    """The first light is locked, and off at night: the others give what is wished for then."""
+    session = measured_session(basis, mean=200.0)
+    session.handle(protocol.ConstrainLight(0, {"lock": True}), {})
+    cases = LightCase("night", {basis.names[0]: 0.0}), LightCase("noon", {basis.names[0]: 1.0})
+    illuminance = desk(basis.lights, mean=200.0)
+    session.set_measured_planes(SessionPlanes(illuminance, PowerBudget(), 6.0, "", cases))
+    planes, reading = session.live_answer.planes, session.answer_update().reading
+    assert planes is not None
+    assert reading is not None
+    assert [plane.name for plane in planes.info.planes] == ["desk, night", "desk, noon"]
+    night, noon = reading.planes
+    assert night.mean >= 200 * (1 - MET)
+    given = noon.mean - night.mean
+    alone = illuminance.of(basis.current_weights * [[1], [0], [0]])
+    assert given == pytest.approx(alone.mean())
+
+
 def test_planes_are_measured_at_the_start_and_after_a_move(tmp_path: Path) -> None:
     path = tmp_path / "floor.planes.toml"
     text = '[plane.floor]\nshape = "floor"\nheight = 0.1\ngrid = 0.5\nmean = 20\n'
     path.write_text(text, encoding="utf-8")
     lights = LIGHTS["bulb"] + LIGHTS["beam"]
-    moving = MovingStudio(tmp_path, lights, planes=str(path), cd_per_unit=100.0)
+    settings = Settings(spp=16, use_cache=False, planes=str(path), cd_per_unit=100.0)
+    moving = MovingStudio(tmp_path, lights, settings)
     try:
         first = moving.wait(lambda: moving.studio.session.live_answer.planes_reading())
         assert first.planes[0].mean >= 20 * (1 - MET)
@@ -148,14 +181,9 @@ def test_planes_are_measured_at_the_start_and_after_a_move(tmp_path: Path) -> No
         assert state.planes.planes[0].name == "floor"
         count = len(moving.messages)
         high = {"bulb": {"position": [-0.5, 1.9, 0.5]}}
-        [moved] = [m for m in moving.send(protocol.MoveLights(high)) if m.kind == "answer"]
-        assert moved.reading.is_old
-        moving.wait(
-            lambda: any(
-                m.kind == "state" and m.reading is not None and not m.reading.is_old
-                for m in moving.messages[count:]
-            )
-        )
+        [moved] = readings(moving.send(protocol.MoveLights(high)))
+        assert moved.is_old
+        moving.wait(lambda: any(not x.is_old for x in readings(moving.messages[count:])))
         assert any(getattr(m, "task", "") == "planes" for m in moving.messages)
     finally:
         moving.close()

@@ -29,6 +29,7 @@ from lightpaint.images.denoiser import denoised
 from lightpaint.images.estimate import read_estimate
 from lightpaint.images.pixel_blocks import block_mean, fitting_factor
 from lightpaint.lighting.answer.lighting_file import read_lighting
+from lightpaint.photometry.measuring_plane import plane_title
 from lightpaint.photometry.readings_file import PLANES
 from lightpaint.pipeline.results.planes_folder import FOLDER as PLANES_FOLDER
 from lightpaint.pipeline.results.result_folder import RECORD
@@ -88,7 +89,11 @@ class LightRow:
 
 @dataclass(frozen=True)
 class PlaneRow:
-    """The illuminance on a measuring plane in a look. uniformity: the least over the mean."""
+    """The illuminance on a measuring plane in a look.
+
+    name: of the plane and its case. mean_lx: the mean illuminance in lx. uniformity: the least over
+    the mean.
+    """
 
     name: str
     mean_lx: float
@@ -103,8 +108,8 @@ class SummaryRow:
     None if nothing was painted. agrees: whether a render confirms it; None if there was none.
     spp: samples per pixel of its basis; None if nothing was rendered. fingerprint: hash of its
     request and of the files that it reads, as in the journal.
-    planes: on which illuminance was measured. watts: power of all lamps; None if that of one is
-    unknown, or without planes.
+    planes: on which illuminance was measured. watts: power of all lamps, where there are planes and
+    the power of each lamp is known.
     files: to open. picture: small, relative to the batch's folder; "" where there is none.
     """
 
@@ -234,15 +239,18 @@ def lights_of_answer(folder: Path, report: Mapping[str, Any]) -> tuple[LightRow,
 
 def planes_of_answer(folder: Path) -> tuple[PlaneRow, ...]:
     """Return what an answer in a folder gives on measuring planes; nothing without any."""
-    planes = _json(folder / PLANES_FOLDER / PLANES).get("planes")
-    if not isinstance(planes, dict):
-        return ()
-    with suppress(AttributeError, KeyError, TypeError, ValueError):
-        return tuple(
-            PlaneRow(name, float(plane["mean"]), float(plane["uniformity"]))
-            for name, plane in planes.items()
-        )
-    return ()
+    base = folder / PLANES_FOLDER
+    rows = list[PlaneRow]()
+    # Each case has a folder.
+    for file in sorted(base.glob(f"**/{PLANES}")):
+        case = "" if file.parent == base else file.parent.name
+        planes = _json(file).get("planes")
+        with suppress(AttributeError, KeyError, TypeError, ValueError):
+            rows += [
+                PlaneRow(plane_title(name, case), float(x["mean"]), float(x["uniformity"]))
+                for name, x in (planes or {}).items()
+            ]
+    return tuple(rows)
 
 
 def watts_of_answer(folder: Path) -> float | None:

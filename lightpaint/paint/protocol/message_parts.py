@@ -26,8 +26,10 @@ class ConsoleInfo:
 
 @dataclass(frozen=True)
 class MeasuredPlane:
-    """A plane on which illuminance is measured. size: rows and columns of a picture of it. cells:
-    row and column of each point. points: where they are, in units of the scene.
+    """A plane on which illuminance is measured, in one of the cases if there are several.
+
+    size: rows and columns of a picture of it. cells: row and column of each point. points: where
+    they are, in units of the scene.
     """
 
     name: str

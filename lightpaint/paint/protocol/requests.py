@@ -35,8 +35,8 @@ class ChangeSettings(Request, kind="change_settings"):
     """Settings of the answer, as in `Fit`. Answered by `answer`.
 
     settings: of hold, space, colors, literal, prefer_current, near, sparse; null for the default
-    that follows from the painting. ignore_wishes: true for answers that need not meet the wishes
-    for measuring planes.
+    that follows from the painting. With `ignore_wishes` true, answers need not meet the wishes for
+    measuring planes.
     """
 
     settings: Mapping[str, Any]

@@ -66,8 +66,10 @@ export interface ConsoleInfo {
 }
 
 /**
- * A plane on which illuminance is measured. size: rows and columns of a picture of it. cells:
- * row and column of each point. points: where they are, in units of the scene.
+ * A plane on which illuminance is measured, in one of the cases if there are several.
+ *
+ * size: rows and columns of a picture of it. cells: row and column of each point. points: where
+ * they are, in units of the scene.
  */
 export interface MeasuredPlane {
   name: string;
@@ -557,11 +559,12 @@ export interface PlaneLight {
 }
 
 /**
- * What an answer gives on measuring planes, under the master dimmer, in the order of the state.
+ * The illuminance on measuring planes under an answer and the master dimmer.
  *
- * watts: power of all lamps; null if that of one is unknown. power: the limit of it; null for
- * none. is_required: whether answers have to meet the wishes, as far as they can be met. is_old:
- * whether lights have been moved, added or removed since the planes were measured.
+ * planes: in the order of the state. watts: power of all lamps; null if that of one is unknown.
+ * power: the limit of it; null for none. is_required: whether answers have to meet the wishes, as
+ * far as they can be met. is_old: whether lights have been moved, added or removed since the
+ * planes were measured.
  */
 export interface PlanesReading {
   planes: PlaneLight[];
@@ -595,8 +598,8 @@ export interface Findings {
  * The progress of a long task. Unasked.
  *
  * task: `export`, `final` for a final render, `basis`, `sampling` for samples added where the
- * paint needs them, `planes` for measuring planes, or the renderer's name for the task. done, total: steps so far, and in all.
- * unit: of these steps; "" for none.
+ * paint needs them, `planes` for measuring planes, or the renderer's name for the task. done,
+ * total: steps so far, and in all. unit: of these steps; "" for none.
  */
 export interface ProgressReport {
   kind: 'progress';
@@ -1556,8 +1559,8 @@ export interface Hello {
  * Settings of the answer, as in `Fit`. Answered by `answer`.
  *
  * settings: of hold, space, colors, literal, prefer_current, near, sparse; null for the default
- * that follows from the painting. ignore_wishes: true for answers that need not meet the wishes
- * for measuring planes.
+ * that follows from the painting. With `ignore_wishes` true, answers need not meet the wishes for
+ * measuring planes.
  */
 export interface ChangeSettings {
   settings: Record<string, any>;
