@@ -167,7 +167,8 @@ def _derive_answer(
     lighting = derive_lighting(task.lightings, bases[0], share=task.share, space=task.space)
     if task.mireds:
         lighting = shift(lighting, task.mireds, dimmer_lights(bases[0]))
-    lighting = replace(lighting.for_target(task.look), cd_per_unit=settings.cd_per_unit)
+    scale = settings.cd_per_unit or lighting.cd_per_unit
+    lighting = replace(lighting.for_target(task.look), cd_per_unit=scale)
     views = view_names(scenes) if fields["by_sensor"] else [""]
     scene = scenes[0] if scenes else None
     options: dict[str, Any] = {"views": views, "groups": groups}
