@@ -110,7 +110,7 @@ def test_live_and_exact_answers_meet_wishes_until_these_are_ignored(basis: Basis
     assert not ignored.reading.is_required
     assert ignored.reading.planes[0].mean < 300
     assert not ignored.reading.planes[0].wishes[0].is_met
-    assert session.history.info().undo[-1] == "Wishes for planes"
+    assert session.history.info().undo[-1] == "Answers meet the wishes"
     session.handle(protocol.Undo(), {})
     again = session.answer_update().reading
     assert again is not None

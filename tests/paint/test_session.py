@@ -31,6 +31,7 @@ from lightpaint.paint.store.history_steps import Identity, Pixels, Step
 from lightpaint.paint.store.session_requests import (
     ALL_LIGHTS_KEYS,
     FIT_KEYS,
+    IGNORE_WISHES,
     TITLES,
     SessionRequests,
 )
@@ -546,14 +547,15 @@ def test_a_setting_is_undone_by_the_name_that_the_page_has_for_it():
     page = REPOSITORY / "lightpaint" / "paint" / "page"
     panel = (page / "ui" / "settings_panel.js").read_text("utf-8")
     titles = re.findall(r"<\$\{Row\} title=\$\{t\('([^']+)'\)\}", panel)
-    # This one is beside the lights that it is about.
-    lamps = (page / "ui" / "lamps" / "start_lamps.js").read_text("utf-8")
-    in_panel = [title for title in TITLES.values() if f"t('{title}')" not in lamps]
-    assert len(in_panel) == len(TITLES) - 1
+    # These are beside the lights and the planes that they are about.
+    beside = ("lamps/start_lamps.js", "planes/planes_panel.js")
+    others = "".join((page / "ui" / file).read_text("utf-8") for file in beside)
+    in_panel = [title for title in TITLES.values() if f"t('{title}')" not in others]
+    assert len(in_panel) == len(TITLES) - 2
     assert in_panel == titles[: len(in_panel)]
     # These are of the page, not of the solve.
     assert titles[len(in_panel) :] == ["Theme", "Panels", "Tour", "Language"]
-    assert set(TITLES) == {*FIT_KEYS, *ALL_LIGHTS_KEYS}
+    assert set(TITLES) == {*FIT_KEYS, *ALL_LIGHTS_KEYS, IGNORE_WISHES}
 
 
 def test_who_leaves_in_the_middle_leaves_a_stroke_and_no_slider(basis: lp.Basis):

@@ -41,7 +41,7 @@ TITLES = {
     "prefer_current": "Lights that make little difference",
     "near": "Near my lamps",
     "sparse": "Number of lights",
-    IGNORE_WISHES: "Wishes for planes",
+    IGNORE_WISHES: "Answers meet the wishes",
 }
 
 
