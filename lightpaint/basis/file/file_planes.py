@@ -19,7 +19,7 @@ import numpy as np
 import numpy.typing as npt
 
 from lightpaint.arrays import Doubles, Floats, Indices
-from lightpaint.basis.planes import MemoryPlanes, Planes, PlanesBase, mix
+from lightpaint.basis.planes import MemoryPlanes, Planes, PlanesBase, as_slice, mix
 from lightpaint.images.formats.exr_rows import PartLayout, RowFile
 from lightpaint.threads import parallel_map
 
@@ -77,12 +77,16 @@ class RowPlanes(PlanesBase):
                 for k in range(start // length, max(-(-stop // length), start // length + 1))
             ]
             return parts[0] if len(parts) == 1 else joined_pixels(parts)
-        picked = np.empty((self.count, 3, len(where)), np.float32).transpose(0, 2, 1)
+        picked = np.empty((self.count, 3, len(where)), np.float32)
         of_strip = where // length
         for k in np.unique(of_strip):
             in_strip = np.flatnonzero(of_strip == k)
-            picked[:, in_strip] = self._strip(int(k))[:, where[in_strip] - k * length]
-        return picked
+            places, strip = where[in_strip] - k * length, self._strip(int(k)).transpose(0, 2, 1)
+            if strip.flags.c_contiguous:  # of which `take` needs no copy
+                picked[:, :, as_slice(in_strip)] = strip.take(places, axis=2)
+            else:
+                picked[:, :, in_strip] = strip[:, :, places]
+        return picked.transpose(0, 2, 1)
 
     def _strip(self, k: int) -> Floats:
         """Return the pixels of a strip, (n, p, 3)."""

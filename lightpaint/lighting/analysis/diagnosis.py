@@ -279,16 +279,17 @@ def _compromise(solution: Solution) -> float:
 def unbounded_weights(solution: Solution) -> Doubles:
     """Return the closest weights (n, 3) of any sign; fixed lights stay at 1."""
     equations, weights = solution.equations, solution.weights
-    whole = equations.full_matrix
-    for columns in all_columns(solution):
-        moved = np.flatnonzero(columns.any(axis=1))
-        to = columns[moved]
-        gradient = np.einsum("cij,jc->ci", equations.M, weights) - equations.b
-        step = np.zeros(len(columns))
-        curvature = to.T @ whole[np.ix_(moved, moved)] @ to
-        step[moved] = to @ pseudo_inverse(curvature) @ (to.T @ gradient.ravel()[moved])
-        weights = weights - step.reshape(3, -1).T
-    return weights
+    gradient = np.einsum("cij,jc->ic", equations.M, weights) - equations.b.T
+    if any(light.is_scalar for light in solution.basis.lights):
+        to = all_columns(solution)
+        step = to @ pseudo_inverse(to.T @ equations.full_matrix @ to) @ (to.T @ gradient.T.ravel())
+        return np.asarray(weights - step.reshape(3, -1).T)
+    closest = weights.copy()
+    is_movable = equations.reached & ~solution.basis.is_fixed[:, None]
+    for c, M in enumerate(equations.M):
+        moved = np.flatnonzero(is_movable[:, c])
+        closest[moved, c] -= pseudo_inverse(M[np.ix_(moved, moved)]) @ gradient[moved, c]
+    return closest
 
 
 def _place(solution: Solution, unreachable: Floats) -> Place | None:

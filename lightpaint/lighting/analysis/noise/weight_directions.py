@@ -200,10 +200,9 @@ def solve_for(solution: Solution, equations: NormalEquations) -> Doubles:
     return solve_reduced(pulled, problem.local_reduction, solution.weights).weights
 
 
-def all_columns(solution: Solution) -> Iterator[Doubles]:
-    """Yield the effect of every unknown on the weights, (3 n, k), for each independent problem.
-
-    Without constraints: only fixed lights stay.
+def all_columns(solution: Solution) -> Doubles:
+    """Return the effect of every unknown on the weights, (3 n, k), without constraints: only fixed
+    lights stay.
     """
     lights = np.flatnonzero(~solution.basis.is_fixed)
     scalar = np.array([light.is_scalar for light in solution.basis.lights], dtype=bool)
@@ -213,11 +212,7 @@ def all_columns(solution: Solution) -> Iterator[Doubles]:
         for c in range(3):
             # With one weight for all channels, the unknown is that of the first channel.
             columns[c, light, 0 if scalar[light] else c, k] = lit[light, c]
-    flat = columns.reshape(3 * len(scalar), 3, lights.size)
-    if scalar.any():
-        yield flat.reshape(len(flat), -1)
-    else:
-        yield from (flat[:, c] for c in range(3))
+    return columns.reshape(3 * len(scalar), -1)
 
 
 def _active_sums(reduction: Reduction, optimum: ReducedOptimum) -> tuple[Doubles, Doubles]:
