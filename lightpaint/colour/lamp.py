@@ -15,6 +15,7 @@ import numpy as np
 from lightpaint.arrays import RGB, Bools, Doubles, Indices
 from lightpaint.colour.color import cct_and_duv, luminance
 from lightpaint.colour.emitter_preference import Preference
+from lightpaint.colour.spectra.spectrum import WAVELENGTHS, Spectrum
 
 #: Most emitters of a lamp: the mixes that are compared grow exponentially with their number.
 MAX_EMITTERS = 10
@@ -36,7 +37,7 @@ class LampEmitter:
 
     emission: linear Rec.709 at full, in the unit of the light; channels may be negative, since LEDs
     lie outside Rec.709. most: the largest drive, at most 1. bits: of the channel that sets it.
-    watts: power at full, if known.
+    watts: power at full, if known. spectrum: of luminance 1, if known.
     """
 
     name: str
@@ -44,6 +45,13 @@ class LampEmitter:
     most: float = 1.0
     bits: int = 8
     watts: float | None = None
+    spectrum: Spectrum | None = None
+
+    def __post_init__(self) -> None:
+        if self.spectrum is not None and len(self.spectrum) != len(WAVELENGTHS):
+            raise ValueError(
+                f"a spectrum has {len(self.spectrum)} powers: expected {len(WAVELENGTHS)}"
+            )
 
     def level(self, drive: float) -> int:
         """Return the level of its channel for a drive."""

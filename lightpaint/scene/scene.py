@@ -60,6 +60,7 @@ class SceneFiles:
     path: Path
     files: tuple[Path, ...]
     lights_file: Path | None
+    requests: SceneRequests
     parsed: ParsedScene
 
     @property
@@ -82,8 +83,9 @@ class SceneFiles:
 
     @property
     def read_files(self) -> tuple[Path, ...]:
-        """`originals`, and the lights file if there is one."""
-        return (*self.originals, *([] if self.lights_file is None else [self.lights_file]))
+        """`originals`, and the lights file and its spectra if there are any."""
+        lights_files = [] if self.lights_file is None else [self.lights_file]
+        return (*self.originals, *lights_files, *self.requests.spectrum_files)
 
     @property
     def places(self) -> frozenset[Path]:

@@ -199,7 +199,7 @@ def _lamp_fields(light: LightSetting, lamp: Lamp) -> dict[str, Any]:
     fields: dict[str, Any] = {"drives": dict(light.drives)}
     if light.standard_error is not None:
         fields["drive_errors"] = dict(light.drive_errors)
-    emitters = [fields_of(x, "watts") for x in lamp.emitters]
+    emitters = [fields_of(x, "watts", "spectrum") for x in lamp.emitters]
     return fields | fields_of(lamp, "power_share", "prefer") | {"emitters": emitters}
 
 

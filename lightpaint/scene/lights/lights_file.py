@@ -10,6 +10,7 @@ from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
 
+from lightpaint.colour.spectra.spectrum_source import is_spectrum_file
 from lightpaint.errors import SceneError
 from lightpaint.file_reading import read_text
 from lightpaint.files import one_line
@@ -78,6 +79,17 @@ class SceneRequests:
         return tuple(
             name for name, table in tables if isinstance(table, dict) and "emitters" in table
         )
+
+    @property
+    def spectrum_files(self) -> tuple[Path, ...]:
+        """The files of the spectra of its emitters."""
+        lights = self.keys.get("light")
+        tables = lights.values() if isinstance(lights, dict) else ()
+        lists = [x.get("emitters") for x in tables if isinstance(x, dict)]
+        emitters = [x for found in lists if isinstance(found, list) for x in found]
+        spectra = [x.get("spectrum") for x in emitters if isinstance(x, dict)]
+        names = dict.fromkeys(x for x in spectra if isinstance(x, str) and is_spectrum_file(x))
+        return tuple(Path(self.source).parent / name for name in names)
 
     @property
     def symmetric(self) -> frozenset[str]:
