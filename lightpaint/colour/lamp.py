@@ -83,6 +83,11 @@ class Lamp:
         return np.array([x.emission for x in self.emitters], np.float64)
 
     @cached_property
+    def levels(self) -> Doubles:
+        """(e,), the luminance of each emitter at full."""
+        return np.asarray(luminance(self.columns), np.float64)
+
+    @cached_property
     def most(self) -> Doubles:
         """(e,), the largest drive of each emitter."""
         return np.array([x.most for x in self.emitters])

@@ -14,11 +14,11 @@ from itertools import pairwise
 
 import numpy as np
 
-from lightpaint.arrays import Bools, Doubles, Indices
+from lightpaint.arrays import Bools, Doubles, Indices, as_rgb
 from lightpaint.basis.lights import BasisLight
 from lightpaint.colour.lamp import Lamp
 from lightpaint.lighting.algebra.quadratic import Cap
-from lightpaint.lighting.constraints.constraints import Constraints
+from lightpaint.lighting.constraints.constraints import Constraints, LightConstraint
 from lightpaint.lighting.constraints.light_patterns import constraints_by_light, tied_lights
 from lightpaint.lighting.unknowns.gamuts import Gamuts
 from lightpaint.lighting.unknowns.knobs import (
@@ -30,6 +30,11 @@ from lightpaint.lighting.unknowns.knobs import (
     lamp_of,
     mixing_knob,
     tied_knob,
+)
+from lightpaint.lighting.unknowns.lamp_parts import (
+    WholeLamps,
+    emission_of_parts,
+    part_lamps,
 )
 from lightpaint.lighting.unknowns.requirements import (
     Requirements,
@@ -335,12 +340,56 @@ def reduce_to(constraints: Constraints, lights: Sequence[BasisLight]) -> Reducti
     Raises ConstraintError for a light that is not there, and for the impossible: a colour for a
     light that has only a dimmer, a light on two dimmers, limits that leave nothing.
     """
+    whole = WholeLamps.of(lights)
+    if not whole.has_parts:
+        return _reduce_to(constraints, lights)
+    by_light = constraints_by_light(constraints, whole.lights)
+    lamps = _lamps_of(constraints, whole.lights, by_light)
+    if not lamps:  # nothing says what the emitters have in common
+        return _reduce_to(constraints, lights)
+    colored = [
+        replace(light, emission=as_rgb(emission_of_parts([lights[i] for i in parts], lamps[k])))
+        if k in lamps
+        else light
+        for k, (light, parts) in enumerate(zip(whole.lights, whole.parts, strict=True))
+    ]
+    reduction = _reduce_to(constraints, colored)
+    fixed = [whole.weights(k, lamps.get(k), row) for k, row in enumerate(reduction.fixed_weights)]
+    labels = [
+        label for label, parts in zip(reduction.labels, whole.parts, strict=True) for _ in parts
+    ]
+    knobs = [part for knob in reduction.knobs for part in whole.knobs(knob, lamps)]
+    of_parts = {
+        i: part
+        for k, lamp in lamps.items()
+        for i, part in zip(whole.parts[k], part_lamps(lamp), strict=True)
+    }
+    return Reduction(np.concatenate(fixed), tuple(labels), tuple(knobs), lamps=of_parts)
+
+
+def lamps_by_name(constraints: Constraints, lights: Sequence[BasisLight]) -> dict[str, Lamp]:
+    """Return what mixes lights from emitters, by the light's name. Raises ConstraintError."""
+    by_light = constraints_by_light(constraints, lights)
+    return {lights[k].name: lamp for k, lamp in _lamps_of(constraints, lights, by_light).items()}
+
+
+def _lamps_of(
+    constraints: Constraints,
+    lights: Sequence[BasisLight],
+    by_light: Sequence[LightConstraint | None],
+) -> dict[int, Lamp]:
+    """Return what mixes lights from emitters, by the light's index."""
+    scale, prefer = constraints.cd_per_unit, constraints.prefer_emitters
+    made = (lamp_of(light, x, scale, prefer) for light, x in zip(lights, by_light, strict=True))
+    return {k: lamp for k, lamp in enumerate(made) if lamp is not None}
+
+
+def _reduce_to(constraints: Constraints, lights: Sequence[BasisLight]) -> Reduction:
+    """Return the unknowns that `constraints` leave among `lights`, each of which is whole."""
     by_light = constraints_by_light(constraints, lights)
     labels = ["" if constraint is None else constraint.label for constraint in by_light]
     tied, fixed, knobs = tied_lights(constraints, lights), np.zeros((len(lights), 3)), []
-    scale, prefer = constraints.cd_per_unit, constraints.prefer_emitters
-    made = (lamp_of(light, x, scale, prefer) for light, x in zip(lights, by_light, strict=True))
-    lamps = {k: lamp for k, lamp in enumerate(made) if lamp is not None}
+    lamps = _lamps_of(constraints, lights, by_light)
     for k, (light, constraint) in enumerate(zip(lights, by_light, strict=True)):
         if light.is_fixed:
             fixed[k] = 1

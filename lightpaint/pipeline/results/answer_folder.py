@@ -60,7 +60,7 @@ def write_answer(
     programs. has_lighting: True if lighting.json exists already, or is not needed. A lighting that
     says nothing of places gets those of the scene.
     """
-    lighting = with_places(lighting, scene)
+    lighting = with_places(lighting.of_lamps(), scene)
     if not has_lighting:
         write_lighting(folder / LIGHTING, lighting)
     if groups is not None:
