@@ -6,7 +6,7 @@ preference chooses one of these, so that the emission stays the same (docs/metho
 """
 
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property, lru_cache
 from itertools import combinations, product
 
@@ -15,6 +15,7 @@ import numpy as np
 from lightpaint.arrays import RGB, Bools, Doubles, Indices
 from lightpaint.colour.color import cct_and_duv, luminance
 from lightpaint.colour.emitter_preference import Preference
+from lightpaint.colour.spectra.best_mix import best_mix
 from lightpaint.colour.spectra.spectrum import WAVELENGTHS, Spectrum
 
 #: Most emitters of a lamp: the mixes that are compared grow exponentially with their number.
@@ -114,7 +115,28 @@ class Lamp:
             drives = mixes.values(self.mix(self._nearest_drives(emission)))
         if not len(drives):  # round-off at a corner of what it can mix
             return self._nearest_drives(emission)
-        return np.asarray(drives[np.argmin(self._costs(drives))])
+        # The cheapest comes first, for colours of which nothing tells how they render others.
+        drives = drives[np.argsort(self._costs(drives), kind="stable")]
+        if self.prefer == "rf" and self.powers_at_full is not None:
+            return best_mix(drives, self.powers_at_full)
+        return np.asarray(drives[0])
+
+    @cached_property
+    def while_painting(self) -> "Lamp":
+        """The lamp without a preference that takes a second to find."""
+        return replace(self, prefer="watts") if self.prefer == "rf" else self
+
+    def best_rendering(self, emission: Doubles) -> Doubles:
+        """Return the drives (e,) of the highest Rf found that mix an emission (3,)."""
+        return replace(self, prefer="rf").drives_for(emission)
+
+    @cached_property
+    def powers_at_full(self) -> Doubles | None:
+        """(e, 81), the spectrum of each emitter at full; None if one is unknown."""
+        spectra = [x.spectrum for x in self.emitters if x.spectrum is not None]
+        if len(spectra) < len(self.emitters):
+            return None
+        return np.asarray(self.levels[:, None] * np.array(spectra, np.float64))
 
     def can_mix(self, emission: Doubles) -> bool:
         """Return whether some drives mix an emission (3,)."""

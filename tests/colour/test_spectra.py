@@ -5,8 +5,11 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from lightpaint.colour.color import kelvin_to_rgb
+from lightpaint.colour.lamp import Lamp, LampEmitter
 from lightpaint.colour.planckian_locus import xy_of, xy_of_spectrum
 from lightpaint.colour.primaries import colour_science
+from lightpaint.colour.spectra.color_rendering import color_rendering, fidelity
 from lightpaint.colour.spectra.spectrum import (
     WAVELENGTHS,
     rgb_of_powers,
@@ -143,3 +146,60 @@ def test_an_emitter_keeps_its_spectrum():
     assert len(emitter.spectrum) == len(WAVELENGTHS)
     assert np.ptp(emitter.spectrum) == 0
     assert Constraints.of({"par": table})
+
+
+def _rendering_of(name: str):
+    found = color_rendering(np.array(spectrum_of(*named_spectrum(name, HERE))))
+    assert found is not None
+    return found
+
+
+#: Ra of CIE 15:2004, in whole numbers; Rf and Rg of TM-30-18's calculator.
+KNOWN = {"A": (100, 100, 100), "D65": (100, 100, 100), "FL2": (64, 70.1, 86.4)}
+
+
+@pytest.mark.parametrize("name", KNOWN)
+def test_known_illuminants_have_their_rendering(name: str):
+    found, (ra, rf, rg) = _rendering_of(name), KNOWN[name]
+    assert found.ra == pytest.approx(ra, abs=0.5)
+    assert found.rf == pytest.approx(rf, abs=0.1)
+    assert found.rg == pytest.approx(rg, abs=0.1)
+
+
+def test_colours_have_no_rendering():
+    red = np.exp(-0.5 * ((WAVELENGTHS - 630) / 12.0) ** 2)
+    assert color_rendering(red) is None
+    assert color_rendering(0 * red) is None
+
+
+def _rgbw(**fields: object) -> Lamp:
+    peaks = {"red": (630, 10), "green": (525, 15), "blue": (455, 10), "white": (575, 60)}
+    waves = np.arange(380, 781.0)
+    emitters = []
+    for name, (peak, width) in peaks.items():
+        spectrum = spectrum_of(waves, np.exp(-0.5 * ((waves - peak) / width) ** 2))
+        color = tuple(rgb_of_powers(spectrum).tolist())
+        emitters.append(LampEmitter(name, color, watts=10, spectrum=spectrum))
+    return Lamp(tuple(emitters), **fields)
+
+
+def test_the_mix_of_the_best_rf_is_that_of_a_fine_search():
+    """RGBW leaves one dimension, along which all mixes are tried."""
+    lamp = _rgbw(prefer="rf")
+    white = kelvin_to_rgb(3200.0)
+    emission = 0.6 * np.asarray(white)
+    found = lamp.drives_for(emission)
+    assert lamp.mix(found) == pytest.approx(emission, abs=1e-6)
+    assert lamp.powers_at_full is not None
+    free = np.linalg.svd(lamp.columns.T)[2][-1]
+    tried = [found + t * free for t in np.linspace(-1, 1, 201)]
+    tried = [x for x in tried if x.min() >= -1e-9 and x.max() <= 1 + 1e-9]
+    best = max(fidelity(x @ lamp.powers_at_full) for x in tried)
+    rf = fidelity(found @ lamp.powers_at_full)
+    assert rf > best - 1  # places of the search are an eighth of the way apart
+    assert rf > fidelity(_rgbw().drives_for(emission) @ lamp.powers_at_full) - 1e-9
+
+
+def test_of_coloured_light_the_best_rf_is_the_least_power():
+    emission = _rgbw().mix(np.array([0.5, 0.0, 0.3, 0.0]))
+    assert _rgbw(prefer="rf").drives_for(emission) == pytest.approx(_rgbw().drives_for(emission))

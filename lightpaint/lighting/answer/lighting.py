@@ -176,11 +176,9 @@ class LightSetting:
     @cached_property
     def powers(self) -> Doubles | None:
         """(81,), the spectrum of its emission; None if a spectrum of its emitters is unknown."""
-        spectra = [] if self.lamp is None else [x.spectrum for x in self.lamp.emitters]
-        if self.lamp is None or any(x is None for x in spectra):
+        if self.lamp is None or self.lamp.powers_at_full is None:
             return None
-        levels = np.array(list(self.drives.values())) * self.lamp.levels
-        return np.asarray(levels @ np.array(spectra, np.float64))
+        return np.asarray(np.array(list(self.drives.values())) @ self.lamp.powers_at_full)
 
     @property
     def is_partly_reached(self) -> bool:
