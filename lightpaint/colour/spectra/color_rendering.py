@@ -7,6 +7,7 @@ whites alone.
 import warnings
 from dataclasses import dataclass
 from functools import lru_cache
+from threading import Lock
 from typing import Any
 
 import numpy as np
@@ -58,8 +59,18 @@ def fidelity(powers: Doubles) -> float:
     return -np.inf if found is None else found.rf
 
 
+#: Held by the thread that asks colour-science, whose scale of numbers is one for all threads: two at
+#: a time leave it wrong (findings/colour_science_threads_leave_its_scale_wrong.sh).
+_ONE_AT_A_TIME = Lock()
+
+
 @lru_cache(1024)
 def _of_spectrum(spectrum: Spectrum) -> ColorRendering:
+    with _ONE_AT_A_TIME:
+        return _computed(spectrum)
+
+
+def _computed(spectrum: Spectrum) -> ColorRendering:
     quality = colour_science().quality
     # Both are defined on this grid. On a finer one the splines of colour-science would change it.
     measured = _distribution(spectrum)

@@ -71,7 +71,7 @@ class WholeLamps:
     def _dimmer(self, knob: Knob, lamps: dict[int, Lamp]) -> Unknown:
         """Return the unknown of lights of one colour each, by the drives that mix it at full."""
         [unknown] = knob.unknowns
-        columns = []
+        columns: list[tuple[int, Doubles]] = []
         for k, color in unknown.columns:
             lamp = lamps.get(k)
             brightest = 1.0 if lamp is None else lamp.brightest(color) or 1.0

@@ -200,7 +200,7 @@ class Job:
         if self.settings.suggest:
             check_suggestible(scenes[0])
         all_rigging = rigging_for(self.rigging, scenes, self.settings)
-        check_spectral(self.settings, all_rigging, self.placement)
+        check_spectral(self.settings, all_constraints, all_rigging, self.placement)
         views = painted_views(scenes, targets, bases, folders, self.settings)
         if self.all_groups:
             views = tuple(x.without(y.holes) for x, y in zip(views, self.all_groups, strict=True))

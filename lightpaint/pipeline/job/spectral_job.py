@@ -27,7 +27,7 @@ def spectral_scenes(scenes: Sequence[Scene], constraints: Constraints) -> list[S
     return found
 
 
-def check_spectral(settings: Settings, *others: object) -> None:
+def check_spectral(settings: Settings, constraints: Constraints, *others: object) -> None:
     """Raise LightpaintError for what does not go with spectra. others: what moves or adds lights;
     false if there is nothing.
     """
@@ -39,6 +39,10 @@ def check_spectral(settings: Settings, *others: object) -> None:
     if unusable:
         raise LightpaintError(
             Hint("spectral", True), " does not go with ", Hint(unusable[0]), ": leave one out"
+        )
+    if constraints.start:
+        raise LightpaintError(
+            Hint("spectral", True), " starts from the scene as it is: leave ", Hint("start"), " out"
         )
     if any(others):
         raise LightpaintError(

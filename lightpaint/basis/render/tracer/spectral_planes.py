@@ -90,7 +90,7 @@ def _color_table(spectrum: Spectrum | None) -> Doubles:
 
     spectrum: of an emitter, whose light is relative to D65; None for light as it is in the scene.
     """
-    waves = FIRST_NM + 0.5 + np.arange(BINS)
+    waves: Doubles = FIRST_NM + 0.5 + np.arange(BINS, dtype=np.float64)
     metres, observer = matching_functions()
     xyz = np.stack([np.interp(waves, metres * 1e9, x) for x in observer.T], axis=1)
     if spectrum is None:
