@@ -1,5 +1,6 @@
 """Spectra of lights: known illuminants, files as instruments write them, and mistakes in these."""
 
+from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 
 import numpy as np
@@ -203,3 +204,15 @@ def test_the_mix_of_the_best_rf_is_that_of_a_fine_search():
 def test_of_coloured_light_the_best_rf_is_the_least_power():
     emission = _rgbw().mix(np.array([0.5, 0.0, 0.3, 0.0]))
     assert _rgbw(prefer="rf").drives_for(emission) == pytest.approx(_rgbw().drives_for(emission))
+
+
+#: Ra of the illuminants FL1 to FL12 of CIE 15:2004.
+FLUORESCENT = (76, 64, 57, 51, 72, 59, 90, 95, 90, 81, 83, 83)
+
+
+def test_threads_get_the_numbers_of_one():
+    """colour-science alone leaves wrong ones for good, once two threads have asked at a time."""
+    spectra = [spectrum_of(*named_spectrum(f"FL{k}", HERE)) for k in range(1, 13)]
+    with ThreadPoolExecutor(4) as pool:
+        found = list(pool.map(lambda x: color_rendering(np.array(x)), spectra))
+    assert [None if x is None else x.ra for x in found] == pytest.approx(FLUORESCENT, abs=0.6)

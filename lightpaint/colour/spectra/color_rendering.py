@@ -59,8 +59,8 @@ def fidelity(powers: Doubles) -> float:
     return -np.inf if found is None else found.rf
 
 
-#: Held by the thread that asks colour-science, whose scale of numbers is one for all threads: two at
-#: a time leave it wrong (findings/colour_science_threads_leave_its_scale_wrong.sh).
+#: Held by the thread that asks colour-science, whose scale of numbers is one for all threads: two
+#: at a time leave it wrong (findings/colour_science_threads_leave_its_scale_wrong.sh).
 _ONE_AT_A_TIME = Lock()
 
 

@@ -11,14 +11,17 @@ from lightpaint.colour.spectra.color_rendering import (
 )
 from lightpaint.lighting.answer.lighting import Lighting, LightSetting
 
+#: Most lamps whose best mix is searched, which takes a second or two for each.
+SEARCHED_LAMPS = 8
+
 
 @dataclass(frozen=True)
 class LightRendering:
     """What the spectrum of a lamp does.
 
     color: how it renders colours; None for a light that is off, or far from white. best_rf: the
-    highest Rf that was found among mixes of the same colour. lm_per_w: None if lumens or watts are
-    unknown.
+    highest Rf that was found among mixes of the same colour, of the first lamps. lm_per_w: None if
+    lumens or watts are unknown.
     """
 
     color: ColorRendering | None
@@ -28,18 +31,18 @@ class LightRendering:
 
 def renderings_of(lighting: Lighting) -> dict[str, LightRendering]:
     """Return what the spectrum of each lamp that is on does, of those whose spectra are known."""
+    lamps = [x for x in lighting.of_lamps().lights if x.powers is not None and x.powers.any()]
     return {
-        light.name: _rendering(lighting, light)
-        for light in lighting.of_lamps().lights
-        if light.powers is not None and light.powers.any()
+        light.name: _rendering(lighting, light, is_searched=k < SEARCHED_LAMPS)
+        for k, light in enumerate(lamps)
     }
 
 
-def _rendering(lighting: Lighting, light: LightSetting) -> LightRendering:
+def _rendering(lighting: Lighting, light: LightSetting, *, is_searched: bool) -> LightRendering:
     assert light.lamp is not None
     assert light.powers is not None
     color, best = color_rendering(light.powers), None
-    if color is not None:
+    if color is not None and is_searched:
         mix = light.lamp.best_rendering(np.array(light.emission))
         assert light.lamp.powers_at_full is not None
         best = max(color.rf, fidelity(mix @ light.lamp.powers_at_full))

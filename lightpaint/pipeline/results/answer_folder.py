@@ -121,4 +121,5 @@ def new_answer(
 
 def reload_relit(relit: Scene, path: Path, sensor: int) -> Scene:
     """Load a relit scene again from `path`, with its parameters."""
-    return load_scene(path, sensor=sensor, parameters=relit.parameters, use_lights_file=False)
+    scene = load_scene(path, sensor=sensor, parameters=relit.parameters, use_lights_file=False)
+    return replace(scene, is_spectral=relit.is_spectral)

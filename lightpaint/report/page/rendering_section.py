@@ -38,6 +38,8 @@ def _cells(found: LightRendering) -> list[str]:
     return [
         f"{color.kelvin:.0f} K",
         f"{color.duv:+.4f}",
-        *(f"{x:.0f}" for x in (color.ra, color.r9, color.rf, found.best_rf or color.rf, color.rg)),
+        *(f"{x:.0f}" for x in (color.ra, color.r9, color.rf)),
+        "" if found.best_rf is None else f"{found.best_rf:.0f}",
+        f"{color.rg:.0f}",
         efficacy,
     ]
