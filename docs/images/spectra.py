@@ -26,6 +26,9 @@ from lightpaint.colour.srgb import encode_display, to_8_bit
 HERE = Path(__file__).resolve().parent
 WIDTH, HEIGHT, FOOT = 320, 200, 22
 
+#: Brightness of the picture.
+EXPOSURE = 30.0
+
 #: LEDs, as Gaussians: peaks and widths in nanometres, and a share of full. The white one is a blue
 #: LED with a phosphor.
 LEDS = {
@@ -91,7 +94,8 @@ def lamp_of_leds() -> Lamp:
 def panel(basis: Basis, lamp: Lamp, drives: np.ndarray) -> np.ndarray:
     """Return the room under a mix, (h, w, 3) 8 bits, with its Rf below."""
     weights = np.repeat((drives * lamp.levels)[:, None], 3, axis=1)
-    light = basis.mix(weights) * (10.0 / np.pi)
+    # As a camera shows it that is balanced for that white.
+    light = basis.mix(weights) * (EXPOSURE / np.asarray(kelvin_to_rgb(3200.0), np.float32))
     assert lamp.powers_at_full is not None
     found = color_rendering(drives @ lamp.powers_at_full)
     assert found is not None

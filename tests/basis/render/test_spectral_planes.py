@@ -25,6 +25,7 @@ from lightpaint.lighting.answer.combination import combine
 from lightpaint.lighting.answer.lighting import Lighting
 from lightpaint.relit.relight import relight
 from lightpaint.relit.verification_render import verify
+from lightpaint.scene.properties.measuring_points import MeasuringPoints
 from lightpaint.scene.scene_reader import load_scene
 
 WAVES = np.arange(380, 781.0)
@@ -83,6 +84,19 @@ def test_one_bounce_is_spectrum_times_reflectance_times_observer(tmp_path: Path)
         # Each pixel has 16 wavelengths in 256 places: a tenth of a nanometre apart.
         assert image.mean(axis=(0, 1)) == pytest.approx(expected, abs=1e-3 * np.abs(expected).max())
         assert image.std(axis=(0, 1)).max() < 0.01 * np.abs(expected).max()
+
+
+def test_light_at_points_is_intensity_over_squared_distance(tmp_path: Path):
+    (tmp_path / "floor.xml").write_text(FLOOR)
+    scene = load_scene(tmp_path / "floor.xml")
+    up = np.array([[0.0, 0.0, 1.0]])
+    points = MeasuringPoints(np.array([[0.0, 0.0, 1e-3]]), up, np.zeros(1, bool))
+    at_floor = scene.with_lamps({"lamp": LEDS}).at_points(points)
+    basis = render_basis(at_floor, spp=64)
+    for name in LEDS.names:
+        assert luminance(basis.image(f"lamp/{name}"))[0, 0] == pytest.approx(1 / 4, rel=5e-3)
+    in_rgb = render_basis(scene.at_points(points), spp=64)
+    assert in_rgb.image("lamp")[0, 0] == pytest.approx(1 / 4, rel=2e-3)
 
 
 def test_a_room_under_d65_is_that_of_rgb(tmp_path: Path):
