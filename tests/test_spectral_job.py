@@ -16,7 +16,7 @@ from lightpaint.lighting.answer.lighting_file import read_lighting
 from lightpaint.lighting.constraints.constraints_file import constraints_of
 from lightpaint.lighting.unknowns.reduction import lamps_by_name
 from lightpaint.pipeline.results.results import verify_result
-from lightpaint.relit.export.spectra import spectra_csv
+from lightpaint.relit.export.spectra_table import spectra_csv
 from lightpaint.scene.scene_reader import load_scene
 
 LEVELS = {"red": 4.0, "green": 8.0, "blue": 1.5}

@@ -10,7 +10,7 @@ from lightpaint.colour.spectra.spectrum import WAVELENGTHS, black_body, rgb_of_p
 from lightpaint.errors import LightpaintError
 from lightpaint.lighting.answer.light_rendering import renderings_of
 from lightpaint.lighting.answer.lighting import Lighting, LightSetting
-from lightpaint.relit.export.spectra import spectra_csv
+from lightpaint.relit.export.spectra_table import spectra_csv
 from lightpaint.report.page.rendering_section import rendering_numbers, rendering_section
 
 

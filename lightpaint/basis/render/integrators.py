@@ -42,7 +42,7 @@ def why_not_one_pass(scene: Scene) -> str | None:
     return None
 
 
-def check_spectral(scene: Scene) -> None:
+def check_renders_spectra(scene: Scene) -> None:
     """Raise SceneError for a scene that cannot be rendered with spectra."""
     if (reason := why_not_one_pass(scene)) is not None:
         raise SceneError(

@@ -1,4 +1,4 @@
-"""How a light renders the colours of things: CIE 13.3 and ANSI/IES TM-30, by colour-science.
+"""Colour rendering of a light by CIE 13.3 and ANSI/IES TM-30, from colour-science.
 
 Both compare with daylight or a black body of the same colour temperature, so they say something of
 whites alone.

@@ -71,7 +71,7 @@ def named_spectrum(name: str, folder: Path) -> tuple[Doubles, Doubles]:
 def read_spectrum(path: Path) -> tuple[Doubles, Doubles]:
     """Return nanometres (k,), rising, and power (k,), >= 0, of a measurement in a file.
 
-    Raises ColorError for a file that is missing, or is no spectrum of visible light.
+    Raises ColorError for a file that is missing, or is not a spectrum of visible light.
     """
     if path.suffix.lower() in TM27:
         points = _points_of_tm27(read_bytes(path, "spectrum", ColorError, limit=MAX_BYTES), path)

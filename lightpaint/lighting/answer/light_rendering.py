@@ -1,4 +1,4 @@
-"""How the lamps of a lighting render colours, and how much light they make of a watt."""
+"""Colour rendering of the lamps of a lighting, and the light that they make of a watt."""
 
 from dataclasses import dataclass
 
@@ -17,7 +17,7 @@ SEARCHED_LAMPS = 8
 
 @dataclass(frozen=True)
 class LightRendering:
-    """What the spectrum of a lamp does.
+    """Colour rendering and efficacy of a lamp.
 
     color: how it renders colours; None for a light that is off, or far from white. best_rf: the
     highest Rf that was found among mixes of the same colour, of the first lamps. lm_per_w: None if
@@ -30,7 +30,7 @@ class LightRendering:
 
 
 def renderings_of(lighting: Lighting) -> dict[str, LightRendering]:
-    """Return what the spectrum of each lamp that is on does, of those whose spectra are known."""
+    """Return those of each lamp that is on and whose spectra are known, by its name."""
     lamps = [x for x in lighting.of_lamps().lights if x.powers is not None and x.powers.any()]
     return {
         light.name: _rendering(lighting, light, is_searched=k < SEARCHED_LAMPS)

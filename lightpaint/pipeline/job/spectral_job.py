@@ -2,7 +2,7 @@
 
 from collections.abc import Sequence
 
-from lightpaint.basis.render.integrators import check_spectral as check_renderable
+from lightpaint.basis.render.integrators import check_renders_spectra
 from lightpaint.basis.render.render_origin import basis_lights
 from lightpaint.errors import LightpaintError
 from lightpaint.lighting.constraints.constraints import Constraints
@@ -21,7 +21,7 @@ def spectral_scenes(scenes: Sequence[Scene], constraints: Constraints) -> list[S
     found = []
     for scene in scenes:
         if not scene.is_spectral:
-            check_renderable(scene)
+            check_renders_spectra(scene)
             scene = scene.with_lamps(lamps_by_name(constraints, basis_lights(scene)))
         found.append(scene)
     return found

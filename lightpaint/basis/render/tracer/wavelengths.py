@@ -1,4 +1,4 @@
-"""What light along a path is made of: RGB, or power at wavelengths that all emitters share.
+"""Light along a path: RGB, or power at wavelengths that all emitters share.
 
 Mitsuba's spectra hold four wavelengths. A path of a spectral render carries several of them,
 packets, along the same rays: each surface and each emitter is asked for all, with the same random
@@ -45,7 +45,7 @@ class RgbPaths:
     packets = 1
 
     def along(self, numbers, term):
-        """Return what the light of each path is made of. term: number of its sample."""
+        """Return the paths of a sample with their wavelengths. term: number of the sample."""
         return self
 
     def at(self, si, packet):
