@@ -81,10 +81,10 @@ def use_variant(requested: str | None = None) -> Backend:
 
 @contextmanager
 def spectral_variant() -> Iterator[None]:
-    """Make Mitsuba render spectra instead of RGB within the block, in which no other thread uses it.
+    """Make Mitsuba render spectra instead of RGB within the block.
 
-    Scenes belong to the variant in which they were loaded. Raises BackendError where there is no
-    spectral variant that runs Python integrators.
+    No other thread uses it meanwhile. Scenes belong to the variant in which they were loaded.
+    Raises BackendError where there is no spectral variant that runs Python integrators.
     """
     global _current
     with MITSUBA.acquired():
