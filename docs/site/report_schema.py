@@ -65,6 +65,7 @@ def report_schema() -> Schema:
         "colors": _by_name(_record(**_fields(ColorChoice, "delta_e", "light", "before", "color"))),
         "fit": _fit(),
         "lights": _by_name(_light()),
+        "rendering": _by_name(_rendering()),
         "missed": _missed(region),
         "uncertainty": _record(excess=_NUMBER, most_uncertain=_TEXT, halving_spp=_NUMBER),
         "verification": _verification(size),
@@ -75,6 +76,11 @@ def report_schema() -> Schema:
     required = ["basis", "painting", "view", "seen", "meant", "fit", "lights"]
     head = {"format": {"const": FORMAT}, **_all(_TEXT, "lightpaint", "target", "command")}
     return {**_record(**head, **parts), "required": [*head, *required]}
+
+
+def _rendering() -> Schema:
+    names = ("kelvin", "duv", "ra", "r9", "rf", "rg", "best_rf", "lm_per_w")
+    return _record(**_all(_NUMBER, *names))
 
 
 def _wish() -> Schema:

@@ -58,6 +58,10 @@ def lighting_schema() -> Schema:
     light["properties"]["photometry"] = {"type": "object"}
     # The fields of its lamp stand beside its own.
     del light["properties"]["lamp"]
+    # Drives stand for the mix, and lamps for their emitters.
+    for name in ("mix", "mix_errors", "part_of"):
+        del light["properties"][name]
+    light["properties"]["is_spectral"] = {"type": "boolean"}
     light["properties"] |= schema_of(Lamp)["properties"]
     drives = {"type": "object", "additionalProperties": {"type": "number"}}
     errors = {"type": "object", "additionalProperties": {"type": ["number", "null"]}}

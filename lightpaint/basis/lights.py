@@ -29,6 +29,8 @@ class BasisLight:
     identity: identity of its plane; planes with equal identities are equal up to noise (see
     `Light.identity`). "" if unknown.
     is_outside_gamut: whether its emission has negative channels, as LEDs outside Rec.709 have.
+    lamp: of an emitter of a lamp in a basis of spectra, the lamp's name; its weight is the
+    luminance of its emission.
     """
 
     name: str
@@ -43,6 +45,7 @@ class BasisLight:
     unit_flux: RGB | None = None
     identity: str = ""
     is_outside_gamut: bool = False
+    lamp: str = ""
 
     def __post_init__(self) -> None:
         if len(self.name) > MAX_NAME:

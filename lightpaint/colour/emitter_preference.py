@@ -3,4 +3,4 @@
 from typing import Literal
 
 #: What a lamp saves, or uses most, among the drives that mix the same colour.
-Preference = Literal["watts", "white", "fewest"]
+Preference = Literal["watts", "white", "fewest", "rf"]

@@ -6,7 +6,7 @@ preference chooses one of these, so that the emission stays the same (docs/metho
 """
 
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property, lru_cache
 from itertools import combinations, product
 
@@ -15,6 +15,8 @@ import numpy as np
 from lightpaint.arrays import RGB, Bools, Doubles, Indices
 from lightpaint.colour.color import cct_and_duv, luminance
 from lightpaint.colour.emitter_preference import Preference
+from lightpaint.colour.spectra.best_mix import best_mix
+from lightpaint.colour.spectra.spectrum import WAVELENGTHS, Spectrum
 
 #: Most emitters of a lamp: the mixes that are compared grow exponentially with their number.
 MAX_EMITTERS = 10
@@ -36,7 +38,7 @@ class LampEmitter:
 
     emission: linear Rec.709 at full, in the unit of the light; channels may be negative, since LEDs
     lie outside Rec.709. most: the largest drive, at most 1. bits: of the channel that sets it.
-    watts: power at full, if known.
+    watts: power at full, if known. spectrum: of luminance 1, if known.
     """
 
     name: str
@@ -44,6 +46,13 @@ class LampEmitter:
     most: float = 1.0
     bits: int = 8
     watts: float | None = None
+    spectrum: Spectrum | None = None
+
+    def __post_init__(self) -> None:
+        if self.spectrum is not None and len(self.spectrum) != len(WAVELENGTHS):
+            raise ValueError(
+                f"a spectrum has {len(self.spectrum)} powers: expected {len(WAVELENGTHS)}"
+            )
 
     def level(self, drive: float) -> int:
         """Return the level of its channel for a drive."""
@@ -75,6 +84,11 @@ class Lamp:
         return np.array([x.emission for x in self.emitters], np.float64)
 
     @cached_property
+    def levels(self) -> Doubles:
+        """(e,), the luminance of each emitter at full."""
+        return np.asarray(luminance(self.columns), np.float64)
+
+    @cached_property
     def most(self) -> Doubles:
         """(e,), the largest drive of each emitter."""
         return np.array([x.most for x in self.emitters])
@@ -101,7 +115,28 @@ class Lamp:
             drives = mixes.values(self.mix(self._nearest_drives(emission)))
         if not len(drives):  # round-off at a corner of what it can mix
             return self._nearest_drives(emission)
-        return np.asarray(drives[np.argmin(self._costs(drives))])
+        # The cheapest comes first, for colours of which nothing tells how they render others.
+        drives = drives[np.argsort(self._costs(drives), kind="stable")]
+        if self.prefer == "rf" and self.powers_at_full is not None:
+            return best_mix(drives, self.powers_at_full)
+        return np.asarray(drives[0])
+
+    @cached_property
+    def while_painting(self) -> "Lamp":
+        """The lamp without a preference that takes a second to find."""
+        return replace(self, prefer="watts") if self.prefer == "rf" else self
+
+    def best_rendering(self, emission: Doubles) -> Doubles:
+        """Return the drives (e,) of the highest Rf found that mix an emission (3,)."""
+        return replace(self, prefer="rf").drives_for(emission)
+
+    @cached_property
+    def powers_at_full(self) -> Doubles | None:
+        """(e, 81), the spectrum of each emitter at full; None if one is unknown."""
+        spectra = [x.spectrum for x in self.emitters if x.spectrum is not None]
+        if len(spectra) < len(self.emitters):
+            return None
+        return np.asarray(self.levels[:, None] * np.array(spectra, np.float64))
 
     def can_mix(self, emission: Doubles) -> bool:
         """Return whether some drives mix an emission (3,)."""

@@ -6,13 +6,17 @@ from pathlib import Path
 
 import numpy as np
 
-from lightpaint.arrays import RGB, Floats
+from lightpaint.arrays import RGB, Doubles, Floats
+from lightpaint.colour.spectra.spectrum import WAVELENGTHS
 from lightpaint.errors import SceneError
 from lightpaint.relit.xml_edit import Element, XmlFile
 from lightpaint.scene.checks.tokens import tag
 from lightpaint.scene.lights.emitters import Emitter
 from lightpaint.scene.properties.emission import AS_AUTHORED, Scaling, child_named
 from lightpaint.scene.scene import Scene
+
+#: Luminance that Mitsuba shows for a power per nanometre that has the luminance 1 for the observer.
+LUMINANCE_OF_POWER = 0.009367658735689113
 
 
 @dataclass
@@ -139,6 +143,14 @@ def set_emission(
     elif rgb != AS_AUTHORED:
         return _scale_image(changes, scene, emitter, kind.parameter, rgb, stem)
     return {}
+
+
+def set_spectrum(changes: Changes, emitter: Emitter, powers: Doubles) -> None:
+    """Set the emission of `emitter` to a spectrum. powers: (81,) at WAVELENGTHS, for luminance."""
+    assert emitter.kind is not None
+    values = zip(WAVELENGTHS.tolist(), (powers / LUMINANCE_OF_POWER).tolist(), strict=True)
+    text = ", ".join(f"{wave}:{value:.6g}" for wave, value in values)
+    changes.set("spectrum", emitter.kind.parameter, text)
 
 
 def set_image(changes: Changes, emitter: Emitter, image: Floats, *, stem: str) -> dict[str, Floats]:

@@ -22,6 +22,7 @@ from lightpaint.relit.export.fixtures import fixtures_csv, fixtures_json
 from lightpaint.relit.export.mvr_copy import show_copy
 from lightpaint.relit.export.nuke import needs_copy, nuke_lights, nuke_script, spoken_unreadable
 from lightpaint.relit.export.program_axes import SkyMap
+from lightpaint.relit.export.spectra_table import spectra_csv
 from lightpaint.relit.export.usd import check_usd, usd_overrides
 from lightpaint.relit.export.usd_groups import usd_multipliers
 from lightpaint.relit.exported_answer import (
@@ -250,6 +251,13 @@ class JsonFormat(TableFormat):
     text_of = staticmethod(fixtures_json)
 
 
+class SpectraFormat(TableFormat):
+    """A table of the lamps' spectra."""
+
+    name, file, file_of_groups = "spectra", "spectra.csv", "spectra.csv"
+    text_of = staticmethod(spectra_csv)
+
+
 class MitsubaFormat(ExportFormat):
     """A patch of the scene's XML."""
 
@@ -291,7 +299,7 @@ class MvrFormat(ExportFormat):
 FORMS: dict[str, ExportFormat] = {
     x.name: x
     for x in (
-        *(CsvFormat(), JsonFormat(), MitsubaFormat()),
+        *(CsvFormat(), JsonFormat(), SpectraFormat(), MitsubaFormat()),
         *(UsdFormat(), BlenderFormat(), NukeFormat(), MvrFormat()),
     )
 }

@@ -13,7 +13,7 @@ from pathlib import Path
 
 import numpy as np
 
-from lightpaint.arrays import RGB
+from lightpaint.arrays import RGB, Doubles
 from lightpaint.display_text import some_names
 from lightpaint.errors import LightingError, OutputError, SceneError
 from lightpaint.files import write_bytes
@@ -67,16 +67,19 @@ def relight(scene: Scene, lighting: Lighting, path: str | Path) -> Scene:
         >>> relit.light("panel").emission
         (2.0, 1.5, 1.0)
     """
-    path = Path(path)
-    scene = scene_of(scene, lighting)
-    for file, content in relit_files(scene, lighting.emission, path).items():
+    path, lighting = Path(path), lighting.of_lamps()
+    scene, spectra = scene_of(scene, lighting), spectra_of(lighting)
+    for file, content in relit_files(scene, lighting.emission, path, spectra=spectra).items():
         if isinstance(content, bytes):
             write_bytes(file, content)
         else:
             write_rgb(file, content)
-    relit = _loaded(path, scene)
+    relit = replace(_loaded(path, scene), is_spectral=bool(spectra))
+    with_spectrum = {x for name in spectra for x in lighting.members[name]}
     emissions = {emitter.name: emitter.emission for emitter in relit.emitters}
     for emitter, new_emission in settings_of(scene, lighting.emission):
+        if emitter.name in with_spectrum:
+            continue  # Mitsuba converts it in its own way in RGB
         if emitter.texel or emitter.kind is None or emitter.kind.scaling is not Scaling.COLOUR:
             continue  # a factor of 1 means as authored there, and texels are in an image
         written = written_emission(scene, emitter, new_emission)
@@ -108,6 +111,12 @@ def _loaded(path: Path, scene: Scene) -> Scene:
             }
 
 
+def spectra_of(lighting: Lighting) -> dict[str, Doubles]:
+    """Return the spectra of the lamps of a lighting that was found with spectra."""
+    powers = {x.name: x.powers for x in lighting.lights if x.mix is not None}
+    return {name: spectrum for name, spectrum in powers.items() if spectrum is not None}
+
+
 def settle(scene: Scene, lighting: Lighting, path: Path, home: Path) -> bool:
     """Correct the relit XML at `path`, and the files beside it, for its final location `home`.
 
@@ -121,7 +130,9 @@ def settle(scene: Scene, lighting: Lighting, path: Path, home: Path) -> bool:
 
     if ways(path) == ways(home):
         return False
-    for file, content in relit_files(scene_of(scene, lighting), lighting.emission, home).items():
+    lighting = lighting.of_lamps()
+    of_lighting = scene_of(scene, lighting), lighting.emission
+    for file, content in relit_files(*of_lighting, home, spectra=spectra_of(lighting)).items():
         if isinstance(content, bytes):
             write_bytes(path.parent / file.relative_to(home.parent), content)
     return True
@@ -209,11 +220,13 @@ def scene_patch(scene: Scene, lighting: Lighting) -> str:
     `patch -p1 < relit.patch` in the folder of the scene applies it. Raises SceneError for scaled
     images, which a text patch cannot contain, and LightingError if the two name different emitters.
     """
+    lighting = lighting.of_lamps()
     scene = scene_of(scene, lighting)
     root = scene.files[0].resolve()
     place = root.parent / PATCH_SUFFIX / root.name
     lines: list[str] = []
-    for file, content in relit_files(scene, lighting.emission, place).items():
+    spectra = spectra_of(lighting)
+    for file, content in relit_files(scene, lighting.emission, place, spectra=spectra).items():
         if not isinstance(content, bytes):
             raise SceneError(
                 f"{file.name} is an image that this lighting scales, which a text patch cannot "

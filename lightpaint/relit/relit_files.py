@@ -7,9 +7,9 @@ from pathlib import Path
 
 import numpy as np
 
-from lightpaint.arrays import RGB, Floats
+from lightpaint.arrays import RGB, Doubles, Floats
 from lightpaint.errors import OutputError, SceneError
-from lightpaint.relit.emission_xml import Changes, set_emission, set_image
+from lightpaint.relit.emission_xml import Changes, set_emission, set_image, set_spectrum
 from lightpaint.relit.luminaire_xml import luminaire_of, luminaire_xml
 from lightpaint.relit.xml_edit import XmlFile
 from lightpaint.scene.checks.tokens import tag
@@ -33,6 +33,7 @@ class _Edits:
 
     texel_images: images of lights whose texels are set, with one of these and its sampling weight,
     by byte offset.
+    spectra: of emitters that have one, by byte offset: power at WAVELENGTHS, for luminance.
     integrators: replacements of elements, by byte offset; None for an addition.
     moved: child elements to set in the elements of moved lights, by byte offset, as XML by name.
     added: lines of the elements of new lights. removed: byte offsets of elements to leave out.
@@ -41,6 +42,7 @@ class _Edits:
     original: Path
     settings: dict[int, tuple[Emitter, RGB, float | None]] = field(default_factory=dict)
     texel_images: dict[int, tuple[Emitter, Floats, float | None]] = field(default_factory=dict)
+    spectra: dict[int, Doubles] = field(default_factory=dict)
     integrators: dict[int | None, str] = field(default_factory=dict)
     moved: dict[int, Mapping[str, str]] = field(default_factory=dict)
     added: list[str] = field(default_factory=list)
@@ -48,15 +50,20 @@ class _Edits:
 
 
 def relit_files(
-    scene: Scene, emission: Mapping[str, RGB], path: Path
+    scene: Scene,
+    emission: Mapping[str, RGB],
+    path: Path,
+    *,
+    spectra: Mapping[str, Doubles] | None = None,
 ) -> dict[Path, bytes | Floats]:
     """Return the content of the relit XML at `path`, and of its includes and images.
 
+    spectra: of lights that have one in the place of a colour, as in `LightSetting.powers`.
     Raises OutputError if one of them would replace a file of the scene itself.
     """
     root = scene.files[0]
     contents: dict[Path, bytes | Floats] = {}
-    for edit in _edits_of(scene, emission).values():
+    for edit in _edits_of(scene, emission, spectra or {}).values():
         is_root = edit.original == root
         target = path if is_root else path.parent / _place_of_include(edit.original, root)
         content, images = _edit(edit, target.parent, scene, path.stem)
@@ -71,7 +78,9 @@ def relit_files(
     return contents
 
 
-def _edits_of(scene: Scene, emission: Mapping[str, RGB]) -> dict[Path, _Edits]:
+def _edits_of(
+    scene: Scene, emission: Mapping[str, RGB], spectra: Mapping[str, Doubles]
+) -> dict[Path, _Edits]:
     """Return the edits of each file, by its resolved path; the root comes first."""
     root = scene.files[0]
     edits = {root.resolve(): _Edits(root)}
@@ -93,6 +102,9 @@ def _edits_of(scene: Scene, emission: Mapping[str, RGB]) -> dict[Path, _Edits]:
     unchanged = [emitter for emitter in unchanged if emitter not in kept]
     settings |= kept
     _edit_emitters(scene, edits, settings, unchanged, sampled)
+    for name, powers in spectra.items():
+        for member in scene.light(name).members:
+            edits[scene.files[member.file].resolve()].spectra[member.offset] = powers
     _edit_integrators(scene, edits)
     for index, offset in (x for hung in scene.luminaires for x in hung.further):
         file = scene.files[index]
@@ -267,7 +279,10 @@ def _edit(edit: _Edits, folder: Path, scene: Scene, stem: str) -> tuple[bytes, d
             emitter, rgb, weight = edit.settings[offset]
             if weight is not None:
                 changes.set("float", "sampling_weight", f"{weight:g}")
-            images |= set_emission(changes, scene, emitter, rgb, stem=stem)
+            if offset in edit.spectra and any(rgb):
+                set_spectrum(changes, emitter, edit.spectra[offset])
+            else:
+                images |= set_emission(changes, scene, emitter, rgb, stem=stem)
         if offset in edit.texel_images:
             emitter, image, weight = edit.texel_images[offset]
             if weight is not None:

@@ -170,12 +170,14 @@ PREFERENCE_TEXTS = {
     "watts": "the one that needs the least power",
     "white": "the one with the most light from white emitters",
     "fewest": "the one of the fewest emitters",
+    "rf": "the one that renders colours best, as far as their spectra are known",
 }
 
 
 def spoken_preference(lights: Iterable[LightSetting]) -> str:
     """Return which mix of emitters lamps have, in a sentence; "" without lamps."""
-    preferences = [light.lamp.prefer for light in lights if light.lamp is not None]
+    lamps = [x.lamp for x in lights if x.lamp is not None and not x.part_of and x.mix is None]
+    preferences = [lamp.prefer for lamp in lamps]
     if not preferences:
         return ""
     return (

@@ -46,6 +46,7 @@ from lightpaint.report.measures import (
     relative_residual,
 )
 from lightpaint.report.page.diagnosis_section import maps_limit
+from lightpaint.report.page.rendering_section import rendering_numbers
 from lightpaint.report.planes_text import planes_numbers
 from lightpaint.report.reported_answer import ReportedAnswer
 from lightpaint.report.rig.hung_lights import placement_numbers
@@ -75,6 +76,7 @@ def report_numbers(answer: ReportedAnswer, *, missed: Residual | None = None) ->
         "colors": {choice.colors: _choice(choice) for choice in answer.color_choices} or None,
         "fit": _fit(solution, predicted, answer.unconstrained),
         "lights": _lights(basis, solution, uncertainty),
+        "rendering": rendering_numbers(solution.lighting),
         "missed": None if diagnosis is None else _missed(solution, diagnosis, transform),
         "uncertainty": None if uncertainty is None else _uncertainty(basis, solution, uncertainty),
         "verification": None if verification is None else verification_numbers(verification),

@@ -7,18 +7,21 @@ and no reference to one of its emitters may outlive it.
 import gc
 import hashlib
 from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
+from contextlib import AbstractContextManager, nullcontext
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 from pathlib import Path, PurePath
 from typing import Any, TypeVar
 
 from lightpaint.arrays import RGB, Floats, Position
+from lightpaint.colour.lamp import Lamp
 from lightpaint.display_text import Listed, Shown, some_of
 from lightpaint.keywords import keywords
 from lightpaint.luminaires.plugin_names import LUMINAIRE_PLUGINS
 from lightpaint.scene.lights.emitters import Emitter, find_emitters
 from lightpaint.scene.lights.hung_luminaires import HungLuminaire
 from lightpaint.scene.lights.image_split import with_split
+from lightpaint.scene.lights.lamp_lights import lights_of_lamps
 from lightpaint.scene.lights.light import (
     Light,
     black_emitters,
@@ -48,6 +51,7 @@ from lightpaint.scene.properties.site import EmitterPlace, Site
 from lightpaint.scene.runtime.kernel_threads import kernels
 from lightpaint.scene.runtime.mitsuba_errors import mitsuba_errors, render_errors
 from lightpaint.scene.runtime.render_lock import MITSUBA
+from lightpaint.scene.runtime.variant import spectral_variant
 from lightpaint.scene.scene_tree import ParsedScene, darkened, with_elements, with_motions
 
 _Result_T = TypeVar("_Result_T")
@@ -62,6 +66,7 @@ class SceneFiles:
     path: Path
     files: tuple[Path, ...]
     lights_file: Path | None
+    requests: SceneRequests
     parsed: ParsedScene
 
     @property
@@ -84,8 +89,9 @@ class SceneFiles:
 
     @property
     def read_files(self) -> tuple[Path, ...]:
-        """`originals`, and the lights file if there is one."""
-        return (*self.originals, *([] if self.lights_file is None else [self.lights_file]))
+        """`originals`, and the lights file and its spectra if there are any."""
+        lights_files = [] if self.lights_file is None else [self.lights_file]
+        return (*self.originals, *lights_files, *self.requests.spectrum_files)
 
     @property
     def places(self) -> frozenset[Path]:
@@ -140,6 +146,7 @@ class Scene(SceneFiles, Shown):
         added: Emitters of `with_new_emitters`, which are in no file.
         old_sites: Sites in the file of the emitters that `moved` has moved, by name.
         points: Points of `at_points`, which replace the film's pixels; None for a film.
+        is_spectral: Whether it is rendered with spectra, from `with_lamps`.
 
     Examples:
         >>> scene = lp.load_scene("room.xml")
@@ -173,6 +180,7 @@ class Scene(SceneFiles, Shown):
     added: tuple[NewEmitter, ...] = ()
     old_sites: Mapping[str, Site] = field(default_factory=dict)
     points: MeasuringPoints | None = None
+    is_spectral: bool = False
 
     def __post_init__(self) -> None:
         for name in ("lights", "emitters"):
@@ -190,15 +198,17 @@ class Scene(SceneFiles, Shown):
         """
         content = self._seen(self.content)
         is_single = all(x.member_names == (x.name,) and not x.is_fixed for x in self.lights)
-        if is_single and not self.split:
+        if is_single and not self.split and not self.is_spectral:
             return content
-        structure = [(x.name, x.member_names, x.is_fixed) for x in self.lights]
+        structure: list[Any] = [(x.name, x.member_names, x.is_fixed) for x in self.lights]
+        if self.is_spectral:
+            structure += ["spectral", *(x.spectrum for x in self.lights)]
         return hashlib.sha256(repr((content, structure)).encode()).hexdigest()[:32]
 
     @property
     def light_identities(self) -> tuple[str, ...]:
         """Identity of the image of each light; see `Light.identity`."""
-        unlit_content = self._seen(self.unlit_content)
+        unlit_content = self._seen(self.unlit_content) + ("spectral" if self.is_spectral else "")
         return tuple(light.identity(unlit_content) for light in self.lights)
 
     def _seen(self, content: str) -> str:
@@ -207,8 +217,9 @@ class Scene(SceneFiles, Shown):
 
     @property
     def plane_of(self) -> Mapping[str, int]:
-        """Index of each emitter's light, by the emitter's name."""
-        return {m.name: k for k, light in enumerate(self.lights) for m in light.members}
+        """Index of each emitter's light, by the emitter's name; of a lamp's, that of the first."""
+        lights = reversed([*enumerate(self.lights)])
+        return {m.name: k for k, light in lights for m in light.members}
 
     def with_lights(
         self, members: Mapping[str, Sequence[str]], fixed: Collection[str] = ()
@@ -220,6 +231,25 @@ class Scene(SceneFiles, Shown):
         """
         check_grouping(members, self.emitters, scene=str(self.path))
         return replace(self, lights=lights_of(self.emitters, members, fixed))
+
+    def with_lamps(self, lamps: Mapping[str, Lamp]) -> "Scene":
+        """Return this scene for renders with spectra, in which each emitter of a lamp is a light.
+
+        lamps: by name of each light that is adjusted. Raises SceneError if one cannot be rendered
+        with spectra.
+        """
+        lights = lights_of_lamps(self.lights, lamps, scene=str(self.path))
+        return replace(self, lights=lights, is_spectral=True)
+
+    @property
+    def materials(self) -> frozenset[str]:
+        """Mitsuba's names of the kinds of its materials."""
+        return self.parsed.materials()
+
+    @property
+    def in_rgb(self) -> "Scene":
+        """This scene for renders in RGB."""
+        return replace(self, is_spectral=False) if self.is_spectral else self
 
     @property
     def sensor(self) -> int:
@@ -401,13 +431,18 @@ class Scene(SceneFiles, Shown):
         views: Sequence["Scene"] = (),
     ) -> _Result_T:
         """Return the result of `work` on the loaded scene, which is released afterwards."""
-        loaded = self.load(emission, views=views)
-        try:
-            with render_errors(self.path), kernels():
-                return work(loaded)
-        finally:
-            del loaded
-            gc.collect()
+        with self.variant():
+            loaded = self.load(emission, views=views)
+            try:
+                with render_errors(self.path), kernels():
+                    return work(loaded)
+            finally:
+                del loaded
+                gc.collect()
+
+    def variant(self) -> AbstractContextManager[None]:
+        """Return a context in which Mitsuba loads and renders it with spectra, if it has them."""
+        return spectral_variant() if self.is_spectral else nullcontext()
 
 
 def up_of(parsed: ParsedScene, sensor: int, emitters: Sequence[Emitter]) -> Position:

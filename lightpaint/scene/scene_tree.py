@@ -208,9 +208,17 @@ class ParsedScene:
             props["film"] = film.load()
         with kernels_for_all_sizes():
             with self._resolving(), mitsuba_errors(self.path, self.integrator_choice):
-                scene = mi.parser.instantiate(self.config, state)
+                scene = mi.parser.instantiate(self._config(), state)
             make_normals_reproducible(scene)
         return scene
+
+    def _config(self) -> Any:
+        """Return the configuration for the variant that is in use, which may be a spectral one."""
+        import mitsuba as mi
+
+        config = mi.parser.ParserConfig(mi.variant())
+        config.merge_meshes, config.parallel = self.config.merge_meshes, self.config.parallel
+        return config
 
     def shape_plugin(self, emitter: int) -> str:
         """Return the plugin of the shape of an emitter; "" if it has no shape."""
@@ -242,6 +250,12 @@ class ParsedScene:
     def integrator(self) -> Integrator:
         """Return the scene's integrator."""
         return read_integrator(self.state, self.path)
+
+    def materials(self) -> frozenset[str]:
+        import mitsuba as mi
+
+        nodes = self._nodes_of(mi.ObjectType.BSDF)
+        return frozenset(str(self.state.nodes[k].props.plugin_name()) for k in nodes)
 
     def has_media(self) -> bool:
         import mitsuba as mi

@@ -46,12 +46,12 @@ class Surfaces:
 
 def render_surfaces(scene: Scene, *, seed: int = 0, progress: Progress = silent) -> Surfaces:
     """Render the first surfaces of `scene`, without its light."""
-    return scene.while_loaded(lambda loaded: _surfaces(scene, loaded, seed, progress))
+    return scene.in_rgb.while_loaded(lambda loaded: _surfaces(scene, loaded, seed, progress))
 
 
 def render_features(scene: Scene, *, seed: int = 0) -> Features:
     """Return albedo, normals and positions of `scene`; the first two are rounded to half floats."""
-    return scene.while_loaded(lambda loaded: loaded_features(scene, loaded, seed))
+    return scene.in_rgb.while_loaded(lambda loaded: loaded_features(scene, loaded, seed))
 
 
 def render_first_hits(
@@ -62,7 +62,7 @@ def render_first_hits(
     def render_both(loaded: Any) -> tuple[Features, Objects]:
         return loaded_features(scene, loaded, seed), _objects(scene, loaded, seed)
 
-    return scene.while_loaded(render_both) if loaded is None else render_both(loaded)
+    return scene.in_rgb.while_loaded(render_both) if loaded is None else render_both(loaded)
 
 
 def loaded_features(scene: Scene, loaded: Any, seed: int) -> Features:

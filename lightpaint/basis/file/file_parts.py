@@ -146,7 +146,7 @@ def encoded_planes_of(basis: Basis, k: int) -> list[EncodedPlane]:
 
 def light_texts(light: BasisLight, encodings: Sequence[PlaneEncoding]) -> dict[str, str]:
     """Return the text attributes for the part of a light."""
-    data = fields_of(light, "is_fixed", "unit_flux", "identity", "is_outside_gamut")
+    data = fields_of(light, "is_fixed", "unit_flux", "identity", "is_outside_gamut", "lamp")
     if light.members == (light.name,):
         del data["members"]  # the default for a single emitter
     texts = {LIGHT_KEY: json.dumps(data, ensure_ascii=False)}

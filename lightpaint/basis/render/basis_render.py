@@ -195,7 +195,8 @@ def _render_together(
         ) from None
     else:
         if needs_first_hits:
-            return with_first_hits(rendered, scene, seed, loaded=render.tracer.loaded)
+            loaded = None if scene.is_spectral else render.tracer.loaded
+            return with_first_hits(rendered, scene, seed, loaded=loaded)
         return rendered
     finally:
         render.tracer.close()

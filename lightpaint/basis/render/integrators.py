@@ -4,10 +4,12 @@ It traces the paths of `path`. Some other integrators estimate the same picture 
 their basis is then the same up to noise.
 """
 
+from lightpaint.errors import SceneError
 from lightpaint.scene.properties.emission import ENVIRONMENTS
 from lightpaint.scene.properties.integrator import Integrator
-from lightpaint.scene.runtime.variant import use_variant
+from lightpaint.scene.runtime.variant import FAST_VARIANT, use_variant
 from lightpaint.scene.scene import Scene
+from lightpaint.sentences import Hint
 
 #: Integrators that end after one bounce.
 DIRECT = ("direct", "direct_projective")
@@ -38,6 +40,21 @@ def why_not_one_pass(scene: Scene) -> str | None:
         # It would count lights without a size once per sample.
         return "the integrator direct takes other than one sample (emitter_samples, bsdf_samples)"
     return None
+
+
+def check_renders_spectra(scene: Scene) -> None:
+    """Raise SceneError for a scene that cannot be rendered with spectra."""
+    if (reason := why_not_one_pass(scene)) is not None:
+        raise SceneError(
+            f"{reason}, and spectra are only rendered where one pass renders all lights: use ",
+            Hint("integrator", "path"),
+            f" and a variant like {FAST_VARIANT}",
+        )
+    if "hair" in scene.materials:
+        raise SceneError(
+            f"{scene.path} has hair, whose fibres scatter each wavelength in its own direction: "
+            "renders with spectra cannot show it"
+        )
 
 
 def remark_on_separate_renders(scene: Scene) -> str | None:

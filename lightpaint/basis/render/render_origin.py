@@ -129,6 +129,7 @@ def basis_lights(scene: Scene) -> Lights:
             x.unit_flux,
             identity,
             min(x.emission) < 0,
+            x.lamp,
         )
         for x, identity in zip(scene.lights, scene.light_identities, strict=True)
     )

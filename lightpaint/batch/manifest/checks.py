@@ -181,6 +181,11 @@ def settings_of(manifest: Manifest, label: str, look: Mapping[str, Any]) -> Sett
             "sun adds texels for one look, and looks share their basis: leave it out here, and "
             "solve that look alone for its sun",
         )
+    if values.pop("spectral", False):
+        mistakes.add(
+            label,
+            "spectral goes with solve, not with a batch: leave it out, and solve that look alone",
+        )
     if "scene" in look:
         values["sun"] = 0  # also instead of that in a lights file
         # What an earlier run has left in the cache must not decide the answers of a batch.

@@ -97,7 +97,7 @@ def add_method(parser: argparse.ArgumentParser) -> None:
     """Add the options for how a painting is solved."""
     add_fit(parser)
     add_fields(parser, Settings, "unpainted", "emitters", "resize", "noise_correction", "refine")
-    add_fields(parser, Settings, "method", "sun", "suggest")
+    add_fields(parser, Settings, "method", "sun", "spectral", "suggest")
 
 
 def add_verification(parser: argparse.ArgumentParser) -> None:
@@ -319,8 +319,8 @@ def _add_preferences(group: argparse._ArgumentGroup) -> None:
         "--prefer-emitters",
         choices=get_args(Preference),
         help="among mixes of a lamp's emitters that look the same, choose the one that needs the "
-        "least power, with the most light from white emitters, or of the fewest emitters (default: "
-        "watts)",
+        "least power, with the most light from white emitters, of the fewest emitters, or that "
+        "renders colours best by their spectra (Rf of TM-30; default: watts)",
     )
     group.add_argument(
         "--start",

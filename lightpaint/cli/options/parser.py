@@ -241,8 +241,9 @@ def _export(parser: argparse.ArgumentParser) -> None:
         type=arguments.names_of,
         action="extend",
         required=True,
-        metavar="csv,json,mitsuba,usd,blender,nuke,mvr,cues",
+        metavar="csv,json,spectra,mitsuba,usd,blender,nuke,mvr,cues",
         help="one format or several. csv, json: fixtures with colour, kelvin, lumen and DMX; "
+        "spectra: a table of the spectra of lamps whose emitters have some; "
         "mitsuba: a patch for the XML of the scene; usd: a layer that overrides the lights "
         "of a stage; blender: a Python script that sets lights by name; nuke: a script with the "
         "lights of --scene in Nuke's 3-D system, or one that scales the light groups of --lights; "

@@ -126,6 +126,10 @@ def _constraint_bound(o: BoundedAnswer, place: int) -> ActiveBound:
     """Return the constraint on a light that has a knob, or on the lights of one dimmer."""
     knob, unknowns = o.reduction.knobs[place], list(o.reduction.places[place])
     lights, estimate = knob.lights, _release_estimate(o, knob.lights)
+    if len(lights) > 1 and len(unknowns) > 1:  # emitters of a lamp with a limit of all together
+        caps = zip(o.reduction.caps, o.optimum.cap_multipliers, strict=True)
+        force = sum(2 * float(x) for cap, x in caps if cap.unknowns[0] == unknowns[0])
+        return ActiveBound(lights, "limits", estimate, (force,), "luminance")
     if len(lights) > 1:
         [unknown] = knob.unknowns
         multipliers = tuple(2 * float(rgb @ o.gradient[k]) for k, rgb in unknown.columns)

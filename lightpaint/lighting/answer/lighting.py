@@ -4,6 +4,7 @@ import math
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
+from itertools import groupby
 from typing import Any
 
 import numpy as np
@@ -11,8 +12,10 @@ import numpy as np
 from lightpaint.arrays import RGB, Bools, Doubles, Position, as_rgb
 from lightpaint.basis.basis import Basis
 from lightpaint.basis.lights import BasisLight, Lights
-from lightpaint.colour.lamp import Lamp
+from lightpaint.colour.color import luminance
+from lightpaint.colour.lamp import Lamp, LampEmitter
 from lightpaint.colour.photometry import Photometry, photometry
+from lightpaint.colour.spectra.spectrum import rgb_of_powers
 from lightpaint.dataframes import CHANNELS, by_channel, number, pandas, xarray
 from lightpaint.display_text import Shown, some_names, some_of
 from lightpaint.errors import LightingError, UnknownLightError
@@ -53,6 +56,9 @@ class LightSetting:
     lamp: what mixes its emission from emitters. is_outside_gamut: whether it has a colour outside
     Rec.709 without that, in the scene. Channels of the emission of such lights, and only of these,
     may be negative.
+    part_of: of an emitter that is a light, as in a basis of spectra, the name of its lamp. mix,
+    mix_errors: of a lamp of such lights, the drives of its emitters and their standard errors; None
+    where they follow from the emission.
     """
 
     name: str
@@ -72,12 +78,21 @@ class LightSetting:
     untold: bool = False
     lamp: Lamp | None = None
     is_outside_gamut: bool = False
+    part_of: str = ""
+    mix: tuple[float, ...] | None = None
+    mix_errors: tuple[float | None, ...] | None = None
 
     def __post_init__(self) -> None:
         if len(self.name) > MAX_NAME:
             raise LightingError(f"a light has a name of more than {MAX_NAME} characters")
         if not self.members:
             object.__setattr__(self, "members", (self.name,))
+        if self.mix is not None and (
+            self.lamp is None
+            or len(self.mix) != len(self.lamp.emitters)
+            or not all(map(is_amount, self.mix))
+        ):
+            raise LightingError(f"light {self.name!r} has drives that are not of its emitters")
         self._check_errors()
         values = {"emission": self.emission, "weight": self.weight}
         for name, rgb in values.items():
@@ -103,11 +118,15 @@ class LightSetting:
     @property
     def physical_emission(self) -> RGB:
         """Emission in the sense of `unit`: Mitsuba's projector gives a plane at distance 1 π times
-        its parameter.
+        its parameter. That of a lamp's emitter has its colour.
         """
+        emission = self.emission
+        if self.part_of and self.lamp is not None:
+            [emitter] = self.lamp.emitters
+            emission = as_rgb(emission[0] * _own_color(emitter))
         if (self.plugin, self.unit) != PROJECTOR:
-            return self.emission
-        r, g, b = (math.pi * channel for channel in self.emission)
+            return emission
+        r, g, b = (math.pi * channel for channel in emission)
         return r, g, b
 
     def with_emission(self, emission: RGB, *, weight: RGB | None = None) -> "LightSetting":
@@ -120,6 +139,8 @@ class LightSetting:
             self,
             emission=emission,
             weight=emission if weight is None else weight,
+            mix=None,
+            mix_errors=None,
             constraint="",
             is_active=False,
             standard_error=None,
@@ -134,6 +155,8 @@ class LightSetting:
         """
         if self.lamp is None:
             return {}
+        if self.mix is not None:
+            return dict(zip(self.lamp.names, self.mix, strict=True))
         drives = self.lamp.drives_for(np.array(self.emission))
         return dict(zip(self.lamp.names, drives.tolist(), strict=True))
 
@@ -142,11 +165,20 @@ class LightSetting:
         """The standard error of each drive; None where it is unknown, and of a drive at 0 or full,
         which small errors do not move.
         """
-        if self.lamp is None or self.standard_error is None:
+        if self.mix_errors is not None:
+            return dict(zip(self.drives, self.mix_errors, strict=True))
+        if self.lamp is None or self.mix is not None or self.standard_error is None:
             return dict.fromkeys(self.drives)
         drives = np.array(list(self.drives.values()))
         errors = self.lamp.drive_errors(drives, self.standard_error)
         return dict(zip(self.drives, errors, strict=True))
+
+    @cached_property
+    def powers(self) -> Doubles | None:
+        """(81,), the spectrum of its emission; None if a spectrum of its emitters is unknown."""
+        if self.lamp is None or self.lamp.powers_at_full is None:
+            return None
+        return np.asarray(np.array(list(self.drives.values())) @ self.lamp.powers_at_full)
 
     @property
     def is_partly_reached(self) -> bool:
@@ -217,7 +249,8 @@ class Lighting(Shown, Mapping[str, LightSetting]):
         names = [light.name for light in self.lights]
         if len(set(names)) != len(names):
             raise LightingError(f"light names repeat: {some_names(names)}")
-        members = [name for light in self.lights for name in light.members]
+        lamps = {x.part_of or x.name: x.members for x in self.lights}
+        members = [name for names in lamps.values() for name in names]
         if len(set(members)) != len(members):
             raise LightingError(f"an emitter is in two lights: {some_names(sorted(members))}")
         scale = self.cd_per_unit
@@ -356,6 +389,13 @@ class Lighting(Shown, Mapping[str, LightSetting]):
         """The lighting at each frame from the first key to the last; none if it stays the same."""
         return {x: self.at_frame(x) for x in key_span(self.animation)} if self.animation else {}
 
+    def of_lamps(self) -> "Lighting":
+        """Return the lighting with a light for each lamp, also where emitters are lights."""
+        if not any(light.part_of for light in self.lights):
+            return self
+        groups = groupby(self.lights, key=lambda light: light.part_of or light.name)
+        return replace(self, lights=tuple(whole_lamp(tuple(parts)) for _, parts in groups))
+
     def for_target(self, target: str) -> "Lighting":
         """Return the lighting as the answer to that target."""
         return replace(self, target=target)
@@ -417,9 +457,13 @@ class Lighting(Shown, Mapping[str, LightSetting]):
 
         Raises LightingError if the two do not name the same lights.
         """
-        by_name = {light.name: light.weight for light in self.lights}
         if isinstance(lights, Basis):
             lights = lights.lights
+        settings = self.lights
+        if any(light.lamp for light in lights):
+            settings = tuple(part for light in settings for part in parts_of(light))
+        by_name = {light.name: light.weight for light in settings}
+        members = {light.name: light.members for light in settings}
         if set(by_name) != set(lights.names):
             missing = sorted(set(lights.names) - set(by_name))
             unknown = sorted(set(by_name) - set(lights.names))
@@ -428,10 +472,10 @@ class Lighting(Shown, Mapping[str, LightSetting]):
                 f"missing {some_names(missing) or 'none'}; unknown {some_names(unknown) or 'none'}"
             )
         for light in lights:
-            if set(light.members) != set(self.members[light.name]):
+            if set(light.members) != set(members[light.name]):
                 raise LightingError(
                     f"light {light.name!r} is not the same in both: of "
-                    f"{some_names(self.members[light.name])} in the lighting, of "
+                    f"{some_names(members[light.name])} in the lighting, of "
                     f"{some_names(light.members)} in the basis"
                 )
         return np.array([by_name[name] for name in lights.names], dtype=np.float64)
@@ -460,4 +504,69 @@ def _setting(
         reached=reached,
         lamp=lamp,
         is_outside_gamut=light.is_outside_gamut,
+        part_of=light.lamp,
     )
+
+
+def whole_lamp(parts: Sequence[LightSetting]) -> LightSetting:
+    """Return the lamp of emitters that are lights, or a light that is not one of these."""
+    first = parts[0]
+    if not first.part_of:
+        return first
+    emitters = [_of_its_color(x.lamp.emitters[0]) for x in parts if x.lamp is not None]
+    assert first.lamp is not None
+    lamp = replace(first.lamp, emitters=tuple(emitters))
+    drives = np.array([x.emission[0] for x in parts]) / lamp.levels
+    errors = [None if x.standard_error is None else x.standard_error[0] for x in parts]
+    emission = as_rgb(lamp.mix(drives))
+    return replace(
+        first,
+        name=first.part_of,
+        emission=emission,
+        weight=emission,
+        is_active=any(x.is_active for x in parts),
+        reached=ALL_REACHED,
+        standard_error=None,
+        interval=None,
+        untold=any(x.untold for x in parts),
+        lamp=lamp,
+        part_of="",
+        mix=tuple(drives.tolist()),
+        mix_errors=tuple(
+            None if x is None else float(x / y) for x, y in zip(errors, lamp.levels, strict=True)
+        ),
+    )
+
+
+def parts_of(light: LightSetting) -> tuple[LightSetting, ...]:
+    """Return a light for each emitter of a lamp, as a basis of spectra has them."""
+    if light.lamp is None or light.part_of or light.is_fixed:
+        return (light,)
+    levels = (np.array(list(light.drives.values())) * light.lamp.levels).tolist()
+    return tuple(
+        replace(
+            light,
+            name=f"{light.name}/{emitter.name}",
+            emission=(level, level, level),
+            weight=(level, level, level),
+            lamp=None,
+            part_of=light.name,
+            mix=None,
+            mix_errors=None,
+            standard_error=None,
+            interval=None,
+        )
+        for emitter, level in zip(light.lamp.emitters, levels, strict=True)
+    )
+
+
+def _of_its_color(emitter: LampEmitter) -> LampEmitter:
+    """Return an emitter, whose emission has its luminance in each channel, in its own colour."""
+    return replace(emitter, emission=as_rgb(emitter.emission[0] * _own_color(emitter)))
+
+
+def _own_color(emitter: LampEmitter) -> Doubles:
+    """Return the colour of an emitter's spectrum, (3,), of luminance 1."""
+    assert emitter.spectrum is not None
+    color = rgb_of_powers(emitter.spectrum)
+    return np.asarray(color / luminance(color))

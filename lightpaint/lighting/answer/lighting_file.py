@@ -29,6 +29,9 @@ PLAIN_FIELDS = ("target", "scene_identity", "cd_per_unit", "up")
 #: Fields of a light's lamp, which its file has beside the others.
 LAMP_FIELDS = ("emitters", "power_share", "prefer")
 
+#: Key of a lamp whose drives are the answer, found with spectra; its emission follows from them.
+SPECTRAL = "is_spectral"
+
 #: Fields of a certificate for options of the fit, written where they differ from the paper.
 FIT_FIELDS = ("display", "rounds", "hold", "colors", "noise_removed", "software", "basis_spp")
 
@@ -49,7 +52,7 @@ def write_lighting(path: str | Path, lighting: Lighting) -> None:
         >>> len(lp.read_lighting("evening.json").lights)
         2
     """
-    data = lighting_fields(lighting)
+    data = lighting_fields(lighting.of_lamps())
     write_text(Path(path), json.dumps(data, indent=2, ensure_ascii=False, allow_nan=False) + "\n")
 
 
@@ -159,6 +162,10 @@ def _read_setting(name: str, data: Mapping[str, Any]) -> LightSetting:
     fields = {**data, "name": name}
     if "emitters" in data:
         fields["lamp"] = {key: data[key] for key in LAMP_FIELDS if key in data}
+        if data.get(SPECTRAL) is True:
+            names, errors = [x["name"] for x in data["emitters"]], data.get("drive_errors", {})
+            fields["mix"] = [data["drives"][name] for name in names]
+            fields["mix_errors"] = [errors.get(name) for name in names] if errors else None
     return read_record(LightSetting, fields, others=True)
 
 
@@ -197,9 +204,11 @@ def _optional_fields(light: LightSetting) -> dict[str, Any]:
 def _lamp_fields(light: LightSetting, lamp: Lamp) -> dict[str, Any]:
     """Return the emitters of a light, and their drives, which follow from its emission."""
     fields: dict[str, Any] = {"drives": dict(light.drives)}
-    if light.standard_error is not None:
+    if light.mix is not None:
+        fields[SPECTRAL] = True
+    if light.standard_error is not None or any(x is not None for x in light.mix_errors or ()):
         fields["drive_errors"] = dict(light.drive_errors)
-    emitters = [fields_of(x, "watts") for x in lamp.emitters]
+    emitters = [fields_of(x, "watts", "spectrum") for x in lamp.emitters]
     return fields | fields_of(lamp, "power_share", "prefer") | {"emitters": emitters}
 
 

@@ -182,7 +182,8 @@ class Constraints:
             of a light costs as much as its effect on a picture painted all over would count.
         cd_per_unit: cd/m² of a radiance of 1, for emitters in candelas or lumens.
         prefer_emitters: Among mixes of a lamp's emitters that look the same, the one with the least
-            "watts", with the most light from "white" emitters, or of the "fewest" emitters.
+            "watts", with the most light from "white" emitters, of the "fewest" emitters, or with
+            the highest "rf", the fidelity of colours by TM-30.
         requirements: Sums of light and power that the answer has to reach, in memory only.
 
     Examples:

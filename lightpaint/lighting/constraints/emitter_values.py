@@ -3,6 +3,7 @@
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from itertools import pairwise
+from pathlib import Path
 from typing import Any, Literal
 
 import numpy as np
@@ -12,8 +13,11 @@ from lightpaint.basis.lights import BasisLight
 from lightpaint.colour.color import luminance
 from lightpaint.colour.lamp import MAX_EMITTERS, LampEmitter
 from lightpaint.colour.photometry import photometry
-from lightpaint.colour.primaries import REC709, colour_science, rgb_to_xyz
-from lightpaint.errors import ConstraintError
+from lightpaint.colour.planckian_locus import matching_functions
+from lightpaint.colour.primaries import REC709, rgb_to_xyz
+from lightpaint.colour.spectra.spectrum import Spectrum, spectrum_of
+from lightpaint.colour.spectra.spectrum_source import named_spectrum
+from lightpaint.errors import ColorError, ConstraintError
 from lightpaint.files import one_line
 from lightpaint.lighting.constraints.values import check_keys
 from lightpaint.luminaires.plugin_names import FULL
@@ -36,7 +40,8 @@ class EmitterRequest:
     """An emitter of a lights file.
 
     color: of luminance 1; channels may be negative. amount: at full, as `per` says: the luminance
-    of its emission in the unit of the light, candelas, or lumens.
+    of its emission in the unit of the light, candelas, or lumens. spectrum: None if only its colour
+    is known.
     """
 
     name: str
@@ -47,6 +52,7 @@ class EmitterRequest:
     bits: int
     watts: float | None
     where: SourceKey
+    spectrum: Spectrum | None = None
 
     def in_light(self, light: BasisLight, cd_per_unit: float | None) -> LampEmitter:
         """Return the emitter with its emission in the unit of a light.
@@ -61,7 +67,7 @@ class EmitterRequest:
             level *= count / self._amount_of_one(light, cd_per_unit)
         emission = as_rgb(level * np.array(self.color))
         watts = None if self.watts is None else count * self.watts
-        return LampEmitter(self.name, emission, self.most, self.bits, watts)
+        return LampEmitter(self.name, emission, self.most, self.bits, watts, spectrum=self.spectrum)
 
     def _amount_of_one(self, light: BasisLight, cd_per_unit: float | None) -> float:
         """Return the candelas or lumens of an emission of luminance 1."""
@@ -129,9 +135,13 @@ def _parse_emitter(table: Mapping[str, Any], where: SourceKey) -> EmitterRequest
     amounts = [key for key in AMOUNTS if key in table]
     if len(amounts) > 1:
         raise ConstraintError(where, f" has {' and '.join(amounts)}: expected one of them")
-    color = _parse_color(color_keys[0], table[color_keys[0]], where / color_keys[0])
+    key, spectrum = color_keys[0], None
+    if key == "spectrum":
+        color, spectrum = _parse_spectrum(table[key], where / key)
+    else:
+        color = _parse_color(key, table[key], where / key)
     size = float(luminance(color))
-    if not amounts and color_keys[0] != "rgb":
+    if not amounts and key != "rgb":
         raise ConstraintError(
             where,
             " does not say how bright it is at full: add cd, lm, or Y, the luminance of its "
@@ -144,7 +154,8 @@ def _parse_emitter(table: Mapping[str, Any], where: SourceKey) -> EmitterRequest
         raise ConstraintError(where / "bits", f" is {bits!r}: expected 8, 16 or 24")
     most = _positive(table, "max", where, most=1.0) if "max" in table else 1.0
     watts = _positive(table, "watts", where) if "watts" in table else None
-    return EmitterRequest(name.strip(), as_rgb(color / size), amount, per, most, bits, watts, where)
+    unit_color = as_rgb(color / size)
+    return EmitterRequest(name.strip(), unit_color, amount, per, most, bits, watts, where, spectrum)
 
 
 def _positive(
@@ -160,8 +171,6 @@ def _positive(
 def _parse_color(key: str, value: Any, where: SourceKey) -> Doubles:
     """Return the linear Rec.709 colour (3,) of an emitter, with a luminance > 0."""
     numbers = value if isinstance(value, Sequence) and not isinstance(value, str) else []
-    if key == "spectrum":
-        return _of_spectrum(value, where)
     count = 2 if key == "xy" else 3
     if len(numbers) != count or not all(is_number(x) and abs(x) <= BRIGHTEST for x in numbers):
         expected = "x and y of CIE 1931, [0.69, 0.31]" if key == "xy" else "three numbers"
@@ -183,11 +192,31 @@ def _of_xyz(xyz: Doubles) -> Doubles:
     return np.asarray(np.linalg.solve(rgb_to_xyz(REC709), xyz))
 
 
-def _of_spectrum(value: Any, where: SourceKey) -> Doubles:
-    """Return the colour of a spectrum, pairs of nanometres and power, under the CIE's standard
-    observer of 1931.
+def _parse_spectrum(value: Any, where: SourceKey) -> tuple[Doubles, Spectrum]:
+    """Return the colour of a spectrum under the CIE's standard observer of 1931, of luminance 1,
+    and the spectrum.
+
+    value: pairs of nanometres and power, or the name of a light or a file; relative to the lights
+    file.
     """
-    is_list = isinstance(value, Sequence) and not isinstance(value, str)
+    try:
+        if isinstance(value, str):
+            is_file = where.source.endswith(".toml")
+            folder = Path(where.source).parent if is_file else Path()
+            waves, powers = named_spectrum(value, folder)
+        else:
+            waves, powers = _pairs(value, where)
+        # Between its points a spectrum is straight, and dark beyond them.
+        metres, observer = matching_functions()
+        xyz = np.interp(metres * 1e9, waves, powers, left=0, right=0) @ observer
+        return _of_xyz(xyz / max(xyz[1], 1e-300)), spectrum_of(waves, powers)
+    except ColorError as error:
+        raise ConstraintError(where, ": " if isinstance(value, str) else " ", error) from None
+
+
+def _pairs(value: Any, where: SourceKey) -> tuple[Doubles, Doubles]:
+    """Return nanometres and power, (k,) each, of a list of pairs."""
+    is_list = isinstance(value, Sequence)
     pairs = [
         (float(pair[0]), float(pair[1]))
         for pair in (value if is_list else [])
@@ -206,15 +235,7 @@ def _of_spectrum(value: Any, where: SourceKey) -> Doubles:
         raise ConstraintError(
             where,
             f" is not a spectrum: expected pairs of nanometres, rising from {low:g} to {high:g}, "
-            "and power, [[620, 0.1], [632, 1], [644, 0.1]]",
+            "and power, [[620, 0.1], [632, 1], [644, 0.1]]; or the name of a file or a light, "
+            '"led.csv", "3200K blackbody"',
         )
-    science = colour_science()
-    # Between its pairs a spectrum is straight, and dark beyond them.
-    grid = np.arange(360, 831)
-    powers = np.interp(grid, waves, [power for _, power in pairs], left=0, right=0)
-    observer = science.MSDS_CMFS["CIE 1931 2 Degree Standard Observer"].copy()
-    matching = observer.align(science.SpectralShape(360, 830, 1)).values
-    xyz = powers @ matching
-    if not xyz[1] > 0:
-        raise ConstraintError(where, " has no power that eyes see: leave this emitter out")
-    return _of_xyz(xyz / xyz[1])
+    return np.array(waves), np.array([power for _, power in pairs])

@@ -89,6 +89,8 @@ def _match_lights(
     the texels of the image of this name.
     """
     names = [light.name for light in lights]
+    if parts := [k for k, light in enumerate(lights) if light.lamp and light.lamp == name]:
+        return parts
     for k, light in enumerate(lights):
         if name == light.name and not light.is_fixed:
             return [k]
@@ -107,9 +109,12 @@ def _match_lights(
             raise ConstraintError(
                 where, f": {name!r} is part of the light {light.name!r}: constrain that light"
             )
-    matches = [k for k, x in enumerate(lights) if not x.is_fixed and _is_meant(x.name, name)]
+    matches = [
+        k for k, x in enumerate(lights) if not x.is_fixed and _is_meant(x.lamp or x.name, name)
+    ]
     if not matches:
-        adjustable = [light.name for light in lights if not light.is_fixed]
+        adjustable = [x.lamp or x.name for x in lights if not x.is_fixed]
+        adjustable = [*dict.fromkeys(adjustable)]
         hint = with_similar_name(f"there are {some_names(adjustable)}", name, adjustable)
         raise ConstraintError(Lead(SourceKey.of(where)), f"no light {name!r}; {hint}")
     return matches

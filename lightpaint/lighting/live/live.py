@@ -128,7 +128,7 @@ class LiveSolver:
     @property
     def lamps(self) -> Mapping[int, Lamp]:
         """The lamps that mix lights from emitters, by the light's index."""
-        return self._reduction.lamps
+        return {k: lamp.while_painting for k, lamp in self._reduction.lamps.items()}
 
     @property
     def mode(self) -> Space:

@@ -59,7 +59,7 @@ def nearest_unknowns(reduction: Reduction, start: Doubles, reached: Bools) -> Do
     for stack in reduction.limited_knobs:
         for k in _clip_to_limits(x, reduction, stack):
             knob = reduction.knobs[k]
-            if not (knob.is_free or reached[knob.lights[0]]):
+            if not (knob.is_free or len(knob.lights) > 1 or reached[knob.lights[0]]):
                 x[list(reduction.places[k])] = _nearest_limited(knob, start)
     return x
 

@@ -14,7 +14,7 @@ from itertools import pairwise
 
 import numpy as np
 
-from lightpaint.arrays import Bools, Doubles, Indices
+from lightpaint.arrays import Bools, Doubles, Indices, as_rgb
 from lightpaint.basis.lights import BasisLight
 from lightpaint.colour.lamp import Lamp
 from lightpaint.errors import ConstraintError
@@ -33,6 +33,11 @@ from lightpaint.lighting.unknowns.knobs import (
     mixing_knob,
     tied_knob,
     white_lamp_knob,
+)
+from lightpaint.lighting.unknowns.lamp_parts import (
+    WholeLamps,
+    emission_of_parts,
+    part_lamps,
 )
 from lightpaint.lighting.unknowns.lamp_powers import watts_of_fixed, watts_of_unknowns
 from lightpaint.lighting.unknowns.unknown_blocks import (
@@ -348,7 +353,7 @@ def _lamps(
     made: dict[Hashable, Lamp | None] = {}
     lamps = {}
     for k, (light, constraint) in enumerate(zip(lights, by_light, strict=True)):
-        quantity = light.plugin, light.unit, light.unit_flux
+        quantity = light.plugin, light.unit, light.unit_flux, len(light.members)
         kind = id(constraint), quantity, light.is_fixed, light.is_scalar
         if kind not in made:
             made[kind] = lamp_of(light, constraint, scale, prefer)
@@ -364,6 +369,51 @@ def reduce_to(constraints: Constraints, lights: Sequence[BasisLight]) -> Reducti
     the impossible: a colour for a light that has only a dimmer, a light on two dimmers, limits that
     leave nothing.
     """
+    reduction = _reduce_parts(constraints, lights)
+    if constraints.requirements is None:
+        return reduction
+    return reduction.with_requirements(constraints.requirements)
+
+
+def _reduce_parts(constraints: Constraints, lights: Sequence[BasisLight]) -> Reduction:
+    """Return the unknowns among lights, of which some may be emitters of a lamp, without
+    requirements.
+    """
+    whole = WholeLamps.of(lights)
+    if not whole.has_parts:
+        return _reduce_to(constraints, lights)
+    by_light = constraints_by_light(constraints, whole.lights)
+    lamps = _lamps(constraints, whole.lights, by_light)
+    if not lamps:  # nothing says what the emitters have in common
+        return _reduce_to(constraints, lights)
+    colored = [
+        replace(light, emission=as_rgb(emission_of_parts([lights[i] for i in parts], lamps[k])))
+        if k in lamps
+        else light
+        for k, (light, parts) in enumerate(zip(whole.lights, whole.parts, strict=True))
+    ]
+    reduction = _reduce_to(constraints, colored)
+    fixed = [whole.weights(k, lamps.get(k), row) for k, row in enumerate(reduction.fixed_weights)]
+    labels = [
+        label for label, parts in zip(reduction.labels, whole.parts, strict=True) for _ in parts
+    ]
+    knobs = [part for knob in reduction.knobs for part in whole.knobs(knob, lamps)]
+    of_parts = {
+        i: part
+        for k, lamp in lamps.items()
+        for i, part in zip(whole.parts[k], part_lamps(lamp), strict=True)
+    }
+    return Reduction(np.concatenate(fixed), tuple(labels), tuple(knobs), lamps=of_parts)
+
+
+def lamps_by_name(constraints: Constraints, lights: Sequence[BasisLight]) -> dict[str, Lamp]:
+    """Return what mixes lights from emitters, by the light's name. Raises ConstraintError."""
+    by_light = constraints_by_light(constraints, lights)
+    return {lights[k].name: lamp for k, lamp in _lamps(constraints, lights, by_light).items()}
+
+
+def _reduce_to(constraints: Constraints, lights: Sequence[BasisLight]) -> Reduction:
+    """Return the unknowns that `constraints` leave among `lights`, each of which is whole."""
     by_light = constraints_by_light(constraints, lights)
     labels = ["" if constraint is None else constraint.label for constraint in by_light]
     tied, fixed, knobs = tied_lights(constraints, lights), np.zeros((len(lights), 3)), []
@@ -401,7 +451,4 @@ def reduce_to(constraints: Constraints, lights: Sequence[BasisLight]) -> Reducti
             knobs.append(lamp_knob(k, light, constraint, lamps[k]))
         else:
             knobs.append(mixing_knob(k, light, constraint))
-    reduction = Reduction(fixed, tuple(labels), tuple(knobs), lamps=lamps)
-    if constraints.requirements is None:
-        return reduction
-    return reduction.with_requirements(constraints.requirements)
+    return Reduction(fixed, tuple(labels), tuple(knobs), lamps=lamps)

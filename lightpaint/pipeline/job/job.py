@@ -58,6 +58,7 @@ from lightpaint.pipeline.job.sources import (
     check_nothing_unused,
     content,
 )
+from lightpaint.pipeline.job.spectral_job import check_spectral, spectral_scenes
 from lightpaint.pipeline.results.answer_folder import answer_files
 from lightpaint.pipeline.results.planes_folder import files_of_planes
 from lightpaint.pipeline.results.result_folder import ResultFolder
@@ -193,6 +194,8 @@ class Job:
             agreed_scale(scene.cd_per_unit, self.settings.cd_per_unit)
         scale = Constraints(cd_per_unit=self.settings.cd_per_unit)
         all_constraints = all_constraints.and_then(scale)
+        if self.settings.spectral:
+            scenes = spectral_scenes(scenes, all_constraints)
         if scenes and bases:
             check_same_view(scenes[0], bases[0])
         check_places(self.placement, scenes)
@@ -210,6 +213,7 @@ class Job:
         if self.settings.suggest:
             check_suggestible(scenes[0])
         all_rigging = rigging_for(self.rigging, scenes, self.settings)
+        check_spectral(self.settings, all_constraints, all_rigging, self.placement)
         views = painted_views(scenes, targets, bases, folders, self.settings)
         if self.all_groups:
             views = tuple(x.without(y.holes) for x, y in zip(views, self.all_groups, strict=True))

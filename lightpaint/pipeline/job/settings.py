@@ -60,6 +60,8 @@ class Settings(Fit):
         suggest: Maximum number of point lights to suggest; needs a scene. All views count.
         sun: How many texels a sky that is split may get more, finer ones where a sun is; None for
             as many as the lights file says, by default none.
+        spectral: Whether to render with the spectra of the lamps' emitters, in the lights file, and
+            find a drive for each; needs a scene.
         move_lights: Whether to move the lights that may move.
         animate: True to find a lighting for each painted frame of a shot, and lights that change
             smoothly between them, instead of one lighting for all.
@@ -212,6 +214,16 @@ class Settings(Fit):
             bare=72,
         ),
     ] = None
+    spectral: Annotated[
+        bool,
+        Option(
+            "--spectral",
+            "render with the spectra of the emitters in the lights file, one picture for each, "
+            "which shows what LEDs do to colours; takes about three times as long",
+            default="render in RGB",
+            theme="Lights",
+        ),
+    ] = False
     move_lights: Annotated[
         bool,
         Option(
@@ -379,6 +391,7 @@ class SettingsByName(TypedDict, total=False):
     refine: int
     suggest: int
     sun: int | None
+    spectral: bool
     move_lights: bool
     animate: bool
     cd_per_unit: float | None

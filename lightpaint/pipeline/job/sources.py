@@ -26,7 +26,10 @@ from lightpaint.target.target_reader import Paint, read_over_look, read_target
 
 #: Settings of sampling, of rendering, and those that light groups do not support.
 SAMPLING_SETTINGS = ("spp", "exact_spp", "time_s", "error", "quality", "resolution")
-RENDER_SETTINGS = (*SAMPLING_SETTINGS, "refine", "suggest", "sun", "planes", "verify_spp")
+RENDER_SETTINGS = (
+    *SAMPLING_SETTINGS,
+    *("refine", "suggest", "sun", "planes", "spectral", "verify_spp"),
+)
 NOT_IN_GROUPS = (*RENDER_SETTINGS, "seed", "noise_correction", "cd_per_unit", "emitters")
 
 

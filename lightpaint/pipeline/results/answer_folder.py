@@ -60,7 +60,7 @@ def write_answer(
     programs. has_lighting: True if lighting.json exists already, or is not needed. A lighting that
     says nothing of places gets those of the scene.
     """
-    lighting = with_places(lighting, scene)
+    lighting = with_places(lighting.of_lamps(), scene)
     if not has_lighting:
         write_lighting(folder / LIGHTING, lighting)
     if groups is not None:
@@ -121,4 +121,5 @@ def new_answer(
 
 def reload_relit(relit: Scene, path: Path, sensor: int) -> Scene:
     """Load a relit scene again from `path`, with its parameters."""
-    return load_scene(path, sensor=sensor, parameters=relit.parameters, use_lights_file=False)
+    scene = load_scene(path, sensor=sensor, parameters=relit.parameters, use_lights_file=False)
+    return replace(scene, is_spectral=relit.is_spectral)

@@ -2,7 +2,7 @@
 
 import json
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 from lightpaint.basis.basis import Basis, Origin
@@ -191,6 +191,8 @@ def write_predicted(
     film = {} if size is None else {"width": size[1], "height": size[0]}
     parameters = {} if scene is None or not scene.parameters else {"parameters": scene.parameters}
     view = {"sensor": origin.sensor, "spp": spp, "basis_spp": origin.spp, **film, **parameters}
+    if scene is not None and scene.is_spectral:
+        view["is_spectral"] = True
     write_estimate(path, predicted, {VIEW_KEY: json.dumps(view)})
 
 
@@ -293,6 +295,7 @@ def verify_result(
     relit = load_scene(
         relit_xml, sensor=view.sensor, parameters=view.parameters, use_lights_file=False
     )
+    relit = replace(relit, is_spectral=view.is_spectral)
     if view.width is not None and view.height is not None:
         film = (view.height, view.width)
         # A scene that was edited by hand may have another film, which `verify` refuses.
@@ -313,7 +316,8 @@ class _RecordedView:
     """The content of VIEW_KEY; None for what is missing.
 
     spp: samples per pixel. width, height: film of the verification; None for the whole film.
-    parameters: values of `$name` parameters of the scene.
+    parameters: values of `$name` parameters of the scene. is_spectral: whether it is rendered with
+    spectra.
     """
 
     sensor: str | None = None
@@ -321,6 +325,7 @@ class _RecordedView:
     width: int | None = None
     height: int | None = None
     parameters: Mapping[str, str] | None = None
+    is_spectral: bool = False
 
     def __post_init__(self) -> None:
         if self.spp == 0:

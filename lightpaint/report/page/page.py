@@ -44,6 +44,7 @@ from lightpaint.report.page.lights_table import MAX_THUMBNAILS, lights_table, th
 from lightpaint.report.page.mixer import mixer_assets, mixer_html, planes_for_page
 from lightpaint.report.page.placement_section import placement_section, suggestion_section
 from lightpaint.report.page.planes_section import planes_section
+from lightpaint.report.page.rendering_section import rendering_section
 from lightpaint.report.reported_answer import ReportedAnswer
 from lightpaint.report.verdict import spoken_samples, verdict
 from lightpaint.report.visible_emitters import emitter_remarks
@@ -123,6 +124,7 @@ def report_page(
             cd_per_unit=solution.lighting.cd_per_unit,
             is_clean=looks.is_clean,
         ),
+        rendering=rendering_section(solution.lighting),
         sure=sure_section(basis, solution, answer.uncertainty),
         command=answer.command,
     )

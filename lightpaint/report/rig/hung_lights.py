@@ -99,7 +99,9 @@ class HungLights:
 
 def hung_lights(lighting: Lighting) -> tuple[HungLight, ...]:
     """Return the lights of an answer whose places are known."""
-    colors = {member: light.emission for light in lighting.lights for member in light.members}
+    colors = {
+        member: light.emission for light in lighting.of_lamps().lights for member in light.members
+    }
     black = (0.0, 0.0, 0.0)
     return tuple(HungLight(place, colors.get(place.name, black)) for place in lighting.places)
 

@@ -5,6 +5,7 @@ from collections.abc import Collection, Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 
 from lightpaint.arrays import RGB
+from lightpaint.colour.spectra.spectrum import Spectrum
 from lightpaint.display_text import some_names
 from lightpaint.errors import SceneError
 from lightpaint.scene.lights.emitters import Emitter
@@ -33,7 +34,9 @@ class Light:
     emission: current RGB emission in `unit`.
     is_scalar: whether it has one weight for all channels instead of three. is_fixed: whether it is
     the light of all emitters that stay as they are, with weight 1. is_found: whether its members
-    were grouped automatically because they are many, similar and unnamed.
+    were grouped automatically because they are many, similar and unnamed. lamp, spectrum: of an
+    emitter of a lamp in a render with spectra, the name of the lamp's light and its spectrum; the
+    weight is then the luminance of its emission.
     """
 
     name: str
@@ -44,6 +47,8 @@ class Light:
     is_scalar: bool = False
     is_fixed: bool = False
     is_found: bool = False
+    lamp: str = ""
+    spectrum: Spectrum | None = None
 
     def __repr__(self) -> str:
         emission = " ".join(f"{v:.4g}" for v in self.emission)
@@ -100,7 +105,9 @@ class Light:
             digests = [m.digest and m.digest.unit for m in self.members]
         if None in digests:
             return ""
-        return combined_identity(unlit_content, self.is_fixed, self.unit, sorted(map(str, digests)))
+        own_digests = sorted(map(str, digests))
+        facts = () if self.spectrum is None else ("spectrum", self.spectrum)
+        return combined_identity(unlit_content, self.is_fixed, self.unit, own_digests, *facts)
 
     def emission_of(self, member: Emitter, emission: RGB) -> RGB:
         """Return the emission of `member` in its own unit when this light has `emission`."""

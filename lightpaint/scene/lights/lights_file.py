@@ -10,6 +10,7 @@ from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
 
+from lightpaint.colour.spectra.spectrum_source import is_spectrum_file
 from lightpaint.display_text import known_keys
 from lightpaint.errors import SceneError
 from lightpaint.file_reading import read_text
@@ -130,6 +131,17 @@ class SceneRequests:
         }
         scale = {key: self.keys[key] for key in ("cd_per_unit",) if key in self.keys}
         return SceneRequests({"light": tables, **scale}, self.source)
+
+    @property
+    def spectrum_files(self) -> tuple[Path, ...]:
+        """The files of the spectra of its emitters."""
+        lights = self.keys.get("light")
+        tables = lights.values() if isinstance(lights, dict) else ()
+        lists = [x.get("emitters") for x in tables if isinstance(x, dict)]
+        emitters = [x for found in lists if isinstance(found, list) for x in found]
+        spectra = [x.get("spectrum") for x in emitters if isinstance(x, dict)]
+        names = dict.fromkeys(x for x in spectra if isinstance(x, str) and is_spectrum_file(x))
+        return tuple(Path(self.source).parent / name for name in names)
 
     @property
     def symmetric(self) -> frozenset[str]:

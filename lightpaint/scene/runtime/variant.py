@@ -5,6 +5,8 @@ This is the only module that calls `mi.set_variant`.
 
 import sys
 import warnings
+from collections.abc import Iterator
+from contextlib import contextmanager
 from dataclasses import dataclass
 from types import FrameType
 from typing import Any
@@ -14,11 +16,13 @@ from lightpaint.keywords import keywords
 from lightpaint.luminaires.registration import register_luminaires
 from lightpaint.scene.runtime.llvm import INSTALL_LLVM, OLDEST_LLVM, Llvm, prepare_llvm
 from lightpaint.scene.runtime.plugins import loaded_plugins
+from lightpaint.scene.runtime.render_lock import MITSUBA
 from lightpaint.sentences import Sentence
 from lightpaint.signals import interruptible_between_pieces
 
 FAST_VARIANT = "llvm_ad_rgb"
 PLAIN_VARIANT = "scalar_rgb"
+SPECTRAL = "_spectral"
 
 
 class SlowBackendWarning(UserWarning):
@@ -74,6 +78,36 @@ def use_variant(requested: str | None = None) -> Backend:
     if _current.note:
         _warn_of(_current)
     return _current
+
+
+@contextmanager
+def spectral_variant() -> Iterator[None]:
+    """Make Mitsuba render spectra instead of RGB within the block.
+
+    No other thread uses it meanwhile. Scenes belong to the variant in which they were loaded.
+    Raises BackendError where there is no spectral variant that runs Python integrators.
+    """
+    global _current
+    with MITSUBA.acquired():
+        backend = use_variant()
+        if backend.variant.endswith(SPECTRAL):  # a block within another
+            yield
+            return
+        import mitsuba as mi
+
+        spectral = backend.variant.removesuffix("_rgb") + SPECTRAL
+        if not backend.is_jit or spectral not in mi.variants():
+            raise BackendError(
+                f"spectra need a variant like {FAST_VARIANT}, and this process renders with "
+                f"{backend.variant}: {INSTALL_LLVM}"
+            )
+        try:
+            mi.set_variant(spectral)
+            _current = Backend(spectral, backend.llvm)
+            yield
+        finally:
+            mi.set_variant(backend.variant)
+            _current = backend
 
 
 def _warn_of(backend: Backend) -> None:

@@ -183,18 +183,15 @@ class EmitterGuide:
         below = dr.gather(mi.Float, self._cumulative, first + emitter - 1, active & (emitter > 0))
         return below, above - below
 
-    def learn(self, cell, emitter, contribution, *, is_sampled, lit):
+    def learn(self, cell, emitter, gray, *, is_sampled, lit):
         """Record the light that `emitter` contributed to the picture from `cell`.
 
-        contribution: RGB, not divided by the probability of the emitter. is_sampled: whether the
-        emitter was sampled at all. lit: whether its light arrived.
+        gray: mean of its channels, not divided by the probability of the emitter. is_sampled:
+        whether the emitter was sampled at all. lit: whether its light arrived.
         """
         entry = cell * self.count + emitter
         is_sampled, lit = is_sampled & self._learns, lit & self._learns
         _count(self._new_counts, mi.UInt32(1), entry, is_sampled)
-        # dr.mean would compile the number of paths into the kernel as a constant.
-        red, green, blue = contribution
-        gray = (red + green + blue) * (1 / 3)
         units = gray * dr.gather(mi.Float, self._units_of, emitter, lit)
         units = mi.UInt64(mi.UInt32(dr.clip(units, 0, MAX_UNITS)))
         _count(self._new_light, units, entry, lit & dr.isfinite(gray))

@@ -55,17 +55,11 @@ class LightPlanes:
             self._sums = mi.Float(start.ravel())
         self._seen = dr.zeros(mi.Float, pixels)
 
-    @classmethod
-    def nowhere(
-        cls, light_of: Any, lights: int, *, is_split: bool, texels: TexelTable | None
-    ) -> "LightPlanes":
-        """Return planes that discard light, for paths from which the guide only learns.
-
-        lights, is_split, texels: as in the planes of other paths, which then share the same kernel.
+    def discard_light(self) -> None:
+        """Discard all light, of paths from which the guide only learns. They have the kernel of
+        other paths.
         """
-        nothing = cls(light_of, lights, (1, 1), is_split=is_split, texels=texels)
-        nothing._keeps = dr.opaque(mi.Bool, False)
-        return nothing
+        self._keeps = dr.opaque(mi.Bool, False)
 
     def add(self, pixel, emitter, value, direction, uv, bounces, active):
         """Add RGB values to the plane of the light that `emitter` belongs to.

@@ -15,7 +15,8 @@ Import this module after setting a Dr.Jit variant, since its array types do not 
 
 # mypy: disable-error-code="no-untyped-call"
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
+from functools import partial
 from typing import Any
 
 import drjit as dr
@@ -33,7 +34,9 @@ from lightpaint.basis.render.tracer.light_planes import LightPlanes, lights_by_i
 from lightpaint.basis.render.tracer.path_tracer import Rules, View, trace_paths, trace_samples
 from lightpaint.basis.render.tracer.point_surfaces import PointSurfaces
 from lightpaint.basis.render.tracer.sobol import SobolPairs
+from lightpaint.basis.render.tracer.spectral_planes import ColorTables, SpectralPlanes
 from lightpaint.basis.render.tracer.texel_table import TexelTable
+from lightpaint.basis.render.tracer.wavelengths import RgbPaths, SpectralPaths
 from lightpaint.scene.runtime.kernel_threads import kernels
 from lightpaint.scene.scene import Scene
 from lightpaint.scene.scene_render import Stream, pass_seed
@@ -76,10 +79,13 @@ class Tracer:
     ) -> None:
         self.scene = scene
         unit = {light.name: (1.0, 1.0, 1.0) for light in scene.lights}
-        self.loaded = scene.load(unit, views=views, evenly=True) if loaded is None else loaded
-        self._texels = TexelTable.of(scene, self.loaded)
-        self.light_of = lights_by_instance(self.loaded, planes_by_emitter(scene))
-        self.guide = EmitterGuide(self.loaded, self.light_of, scene.eye(self.loaded), guide_table)
+        with scene.variant():
+            self.loaded = scene.load(unit, views=views, evenly=True) if loaded is None else loaded
+            self._texels = TexelTable.of(scene, self.loaded)
+            self.light_of = lights_by_instance(self.loaded, planes_by_emitter(scene))
+            eye = scene.eye(self.loaded)
+            self.guide = EmitterGuide(self.loaded, self.light_of, eye, guide_table)
+            self._planes = self._kind_of_planes()
         self.guide_table = guide_table if self.guide.is_trained else None
         if emitter_samples is None:
             emitter_samples = FIRST_EMITTER_SAMPLES, later_emitter_samples(self.guide.count)
@@ -88,14 +94,23 @@ class Tracer:
         # all independent.
         self._streams = [pass_seed(seed, Stream.NUMBERS, k) for k in range(5)]
 
+    def _kind_of_planes(self) -> Callable[..., LightPlanes]:
+        """Return the function that makes planes of rows and columns of pixels, and options."""
+        lights, is_split = len(self.scene.lights), has_indirect_planes(self.scene)
+        if not self.scene.is_spectral:
+            texels = self._texels
+            return partial(LightPlanes, self.light_of, lights, is_split=is_split, texels=texels)
+        tables = ColorTables(self.scene, self.light_of)
+        return partial(SpectralPlanes, self.light_of, lights, is_split=is_split, tables=tables)
+
     def learn(self, rows: range, first: int, spp: int) -> None:
         """Train the guide with some samples of some rows, and discard their light.
 
         first: number of samples per pixel in earlier passes.
         """
-        lights, is_split = len(self.scene.lights), has_indirect_planes(self.scene)
-        nowhere = LightPlanes.nowhere(self.light_of, lights, is_split=is_split, texels=self._texels)
-        with kernels():
+        nowhere = self._planes((1, 1))
+        nowhere.discard_light()
+        with self.scene.variant(), kernels():
             self._trace_rows(TRAINING_STREAM, nowhere, rows, first, spp)
             self.guide.evaluate()
         self.guide.update()
@@ -117,22 +132,11 @@ class Tracer:
         start: initial sums of earlier samples, (planes, rows, columns, 3).
         """
         size = len(rows), self.scene.size[1]
-        return self._light_planes(size, start)
+        return self._planes(size, start=start)
 
     def pixel_planes(self, pixels: int) -> LightPlanes:
         """Return planes for a number of single pixels, without added samples."""
-        return self._light_planes((1, pixels))
-
-    def _light_planes(self, size: tuple[int, int], start: Floats | None = None) -> LightPlanes:
-        """Return planes of a number of rows and columns of pixels. start: initial sums."""
-        return LightPlanes(
-            self.light_of,
-            len(self.scene.lights),
-            size,
-            is_split=has_indirect_planes(self.scene),
-            start=start,
-            texels=self._texels,
-        )
+        return self._planes((1, pixels))
 
     def add(self, planes: LightPlanes, half: int, rows: range, first: int, spp: int) -> None:
         """Trace some samples of some rows for one half, and add their light to the `planes` of
@@ -140,7 +144,7 @@ class Tracer:
 
         first: number of earlier samples per pixel of that half.
         """
-        with kernels():
+        with self.scene.variant(), kernels():
             self._trace_rows(half, planes, rows, first, spp)
             planes.evaluate()
 
@@ -153,14 +157,14 @@ class Tracer:
         pixels: (p,), row-major indices into the picture, without repetitions; `planes` are (1, p).
         first: (p,), number of samples in earlier calls. spp: (p,), number of samples to take.
         """
-        with kernels():
+        with self.scene.variant(), kernels():
             places = np.arange(pixels.size)
             self._trace(FIRST_TOP_UP_STREAM + half, planes, places, pixels, first, spp)
             planes.evaluate()
 
     def close(self) -> None:
         """Release the scene and everything that refers to it."""
-        del self.loaded, self.light_of, self.guide, self._texels
+        del self.loaded, self.light_of, self.guide, self._texels, self._planes
 
     def _trace_rows(
         self, stream: int, planes: LightPlanes, rows: range, first: int, spp: int
@@ -219,7 +223,8 @@ def view_of(scene: Scene, loaded: Any) -> View:
     camera = scene.camera(loaded)
     width, height = (int(v) // scene.film.block for v in camera.film().crop_size())
     points = None if scene.points is None else PointSurfaces(scene.points)
-    return View(loaded, camera, width, height, points)
+    paths = SpectralPaths() if scene.is_spectral else RgbPaths()
+    return View(loaded, camera, width, height, points, paths)
 
 
 def rules_of(scene: Scene) -> Rules:

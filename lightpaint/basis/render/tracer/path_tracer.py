@@ -22,6 +22,15 @@ import numpy as np
 from lightpaint.arrays import Bools
 from lightpaint.basis.render.tracer.emitter_guide import BELOW_1
 from lightpaint.basis.render.tracer.sobol import APERTURE, FILM, TIME
+from lightpaint.basis.render.tracer.wavelengths import (
+    RgbPaths,
+    each_bsdf_sample,
+    each_bsdf_value,
+    each_direction,
+    each_emission,
+    is_any,
+    products,
+)
 
 #: Multiples of this, modulo 1, are evenly spread for any number of them.
 GOLDEN_RATIO = 0.6180339887
@@ -61,7 +70,7 @@ class View(NamedTuple):
 
     width, height: number of pixels into which the film's crop window is divided, its own or larger
     ones. points: `PointSurfaces`, one for each pixel, at which paths start instead of the camera;
-    None for a camera.
+    None for a camera. paths: what light is made of.
     """
 
     scene: Any
@@ -69,6 +78,7 @@ class View(NamedTuple):
     width: int
     height: int
     points: Any = None
+    paths: Any = RgbPaths()
 
 
 def _camera_rays(view, sampler, numbers, pixel, term):
@@ -121,7 +131,7 @@ class _Start(NamedTuple):
     pdf: Any
 
 
-def _leave_points(view, numbers, guide, planes, rules, pixel, place, term):
+def _leave_points(view, waves, numbers, guide, planes, rules, pixel, place, term):
     """Add the direct light at measuring points to `planes`, and return rays for the rest.
 
     A point is the first vertex of its path, as a surface is that a camera sees.
@@ -131,14 +141,26 @@ def _leave_points(view, numbers, guide, planes, rules, pixel, place, term):
     cell, count = guide.cell(si), rules.emitter_samples_at(depth)
     number, is_lit = numbers.at_vertex(term, depth, 0), rules.max_depth > 1
     # The irradiance is π times the radiance of a white surface.
-    weight = mi.Spectrum(dr.pi)
+    weight = [mi.Spectrum(dr.pi)] * waves.packets
     _sample_emitters(
-        view.scene, guide, planes, place, si, bsdf, weight, cell, number, count, depth, is_lit
+        view.scene,
+        waves,
+        guide,
+        planes,
+        place,
+        si,
+        bsdf,
+        weight,
+        cell,
+        number,
+        count,
+        depth,
+        is_lit,
     )
     lobe, direction, _ = _numbers_of_surface(None, numbers, term, depth)
-    sample, bsdf_weight = bsdf.sample(mi.BSDFContext(), si, lobe, direction)
+    sample, bsdf_weight = each_bsdf_sample(waves, bsdf, si, lobe, direction, True)
     ray = si.spawn_ray(si.to_world(sample.wo))
-    return _Start(ray, weight * bsdf_weight, mi.Interaction3f(si), cell, sample.pdf)
+    return _Start(ray, products(weight, bsdf_weight), mi.Interaction3f(si), cell, sample.pdf)
 
 
 @dr.syntax
@@ -161,14 +183,15 @@ def trace_paths(view, sampler, numbers, guide, planes, rules, pixel, place, term
 
     term: number of the sample. The other parameters are those of `trace_samples`.
     """
-    scene = view.scene
+    scene, waves = view.scene, view.paths.along(numbers, term)
     if dr.hint(view.points is None, mode="scalar"):
-        ray, weight = _camera_rays(view, sampler, numbers, pixel, term)
+        ray, camera_weight = _camera_rays(view, sampler, numbers, pixel, term)
+        weight = waves.from_camera(camera_weight)
     else:
-        start = _leave_points(view, numbers, guide, planes, rules, pixel, place, term)
+        start = _leave_points(view, waves, numbers, guide, planes, rules, pixel, place, term)
         ray, weight = start.ray, start.weight
     # fmt: off
-    throughput = mi.Spectrum(1)                 # Fraction of radiance that reaches the camera
+    throughput = _unit_light(waves)             # Fraction of radiance that reaches the camera
     eta = mi.Float(1)                           # Product of relative indices of refraction
     depth = mi.UInt32(0)                        # Number of vertices after the camera
     active = rules.max_depth > 0                # Paths that continue
@@ -189,7 +212,7 @@ def trace_paths(view, sampler, numbers, guide, planes, rules, pixel, place, term
         looks_through = mi.Bool(False)
 
     if dr.hint(rules.must_bounce, mode="scalar"):
-        active = _will_bounce(scene, sampler, numbers, term, ray, pi, active, rules)
+        active = _will_bounce(scene, waves, sampler, numbers, term, ray, pi, active, rules)
 
     while active:
         si = pi.compute_surface_interaction(ray, mi.RayFlags.All, active)
@@ -207,9 +230,9 @@ def trace_paths(view, sampler, numbers, guide, planes, rules, pixel, place, term
             pdf = emitter.pdf_direction(previous, ds, by_choice)
             pdf *= guide.probability(previous_cell, emitter, by_choice)
             pdf *= rules.emitter_samples_at(depth - 1)
-        emission = emitter.eval(si, hit & (previous_pdf > 0))
-        carried = weight * throughput
-        emitted = carried * emission * _mis(previous_pdf, pdf)
+        emission = each_emission(waves, emitter, si, hit & (previous_pdf > 0))
+        carried = products(weight, throughput)
+        emitted = waves.light(products(carried, emission, _mis(previous_pdf, pdf)))
         planes.add(place, emitter, emitted, ray.d, si.uv, depth, hit)
         planes.note_seen(place, hit & looks_through)
 
@@ -223,21 +246,33 @@ def trace_paths(view, sampler, numbers, guide, planes, rules, pixel, place, term
             wo = si.to_local(ds.d)
             bsdf_value, bsdf_pdf = bsdf.eval_pdf(mi.BSDFContext(), si, wo, lit)
             mis = dr.select(ds.delta, 1, _mis(ds.pdf, bsdf_pdf))
-            arriving = carried * bsdf_value * radiance * mis
+            arriving = carried[0] * bsdf_value * radiance * mis
             planes.add(place, ds.emitter, arriving, ds.d, ds.uv, depth + 1, lit)
         else:
             cell = guide.cell(si)
             number = numbers.at_vertex(term, depth, 0)
             count = rules.emitter_samples_at(depth)
             _sample_emitters(
-                scene, guide, planes, place, si, bsdf, carried, cell, number, count, depth, smooth
+                scene,
+                waves,
+                guide,
+                planes,
+                place,
+                si,
+                bsdf,
+                carried,
+                cell,
+                number,
+                count,
+                depth,
+                smooth,
             )
 
         # Sample the BSDF for the next direction.
         lobe, direction, fate = _numbers_of_surface(sampler, numbers, term, depth)
-        sample, bsdf_weight = bsdf.sample(mi.BSDFContext(), si, lobe, direction, active_next)
+        sample, bsdf_weight = each_bsdf_sample(waves, bsdf, si, lobe, direction, active_next)
         ray = si.spawn_ray(si.to_world(sample.wo))
-        throughput *= bsdf_weight
+        throughput = products(throughput, bsdf_weight)
         eta *= sample.eta
         previous = mi.Interaction3f(si)
         previous_pdf = sample.pdf
@@ -258,7 +293,7 @@ def _passes_clearly(sample):
 
 
 @dr.syntax
-def _will_bounce(scene, sampler, numbers, term, ray, pi, active, rules):
+def _will_bounce(scene, waves, sampler, numbers, term, ray, pi, active, rules):
     """Return which of the paths will meet a surface other than a null surface.
 
     Whether a path counts is only known after it has gathered light, possibly from several lights.
@@ -268,7 +303,7 @@ def _will_bounce(scene, sampler, numbers, term, ray, pi, active, rules):
     sampler = None if sampler is None else sampler.clone()
     pi = mi.PreliminaryIntersection3f(pi)  # Intersection of the ray
     ray = mi.Ray3f(ray)                    # Ray being traced
-    throughput = mi.Spectrum(1)            # Fraction of radiance that reaches the camera
+    throughput = _unit_light(waves)        # Fraction of radiance that reaches the camera
     eta = mi.Float(1)                      # Product of relative indices of refraction
     depth = mi.UInt32(0)                   # Number of vertices after the camera
     active = mi.Bool(active)               # Paths with only null surfaces so far
@@ -281,12 +316,12 @@ def _will_bounce(scene, sampler, numbers, term, ray, pi, active, rules):
         if dr.hint(sampler is not None, mode="scalar"):
             sampler.next_2d()  # the number that chooses an emitter
         lobe, direction, fate = _numbers_of_surface(sampler, numbers, term, depth)
-        sample, weight = bsdf.sample(mi.BSDFContext(), si, lobe, direction, active)
+        sample, weight = each_bsdf_sample(waves, bsdf, si, lobe, direction, active)
         passes = mi.has_flag(sample.sampled_type, mi.BSDFFlags.Null)
         bounces |= active & si.is_valid() & ~passes
 
         ray = si.spawn_ray(si.to_world(sample.wo))
-        throughput *= weight
+        throughput = products(throughput, weight)
         eta *= sample.eta
         goes_on = active & (depth + 1 < rules.max_depth) & si.is_valid() & passes
         depth[si.is_valid()] += 1
@@ -297,7 +332,7 @@ def _will_bounce(scene, sampler, numbers, term, ray, pi, active, rules):
 
 @dr.syntax
 def _sample_emitters(
-    scene, guide, planes, place, si, bsdf, carried, cell, number, count, depth, active
+    scene, waves, guide, planes, place, si, bsdf, carried, cell, number, count, depth, active
 ):
     """Sample `count` emitters, and add the light that is not in shadow to `planes`.
 
@@ -305,7 +340,6 @@ def _sample_emitters(
     samples, rounded up or down. number: pair that chooses the first emitter and a point on it.
     carried: fraction of the scattered light that reaches the camera.
     """
-    context = mi.BSDFContext()
     k = mi.UInt32(0)  # Number of emitters sampled so far
     active = mi.Bool(active)  # Paths that need more samples
     while active:
@@ -313,17 +347,18 @@ def _sample_emitters(
         y = number.y + mi.Float(k) * GOLDEN_RATIO
         chosen, chance, rest = guide.choose(cell, x, active)
         emitter = dr.gather(mi.EmitterPtr, guide.emitters, chosen, active)
-        ds, radiance = emitter.sample_direction(si, mi.Point2f(rest, y - dr.floor(y)), active)
+        point = mi.Point2f(rest, y - dr.floor(y))
+        ds, radiance = each_direction(waves, emitter, si, point, active)
         lit = active & (ds.pdf != 0)
         expected = chance * mi.Float(count)
-        bsdf_value, bsdf_pdf = bsdf.eval_pdf(context, si, si.to_local(ds.d), lit)
+        bsdf_value, bsdf_pdf = each_bsdf_value(waves, bsdf, si, si.to_local(ds.d), lit)
         mis = dr.select(ds.delta, 1, _mis(ds.pdf * expected, bsdf_pdf))
-        contribution = carried * bsdf_value * radiance * mis
+        contribution = products(carried, bsdf_value, radiance, mis)
         # No shadow ray is needed outside the cone of a spot, or below the surface.
-        lit &= dr.any(contribution != 0)
+        lit &= is_any(contribution)
         lit &= ~scene.ray_test(si.spawn_ray_to(ds.p), lit)
-        guide.learn(cell, chosen, contribution, is_sampled=active, lit=lit)
-        arriving = contribution * dr.rcp(expected)
+        guide.learn(cell, chosen, waves.gray(contribution), is_sampled=active, lit=lit)
+        arriving = waves.light(products(contribution, dr.rcp(expected)))
         planes.add(place, emitter, arriving, ds.d, ds.uv, depth + 1, lit)
         k += 1
         active &= k < count
@@ -346,10 +381,17 @@ def _roulette(throughput, eta, roulette, fate, active):
     The probability depends on surfaces alone, never on emission. So the paths, and hence all
     planes, do not depend on what the lights emit.
     """
-    strongest = dr.max(throughput)
+    strongest = dr.max(throughput[0])
+    for packet in throughput[1:]:
+        strongest = dr.maximum(strongest, dr.max(packet))
     survival = dr.minimum(strongest * dr.square(eta), 0.95)
-    throughput[roulette] *= dr.rcp(survival)
+    for packet in throughput:
+        packet[roulette] *= dr.rcp(survival)
     return active & (~roulette | (fate < survival)) & (strongest != 0)
+
+
+def _unit_light(waves):
+    return [mi.Spectrum(1) for _ in range(waves.packets)]
 
 
 def _mis(pdf_a, pdf_b):

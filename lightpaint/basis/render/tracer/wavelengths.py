@@ -1,0 +1,151 @@
+"""Light along a path: RGB, or power at wavelengths that all emitters share.
+
+Mitsuba's spectra hold four wavelengths. A path of a spectral render carries several of them,
+packets, along the same rays: each surface and each emitter is asked for all, with the same random
+numbers. The wavelengths of a path are evenly spaced, and its number in the sequence of the pixel
+shifts them, so that the paths of a pixel cover all; estimates are unbiased.
+
+Import this module after setting a Dr.Jit variant, since its array types do not exist before.
+"""
+
+# mypy: disable-error-code="no-untyped-def, no-untyped-call"
+
+from typing import Any, NamedTuple
+
+import drjit as dr
+import mitsuba as mi
+
+from lightpaint.basis.render.tracer.sobol import TIME
+
+#: The first wavelength in nanometres, and the number of bins of 1 nm that follow.
+FIRST_NM, BINS = 380, 400
+
+#: Packets of four wavelengths, and the distance in nanometres between two wavelengths of a path.
+PACKETS = 4
+SPACING = BINS // (4 * PACKETS)
+
+
+class PowerByWavelength(NamedTuple):
+    """Light at the wavelengths of a path.
+
+    first_bin: bin of the first; others follow every SPACING. packets: values at four each.
+    """
+
+    first_bin: Any
+    packets: list[Any]
+
+    def at(self, k: int):
+        """Return the value at wavelength k."""
+        return self.packets[k // 4][k % 4]
+
+
+class RgbPaths:
+    """Paths whose light is RGB."""
+
+    packets = 1
+
+    def along(self, numbers, term):
+        """Return the paths of a sample with their wavelengths. term: number of the sample."""
+        return self
+
+    def at(self, si, packet):
+        """Return a surface interaction, at the wavelengths of a packet."""
+        return si
+
+    def from_camera(self, weight):
+        """Return the light per radiance along a camera ray of this weight, for each packet."""
+        return [weight]
+
+    def light(self, values):
+        """Return light as planes take it."""
+        return values[0]
+
+    def gray(self, values):
+        """Return the mean of light over its channels."""
+        # dr.mean would compile the number of paths into the kernel as a constant.
+        red, green, blue = values[0]
+        return (red + green + blue) * (1 / 3)
+
+
+class SpectralPaths(RgbPaths):
+    """Paths whose light is power at wavelengths. first_bin: of each path, if these are known."""
+
+    packets = PACKETS
+
+    def __init__(self, first_bin=None) -> None:
+        self._first_bin = first_bin
+
+    def along(self, numbers, term):
+        shift = mi.UInt32(numbers.pair(term, TIME).y * SPACING)
+        return SpectralPaths(dr.minimum(shift, SPACING - 1))
+
+    def at(self, si, packet):
+        first = mi.Float(self._first_bin) + (FIRST_NM + 0.5 + 4 * SPACING * packet)
+        there = mi.SurfaceInteraction3f(si)
+        there.wavelengths = mi.Spectrum(*(first + SPACING * k for k in range(4)))
+        return there
+
+    def from_camera(self, weight):
+        # The camera chose wavelengths of its own, whose weights do not belong to these.
+        _, of_wavelengths = mi.sample_rgb_spectrum(mi.sample_shifted(mi.Float(0)))
+        return [mi.Spectrum(weight[0] / of_wavelengths[0])] * PACKETS
+
+    def light(self, values):
+        return PowerByWavelength(self._first_bin, values)
+
+    def gray(self, values):
+        total = sum(x[0] + x[1] + x[2] + x[3] for x in values)
+        return total * (1 / (4 * PACKETS))
+
+
+def each_emission(waves, emitter, si, active):
+    """Return what `emitter` emits at `si`, for each packet."""
+    return [emitter.eval(waves.at(si, k), active) for k in range(waves.packets)]
+
+
+def each_direction(waves, emitter, si, number, active):
+    """Return a direction sample of `emitter`, and its radiance for each packet."""
+    sampled = [
+        emitter.sample_direction(waves.at(si, k), number, active) for k in range(waves.packets)
+    ]
+    return sampled[0][0], [radiance for _, radiance in sampled]
+
+
+def each_bsdf_value(waves, bsdf, si, wo, active):
+    """Return the value of a BSDF for each packet, and its density."""
+    context = mi.BSDFContext()
+    value, pdf = bsdf.eval_pdf(context, waves.at(si, 0), wo, active)
+    others = [bsdf.eval(context, waves.at(si, k), wo, active) for k in range(1, waves.packets)]
+    return [value, *others], pdf
+
+
+def each_bsdf_sample(waves, bsdf, si, lobe, direction, active):
+    """Return a BSDF sample, and its weight for each packet.
+
+    The direction is that of the first packet: no surface chooses it by the wavelength.
+    """
+    sampled = [
+        bsdf.sample(mi.BSDFContext(), waves.at(si, k), lobe, direction, active)
+        for k in range(waves.packets)
+    ]
+    return sampled[0][0], [weight for _, weight in sampled]
+
+
+def products(*factors):
+    """Return the products of light, for each packet, with light and numbers."""
+    packets = max(len(x) for x in factors if isinstance(x, list))
+    values = []
+    for k in range(packets):
+        first, *others = (x[k] if isinstance(x, list) else x for x in factors)
+        for factor in others:
+            first = first * factor
+        values.append(first)
+    return values
+
+
+def is_any(values):
+    """Return whether some light is not black."""
+    found = dr.any(values[0] != 0)
+    for value in values[1:]:
+        found |= dr.any(value != 0)
+    return found

@@ -1,0 +1,163 @@
+"""Spectra as people name them: a black body, an illuminant of the CIE, a file of a measurement.
+
+Files are tables of two columns, nanometres and power, or IES TM-27 (.spdx).
+"""
+
+import re
+from pathlib import Path
+from xml.parsers import expat
+
+import numpy as np
+
+from lightpaint.arrays import Doubles
+from lightpaint.colour.primaries import colour_science
+from lightpaint.colour.spectra.spectrum import black_body
+from lightpaint.errors import ColorError
+from lightpaint.file_reading import read_bytes, read_text
+from lightpaint.files import one_line
+
+#: Endings of files: tables, and TM-27.
+TABLES, TM27 = (".csv", ".txt", ".dat", ".spd"), (".spdx", ".xml")
+
+#: Longest file of a spectrum in bytes, and most points in it.
+MAX_BYTES, MAX_POINTS = 2**20, 5000
+
+#: Nanometres that a measurement has to cover, and the fewest points that it needs.
+COVERED, FEWEST_POINTS = (400.0, 700.0), 5
+
+#: Largest negative power that counts as noise of a measurement, relative to its largest power.
+NOISE = 0.01
+
+#: Kelvin of black bodies.
+KELVINS = (500.0, 100_000.0)
+
+#: Deepest nesting of XML.
+MAX_NESTING = 32
+
+_BLACK_BODY = re.compile(r"(\d+(?:\.\d+)?) ?k(?: ?black ?body)?", re.IGNORECASE)
+
+
+def is_spectrum_file(name: str) -> bool:
+    """Return whether a name is that of a file, rather than of a light."""
+    return Path(name).suffix.lower() in (*TABLES, *TM27)
+
+
+def named_spectrum(name: str, folder: Path) -> tuple[Doubles, Doubles]:
+    """Return nanometres (k,), rising, and power (k,) of a spectrum by its name or file.
+
+    name: `3200K blackbody`, an illuminant like `D65`, or a file. folder: of relative paths. Raises
+    ColorError, which says what is wrong without the name.
+    """
+    if is_spectrum_file(name):
+        return read_spectrum(folder / name)
+    if match := _BLACK_BODY.fullmatch(name.strip()):
+        kelvin = float(match[1])
+        if not KELVINS[0] <= kelvin <= KELVINS[1]:
+            raise ColorError(f"{kelvin:g} K: expected {KELVINS[0]:g} to {KELVINS[1]:g}")
+        from lightpaint.colour.spectra.spectrum import WAVELENGTHS
+
+        return WAVELENGTHS.astype(np.float64), np.array(black_body(kelvin))
+    illuminants = colour_science().SDS_ILLUMINANTS
+    if name in illuminants:
+        found = illuminants[name]
+        return np.array(found.wavelengths), np.array(found.values)
+    raise ColorError(
+        f"{one_line(repr(name))}: expected pairs of nanometres and power, a file "
+        '("led.csv", "led.spdx"), a black body ("3200K blackbody") or an illuminant of the CIE '
+        '("D65", "A", "FL2")'
+    )
+
+
+def read_spectrum(path: Path) -> tuple[Doubles, Doubles]:
+    """Return nanometres (k,), rising, and power (k,), >= 0, of a measurement in a file.
+
+    Raises ColorError for a file that is missing, or is not a spectrum of visible light.
+    """
+    if path.suffix.lower() in TM27:
+        points = _points_of_tm27(read_bytes(path, "spectrum", ColorError, limit=MAX_BYTES), path)
+    else:
+        points = _points_of_table(read_text(path, "spectrum", ColorError, limit=MAX_BYTES), path)
+    if not FEWEST_POINTS <= len(points) <= MAX_POINTS:
+        raise ColorError(
+            path, f" has {len(points)} points: expected {FEWEST_POINTS} to {MAX_POINTS}"
+        )
+    waves, powers = np.array(points, np.float64).T
+    if not (np.isfinite(waves).all() and np.isfinite(powers).all()):
+        raise ColorError(path, " has a number that is not finite")
+    if (falls := np.flatnonzero(np.diff(waves) <= 0)).size:
+        k = int(falls[0])
+        raise ColorError(
+            path, f" goes from {waves[k]:g} to {waves[k + 1]:g} nm: wavelengths have to rise"
+        )
+    low, high = COVERED
+    if waves[0] > low or waves[-1] < high:
+        raise ColorError(
+            path, f" covers {waves[0]:g} to {waves[-1]:g} nm: expected {low:g} to {high:g} at least"
+        )
+    if powers.min() < -NOISE * powers.max():
+        k = int(powers.argmin())
+        raise ColorError(
+            path,
+            f" has the power {powers[k]:g} at {waves[k]:g} nm: a light has none below 0, apart "
+            f"from noise of {100 * NOISE:g} % of the largest",
+        )
+    return waves, np.maximum(powers, 0)
+
+
+def _points_of_table(text: str, path: Path) -> list[tuple[float, float]]:
+    """Return the points of a table, whose first lines may be a heading."""
+    points: list[tuple[float, float]] = []
+    for number, line in enumerate(text.splitlines(), 1):
+        # A comma between digits of a semicolon's or tab's table is a decimal one.
+        if ";" in line or "\t" in line:
+            line = line.replace(",", ".")
+        cells = re.split(r"[,;\s]+", line.split("#")[0].strip(" ,;\t"))
+        if cells == [""]:
+            continue
+        try:
+            wave, power = map(float, cells)
+        except ValueError:
+            if not points:
+                continue
+            raise ColorError(
+                path, f" has {one_line(repr(line))} in line {number}: expected nanometres and power"
+            ) from None
+        points.append((wave, power))
+    return points
+
+
+def _points_of_tm27(data: bytes, path: Path) -> list[tuple[float, float]]:
+    """Return the points of IES TM-27. A document type, which entities need, is refused."""
+    parser = expat.ParserCreate()
+    parser.buffer_text = True
+    points: list[tuple[float, float]] = []
+    open_waves: list[str] = []
+    texts: list[str] = []
+    depth = 0
+
+    def start(tag: str, attributes: dict[str, str]) -> None:
+        nonlocal depth
+        depth += 1
+        if depth > MAX_NESTING:
+            raise ColorError(path, f" is nested more than {MAX_NESTING} deep")
+        if tag.rpartition(":")[2] == "SpectralData":
+            open_waves.append(attributes.get("wavelength", ""))
+            texts.clear()
+
+    def end(tag: str) -> None:
+        nonlocal depth
+        depth -= 1
+        if tag.rpartition(":")[2] == "SpectralData":
+            points.append((float(open_waves.pop()), float("".join(texts))))
+
+    def refuse(*_: object) -> None:
+        raise ColorError(path, " has a document type declaration: it is not read")
+
+    parser.StartElementHandler, parser.EndElementHandler = start, end
+    parser.CharacterDataHandler = texts.append
+    parser.StartDoctypeDeclHandler = refuse
+    try:
+        parser.Parse(data, True)
+    except (expat.ExpatError, ValueError) as error:
+        raise ColorError(path, f" is not TM-27: {one_line(str(error))}") from None
+    return points

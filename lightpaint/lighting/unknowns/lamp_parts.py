@@ -1,0 +1,105 @@
+"""Lamps whose emitters have a picture each, as in a basis of spectra.
+
+Constraints speak of lamps. So the unknowns are first those of lamps, with an emission in RGB; then
+each unknown moves the weights of the pictures of the lamp's emitters instead.
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from itertools import groupby
+
+import numpy as np
+
+from lightpaint.arrays import Doubles, as_rgb
+from lightpaint.basis.lights import BasisLight
+from lightpaint.colour.color import luminance
+from lightpaint.colour.lamp import Lamp
+from lightpaint.lighting.unknowns.knobs import Knob, Unknown
+
+
+@dataclass(frozen=True)
+class WholeLamps:
+    """Lights in which the emitters of a lamp are one light. parts: their indices, by light."""
+
+    lights: tuple[BasisLight, ...]
+    parts: tuple[tuple[int, ...], ...]
+
+    @classmethod
+    def of(cls, lights: Sequence[BasisLight]) -> "WholeLamps":
+        """Make them of the lights of a basis."""
+        groups = groupby(range(len(lights)), key=lambda k: lights[k].lamp or lights[k].name)
+        parts = tuple(tuple(indices) for _, indices in groups)
+        return cls(tuple(_whole([lights[k] for k in places]) for places in parts), parts)
+
+    @property
+    def has_parts(self) -> bool:
+        """True if some light is an emitter of a lamp."""
+        return any(light.lamp for light in self.lights)
+
+    def weights(self, k: int, lamp: Lamp | None, emission: Doubles) -> Doubles:
+        """Return the weights (parts, 3) at which light k has an emission (3,)."""
+        if lamp is None or not self.lights[k].lamp:
+            return emission[None]
+        levels = lamp.drives_for(emission) * lamp.levels if emission.any() else 0 * lamp.levels
+        return np.repeat(levels[:, None], 3, axis=1)
+
+    def knobs(self, knob: Knob, lamps: dict[int, Lamp]) -> tuple[Knob, ...]:
+        """Return a knob of lights as knobs of their parts."""
+        places = tuple(part for k in knob.lights for part in self.parts[k])
+        if not any(self.lights[k].lamp for k in knob.lights):
+            [single] = [replace(knob, lights=places, unknowns=self._moved(knob.unknowns))]
+            return (single,)
+        lamp = lamps.get(knob.lights[0])
+        colors = [x.columns[0][1] for x in knob.unknowns]
+        if len(knob.lights) > 1 or lamp is None or not np.array_equal(colors, lamp.columns):
+            return (replace(knob, lights=places, unknowns=(self._dimmer(knob, lamps),)),)
+        unknowns = tuple(
+            replace(x, columns=((part, np.full(3, level)),))
+            for x, part, level in zip(knob.unknowns, places, lamp.levels, strict=True)
+        )
+        if knob.limit is None:
+            return tuple(Knob((k,), (x,)) for k, x in zip(places, unknowns, strict=True))
+        return (replace(knob, lights=places, unknowns=unknowns),)
+
+    def _moved(self, unknowns: Sequence[Unknown]) -> tuple[Unknown, ...]:
+        """Return unknowns of whole lights with the indices of these among the parts."""
+        return tuple(
+            replace(x, columns=tuple((self.parts[k][0], rgb) for k, rgb in x.columns))
+            for x in unknowns
+        )
+
+    def _dimmer(self, knob: Knob, lamps: dict[int, Lamp]) -> Unknown:
+        """Return the unknown of lights of one colour each, by the drives that mix it at full."""
+        [unknown] = knob.unknowns
+        columns: list[tuple[int, Doubles]] = []
+        for k, color in unknown.columns:
+            lamp = lamps.get(k)
+            brightest = 1.0 if lamp is None else lamp.brightest(color) or 1.0
+            weights = self.weights(k, lamp, brightest * color) / brightest
+            columns += zip(self.parts[k], weights, strict=True)
+        return replace(unknown, columns=tuple(columns))
+
+
+def part_lamps(lamp: Lamp) -> list[Lamp]:
+    """Return a lamp for each emitter, whose emission has its luminance in each channel."""
+    return [
+        replace(lamp, emitters=(replace(x, emission=as_rgb(np.full(3, level))),), power_share=None)
+        for x, level in zip(lamp.emitters, lamp.levels, strict=True)
+    ]
+
+
+def emission_of_parts(parts: Sequence[BasisLight], lamp: Lamp) -> Doubles:
+    """Return the emission (3,) of a lamp whose emitters are at the emissions of `parts`."""
+    drives = np.array([x.emission[0] for x in parts]) / lamp.levels
+    return lamp.mix(drives)
+
+
+def _whole(parts: Sequence[BasisLight]) -> BasisLight:
+    """Return the light that emitters form. It is grey until its lamp is known."""
+    first = parts[0]
+    if not first.lamp:
+        return first
+    level = sum(float(luminance(np.array(x.emission))) for x in parts)
+    return replace(
+        first, name=first.lamp, emission=(level, level, level), is_scalar=False, identity=""
+    )

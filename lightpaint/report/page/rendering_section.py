@@ -1,0 +1,45 @@
+"""The section of the report on how lamps render colours, where their spectra are known."""
+
+from typing import Any
+
+from markupsafe import Markup
+
+from lightpaint.lighting.answer.light_rendering import LightRendering, renderings_of
+from lightpaint.lighting.answer.lighting import Lighting
+from lightpaint.report.page.html import html
+
+
+def rendering_section(lighting: Lighting) -> Markup:
+    """Return the section; "" without spectra."""
+    found = renderings_of(lighting)
+    if not found:
+        return Markup("")
+    lamps = [{"name": name, "cells": _cells(x)} for name, x in found.items()]
+    return html("rendering", lamps=lamps)
+
+
+def rendering_numbers(lighting: Lighting) -> dict[str, dict[str, Any]] | None:
+    """Return the same for programs, by name of lamp; None without spectra."""
+    numbers = {
+        name: {
+            **({} if x.color is None else vars(x.color)),
+            "best_rf": x.best_rf,
+            "lm_per_w": x.lm_per_w,
+        }
+        for name, x in renderings_of(lighting).items()
+    }
+    return numbers or None
+
+
+def _cells(found: LightRendering) -> list[str]:
+    efficacy = "" if found.lm_per_w is None else f"{found.lm_per_w:.0f}"
+    if (color := found.color) is None:
+        return ["coloured", *[""] * 6, efficacy]
+    return [
+        f"{color.kelvin:.0f} K",
+        f"{color.duv:+.4f}",
+        *(f"{x:.0f}" for x in (color.ra, color.r9, color.rf)),
+        "" if found.best_rf is None else f"{found.best_rf:.0f}",
+        f"{color.rg:.0f}",
+        efficacy,
+    ]

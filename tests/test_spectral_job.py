@@ -1,0 +1,113 @@
+"""A solve with spectra from files to files, and what does not go with it."""
+
+import json
+from pathlib import Path
+
+import numpy as np
+import pytest
+from renderer import LIGHTS, write_room
+
+from lightpaint import Constraints, Job, Painting, SceneFile, Settings, run
+from lightpaint.basis.render.basis_render import render_basis
+from lightpaint.basis.render.render_origin import basis_lights
+from lightpaint.errors import LightpaintError, SceneError
+from lightpaint.images.formats.exr import write_rgb
+from lightpaint.lighting.answer.lighting_file import read_lighting
+from lightpaint.lighting.constraints.constraints_file import constraints_of
+from lightpaint.lighting.unknowns.reduction import lamps_by_name
+from lightpaint.pipeline.results.results import verify_result
+from lightpaint.relit.export.spectra_table import spectra_csv
+from lightpaint.scene.scene_reader import load_scene
+
+LEVELS = {"red": 4.0, "green": 8.0, "blue": 1.5}
+PEAKS = {"red": (630, 12), "green": (525, 16), "blue": (455, 12)}
+DRIVES = {"panel": (0.5, 0.2, 0.7), "bulb": (0.1, 0.3, 0.0)}
+
+
+@pytest.fixture
+def room(tmp_path: Path) -> Path:
+    """A room whose lamps have three LEDs each, and a sky that stays."""
+    path = write_room(tmp_path, lights="".join(LIGHTS[x] for x in ("panel", "bulb", "sky")))
+    waves = np.arange(380, 781, 5.0)
+    for name, (peak, width) in PEAKS.items():
+        table = np.stack([waves, np.exp(-0.5 * ((waves - peak) / width) ** 2)], axis=1)
+        np.savetxt(tmp_path / f"{name}.csv", table, delimiter=",")
+    emitters = ", ".join(
+        f'{{name = "{x}", spectrum = "{x}.csv", Y = {y}}}' for x, y in LEVELS.items()
+    )
+    tables = "".join(f"[light.{lamp}]\nemitters = [{emitters}]\n" for lamp in DRIVES)
+    (tmp_path / "room.lights.toml").write_text('lights = ["panel", "bulb"]\n' + tables)
+    return path
+
+
+def _paint(path: Path) -> Path:
+    """Write the picture of DRIVES."""
+    scene = load_scene(path)
+    lamps = lamps_by_name(constraints_of(scene.requests), basis_lights(scene))
+    basis = render_basis(scene.with_lamps(lamps), spp=256, seed=3)
+    weights = np.ones((len(basis.lights), 3))
+    for lamp, drives in DRIVES.items():
+        for (name, level), drive in zip(LEVELS.items(), drives, strict=True):
+            weights[basis.names.index(f"{lamp}/{name}")] = level * drive
+    picture = path.with_name("painting.exr")
+    write_rgb(picture, basis.mix(weights).astype(np.float32))
+    return picture
+
+
+def _job(path: Path, picture: Path, **fields: object) -> Job:
+    settings = {"spp": 256, "seed": 1, "spectral": True, "literal": True, "use_cache": False}
+    constraints = fields.pop("constraints", Constraints())
+    return Job(
+        (SceneFile(str(path)),),
+        (Painting(str(picture)),),
+        path.with_name("out"),
+        constraints=constraints,
+        settings=Settings(**{**settings, **fields}),
+    )
+
+
+def test_a_painting_becomes_a_drive_of_each_emitter(room: Path):
+    [look] = run(_job(room, _paint(room), verify_spp=256))
+    assert look.verification is not None
+    assert look.verification.agrees
+    # With other random numbers, from the files alone.
+    assert verify_result(room.with_name("out")).agrees
+    lighting = read_lighting(room.with_name("out") / "lighting.json")
+    assert set(lighting) == {*DRIVES, "rest"}
+    for lamp, drives in DRIVES.items():
+        # The noise of picture and basis moves them by a hundredth.
+        assert list(lighting[lamp].drives.values()) == pytest.approx(drives, abs=0.03)
+    report = json.loads((room.with_name("out") / "report.json").read_text())
+    assert set(report["rendering"]) == set(DRIVES)
+    text = (room.with_name("out") / "relit.xml").read_text()
+    assert text.count('<spectrum name="') == len(DRIVES)
+    assert spectra_csv(lighting).splitlines()[0] == "nm,panel,bulb"
+
+
+WRONG = {
+    "suggest": ({"suggest": 1}, "spectral=True does not go with suggest"),
+    "refine": ({"refine": 1}, "spectral=True does not go with refine"),
+    "start": (
+        {"constraints": Constraints.of(start={"panel": (1, 1, 1)})},
+        "spectral=True starts from the scene as it is",
+    ),
+}
+
+
+@pytest.mark.parametrize("case", WRONG)
+def test_what_does_not_go_with_spectra_is_refused(case: str, room: Path):
+    fields, message = WRONG[case]
+    write_rgb(room.with_name("painting.exr"), np.ones((20, 24, 3), np.float32))
+    with pytest.raises(LightpaintError, match=message):
+        _job(room, room.with_name("painting.exr"), **fields)
+
+
+def test_a_lamp_without_spectra_is_named(room: Path):
+    write_rgb(room.with_name("painting.exr"), np.ones((20, 24, 3), np.float32))
+    file = room.with_name("room.lights.toml")
+    file.write_text('lights = ["panel"]\n')
+    with pytest.raises(SceneError, match="has no emitters for light 'panel'"):
+        _job(room, room.with_name("painting.exr"))
+    file.write_text('[light.panel]\nemitters = [{name = "a", xy = [0.3, 0.3], Y = 1}]\n')
+    with pytest.raises(SceneError, match="no spectrum of a for light 'panel'"):
+        _job(room, room.with_name("painting.exr"))
