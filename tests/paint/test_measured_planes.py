@@ -2,6 +2,7 @@
 
 from collections.abc import Sequence
 from pathlib import Path
+from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
@@ -16,6 +17,7 @@ from lightpaint.errors import LightpaintError
 from lightpaint.lighting.constraints.constraints import Constraints
 from lightpaint.paint import protocol
 from lightpaint.paint.protocol import Message
+from lightpaint.paint.session.live_readings import LiveReadings
 from lightpaint.paint.session.session import Session
 from lightpaint.paint.session.session_planes import SessionPlanes
 from lightpaint.paint.store.history_steps import Identity
@@ -115,6 +117,24 @@ def test_live_and_exact_answers_meet_wishes_until_these_are_ignored(basis: Basis
     again = session.answer_update().reading
     assert again is not None
     assert again.planes[0].mean >= 350 * (1 - MET)
+
+
+def test_readings_take_a_tenth_of_the_time_of_a_stroke() -> None:
+    """By a clock that the test sets: a reading of 20 ms comes every 200 ms after its end."""
+    now, taken = 0.0, list[float]()
+
+    def planes_reading() -> str:
+        nonlocal now
+        taken.append(now)
+        now += 0.02
+        return "reading"
+
+    readings = LiveReadings(lambda: now)
+    answer: Any = SimpleNamespace(planes_reading=planes_reading)
+    while now < 0.7:
+        readings.take(answer)
+        now += 0.01
+    assert taken == pytest.approx([0.0, 0.22, 0.44, 0.66], abs=0.02)
 
 
 def test_readings_are_under_the_master_dimmer(basis: Basis) -> None:

@@ -34,6 +34,7 @@ from lightpaint.paint.references.reference_table import ReferenceTable
 from lightpaint.paint.session.history import Changes, History, Travel, restore
 from lightpaint.paint.session.live_answer import LiveAnswer, weights_by_name
 from lightpaint.paint.session.live_drives import LiveDrives
+from lightpaint.paint.session.live_readings import LiveReadings
 from lightpaint.paint.session.moved_lights import MovedLights, NoPlaneSource, Placed, PlaneSource
 from lightpaint.paint.session.request_changes import (
     RequestChange,
@@ -116,7 +117,7 @@ class Session:
             transform=transform,
             lights_of=lambda session_requests: self._moved_lights.lights(session_requests.placed),
         )
-        self._live_drives = LiveDrives()
+        self._live_drives, self._live_readings = LiveDrives(), LiveReadings()
         self.history = History(store, self.views, self.live_answer)
         self.references = ReferenceTable(store, transform)
         self._update_answer()
@@ -224,8 +225,9 @@ class Session:
     def answer_update(self, **fields_of_answer: Any) -> AnswerUpdate:
         """Return the current weights, with further fields, while the brush is down."""
         fields: dict[str, Any] = {"stroke": self.stroke, "exact": False, "version": self.version}
-        mode, weights = self.live_answer.mode, self.weights
-        fields |= {"mode": mode, "weights": weights, "reading": self.live_answer.planes_reading()}
+        fields |= {"mode": self.live_answer.mode, "weights": self.weights}
+        if "reading" not in fields_of_answer:
+            fields["reading"] = self.live_answer.planes_reading()
         return AnswerUpdate(**{**fields, **fields_of_answer})
 
     def accept_solution(
@@ -270,7 +272,8 @@ class Session:
         if is_final:
             return self.answer_update(**self.edit_state)
         drives = self._live_drives.take(self.live_answer.lamps, self.weights)
-        return self.answer_update(**({} if drives is None else {"drives": drives}))
+        fields: dict[str, Any] = {} if drives is None else {"drives": drives}
+        return self.answer_update(**fields, reading=self._live_readings.take(self.live_answer))
 
     def _patch_messages(self, regions: Changes) -> list[Message]:
         """Return the pixels of changed regions: a message per view, or one if there are none."""
