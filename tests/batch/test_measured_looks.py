@@ -90,6 +90,15 @@ def test_looks_give_the_light_and_another_planes_file_makes_them_stale(folder: P
     assert 450 <= float(row["floor Em lx"]) < 470
 
 
+def test_a_light_that_is_no_lamp_leaves_the_power_known(folder: Path) -> None:
+    lights = f"cd_per_unit = 100\n[light.panel]\n{LAMP}[light.bulb]\nlock = true\n"
+    (folder / "project" / "room.lights.toml").write_text(lights, encoding="utf-8")
+    run_looks(folder)
+    report = json.loads((folder / "out/dark/report.json").read_text("utf-8"))["planes"]
+    row, _ = summary_rows(folder)
+    assert float(row["W"]) == pytest.approx(report["watts"], rel=1e-3)
+
+
 def test_a_worker_elsewhere_gets_the_planes_file_and_does_the_same(
     folder: Path, tmp_path: Path
 ) -> None:

@@ -254,13 +254,16 @@ def planes_of_answer(folder: Path) -> tuple[PlaneRow, ...]:
 
 
 def watts_of_answer(folder: Path) -> float | None:
-    """Return the power of all lamps of an answer in a folder; None if that of one is unknown."""
+    """Return the power of all lamps of an answer in a folder; None if that of one is unknown.
+
+    Lights of unknown emitters, such as a sky, are no lamps.
+    """
     with suppress(LightpaintError):
         lights = read_lighting(folder / "lighting.json").lights
         watts = [
-            None if light.lamp is None else light.lamp.watts_for(np.array(light.emission))
+            light.lamp.watts_for(np.array(light.emission))
             for light in lights
-            if light.lamp is not None or not light.is_fixed
+            if light.lamp is not None
         ]
         known = [x for x in watts if x is not None]
         return sum(known) if len(known) == len(watts) > 0 else None
