@@ -177,7 +177,7 @@ def test_a_plan_is_met_or_says_by_how_much_it_is_not(tmp_path: Path):
 
     dark = run(tmp_path, "plan", "room.xml", "-o", "dark", "--watts", "20")
     assert dark.returncode == 1
-    assert "of 300 lx, as much as the other wishes leave." in dark.stdout
+    assert "of 300 lx, as much as the limit of 20 W leaves." in dark.stdout
     numbers = json.loads((tmp_path / "dark/plan.json").read_text())
     assert numbers["watts"] <= 20 * (1 + 1e-6)
 

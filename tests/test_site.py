@@ -46,6 +46,7 @@ INTERNAL = {
     *("BasisFile", "GroupsFile", "PaintedView", "PlacementFile", "PlacementRecord", "ResultFolder"),
     *("Loss", "Reduction", "SceneRequests", "Sentence", "Software", "SourceKey"),
     *("Squares", "Stream", "SurfaceFilter"),
+    *("HungLuminaire", "MeasuringPoints", "Requirements"),
     *("TexelLayout", "Views"),
 }
 

@@ -111,3 +111,26 @@ def test_a_lamp_without_spectra_is_named(room: Path):
     file.write_text('[light.panel]\nemitters = [{name = "a", xy = [0.3, 0.3], Y = 1}]\n')
     with pytest.raises(SceneError, match="no spectrum of a for light 'panel'"):
         _job(room, room.with_name("painting.exr"))
+
+
+def test_a_lamp_that_is_off_is_verified_as_well(room: Path) -> None:
+    """And reasons for what is missed name the lamp, not its emitters."""
+    picture = _paint(room)
+    off = Constraints.of({"bulb": {"off": True}})
+    [look] = run(_job(room, picture, constraints=off))
+    lighting = read_lighting(room.with_name("out") / "lighting.json")
+    assert lighting.emission["bulb"] == (0, 0, 0)
+    assert look.verification is not None
+    assert look.verification.agrees
+
+
+def test_luminaires_do_not_go_with_spectra(room: Path) -> None:
+    from webs import batwing, ies_text
+
+    (room.parent / "lamp.ies").write_text(ies_text(batwing), encoding="ascii")
+    toml = 'cd_per_unit = 1\n[light.bulb]\nphotometry = "lamp.ies"\n'
+    (room.parent / "room.lights.toml").write_text(toml, encoding="utf-8")
+    picture = room.with_name("painting.exr")
+    write_rgb(picture, np.ones((20, 24, 3), np.float32))
+    with pytest.raises(SceneError, match="has luminaires of photometric files"):
+        _job(room, picture)

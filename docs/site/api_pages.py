@@ -139,6 +139,7 @@ PARTS: dict[str, tuple[str, ...]] = {
     "target.wish": ("Wish",),
     "lighting.problem": ("Refinement",),
     "lighting.answer.certificate": ("Bound",),
+    "lighting.wishes.planes_answer": ("PlanesAnswer",),
     "lighting.answer.lighting": ("LightSetting",),
     "lighting.answer.lighting_keys": ("LightingKey",),
     "colour.photometry": ("Photometry",),

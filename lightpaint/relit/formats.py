@@ -299,8 +299,8 @@ class MvrFormat(ExportFormat):
 FORMS: dict[str, ExportFormat] = {
     x.name: x
     for x in (
-        *(CsvFormat(), JsonFormat(), SpectraFormat(), MitsubaFormat()),
-        *(UsdFormat(), BlenderFormat(), NukeFormat(), MvrFormat()),
+        *(CsvFormat(), JsonFormat(), MitsubaFormat(), UsdFormat()),
+        *(BlenderFormat(), NukeFormat(), MvrFormat(), SpectraFormat()),
     )
 }
 

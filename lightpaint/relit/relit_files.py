@@ -281,6 +281,9 @@ def _edit(edit: _Edits, folder: Path, scene: Scene, stem: str) -> tuple[bytes, d
                 changes.set("float", "sampling_weight", f"{weight:g}")
             if offset in edit.spectra and any(rgb):
                 set_spectrum(changes, emitter, edit.spectra[offset])
+            elif offset in edit.spectra and emitter.kind is not None:
+                # A colour of 0 is a spectrum without power, which Mitsuba refuses.
+                changes.set("spectrum", emitter.kind.parameter, "0")
             else:
                 images |= set_emission(changes, scene, emitter, rgb, stem=stem)
         if offset in edit.texel_images:

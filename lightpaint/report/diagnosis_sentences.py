@@ -63,7 +63,7 @@ JOINT_RELEASE_CLAUSES = {
     "sparse": "The number of lights is limited; allowing more",
     "prefer_current": "Lights are pulled towards their current setting; leaving them free",
     "near": "Lights stay near the lighting that you started from; leaving them free",
-    "planes": "Wishes for measuring planes are met; leaving them out",
+    "planes": "Wishes for measuring planes come first; leaving them out",
 }
 
 #: Texts for a light without a meaningful error: in a table, and in a sentence.

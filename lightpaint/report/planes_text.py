@@ -4,7 +4,7 @@ import math
 from collections.abc import Iterator
 from typing import Any
 
-from lightpaint.lighting.wishes.planes_answer import PlanesAnswer, WishOutcome
+from lightpaint.lighting.wishes.planes_answer import MISSED, PlanesAnswer, WishOutcome
 from lightpaint.lighting.wishes.wished_light import NORMAL_95
 from lightpaint.photometry.illuminance import PlaneReading
 from lightpaint.photometry.measuring_plane import MeasuringPlane, plane_title
@@ -118,9 +118,11 @@ def _missed(answer: PlanesAnswer, outcome: WishOutcome) -> str:
     title = plane_title(wish.plane, wish.case)
     if wish.kind == "mean":
         text = f"{title}: {reached:.0f} of {wish.asked:g} lx"
+        if (limit := _limit_of_power(answer)) is not None:
+            return f"{text}, as much as the limit of {limit:.4g} W leaves."
         if not answer.all_at_full:
             return f"{text}, as much as the other wishes leave."
-        count = len(answer.wished.illuminance.lights)
+        count = answer.lamps
         more = math.ceil(count * (wish.asked / reached - 1)) if reached > 0 else 0
         advice = f"; about {more} more lamps like these {count} would do" if more else ""
         return f"{text}: all lamps are at full{advice}."
@@ -133,10 +135,17 @@ def _missed(answer: PlanesAnswer, outcome: WishOutcome) -> str:
     return f"The lamps take {reached:.4g} W, where {wish.asked:g} W are allowed."
 
 
+def _limit_of_power(answer: PlanesAnswer) -> float | None:
+    """Return the limit of the power in watts, if the lamps take all of it."""
+    limits = [x for x in answer.outcomes if x.wish.kind == "power"]
+    taken = [x.wish.asked for x in limits if x.reached >= x.wish.asked * (1 - MISSED)]
+    return min(taken, default=None)
+
+
 def _prices(answer: PlanesAnswer) -> Iterator[str]:
     """Yield what the last steps of wishes cost, where they cost power."""
-    for outcome in answer.outcomes:
-        if outcome.price is None or outcome.wish.kind not in STEPS or not outcome.is_met:
+    for outcome in () if answer.missed else answer.outcomes:
+        if outcome.price is None or outcome.wish.kind not in STEPS:
             continue
         step, text = STEPS[outcome.wish.kind]
         if (watts := step * outcome.price) >= LEAST_PRICE:

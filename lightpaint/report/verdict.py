@@ -52,7 +52,7 @@ REASON_CLAUSES: dict[str, tuple[str, str]] = {
     "sparse": ("the number of lights is limited",) * 2,
     "prefer_current": ("lights are pulled towards their current setting",) * 2,
     "near": ("lights stay near the lighting that you started from",) * 2,
-    "planes": ("wishes for measuring planes are met",) * 2,
+    "planes": ("wishes for measuring planes come first",) * 2,
     "views": ("view {} asks for different light", "views {} ask for different light"),
 }
 

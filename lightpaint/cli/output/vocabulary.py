@@ -35,6 +35,7 @@ _OTHER_OPTIONS = {
     "sensor": "-s",
     "split": "--split",
     "stage": "--stage",
+    "start": "--start",
     "symmetric": "--symmetric",
     "template": "--template",
     "transform": "--view",

@@ -6,7 +6,8 @@ Unlike caps, the sums may share unknowns and have coefficients of either sign, a
 thousands, few of which hold. The method of multipliers (Hestenes 1969, Powell 1969; for
 inequalities Rockafellar, SIAM Journal on Control 12, 1974) solves problems without requirements: a
 penalty draws x to the sums that it misses, and their multipliers, updated each time, replace it.
-At its end the multipliers prove the optimum as those of bounds do.
+At its end the multipliers prove the optimum as those of bounds do. Where an active set finds the
+optimum at once (held_sums.py), which is the rule from a similar problem, that suffices.
 """
 
 from collections.abc import Iterable
@@ -16,8 +17,9 @@ from typing import Any
 import numpy as np
 
 from lightpaint.arrays import Bools, Doubles
+from lightpaint.lighting.algebra.held_sums import HeldSums
 from lightpaint.lighting.algebra.method import Method
-from lightpaint.lighting.algebra.optimum import Optimum, QuadraticFamily
+from lightpaint.lighting.algebra.optimum import TOLERANCE, Optimum, QuadraticFamily
 from lightpaint.lighting.algebra.quadratic import Cap
 from lightpaint.progress import cancellation_check
 
@@ -86,6 +88,10 @@ class RequiredSums:
             "mk,k->m", np.square(rows), 1 / np.maximum(power, LEAST_DIAGONAL * largest)
         )
         self._sizes = np.where(spread > 0, spread, 1.0)
+        self._held: HeldSums | None = None
+        if not self._limits["caps"] and method == "polished":
+            root = np.sqrt(np.maximum(power, LEAST_DIAGONAL * largest))
+            self._held = HeldSums.of(M, rows, least, lower=lower, upper=upper, root=root)
         self._penalty = PENALTY
         self._families: dict[bytes, QuadraticFamily] = {}
 
@@ -103,6 +109,11 @@ class RequiredSums:
         close: the largest miss of a sum to end at. options: of `QuadraticFamily.minimise`.
         """
         duals = np.zeros(len(self._least)) if multipliers is None else multipliers
+        if self._held is not None:
+            tolerance = options.get("tolerance", TOLERANCE)
+            held = self._held.minimise(b, start, duals, tolerance=tolerance, close=CLOSE)
+            if held is not None:
+                return RequiredOptimum(*held, miss=0.0)
         x, last, check = start, np.inf, cancellation_check()
         for _ in range(MAX_UPDATES):
             check()

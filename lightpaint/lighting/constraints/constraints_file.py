@@ -4,6 +4,7 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
+from lightpaint.colour.spectra.spectrum_source import is_spectrum_file
 from lightpaint.errors import ConstraintError
 from lightpaint.files import one_line
 from lightpaint.keywords import keywords
@@ -74,6 +75,7 @@ def _constraint_tables(requests: SceneRequests) -> Any:
         where = SourceKey(requests.source, "light", name)
         check_keys(table, (*LIGHT_KEYS, *_OTHER_KEYS), where)
         remaining = {key: value for key, value in table.items() if key not in _OTHER_KEYS}
+        remaining = _with_places_of_spectra(remaining, Path(requests.source).parent)
         if PHOTOMETRY in table and "emitters" not in table:
             remaining = _with_own_emitter(remaining, requests.luminaires[name].watts, where)
         elif PHOTOMETRY in table:
@@ -81,6 +83,23 @@ def _constraint_tables(requests: SceneRequests) -> Any:
         if remaining or not table:
             tables[name] = remaining
     return tables
+
+
+def _with_places_of_spectra(table: Mapping[str, Any], folder: Path) -> dict[str, Any]:
+    """Return the table of a light whose files of spectra, which are relative to `folder`, are found
+    from anywhere: constraints from elsewhere may be added to it.
+    """
+    emitters = table.get("emitters")
+    if not isinstance(emitters, Sequence) or isinstance(emitters, str):
+        return dict(table)
+    return {**table, "emitters": [_with_place(x, folder) for x in emitters]}
+
+
+def _with_place(emitter: Any, folder: Path) -> Any:
+    name = emitter.get("spectrum") if isinstance(emitter, Mapping) else None
+    if not (isinstance(name, str) and is_spectrum_file(name)):
+        return emitter
+    return {**emitter, "spectrum": str(folder / name)}
 
 
 def _with_losses(table: Mapping[str, Any], factor: float) -> dict[str, Any]:

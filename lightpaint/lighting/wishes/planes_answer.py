@@ -45,10 +45,10 @@ class WishOutcome:
 class PlanesAnswer:
     """A lighting on measuring planes.
 
-    outcomes: of all wishes. readings: of all planes, by name. watts: the power of all lamps; None
-    if that of one is unknown. floor_m2: the area that it is divided by; 0 without one.
-    all_at_full: whether no lamp could give more. cost_delta_e: the mean CIEDE2000 to the painting
-    beyond that of an answer without wishes; None without a painting.
+    outcomes: of all wishes. watts: the power of all lamps; None if that of one is unknown.
+    floor_m2: the area that it is divided by; 0 without one. all_at_full: whether no lamp could give
+    more. lamps: their number, without those that stay as they are. cost_delta_e: the mean CIEDE2000
+    to the painting beyond that of an answer without wishes; None without a painting.
     """
 
     wished: WishedLight
@@ -57,6 +57,7 @@ class PlanesAnswer:
     watts: float | None
     floor_m2: float
     all_at_full: bool
+    lamps: int
     cost_delta_e: float | None = None
 
     @cached_property
@@ -103,8 +104,17 @@ def planes_answer(
         )
         for k, wish in enumerate(wished.wishes)
     )
-    is_full = _is_all_at_full(reduction, weights)
-    return PlanesAnswer(wished, weights, outcomes, watts, floor_m2, is_full, cost_delta_e)
+    movable = {light for knob in reduction.knobs for light in knob.lights}
+    return PlanesAnswer(
+        wished,
+        weights,
+        outcomes,
+        watts,
+        floor_m2,
+        _is_all_at_full(reduction, weights),
+        len(movable),
+        cost_delta_e,
+    )
 
 
 def _reached(

@@ -295,7 +295,8 @@ def verify_result(
     relit = load_scene(
         relit_xml, sensor=view.sensor, parameters=view.parameters, use_lights_file=False
     )
-    relit = replace(relit, is_spectral=view.is_spectral)
+    if view.is_spectral:
+        relit = replace(relit, is_spectral=True)
     if view.width is not None and view.height is not None:
         film = (view.height, view.width)
         # A scene that was edited by hand may have another film, which `verify` refuses.

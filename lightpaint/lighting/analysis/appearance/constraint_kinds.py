@@ -98,9 +98,10 @@ class ConstraintsByLight:
             }
             for k, table in enumerate(self.tables)
         ]
-        remaining = tuple(
-            (light.name, table, SourceKey("", "light", light.name))
+        # The emitters of a lamp are constrained as one.
+        remaining = {
+            (name := light.lamp or light.name): (name, table, SourceKey("", "light", name))
             for light, table in zip(self.lights, tables, strict=True)
             if table
-        )
-        return replace(self.constraints, lights=remaining)
+        }
+        return replace(self.constraints, lights=tuple(remaining.values()))
