@@ -277,6 +277,9 @@ def lights_text() -> str:
 
 PLANES = """\
 # Written by make_office.py.
+[power]
+area = 50.4
+
 [plane.room]
 shape = "floor"
 height = 0.75
