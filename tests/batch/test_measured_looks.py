@@ -88,6 +88,18 @@ def test_looks_give_the_light_and_another_planes_file_makes_them_stale(folder: P
     assert run_looks(folder) == ["dark", "dark-warmer"]
     row, _ = summary_rows(folder)
     assert 450 <= float(row["floor Em lx"]) < 470
+    assert row["wishes missed"] == ""
+
+
+def test_a_summary_names_planes_that_miss_their_wishes(folder: Path) -> None:
+    text = PLANES.replace("400", "400000")
+    (folder / "project" / "floor.planes.toml").write_text(text, encoding="utf-8")
+    run_looks(folder)
+    row, _ = summary_rows(folder)
+    assert float(row["floor Em lx"]) < 400000
+    assert row["wishes missed"] == "floor"
+    [look, _] = json.loads((folder / "out/summary.json").read_text("utf-8"))["looks"]
+    assert look["missed_planes"] == ["floor"]
 
 
 def test_a_light_that_is_no_lamp_leaves_the_power_known(folder: Path) -> None:

@@ -62,9 +62,9 @@ COLUMNS = (
 #: Suffixes of a light's columns: luminance, emission, kelvin.
 LIGHT_COLUMNS = ("", " R", " G", " B", " K")
 
-#: Columns of a plane: its mean illuminance, and the ratio of its least to that. And the column of
-#: the power of all lamps, in watts.
-PLANE_COLUMNS, POWER_COLUMN = (" Em lx", " U0"), "W"
+#: Columns of a plane: its mean illuminance, and the ratio of its least to that. And the columns of
+#: the power of all lamps, in watts, and of the planes that do not get what was wished for.
+PLANE_COLUMNS, POWER_COLUMN, MISSED_COLUMN = (" Em lx", " U0"), "W", "wishes missed"
 
 State = Literal["done", "failed", "waiting"]
 
@@ -109,7 +109,7 @@ class SummaryRow:
     spp: samples per pixel of its basis; None if nothing was rendered. fingerprint: hash of its
     request and of the files that it reads, as in the journal.
     planes: on which illuminance was measured. watts: power of all lamps, where there are planes and
-    the power of each lamp is known.
+    the power of each lamp is known. missed_planes: names of planes whose wishes are not all met.
     files: to open. picture: small, relative to the batch's folder; "" where there is none.
     """
 
@@ -134,6 +134,7 @@ class SummaryRow:
     fingerprint: str = ""
     planes: tuple[PlaneRow, ...] = ()
     watts: float | None = None
+    missed_planes: tuple[str, ...] = ()
 
 
 def rows_of(plan: Plan, lines: Mapping[tuple[str, Kind], JournalLine]) -> list[SummaryRow]:
@@ -217,6 +218,7 @@ def _row(plan: Plan, look: PlannedLook, folder: Path, state: State, reason: str)
         spp=basis.get("spp"),
         planes=planes,
         watts=watts_of_answer(look.folder) if planes else None,
+        missed_planes=missed_planes(report),
     )
 
 
@@ -251,6 +253,16 @@ def planes_of_answer(folder: Path) -> tuple[PlaneRow, ...]:
                 for name, x in (planes or {}).items()
             ]
     return tuple(rows)
+
+
+def missed_planes(report: Mapping[str, Any]) -> tuple[str, ...]:
+    """Return the planes whose wishes are not all met. report: the report.json of an answer."""
+    with suppress(AttributeError, KeyError, TypeError):
+        planes = report["planes"]["planes"]
+        return tuple(
+            name for name, x in planes.items() if not all(wish["is_met"] for wish in x["wishes"])
+        )
+    return ()
 
 
 def watts_of_answer(folder: Path) -> float | None:
@@ -348,14 +360,15 @@ def summary_csv(rows: list[SummaryRow]) -> str:
 
     These are the luminance of its emission, under its name, the emission in R, G and B, and its
     colour temperature in kelvin, if it has one. Where illuminance was measured, two columns for
-    each plane come before them, and one for the power of all lamps.
+    each plane come before them, one for the power of all lamps, and one for planes that do not get
+    what was wished for.
     """
     names = list(dict.fromkeys(light.name for row in rows for light in row.lights))
     planes = list(dict.fromkeys(plane.name for row in rows for plane in row.planes))
     text = io.StringIO()
     table = csv.writer(text, lineterminator="\n")
     measured = [f"{name}{ending}" for name in planes for ending in PLANE_COLUMNS]
-    measured += [POWER_COLUMN] if planes else []
+    measured += [POWER_COLUMN, MISSED_COLUMN] if planes else []
     columns = _light_columns(names, taken={*COLUMNS, *measured})
     table.writerow([*COLUMNS, *map(plain_cell, measured), *map(plain_cell, columns)])
     for row in rows:
@@ -368,10 +381,12 @@ def summary_csv(rows: list[SummaryRow]) -> str:
 
 
 def _measured_cells(row: SummaryRow, planes: Sequence[str]) -> list[str]:
-    """Return the cells of all planes and of the power; none if no row has a plane."""
+    """Return the cells of all planes, of the power and of what is missed; none if no row has a
+    plane.
+    """
     by_name = {plane.name: [plane.mean_lx, plane.uniformity] for plane in row.planes}
     values = [x for name in planes for x in by_name.get(name, [None] * len(PLANE_COLUMNS))]
-    return [_cell(x) for x in [*values, row.watts]] if planes else []
+    return [_cell(x) for x in [*values, row.watts, "; ".join(row.missed_planes)]] if planes else []
 
 
 def _light_columns(names: Sequence[str], taken: set[str]) -> list[str]:
