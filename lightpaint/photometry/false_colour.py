@@ -1,4 +1,4 @@
-"""False-colour pictures of the illuminance on a plane, with isolux lines and a scale."""
+"""False-colour pictures of the illuminance on a plane, with isolux lines, numbers and a scale."""
 
 import math
 from collections.abc import Sequence
@@ -23,6 +23,10 @@ GROUND, TEXT, LINE = (24, 24, 26), (226, 226, 226), 0.55
 #: Approximate side of the longer side of a plane's picture, largest side of a cell, and space for
 #: the scale at the right and the title above, in pixels.
 LONGEST, LARGEST_CELL, SCALE_WIDTH, TITLE_HEIGHT, MARGIN = 640, 96, 120, 40, 16
+#: Size of numbers on the picture, in pixels, and the least space between two.
+NUMBER_SIZE, NUMBER_GAP = 12, 24
+#: Grey of a colour, 0 to 255, above which the number on it is dark.
+LIGHT_GROUND = 110
 #: Approximate number of isolux lines, and least height of the picture.
 STEPS, LEAST_HEIGHT = 10, 240
 
@@ -43,7 +47,8 @@ def false_colours(plane: MeasuringPlane, values: Doubles, title: str) -> npt.NDA
     """Return a picture of the illuminance on a plane, (h, w, 3).
 
     values: (p,), lx at its points. Between points the light is interpolated; cells without a point
-    stay dark. Lines are where it passes a level of the scale.
+    stay dark. Lines are where it passes a level of the scale. Numbers are in lx, at as many points
+    as there is space for. The lengths of the plane follow the title.
     """
     cells = plane.picture(values)[::-1]
     side = max(1, min(LARGEST_CELL, LONGEST // max(cells.shape)))
@@ -55,10 +60,72 @@ def false_colours(plane: MeasuringPlane, values: Doubles, title: str) -> npt.NDA
     sheet = Image.new("RGB", (max(width, 360), height), GROUND)
     sheet.paste(Image.fromarray(picture), (MARGIN, TITLE_HEIGHT))
     draw = ImageDraw.Draw(sheet)
-    draw.text((MARGIN, 12), visible(title), TEXT, font)
+    draw.text((MARGIN, 12), visible(title) + lengths_text(plane), TEXT, font)
+    _draw_numbers(draw, cells, side, levels[-1])
     left, top = picture.shape[1] + 2 * MARGIN, TITLE_HEIGHT
     _draw_scale(draw, levels, (left, top, height - top - MARGIN), font)
     return np.asarray(sheet)
+
+
+def lengths_text(plane: MeasuringPlane) -> str:
+    """Return the mean lengths of a plane's grid in metres, across and along, after a comma.
+
+    "" for listed points, a single row, and surfaces that lie beside each other in the picture.
+    """
+    index = plane.picture(np.arange(len(plane), dtype=float))
+    lengths = []
+    for axis in (1, 0):
+        steps = np.diff(plane.points[np.nan_to_num(index).astype(int)], axis=axis)
+        are_points = ~np.isnan(np.diff(index, axis=axis))
+        has_gap = np.isnan(index).all(axis=1 - axis).any()
+        if not plane.spacing or has_gap or not are_points.any():
+            return ""
+        step = float(np.linalg.norm(steps, axis=-1)[are_points].mean())
+        lengths.append(index.shape[axis] * step)
+    return f", {lengths[0]:.3g} m x {lengths[1]:.3g} m"
+
+
+def number_texts(values: Doubles) -> list[str]:
+    """Return illuminances as short texts, (n,) in lx: whole numbers from 100 lx on."""
+    most = float(np.max(values, initial=0))
+    decimals = 0 if most >= 100 else 1 if most >= 10 else 2
+    return [f"{x:.{decimals}f}" for x in values]
+
+
+def numbered_cells(shape: tuple[int, int], side: int, size: tuple[float, float]) -> list[slice]:
+    """Return the rows and the columns of cells that have a number, so that no two overlap and none
+    leaves the picture.
+
+    side: of a cell, in pixels. size: width and height of the largest number, in pixels.
+    """
+    width, height = size
+    chosen = []
+    for count, length in zip(shape, (height, width), strict=True):
+        step = math.ceil((length + NUMBER_GAP) / side)
+        edge = max(0, math.ceil(length / 2 / side - 0.5))
+        inside = count - 2 * edge
+        chosen.append(slice(edge + (inside - 1) % step // 2, count - edge, step))
+    return chosen
+
+
+def _draw_numbers(draw: ImageDraw.ImageDraw, cells: Doubles, side: int, most: float) -> None:
+    """Write the illuminance into cells, in dark on light ones and the other way round."""
+    font = ImageFont.load_default(NUMBER_SIZE)
+    rows, columns = np.nonzero(~np.isnan(cells))
+    places = zip(rows.tolist(), columns.tolist(), strict=True)
+    texts = dict(zip(places, number_texts(cells[rows, columns]), strict=True))
+    boxes = {place: draw.textbbox((0, 0), text, font) for place, text in texts.items()}
+    size = max(box[2] for box in boxes.values()), max(box[3] for box in boxes.values())
+    row_slice, column_slice = numbered_cells(cells.shape, side, size)
+    for row in range(cells.shape[0])[row_slice]:
+        for column in range(cells.shape[1])[column_slice]:
+            if (row, column) not in texts:
+                continue
+            left, top, right, bottom = boxes[row, column]
+            x = MARGIN + (column + 0.5) * side - (left + right) / 2
+            y = TITLE_HEIGHT + (row + 0.5) * side - (top + bottom) / 2
+            grey = float(colours_of(cells[row, column] / most) @ (0.2126, 0.7152, 0.0722))
+            draw.text((x, y), texts[row, column], GROUND if grey > LIGHT_GROUND else TEXT, font)
 
 
 def _painted(cells: Doubles, side: int, levels: Sequence[float]) -> npt.NDArray[np.uint8]:
