@@ -16,6 +16,7 @@ from lightpaint.cli.options.parser import command_parser
 from lightpaint.cli.options.source_options import LOADING
 from lightpaint.cli.output.vocabulary import BY_OPTION, OPTIONS, SPELLINGS, spoken
 from lightpaint.dmx.mvr import read_rig
+from lightpaint.lighting.constraints.constraints import Constraints
 from lightpaint.paint.launch import paint_in_browser
 from lightpaint.pipeline.job.settings import Settings
 from lightpaint.pipeline.job.sources import NOT_IN_GROUPS
@@ -144,6 +145,7 @@ def test_every_word_of_the_table_is_an_argument_of_the_library() -> None:
     keywords |= {*inspect.signature(Source).parameters, *inspect.signature(RunOptions).parameters}
     keywords |= {*inspect.signature(lightpaint.relight_frames).parameters}
     keywords |= {*inspect.signature(read_rig).parameters}
+    keywords |= {*inspect.signature(Constraints.of).parameters}
     assert {*NOT_IN_GROUPS, *LOADING} <= set(OPTIONS)
     assert {*OPTIONS, *(text.partition("=")[0] for text in SPELLINGS)} <= keywords
 
