@@ -1,5 +1,6 @@
 """A hall with as many lights as asked for: no scene of the project has more than fourteen."""
 
+import math
 from collections.abc import Iterator
 from pathlib import Path
 
@@ -38,6 +39,19 @@ def write_hall(folder: Path, lights: int, *, width: int, height: int) -> Path:
 """,
         encoding="utf-8",
     )
+    return path
+
+
+def write_floor(folder: Path, points: int) -> Path:
+    """Write a planes file for the hall's floor, 0.8 m high, and return its path.
+
+    points: their approximate number.
+    """
+    grid = math.sqrt((WIDTH - 0.4) * (LENGTH - 0.4) / points)
+    corners = [[-WIDTH / 2 + 0.2, 0.8, 0.2], [WIDTH / 2 - 0.2, 0.8, 0.2]]
+    corners += [[WIDTH / 2 - 0.2, 0.8, LENGTH - 0.2]]
+    path = folder / "hall.planes.toml"
+    path.write_text(f"[plane.floor]\ncorners = {corners}\ngrid = {grid}\n", "utf-8")
     return path
 
 

@@ -11,13 +11,12 @@ and how well each light alone is known in the mean over the floor.
 """
 
 import argparse
-import math
 import tempfile
 import time
 from pathlib import Path
 
 import numpy as np
-from hall import LENGTH, WIDTH, write_hall
+from hall import write_floor, write_hall
 
 from lightpaint.basis.render.basis_render import render_basis
 from lightpaint.photometry.measure import measure_illuminance, weights_on
@@ -33,12 +32,7 @@ def main() -> None:
     with tempfile.TemporaryDirectory() as folder:
         path = write_hall(Path(folder), options.lights, width=width, height=height)
         scene = load_scene(path, group_alike=False)
-        grid = math.sqrt((WIDTH - 0.4) * (LENGTH - 0.4) / options.points)
-        corners = [[-WIDTH / 2 + 0.2, 0.8, 0.2], [WIDTH / 2 - 0.2, 0.8, 0.2]]
-        corners += [[WIDTH / 2 - 0.2, 0.8, LENGTH - 0.2]]
-        planes_path = Path(folder) / "hall.planes.toml"
-        planes_path.write_text(f"[plane.floor]\ncorners = {corners}\ngrid = {grid}\n", "utf-8")
-        planes = read_planes(planes_path, scene).planes
+        planes = read_planes(write_floor(Path(folder), options.points), scene).planes
         measure_illuminance(scene, planes, spp=2, use_cache=False)
         render_basis(scene, spp=2)
 

@@ -11,14 +11,13 @@ it, the seconds of both solves, their ratio, how many rows hold, and what the fl
 """
 
 import argparse
-import math
 import tempfile
 import time
 from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
-from hall import LENGTH, WIDTH, write_hall
+from hall import write_floor, write_hall
 
 from lightpaint.basis.render.basis_render import render_basis
 from lightpaint.colour.display.view_transform import ViewTransform
@@ -53,12 +52,7 @@ def main() -> None:
     with tempfile.TemporaryDirectory() as folder:
         path = write_hall(Path(folder), options.lights, width=width, height=height)
         scene = load_scene(path, group_alike=False)
-        grid = math.sqrt((WIDTH - 0.4) * (LENGTH - 0.4) / options.points)
-        corners = [[-WIDTH / 2 + 0.2, 0.8, 0.2], [WIDTH / 2 - 0.2, 0.8, 0.2]]
-        corners += [[WIDTH / 2 - 0.2, 0.8, LENGTH - 0.2]]
-        planes_path = Path(folder) / "hall.planes.toml"
-        planes_path.write_text(f"[plane.floor]\ncorners = {corners}\ngrid = {grid}\n", "utf-8")
-        planes = read_planes(planes_path, scene).planes
+        planes = read_planes(write_floor(Path(folder), options.points), scene).planes
         measured = measure_illuminance(scene, planes, spp=64, use_cache=False)
         basis = render_basis(scene, spp=options.spp)
     bright = 2 * float(basis.current_weights.max())
