@@ -1,6 +1,7 @@
 """A batch of a small scene: one basis for all looks of a sensor, and what is rendered of each."""
 
 import json
+from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
@@ -59,7 +60,15 @@ lighting = "preset.json"
 
 
 @pytest.fixture(scope="module")
-def batch_folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
+def own_cache(tmp_path_factory: pytest.TempPathFactory) -> Iterator[None]:
+    """A cache in which no other test has left planes of these lights with other samples."""
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setenv("LIGHTPAINT_CACHE", str(tmp_path_factory.mktemp("cache")))
+        yield
+
+
+@pytest.fixture(scope="module")
+def batch_folder(tmp_path_factory: pytest.TempPathFactory, own_cache: None) -> Path:
     folder = tmp_path_factory.mktemp("rendered")
     write_room(folder, lights=LIGHTS["panel"] + LIGHTS["bulb"], sensors=SIDE)
     for name, light in (("bright", 0.8), ("dark", 0.2)):
@@ -115,7 +124,9 @@ def test_a_remark_on_a_kept_basis_names_no_option_that_a_batch_lacks(batch_folde
     """The fixture has solved the same scene with as many samples."""
     command = ("batch", "looks.toml", "-o", "again", "--only", "dark-camera")
     lines = run(batch_folder, *command).stderr.splitlines()
-    [remark] = [line for line in lines if "from an earlier run" in line]
+    remarks = [line for line in lines if "from an earlier run" in line]
+    assert len(remarks) == 1, lines
+    [remark] = remarks
     assert remark.endswith("basis of 8 samples per pixel kept from an earlier run")
 
 
