@@ -16,13 +16,13 @@ from page_texts import all_sentences
 from renderer import REPOSITORY
 
 import lightpaint as lp
-from lightpaint.cli.options.parser import command_parser
+from lightpaint.cli.options.parser import COMMANDS, command_parser
 from lightpaint.sentences import Hint, Word
 
 sys.path.insert(0, str(REPOSITORY / "docs" / "site"))
 
 from api_pages import GROUPS, PARTS
-from command_pages import GUIDES, write_commands
+from command_pages import write_commands
 from page_repair import short_type
 from site_check import check_site
 from staging import stage
@@ -126,12 +126,18 @@ def test_types_are_shown_without_modules() -> None:
 def test_every_option_of_every_command_is_in_the_reference(tmp_path: Path) -> None:
     write_commands(tmp_path / "commands")
     [commands] = (x for x in command_parser()._actions if isinstance(x.choices, dict))
-    assert set(GUIDES) == set(commands.choices)
     for name, parser in commands.choices.items():
         page = (tmp_path / "commands" / f"{name}.rst").read_text("utf-8")
         shown = " ".join(re.findall(r"^\.\. option:: (.*)$", page, re.MULTILINE))
         options = [x for action in parser._actions for x in action.option_strings]
         assert [x for x in options if not re.search(rf"(?<![\w-]){x}(?![\w-])", shown)] == []
+
+
+@pytest.mark.parametrize("name", COMMANDS)
+def test_every_command_has_its_function_and_its_guide(name: str) -> None:
+    command = COMMANDS[name]
+    assert callable(getattr(import_module(f"lightpaint.cli.commands.{command.module}"), name))
+    assert (REPOSITORY / "docs" / f"{command.guide}.md").exists()
 
 
 def test_links_out_of_the_documents_lead_into_the_site(staged: Path) -> None:

@@ -5,29 +5,7 @@ import re
 from pathlib import Path
 
 from lightpaint.cli.options.option_groups import by_theme
-from lightpaint.cli.options.parser import EXIT_CODES, command_parser
-
-#: Pages on what a command is for.
-GUIDES = {
-    "demo": "first-look",
-    "lights": "lights",
-    "basis": "solving",
-    "measure": "photometry",
-    "template": "targets",
-    "solve": "solving",
-    "paint": "painter",
-    "plan": "photometry",
-    "batch": "batch",
-    "export": "formats",
-    "rig": "rigs",
-    "send": "stage",
-    "listen": "stage",
-    "blender": "blender",
-    "relight": "solving",
-    "verify": "solving",
-    "cache": "solving",
-    "doctor": "install",
-}
+from lightpaint.cli.options.parser import COMMANDS, EXIT_CODES, command_parser
 
 _SPECIAL = re.compile(r"([\\*`|_])")
 _OPTION = re.compile(r"(?<![\w-])(--?[a-z][a-z-]*)(?![\w-])")
@@ -60,7 +38,7 @@ def _page(name: str, command: argparse.ArgumentParser) -> str:
     parts = [
         _title(f"lightpaint {name}", "="),
         _prose(command.description or ""),
-        f"The guide is :doc:`/{GUIDES[name]}`.",
+        f"The guide is :doc:`/{COMMANDS[name].guide}`.",
         f".. program:: lightpaint {name}",
     ]
     for title, actions in by_theme(command).items():

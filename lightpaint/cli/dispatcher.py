@@ -11,27 +11,11 @@ from contextlib import contextmanager
 from importlib import import_module
 
 from lightpaint.cli.crash_report import report_fault
-from lightpaint.cli.options.parser import command_parser
+from lightpaint.cli.options.parser import COMMANDS, command_parser
 from lightpaint.cli.output import lines
 from lightpaint.cli.output.lines import CommandOutcome, OutputMode, using_output_mode
 from lightpaint.cli.output.vocabulary import spoken
 from lightpaint.errors import BatchError, LightpaintError, refusal_of
-
-#: Modules of the commands that are not in `render_commands`.
-_MODULES = {
-    "batch": "batch_command",
-    "blender": "program_commands",
-    "cache": "maintenance",
-    "doctor": "maintenance",
-    "export": "program_commands",
-    "listen": "console_commands",
-    "measure": "measure_command",
-    "paint": "paint_command",
-    "plan": "plan_command",
-    "rig": "rig_command",
-    "send": "console_commands",
-    "solve": "solve_command",
-}
 
 #: The scene or the film needs too much memory, which is not a bug.
 OUT_OF_MEMORY_TEXT = (
@@ -121,7 +105,7 @@ def _without_garbage() -> Iterator[None]:
 
 def _command(name: str) -> Callable[..., CommandOutcome]:
     """Return the function of a command, importing only its own modules."""
-    module = import_module(f"lightpaint.cli.commands.{_MODULES.get(name, 'render_commands')}")
+    module = import_module(f"lightpaint.cli.commands.{COMMANDS[name].module}")
     return getattr(module, name)  # type: ignore[no-any-return]
 
 

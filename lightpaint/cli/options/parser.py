@@ -2,6 +2,7 @@
 
 import argparse
 from collections.abc import Callable
+from dataclasses import dataclass
 
 from lightpaint.cli.options import arguments
 from lightpaint.cli.options.answer_options import (
@@ -57,6 +58,20 @@ EXIT_CODES = (
 )
 
 
+@dataclass(frozen=True)
+class Command:
+    """A command of the command line.
+
+    summary: what it does, as `lightpaint --help` prints it. module: the one in `cli/commands/` with
+    its function, which has the name of the command. guide: the page of `docs/` on what it is for.
+    """
+
+    summary: str
+    add_options: Callable[[argparse.ArgumentParser], None]
+    module: str
+    guide: str
+
+
 def command_parser() -> argparse.ArgumentParser:
     """Return the parser of all commands."""
     parser = Parser(
@@ -67,13 +82,14 @@ def command_parser() -> argparse.ArgumentParser:
     commands = parser.add_subparsers(
         dest="command", metavar="COMMAND", required=True, parser_class=CommandParser
     )
-    for name, (summary, add_options) in _COMMANDS.items():
+    for name, command in COMMANDS.items():
+        summary = command.summary
         description = summary[0].upper() + summary[1:] + "."
-        command = commands.add_parser(
+        options = commands.add_parser(
             name, help=summary, description=description, epilog=EXIT_CODES
         )
-        add_options(command)
-        add_output_mode(command)
+        command.add_options(options)
+        add_output_mode(options)
     return parser
 
 
@@ -368,24 +384,89 @@ def _cache(parser: argparse.ArgumentParser) -> None:
     )
 
 
-#: The description of each command, and the function that adds its options.
-_COMMANDS: dict[str, tuple[str, Callable[[argparse.ArgumentParser], None]]] = {
-    "demo": ("solve the example that comes with lightpaint", _demo),
-    "lights": ("list the lights of a scene", _lights),
-    "basis": ("render the image of each light alone", _basis),
-    "measure": ("measure the illuminance on planes of a scene, in lux", _measure),
-    "template": ("render the current look as a template to paint over", _template),
-    "solve": ("find the lighting that comes closest to a painting", _solve),
-    "paint": ("paint in the browser, and see the closest lighting as you paint", _paint),
-    "plan": ("find the least power that meets the wishes for measuring planes", _plan),
-    "batch": ("solve many looks from one manifest; a stopped batch continues", add_batch),
-    "export": ("write a lighting for other programs, fixtures and consoles", _export),
-    "rig": ("make a scene and a lights file of the fixtures of a show", _rig),
-    "send": ("send the levels of a lighting to a console, or print them", add_send),
-    "listen": ("print the levels that arrive from a console or from send", add_listen),
-    "blender": ("write the add-on for Blender, whose lamps follow the painter", _blender),
-    "relight": ("write lightings into the scene, and render it", _relight),
-    "verify": ("render results again, and compare them with the prediction", _verify),
-    "cache": ("list or delete the bases that earlier runs kept", _cache),
-    "doctor": ("check what works on this machine and what to install", add_variant),
+#: All commands by their names, in the order of `lightpaint --help`.
+COMMANDS = {
+    "demo": Command(
+        "solve the example that comes with lightpaint", _demo, "render_commands", "first-look"
+    ),
+    "lights": Command("list the lights of a scene", _lights, "render_commands", "lights"),
+    "basis": Command("render the image of each light alone", _basis, "render_commands", "solving"),
+    "measure": Command(
+        "measure the illuminance on planes of a scene, in lux",
+        _measure,
+        "measure_command",
+        "photometry",
+    ),
+    "template": Command(
+        "render the current look as a template to paint over",
+        _template,
+        "render_commands",
+        "targets",
+    ),
+    "solve": Command(
+        "find the lighting that comes closest to a painting", _solve, "solve_command", "solving"
+    ),
+    "paint": Command(
+        "paint in the browser, and see the closest lighting as you paint",
+        _paint,
+        "paint_command",
+        "painter",
+    ),
+    "plan": Command(
+        "find the least power that meets the wishes for measuring planes",
+        _plan,
+        "plan_command",
+        "photometry",
+    ),
+    "batch": Command(
+        "solve many looks from one manifest; a stopped batch continues",
+        add_batch,
+        "batch_command",
+        "batch",
+    ),
+    "export": Command(
+        "write a lighting for other programs, fixtures and consoles",
+        _export,
+        "program_commands",
+        "formats",
+    ),
+    "rig": Command(
+        "make a scene and a lights file of the fixtures of a show", _rig, "rig_command", "rigs"
+    ),
+    "send": Command(
+        "send the levels of a lighting to a console, or print them",
+        add_send,
+        "console_commands",
+        "stage",
+    ),
+    "listen": Command(
+        "print the levels that arrive from a console or from send",
+        add_listen,
+        "console_commands",
+        "stage",
+    ),
+    "blender": Command(
+        "write the add-on for Blender, whose lamps follow the painter",
+        _blender,
+        "program_commands",
+        "blender",
+    ),
+    "relight": Command(
+        "write lightings into the scene, and render it", _relight, "render_commands", "solving"
+    ),
+    "verify": Command(
+        "render results again, and compare them with the prediction",
+        _verify,
+        "render_commands",
+        "solving",
+    ),
+    "cache": Command(
+        "list or delete the bases that earlier runs kept", _cache, "maintenance", "solving"
+    ),
+    "doctor": Command(
+        "check what works on this machine and what to install",
+        add_variant,
+        "maintenance",
+        "install",
+    ),
 }
