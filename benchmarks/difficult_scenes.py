@@ -14,7 +14,7 @@ no mix makes. Printed are, over bases of that many samples with other seeds:
   channels of lights that are on, and `told`, the same without lights of which an answer says that
   they cannot be told;
 - `met`, `unmet`: the share of answers whose headline calls the painting that can be met close, and
-  the other one not;
+  the other one not; `blamed`: the share of headlines that call what can be met out of reach;
 - `render / prediction`: the mean light of plain Mitsuba renders of the relit scene, with samples
   that nothing else has, over that of the prediction, with its standard error.
 
@@ -49,6 +49,9 @@ SQUARE_STOPS, SQUARES = 1.5, 8
 
 #: The beginning of a headline for a painting that is met.
 CLOSE = "Close: "
+
+#: Words of a headline for what no light can do.
+OUT_OF_REACH = "out of reach", "cannot match"
 
 SCREEN = """<shape type="rectangle" id="screen"><transform name="to_world">
         <scale x="0.5" y="0.3"/><translate x="0.7" y="1.1" z="-0.98"/></transform>
@@ -157,13 +160,14 @@ def main() -> None:
 class Findings:
     """The findings in one scene over all seeds.
 
-    held, told: shares of channels. met, unmet: shares of right headlines. ratios: (seeds,), the
-    light of a plain render over the predicted light.
+    held, told: shares of channels. met, unmet: shares of right headlines; blamed: share of wrong
+    ones. ratios: (seeds,), the light of a plain render over the predicted light.
     """
 
     held: float
     told: float
     met: float
+    blamed: float
     unmet: float
     ratios: np.ndarray
 
@@ -176,15 +180,16 @@ class Findings:
 
 def heading() -> str:
     """Return the heads of the columns of `line`."""
-    columns = f"{'held':>8s}{'told':>8s}{'met':>6s}{'unmet':>7s}"
+    columns = f"{'held':>8s}{'told':>8s}{'met':>6s}{'blamed':>8s}{'unmet':>7s}"
     return f"{'':14s}{columns}{'render / prediction':>22s}{'CPU s':>8s}"
 
 
 def line(name: str, found: Findings) -> str:
     """Return the line of a scene."""
     mean, error = found.ratio
-    shares = f"{found.held:8.3f}{found.told:8.3f}{found.met:6.2f}{found.unmet:7.2f}"
-    return f"{name:14s}{shares}{mean:13.4f} ± {error:.4f}"
+    shares = f"{found.held:8.3f}{found.told:8.3f}"
+    headlines = f"{found.met:6.2f}{found.blamed:8.2f}{found.unmet:7.2f}"
+    return f"{name:14s}{shares}{headlines}{mean:13.4f} ± {error:.4f}"
 
 
 def measure(name: str, folder: Path, *, seeds: int, spp: int) -> Findings:
@@ -207,16 +212,19 @@ def measure(name: str, folder: Path, *, seeds: int, spp: int) -> Findings:
             is_held, is_on = (low <= weights + 1e-9) & (weights <= high + 1e-9), weights > 0
             held.append(is_held[is_on])
             told.append(is_held[is_on & ~bars.untold[:, None]])
-        right.append([is_called_close(answer) for answer in answers])
+        of_met, of_unmet = map(headline, answers)
+        is_blamed = any(words in of_met for words in OUT_OF_REACH)
+        right.append([of_met.startswith(CLOSE), is_blamed, not of_unmet.startswith(CLOSE)])
         ratios.append(render_over_prediction(scene, basis, answers[1], folder, spp=RENDER * spp))
-    met, called_met = np.array(right, float).mean(axis=0)
+    met, blamed, unmet = np.array(right, float).mean(axis=0).tolist()
     all_told = np.concatenate(told)
     share_told = float(all_told.mean()) if all_told.size else np.nan
     return Findings(
         float(np.concatenate(held).mean()),
         share_told,
-        float(met),
-        1 - float(called_met),
+        met,
+        blamed,
+        unmet,
         np.array(ratios),
     )
 
@@ -248,10 +256,9 @@ def whole_painting(name: str, image: np.ndarray) -> lp.Target:
     return lp.Target(name, image.astype(np.float32), importance, everything=True)
 
 
-def is_called_close(answer: lp.Solution) -> bool:
-    """Return whether the headline says that the painting is met."""
-    predicted = lp.combine(answer.basis, answer.lighting)
-    return lp.verdict(answer, predicted, None).startswith(CLOSE)
+def headline(answer: lp.Solution) -> str:
+    """Return what is said of an answer without a render."""
+    return lp.verdict(answer, lp.combine(answer.basis, answer.lighting), None)
 
 
 def render_over_prediction(

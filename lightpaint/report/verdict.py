@@ -7,10 +7,16 @@ from lightpaint.colour.color import luminance
 from lightpaint.display_text import some_names
 from lightpaint.images.estimate import Estimate
 from lightpaint.keywords import keywords
-from lightpaint.lighting.analysis.appearance.appearance import CLOSE, Appearance, compare_appearance
+from lightpaint.lighting.analysis.appearance.appearance import (
+    CLOSE,
+    Appearance,
+    compare_appearance,
+    with_undetermined,
+)
 from lightpaint.lighting.analysis.appearance.delivery import Delivery, main_deliveries
 from lightpaint.lighting.analysis.appearance.limiting_reasons import Reason
 from lightpaint.lighting.analysis.appearance.pixel_sample import LimitGroup
+from lightpaint.lighting.analysis.noise.uncertainty import error_bars
 from lightpaint.lighting.solution import Solution
 from lightpaint.relit.detection_power import ERROR
 from lightpaint.relit.verification import Verification
@@ -95,7 +101,7 @@ def verdict(
         >>> lp.verdict(solution, lp.combine(basis, solution.lighting), None)
         'Close: it looks as painted. Mean ΔE 0.0 over what was painted (... as the scene is now...'
     """
-    appearance = appearance or compare_appearance(solution, predicted)
+    appearance = appearance or _appearance_of(solution, predicted)
     sentences = [
         (start := headline(appearance)),
         f"{spoken_delta_e(appearance, known=bool(predicted.half_difference.any()))}.",
@@ -116,6 +122,16 @@ def verdict(
     else:
         sentences.append(f"Rendered again: NOT equal; {agreement(verification)}.")
     return " ".join(sentences)
+
+
+def _appearance_of(solution: Solution, predicted: Estimate) -> Appearance:
+    """Compare an answer with its painting, and find out what its samples cannot tell there."""
+    appearance = compare_appearance(solution, predicted)
+    has_miss = appearance.place is not None and not appearance.is_close
+    uncertainty = error_bars(solution) if has_miss else None
+    if uncertainty is None:
+        return appearance
+    return with_undetermined(appearance, solution, uncertainty)
 
 
 def headline(appearance: Appearance) -> str:
@@ -294,8 +310,8 @@ def _spoken_reach(appearance: Appearance, *, is_of_color: bool = False) -> str:
 
 def _spoken_hidden(appearance: Appearance) -> str:
     """Return which lights that reach the place the samples do not determine."""
-    hidden = tuple(x for x in appearance.local_lights if x in appearance.undetermined_lights)
-    return f"too few samples tell what {_spoken_some(hidden)[0]} can do there"
+    names = _spoken_some(appearance.hidden_lights)[0]
+    return f"too few samples tell what {names} can do there"
 
 
 def _spoken_spill(appearance: Appearance) -> str:

@@ -15,6 +15,7 @@ from lightpaint.basis.file.basis_file import write_basis
 from lightpaint.images.estimate import Estimate
 from lightpaint.images.formats.exr import write_rgb
 from lightpaint.lighting.analysis.appearance.appearance import Appearance
+from lightpaint.lighting.analysis.appearance.area_lights import AreaLights
 from lightpaint.lighting.analysis.appearance.delivery import Delivery
 from lightpaint.lighting.analysis.appearance.limiting_reasons import HEADLINE_SHARE, Reason
 from lightpaint.lighting.analysis.appearance.unpainted_change import UnpaintedChange
@@ -166,6 +167,16 @@ def _seen(missed_delta_e: float, asked_delta_e: float = 20.0, **fields: Any) -> 
             _seen(14.0, local_lights=("lamp",), undetermined_lights=("lamp",)),
             "The lights do not match this: in the middle the paint is brighter than the lights "
             "make it; too few samples tell what lamp can do there.",
+        ),
+        (
+            _seen(
+                5.0,
+                local_lights=("lamp",),
+                area_lights=AreaLights(("lamp", "sun"), is_alone=False),
+                undetermined_lights=("sun",),
+            ),
+            "Most of the way, but the brighter light in the middle is missing: too few samples "
+            "tell what sun can do there.",
         ),
         (
             _seen(10.4, 20.8, noise=5.2, error_shares={"noise": 0.9}),

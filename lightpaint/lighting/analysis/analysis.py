@@ -10,7 +10,11 @@ from lightpaint.display_text import short_repr
 from lightpaint.images.bands import in_turns
 from lightpaint.keywords import keywords
 from lightpaint.lighting.analysis.ambiguity import Ambiguity, ambiguities
-from lightpaint.lighting.analysis.appearance.appearance import Appearance, compare_appearance
+from lightpaint.lighting.analysis.appearance.appearance import (
+    Appearance,
+    compare_appearance,
+    with_undetermined,
+)
 from lightpaint.lighting.analysis.appearance.color_choices import (
     Choices,
     best_by_colors,
@@ -92,8 +96,11 @@ def analyse(
     diagnoses = [diagnosis for _, diagnosis in looked_at]
     uncertainty, best, alike = next(answers), next(answers), next(answers)
     solution = with_error_bars(solution, uncertainty)
-    undetermined = tuple(x.name for x in solution.lighting.lights if x.untold)
-    appearances = [replace(x, undetermined_lights=undetermined) for x in appearances]
+    if uncertainty is not None:
+        appearances = [
+            with_undetermined(x, view, uncertainty)
+            for x, view in zip(appearances, views, strict=True)
+        ]
     choices = color_choices(
         solution, [view_appearance.delta_e for view_appearance in appearances], best
     )

@@ -6,14 +6,21 @@ from typing import Any
 import numpy as np
 import pytest
 
+from lightpaint.colour.color import luminance
 from lightpaint.colour.color_difference import delta_e
 from lightpaint.colour.display.view_transform import ViewTransform
 from lightpaint.images.object_map import Objects
 from lightpaint.lighting.analysis.analysis import analyse
-from lightpaint.lighting.analysis.appearance.appearance import CLOSE, Appearance, compare_appearance
+from lightpaint.lighting.analysis.appearance.appearance import (
+    CLOSE,
+    Appearance,
+    compare_appearance,
+    with_undetermined,
+)
 from lightpaint.lighting.analysis.appearance.display_difference import PaintComparison
 from lightpaint.lighting.analysis.appearance.pixel_sample import PixelSample
 from lightpaint.lighting.analysis.appearance.unpainted_change import unpainted_change
+from lightpaint.lighting.analysis.noise.uncertainty import error_bars
 from lightpaint.lighting.answer.combination import combine
 from lightpaint.lighting.constraints.constraints import Constraints
 from lightpaint.lighting.solve import solve
@@ -68,6 +75,23 @@ def test_the_mean_is_over_the_paint_weighted_and_against_the_paint(make_basis: A
     assert appearance.delta_e == pytest.approx((0.25 * upper + lower) / 1.25, rel=1e-5)
     assert appearance.requested_change == pytest.approx(appearance.delta_e, rel=1e-5)
     assert appearance.noise == 0
+
+
+@pytest.mark.parametrize(("share", "hidden"), [(0.99, ()), (1.01, ("left",))])
+def test_a_light_is_undetermined_where_its_error_may_be_all_that_is_missing(
+    make_basis: Any, share: float, hidden: tuple[str, ...]
+):
+    """The light of `left` is 1 there at unit emission, so its error is that of its weight."""
+    basis = _left_and_right(make_basis)
+    target = _paint_over(_look(basis), (slice(None), slice(0, 24)), (0.5, 0.4, 0.3))
+    solution = solve(basis, target, constraints=Constraints.of({"left": {"lock": True}}))
+    appearance = compare_appearance(solution)
+    missed = float(luminance(np.array([0.3, 0.2, 0.1])))
+    bars = error_bars(solution)
+    assert bars is not None
+    half = np.array([[share * missed] * 3, [10.0] * 3])
+    uncertain = replace(bars, interval=(solution.weights - half, solution.weights + half))
+    assert with_undetermined(appearance, solution, uncertain).hidden_lights == hidden
 
 
 def test_a_look_at_the_exposure_and_through_the_view_of_the_painting(make_basis: Any):

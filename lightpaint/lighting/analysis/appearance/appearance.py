@@ -31,6 +31,7 @@ from lightpaint.lighting.analysis.appearance.error_place import (
     lights_at,
     object_with_most_error,
     place_with_most_error,
+    undetermined_at,
 )
 from lightpaint.lighting.analysis.appearance.limiting_reasons import (
     HEADLINE_SHARE,
@@ -48,6 +49,7 @@ from lightpaint.lighting.analysis.diagnosis import (
     diagnose,
     error_shares,
 )
+from lightpaint.lighting.analysis.noise.uncertainty import Uncertainty
 from lightpaint.lighting.constraints.light_patterns import constraints_by_light, tied_lights
 from lightpaint.lighting.solution import Solution
 
@@ -96,8 +98,9 @@ class Appearance:
             if it is a part of the paint. "" if they are about all of it.
         compensating_lights: Lights that are down by two stops or more only to make up for what
             others spill on unpainted parts.
-        undetermined_lights: Lights that the samples do not determine (`Uncertainty.untold`): what
-            they could do is not known.
+        undetermined_lights: Lights that the samples do not determine (`Uncertainty.untold`), or not
+            well enough to tell what is missing at the place: what they could do is not known. Empty
+            if errors of lights were not computed.
 
     Examples:
         >>> appearance = lp.compare_appearance(lp.solve(basis, target))
@@ -180,7 +183,16 @@ class Appearance:
     @property
     def is_hidden_by_noise(self) -> bool:
         """True if the samples do not determine a light that reaches the place."""
-        return bool(set(self.local_lights) & set(self.undetermined_lights))
+        return bool(self.hidden_lights)
+
+    @property
+    def hidden_lights(self) -> tuple[str, ...]:
+        """Those of the lights of the place, and of the paint in question, that the samples do not
+        determine.
+        """
+        of_area = () if self.area_lights is None else self.area_lights.names
+        names = dict.fromkeys((*self.local_lights, *of_area))
+        return tuple(name for name in names if name in self.undetermined_lights)
 
     @property
     def noise_shares(self) -> dict[str, float]:
@@ -317,6 +329,16 @@ def compare_appearance(
         look = look.within(area)
         appearance = replace(appearance, reasons_wish=delivered.name_of_part(appearance.worst_wish))
     return _with_reasons(appearance, solution, look, predicted, area, diagnosis)
+
+
+def with_undetermined(
+    appearance: Appearance, view: Solution, uncertainty: Uncertainty
+) -> Appearance:
+    """Return the appearance of a view with the lights that its samples do not determine."""
+    names = {x for x, is_so in zip(view.basis.names, uncertainty.untold, strict=True) if is_so}
+    if appearance.place is not None:
+        names.update(undetermined_at(view, appearance.place, uncertainty))
+    return replace(appearance, undetermined_lights=tuple(x for x in view.basis.names if x in names))
 
 
 def _worst_area(appearance: Appearance, delivered: DeliveryReport) -> Floats | None:

@@ -16,6 +16,7 @@ from lightpaint.lighting.analysis.diagnosis import (
     REGIONS,
     Place,
 )
+from lightpaint.lighting.analysis.noise.uncertainty import Uncertainty
 from lightpaint.lighting.solution import Solution
 
 #: Smallest share of the error on a named object, and its largest share of the picture.
@@ -154,11 +155,7 @@ def lights_at(solution: Solution, place: Place) -> tuple[tuple[str, ...], bool]:
     by their effect there relative to their brightest pixels, which does not depend on their
     strength.
     """
-    basis = solution.basis
-    top, left, bottom, right = place.box
-    local_light = basis.planes.rows(top, bottom)[:, :, left:right].mean(
-        axis=(1, 2), dtype=np.float64
-    )
+    basis, local_light = solution.basis, _local_light(solution, place)
     if luminance(np.array(place.painted)) < luminance(np.array(place.reached)):
         part, enough = luminance(local_light * solution.weights), DOES_MUCH
         whole = np.full(len(part), part.sum())
@@ -171,3 +168,22 @@ def lights_at(solution: Solution, place: Place) -> tuple[tuple[str, ...], bool]:
     share = np.where(whole > 0, part / np.where(whole > 0, whole, 1), 0)
     names = (basis.names[k] for k in np.argsort(-share, kind="stable") if share[k] > enough)
     return tuple(names), bool(share.max() > DOES_MUCH)
+
+
+def undetermined_at(solution: Solution, place: Place, uncertainty: Uncertainty) -> tuple[str, ...]:
+    """Return the lights whose error alone may be all that is missing at a place, or too much there.
+
+    A light of known weight takes no part, whatever the samples say of the others.
+    """
+    low, high = uncertainty.interval
+    errors = np.nan_to_num(high - low) / 2 * _local_light(solution, place)  # (n, 3)
+    missed = luminance(np.abs(np.subtract(place.painted, place.reached)))
+    names = solution.basis.names
+    return tuple(name for name, x in zip(names, luminance(errors), strict=True) if x >= missed > 0)
+
+
+def _local_light(solution: Solution, place: Place) -> Doubles:
+    """Return the mean light of each light at a place, at unit emission, (n, 3)."""
+    top, left, bottom, right = place.box
+    rows = solution.basis.planes.rows(top, bottom)
+    return np.asarray(rows[:, :, left:right].mean(axis=(1, 2), dtype=np.float64))
