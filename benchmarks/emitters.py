@@ -1,7 +1,7 @@
 """Lamps of emitters against answers of three numbers a lamp, and the way through DMX.
 
     pip install '.[stage]'
-    python benchmarks/emitters.py [--spp 64] [--drives 504]
+    python benchmarks/emitters.py [--spp 64] [--drives 504] [--drives-only]
 
 The shipped show, four lamps with four emitters and two with six, lights its room with known drives.
 The picture gets 2 % of noise, and is solved
@@ -14,8 +14,10 @@ The picture gets 2 % of noise, and is solved
     rendered         by Mitsuba with the received drives, in blocks of 5 x 5 pixels, whose noise is
                      that of the basis and of this render; and the means of its channels, relative
 
-Errors are relative to the picture without noise (RMS). Then lamps of six emitters with so many
-drives are solved, beside the same lights with three channels each.
+Errors are relative to the picture without noise (RMS). Before, lamps of six emitters with so many
+drives are solved, in turns with the same lights with three channels each: for a picture whose
+colours all lamps can mix, and for one of known drives, many of which are 0 or 1; literally, and as
+a display shows it, with any colours and by default. `--drives-only` ends there.
 """
 
 from __future__ import annotations
@@ -25,7 +27,6 @@ import subprocess
 import sys
 import tempfile
 import time
-from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
 from subprocess import DEVNULL
@@ -145,18 +146,8 @@ def compare(spp: int) -> None:
         )
 
 
-def seconds(call: Callable[[], Any]) -> float:
-    """Return the least processor seconds of five calls."""
-    times = []
-    for _ in range(5):
-        start = time.process_time()
-        call()
-        times.append(time.process_time() - start)
-    return min(times)
-
-
-def speed(drives: int) -> None:
-    """Print the time of a solve for so many drives, relative to three channels a light."""
+def made_lamps(drives: int) -> tuple[Basis, lp.Constraints, dict[str, Any]]:
+    """Return a basis of lamps of six emitters, their constraints, and two paintings by name."""
     lights, size = drives // 6, (45, 80)
     rng = np.random.default_rng(SEED)
     images = (rng.random((lights, *size, 3)) ** 8).astype(np.float32)
@@ -172,29 +163,53 @@ def speed(drives: int) -> None:
         **{"white": [0.33, 0.34], "amber": [0.57, 0.42], "lime": [0.41, 0.55]},
     }
     emitters = [{"name": name, "xy": x, "Y": 1.0} for name, x in xy.items()]
-    lamps = lp.Constraints.of({"l*": {"emitters": emitters}})
-    image = (basis.mix(rng.random((lights, 3)) * 3) * rng.uniform(0.8, 1.2, (*size, 1))).astype(
-        "f4"
-    )
-    target = lp.Target("made", image, np.ones(size, np.float32), everything=True)
-    three = seconds(lambda: lp.solve(basis, target, literal=True))
-    many = seconds(lambda: lp.solve(basis, target, constraints=lamps, literal=True))
-    print(
-        f"{6 * lights} drives of {lights} lamps: {many:.3f} s, {many / three:.1f} times that of "
-        f"{lights} lights with three channels"
-    )
-    solution = lp.solve(basis, target, constraints=lamps, literal=True)
-    fresh = [replace(x) for x in solution.lighting.lights]
-    start = time.process_time()
+    constraints = lp.Constraints.of({"l*": {"emitters": emitters}})
+    inside = basis.mix(rng.random((lights, 3)) * 3) * rng.uniform(0.8, 1.2, (*size, 1))
+    lamps = reduce_to(constraints, basis.lights).lamps.values()
+    known = np.array([lamp.mix(rng.choice([0, 0, 0.1, 0.4, 0.7, 1], 6)) for lamp in lamps])
+    at_bounds = basis.mix(known) * (1 + NOISE * rng.standard_normal((*size, 1)))
+    ones = np.ones(size, np.float32)
+    targets = {
+        name: lp.Target(name, image.astype(np.float32), ones, everything=True)
+        for name, image in (("inside", inside), ("known drives", at_bounds))
+    }
+    return basis, constraints, targets
+
+
+def speed(drives: int) -> None:
+    """Print the time of solves for so many drives, relative to three channels a light."""
+    basis, constraints, targets = made_lamps(drives)
+    display = {"space": "display", "transform": lp.ViewTransform("srgb")}
+    fits = {
+        "literal": {"literal": True},
+        "display": {**display, "colors": "free"},
+        "default": {**display, "colors": "gentle"},
+    }
+    print(f"{drives} drives of {len(basis.lights)} lamps, relative to three channels a light")
+    for name, target in targets.items():
+        for fit, options in fits.items():
+            times: dict[bool, list[float]] = {False: [], True: []}
+            for _ in range(5):
+                for has_drives, spent in times.items():
+                    given = constraints if has_drives else None
+                    begin_s = time.process_time()
+                    found = lp.solve(basis, target, constraints=given, **options)
+                    spent.append(time.process_time() - begin_s)
+            three, many = (min(spent) for spent in times.values())
+            print(f"{name:12} {fit:8} {1000 * many:6.1f} ms, {many / three:5.2f} times")
+    fresh = [replace(x) for x in found.lighting.lights]
+    begin_s = time.process_time()
     for light in fresh:
         _ = light.drives
-    print(f"preferred mixes of all: {1000 * (time.process_time() - start):.0f} ms")
+    print(f"preferred mixes of all: {1000 * (time.process_time() - begin_s):.0f} ms")
 
 
 if __name__ == "__main__":
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("--spp", type=int, default=64)
     parser.add_argument("--drives", type=int, default=504)
+    parser.add_argument("--drives-only", action="store_true", help="skip the shipped show")
     asked = parser.parse_args()
     speed(asked.drives)
-    compare(asked.spp)
+    if not asked.drives_only:
+        compare(asked.spp)

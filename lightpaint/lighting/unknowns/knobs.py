@@ -284,8 +284,8 @@ def lamp_knob(k: int, light: BasisLight, constraint: LightConstraint, lamp: Lamp
     """Make the knob of a lamp, whose unknowns are the drives of its emitters."""
     lower, upper = np.zeros(len(lamp.most)), lamp.most
     unknowns = tuple(
-        Unknown(((k, rgb),), 0.0, float(most))
-        for rgb, most in zip(lamp.columns, upper, strict=True)
+        Unknown(((k, rgb),), 0.0, most)
+        for rgb, most in zip(lamp.columns, upper.tolist(), strict=True)
     )
     if lamp.power_share is not None:
         return Knob((k,), unknowns, (tuple(map(float, lamp.powers)), 0.0, lamp.power_share))

@@ -53,9 +53,16 @@ def nearest_unknowns(reduction: Reduction, start: Doubles, reached: Bools) -> Do
     reached: (n,). For a light that reaches something, a luminance at its limit is good enough.
     """
     x = np.zeros(len(reduction.unknowns))
-    for group in reduction.knob_groups:
-        bounds = reduction.lower[group.places], reduction.upper[group.places]
-        x[group.places] = _nearest_in_group(group, start, *bounds)
+    mixed = reduction.mixed_lights
+    for j, group in enumerate(reduction.knob_groups):
+        low, high = reduction.lower[group.places], reduction.upper[group.places]
+        mixes = None if mixed is None else mixed.groups[j].mixes
+        if mixes is None:
+            x[group.places] = _nearest_in_group(group, start, low, high)
+        else:
+            every, emissions = np.arange(len(low)), start[group.lights[:, 0]]
+            values = mixes.nearest(every, emissions, np.ones(emissions.shape))
+            x[group.places] = _snap_to_bounds(values, low, high)
     for stack in reduction.limited_knobs:
         for k in _clip_to_limits(x, reduction, stack):
             knob = reduction.knobs[k]
@@ -335,6 +342,11 @@ class ReducedSolver:
                 M, b = M[:, lights[:, None], lights], b[:, lights]
             options = {"lower": alike.lower, "upper": alike.upper, **options}
             return minimise_each(M, b, start=x[alike.unknowns], method=self._method, **options)
+        if self._method == "polished" and (mixed := reduction.mixed_lights) is not None:
+            tolerance = options.get("tolerance", TOLERANCE)
+            optimum = mixed.minimise(M, b, coupling, x, tolerance=tolerance)
+            if optimum is not None:
+                return [optimum]
         if not self._families:
             problems = _block_problems((M, b), coupling, reduction)
             self._families = [self._family(p, p.M) for p in problems]

@@ -40,6 +40,7 @@ from lightpaint.lighting.unknowns.lamp_parts import (
     part_lamps,
 )
 from lightpaint.lighting.unknowns.lamp_powers import watts_of_fixed, watts_of_unknowns
+from lightpaint.lighting.unknowns.mixed_lights import MixedLights
 from lightpaint.lighting.unknowns.unknown_blocks import (
     AlikeBlocks,
     Block,
@@ -250,6 +251,16 @@ class Reduction:
             )
             blocks.append(Block(channels, members, tuple(entries), caps, cap_indices))
         return tuple(blocks)
+
+    @cached_property
+    def mixed_lights(self) -> MixedLights | None:
+        """The unknowns as lamps of many emitters, and others beside them; None where none is one,
+        or caps or requirements join them.
+        """
+        is_one = [block.unknowns.size for block in self.blocks] == [len(self.unknowns)]
+        if self.caps or self.requirements is not None or not is_one:
+            return None
+        return MixedLights.of(self.knob_groups, (self.lower, self.upper), self.columns)
 
     @cached_property
     def alike_blocks(self) -> AlikeBlocks | None:
