@@ -23,6 +23,9 @@ SINGULAR = 1e-12
 #: Squared sine of the angle between two edges that count as parallel.
 FLAT = 1e-16
 
+#: Corrections of drives on the way to a face; distance from a bound that is round-off.
+CORRECTIONS, BOUND_ROUND_OFF = 2, 1e-13
+
 #: Emitters of a lamp beyond which its parallelograms are too many.
 MAX_EMITTERS = 12
 
@@ -115,11 +118,16 @@ class EmissionMixes:
         own = self.pairs[face]
         turns[rows[:, None], own] = _in_plane(edges[rows, own[:, 0]], edges[rows, own[:, 1]], rest)
         turns *= out[:, None]
-        # What is left is the width by which planes were turned.
-        rest = from_middle - np.matmul(turns[:, None], edges)[:, 0]
-        across = np.matmul(edges.swapaxes(1, 2), edges)
-        turns += np.matmul(edges, _solve_or_zero(across, rest)[:, :, None])[..., 0]
-        return np.asarray(np.clip(turns, -1, 1))
+        turns = np.clip(turns, -1, 1)
+        for _ in range(CORRECTIONS):
+            # What is left is due to the width by which planes were turned.
+            rest = from_middle - np.matmul(turns[:, None], edges)[:, 0]
+            free = edges * (np.abs(turns) < 1)[:, :, None]
+            across = np.matmul(free.swapaxes(1, 2), free)
+            turns += np.matmul(free, _solve_or_zero(across, rest)[:, :, None])[..., 0]
+            turns = np.clip(turns, -1, 1)
+        is_at_bound = np.abs(turns) > 1 - BOUND_ROUND_OFF
+        return np.asarray(np.where(is_at_bound, np.sign(turns), turns))
 
     def _turns_on_faces(
         self,
