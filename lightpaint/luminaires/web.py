@@ -45,6 +45,18 @@ class Opening:
         """Its largest size in metres."""
         return max(self.along_c0, self.along_c90, self.height)
 
+    def projected_area(self, directions: Doubles) -> Doubles:
+        """Return its area (...) in m² as seen from directions (..., 3), unit vectors of the web.
+
+        Lower and upper side are as large as each other, and its sides are upright.
+        """
+        x, y, z = np.abs(np.moveaxis(np.asarray(directions, np.float64), -1, 0))
+        across, along = self.along_c90 * x, self.along_c0 * y
+        width = np.hypot(across, along) if self.is_round else across + along
+        corners = math.pi / 4 if self.is_round else 1.0
+        flat = corners * self.along_c0 * self.along_c90 * z
+        return np.asarray(flat + self.height * width)
+
 
 @dataclass(frozen=True)
 class PhotometricWeb:

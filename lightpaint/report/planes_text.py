@@ -6,8 +6,11 @@ from typing import Any
 
 from lightpaint.lighting.wishes.planes_answer import MISSED, PlanesAnswer, WishOutcome
 from lightpaint.lighting.wishes.wished_light import NORMAL_95
+from lightpaint.photometry.glare import GlareReading
 from lightpaint.photometry.illuminance import PlaneReading
 from lightpaint.photometry.measuring_plane import MeasuringPlane, plane_title
+from lightpaint.photometry.readings_file import glare_document
+from lightpaint.report.glare_text import glare_sentences
 
 #: Headings of a table of planes.
 HEADINGS = ("plane", "Em lx", "U0", "least lx", "most lx", "wished for", "W/m² per 100 lx")
@@ -47,8 +50,13 @@ def wishes_text(plane: MeasuringPlane) -> str:
     return ", ".join(parts)
 
 
+def glare_by_title(answer: PlanesAnswer) -> dict[str, GlareReading]:
+    """Return the glare that observers see, by name of the observer and case."""
+    return {plane_title(name, case): x for (case, name), x in answer.glare_readings.items()}
+
+
 def planes_sentences(answer: PlanesAnswer) -> list[str]:
-    """Return what is missed, what the power is, and what the wishes cost."""
+    """Return what is missed, what the power is, what the wishes cost, and what glare is unknown."""
     sentences = [_missed(answer, outcome) for outcome in answer.missed]
     if not answer.missed and answer.outcomes:
         what = "All wishes for the planes are" if answer.readings else "The limit of power is"
@@ -63,7 +71,7 @@ def planes_sentences(answer: PlanesAnswer) -> list[str]:
         cost = answer.cost_delta_e
         text = f"by ΔE {cost:.1f} further" if cost >= LEAST_COST else "no further"
         sentences.append(f"With these wishes the picture is {text} from the painting.")
-    return sentences
+    return [*sentences, *glare_sentences(glare_by_title(answer))]
 
 
 def planes_numbers(answer: PlanesAnswer) -> dict[str, Any]:
@@ -87,6 +95,7 @@ def planes_numbers(answer: PlanesAnswer) -> dict[str, Any]:
     budget = [x.wish.asked for x in answer.outcomes if x.wish.kind == "power"]
     return {
         "planes": planes,
+        "observers": {name: glare_document(x) for name, x in glare_by_title(answer).items()},
         "watts": answer.watts,
         "budget_watts": min(budget, default=None),
         "floor_m2": answer.floor_m2 or None,
