@@ -303,6 +303,16 @@ mean = 500
 uniformity = 0.6
 """
 
+#: Who sits at the first desk, and who comes in.
+OBSERVERS = """
+[observer.seat_1]
+at = [2.0, 1.55, 1.2]
+towards = [2.0, 5.0, 1.2]
+
+[observer.door]
+at = "camera"
+"""
+
 
 def main() -> None:
     """Write all files."""
@@ -311,7 +321,7 @@ def main() -> None:
     (HERE / "office.xml").write_text(scene_text(), encoding="utf-8")
     (HERE / "office.lights.toml").write_text(lights_text(), encoding="utf-8")
     desks = "".join(DESK.format(number=k + 1) for k in range(len(DESKS)))
-    (HERE / "office.planes.toml").write_text(PLANES + desks, encoding="utf-8")
+    (HERE / "office.planes.toml").write_text(PLANES + desks + OBSERVERS, encoding="utf-8")
 
 
 if __name__ == "__main__":

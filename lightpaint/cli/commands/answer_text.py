@@ -105,6 +105,7 @@ def show_planes(answer: PlanesAnswer) -> None:
 def show_glare(readings: Mapping[str, GlareReading]) -> None:
     """Print the glare that observers see. readings: by title."""
     if readings:
+        terminal.write("")
         table = terminal.table(*GLARE_HEADINGS)
         for row in glare_rows(readings):
             table.row(*row)
