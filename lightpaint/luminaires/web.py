@@ -67,7 +67,9 @@ class PhotometricWeb:
     table: (c, g) candela, after all factors of the file.
     stated_lumens: the flux that the file states: of the luminaire if it is absolute or tells the
     efficiency, else of the lamps in it; None if unknown. of_lamps: whether it is that of the lamps.
-    watts: input power; None if unknown.
+    watts: input power; None if unknown. tilt_factors: (2, k), angles by which the luminaire is
+    tilted, in degrees from hanging as it was measured, and factors of its light; None without.
+    unread: number of texts in the file after what it describes.
     """
 
     name: str
@@ -79,6 +81,8 @@ class PhotometricWeb:
     stated_lumens: float | None = None
     of_lamps: bool = False
     watts: float | None = None
+    tilt_factors: Doubles | None = None
+    unread: int = 0
 
     def __post_init__(self) -> None:
         for key in ("gammas", "planes", "table"):
@@ -126,6 +130,15 @@ class PhotometricWeb:
         value = (1 - c_share) * on_plane[0] + c_share * on_plane[1]
         inside = (gamma >= self.gammas[0] - SAME_ANGLE) & (gamma <= self.gammas[-1] + SAME_ANGLE)
         return np.asarray(np.where(inside, value, 0.0))
+
+    def factor_at(self, tilt: float) -> float:
+        """Return the factor of its light if its nadir is by `tilt` degrees away from downwards.
+
+        It is linear between the angles of the file, and constant beyond them.
+        """
+        if self.tilt_factors is None:
+            return 1.0
+        return float(np.interp(tilt, *self.tilt_factors))
 
     def profile(self) -> Doubles:
         """Return the intensities (g,) of a web that is the same in all planes."""
