@@ -75,6 +75,19 @@ class PlanesFile:
     observers: tuple[GlareObserver, ...] = ()
     error: float = DEFAULT_ERROR
 
+    def remarks(self, scene: Scene) -> list[str]:
+        """Return what luminaires, which become panels, cover of planes in a scene."""
+        panels = {x.name for x in scene.luminaires if x.is_panel}
+        remarks = []
+        for plane in self.planes:
+            if covers := [name for name in plane.covered_by if name in panels]:
+                count = "1 point is" if len(covers) == 1 else f"{len(covers)} points are"
+                remarks.append(
+                    f"plane {plane.name}: {count} left out behind {some_names(sorted({*covers}))}, "
+                    "of the size of its luminous opening"
+                )
+        return remarks
+
 
 def planes_file_beside(scene: Path) -> Path:
     """Return the path of the planes file of `scene`, whether it exists or not."""

@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 
 from lightpaint.arrays import Doubles
-from lightpaint.files import write_bytes, write_text
+from lightpaint.files import one_line, write_bytes, write_text
 from lightpaint.images.formats.png import png_bytes
 from lightpaint.photometry.false_colour import false_colours
 from lightpaint.photometry.glare import Glare, GlareReading
@@ -140,10 +140,14 @@ def missed_wishes(measured: Illuminance, weights: Doubles) -> list[str]:
     return missed
 
 
-def is_measured_folder(folder: Path) -> bool:
-    """Return True if the files of an earlier measurement are in `folder`."""
+def measured_origin(folder: Path) -> str | None:
+    """Return the origin of an earlier measurement in `folder`, as `write_readings` had it; None
+    without one.
+    """
     try:
         document = strict_json((folder / PLANES).read_text("utf-8"))
     except (OSError, ValueError):
-        return False
-    return isinstance(document, Mapping) and document.get("format") == FORMAT
+        return None
+    if not isinstance(document, Mapping) or document.get("format") != FORMAT:
+        return None
+    return one_line(str(document.get("origin", "")))

@@ -86,6 +86,8 @@ def measure_planes(
     radiance of 1 stands for.
     """
     file, cd_per_unit = read_planes(path, scene), checked_scale(path, cd_per_unit)
+    for remark in file.remarks(scene):
+        listen.say(remark)
     illuminance = measure_illuminance(
         scene,
         file.planes,

@@ -21,7 +21,7 @@ from lightpaint.photometry.measure_glare import measure_glare
 from lightpaint.photometry.planes_file import planes_file_beside, read_planes
 from lightpaint.photometry.readings_file import (
     POINTS,
-    is_measured_folder,
+    measured_origin,
     missed_wishes,
     readings_document,
     readings_files,
@@ -56,10 +56,14 @@ def measure(
         )
     with terminal.TerminalListener() as listen, stage("placing the points", listen):
         found = read_planes(planes_path, content)
+    for remark in found.remarks(content):
+        terminal.say(remark)
     weights = _weights(content, emission)
     inputs = [*content.read_files, planes_path, *([] if lighting is None else [lighting])]
     files = [output / name for name in readings_files(x.name for x in found.planes)]
     _check(output, files, inputs, force=settings.force)
+    if (earlier := measured_origin(output)) is not None:
+        terminal.say(f"{output} had a measurement, {earlier}: it is replaced (-o names another)")
     with terminal.TerminalListener() as listen:
         measured = measure_illuminance(
             content,
@@ -144,7 +148,7 @@ def _check(folder: Path, files: Sequence[Path], inputs: Sequence[Path], *, force
     check_writable(folder)
     finish(folder)
     existing_files = [file for file in files if file.exists()]
-    if existing_files and not force and not is_measured_folder(folder):
+    if existing_files and not force and measured_origin(folder) is None:
         raise OutputError(
             f"{existing_files[0]} exists and is of no measurement: name another folder with -o, "
             "or pass ",
