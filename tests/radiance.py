@@ -112,6 +112,26 @@ def _run(command: list[object], folder: Path, given: str = "") -> bytes:
     ).stdout
 
 
+def illuminance_of_panel(
+    folder: Path, side: float, height: float, radiance: float, points: Doubles
+) -> Doubles:
+    """The lux (n,), as Radiance's programs count them, of a panel of that radiance in W/(m² sr).
+
+    It hangs in the middle of nothing, at (0, 0, height), and faces down; points look up.
+    """
+    programs = _programs()
+    folder.mkdir()
+    half, level = side / 2, " ".join([f"{radiance:.9g}"] * 3)
+    corners = [f"{i * half} {j * half} {height}" for i, j in ((-1, -1), (-1, 1), (1, 1), (1, -1))]
+    text = f"void light lit 0 0 3 {level}\nlit polygon panel 0 0 12 {' '.join(corners)}\n"
+    (folder / "scene.rad").write_text(text, encoding="ascii")
+    (folder / "scene.oct").write_bytes(_run([programs / "oconv", "scene.rad"], folder))
+    rows = "\n".join(" ".join(f"{x:.9g}" for x in (*point, 0, 0, 1)) for point in points)
+    direct = ["-I", "-h", "-ab", "0", "-dj", "0", "-ds", "0.05"]
+    found = _run([programs / "rtrace", *direct, "scene.oct"], folder, rows)
+    return EFFICACY * np.array(found.split(), float).reshape(-1, 3) @ WEIGHTS
+
+
 def unified_glare_rating(
     folder: Path,
     size: tuple[float, float, float],

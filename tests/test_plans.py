@@ -129,6 +129,14 @@ def test_radiance_finds_what_a_plan_promises(tmp_path: Path, web: Distribution, 
     assert promised["uniformity"] >= 0.6
 
 
+def test_a_preset_says_its_figures_and_where_they_come_from(tmp_path: Path):
+    text = PLANES.replace("mean = 300\nuniformity = 0.6", 'preset = "corridor"')
+    write_room(tmp_path, batwing, planes=text)
+    printed = succeed(tmp_path, "plan", "room.xml", "-o", "plan")
+    assert "corridor: circulation areas, EN 12464-1:2021: 100 lx at a uniformity of 0.4" in printed
+    assert "check them" in printed
+
+
 def test_two_bounces_are_those_of_radiance(tmp_path: Path):
     scene = write_room(tmp_path, street, turn=30.0, depth=4)
     loaded = load_scene(scene)

@@ -10,6 +10,7 @@ from lightpaint.photometry.glare import GlareReading
 from lightpaint.photometry.illuminance import PlaneReading
 from lightpaint.photometry.measuring_plane import MeasuringPlane, plane_title
 from lightpaint.photometry.readings_file import glare_document
+from lightpaint.photometry.wish_presets import PRESETS
 from lightpaint.report.glare_text import glare_sentences
 
 #: Headings of a table of planes.
@@ -56,7 +57,9 @@ def glare_by_title(answer: PlanesAnswer) -> dict[str, GlareReading]:
 
 
 def planes_sentences(answer: PlanesAnswer) -> list[str]:
-    """Return what is missed, what the power is, what the wishes cost, and what glare is unknown."""
+    """Return what is missed, what the power is, what the wishes cost, what glare is unknown, and
+    where the figures of presets come from.
+    """
     sentences = [_missed(answer, outcome) for outcome in answer.missed]
     if not answer.missed and answer.outcomes:
         what = "All wishes for the planes are" if answer.readings else "The limit of power is"
@@ -71,7 +74,7 @@ def planes_sentences(answer: PlanesAnswer) -> list[str]:
         cost = answer.cost_delta_e
         text = f"by ΔE {cost:.1f} further" if cost >= LEAST_COST else "no further"
         sentences.append(f"With these wishes the picture is {text} from the painting.")
-    return [*sentences, *glare_sentences(glare_by_title(answer))]
+    return [*sentences, *glare_sentences(glare_by_title(answer)), *_preset_sentences(answer)]
 
 
 def planes_numbers(answer: PlanesAnswer) -> dict[str, Any]:
@@ -101,6 +104,13 @@ def planes_numbers(answer: PlanesAnswer) -> dict[str, Any]:
         "floor_m2": answer.floor_m2 or None,
         "cost_delta_e": answer.cost_delta_e,
     }
+
+
+def _preset_sentences(answer: PlanesAnswer) -> Iterator[str]:
+    """Yield where the figures of presets come from."""
+    presets = {plane.wishes.preset for plane in answer.wished.illuminance.planes} - {""}
+    for name in sorted(presets):
+        yield f"{name}: {PRESETS[name]}."
 
 
 def _outcome_numbers(outcome: WishOutcome) -> dict[str, Any]:
