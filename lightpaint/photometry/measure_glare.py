@@ -269,8 +269,7 @@ def _seen(
     index = np.stack(
         [position_index(d, x.ahead, x.up) for d, x in zip(rays.directions, observers, strict=True)]
     )
-    is_seen: Bools = light.any(axis=-1)
-    has_area = rays.density > 0
+    is_seen, has_area = np.asarray(light.any(axis=-1)), rays.density > 0
     # The solid angle that each place stands for; a point with an opening has that of all of it.
     angle = np.divide(1.0, rays.density, out=np.zeros_like(index), where=has_area & is_seen)
     angle += np.where(has_area | ~is_seen, 0.0, openings[..., None])
