@@ -121,7 +121,7 @@ def place_plane(request: PlaneRequest, room: RoomRays) -> MeasuringPlane:
         cells,
         request.wishes,
         is_cylindrical,
-        grid.covered_by,
+        covered_by=grid.covered_by,
     )
 
 
@@ -361,7 +361,7 @@ def _side_by_side(grids: Sequence[_Cells]) -> _Cells:
         np.concatenate(cells),
         max(grid.spacing for grid in grids),
         float(np.concatenate(areas).mean()) if sum(map(len, areas)) else 0.0,
-        tuple(name for grid in grids for name in grid.covered_by),
+        covered_by=tuple(name for grid in grids for name in grid.covered_by),
     )
 
 

@@ -185,30 +185,40 @@ def answer_on_planes(
     solution: Solution, planes: MeasuredPlanes, required: RequiredProblem
 ) -> PlanesAnswer:
     """Return what a solution gives on planes, and what their wishes cost the picture."""
-    reduction = solution.problem.reduction
-    return planes_answer(
+    answer = planes_answer(
         required.wished,
-        reduction,
+        solution.problem.reduction,
         solution.weights,
         floor_m2=planes.floor_m2,
-        cost_delta_e=_cost_in_delta_e(solution),
         glare=planes.glare,
     )
+    return _with_costs(answer, solution, planes)
 
 
-def _cost_in_delta_e(solution: Solution) -> float | None:
-    """Return by how much the answer is further from the painting than one without wishes."""
+def _with_costs(answer: PlanesAnswer, solution: Solution, planes: MeasuredPlanes) -> PlanesAnswer:
+    """Return an answer with how much further it is from the painting than one without wishes, and
+    than one whose power is not limited.
+    """
     problem = solution.problem
     if problem.reduction.requirements is None:
-        return None
-    free = without_wishes(problem)
-    look = PaintComparison.of_problem(problem)
+        return answer
+    free, look = without_wishes(problem), PaintComparison.of_problem(problem)
     rows = look.rows(problem.basis.planes)
 
     def missed(weights: Doubles) -> float:
         return look.mean(look.difference(np.einsum("npc,nc->pc", rows, weights)))
 
-    return missed(solution.weights) - missed(solution_of(free, start=solution.weights).weights)
+    def cost_beside(other: Problem) -> float:
+        other_weights = solution_of(other, start=solution.weights).weights
+        return missed(solution.weights) - missed(other_weights)
+
+    answer = replace(answer, cost_delta_e=cost_beside(free))
+    is_alone = all(wish.kind == "power" for wish in answer.wished.wishes)
+    if answer.binding_limit is None or is_alone:
+        return answer
+    unlimited = replace(planes, file=replace(planes.file, power=PowerBudget()))
+    wished = with_wishes(free, unlimited.wished_of(free.reduction))
+    return replace(answer, budget_delta_e=cost_beside(wished.problem))
 
 
 def _floor_area(file: PlanesFile, scene: Scene) -> float:

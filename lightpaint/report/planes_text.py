@@ -4,7 +4,7 @@ import math
 from collections.abc import Iterator
 from typing import Any
 
-from lightpaint.lighting.wishes.planes_answer import MISSED, PlanesAnswer, WishOutcome
+from lightpaint.lighting.wishes.planes_answer import PlanesAnswer, WishOutcome
 from lightpaint.lighting.wishes.wished_light import NORMAL_95
 from lightpaint.photometry.glare import GlareReading
 from lightpaint.photometry.illuminance import PlaneReading
@@ -74,6 +74,9 @@ def planes_sentences(answer: PlanesAnswer) -> list[str]:
         cost = answer.cost_delta_e
         text = f"by ΔE {cost:.1f} further" if cost >= LEAST_COST else "no further"
         sentences.append(f"With these wishes the picture is {text} from the painting.")
+    if answer.budget_delta_e is not None and answer.budget_delta_e >= LEAST_COST:
+        limit, cost = answer.binding_limit, answer.budget_delta_e
+        sentences.append(f"Of that, the limit of {limit:.4g} W costs ΔE {cost:.1f}.")
     return [*sentences, *glare_sentences(glare_by_title(answer)), *_preset_sentences(answer)]
 
 
@@ -103,6 +106,7 @@ def planes_numbers(answer: PlanesAnswer) -> dict[str, Any]:
         "budget_watts": min(budget, default=None),
         "floor_m2": answer.floor_m2 or None,
         "cost_delta_e": answer.cost_delta_e,
+        "budget_delta_e": answer.budget_delta_e,
     }
 
 
@@ -137,7 +141,7 @@ def _missed(answer: PlanesAnswer, outcome: WishOutcome) -> str:
     title = plane_title(wish.plane, wish.case)
     if wish.kind == "mean":
         text = f"{title}: {reached:.0f} of {wish.asked:g} lx"
-        if (limit := _limit_of_power(answer)) is not None:
+        if (limit := answer.binding_limit) is not None:
             return f"{text}, as much as the limit of {limit:.4g} W leaves."
         if not answer.all_at_full:
             return f"{text}, as much as the other wishes leave."
@@ -152,13 +156,6 @@ def _missed(answer: PlanesAnswer, outcome: WishOutcome) -> str:
     if wish.kind == "ratio":
         return f"{title}: {reached:.2f} of the mean of {wish.to}, wished for {wish.asked:g}."
     return f"The lamps take {reached:.4g} W, where {wish.asked:g} W are allowed."
-
-
-def _limit_of_power(answer: PlanesAnswer) -> float | None:
-    """Return the limit of the power in watts, if the lamps take all of it."""
-    limits = [x for x in answer.outcomes if x.wish.kind == "power"]
-    taken = [x.wish.asked for x in limits if x.reached >= x.wish.asked * (1 - MISSED)]
-    return min(taken, default=None)
 
 
 def _prices(answer: PlanesAnswer) -> Iterator[str]:

@@ -49,8 +49,9 @@ class PlanesAnswer:
     outcomes: of all wishes. watts: the power of all lamps; None if that of one is unknown.
     floor_m2: the area that it is divided by; 0 without one. all_at_full: whether no lamp could give
     more. lamps: their number, without those that stay as they are. cost_delta_e: the mean CIEDE2000
-    to the painting beyond that of an answer without wishes; None without a painting. glare: that
-    observers see; None if it was not measured.
+    to the painting beyond that of an answer without wishes; None without a painting.
+    budget_delta_e: the same beyond one whose power is not limited, where the limit binds. glare:
+    that observers see; None if it was not measured.
     """
 
     wished: WishedLight
@@ -61,7 +62,15 @@ class PlanesAnswer:
     all_at_full: bool
     lamps: int
     cost_delta_e: float | None = None
+    budget_delta_e: float | None = None
     glare: Glare | None = None
+
+    @property
+    def binding_limit(self) -> float | None:
+        """The limit of the power in watts, if the lamps take all of it."""
+        limits = [x for x in self.outcomes if x.wish.kind == "power"]
+        taken = [x.wish.asked for x in limits if x.reached >= x.wish.asked * (1 - MISSED)]
+        return min(taken, default=None)
 
     @cached_property
     def glare_readings(self) -> Mapping[tuple[str, str], GlareReading]:
@@ -131,7 +140,7 @@ def planes_answer(
         _is_all_at_full(reduction, weights),
         len(movable),
         cost_delta_e,
-        glare,
+        glare=glare,
     )
 
 
