@@ -9,11 +9,14 @@ import pytest
 from command import run_refused, succeed
 from lit_planes import BLACK, floor, write_scene
 from radiance import unified_glare_rating
-from test_plans import write_room
+from test_plans import REFLECTANCES, SIZE, write_room
 from webs import batwing, cosine, ies_text
 
 from lightpaint.arrays import Doubles
+from lightpaint.basis.render.render_origin import basis_lights
 from lightpaint.errors import SceneError
+from lightpaint.lighting.constraints.constraints_file import constraints_of
+from lightpaint.lighting.unknowns.reduction import lamps_by_name
 from lightpaint.luminaires.web import Opening
 from lightpaint.photometry.glare import Glare, GlareObserver, position_index
 from lightpaint.photometry.measure_glare import measure_glare
@@ -212,6 +215,23 @@ def test_a_lamp_without_a_size_leaves_it_unknown_until_it_is_off(tmp_path: Path)
     assert glare.readings(weights)["me"].reason == "no lamp is in sight"
 
 
+def test_with_spectra_the_luminance_is_the_sum_of_those_of_the_emitters(tmp_path: Path) -> None:
+    """The weight of an emitter is the luminance of its light, which a square shows as it is."""
+    path = write_scene(tmp_path, square("lamp", *SQUARES[0]) + floor(8.0))
+    emitters = '{ name = "a", spectrum = "D65", Y = 700 }, { name = "b", spectrum = "A", Y = 300 }'
+    toml = f"[light.lamp]\nemitters = [{emitters}]\n"
+    (tmp_path / "lit.lights.toml").write_text(toml, encoding="utf-8")
+    plain = load_scene(path)
+    lamps = lamps_by_name(constraints_of(plain.requests), basis_lights(plain))
+    scene = plain.with_lamps(lamps)
+    me = GlareObserver("me", EYE, AHEAD, UP)
+    glare = measure_glare(scene, [me], error=0.1, use_cache=False)
+    assert glare.background.lights.names == ("lamp/a", "lamp/b")
+    weights = np.array([[700.0] * 3, [150.0] * 3])
+    assert glare.sources.lit(weights)[0, 0] == pytest.approx(850, rel=1e-5)
+    assert glare.readings(weights)["me"].rating is not None
+
+
 def test_who_looks_away_or_stands_in_the_dark_has_no_rating(tmp_path: Path) -> None:
     away = OBSERVER.replace("towards = [5, 1, 0]", "towards = [-5, 1, 0]")
     glare = glare_of(tmp_path, squares() + SKY, planes=PLANES + away)
@@ -267,8 +287,6 @@ PIXELS = 0.15
 
 
 def test_evalglare_finds_the_same_rating_in_a_room(tmp_path: Path) -> None:
-    from test_plans import REFLECTANCES, SIZE
-
     path = write_room(tmp_path, batwing)
     text = path.read_text(encoding="utf-8")
     text = text[: text.index("<emitter")] + "".join(
