@@ -77,7 +77,7 @@ class GlareReading:
 
 @dataclass(frozen=True)
 class GlareSources:
-    """What o observers see of s sources of light, each at an emission of 1.
+    """Light of s sources as o observers see it, of each at an emission of 1.
 
     names: (s,). luminance: (o, s, 3), cd/m² per channel, the mean over what is seen of it; of one
     without a known size its light at the eye, in any unit. solid_angle: (o, s), sr. spread: (o, s),

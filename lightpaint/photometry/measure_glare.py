@@ -121,7 +121,7 @@ def _eye(observer: GlareObserver) -> MeasuringPlane:
 
 @dataclass(frozen=True)
 class _SeenLight:
-    """What o observers see of e loaded emitters, each at an emission of 1.
+    """Light of e loaded emitters as o observers see it, of each at an emission of 1.
 
     emitters: those of the scene that each is; several for one that is split. radiance: (o, e, 3),
     the mean over what is seen. irradiance: (o, e, 3), at the eye. solid_angle, spread, is_sizeless:
