@@ -19,7 +19,7 @@ import os
 import subprocess
 import tempfile
 import time
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from pathlib import Path
 from typing import IO, NamedTuple
 
@@ -242,16 +242,23 @@ def write_radiance(folder: Path, count: int) -> Path:
 
 def write_mitsuba(folder: Path, count: int) -> Scene:
     """Write the room for Mitsuba, and load it."""
-    shapes = []
-    for name, corners in walls():
-        shapes.append(_rectangle(corners, SURFACES[name], ""))
-    for k, corners in enumerate(lamps_of(count)):
-        shapes.append(_rectangle(corners, (0, 0, 0), f'<emitter type="area" id="lamp_{k}"/>'))
+    lamps = [
+        _rectangle(corners, (0, 0, 0), f'<emitter type="area" id="lamp_{k}"/>')
+        for k, corners in enumerate(lamps_of(count))
+    ]
+    scene = load_scene(write_walls(folder, lamps, BOUNCES + 2))
+    assert len(scene.lights) == count
+    return scene
+
+
+def write_walls(folder: Path, lamps: Sequence[str], max_depth: int) -> Path:
+    """Write the room with lamps, as XML, for Mitsuba, and return its path."""
+    shapes = [_rectangle(corners, SURFACES[name], "") for name, corners in walls()] + [*lamps]
     path = folder / "room.xml"
     newline = "\n"
     path.write_text(
         f"""<scene version="3.0.0">
-    <integrator type="path"><integer name="max_depth" value="{BOUNCES + 2}"/></integrator>
+    <integrator type="path"><integer name="max_depth" value="{max_depth}"/></integrator>
     <sensor type="perspective"><float name="fov" value="{FIELD}"/>
         <transform name="to_world"><lookat origin="0, 0, -5.8" target="0, 0, 0" up="0, 1, 0"/>
         </transform>
@@ -262,9 +269,7 @@ def write_mitsuba(folder: Path, count: int) -> Scene:
 """,
         encoding="utf-8",
     )
-    scene = load_scene(path)
-    assert len(scene.lights) == count
-    return scene
+    return path
 
 
 def _rectangle(corners: Quad, colour: tuple[float, ...], emitter: str) -> str:

@@ -77,6 +77,7 @@ if TYPE_CHECKING:
     from lightpaint.paint.notebook.widget import Painter as Painter
     from lightpaint.photometry.illuminance import Illuminance as Illuminance
     from lightpaint.photometry.measure import measure_illuminance as measure_illuminance
+    from lightpaint.photometry.measure_glare import measure_glare as measure_glare
     from lightpaint.photometry.measuring_plane import MeasuringPlane as MeasuringPlane
     from lightpaint.photometry.planes_file import read_planes as read_planes
     from lightpaint.pipeline.frame_pictures import relight_frames as relight_frames
@@ -163,6 +164,7 @@ _HOMES = {
     "error_bars": "lighting.analysis.noise.uncertainty",
     "find_frames": "basis.lightgroups.frame_sequence",
     "load_scene": "scene.scene_reader",
+    "measure_glare": "photometry.measure_glare",
     "measure_illuminance": "photometry.measure",
     "paint_with_light": "pipeline.one_call",
     "place": "placement.place",

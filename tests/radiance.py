@@ -110,3 +110,60 @@ def _run(command: list[object], folder: Path, given: str = "") -> bytes:
     return subprocess.run(
         texts, cwd=folder, input=given.encode(), capture_output=True, check=True, env=library
     ).stdout
+
+
+def illuminance_of_panel(
+    folder: Path, side: float, height: float, radiance: float, points: Doubles
+) -> Doubles:
+    """The lux (n,), as Radiance's programs count them, of a panel of that radiance in W/(m² sr).
+
+    It hangs in the middle of nothing, at (0, 0, height), and faces down; points look up.
+    """
+    programs = _programs()
+    folder.mkdir()
+    half, level = side / 2, " ".join([f"{radiance:.9g}"] * 3)
+    corners = [f"{i * half} {j * half} {height}" for i, j in ((-1, -1), (-1, 1), (1, 1), (1, -1))]
+    text = f"void light lit 0 0 3 {level}\nlit polygon panel 0 0 12 {' '.join(corners)}\n"
+    (folder / "scene.rad").write_text(text, encoding="ascii")
+    (folder / "scene.oct").write_bytes(_run([programs / "oconv", "scene.rad"], folder))
+    rows = "\n".join(" ".join(f"{x:.9g}" for x in (*point, 0, 0, 1)) for point in points)
+    direct = ["-I", "-h", "-ab", "0", "-dj", "0", "-ds", "0.05"]
+    found = _run([programs / "rtrace", *direct, "scene.oct"], folder, rows)
+    return EFFICACY * np.array(found.split(), float).reshape(-1, 3) @ WEIGHTS
+
+
+def unified_glare_rating(
+    folder: Path,
+    size: tuple[float, float, float],
+    reflectances: tuple[float, float, float],
+    panels: Sequence[tuple[tuple[float, float, float], float, float]],
+    eye: tuple[float, float, float],
+    ahead: tuple[float, float, float],
+    *,
+    pixels: int,
+    threshold: float,
+) -> float:
+    """The UGR that evalglare finds in a picture of 180 degrees, in a room as above.
+
+    panels: of each its middle, its side in metres, and its luminance in cd/m²; they face down.
+    threshold: luminance in cd/m² between walls and panels.
+    """
+    programs = _programs()
+    folder.mkdir()
+    parts = [_room(size, reflectances)]
+    for k, ((x, y, z), side, luminance) in enumerate(panels):
+        signs = ((-1, -1), (-1, 1), (1, 1), (1, -1))
+        corners = [f"{x + i * side / 2:g} {y + j * side / 2:g} {z:g}" for i, j in signs]
+        level = " ".join([f"{luminance / EFFICACY:.9g}"] * 3)
+        parts.append(f"void light lit{k} 0 0 3 {level}")
+        parts.append(f"lit{k} polygon panel{k} 0 0 12 {' '.join(corners)}")
+    (folder / "scene.rad").write_text("\n".join(parts) + "\n", encoding="ascii")
+    (folder / "scene.oct").write_bytes(_run([programs / "oconv", "scene.rad"], folder))
+    view = ["-vta", "-vp", *eye, "-vd", *ahead, "-vu", 0, 0, 1, "-vh", 180, "-vv", 180]
+    rays = ["-ps", 1, "-ab", 5, "-ad", 256, "-as", 64, "-aa", 0.2, "-ar", 16, "-ds", 0.2]
+    size_options = ["-x", pixels, "-y", pixels]
+    picture = _run([programs / "rpict", *view, *size_options, *rays, "scene.oct"], folder)
+    (folder / "view.hdr").write_bytes(picture)
+    found = _run([programs / "evalglare", "-b", threshold, "-d", "view.hdr"], folder).decode()
+    names, values = found.strip().splitlines()[-1].split(": ")
+    return float(values.split()[names.split(",").index("ugr")])

@@ -129,6 +129,14 @@ def test_radiance_finds_what_a_plan_promises(tmp_path: Path, web: Distribution, 
     assert promised["uniformity"] >= 0.6
 
 
+def test_a_preset_says_its_figures_and_where_they_come_from(tmp_path: Path):
+    text = PLANES.replace("mean = 300\nuniformity = 0.6", 'preset = "corridor"')
+    write_room(tmp_path, batwing, planes=text)
+    printed = succeed(tmp_path, "plan", "room.xml", "-o", "plan")
+    assert "corridor: circulation areas, EN 12464-1:2021: 100 lx at a uniformity of 0.4" in printed
+    assert "check them" in printed
+
+
 def test_two_bounces_are_those_of_radiance(tmp_path: Path):
     scene = write_room(tmp_path, street, turn=30.0, depth=4)
     loaded = load_scene(scene)
@@ -221,12 +229,31 @@ def test_a_painting_is_answered_under_the_wishes(tmp_path: Path):
     assert (tmp_path / "mood/planes/desk.png").is_file()
     assert "On measuring planes" in (tmp_path / "mood/report.html").read_text("utf-8")
 
+    assert "budget_delta_e" not in report["planes"]
+
     limited = succeed(
         tmp_path, "solve", "room.xml", "mood.png", "--watts", "30", "-o", "limited", *options
     )
     assert "The limit of power is met." in limited
     drives = drives_of(tmp_path / "limited")
     assert 40 * sum(drives.values()) <= 30 * (1 + 1e-6)
+
+
+def test_a_limit_of_power_costs_the_picture_something_beside_the_lux(tmp_path: Path):
+    write_room(tmp_path, batwing, planes=PLANES.replace("mean = 300", "mean = 100"))
+    _paint(tmp_path)
+    command = ("solve", "room.xml", "mood.png", "--planes", "room.planes.toml", "--no-verify")
+    costs, printed = [], ""
+    for name, limit in (("free", ()), ("tight", ("--watts", "40"))):
+        printed = succeed(tmp_path, *command, "--spp", "32", *limit, "-o", name)
+        costs.append(json.loads((tmp_path / name / "report.json").read_text())["planes"])
+    free, tight = costs
+    assert free["watts"] > 40
+    assert tight["budget_delta_e"] > 0.5
+    assert f"the limit of 40 W costs ΔE {tight['budget_delta_e']:.1f}." in printed
+    # What the lux cost and what the limit costs make up all of it.
+    rest = tight["cost_delta_e"] - tight["budget_delta_e"]
+    assert rest == pytest.approx(free["cost_delta_e"], abs=0.02)
 
 
 @pytest.mark.parametrize(

@@ -14,6 +14,8 @@ writes beside itself
     table.jpg       the table's painting of sunset, the answer, and the sky that was found for it
     led-wall.jpg    the stage with the picture that its wall of LEDs shows for the sunset, which is
                     in a corner
+    office.jpg      the office's painting of an evening, the answer that gives the desks 500 lx, and
+                    the lux of one desk
 
 Each scene's basis is rendered once at 1280 x 720, the table's of 130 lights at 640 x 360, and kept
 in FOLDER for the next time if there is one. Each look is the sum of that basis for the lighting
@@ -49,7 +51,7 @@ from lightpaint.scene.scene_render import Stream, render  # noqa: E402
 
 SIZE = (1280, 720)
 INSET, GAP = (176, 99), 8
-PICTURES = ("gallery", "stage", "six-looks", "placement", "table", "led-wall")
+PICTURES = ("gallery", "stage", "six-looks", "placement", "table", "led-wall", "office")
 
 #: Qualities that are tried until a picture has so few bytes.
 QUALITIES, MAX_BYTES = range(88, 60, -4), 380_000
@@ -59,6 +61,9 @@ WALL, WALL_SIZE = (16, 9), (960, 540)
 
 #: Size of a painting and of its answer, and the strip above them with their titles.
 CELL, TITLE, TITLE_SIZE = (640, 360), 36, 22
+
+#: Stops of the office's painting.
+OFFICE_STOPS = -7.0
 
 #: The two tracks of the gallery, the spots that may turn and slide on each, and spots to add.
 TRACKS = {
@@ -212,7 +217,13 @@ def table(spp: int) -> Image.Image:
         shown(denoise(look.predicted.image, see(scene, size=(width, height)))),
         shown(sky.domain.interpolated(weights[sky.places], (2 * height, height))),
     ]
-    sheet = Image.new("RGB", (sum(x.width for x in panels) + 2 * GAP, height), "white")
+    return side_by_side(panels)
+
+
+def side_by_side(panels: list[Image.Image]) -> Image.Image:
+    """Pictures of the same height in a row."""
+    width = sum(panel.width + GAP for panel in panels) - GAP
+    sheet = Image.new("RGB", (width, panels[0].height), "white")
     left = 0
     for panel in panels:
         sheet.paste(panel, (left, 0))
@@ -249,6 +260,32 @@ def led_wall(spp: int) -> Image.Image:
     return sheet
 
 
+def office(spp: int) -> Image.Image:
+    """The painting of the office's evening, its answer with 500 lx on the desks, and one desk."""
+    folder, painting = ROOT / "scenes" / "office", ROOT / "docs/tutorials/files/office-evening.png"
+    with tempfile.TemporaryDirectory() as results:
+        look = lp.paint_with_light(
+            str(folder / "office.xml"),
+            str(painting),
+            Path(results) / "look",
+            planes=str(folder / "office.planes.toml"),
+            transform=lp.ViewTransform("srgb", OFFICE_STOPS),
+            spp=spp,
+            verify=False,
+            report=False,
+        )
+        desk = Image.open(Path(results) / "look/planes/desk_2.png").convert("RGB")
+    print(f"office: {look.verdict}", flush=True)
+    height, _ = look.basis.size
+    desk_size = (round(desk.width * height / desk.height), height)
+    panels = [
+        read_painting(painting),
+        shown(2.0**OFFICE_STOPS * denoised(look.predicted.image, look.basis.features)),
+        desk.resize(desk_size, Image.Resampling.LANCZOS),
+    ]
+    return side_by_side(panels)
+
+
 def cpu_s() -> float:
     """Seconds of the processor that this process has taken."""
     usage = resource.getrusage(resource.RUSAGE_SELF)
@@ -278,6 +315,8 @@ def main() -> None:
         made["table"] = table(asked.spp)
     if "led-wall" in wanted:
         made["led-wall"] = led_wall(asked.spp)
+    if "office" in wanted:
+        made["office"] = office(asked.spp)
     for name, picture in made.items():
         write(picture, HERE / f"{name}.jpg")
 

@@ -93,7 +93,7 @@ GROUPS: dict[str, tuple[str, str, tuple[str, ...]]] = {
     "measuring": (
         "Lux on planes",
         "Say where to measure, and measure the illuminance that each light gives there.",
-        ("read_planes", "MeasuringPlane", "measure_illuminance", "Illuminance"),
+        ("read_planes", "MeasuringPlane", "measure_illuminance", "Illuminance", "measure_glare"),
     ),
     "placing": (
         "Lights at other places",

@@ -139,13 +139,21 @@ class LuminairePoint(_Luminaire):
         self._position = mi.Point3f(*matrix[:3, 3].tolist())
         dr.make_opaque(self._position)
         self._corner = mi.ScalarPoint3f(*matrix[:3, 3].tolist())
-        axes = world_from_web(matrix[:3, :3], turn=self._turn, tilt=self._tilt)
-        self._table = WebTable(self.web, self.scale, axes)
+        self._place = matrix[:3, 3]
+        self._axes = world_from_web(matrix[:3, :3], turn=self._turn, tilt=self._tilt)
+        self._table = WebTable(self.web, self.scale, self._axes)
 
     def traverse(self, callback: Any) -> None:
         """List its parameters."""
         super().traverse(callback)
         callback.put("to_world", self.to_world, mi.ParamFlags.NonDifferentiable)
+
+    def opening_from(self, places: Doubles) -> Doubles:
+        """Return the solid angle of its luminous opening (p,) from places (p, 3)."""
+        away = places - self._place
+        distance = np.linalg.norm(away, axis=-1)
+        local = away @ self._axes / distance[:, None]
+        return np.asarray(self.web.opening.projected_area(local) / distance**2)
 
     def sample_direction(self, it, sample, active=True):
         """Return the direction to the point, and `eval_direction`."""

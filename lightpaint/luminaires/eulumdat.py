@@ -64,6 +64,7 @@ def parse_eulumdat(text: str) -> PhotometricWeb:
         flux * efficiency / 100 if efficiency > 0 else flux,
         of_lamps=efficiency <= 0,
         watts=watts if watts > 0 else None,
+        unread=numbers.left,
     )
 
 

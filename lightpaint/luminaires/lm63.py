@@ -1,6 +1,9 @@
 """Reads ANSI/IES LM-63 files (`.ies`), of 1986 to 2019, with photometry of type C."""
 
 import re
+from dataclasses import replace
+
+import numpy as np
 
 from lightpaint.arrays import Doubles
 from lightpaint.errors import SceneError
@@ -17,6 +20,9 @@ LENGTHS = {1: 0.3048, 2: 1.0}
 #: Lumens per lamp of a file whose candela are absolute.
 ABSOLUTE = -1
 
+#: What DOS wrote after the end of a file.
+END_OF_FILE = "\x1a"
+
 #: Lines before the tilt at most.
 MAX_KEYWORDS = 1000
 
@@ -30,19 +36,24 @@ def parse_lm63(text: str) -> PhotometricWeb:
     name, edition = "", lines[0].strip().upper() if lines else ""
     for k, line in enumerate(lines[: MAX_KEYWORDS + 1]):
         if tilt := _TILT.match(line):
-            numbers = Numbers(" ".join(lines[k + 1 :]).replace(",", " ").split())
-            _skip_tilt(tilt[1], numbers)
-            return _parse_numbers(numbers, name, is_of_2019=edition.endswith("LM-63-2019"))
+            text = " ".join(lines[k + 1 :]).removesuffix(END_OF_FILE)
+            numbers = Numbers(text.replace(",", " ").split())
+            tilt_factors = _tilt_factors(tilt[1], numbers)
+            web = _parse_numbers(numbers, name, is_of_2019=edition.endswith("LM-63-2019"))
+            return replace(web, tilt_factors=tilt_factors, unread=numbers.left)
         keyword = _KEYWORD.match(line)
         if keyword and keyword[1].upper() in ("LUMINAIRE", "LUMCAT") and keyword[2]:
             name = name if keyword[1].upper() == "LUMCAT" and name else one_line(keyword[2])
     raise SceneError("it has no line TILT=: it is not an IES file (LM-63)")
 
 
-def _skip_tilt(tilt: str, numbers: Numbers) -> None:
-    """Pass the factors for a tilted lamp, which are 1 for one that hangs as it was measured."""
+def _tilt_factors(tilt: str, numbers: Numbers) -> Doubles | None:
+    """Return the factors of a luminaire that is tilted, (2, k): angles and factors; None without.
+
+    The geometry of the lamp, which comes before them, says why they differ and changes nothing.
+    """
     if tilt.upper() == "NONE":
-        return
+        return None
     if tilt.upper() != "INCLUDE":
         raise SceneError(
             f"its TILT is in another file, {one_line(repr(tilt), limit=60)}: put it into this one "
@@ -50,7 +61,12 @@ def _skip_tilt(tilt: str, numbers: Numbers) -> None:
         )
     numbers.one("the geometry of the lamp")
     count = numbers.whole("the number of tilt angles", MAX_ANGLES)
-    numbers.several(2 * count, "tilt angles and factors")
+    angles = numbers.several(count, "tilt angles")
+    check_rising(angles, "tilt angles", 0, 180)
+    factors = numbers.several(count, "factors of tilt angles")
+    if factors.min() < 0:
+        raise SceneError("it has a negative factor of a tilt angle")
+    return np.array([angles, factors])
 
 
 def _parse_numbers(numbers: Numbers, name: str, *, is_of_2019: bool) -> PhotometricWeb:

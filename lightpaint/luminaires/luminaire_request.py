@@ -1,7 +1,7 @@
 """Luminaires of a lights file: their photometric files, and how they hang and dim."""
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 from pathlib import Path
 from typing import Any
@@ -27,7 +27,8 @@ class LuminaireRequest:
 
     path: of its photometric file. lumens: its flux at full, instead of the file's. factor: for
     maintenance and other losses. input_watts: its power at full, instead of the file's. turn, tilt:
-    degrees, as in `turned`.
+    degrees, as in `turned`. has_absolute_emitters: whether emitters in candela or lumens say how
+    bright it is, so that the file gives directions alone.
     """
 
     path: Path
@@ -36,6 +37,7 @@ class LuminaireRequest:
     input_watts: float | None = None
     turn: float = 0.0
     tilt: float = 0.0
+    has_absolute_emitters: bool = False
 
     @classmethod
     def of(cls, table: Mapping[str, Any], where: str, folder: Path) -> "LuminaireRequest":
@@ -65,6 +67,7 @@ class LuminaireRequest:
             table.get("watts"),
             float(table.get("turn", 0.0)),
             float(table.get("tilt", 0.0)),
+            _are_absolute(table.get("emitters")),
         )
 
     @cached_property
@@ -76,6 +79,14 @@ class LuminaireRequest:
     def watts(self) -> float | None:
         """Its input power at full; None if neither says it."""
         return self.web.watts if self.input_watts is None else self.input_watts
+
+    def tilted(self, degrees: float) -> "LuminaireRequest":
+        """Return this luminaire with the loss that its file states for hanging tilted.
+
+        degrees: from its nadir to downwards. What emitters say of themselves is kept.
+        """
+        factor = 1.0 if self.has_absolute_emitters else self.web.factor_at(degrees)
+        return replace(self, factor=self.factor * factor)
 
     def scale(self, cd_per_unit: float) -> float:
         """Return the factor of the candela of its file in a scene."""
@@ -93,6 +104,12 @@ class LuminaireRequest:
         defaults = {"factor": 1.0, "cd_per_unit": 1.0, "turn": 0.0, "tilt": 0.0}
         changed = {key: x for key, x in numbers.items() if x != defaults[key]}
         return changed if self.lumens is None else {"lumens": float(self.lumens), **changed}
+
+
+def _are_absolute(emitters: Any) -> bool:
+    """Return whether all emitters of a table are in candela or lumens."""
+    is_list = isinstance(emitters, list) and len(emitters) > 0
+    return is_list and all(isinstance(x, Mapping) and {"cd", "lm"} & x.keys() for x in emitters)
 
 
 def luminaires_in(tables: Any, source: str) -> dict[str, LuminaireRequest]:

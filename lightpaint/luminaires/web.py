@@ -45,6 +45,18 @@ class Opening:
         """Its largest size in metres."""
         return max(self.along_c0, self.along_c90, self.height)
 
+    def projected_area(self, directions: Doubles) -> Doubles:
+        """Return its area (...) in m² as seen from directions (..., 3), unit vectors of the web.
+
+        Lower and upper side are as large as each other, and its sides are upright.
+        """
+        x, y, z = np.abs(np.moveaxis(np.asarray(directions, np.float64), -1, 0))
+        across, along = self.along_c90 * x, self.along_c0 * y
+        width = np.hypot(across, along) if self.is_round else across + along
+        corners = math.pi / 4 if self.is_round else 1.0
+        flat = corners * self.along_c0 * self.along_c90 * z
+        return np.asarray(flat + self.height * width)
+
 
 @dataclass(frozen=True)
 class PhotometricWeb:
@@ -55,7 +67,9 @@ class PhotometricWeb:
     table: (c, g) candela, after all factors of the file.
     stated_lumens: the flux that the file states: of the luminaire if it is absolute or tells the
     efficiency, else of the lamps in it; None if unknown. of_lamps: whether it is that of the lamps.
-    watts: input power; None if unknown.
+    watts: input power; None if unknown. tilt_factors: (2, k), angles by which the luminaire is
+    tilted, in degrees from hanging as it was measured, and factors of its light; None without.
+    unread: number of texts in the file after what it describes.
     """
 
     name: str
@@ -67,6 +81,8 @@ class PhotometricWeb:
     stated_lumens: float | None = None
     of_lamps: bool = False
     watts: float | None = None
+    tilt_factors: Doubles | None = None
+    unread: int = 0
 
     def __post_init__(self) -> None:
         for key in ("gammas", "planes", "table"):
@@ -114,6 +130,15 @@ class PhotometricWeb:
         value = (1 - c_share) * on_plane[0] + c_share * on_plane[1]
         inside = (gamma >= self.gammas[0] - SAME_ANGLE) & (gamma <= self.gammas[-1] + SAME_ANGLE)
         return np.asarray(np.where(inside, value, 0.0))
+
+    def factor_at(self, tilt: float) -> float:
+        """Return the factor of its light if its nadir is by `tilt` degrees away from downwards.
+
+        It is linear between the angles of the file, and constant beyond them.
+        """
+        if self.tilt_factors is None:
+            return 1.0
+        return float(np.interp(tilt, *self.tilt_factors))
 
     def profile(self) -> Doubles:
         """Return the intensities (g,) of a web that is the same in all planes."""

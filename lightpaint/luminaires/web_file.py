@@ -47,6 +47,17 @@ def _parsed(path: Path, data: bytes) -> PhotometricWeb:
     return web
 
 
+def unread_remark(web: PhotometricWeb, where: str) -> str | None:
+    """Return a remark if a file goes on after its end; None if not. where: name of the file."""
+    if not web.unread:
+        return None
+    count = "1 number" if web.unread == 1 else f"{web.unread} numbers"
+    return (
+        f"{where}: {count} after the last intensity that it announces, which count for nothing: "
+        "check its numbers of angles"
+    )
+
+
 def flux_remark(web: PhotometricWeb, where: str) -> str | None:
     """Return a remark if the flux of a web is not what its file states; None if it is, or if the
     file states none.

@@ -4,7 +4,7 @@ The points take the place of the film's pixels (`Scene.at_points`), so a measure
 is rendered by the same path tracer and cached in the same files as pictures are.
 """
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 
 import numpy as np
 
@@ -25,6 +25,8 @@ from lightpaint.validation import Check, between, number
 
 #: Relative error of a measurement without another; see `measure_illuminance`.
 DEFAULT_ERROR = 0.02
+#: Least error that may be asked for: a smaller one is a typing error.
+LEAST_ERROR = 1e-6
 
 #: Samples per point of the first round, and beyond which none are added.
 FIRST_SPP, MOST_SPP = 64, 2**16
@@ -47,6 +49,7 @@ def measure_illuminance(
     weights: Doubles | None = None,
     seed: int = 0,
     use_cache: bool = True,
+    exact_spp: bool = False,
     progress: Progress = silent,
 ) -> Illuminance:
     """Measure the illuminance at the points of planes, from every light of `scene` alone.
@@ -64,6 +67,8 @@ def measure_illuminance(
             the scene as it is now.
         seed: Any number >= 0; different seeds give independent measurements.
         use_cache: Whether measurements are cached as bases are.
+        exact_spp: Whether a cached measurement with more samples than are needed is left alone, so
+            that the result does not depend on earlier runs.
         progress: Called with the progress of the work.
 
     Raises:
@@ -77,27 +82,68 @@ def measure_illuminance(
         >>> round(found.reading("desk", found.lights.current_weights).mean, -3)
         1000.0
     """
-    _check("error", error, between(1e-6, 1, "a relative error"))
+    _check("error", error, between(LEAST_ERROR, 1, "a relative error"))
     _check("cd_per_unit", cd_per_unit, number("cd/m²"))
-    listen, at_points = listener(progress), scene.at_points(points_of(planes))
+
+    def excess_of(measured: Illuminance) -> float:
+        judged = weights_on(measured.lights) if weights is None else weights
+        return error_excess(measured, judged, error)
+
+    return measured_until(
+        scene.at_points(points_of(planes)),
+        lambda basis: illuminance_of(basis, planes, cd_per_unit),
+        excess_of,
+        label="illuminance",
+        spp=spp,
+        seed=seed,
+        use_cache=use_cache,
+        exact_spp=exact_spp,
+        progress=progress,
+    )
+
+
+def measured_until(
+    at_points: Scene,
+    measured_of: Callable[[Basis], Illuminance],
+    excess_of: Callable[[Illuminance], float],
+    *,
+    label: str,
+    spp: int | None = None,
+    seed: int,
+    use_cache: bool,
+    exact_spp: bool,
+    progress: Progress,
+) -> Illuminance:
+    """Return what is measured at the points of a scene, with as many samples as it needs.
+
+    measured_of: makes it of a basis. excess_of: ratio of its error to the one asked for. spp:
+    samples per point, instead of that. label: name of the work.
+    """
+    listen, work_label = listener(progress), label
     goal = FIRST_SPP if spp is None else spp
 
     def report(label: str, done: int, total: int, unit: str = "passes") -> None:
-        listen("illuminance" if label == "basis" else label, done, total, unit)
+        listen(work_label if label == "basis" else label, done, total, unit)
 
     while True:
-        basis = obtain_basis(at_points, spp=goal, seed=seed, use_cache=use_cache, progress=report)
-        measured = illuminance_of(basis, planes, cd_per_unit)
+        basis = obtain_basis(
+            at_points,
+            spp=goal,
+            seed=seed,
+            use_cache=use_cache,
+            exact_spp=exact_spp,
+            progress=report,
+        )
+        measured = measured_of(basis)
         if spp is not None:
             return measured
-        judged = weights_on(measured.lights) if weights is None else weights
-        excess = error_excess(measured, judged, error)
+        excess = excess_of(measured)
         if excess <= 1:
             return measured
         if basis.origin.spp >= MOST_SPP:
             listen.say(
-                f"{MOST_SPP} samples per point are the most that are taken, and the errors are "
-                f"{excess:.1f} times as large as asked for"
+                f"{label}: {MOST_SPP} samples per point are the most that are taken, and the "
+                f"errors are {excess:.1f} times as large as asked for"
             )
             return measured
         growth = np.clip(excess**2 / AIM, LEAST_GROWTH, MOST_GROWTH)

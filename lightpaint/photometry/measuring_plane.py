@@ -81,6 +81,8 @@ class MeasuringPlane:
         wishes: The wishes for it.
         is_cylindrical: Whether cylindrical illuminance around the normals is measured, the mean
             over all directions perpendicular to them.
+        covered_by: Ids of the shapes that cover points of its grid closely, one for each point
+            that is left out.
 
     Examples:
         >>> up = np.array([[0.0, 1, 0], [0, 1, 0]])
@@ -99,6 +101,7 @@ class MeasuringPlane:
     cells: Indices
     wishes: Wishes = field(default_factory=Wishes)
     is_cylindrical: bool = False
+    covered_by: tuple[str, ...] = ()
 
     def __post_init__(self) -> None:
         if not isinstance(self.name, str):

@@ -6,7 +6,7 @@ for a side of d metres, unless another spacing is given. Points are the centres 
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import Literal
 
 import numpy as np
@@ -67,7 +67,8 @@ class _Cells:
     """Cells of a rectangle or a quadrilateral.
 
     points: (p, 3), their centres. normals: (p, 3). cells: (p, 2), row and column. spacing, area:
-    metres between neighbours, and square metres of a cell.
+    metres between neighbours, and square metres of a cell. covered_by: ids of the shapes that
+    cover points which were left out, one for each.
     """
 
     points: Doubles
@@ -75,6 +76,7 @@ class _Cells:
     cells: Indices
     spacing: float
     area: float
+    covered_by: tuple[str, ...] = ()
 
     def only(self, is_kept: Bools) -> "_Cells":
         """Return the cells that are kept."""
@@ -84,6 +86,7 @@ class _Cells:
             self.cells[is_kept],
             self.spacing,
             self.area,
+            self.covered_by,
         )
 
 
@@ -118,6 +121,7 @@ def place_plane(request: PlaneRequest, room: RoomRays) -> MeasuringPlane:
         cells,
         request.wishes,
         is_cylindrical,
+        covered_by=grid.covered_by,
     )
 
 
@@ -298,7 +302,9 @@ def _without_covered(grid: _Cells, room: RoomRays) -> _Cells:
     if not len(grid.points):
         return grid
     hits = room.first_hits(grid.points + 1e-4 * grid.normals, grid.normals)
-    return grid.only(hits.distance > COVER_M)
+    is_covered = hits.distance <= COVER_M
+    names = tuple(room.names[k] for k in hits.shape[is_covered].tolist())
+    return replace(grid.only(~is_covered), covered_by=(*grid.covered_by, *names))
 
 
 def _check_height(request: PlaneRequest, surface: Doubles, lifted: Doubles, room: RoomRays) -> None:
@@ -355,6 +361,7 @@ def _side_by_side(grids: Sequence[_Cells]) -> _Cells:
         np.concatenate(cells),
         max(grid.spacing for grid in grids),
         float(np.concatenate(areas).mean()) if sum(map(len, areas)) else 0.0,
+        covered_by=tuple(name for grid in grids for name in grid.covered_by),
     )
 
 

@@ -4,9 +4,10 @@ For `hall.xml` it is `hall.planes.toml`; docs/photometry.md has the details.
 """
 
 from collections.abc import Iterable, Mapping
+from contextlib import suppress
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Any, Literal
+from typing import Any, Literal, NamedTuple
 
 import numpy as np
 
@@ -16,6 +17,8 @@ from lightpaint.errors import SceneError
 from lightpaint.file_reading import read_text
 from lightpaint.files import is_name, one_line
 from lightpaint.keywords import keywords
+from lightpaint.photometry.glare import GlareObserver
+from lightpaint.photometry.measure import DEFAULT_ERROR, LEAST_ERROR
 from lightpaint.photometry.measuring_plane import (
     LightCase,
     MeasuringPlane,
@@ -23,6 +26,7 @@ from lightpaint.photometry.measuring_plane import (
     Ratio,
     Wishes,
 )
+from lightpaint.photometry.observer_placement import CAMERA, ObserverRequest, place_observers
 from lightpaint.photometry.plane_placement import CYLINDRICAL, PlaneRequest, place_plane
 from lightpaint.photometry.room_rays import RoomRays
 from lightpaint.photometry.wish_presets import PRESETS
@@ -31,7 +35,7 @@ from lightpaint.scene.runtime.variant import use_variant
 from lightpaint.scene.scene import Scene
 from lightpaint.sentences import SourceKey
 from lightpaint.storage.json_records import strict_toml
-from lightpaint.validation import MAX_NAME, is_number
+from lightpaint.validation import MAX_NAME, is_number, parse_share
 
 SUFFIX = ".planes.toml"
 #: Maximum size of a planes file in bytes, and number of its planes.
@@ -52,16 +56,37 @@ PLANE_KEYS = (*PLACES, "height", "margin", "grid", "n", *WISHES)
 MOST_LUX, MOST_METRES, MOST_WATTS = 1e6, 1e4, 1e9
 #: Most cases, and largest emission of a light in one, relative to now.
 MAX_CASES, MOST_FACTOR = 100, 1e6
+#: Most observers.
+MAX_OBSERVERS = 100
 
 
 @dataclass(frozen=True)
 class PlanesFile:
-    """The content of a planes file."""
+    """The content of a planes file.
+
+    observers: who see glare; the camera if the file has none. error: relative error up to which is
+    measured (`measure_illuminance`).
+    """
 
     path: Path
     planes: tuple[MeasuringPlane, ...]
     power: PowerBudget = field(default_factory=PowerBudget)
     cases: tuple[LightCase, ...] = ()
+    observers: tuple[GlareObserver, ...] = ()
+    error: float = DEFAULT_ERROR
+
+    def remarks(self, scene: Scene) -> list[str]:
+        """Return what luminaires, which become panels, cover of planes in a scene."""
+        panels = {x.name for x in scene.luminaires if x.is_panel}
+        remarks = []
+        for plane in self.planes:
+            if covers := [name for name in plane.covered_by if name in panels]:
+                count = "1 point is" if len(covers) == 1 else f"{len(covers)} points are"
+                remarks.append(
+                    f"plane {plane.name}: {count} left out behind {some_names(sorted({*covers}))}, "
+                    "of the size of its luminous opening"
+                )
+        return remarks
 
 
 def planes_file_beside(scene: Path) -> Path:
@@ -87,18 +112,20 @@ def read_planes(path: str | Path, scene: Scene) -> PlanesFile:
         MeasuringPlane('desk', 36 points, 4.00 m²)
     """
     path = Path(path)
-    requests, power, cases = _parse(path)
+    content = _parse(path)
     if not use_variant().is_jit:
         raise SceneError(
             f"the variant is {use_variant().variant}, which cannot measure at points: use a "
             "variant like llvm_ad_rgb"
         )
 
-    def place(loaded: Any) -> tuple[MeasuringPlane, ...]:
+    def place(loaded: Any) -> PlanesFile:
         room = RoomRays(scene, loaded)
-        return tuple(place_plane(request, room) for request in requests)
+        planes = tuple(place_plane(request, room) for request in content.planes)
+        observers = place_observers(content.observers, scene, loaded)
+        return PlanesFile(path, planes, content.power, content.cases, observers, content.error)
 
-    return PlanesFile(path, scene.while_loaded(place), power, cases)
+    return scene.while_loaded(place)
 
 
 def plane_names(path: str | Path) -> tuple[tuple[str, ...], tuple[str, ...]]:
@@ -106,18 +133,28 @@ def plane_names(path: str | Path) -> tuple[tuple[str, ...], tuple[str, ...]]:
 
     Raises SceneError.
     """
-    requests, _, cases = _parse(Path(path))
-    return tuple(request.name for request in requests), tuple(case.name for case in cases)
+    content = _parse(Path(path))
+    return tuple(x.name for x in content.planes), tuple(case.name for case in content.cases)
 
 
-def _parse(path: Path) -> tuple[list[PlaneRequest], PowerBudget, tuple[LightCase, ...]]:
-    """Return the planes, the power and the cases of a planes file, without a scene."""
+class _Content(NamedTuple):
+    """The content of a planes file before it is placed in a scene."""
+
+    planes: list[PlaneRequest]
+    power: PowerBudget
+    cases: tuple[LightCase, ...]
+    observers: tuple[ObserverRequest, ...]
+    error: float
+
+
+def _parse(path: Path) -> _Content:
+    """Return the content of a planes file, without a scene."""
     text = read_text(path, "planes file", SceneError, limit=MAX_BYTES)
     try:
         data = strict_toml(text)
     except ValueError as error:
         raise SceneError(f"{path} is not TOML: {one_line(str(error))}") from None
-    _check_known(data, ("plane", "power", "case"), str(path), "[plane.desk]")
+    _check_known(data, ("plane", "power", "case", "observer", "error"), str(path), "[plane.desk]")
     tables = data.get("plane", {})
     if not isinstance(tables, dict) or not tables:
         raise SceneError(f'{path} has no plane: expected a table like [plane.desk] shape = "floor"')
@@ -131,7 +168,21 @@ def _parse(path: Path) -> tuple[list[PlaneRequest], PowerBudget, tuple[LightCase
         for name, table in tables.items()
     ]
     power = _power(data.get("power", {}), SourceKey(str(path), "power"))
-    return requests, power, _cases(data.get("case", {}), SourceKey(str(path), "case"))
+    cases = _cases(data.get("case", {}), SourceKey(str(path), "case"))
+    observers = _observers(data.get("observer", {}), SourceKey(str(path), "observer"))
+    return _Content(requests, power, cases, observers, _error(data, str(path)))
+
+
+def _error(data: Mapping[str, Any], where: str) -> float:
+    """Return the relative error up to which is measured, a number or a share like "1%"."""
+    value = data.get("error", DEFAULT_ERROR)
+    with suppress(ValueError):
+        error = parse_share(value) if isinstance(value, str) else value
+        if is_number(error) and LEAST_ERROR <= error <= 1:
+            return float(error)
+    raise SceneError(
+        f'{where}: error is {one_line(repr(value))}: expected a relative error, like "1%"'
+    )
 
 
 def _check_known(table: Any, known: Iterable[str], where: str, example: str) -> None:
@@ -298,6 +349,38 @@ def _cases(tables: Any, where: SourceKey) -> tuple[LightCase, ...]:
         }
         cases.append(LightCase(name, {light: x or 0.0 for light, x in factors.items()}))
     return tuple(cases)
+
+
+def _observers(tables: Any, where: SourceKey) -> tuple[ObserverRequest, ...]:
+    """Return those who see glare."""
+    if not isinstance(tables, dict) or len(tables) > MAX_OBSERVERS:
+        raise SceneError(
+            f"{where} is {one_line(repr(tables))}: expected at most {MAX_OBSERVERS} tables like "
+            f"[observer.desk] {OBSERVER_EXAMPLE}"
+        )
+    observers = []
+    for name, table in tables.items():
+        own = where / one_line(name)
+        _check_known(table, ("at", "towards"), own, OBSERVER_EXAMPLE)
+        if not is_name(name) or len(name) > MAX_NAME:
+            raise SceneError(f"{own} cannot name a row of a table: choose another")
+        if table.get("at") == CAMERA and "towards" not in table:
+            observers.append(ObserverRequest(name, own))
+            continue
+        for key in ("at", "towards"):
+            if not _is_vector(table.get(key)):
+                raise SceneError(
+                    f"{own / key} is {one_line(repr(table.get(key)))}: expected a point, as in "
+                    f'{OBSERVER_EXAMPLE}; or at = "{CAMERA}" alone'
+                )
+        at, towards = (np.array(table[key], float) for key in ("at", "towards"))
+        if np.array_equal(at, towards):
+            raise SceneError(f"{own} looks towards its own place: expected another point")
+        observers.append(ObserverRequest(name, own, at, towards))
+    return tuple(observers)
+
+
+OBSERVER_EXAMPLE = "at = [1, 1.2, 0], towards = [4, 1.2, 0]"
 
 
 def _power(table: Any, where: SourceKey) -> PowerBudget:

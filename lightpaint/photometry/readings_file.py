@@ -11,9 +11,10 @@ from typing import Any
 import numpy as np
 
 from lightpaint.arrays import Doubles
-from lightpaint.files import write_bytes, write_text
+from lightpaint.files import one_line, write_bytes, write_text
 from lightpaint.images.formats.png import png_bytes
 from lightpaint.photometry.false_colour import false_colours
+from lightpaint.photometry.glare import Glare, GlareReading
 from lightpaint.photometry.illuminance import Illuminance
 from lightpaint.photometry.measuring_plane import MeasuringPlane, Wishes
 from lightpaint.photometry.wish_presets import PRESETS
@@ -29,10 +30,19 @@ def readings_files(planes: Iterable[str]) -> list[str]:
     return [POINTS, PLANES, *(name + PICTURE_SUFFIX for name in planes)]
 
 
-def write_readings(folder: Path, measured: Illuminance, weights: Doubles, origin: str) -> None:
-    """Write the illuminance on all planes into `folder`. origin: scene and lighting, as text."""
+def write_readings(
+    folder: Path,
+    measured: Illuminance,
+    weights: Doubles,
+    origin: str,
+    *,
+    glare: Glare | None = None,
+) -> None:
+    """Write the illuminance on all planes, and the glare if it was measured, into `folder`. origin:
+    scene and lighting, as text.
+    """
     write_text(folder / POINTS, points_text(measured, weights))
-    document = readings_document(measured, weights) | {"origin": origin}
+    document = readings_document(measured, weights, glare=glare) | {"origin": origin}
     write_text(folder / PLANES, json.dumps(document, indent=2, allow_nan=False) + "\n")
     for plane in measured.planes:
         values = measured.of(weights)[measured.points_of(plane.name)]
@@ -55,14 +65,29 @@ def points_text(measured: Illuminance, weights: Doubles) -> str:
     return text.getvalue()
 
 
-def readings_document(measured: Illuminance, weights: Doubles) -> dict[str, Any]:
-    """Return the readings of all planes for programs (docs/photometry.md)."""
+def readings_document(
+    measured: Illuminance, weights: Doubles, *, glare: Glare | None = None
+) -> dict[str, Any]:
+    """Return the readings of all planes and observers for programs (docs/photometry.md)."""
+    observers = {} if glare is None else glare.readings(weights)
     return {
         "format": FORMAT,
         "cd_per_unit": measured.cd_per_unit,
         "planes": {
             plane.name: _plane_document(plane, measured, weights) for plane in measured.planes
         },
+        "observers": {name: glare_document(x) for name, x in observers.items()},
+    }
+
+
+def glare_document(reading: GlareReading) -> dict[str, Any]:
+    """Return the glare that an observer sees for programs."""
+    return {
+        "ugr": reading.rating,
+        "ugr_error": reading.error if reading.rating is not None else None,
+        "background_cd_m2": reading.background,
+        "strongest": reading.strongest or None,
+        "unknown_because": reading.reason or None,
     }
 
 
@@ -115,10 +140,14 @@ def missed_wishes(measured: Illuminance, weights: Doubles) -> list[str]:
     return missed
 
 
-def is_measured_folder(folder: Path) -> bool:
-    """Return True if the files of an earlier measurement are in `folder`."""
+def measured_origin(folder: Path) -> str | None:
+    """Return the origin of an earlier measurement in `folder`, as `write_readings` had it; None
+    without one.
+    """
     try:
         document = strict_json((folder / PLANES).read_text("utf-8"))
     except (OSError, ValueError):
-        return False
-    return isinstance(document, Mapping) and document.get("format") == FORMAT
+        return None
+    if not isinstance(document, Mapping) or document.get("format") != FORMAT:
+        return None
+    return one_line(str(document.get("origin", "")))

@@ -19,6 +19,7 @@ from lightpaint.pipeline.wished_planes import (
     MeasuredPlanes,
     constraints_for_planes,
     measure_planes,
+    with_glare,
 )
 from lightpaint.progress import Progress, listener, silent
 from lightpaint.scene.scene import Scene
@@ -67,6 +68,7 @@ def plan_lighting(
     reduction = reduce_to(every, lights)
     check_powers(reduction, [light.name for light in lights], "the least power")
     measured = measure_planes(scene, planes, settings, every.cd_per_unit, listen)
+    measured = with_glare(measured, scene, settings, listen)
     return plan_of(measured, reduction, scene_identity=scene.identity)
 
 
@@ -82,6 +84,7 @@ def plan_of(planes: MeasuredPlanes, reduction: Reduction, *, scene_identity: str
         weights,
         floor_m2=planes.floor_m2,
         prices=wished.multipliers_of(program.multipliers),
+        glare=planes.glare,
     )
     lighting = Lighting.of_weights(
         planes.illuminance.lights,

@@ -252,7 +252,8 @@ def _finish_view(
             _remark_on_parameters(relit, listen)
             if rig.planes is not None and settings.planes is not None:
                 origin, measured = f"{scene.path.name} lit by {LIGHTING}", rig.planes.wished
-                write_planes(answer.path, measured.illuminance, rig.planes.weights_by_case, origin)
+                lit, glare = rig.planes.weights_by_case, rig.planes.glare
+                write_planes(answer.path, measured.illuminance, lit, origin, glare=glare)
     _write_prediction(folder, predicted, basis, budget, relit)
     if budget is not None and settings.verify:
         verification = _verify(settings, predicted, budget, solution, listen)

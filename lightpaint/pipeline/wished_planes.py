@@ -9,6 +9,7 @@ import numpy as np
 from lightpaint.arrays import Doubles
 from lightpaint.basis.lights import Lights
 from lightpaint.basis.render.render_origin import basis_lights
+from lightpaint.display_text import some_names
 from lightpaint.lighting.analysis.appearance.display_difference import PaintComparison
 from lightpaint.lighting.constraints.absolute_scale import with_sure_scale
 from lightpaint.lighting.constraints.constraints import Constraints
@@ -26,8 +27,10 @@ from lightpaint.lighting.wishes.wished_light import (
     watts_allowed,
     wished_light,
 )
+from lightpaint.photometry.glare import Glare
 from lightpaint.photometry.illuminance import Illuminance
 from lightpaint.photometry.measure import measure_illuminance
+from lightpaint.photometry.measure_glare import measure_glare
 from lightpaint.photometry.measuring_plane import PowerBudget
 from lightpaint.photometry.planes_file import PlanesFile, read_planes
 from lightpaint.pipeline.job.job import Job
@@ -35,9 +38,6 @@ from lightpaint.pipeline.job.job_checks import checked_scale
 from lightpaint.pipeline.job.settings import Settings
 from lightpaint.progress import Listener
 from lightpaint.scene.scene import Scene
-
-#: Largest error of a plane's mean, at 95 %, unless the settings say another.
-MEAN_ERROR = 0.02
 
 #: Least cosine between the normal of a plane and the vertical at which it faces upwards.
 FACING_UP = 0.7
@@ -47,12 +47,14 @@ FACING_UP = 0.7
 class MeasuredPlanes:
     """Planes of a file with the illuminance of each light on them.
 
-    floor_m2: the area that power is divided by; 0 if there is none.
+    floor_m2: the area that power is divided by; 0 if there is none. glare: that the observers of
+    the file see; None if it was not measured.
     """
 
     file: PlanesFile
     illuminance: Illuminance
     floor_m2: float
+    glare: Glare | None = None
 
     def weights_by_case(self, weights: Doubles) -> Mapping[str, Doubles]:
         """Return the weights (n, 3) of each case; of the light of the scene as "" without cases."""
@@ -84,13 +86,16 @@ def measure_planes(
     radiance of 1 stands for.
     """
     file, cd_per_unit = read_planes(path, scene), checked_scale(path, cd_per_unit)
+    for remark in file.remarks(scene):
+        listen.say(remark)
     illuminance = measure_illuminance(
         scene,
         file.planes,
-        error=settings.error or MEAN_ERROR,
+        error=settings.error or file.error,
         cd_per_unit=cd_per_unit,
         seed=settings.seed,
         use_cache=settings.use_cache,
+        exact_spp=settings.exact_spp,
         progress=listen,
     )
     points = sum(len(plane) for plane in file.planes)
@@ -99,6 +104,26 @@ def measure_planes(
     if settings.watts is not None:
         file = replace(file, power=PowerBudget(settings.watts))
     return MeasuredPlanes(file, illuminance, floor_m2)
+
+
+def with_glare(
+    planes: MeasuredPlanes, scene: Scene, settings: Settings, listen: Listener
+) -> MeasuredPlanes:
+    """Return measured planes with the glare of each light for the observers of their file."""
+    if not planes.file.observers:
+        return planes
+    glare = measure_glare(
+        scene,
+        planes.file.observers,
+        error=settings.error or planes.file.error,
+        cd_per_unit=planes.illuminance.cd_per_unit,
+        seed=settings.seed,
+        use_cache=settings.use_cache,
+        exact_spp=settings.exact_spp,
+        progress=listen,
+    )
+    listen.note(f"glare measured for {some_names(glare.names)}")
+    return replace(planes, glare=glare)
 
 
 def limited_power(watts: float, lights: Lights) -> MeasuredPlanes:
@@ -144,7 +169,8 @@ def planes_of_job(job: Job, lights: Lights, listen: Listener) -> MeasuredPlanes 
     if settings.planes is None or scene is None:
         return None if settings.watts is None else limited_power(settings.watts, lights)
     scale = job.all_constraints.cd_per_unit
-    return measure_planes(scene, settings.planes, settings, scale, listen)
+    planes = measure_planes(scene, settings.planes, settings, scale, listen)
+    return with_glare(planes, scene, settings, listen)
 
 
 def require(problem: Problem, planes: MeasuredPlanes, listen: Listener) -> RequiredProblem:
@@ -159,29 +185,40 @@ def answer_on_planes(
     solution: Solution, planes: MeasuredPlanes, required: RequiredProblem
 ) -> PlanesAnswer:
     """Return what a solution gives on planes, and what their wishes cost the picture."""
-    reduction = solution.problem.reduction
-    return planes_answer(
+    answer = planes_answer(
         required.wished,
-        reduction,
+        solution.problem.reduction,
         solution.weights,
         floor_m2=planes.floor_m2,
-        cost_delta_e=_cost_in_delta_e(solution),
+        glare=planes.glare,
     )
+    return _with_costs(answer, solution, planes)
 
 
-def _cost_in_delta_e(solution: Solution) -> float | None:
-    """Return by how much the answer is further from the painting than one without wishes."""
+def _with_costs(answer: PlanesAnswer, solution: Solution, planes: MeasuredPlanes) -> PlanesAnswer:
+    """Return an answer with how much further it is from the painting than one without wishes, and
+    than one whose power is not limited.
+    """
     problem = solution.problem
     if problem.reduction.requirements is None:
-        return None
-    free = without_wishes(problem)
-    look = PaintComparison.of_problem(problem)
+        return answer
+    free, look = without_wishes(problem), PaintComparison.of_problem(problem)
     rows = look.rows(problem.basis.planes)
 
     def missed(weights: Doubles) -> float:
         return look.mean(look.difference(np.einsum("npc,nc->pc", rows, weights)))
 
-    return missed(solution.weights) - missed(solution_of(free, start=solution.weights).weights)
+    def cost_beside(other: Problem) -> float:
+        other_weights = solution_of(other, start=solution.weights).weights
+        return missed(solution.weights) - missed(other_weights)
+
+    answer = replace(answer, cost_delta_e=cost_beside(free))
+    is_alone = all(wish.kind == "power" for wish in answer.wished.wishes)
+    if answer.binding_limit is None or is_alone:
+        return answer
+    unlimited = replace(planes, file=replace(planes.file, power=PowerBudget()))
+    wished = with_wishes(free, unlimited.wished_of(free.reduction))
+    return replace(answer, budget_delta_e=cost_beside(wished.problem))
 
 
 def _floor_area(file: PlanesFile, scene: Scene) -> float:

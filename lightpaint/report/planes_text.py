@@ -4,10 +4,14 @@ import math
 from collections.abc import Iterator
 from typing import Any
 
-from lightpaint.lighting.wishes.planes_answer import MISSED, PlanesAnswer, WishOutcome
+from lightpaint.lighting.wishes.planes_answer import PlanesAnswer, WishOutcome
 from lightpaint.lighting.wishes.wished_light import NORMAL_95
+from lightpaint.photometry.glare import GlareReading
 from lightpaint.photometry.illuminance import PlaneReading
 from lightpaint.photometry.measuring_plane import MeasuringPlane, plane_title
+from lightpaint.photometry.readings_file import glare_document
+from lightpaint.photometry.wish_presets import PRESETS
+from lightpaint.report.glare_text import glare_sentences
 
 #: Headings of a table of planes.
 HEADINGS = ("plane", "Em lx", "U0", "least lx", "most lx", "wished for", "W/m² per 100 lx")
@@ -47,8 +51,15 @@ def wishes_text(plane: MeasuringPlane) -> str:
     return ", ".join(parts)
 
 
+def glare_by_title(answer: PlanesAnswer) -> dict[str, GlareReading]:
+    """Return the glare that observers see, by name of the observer and case."""
+    return {plane_title(name, case): x for (case, name), x in answer.glare_readings.items()}
+
+
 def planes_sentences(answer: PlanesAnswer) -> list[str]:
-    """Return what is missed, what the power is, and what the wishes cost."""
+    """Return what is missed, what the power is, what the wishes cost, what glare is unknown, and
+    where the figures of presets come from.
+    """
     sentences = [_missed(answer, outcome) for outcome in answer.missed]
     if not answer.missed and answer.outcomes:
         what = "All wishes for the planes are" if answer.readings else "The limit of power is"
@@ -63,7 +74,10 @@ def planes_sentences(answer: PlanesAnswer) -> list[str]:
         cost = answer.cost_delta_e
         text = f"by ΔE {cost:.1f} further" if cost >= LEAST_COST else "no further"
         sentences.append(f"With these wishes the picture is {text} from the painting.")
-    return sentences
+    if answer.budget_delta_e is not None and answer.budget_delta_e >= LEAST_COST:
+        limit, cost = answer.binding_limit, answer.budget_delta_e
+        sentences.append(f"Of that, the limit of {limit:.4g} W costs ΔE {cost:.1f}.")
+    return [*sentences, *glare_sentences(glare_by_title(answer)), *_preset_sentences(answer)]
 
 
 def planes_numbers(answer: PlanesAnswer) -> dict[str, Any]:
@@ -87,11 +101,20 @@ def planes_numbers(answer: PlanesAnswer) -> dict[str, Any]:
     budget = [x.wish.asked for x in answer.outcomes if x.wish.kind == "power"]
     return {
         "planes": planes,
+        "observers": {name: glare_document(x) for name, x in glare_by_title(answer).items()},
         "watts": answer.watts,
         "budget_watts": min(budget, default=None),
         "floor_m2": answer.floor_m2 or None,
         "cost_delta_e": answer.cost_delta_e,
+        "budget_delta_e": answer.budget_delta_e,
     }
+
+
+def _preset_sentences(answer: PlanesAnswer) -> Iterator[str]:
+    """Yield where the figures of presets come from."""
+    presets = {plane.wishes.preset for plane in answer.wished.illuminance.planes} - {""}
+    for name in sorted(presets):
+        yield f"{name}: {PRESETS[name]}."
 
 
 def _outcome_numbers(outcome: WishOutcome) -> dict[str, Any]:
@@ -118,7 +141,7 @@ def _missed(answer: PlanesAnswer, outcome: WishOutcome) -> str:
     title = plane_title(wish.plane, wish.case)
     if wish.kind == "mean":
         text = f"{title}: {reached:.0f} of {wish.asked:g} lx"
-        if (limit := _limit_of_power(answer)) is not None:
+        if (limit := answer.binding_limit) is not None:
             return f"{text}, as much as the limit of {limit:.4g} W leaves."
         if not answer.all_at_full:
             return f"{text}, as much as the other wishes leave."
@@ -133,13 +156,6 @@ def _missed(answer: PlanesAnswer, outcome: WishOutcome) -> str:
     if wish.kind == "ratio":
         return f"{title}: {reached:.2f} of the mean of {wish.to}, wished for {wish.asked:g}."
     return f"The lamps take {reached:.4g} W, where {wish.asked:g} W are allowed."
-
-
-def _limit_of_power(answer: PlanesAnswer) -> float | None:
-    """Return the limit of the power in watts, if the lamps take all of it."""
-    limits = [x for x in answer.outcomes if x.wish.kind == "power"]
-    taken = [x.wish.asked for x in limits if x.reached >= x.wish.asked * (1 - MISSED)]
-    return min(taken, default=None)
 
 
 def _prices(answer: PlanesAnswer) -> Iterator[str]:

@@ -49,17 +49,18 @@ def downlight(_: float, gamma: float) -> float:
     return 2400 * math.exp(-((gamma / 19) ** 2)) if gamma < 60 else 0.0
 
 
-#: For each web: its candela, the C-planes and the last angle of the file, lumens and watts.
-WEBS: dict[str, tuple[Web, list[float], float, float]] = {
-    "pendant": (batwing, [22.5 * k for k in range(5)], 180, 34),
-    "washer": (washer, [15.0 * k for k in range(25)], 90, 24),
-    "downlight": (downlight, [0.0], 90, 12),
+#: For each web: its candela, the C-planes and the last angle of the file, watts, and the diameter
+#: of its round opening.
+WEBS: dict[str, tuple[Web, list[float], float, float, float]] = {
+    "pendant": (batwing, [22.5 * k for k in range(5)], 180, 34, 0.14),
+    "washer": (washer, [15.0 * k for k in range(25)], 90, 24, 0.12),
+    "downlight": (downlight, [0.0], 90, 12, 0.16),
 }
 
 
 def ies_text(name: str) -> str:
     """Return a photometric file of IES LM-63-2002, absolute."""
-    web, planes, last, watts = WEBS[name]
+    web, planes, last, watts, opening = WEBS[name]
     angles = [2.5 * k for k in range(round(last / 2.5) + 1)]
     rows = [[web(c, gamma) for gamma in angles] for c in planes]
     if name == "washer":  # no angle belongs to two planes
@@ -72,7 +73,7 @@ def ies_text(name: str) -> str:
         "[MANUFAC] lightpaint",
         f"[LUMINAIRE] {name} of the example office",
         "TILT=NONE",
-        f"1 -1 1 {len(angles)} {len(planes)} 1 2 0 0 0",
+        f"1 -1 1 {len(angles)} {len(planes)} 1 2 {-opening:g} {-opening:g} 0",
         f"1 1 {watts}",
         " ".join(f"{x:g}" for x in angles),
         " ".join(f"{x:g}" for x in planes),
@@ -302,6 +303,16 @@ mean = 500
 uniformity = 0.6
 """
 
+#: Who sits at the first desk, and who comes in.
+OBSERVERS = """
+[observer.seat_1]
+at = [2.0, 1.55, 1.2]
+towards = [2.0, 5.0, 1.2]
+
+[observer.door]
+at = "camera"
+"""
+
 
 def main() -> None:
     """Write all files."""
@@ -310,7 +321,7 @@ def main() -> None:
     (HERE / "office.xml").write_text(scene_text(), encoding="utf-8")
     (HERE / "office.lights.toml").write_text(lights_text(), encoding="utf-8")
     desks = "".join(DESK.format(number=k + 1) for k in range(len(DESKS)))
-    (HERE / "office.planes.toml").write_text(PLANES + desks, encoding="utf-8")
+    (HERE / "office.planes.toml").write_text(PLANES + desks + OBSERVERS, encoding="utf-8")
 
 
 if __name__ == "__main__":

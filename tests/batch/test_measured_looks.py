@@ -15,8 +15,10 @@ from lightpaint.basis.file.basis_file import write_basis
 from lightpaint.batch.cluster.parcels import FileHashes, ParcelStore, pack, pieces
 from lightpaint.batch.gallery.summary import (
     LightRow,
+    ObserverRow,
     PlaneRow,
     SummaryRow,
+    observers_of_answer,
     planes_of_answer,
     summary_csv,
 )
@@ -27,7 +29,10 @@ from lightpaint.batch.work.item_execution import run_item
 from lightpaint.batch.work.worker_storage import WorkerCache
 from lightpaint.errors import BatchError
 from lightpaint.images.formats.exr import write_rgb
-from lightpaint.progress import silent
+from lightpaint.photometry.measure import error_excess, weights_on
+from lightpaint.pipeline.job.settings import Settings
+from lightpaint.pipeline.wished_planes import measure_planes
+from lightpaint.progress import listener, silent
 from lightpaint.scene.scene_reader import load_scene
 
 LAMP = 'emitters = [{ name = "white", rgb = [9, 9, 9], watts = 30 }]\n'
@@ -132,6 +137,37 @@ def test_a_worker_elsewhere_gets_the_planes_file_and_does_the_same(
         assert outcome.files[name] == expected[name]
 
 
+def _points_and_error(folder: Path, out: str) -> tuple[bytes, float]:
+    """The points of the look, and the relative error of the mean of its plane."""
+    assert run_batch(plan(folder / "looks.toml", folder / out), RunOptions()).done
+    planes = json.loads((folder / out / "dark/planes/planes.json").read_text("utf-8"))["planes"]
+    error = planes["floor"]["mean_error"] / planes["floor"]["mean"]
+    return (folder / out / "dark/planes/planes.csv").read_bytes(), error
+
+
+def test_planes_are_measured_as_well_as_they_ask_whatever_is_cached(folder: Path) -> None:
+    """A finer measurement in the cache must not change the answers of a batch."""
+    first, usual = _points_and_error(folder, "first")
+    finer = f'error = "0.5%"\n{PLANES}'
+    (folder / "project" / "floor.planes.toml").write_text(finer, encoding="utf-8")
+    _, finest = _points_and_error(folder, "finer")
+    assert finest < 0.0026  # half of the 95 % interval is .5 %
+    assert usual > 2 * finest
+    (folder / "project" / "floor.planes.toml").write_text(PLANES, encoding="utf-8")
+    again, _ = _points_and_error(folder, "again")
+    assert again == first
+
+
+def test_the_error_of_a_manifest_holds_for_planes_too(folder: Path) -> None:
+    (folder / "looks.toml").write_text(LOOKS.replace("spp = 4", "error = 0.004"), encoding="utf-8")
+    step = plan(folder / "looks.toml", folder / "out").looks[0].steps[0]
+    values = json.loads(step.task.job)["settings"]
+    settings = Settings(**{key: values[key] for key in ("planes", "error")})
+    scene = load_scene(folder / "project" / "room.xml")
+    found = measure_planes(scene, values["planes"], settings, 100.0, listener(silent)).illuminance
+    assert error_excess(found, weights_on(found.lights), 0.004) <= 1
+
+
 @pytest.mark.parametrize(
     ("lamps", "planes", "expected"),
     [
@@ -160,10 +196,15 @@ def test_each_case_has_columns_of_its_own(tmp_path: Path) -> None:
         folder = tmp_path / "planes" / case
         folder.mkdir(parents=True)
         planes = {"desk": {"mean": mean, "uniformity": 0.5}}
-        (folder / "planes.json").write_text(json.dumps({"planes": planes}), encoding="utf-8")
+        document = {"planes": planes, "observers": {"me": {"ugr": mean / 50}}}
+        (folder / "planes.json").write_text(json.dumps(document), encoding="utf-8")
     assert planes_of_answer(tmp_path) == (
         PlaneRow("desk, night", 300.0, 0.5),
         PlaneRow("desk, noon", 900.0, 0.5),
+    )
+    assert observers_of_answer(tmp_path) == (
+        ObserverRow("me, night", 6.0),
+        ObserverRow("me, noon", 18.0),
     )
 
 
@@ -171,12 +212,16 @@ def test_columns_of_planes_are_those_of_no_light() -> None:
     names = ["desk Em lx", "W", "desk"]
     lights = tuple(LightRow(name, k + 0.5, (2.0, 3.0, 4.0)) for k, name in enumerate(names))
     planes = (PlaneRow("desk", 500.0, 0.6),)
+    seen = (ObserverRow("me", 18.4), ObserverRow("camera", None))
     rows = [
-        SummaryRow("dusk", "done", "", "dusk", lights=lights, planes=planes, watts=70.0),
+        SummaryRow(
+            "dusk", "done", "", "dusk", lights=lights, planes=planes, observers=seen, watts=70.0
+        ),
         SummaryRow("noon", "failed", "no sun", "noon"),
     ]
     [heading, cells, failed] = csv.reader(summary_csv(rows).splitlines())
     assert len(set(heading)) == len(heading) == len(cells) == len(failed)
     table = dict(zip(heading, cells, strict=True))
     assert (table["desk Em lx"], table["desk U0"], table["W"]) == ("500", "0.6", "70")
+    assert (table["me UGR"], table["camera UGR"]) == ("18.4", "")
     assert (table["light desk Em lx"], table["light W"], table["desk"]) == ("0.5", "1.5", "2.5")

@@ -129,7 +129,9 @@ def test_foreign_files_are_kept_and_own_ones_replaced(folder: Path) -> None:
     line = run_refused(folder, "measure", "lit.xml", "--unit", "4", "--spp", "8")
     assert "exists and is of no measurement" in line
     succeed(folder, "measure", "lit.xml", "--unit", "4", "--spp", "8", "--force")
-    succeed(folder, "measure", "lit.xml", "--unit", "4", "--spp", "8")
+    again = run(folder, "measure", "lit.xml", "--unit", "4", "--spp", "8")
+    assert again.returncode == 0
+    assert "measured had a measurement, lit.xml: it is replaced (-o names another)" in again.stderr
 
 
 def test_all_lights_count_also_those_that_are_kept(folder: Path) -> None:

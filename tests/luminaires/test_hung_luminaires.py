@@ -154,6 +154,45 @@ def test_emitters_in_lumens_mix_into_its_web(tmp_path: Path) -> None:
     luminance = float(np.array(lamp.emitters[0].emission) @ [0.2126, 0.7152, 0.0722])
     assert luminance == pytest.approx(0.5, rel=1e-4)  # half of its 1800 lm
 
+    # Their own lumens count, whatever the file has, and a remark says so.
+    [remark] = [x for hung in scene.luminaires for x in hung.remarks()]
+    assert remark.startswith("lamp.ies: lumens changes nothing beside emitters in lm or cd")
+    same = _room(tmp_path, toml.replace("lumens = 1800\n", ""), of=LIGHTS["bulb"])
+    fluxes = []
+    for x in (scene, same):
+        [lamp], [light] = _reduction(x).lamps.values(), basis_lights(x)
+        assert light.unit_flux is not None
+        fluxes.append(np.array(lamp.emitters[0].emission) * light.unit_flux)
+    np.testing.assert_allclose(fluxes[0], fluxes[1], rtol=1e-6)
+
+
+@pytest.mark.parametrize(
+    ("tilt", "factor"), [("", 1.0), ("tilt = 45\nturn = 20", 0.95), ("tilt = 60", 0.9)]
+)
+def test_a_lamp_that_hangs_tilted_has_the_factor_of_its_file(
+    tmp_path: Path, tilt: str, factor: float
+) -> None:
+    (tmp_path / "lamps").mkdir(exist_ok=True)
+    text = ies_text(batwing, tilt="TILT=INCLUDE\n1\n3\n0 45 90\n1 0.95 0.8")
+    (tmp_path / "lamps" / "tilted.ies").write_text(text, encoding="ascii")
+    scene = _room(tmp_path, f'[light.bulb]\nphotometry = "lamps/tilted.ies"\n{tilt}')
+    flux = read_web(tmp_path / "lamps" / "tilted.ies").flux
+    assert scene.light("bulb").unit_flux == pytest.approx((factor * flux,) * 3, rel=1e-5)
+    told = [x for hung in scene.luminaires for x in hung.remarks() if "TILT" in x]
+    assert bool(told) == (factor != 1)
+
+
+def test_a_spot_is_tilted_by_the_angle_at_which_it_aims(tmp_path: Path) -> None:
+    (tmp_path / "lamps").mkdir(exist_ok=True)
+    text = ies_text(batwing, tilt="TILT=INCLUDE\n1\n2\n0 90\n1 0.5")
+    (tmp_path / "lamps" / "tilted.ies").write_text(text, encoding="ascii")
+    scene = _room(tmp_path, '[light.beam]\nphotometry = "lamps/tilted.ies"')
+    ahead = np.subtract((0, 0, 0), (0.8, 1.8, 1.5))
+    angle = np.degrees(np.arccos(-ahead[1] / np.linalg.norm(ahead)))
+    flux = read_web(tmp_path / "lamps" / "tilted.ies").flux
+    expected = (1 - 0.5 * angle / 90) * flux
+    assert scene.light("beam").unit_flux == pytest.approx((expected,) * 3, rel=1e-5)
+
 
 @pytest.mark.parametrize("amount", ["lm = 900", "Y = 0.5"])
 def test_losses_count_once_for_emitters(tmp_path: Path, amount: str) -> None:

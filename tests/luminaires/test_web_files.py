@@ -12,7 +12,7 @@ from lightpaint.arrays import Doubles
 from lightpaint.errors import SceneError
 from lightpaint.luminaires import web_file
 from lightpaint.luminaires.web import PhotometricWeb, turned
-from lightpaint.luminaires.web_file import flux_remark, read_web
+from lightpaint.luminaires.web_file import flux_remark, read_web, unread_remark
 
 #: Files hold ten digits.
 IN_FILE = 1e-8
@@ -126,9 +126,41 @@ def test_an_absolute_file_states_no_lumens(tmp_path: Path) -> None:
     assert flux_remark(web, "lamp.ies") is None
 
 
-def test_factors_of_a_tilted_lamp_are_passed(tmp_path: Path) -> None:
-    tilt = "TILT=INCLUDE\r\n1\r\n3\r\n0 45 90\r\n1.0 0.95 0.9"
-    assert _read(tmp_path, ies_text(cosine, tilt=tilt)).peak == pytest.approx(1000)
+#: Geometry of the lamp, number of angles, angles, and factors.
+TILTED = "TILT=INCLUDE\r\n1\r\n3\r\n0 45 90\r\n1.0 0.95 0.8"
+
+
+def test_factors_of_a_tilted_lamp_are_for_the_angle_at_which_it_hangs(tmp_path: Path) -> None:
+    """LM-63: angles from hanging straight down, and a factor of all candela at each."""
+    web = _read(tmp_path, ies_text(cosine, tilt=TILTED))
+    assert web.peak == pytest.approx(1000)
+    found = [web.factor_at(x) for x in (0, 22.5, 45, 60, 90, 120)]
+    assert found == pytest.approx([1, 0.975, 0.95, 0.9, 0.8, 0.8])
+    assert _read(tmp_path, ies_text(cosine)).factor_at(45) == 1
+
+
+@pytest.mark.parametrize(
+    ("tilt", "reason"),
+    [
+        ("TILT=INCLUDE\n1\n2\n45 0\n1 1", "its tilt angles do not rise"),
+        ("TILT=INCLUDE\n1\n2\n0 90\n1 -1", "it has a negative factor of a tilt angle"),
+    ],
+)
+def test_wrong_factors_of_a_tilted_lamp_are_refused(tmp_path: Path, tilt: str, reason: str) -> None:
+    with pytest.raises(SceneError, match=reason):
+        _read(tmp_path, ies_text(cosine, tilt=tilt))
+
+
+def test_what_follows_after_the_last_intensity_is_told(tmp_path: Path) -> None:
+    whole = _read(tmp_path, ies_text(cosine))
+    assert unread_remark(whole, "lamp.ies") is None
+    assert _read(tmp_path, ies_text(cosine) + "\x1a").unread == 0  # the end of a file in DOS
+    more = unread_remark(_read(tmp_path, ies_text(cosine) + "1 2 3"), "lamp.ies")
+    assert more is not None
+    assert more.startswith("lamp.ies: 3 numbers after the last intensity that it announces")
+    one = unread_remark(_read(tmp_path, ldt_text(cosine, 1) + "7", "ldt"), "lamp.ldt")
+    assert one is not None
+    assert "1 number after" in one
 
 
 @pytest.mark.parametrize(

@@ -7,6 +7,7 @@ from typing import Any
 import numpy as np
 import pytest
 from lit_planes import (
+    BLACK,
     BULB,
     DISC,
     FURNACE,
@@ -16,6 +17,7 @@ from lit_planes import (
     lit_scene,
     plane_of,
 )
+from radiance import illuminance_of_panel
 
 from lightpaint.basis.render import render_budget
 from lightpaint.basis.render.basis_render import render_basis
@@ -198,6 +200,22 @@ def test_mitsubas_irradiancemeter_has_no_light_of_a_point(tmp_path: Path) -> Non
     assert not image.any()
     found = measured(lit_scene(tmp_path, BULB), plane_of([(0, 0, 0)]))
     assert lux(found, "bulb")[0] == pytest.approx(25, rel=ROUNDING)
+
+
+def test_a_watt_is_179_lumens_in_radiance(tmp_path: Path) -> None:
+    """A scene made for Radiance, in watts, is measured as Radiance does with the unit 179; the 683
+    lm/W of green light would give nearly four times as much.
+    """
+    panel = (
+        '<shape type="rectangle" id="panel"><transform name="to_world"><scale value="0.3"/>'
+        f'<rotate x="1" angle="90"/><translate y="2"/></transform>{BLACK}<emitter type="area">'
+        '<rgb name="radiance" value="5"/></emitter></shape>'
+    )
+    found = measured(lit_scene(tmp_path, panel), plane_of(POINTS), cd_per_unit=179.0, spp=4096)
+    points = np.array(POINTS, float)[:, [0, 2, 1]] * (1, -1, 1)  # up is z in Radiance
+    expected = illuminance_of_panel(tmp_path / "radiance", 0.6, 2.0, 5.0, points)
+    errors = found.standard_errors(weights_on(found.lights))
+    assert (np.abs(lux(found, "panel") - expected) < SURE * errors + 0.002 * expected).all()
 
 
 def test_samples_are_added_until_means_and_points_are_certain(tmp_path: Path) -> None:

@@ -4,7 +4,8 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from lit_planes import BULB, box, floor, lit_scene, rectangle
+from lit_planes import BULB, box, floor, lit_scene, rectangle, write_scene
+from webs import cosine, ies_text
 
 from lightpaint.errors import SceneError
 from lightpaint.photometry.measuring_plane import MeasuringPlane, PowerBudget, Ratio, Wishes
@@ -251,6 +252,29 @@ MISTAKES = {
     "[plane.a]\npoints = [[0, 1, 0]]\n[power]\nwatt = 1": "unknown key 'watt'",
     "plane = 3": "has no plane",
 }
+
+
+def test_a_remark_on_points_behind_a_luminaire_that_becomes_a_panel(tmp_path: Path) -> None:
+    """A panel of .6 x .6 m under a ceiling at 3, whose points are .2 m apart: three by three of
+    them lie behind it, and the floor has all of its points.
+    """
+    lamp = '<emitter type="point" id="lamp"><point name="position" x="0" y="2.97" z="0"/></emitter>'
+    ceiling = rectangle("ceiling", 3, '<rotate x="1" angle="90"/><translate y="3"/>')
+    path = write_scene(tmp_path, lamp + ceiling + floor(3))
+    (tmp_path / "lamp.ies").write_text(ies_text(cosine, sizes=(0.6, 0.6, 0)), encoding="ascii")
+    (tmp_path / "lit.lights.toml").write_text(
+        '[light.lamp]\nphotometry = "lamp.ies"\n', encoding="utf-8"
+    )
+    scene = load_scene(path)
+    text = '[plane.top]\nwalls = ["ceiling"]\ngrid = 0.2\n[plane.low]\nshape = "floor"\ngrid = 0.2'
+    found = read(tmp_path, text, scene)
+    top, low = found.planes
+    assert (len(top), len(low)) == (15 * 15 - 9, 15 * 15)
+    [remark] = found.remarks(scene)
+    assert (
+        remark
+        == "plane top: 9 points are left out behind lamp, of the size of its luminous opening"
+    )
 
 
 @pytest.mark.parametrize("text", MISTAKES)

@@ -6,6 +6,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from lit_planes import lit_scene
 from renderer import CORNELL, LIGHTS, mitsuba_render, write_room
 
 from lightpaint.errors import BackendError, SceneError
@@ -279,3 +280,12 @@ def test_a_light_that_shines_nowhere_is_refused(tmp_path: Path):
     path.write_text(path.read_text().replace("</scene>", f"{emitter}</scene>"))
     with pytest.raises(SceneError, match=r"'far' .* has a direction that is not a number"):
         load_scene(path)
+
+
+def test_a_direction_that_is_rounded_to_zero_has_no_sign(tmp_path: Path) -> None:
+    spot = (
+        '<emitter type="spot" id="beam"><transform name="to_world"><lookat origin="0, 2, 0" '
+        'target="-0.001, 0, -0.001" up="0, 0, 1"/></transform></emitter>'
+    )
+    form = lit_scene(tmp_path, spot).light("beam").form
+    assert form == "at (0.00, 2.00, 0.00) towards (0.00, -1.00, 0.00)"

@@ -81,10 +81,10 @@ def has_indirect_planes(scene: Scene) -> bool:
     """Return whether the one pass stores indirect light separately from direct light.
 
     That doubles the memory, which is affordable for small pictures, the ones shown to people.
-    Measurements at points are no pictures, and are not denoised.
+    Measurements at points are no pictures, and are not denoised: there it is a choice.
     """
     if scene.points is not None:
-        return False
+        return scene.points.is_split and depth_limit(scene.integrator) > 2
     height, width = scene.size
     is_small = 12 * len(scene.lights) * height * width <= SPLIT_MAX_BYTES
     return is_small and depth_limit(scene.integrator) > 2

@@ -4,7 +4,7 @@ import csv
 import io
 import json
 import math
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from contextlib import suppress
 from dataclasses import asdict, dataclass, field, replace
 from pathlib import Path
@@ -63,8 +63,10 @@ COLUMNS = (
 LIGHT_COLUMNS = ("", " R", " G", " B", " K")
 
 #: Columns of a plane: its mean illuminance, and the ratio of its least to that. And the columns of
-#: the power of all lamps, in watts, and of the planes that do not get what was wished for.
-PLANE_COLUMNS, POWER_COLUMN, MISSED_COLUMN = (" Em lx", " U0"), "W", "wishes missed"
+#: the glare of an observer, of the power of all lamps, in watts, and of the planes that do not get
+#: what was wished for.
+PLANE_COLUMNS, GLARE_COLUMN = (" Em lx", " U0"), " UGR"
+POWER_COLUMN, MISSED_COLUMN = "W", "wishes missed"
 
 State = Literal["done", "failed", "waiting"]
 
@@ -101,6 +103,17 @@ class PlaneRow:
 
 
 @dataclass(frozen=True)
+class ObserverRow:
+    """The glare that an observer sees in a look.
+
+    name: of the observer and the case. ugr: None if it cannot be told.
+    """
+
+    name: str
+    ugr: float | None
+
+
+@dataclass(frozen=True)
 class SummaryRow:
     """A look, or one view of it.
 
@@ -108,8 +121,9 @@ class SummaryRow:
     None if nothing was painted. agrees: whether a render confirms it; None if there was none.
     spp: samples per pixel of its basis; None if nothing was rendered. fingerprint: hash of its
     request and of the files that it reads, as in the journal.
-    planes: on which illuminance was measured. watts: power of all lamps, where there are planes and
-    the power of each lamp is known. missed_planes: names of planes whose wishes are not all met.
+    planes: on which illuminance was measured. observers: for whom glare was. watts: power of all
+    lamps, where there are planes and the power of each lamp is known. missed_planes: names of
+    planes whose wishes are not all met.
     files: to open. picture: small, relative to the batch's folder; "" where there is none.
     """
 
@@ -133,6 +147,7 @@ class SummaryRow:
     spp: float | None = None
     fingerprint: str = ""
     planes: tuple[PlaneRow, ...] = ()
+    observers: tuple[ObserverRow, ...] = ()
     watts: float | None = None
     missed_planes: tuple[str, ...] = ()
 
@@ -217,6 +232,7 @@ def _row(plan: Plan, look: PlannedLook, folder: Path, state: State, reason: str)
         else (),
         spp=basis.get("spp"),
         planes=planes,
+        observers=observers_of_answer(look.folder) if planes else (),
         watts=watts_of_answer(look.folder) if planes else None,
         missed_planes=missed_planes(report),
     )
@@ -241,16 +257,31 @@ def lights_of_answer(folder: Path, report: Mapping[str, Any]) -> tuple[LightRow,
 
 def planes_of_answer(folder: Path) -> tuple[PlaneRow, ...]:
     """Return what an answer in a folder gives on measuring planes; nothing without any."""
-    base = folder / PLANES_FOLDER
     rows = list[PlaneRow]()
-    # Each case has a folder.
-    for file in sorted(base.glob(f"**/{PLANES}")):
-        case = "" if file.parent == base else file.parent.name
-        planes = _json(file).get("planes")
+    for case, document in _measured_cases(folder):
         with suppress(AttributeError, KeyError, TypeError, ValueError):
             rows += [
                 PlaneRow(plane_title(name, case), float(x["mean"]), float(x["uniformity"]))
-                for name, x in (planes or {}).items()
+                for name, x in document["planes"].items()
+            ]
+    return tuple(rows)
+
+
+def _measured_cases(folder: Path) -> Iterator[tuple[str, dict[str, Any]]]:
+    """Yield the measurements of an answer by case, each of which has a folder; "" without cases."""
+    base = folder / PLANES_FOLDER
+    for file in sorted(base.glob(f"**/{PLANES}")):
+        yield "" if file.parent == base else file.parent.name, _json(file)
+
+
+def observers_of_answer(folder: Path) -> tuple[ObserverRow, ...]:
+    """Return the glare in an answer in a folder; nothing without observers."""
+    rows = list[ObserverRow]()
+    for case, document in _measured_cases(folder):
+        with suppress(AttributeError, KeyError, TypeError, ValueError):
+            rows += [
+                ObserverRow(plane_title(name, case), None if x["ugr"] is None else float(x["ugr"]))
+                for name, x in document["observers"].items()
             ]
     return tuple(rows)
 
@@ -360,32 +391,36 @@ def summary_csv(rows: list[SummaryRow]) -> str:
 
     These are the luminance of its emission, under its name, the emission in R, G and B, and its
     colour temperature in kelvin, if it has one. Where illuminance was measured, two columns for
-    each plane come before them, one for the power of all lamps, and one for planes that do not get
-    what was wished for.
+    each plane come before them, one for the UGR of each observer, one for the power of all lamps,
+    and one for planes that do not get what was wished for.
     """
     names = list(dict.fromkeys(light.name for row in rows for light in row.lights))
     planes = list(dict.fromkeys(plane.name for row in rows for plane in row.planes))
+    observers = list(dict.fromkeys(x.name for row in rows for x in row.observers))
     text = io.StringIO()
     table = csv.writer(text, lineterminator="\n")
     measured = [f"{name}{ending}" for name in planes for ending in PLANE_COLUMNS]
+    measured += [f"{name}{GLARE_COLUMN}" for name in observers]
     measured += [POWER_COLUMN, MISSED_COLUMN] if planes else []
     columns = _light_columns(names, taken={*COLUMNS, *measured})
     table.writerow([*COLUMNS, *map(plain_cell, measured), *map(plain_cell, columns)])
     for row in rows:
         lights = {light.name: _light_cells(light) for light in row.lights}
         cells = [_cell(getattr(row, column)) for column in COLUMNS]
-        cells += _measured_cells(row, planes)
+        cells += _measured_cells(row, planes, observers)
         empty_cells = [""] * len(LIGHT_COLUMNS)
         table.writerow([*cells, *(x for name in names for x in lights.get(name, empty_cells))])
     return text.getvalue()
 
 
-def _measured_cells(row: SummaryRow, planes: Sequence[str]) -> list[str]:
-    """Return the cells of all planes, of the power and of what is missed; none if no row has a
-    plane.
+def _measured_cells(row: SummaryRow, planes: Sequence[str], observers: Sequence[str]) -> list[str]:
+    """Return the cells of all planes, of the glare, of the power and of what is missed; none if no
+    row has a plane.
     """
     by_name = {plane.name: [plane.mean_lx, plane.uniformity] for plane in row.planes}
     values = [x for name in planes for x in by_name.get(name, [None] * len(PLANE_COLUMNS))]
+    glare = {x.name: x.ugr for x in row.observers}
+    values += [glare.get(name) for name in observers]
     return [_cell(x) for x in [*values, row.watts, "; ".join(row.missed_planes)]] if planes else []
 
 

@@ -17,7 +17,12 @@ from lightpaint.pipeline.results.answer_folder import LIGHTING, answer_files, ne
 from lightpaint.pipeline.results.planes_folder import files_of_planes, write_planes
 from lightpaint.pipeline.results.result_folder import ResultFolder
 from lightpaint.pipeline.results.results import write_predicted
-from lightpaint.pipeline.wished_planes import MeasuredPlanes, constraints_for_planes, measure_planes
+from lightpaint.pipeline.wished_planes import (
+    MeasuredPlanes,
+    constraints_for_planes,
+    measure_planes,
+    with_glare,
+)
 from lightpaint.progress import Listener
 from lightpaint.relit.relight import scene_of
 from lightpaint.scene.scene import Scene
@@ -78,7 +83,7 @@ def publish_derived(
             weights = lighting.weights_for(planes.illuminance.lights)
             words = f"{scene.path.name} lit by {LIGHTING}"
             lit = planes.weights_by_case(weights)
-            write_planes(answer.path, planes.illuminance, lit, words)
+            write_planes(answer.path, planes.illuminance, lit, words, glare=planes.glare)
 
 
 def measure_derived(
@@ -96,7 +101,8 @@ def measure_derived(
         return None
     scale = constraints_for_planes(scene, constraints, settings).cd_per_unit
     placed = scene_of(scene, lighting)
-    return measure_planes(placed, settings.planes, settings, scale, listen)
+    planes = measure_planes(placed, settings.planes, settings, scale, listen)
+    return with_glare(planes, placed, settings, listen)
 
 
 def dimmer_lights(basis: Basis) -> set[str]:

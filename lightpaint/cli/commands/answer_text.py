@@ -1,6 +1,6 @@
 """The text that `lightpaint solve` prints for an answer: short, or in full."""
 
-from collections.abc import Collection, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from dataclasses import fields
 from fnmatch import fnmatchcase
 from pathlib import Path
@@ -19,6 +19,7 @@ from lightpaint.lighting.analysis.appearance.constraint_kinds import KEYS_BY_KIN
 from lightpaint.lighting.analysis.appearance.limiting_reasons import Reason
 from lightpaint.lighting.answer.lighting import LightSetting
 from lightpaint.lighting.wishes.planes_answer import PlanesAnswer
+from lightpaint.photometry.glare import GlareReading
 from lightpaint.pipeline.job.settings import Settings
 from lightpaint.pipeline.results.results import Look
 from lightpaint.report.answer_pictures import spoken_view
@@ -36,10 +37,11 @@ from lightpaint.report.diagnosis_sentences import (
     unreached_channels,
     untold_lights,
 )
+from lightpaint.report.glare_text import GLARE_HEADINGS, glare_rows
 from lightpaint.report.measures import energy_shares
 from lightpaint.report.page.constraint_section import closer_choice
 from lightpaint.report.phrases import spoken_drives, spoken_percent, spoken_preference
-from lightpaint.report.planes_text import HEADINGS, plane_rows, planes_sentences
+from lightpaint.report.planes_text import HEADINGS, glare_by_title, plane_rows, planes_sentences
 from lightpaint.sentences import Sentence, SourceKey
 
 Table = Literal["short", "full"]
@@ -94,9 +96,20 @@ def show_planes(answer: PlanesAnswer) -> None:
         for row in plane_rows(answer):
             table.row(*row)
         terminal.print_table(table)
+    show_glare(glare_by_title(answer))
     for sentence in planes_sentences(answer):
         terminal.tell(sentence)
     terminal.write("")
+
+
+def show_glare(readings: Mapping[str, GlareReading]) -> None:
+    """Print the glare that observers see. readings: by title."""
+    if readings:
+        terminal.write("")
+        table = terminal.table(*GLARE_HEADINGS)
+        for row in glare_rows(readings):
+            table.row(*row)
+        terminal.print_table(table)
 
 
 def _sentences(look: Look, table: Table) -> list[str]:

@@ -7,6 +7,7 @@ import numpy as np
 
 from lightpaint.arrays import RGB, Doubles
 from lightpaint.basis.render.render_origin import basis_lights
+from lightpaint.cli.commands.answer_text import show_glare
 from lightpaint.cli.output import terminal
 from lightpaint.cli.output.lines import CommandOutcome
 from lightpaint.errors import OutputError, SceneError
@@ -15,11 +16,12 @@ from lightpaint.lighting.answer.lighting_file import read_lighting
 from lightpaint.lighting.constraints.absolute_scale import with_sure_scale
 from lightpaint.lighting.constraints.constraints_file import constraints_of
 from lightpaint.photometry.illuminance import Illuminance
-from lightpaint.photometry.measure import DEFAULT_ERROR, measure_illuminance
+from lightpaint.photometry.measure import measure_illuminance
+from lightpaint.photometry.measure_glare import measure_glare
 from lightpaint.photometry.planes_file import planes_file_beside, read_planes
 from lightpaint.photometry.readings_file import (
     POINTS,
-    is_measured_folder,
+    measured_origin,
     missed_wishes,
     readings_document,
     readings_files,
@@ -30,6 +32,7 @@ from lightpaint.pipeline.job.settings import Settings
 from lightpaint.pipeline.job.sources import SceneFile
 from lightpaint.progress import stage
 from lightpaint.relit.relight import scene_of
+from lightpaint.report.glare_text import glare_sentences
 from lightpaint.scene.scene import Scene
 from lightpaint.sentences import Hint
 from lightpaint.storage.staging import finish, staged
@@ -53,29 +56,49 @@ def measure(
         )
     with terminal.TerminalListener() as listen, stage("placing the points", listen):
         found = read_planes(planes_path, content)
+    for remark in found.remarks(content):
+        terminal.say(remark)
     weights = _weights(content, emission)
     inputs = [*content.read_files, planes_path, *([] if lighting is None else [lighting])]
     files = [output / name for name in readings_files(x.name for x in found.planes)]
     _check(output, files, inputs, force=settings.force)
+    if (earlier := measured_origin(output)) is not None:
+        terminal.say(f"{output} had a measurement, {earlier}: it is replaced (-o names another)")
     with terminal.TerminalListener() as listen:
         measured = measure_illuminance(
             content,
             found.planes,
             spp=settings.spp,
-            error=DEFAULT_ERROR if settings.error is None else settings.error,
+            error=settings.error or found.error,
             cd_per_unit=unit,
             weights=weights,
             seed=settings.seed,
             use_cache=settings.use_cache,
             progress=listen,
         )
+        glare = None
+        if found.observers:
+            glare = measure_glare(
+                content,
+                found.observers,
+                error=settings.error or found.error,
+                cd_per_unit=unit,
+                weights=weights,
+                seed=settings.seed,
+                use_cache=settings.use_cache,
+                progress=listen,
+            )
     origin = content.path.name + ("" if lighting is None else f" lit by {lighting.name}")
     with staged(output) as folder:
-        write_readings(folder, measured, weights, origin)
+        write_readings(folder, measured, weights, origin, glare=glare)
     _print(measured, weights)
+    if glare is not None:
+        show_glare(readings := glare.readings(weights))
+        for sentence in glare_sentences(readings):
+            terminal.tell(sentence)
     terminal.write(f"{output / POINTS}: all points; a picture of each plane beside it")
     written = {"scene": str(content.path), "files": [*map(str, files)]}
-    return CommandOutcome(lambda: readings_document(measured, weights) | written)
+    return CommandOutcome(lambda: readings_document(measured, weights, glare=glare) | written)
 
 
 def _lit_scene(
@@ -125,7 +148,7 @@ def _check(folder: Path, files: Sequence[Path], inputs: Sequence[Path], *, force
     check_writable(folder)
     finish(folder)
     existing_files = [file for file in files if file.exists()]
-    if existing_files and not force and not is_measured_folder(folder):
+    if existing_files and not force and measured_origin(folder) is None:
         raise OutputError(
             f"{existing_files[0]} exists and is of no measurement: name another folder with -o, "
             "or pass ",

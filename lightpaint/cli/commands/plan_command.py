@@ -50,7 +50,8 @@ def plan(
         text = json.dumps(_numbers(found), indent=2, ensure_ascii=False, allow_nan=False)
         write_text(answer.path / PLAN, text + "\n")
         origin, illuminance = f"{content.path.name} as planned", found.planes.wished.illuminance
-        write_planes(answer.path, illuminance, found.planes.weights_by_case, origin)
+        lit, glare = found.planes.weights_by_case, found.planes.glare
+        write_planes(answer.path, illuminance, lit, origin, glare=glare)
     show_planes(found.planes)
     _show_lamps(found)
     terminal.write(f"results in {folder}/")

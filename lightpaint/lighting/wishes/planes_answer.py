@@ -11,6 +11,7 @@ from lightpaint.errors import ConstraintError
 from lightpaint.lighting.unknowns.lamp_powers import watts_of_fixed
 from lightpaint.lighting.unknowns.reduction import Reduction
 from lightpaint.lighting.wishes.wished_light import LightWish, WishedLight, check_powers
+from lightpaint.photometry.glare import Glare, GlareReading
 from lightpaint.photometry.illuminance import PlaneReading
 
 #: Relative shortfall from which a wish is not met: rows are met up to round-off.
@@ -49,6 +50,8 @@ class PlanesAnswer:
     floor_m2: the area that it is divided by; 0 without one. all_at_full: whether no lamp could give
     more. lamps: their number, without those that stay as they are. cost_delta_e: the mean CIEDE2000
     to the painting beyond that of an answer without wishes; None without a painting.
+    budget_delta_e: the same beyond one whose power is not limited, where the limit binds. glare:
+    that observers see; None if it was not measured.
     """
 
     wished: WishedLight
@@ -59,6 +62,27 @@ class PlanesAnswer:
     all_at_full: bool
     lamps: int
     cost_delta_e: float | None = None
+    budget_delta_e: float | None = None
+    glare: Glare | None = None
+
+    @property
+    def binding_limit(self) -> float | None:
+        """The limit of the power in watts, if the lamps take all of it."""
+        limits = [x for x in self.outcomes if x.wish.kind == "power"]
+        taken = [x.wish.asked for x in limits if x.reached >= x.wish.asked * (1 - MISSED)]
+        return min(taken, default=None)
+
+    @cached_property
+    def glare_readings(self) -> Mapping[tuple[str, str], GlareReading]:
+        """The glare by case, as in `readings`, and observer."""
+        glare = self.glare
+        if glare is None:
+            return {}
+        return {
+            (case, name): reading
+            for case, weights in self.weights_by_case.items()
+            for name, reading in glare.readings(weights).items()
+        }
 
     @cached_property
     def readings(self) -> Mapping[tuple[str, str], PlaneReading]:
@@ -89,10 +113,12 @@ def planes_answer(
     floor_m2: float,
     prices: Doubles | None = None,
     cost_delta_e: float | None = None,
+    glare: Glare | None = None,
 ) -> PlanesAnswer:
     """Return what weights (n, 3) give.
 
     reduction: of the lights. prices: of each wish, (w,), in watts per unit; see `WishOutcome`.
+    glare: of all lights, as measured.
     """
     watts = _power(reduction, wished, weights)
     sums = np.einsum("mnc,nc->m", wished.requirements.rows, weights)
@@ -114,6 +140,7 @@ def planes_answer(
         _is_all_at_full(reduction, weights),
         len(movable),
         cost_delta_e,
+        glare=glare,
     )
 
 

@@ -4,6 +4,7 @@ from collections.abc import Mapping
 from pathlib import Path
 
 from lightpaint.arrays import Doubles
+from lightpaint.photometry.glare import Glare
 from lightpaint.photometry.illuminance import Illuminance
 from lightpaint.photometry.planes_file import plane_names
 from lightpaint.photometry.readings_file import readings_files, write_readings
@@ -20,12 +21,17 @@ def files_of_planes(folder: Path, planes: str | Path) -> list[Path]:
 
 
 def write_planes(
-    folder: Path, illuminance: Illuminance, weights: Mapping[str, Doubles], origin: str
+    folder: Path,
+    illuminance: Illuminance,
+    weights: Mapping[str, Doubles],
+    origin: str,
+    *,
+    glare: Glare | None = None,
 ) -> None:
     """Write what weights (n, 3) by case give on planes, in a folder for each. origin: of the light,
-    in words.
+    in words. glare: of all lights, if it was measured.
     """
     for case, lit in weights.items():
         place, words = folder / FOLDER / case, f"{origin}, {case}" if case else origin
         place.mkdir(parents=True, exist_ok=True)
-        write_readings(place, illuminance, lit, words)
+        write_readings(place, illuminance, lit, words, glare=glare)

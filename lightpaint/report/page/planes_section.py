@@ -7,9 +7,10 @@ from markupsafe import Markup
 from lightpaint.lighting.wishes.planes_answer import PlanesAnswer
 from lightpaint.photometry.false_colour import false_colours
 from lightpaint.photometry.measuring_plane import plane_title
+from lightpaint.report.glare_text import GLARE_HEADINGS, glare_rows
 from lightpaint.report.page.figures import data_uri
 from lightpaint.report.page.html import html
-from lightpaint.report.planes_text import HEADINGS, plane_rows, planes_sentences
+from lightpaint.report.planes_text import HEADINGS, glare_by_title, plane_rows, planes_sentences
 
 
 def planes_section(answer: PlanesAnswer | None) -> Markup:
@@ -18,8 +19,15 @@ def planes_section(answer: PlanesAnswer | None) -> Markup:
         return Markup("")
     return html(
         "planes",
-        headings=HEADINGS,
-        rows=[*plane_rows(answer)],
+        has_planes=bool(answer.readings),
+        tables=[
+            (headings, rows)
+            for headings, rows in (
+                (HEADINGS, [*plane_rows(answer)]),
+                (GLARE_HEADINGS, [*glare_rows(glare_by_title(answer))]),
+            )
+            if rows
+        ],
         sentences=planes_sentences(answer),
         pictures=_pictures(answer),
     )

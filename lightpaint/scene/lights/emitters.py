@@ -225,7 +225,8 @@ def describe_form(emitter: Any, plugin: str) -> str:
     import mitsuba as mi
 
     def at(point: Any) -> str:
-        x, y, z = np.array(point, dtype=float).ravel()[:3]
+        # Adding 0 turns a rounded -0 into 0.
+        x, y, z = np.round(np.array(point, dtype=float).ravel()[:3], 2) + 0.0
         return f"({x:.2f}, {y:.2f}, {z:.2f})"
 
     shape = emitter.get_shape()

@@ -22,7 +22,7 @@ from lightpaint.luminaires.plugin_names import AREA_PLUGIN, LUMINAIRE_PLUGINS, P
 from lightpaint.luminaires.registration import check_can_have_luminaires
 from lightpaint.luminaires.spot_sum import spots_of
 from lightpaint.luminaires.web import PhotometricWeb
-from lightpaint.luminaires.web_file import flux_remark
+from lightpaint.luminaires.web_file import flux_remark, unread_remark
 from lightpaint.luminaires.web_frame import EMITTER_FROM_WEB, hanging_frame, world_from_web
 from lightpaint.scene.checks.tokens import tag
 from lightpaint.scene.properties.emission import child_named
@@ -51,8 +51,9 @@ class HungLuminaire:
 
     name: of its emitter. file, offset: of the element whose place it takes. scale: factor of the
     candela of its file. distance: to the nearest surface that it lights, if that was looked for.
-    is_panel: whether its size counts. further: file and offset of spots that were part of its light
-    in a relit scene, and that it replaces.
+    tilt: degrees by which its nadir is away from downwards. is_panel: whether its size counts.
+    further: file and offset of spots that were part of its light in a relit scene, and that it
+    replaces.
     """
 
     name: str
@@ -61,17 +62,26 @@ class HungLuminaire:
     offset: int
     scale: float
     distance: float | None = None
+    tilt: float = 0.0
     is_panel: bool = False
     further: tuple[tuple[int, int], ...] = ()
 
     def remarks(self) -> list[str]:
         """Return what its user should know of it."""
-        opening = self.request.web.opening
-        remarks = (
-            []
-            if self.request.lumens is not None
-            else [flux_remark(self.request.web, self.request.path.name)]
-        )
+        web, file = self.request.web, self.request.path.name
+        opening, remarks = web.opening, [unread_remark(web, file)]
+        if self.request.lumens is None:
+            remarks.append(flux_remark(web, file))
+        elif self.request.has_absolute_emitters:
+            remarks.append(
+                f"{file}: lumens changes nothing beside emitters in lm or cd, which say how bright "
+                "they are: leave it out"
+            )
+        if not self.request.has_absolute_emitters and (factor := web.factor_at(self.tilt)) != 1:
+            remarks.append(
+                f"{file}: tilted by {self.tilt:.3g} degrees it gives {factor:.3g} of its light, by "
+                "the factors in it (TILT=INCLUDE)"
+            )
         if self.is_panel and self.distance is not None:
             remarks.append(
                 f"{self.name}: its luminous opening is {opening.largest:.3g} m, and "
@@ -104,8 +114,9 @@ def hang_luminaires(
     further = {k: name for k, name in further.items() if name in whole}
     parsed = without_emitters(parsed, further.keys()) if further else _copied(parsed)
     distances = _distances(parsed, chosen, up)
-    for node, request in chosen.items():
-        name = parsed.names[node]
+    for node, hanging in chosen.items():
+        name, tilt = parsed.names[node], _tilt(parsed, node, hanging, up)
+        request = hanging.tilted(tilt)
         distance = distances.get(node)
         is_panel = distance is not None and distance < FAR * request.web.opening.largest
         hung = HungLuminaire(
@@ -114,6 +125,7 @@ def hang_luminaires(
             *_element(parsed, node),
             request.scale(cd_per_unit),
             distance,
+            tilt,
             is_panel,
             tuple(_element(parsed, k) for k, whole in further.items() if whole == name),
         )
@@ -289,6 +301,25 @@ def _distances(
             hits = np.array(loaded.ray_intersect_preliminary(rays).t, np.float64).ravel()
             found[node] = float(hits.min(initial=np.inf))
     return found
+
+
+def _tilt(parsed: ParsedScene, node: int, request: LuminaireRequest, up: Position) -> float:
+    """Return the degrees by which the nadir of a luminaire is away from downwards."""
+    props = parsed.state.nodes[node].props
+    turn, tilt = (
+        float(props[key]) if props.plugin_name() in LUMINAIRE_PLUGINS and key in props else own
+        for key, own in (("turn", request.turn), ("tilt", request.tilt))
+    )
+    axes = _shape_axes(parsed, node) if node in parsed.shape_of else _frame(parsed, node, up)[0]
+    nadir = -world_from_web(axes, turn=turn, tilt=tilt)[:, 2]
+    cosine = float(nadir @ up) / float(np.linalg.norm(up))
+    return float(np.degrees(np.arccos(np.clip(-cosine, -1, 1))))
+
+
+def _shape_axes(parsed: ParsedScene, node: int) -> Doubles:
+    """Return the axes (3, 3) of the shape of an emitter."""
+    props = parsed.state.nodes[parsed.shape_of[node]].props
+    return _matrix(props)[:3, :3] if "to_world" in props else np.eye(3)
 
 
 def _lit_directions(web: PhotometricWeb) -> Doubles:

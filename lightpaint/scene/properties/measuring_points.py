@@ -16,12 +16,14 @@ class MeasuringPoints:
     """Points, and the directions in which irradiance is measured there.
 
     positions: (p, 3) in scene units. normals: (p, 3), unit vectors. is_cylindrical: (p,), whether
-    the irradiance is the mean over all directions perpendicular to the normal.
+    the irradiance is the mean over all directions perpendicular to the normal. is_split: whether
+    light that comes straight from emitters is kept apart from all other.
     """
 
     positions: Doubles
     normals: Doubles
     is_cylindrical: Bools
+    is_split: bool = False
 
     def __post_init__(self) -> None:
         count = len(self.positions)
@@ -47,4 +49,6 @@ class MeasuringPoints:
         digest = hashlib.sha256(content.encode())
         for values in (self.positions, self.normals, self.is_cylindrical):
             digest.update(np.ascontiguousarray(values).tobytes())
+        if self.is_split:
+            digest.update(b"split")
         return digest.hexdigest()[:32]
