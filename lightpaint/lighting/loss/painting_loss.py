@@ -96,11 +96,12 @@ class PaintedPixels(PixelLoss):
         exceeded = self.at_least & (x > self.painted)
         return exceeded if exceeded.any() else None
 
-    def objective(self, x: Doubles) -> Doubles:
-        """Return F per channel, (3,), of x, (3, p)."""
+    def objective(self, x: Doubles, shown: Doubles | None = None) -> Doubles:
+        """Return F per channel, (3,), of x, (3, p). shown: V(x), if it is known."""
 
         def strip_objective(strip: slice, part: "PaintedPixels") -> Doubles:
-            return part._objective(np.ascontiguousarray(x[:, strip], np.float64))
+            own = None if shown is None else shown[:, strip]
+            return part._objective(np.ascontiguousarray(x[:, strip], np.float64), own)
 
         return np.asarray(sum(self.map_strips(strip_objective)))
 
