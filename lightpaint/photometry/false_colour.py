@@ -6,7 +6,6 @@ from collections.abc import Sequence
 import numpy as np
 import numpy.typing as npt
 from PIL import Image, ImageDraw, ImageFont
-from scipy.ndimage import distance_transform_edt
 
 from lightpaint.arrays import Doubles
 from lightpaint.display_text import visible
@@ -130,6 +129,8 @@ def _draw_numbers(draw: ImageDraw.ImageDraw, cells: Doubles, side: int, most: fl
 
 def _painted(cells: Doubles, side: int, levels: Sequence[float]) -> npt.NDArray[np.uint8]:
     """Return the colours of interpolated cells, with lines at levels, (h, w, 3)."""
+    from scipy.ndimage import distance_transform_edt  # late: every command loads this module
+
     rows, columns = cells.shape
     is_empty = np.isnan(cells)
     # Towards a cell without a point, the light is taken to go on as in the nearest cell with one.

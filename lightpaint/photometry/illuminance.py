@@ -13,7 +13,6 @@ from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
-from scipy.special import stdtrit
 
 from lightpaint.arrays import Doubles
 from lightpaint.basis.lights import Lights
@@ -55,12 +54,19 @@ class PlaneReading:
         """Half of the 95 % interval of the mean, by Student's distribution with as many degrees of
         freedom as there are points.
         """
-        return float(stdtrit(self.points, 0.975)) * self.mean_error
+        return _student(self.points) * self.mean_error
 
     @property
     def uniformity_interval(self) -> float:
         """Half of the 95 % interval of the uniformity, without its bias."""
-        return float(stdtrit(self.points, 0.975)) * self.uniformity_error
+        return _student(self.points) * self.uniformity_error
+
+
+def _student(points: int) -> float:
+    """Return half of a 95 % interval, in standard errors estimated from so many points."""
+    from scipy.special import stdtrit  # late: every command loads this module
+
+    return float(stdtrit(points, 0.975))
 
 
 @keywords()

@@ -400,6 +400,17 @@ def test_help_does_not_wait_for_mitsuba(tmp_path: Path) -> None:
         assert "--help" in succeed(tmp_path, command, "--help")
 
 
+def test_commands_load_scipy_where_they_need_it() -> None:
+    """It takes as long to load as all modules of a command."""
+    code = "import sys, lightpaint.cli.commands.solve_command; print(*sys.modules)"
+    completed = subprocess.run(
+        [sys.executable, "-c", code], capture_output=True, text=True, check=True
+    )
+    loaded = completed.stdout.split()
+    assert "lightpaint.photometry.illuminance" in loaded
+    assert "scipy" not in loaded
+
+
 def test_nothing_is_printed_but_one_line_for_mistakes(basis_file: Path, tmp_path: Path) -> None:
     image = np.ones((128, 128, 3), np.float32)
     bad_folder = tmp_path / "bad"

@@ -21,7 +21,7 @@ from lightpaint.lighting.answer.combination import combine
 from lightpaint.lighting.answer.lighting import Lighting
 from lightpaint.lighting.constraints.constraints import Constraints
 from lightpaint.lighting.fit import Fit
-from lightpaint.lighting.loss import lit_pixels, reweighting
+from lightpaint.lighting.loss import lit_pixels, painting_loss, reweighting
 from lightpaint.lighting.loss.lit_pixels import LitPixels
 from lightpaint.lighting.loss.loss import image_of, planes_of
 from lightpaint.lighting.loss.painting_loss import PaintingLoss
@@ -300,6 +300,60 @@ def test_squares_have_the_gradient_of_the_loss(make_basis: Any, transform: ViewT
         aside[y, k, c] = step
         rise = loss.objective(x + aside).sum() - loss.objective(x - aside).sum()
         assert rise / (2 * step) == pytest.approx(gradient[y, k, c], rel=1e-4, abs=1e-6)
+
+
+@pytest.mark.parametrize("transform", VIEWS, ids=str)
+def test_curved_squares_have_the_curvature_of_the_loss(transform: ViewTransform):
+    """And the gradient of all squares. Where V mixes channels, they are those squares."""
+    rng = np.random.default_rng(2)
+    top = 0.5 / 2.0**transform.stops
+    painted, current, x = rng.uniform(0.1, 1, (3, *SIZE, 3)) * top
+    arrays = rng.random(SIZE), rng.random(SIZE), current, painted > 0.6 * top
+    pixels = PaintingLoss(painted, *arrays, transform).pixels
+    planes = planes_of(x)
+    image, weight = pixels.squares(planes, from_clipping=False)
+    curved_image, curved = pixels.curved_squares(planes, from_clipping=False)
+    np.testing.assert_allclose(curved * (curved_image - planes), weight * (image - planes))
+    if not transform.is_per_channel:
+        np.testing.assert_array_equal(curved, weight)
+        return
+    step = 1e-4 * planes
+    sides = [pixels.gradient(planes + sign * step)[0] * pixels.importance for sign in (1, -1)]
+    second = (sides[1] - sides[0]) / (2 * step)
+    least = painting_loss.LEAST_CURVATURE * weight
+    # V″ is a difference over a thousandth of the light; where the goal moves along with x, its
+    # loss has no curvature, and squares keep that of the slope.
+    is_plain = pixels.exceeds(planes) == np.False_
+    np.testing.assert_allclose(
+        curved[is_plain], np.maximum(second, least)[is_plain], rtol=5e-3, atol=1e-3 * weight.max()
+    )
+    if transform.name != "linear":  # which V′² alone would miss
+        assert np.median(np.abs(second / weight - 1)[is_plain]) > 0.1
+
+
+def test_curved_rounds_lead_to_the_same_end_in_fewer_rounds(
+    make_basis: Any, monkeypatch: pytest.MonkeyPatch
+):
+    """Of paintings far from any answer, whose squares are far from their loss."""
+
+    def ends() -> tuple[list[Any], int]:
+        answers, rounds = [], 0
+        for seed in range(4):
+            basis, image, importance = _random_problem(make_basis, seed)
+            solution = solve(basis, _target(image, importance), transform=SRGB)
+            assert solution.certificate.converged
+            answers.append(solution.weights)
+            rounds += solution.certificate.rounds
+        return answers, rounds
+
+    answers, rounds = ends()
+    monkeypatch.setattr(painting_loss.PaintedPixels, "has_curvature", False)
+    expected, plain_rounds = ends()
+    for answer, plain in zip(answers, expected, strict=True):
+        # Rounds end at changes of a millionth of the brightest light's picture, which in rounds of
+        # plain squares may add up.
+        np.testing.assert_allclose(answer, plain, atol=2e-5 * plain.max())
+    assert rounds <= 0.6 * plain_rounds, (rounds, plain_rounds)
 
 
 def test_importance_per_channel(make_basis: Any):

@@ -31,6 +31,14 @@ LayerWishes = Callable[[int], Sequence[Wish]]
 #: Shares of a step to try in display space. An answer is one step from the last one.
 STEP_SHARES = (1.0, 0.5, 0.25)
 
+#: Share of the fall that squares predict from which no shorter step is tried: half a step would
+#: bring that much of it.
+GOOD_FALL = 0.75
+
+#: Number of lightings whose pictures are kept: from one answer to the next, the last ones and the
+#: current lighting stay the same.
+KEPT_PICTURES = 4
+
 
 class PaintedTiles:
     """Equations of painted pixels and of the rest, each at weight 1, in linear light."""
@@ -237,6 +245,7 @@ class Films:
         """Join the planes of the films again, after some were replaced."""
         rows = [film.rows for film in self._films]
         self._rows = rows[0] if len(rows) == 1 else np.concatenate(rows, axis=2)
+        self._kept: dict[tuple[bytes, ViewTransform | None], tuple[Doubles, Doubles]] = {}
 
     @property
     def rows(self) -> Floats:
@@ -271,18 +280,36 @@ class Films:
         start, or less.
 
         The round is one of `reweighting.rounds`, but in float32, and with a step that is halved a
-        few times only, as long as a shorter one lowers the loss. project: moves weights between two
-        allowed ones onto the constraints.
+        few times only, as long as a shorter one lowers the loss, unless the whole step brings most
+        of what its squares promise. project: moves weights between two allowed ones onto the
+        constraints.
         """
 
-        def missed(w: Doubles, x: Doubles) -> float:
-            value = float(pixels.objective(x).sum())
+        def missed(w: Doubles) -> float:
+            value = float(pixels.objective(*self._shown(w, pixels)).sum())
             return value if pull is None else value + float(pull.objective(w).sum())
 
-        mixed = [self._mixed(start) for start in starts]
-        values = [missed(w, x) for w, x in zip(starts, mixed, strict=True)]
+        values = [missed(w) for w in starts]
         k = int(np.argmin(values))
-        start, picture, value = starts[k], mixed[k], values[k]
+        start, value = starts[k], values[k]
+        equations = self._equations(pixels, self._shown(start, pixels)[0])
+        best_weights, nearest = best(equations, start), start
+        pulled = equations if pull is None else equations + pull
+        promised = float((pulled.objective(start) - pulled.objective(best_weights)).sum())
+        for part in STEP_SHARES:
+            step = project(interpolate(start, best_weights, part))
+            reached = missed(step)
+            if reached > value and nearest is not start:
+                break
+            is_good = part == 1 and value - reached >= GOOD_FALL * promised
+            if reached <= value:
+                nearest, value = step, reached
+            if is_good:
+                break
+        return nearest
+
+    def _equations(self, pixels: PaintedPixels, picture: Doubles) -> NormalEquations:
+        """Return the linear problem of the squares at a picture, (3, p), summed in float32."""
         squares = pixels.squares(picture, from_clipping=False)
         image, weight = (x.astype(np.float32) for x in squares)
 
@@ -293,22 +320,22 @@ class Films:
         # Threads of BLAS wait for each other, the longer the busier the machine: many lights take
         # a thread for each channel instead.
         with one_thread():
-            is_cheap = len(start) <= MAX_CHEAP_LIGHTS
+            is_cheap = self._rows.shape[1] <= MAX_CHEAP_LIGHTS
             M = np.stack(list(map(gram, range(3))) if is_cheap else parallel_map(gram, range(3)))
             b = np.stack([r @ x for r, x in zip(self._rows, weight * image, strict=True)])
-        norm2 = np.square(image) * weight
-        equations = NormalEquations(
-            M.astype(np.float64), b.astype(np.float64), norm2.sum(axis=1, dtype=np.float64)
-        )
-        best_weights, nearest = best(equations, start), start
-        for part in STEP_SHARES:
-            step = project(interpolate(start, best_weights, part))
-            reached = missed(step, self._mixed(step))
-            if reached > value and nearest is not start:
-                break
-            if reached <= value:
-                nearest, value = step, reached
-        return nearest
+        norm2 = (np.square(image) * weight).sum(axis=1, dtype=np.float64)
+        return NormalEquations(M.astype(np.float64), b.astype(np.float64), norm2)
+
+    def _shown(self, weights: Doubles, pixels: PaintedPixels) -> tuple[Doubles, Doubles]:
+        """Return the picture of these weights, and its values in the comparison, (3, p) each."""
+        key = weights.tobytes(), pixels.transform
+        if (found := self._kept.pop(key, None)) is None:
+            picture = self._mixed(weights)
+            found = picture, pixels.encode(picture)
+        self._kept[key] = found  # the last one
+        while len(self._kept) > KEPT_PICTURES:
+            del self._kept[next(iter(self._kept))]
+        return found
 
     def _mixed(self, weights: Doubles) -> Doubles:
         """Return the picture of these weights, (3, p)."""

@@ -56,6 +56,11 @@ class PixelLoss(ABC):
         """True if clipped display values may be drawn back (`from_clipping`)."""
         return False
 
+    @property
+    def has_curvature(self) -> bool:
+        """True if `curved_squares` are nearer to the loss than `squares`."""
+        return False
+
     def __len__(self) -> int:
         return len(self.importance)
 
@@ -78,6 +83,10 @@ class PixelLoss(ABC):
         from_clipping: whether a clipped display value is drawn back by a chord, where it has no
         slope.
         """
+
+    def curved_squares(self, x: Doubles, *, from_clipping: bool) -> tuple[Doubles, Doubles]:
+        """Return `squares` whose weights are nearly the curvature of the loss at x."""
+        return self.squares(x, from_clipping=from_clipping)
 
     def over_look(self, look: Doubles) -> Self:
         """Return the same loss over another current look, (3, p)."""

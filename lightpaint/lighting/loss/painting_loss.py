@@ -23,6 +23,13 @@ from lightpaint.lighting.loss.loss import (
 )
 from lightpaint.threads import parallel_map
 
+#: Relative change of light over which the bend of a display's curve is measured.
+BEND_STEP = 1e-3
+
+#: Least curvature of a pixel's loss, relative to the square of the slope, that squares have: where
+#: the picture is much too bright, the loss itself may curve downwards.
+LEAST_CURVATURE = 0.1
+
 #: Fields of a loss that are pictures.
 PICTURES = ("painted", "importance", "share", "current", "at_least")
 
@@ -96,11 +103,12 @@ class PaintedPixels(PixelLoss):
         exceeded = self.at_least & (x > self.painted)
         return exceeded if exceeded.any() else None
 
-    def objective(self, x: Doubles) -> Doubles:
-        """Return F per channel, (3,), of x, (3, p)."""
+    def objective(self, x: Doubles, shown: Doubles | None = None) -> Doubles:
+        """Return F per channel, (3,), of x, (3, p). shown: V(x), if it is known."""
 
         def strip_objective(strip: slice, part: "PaintedPixels") -> Doubles:
-            return part._objective(np.ascontiguousarray(x[:, strip], np.float64))
+            own = None if shown is None else shown[:, strip]
+            return part._objective(np.ascontiguousarray(x[:, strip], np.float64), own)
 
         return np.asarray(sum(self.map_strips(strip_objective)))
 
@@ -118,13 +126,31 @@ class PaintedPixels(PixelLoss):
             terms -= self._unavoidable
         return np.asarray(terms @ self.importance)
 
+    @property
+    def has_curvature(self) -> bool:
+        """True if each display value follows its own channel alone."""
+        return self.transform is not None and self.transform.is_per_channel
+
     def squares(self, x: Doubles, *, from_clipping: bool) -> tuple[Doubles, Doubles]:
         """Return image and weight, (3, p) each, of squares with the gradient of F at x, (3, p)."""
+        return self._squares(x, from_clipping=from_clipping, is_curved=False)
+
+    def curved_squares(self, x: Doubles, *, from_clipping: bool) -> tuple[Doubles, Doubles]:
+        """Return `squares` with ½ F″ as the weight, where that is not much less than V′²."""
+        return self._squares(x, from_clipping=from_clipping, is_curved=self.has_curvature)
+
+    def _squares(
+        self, x: Doubles, *, from_clipping: bool, is_curved: bool
+    ) -> tuple[Doubles, Doubles]:
         image, weight = np.empty((2, *x.shape))
 
         def fill(strip: slice, part: "PaintedPixels") -> None:
             lit = np.ascontiguousarray(x[:, strip], np.float64)
-            gradient, factor = part.gradient(lit, from_clipping=from_clipping)
+            encoded = part._with_slopes(lit) if is_curved else None
+            gradient, factor = part.gradient(lit, from_clipping=from_clipping, encoded=encoded)
+            if encoded is not None:
+                bend = part._bend(lit, *encoded)
+                factor = np.maximum(factor - bend, LEAST_CURVATURE * factor)
             has_weight = factor > 0
             gradient /= factor if has_weight.all() else np.where(has_weight, factor, 1)
             np.add(lit, gradient, out=image[:, strip])
@@ -132,6 +158,21 @@ class PaintedPixels(PixelLoss):
 
         self.map_strips(fill)
         return image, weight
+
+    def _bend(self, x: Doubles, shown: Doubles, slope: Doubles) -> Doubles:
+        """Return what the bend of V takes from ½ F″ at x, without importance: V″ times what is
+        missed, (3, p); 0 where the display clips. shown, slope: V(x) and V′(x).
+        """
+        ahead = BEND_STEP * x
+        _, next_slope = self._with_slopes(x + ahead)
+        is_bent = (slope > 0) & (next_slope > 0) & (ahead > 0)
+        bend = np.where(is_bent, (next_slope - slope) / np.where(is_bent, ahead, 1), 0)
+        missed = self._shown_painting - shown
+        if (exceeds := self.exceeds(x)) is not None:
+            missed[exceeds] = 0
+        return np.asarray(
+            bend * ((1 - self.share) * missed + self.share * (self._shown_current - shown))
+        )
 
     def objective_and_gradient(self, x: Doubles) -> tuple[float, Doubles]:
         """Return F of few pixels, (3, p), and half its gradient, (3, p)."""

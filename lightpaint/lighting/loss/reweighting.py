@@ -171,38 +171,42 @@ def run_rounds(
     from_clipping: bool,
     until: float = MIN_STEP,
     known: SummedSquares | None = None,
+    own_squares: bool = True,
 ) -> RoundsResult:
     """Minimise the loss of some pixels and the terms in the weights, from weights (n, 3).
 
     from_clipping: whether rounds first draw clipped values back, before they use the loss's own
     slope. until: the change of a light's picture at which they end. known: squares of these pixels
-    whose problem is known. Unless `until` is small, the equations of the result may have the matrix
-    of an earlier round.
+    whose problem is known. own_squares: whether the last round is of the loss's own squares, and
+    not of curved ones, which lead there in fewer rounds. Unless `until` is small, the equations of
+    the result may have the matrix of an earlier round.
     """
     pixels = lit.pixels
     from_clipping = from_clipping and pixels.has_clipping
+    is_curved = pixels.has_curvature and (from_clipping or not own_squares)
     w, x = start, lit.predicted(start)
     value = total_loss(pixels, terms, w, x)
     count, matrix, keeps_matrix = 0, None, lit.planes.count >= MANY_LIGHTS
     while True:
-        round_ = _Round.of(
-            lit, terms, w, x, solve, from_clipping=from_clipping, known=known, matrix=matrix
-        )
+        kind = {"from_clipping": from_clipping, "is_curved": is_curved}
+        round_ = _Round.of(lit, terms, w, x, solve, known=known, matrix=matrix, **kind)
         if pixels.has_pieces:  # other squares change all pixels in each round
             known = SummedSquares(round_.image, round_.weight, round_.equations)
         count += 1
         is_first_part = keeps_matrix and from_clipping
         done = round_.has_converged(pixels, x, value, max(until, CLIPPED_STEP * is_first_part))
         if matrix is not None and done and not is_first_part and until <= MIN_STEP:
-            matrix = None  # the last round is of the squares themselves
+            matrix, is_curved = None, False  # the last round is of the squares themselves
             continue
+        is_last_curved = is_curved and own_squares and done and not from_clipping
+        done = done and not is_last_curved
         part, reached = 1.0, total_loss(pixels, terms, round_.best, round_.ahead)
         is_worse = reached > value * (1 + ROUND_OFF)
         if is_worse or from_clipping or not done:
             steps = (w, round_.best), (x, round_.ahead)
             part, reached = _line_search(pixels, terms, *steps, value, reached, round_.fall)
-        if matrix is not None and part == 0:
-            matrix = None
+        if part == 0 and (matrix is not None or is_curved):
+            matrix, is_curved = None, False
             continue
         is_near = part == 1 and round_.step <= KEPT_STEP and not (from_clipping and done)
         if from_clipping and (done or part == 0):
@@ -217,8 +221,9 @@ def run_rounds(
             squares = round_.image, round_.weight, round_.equations
             return RoundsResult(weights, w, x, from_clipping, *squares, count, round_.step, small)
         w, x = interpolate(w, round_.best, part), interpolate(x, round_.ahead, part)
-        value = reached
-        matrix = round_.equations if keeps_matrix and is_near and not pixels.has_pieces else None
+        value, is_curved = reached, pixels.has_curvature and not is_last_curved
+        is_kept = keeps_matrix and is_near and not (pixels.has_pieces or is_last_curved)
+        matrix = round_.equations if is_kept else None
         del round_  # else its pictures would coexist with the next ones
 
 
@@ -248,6 +253,7 @@ class _Round:
         solve: Solver,
         *,
         from_clipping: bool,
+        is_curved: bool,
         known: SummedSquares | None,
         matrix: NormalEquations | None = None,
     ) -> "_Round":
@@ -255,7 +261,8 @@ class _Round:
 
         matrix: equations whose M stands for that of the squares: a step along the same gradient.
         """
-        image, weight = lit.pixels.squares(x, from_clipping=from_clipping)
+        make = lit.pixels.curved_squares if is_curved else lit.pixels.squares
+        image, weight = make(x, from_clipping=from_clipping)
         if matrix is None:
             equations = lit.equations(image, weight, known)
         else:

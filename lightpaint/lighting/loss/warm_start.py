@@ -5,6 +5,8 @@ that of all pixels. A tilt then corrects its gradient: the tilted sample has the
 this was measured, and its optimum is closer the more its curvature resembles the true one.
 """
 
+from typing import Any
+
 import numpy as np
 
 from lightpaint.arrays import Doubles
@@ -61,7 +63,8 @@ def find_near_optimum(
     part = sample_pixels(lit, np.einsum("cii->ic", equations.M), size)
     terms = WeightTerms(pull)
     found_near, least = None, total_loss(lit.pixels, terms, start, lit.predicted(start))
-    w = run_rounds(part, terms, start, solve, from_clipping=True, until=FIRST_STEP).weights
+    options: dict[str, Any] = {"solve": solve, "own_squares": False}
+    w = run_rounds(part, terms, start, from_clipping=True, until=FIRST_STEP, **options).weights
     last_step, tolerance = np.inf, STEP_RATIO * FIRST_STEP
     for _ in range(MAX_CORRECTIONS):
         value, slope = lit.objective_and_gradient(w)
@@ -72,7 +75,7 @@ def find_near_optimum(
         if fell <= MIN_GAIN * value:
             return found_near
         tilted = WeightTerms(pull, part.objective_and_gradient(w)[1] - slope, w)
-        result = run_rounds(part, tilted, w, solve, from_clipping=False, until=tolerance)
+        result = run_rounds(part, tilted, w, from_clipping=False, until=tolerance, **options)
         step, w = relative_change(result.equations, w, result.weights), result.weights
         if step > MAX_STEP_RATIO * last_step:
             return found_near
