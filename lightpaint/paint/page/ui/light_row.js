@@ -91,7 +91,7 @@ export class LightRow extends Component {
           ${this.renderButtons()}
         </div>
         ${this.renderNumbers()}
-        ${light.emitters.length > 0 && html`<${Drives} emitters=${light.emitters} drives=${answer?.drives ?? []} />`}
+        ${light.emitters.length > 0 && html`<${Drives} emitters=${light.emitters} drives=${answer?.drives ?? []} slotDeltaE=${answer?.slot_delta_e} />`}
         ${hasSlider && !light.is_fixed && this.renderDimmer()}
       </div>
       ${isOpen && html`<${LightConstraints} ...${this.props} />`}
@@ -200,15 +200,21 @@ export function Share({ share, pointerShare }) {
     <i style=${{ '--share': String(value) }}></i><span>${percentText(value)}</span></span>`;
 }
 
-/** The drives of a lamp's emitters, a bar for each.
- * @param {{emitters: Light["emitters"], drives: number[]}} props */
-function Drives({ emitters, drives }) {
+/** The drives of a lamp's emitters, a bar for each; and the slot of a colour wheel, with how far
+ * that is from the colour of the solve.
+ * @param {{emitters: Light["emitters"], drives: number[], slotDeltaE?: number}} props */
+function Drives({ emitters, drives, slotDeltaE }) {
   const text = emitters.map(({ name }, j) => `${name} ${percentText(drives[j] ?? 0)}`).join(', ');
+  const slot = emitters.find((_, j) => (drives[j] ?? 0) > 0)?.name ?? '';
+  const note =
+    slotDeltaE !== undefined &&
+    t('{slot}, ΔE {distance} off', { slot, distance: slotDeltaE.toFixed(1) });
   return html`<span class="drives" role="img" aria-label=${t('Drives: {text}', { text })} data-tip=${text}>
     ${emitters.map(
       ({ name, swatch }, j) =>
         html`<i key=${name} style=${{ '--drive': String(drives[j] ?? 0), color: swatch }}></i>`,
-    )}</span>`;
+    )}</span>
+    ${note && html`<span class="wheel-slot" data-tip=${t('Its colour wheel is at the slot closest to the colour of the solve')}>${note}</span>`}`;
 }
 
 /** Remarks below the picture, where they do not change the height of the row.
