@@ -33,6 +33,7 @@ from lightpaint.dmx.gdtf.emitter_colour import (
 from lightpaint.dmx.gdtf.geometry_tree import Placed
 from lightpaint.dmx.gdtf.mode_channels import ChannelFunction, Curve, ModeChannel, curve_of
 from lightpaint.dmx.gdtf.mode_heads import ModeHead, mode_heads
+from lightpaint.dmx.gdtf.shutters import shutter_levels
 from lightpaint.dmx.spot_cone import solid_angle
 from lightpaint.sentences import Hint, Sentence
 
@@ -156,6 +157,11 @@ class ModeReader:
         # These are asked for each beam, of which there may be hundreds.
         self.emitter_colour = cache(partial(emitter_colour, emitters=tuple(self.emitters)))
         self._with_attribute, self._shape = cache(self._find_attribute), cache(self._set_curve)
+        levels, remarks = shutter_levels(self.channels)
+        for k, level in levels.items():
+            self.dmx[k] = replace(self.dmx[k], default=level)
+        for remark in remarks:
+            self._remark(remark)
         self.beams = self._beams(zoom)
         self.way = self._way()
         self.whites: list[int] = []
