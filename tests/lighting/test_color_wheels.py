@@ -160,8 +160,8 @@ def test_the_file_says_slot_and_distance(make_basis, tmp_path):
     write_lighting(file, lighting)
     data = json.loads(file.read_text())["lights"]["spot"]
     assert data["is_wheel"] is True
-    assert data["wheel"]["slot"] == lighting["spot"].slot
-    assert data["wheel"]["delta_e"] == pytest.approx(lighting["spot"].slot_delta_e)
+    assert data["slot"] == lighting["spot"].slot
+    assert data["slot_delta_e"] == pytest.approx(lighting["spot"].slot_delta_e)
     assert read_lighting(file)["spot"] == lighting["spot"]
 
 

@@ -59,8 +59,8 @@ class LightSetting:
     part_of: of an emitter that is a light, as in a basis of spectra, the name of its lamp. mix,
     mix_errors: of a lamp of such lights, the drives of its emitters and their standard errors; None
     where they follow from the emission.
-    asked: of a lamp with a colour wheel, the emission that the solve found before the wheel came to
-    a slot; None for others, where it was off, and where the slot was fixed.
+    asked: of a lamp with a colour wheel that shines, the emission that the solve found before the
+    wheel came to a slot, unless the slot was fixed.
     """
 
     name: str

@@ -29,9 +29,6 @@ PLAIN_FIELDS = ("target", "scene_identity", "cd_per_unit", "up")
 #: Fields of a light's lamp, which its file has beside the others.
 LAMP_FIELDS = ("emitters", "power_share", "prefer", "is_wheel")
 
-#: Key of the slot to which a lamp's colour wheel came, and the colour that was asked of it.
-WHEEL = "wheel"
-
 #: Key of a lamp whose drives are the answer, found with spectra; its emission follows from them.
 SPECTRAL = "is_spectral"
 
@@ -169,8 +166,6 @@ def _read_setting(name: str, data: Mapping[str, Any]) -> LightSetting:
             names, errors = [x["name"] for x in data["emitters"]], data.get("drive_errors", {})
             fields["mix"] = [data["drives"][name] for name in names]
             fields["mix_errors"] = [errors.get(name) for name in names] if errors else None
-        if "asked" in data.get(WHEEL, {}):
-            fields["asked"] = data[WHEEL]["asked"]
     return read_record(LightSetting, fields, others=True)
 
 
@@ -214,9 +209,10 @@ def _lamp_fields(light: LightSetting, lamp: Lamp) -> dict[str, Any]:
     if light.standard_error is not None or any(x is not None for x in light.mix_errors or ()):
         fields["drive_errors"] = dict(light.drive_errors)
     emitters = [fields_of(x, "watts", "spectrum") for x in lamp.emitters]
-    if light.slot:
-        found = {"slot": light.slot, "asked": light.asked, "delta_e": light.slot_delta_e}
-        fields[WHEEL] = {key: value for key, value in found.items() if value is not None}
+    if light.asked is not None:
+        fields |= {"asked": light.asked}
+    wheel = {"slot": light.slot or None, "slot_delta_e": light.slot_delta_e}
+    fields |= {key: value for key, value in wheel.items() if value is not None}
     named = fields_of(lamp, "power_share", "prefer", "is_wheel")
     return fields | named | {"emitters": emitters}
 
