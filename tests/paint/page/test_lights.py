@@ -106,13 +106,14 @@ def test_a_colour_wheel_shows_its_slot_and_how_far_it_is_off(painter: Painter) -
             const emitters = [{ name: 'open', swatch: '#fff' }, { name: 'red', swatch: '#f00' }];
             const [answer, ...answers] = store.value.lightAnswers;
             store.set({
-                lights: [{ ...first, emitters }, ...others],
+                lights: [{ ...first, emitters, address: 'Spot 1 2.21' }, ...others],
                 lightAnswers: [{ ...answer, drives: [0, 0.7], slot_delta_e: 7.04 }, ...answers],
             });
         }"""
     )
     slot = painter.page.locator('[data-light="key"] .wheel-slot')
     assert slot.inner_text() == "red, ΔE 7.0 off"
+    assert painter.page.locator('[data-light="key"] .lamp-notes').inner_text().startswith("2.21")
     # Under the brush only its drives are known.
     painter.tell(kind="answer", version=9, exact=False, drives=[[0.5, 0], None])
     assert slot.count() == 0
