@@ -28,6 +28,9 @@ from lightpaint.dmx.gdtf.mode_channels import ChannelFunction, ModeChannel, dmx_
 #: Most slots that are read of a wheel.
 MAX_SLOTS = 40
 
+#: Kelvin that a lamp can mean.
+LEAST_KELVIN, MOST_KELVIN = 1000.0, 100_000.0
+
 #: What stands between the names of two slots that share the beam.
 _SPLIT = re.compile(r"\s*[/+|&]\s*")
 
@@ -153,6 +156,7 @@ def _colour(
     """Return the light of a lamp behind a slot: by the measured transmission of its filter, or else
     by the colour that the file gives it or the filter.
     """
+    kelvin = min(max(kelvin, LEAST_KELVIN), MOST_KELVIN)
     linked = next((x for x in filters if x.get("Name") == element.get("Filter")), None)
     if linked is not None and (measured := filter_spectrum(linked)) is not None:
         waves, transmission, level = measured
