@@ -12,6 +12,7 @@ from xml.etree.ElementTree import Element
 import numpy as np
 
 from lightpaint.arrays import Doubles
+from lightpaint.colour.lamp import MAX_SLOTS
 from lightpaint.colour.planckian_locus import C2, matching_functions, xy_of
 from lightpaint.colour.primaries import REC2020, rgb_to_xyz
 from lightpaint.dmx.console_rig import RigSlot
@@ -21,15 +22,10 @@ from lightpaint.dmx.gdtf.emitter_colour import (
     bounded,
     filter_spectrum,
     parsed_colour,
+    possible_kelvin,
     xy_of_kelvin,
 )
 from lightpaint.dmx.gdtf.mode_channels import ChannelFunction, ModeChannel, dmx_value
-
-#: Most slots that are read of a wheel.
-MAX_SLOTS = 40
-
-#: Kelvin that a lamp can mean.
-LEAST_KELVIN, MOST_KELVIN = 1000.0, 100_000.0
 
 #: What stands between the names of two slots that share the beam.
 _SPLIT = re.compile(r"\s*[/+|&]\s*")
@@ -156,7 +152,7 @@ def _colour(
     """Return the light of a lamp behind a slot: by the measured transmission of its filter, or else
     by the colour that the file gives it or the filter.
     """
-    kelvin = min(max(kelvin, LEAST_KELVIN), MOST_KELVIN)
+    kelvin = possible_kelvin(kelvin)
     linked = next((x for x in filters if x.get("Name") == element.get("Filter")), None)
     if linked is not None and (measured := filter_spectrum(linked)) is not None:
         waves, transmission, level = measured

@@ -163,9 +163,14 @@ def _measured_light(measurements: Sequence[Any]) -> tuple[float | None, Curve]:
     return top, () if is_straight or rising[-1] != (1.0, 1.0) else tuple(rising)
 
 
+def possible_kelvin(kelvin: float) -> float:
+    """Return the colour temperature that a file means, in the range that lamps have."""
+    return min(max(kelvin, 1000.0), 100_000.0)
+
+
 def xy_of_kelvin(kelvin: float) -> Chromaticity:
     """Return the chromaticity of a black body."""
-    [uv] = uv_of_black_body(np.array([min(max(kelvin, 1000.0), 100_000.0)]))
+    [uv] = uv_of_black_body(np.array([possible_kelvin(kelvin)]))
     return xy_of(xyz_of(uv))
 
 

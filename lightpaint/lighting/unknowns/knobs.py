@@ -396,7 +396,8 @@ def _wheel_knob(k: int, light: BasisLight, constraint: LightConstraint, lamp: La
     """
     least, most = _luminance_limits(constraint, light, "has a colour wheel")
     lower, upper = least / lamp.levels, np.minimum(lamp.most, most / lamp.levels)
-    _check_room(constraint, light, lower.min(), upper[np.argmin(lower)])
+    roomiest = int(np.argmax(upper - lower))
+    _check_room(constraint, light, lower[roomiest], upper[roomiest])
     wheel = ColorWheel(lamp, lower, upper)
     unknowns = _unknowns_of(k, lamp.columns, np.where(lower <= upper, upper, 0.0))
     knob = Knob((k,), unknowns, ((1.0,) * len(unknowns), 0.0, 1.0), wheel=wheel)
