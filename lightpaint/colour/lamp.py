@@ -189,8 +189,8 @@ class Lamp:
         return float(self.drives_for(emission) @ np.array(known))
 
     def brightest(self, color: Doubles) -> float:
-        """Return the largest factor by which a colour (3,) can be mixed; 0 if it cannot be. Of a
-        wheel: with which its closest slot is as bright as the colour.
+        """Return the largest factor by which a colour (3,) can be mixed; 0 if it cannot be. A wheel
+        shows its closest slot as bright as that.
         """
         from scipy.optimize import linprog
 

@@ -197,8 +197,8 @@ class LightSetting:
 
     @property
     def slot_delta_e(self) -> float | None:
-        """How far the slot's colour is from that which the solve asked for, in CIEDE2000 of a white
-        surface; None where none was asked for, or the lamp is off.
+        """The distance of the slot's colour from that which the solve asked for, in CIEDE2000 of a
+        white surface; None where none was asked for, or the lamp is off.
         """
         if self.lamp is None or self.asked is None or not self.slot:
             return None
