@@ -218,7 +218,7 @@ def make_answer(
         labels=labels_and_effects,
         reached=reached,
         lamps=problem.reduction.lamps,
-        asked=problem.reduction.asked,
+        mixed_emissions=problem.reduction.mixed_emissions,
         **fields,
     )
     return LinearAnswer(problem, lighting, weights)

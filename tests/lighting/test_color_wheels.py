@@ -81,12 +81,12 @@ def test_each_wheel_is_at_the_slot_closest_to_the_best_mix(make_basis, seed):
         if (
             luminance(color) < 1e-6 * lamp.levels.max()
         ):  # it is off, and may come on at its open slot
-            assert light.asked is None
+            assert light.mixed_emission is None
             assert light.slot in ("open", "")
             chosen.append(lamp.columns[0])
             continue
         # The row of the oracle weighs 1e5 times as much as the painting.
-        assert np.allclose(light.asked, color, atol=1e-4 * np.abs(color).max())
+        assert np.allclose(light.mixed_emission, color, atol=1e-4 * np.abs(color).max())
         looks = lab(np.array([*lamp.columns, color]) / luminance([*lamp.columns, color])[:, None])
         distances = ciede2000(looks[:-1], looks[-1])
         assert light.slot == lamp.names[int(np.argmin(distances))]
@@ -112,8 +112,8 @@ def test_no_fit_mixes_slots(make_basis, fit):
         assert sum(drive > 0 for drive in light.drives.values()) <= 1
         assert np.allclose(light.emission, light.lamp.mix(np.array([*light.drives.values()])))
     [analysis] = analyse(solution)
-    assert [x.asked for x in analysis.solution.lighting.lights] == [
-        x.asked for x in solution.lighting.lights
+    assert [x.mixed_emission for x in analysis.solution.lighting.lights] == [
+        x.mixed_emission for x in solution.lighting.lights
     ]
 
 
@@ -128,7 +128,7 @@ def test_sparse_lights_have_slots(make_basis):
 def test_a_wheel_can_be_left_open(make_basis):
     basis, target, constraints = _case(make_basis, 5, wheel="open")
     light = solve(basis, target, constraints=constraints).lighting["spot"]
-    assert light.asked is None
+    assert light.mixed_emission is None
     assert light.slot_delta_e is None
     assert [x for x, drive in light.drives.items() if drive > 0] == ["open"]
 
@@ -173,7 +173,7 @@ def test_under_the_brush_wheels_are_at_slots(make_basis, space):
     live = LiveSolver([view], fit=fit, constraints=constraints)
     answer = live.answer(basis.current_weights)
     assert all(live.lamps[k].can_mix(answer[k]) for k in (0, 1))
-    assert 0 in live.asked
+    assert 0 in live.mixed_emissions
     again = live.answer(answer, while_painting=True)
     assert all(live.lamps[k].can_mix(again[k]) for k in (0, 1))
     if space == "linear":
@@ -187,7 +187,7 @@ def test_before_paint_wheels_are_at_slots(make_basis):
     live = LiveSolver([view], fit=Fit(literal=True, space="linear"), constraints=constraints)
     answer = live.answer(basis.current_weights)
     assert all(live.lamps[k].can_mix(answer[k]) for k in (0, 1))
-    assert live.asked == {}
+    assert live.mixed_emissions == {}
 
 
 WRONG = {

@@ -144,7 +144,7 @@ def test_a_colour_wheel_says_its_slot_and_how_far_it_is_off(basis: lp.Basis):
     session = session_of(basis.with_requests(SceneRequests(keys, "hall.lights.toml")))
     session.handle(*paint(1, (2, 9, 3, 12), 0.9))
     light = _light(session, 1)
-    asked, lamp = np.array(session.live_answer.asked[1]), session.live_answer.lamps[1]
+    asked, lamp = np.array(session.live_answer.mixed_emissions[1]), session.live_answer.lamps[1]
     assert sorted(light.drives)[0] == 0 < sorted(light.drives)[1]
     slot = int(np.argmax(light.drives))
     assert light.slot_delta_e == pytest.approx(lamp.distances(asked)[slot])
@@ -154,7 +154,7 @@ def test_a_colour_wheel_says_its_slot_and_how_far_it_is_off(basis: lp.Basis):
     solution = snapshot.solution()
     assert solution is not None
     session.accept_solution(snapshot, solution)
-    assert session.live_answer.asked == solution.problem.reduction.asked
+    assert session.live_answer.mixed_emissions == solution.problem.reduction.mixed_emissions
     assert _light(session, 1).slot_delta_e == solution.lighting[basis.names[1]].slot_delta_e
 
 

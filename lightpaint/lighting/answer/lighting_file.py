@@ -209,8 +209,8 @@ def _lamp_fields(light: LightSetting, lamp: Lamp) -> dict[str, Any]:
     if light.standard_error is not None or any(x is not None for x in light.mix_errors or ()):
         fields["drive_errors"] = dict(light.drive_errors)
     emitters = [fields_of(x, "watts", "spectrum") for x in lamp.emitters]
-    if light.asked is not None:
-        fields |= {"asked": light.asked}
+    if light.mixed_emission is not None:
+        fields |= {"mixed_emission": light.mixed_emission}
     wheel = {"slot": light.slot or None, "slot_delta_e": light.slot_delta_e}
     fields |= {key: value for key, value in wheel.items() if value is not None}
     named = fields_of(lamp, "power_share", "prefer", "is_wheel")

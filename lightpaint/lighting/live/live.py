@@ -91,7 +91,7 @@ class LiveSolver:
         self._fit, self._constraints, self._reduction = fit, constraints, reduction
         self._whites: WhiteLimits | None = None
         self._untouched: Doubles | None = None
-        self._asked: Mapping[int, RGB] = {}
+        self._mixed_emissions: Mapping[int, RGB] = {}
         self._within, self._gamuts_of = reduction, tuple[LiveView, ...]()
         self._answers_left = 0
         self._last_multipliers = LastMultipliers(close=MET_UNDER_BRUSH)
@@ -132,11 +132,11 @@ class LiveSolver:
         return {k: lamp.while_painting for k, lamp in self._reduction.lamps.items()}
 
     @property
-    def asked(self) -> Mapping[int, RGB]:
-        """The emissions that the last answer asked of lamps with colour wheels, before these came
-        to their slots, by the light's index.
+    def mixed_emissions(self) -> Mapping[int, RGB]:
+        """The emissions that lamps with colour wheels had in the last answer before these came to
+        their slots, by the light's index.
         """
-        return self._asked
+        return self._mixed_emissions
 
     @property
     def mode(self) -> Space:
@@ -167,7 +167,7 @@ class LiveSolver:
         """
         views = tuple(view for view in self._views if view.is_painted)
         if not views:
-            self._asked = {}
+            self._mixed_emissions = {}
             return self._unpainted_answer()
         if not self._is_kept_to:
             # Weights that the constraints forbid may well be closer to the painting.
@@ -184,7 +184,7 @@ class LiveSolver:
         if not self._within.open_wheels:
             return mixed
         mixing, self._within = self._within, self._within.with_slots(mixed)
-        self._asked = self._within.asked
+        self._mixed_emissions = self._within.mixed_emissions
         at_slots = nearest_weights(self._within, mixed)
         weights = self._improve((at_slots,), views, unpainted, while_moving=while_moving)
         self._within = mixing

@@ -189,7 +189,7 @@ class Knob:
             for u, axis in zip(self.unknowns, np.eye(3), strict=True)
         )
 
-    def drives(self, lamp: Lamp) -> bool:
+    def has_drives_of(self, lamp: Lamp) -> bool:
         """Return whether its unknowns are the drives of a lamp's emitters."""
         colors = [x.columns[0][1] for x in self.unknowns]
         return len(self.lights) == 1 and np.array_equal(colors, lamp.columns)

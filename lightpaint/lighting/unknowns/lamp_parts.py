@@ -50,7 +50,7 @@ class WholeLamps:
             [single] = [replace(knob, lights=places, unknowns=self._moved(knob.unknowns))]
             return (single,)
         lamp = lamps.get(knob.lights[0])
-        if lamp is None or not knob.drives(lamp):
+        if lamp is None or not knob.has_drives_of(lamp):
             mixes = tuple(self._of_parts(x, lamps) for x in knob.unknowns)
             return (replace(knob, lights=places, unknowns=mixes),)
         unknowns = tuple(

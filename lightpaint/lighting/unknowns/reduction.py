@@ -60,8 +60,8 @@ class Reduction:
     gamuts: colours that lights without other constraints keep to.
     lamps: what mixes a light from emitters, by the light's index.
     requirements: sums that the answer has to reach, if there are any.
-    asked: the emissions, by the light's index, of lamps with colour wheels before these came to
-    their slots.
+    mixed_emissions: the emissions, by the light's index, of lamps with colour wheels before these
+    came to their slots.
     """
 
     fixed_weights: Doubles
@@ -71,7 +71,7 @@ class Reduction:
     gamuts: Gamuts | None = None
     lamps: Mapping[int, Lamp] = field(default_factory=dict)
     requirements: Requirements | None = None
-    asked: Mapping[int, RGB] = field(default_factory=dict)
+    mixed_emissions: Mapping[int, RGB] = field(default_factory=dict)
 
     @cached_property
     def unknowns(self) -> tuple[Unknown, ...]:
@@ -119,17 +119,17 @@ class Reduction:
         """Return the reduction with each colour wheel at the slot that comes closest to the colour
         of its lamp in weights (n, 3).
         """
-        knobs, asked = [*self.knobs], {**self.asked}
+        knobs, mixed_emissions = [*self.knobs], {**self.mixed_emissions}
         for k in self.open_wheels:
             knob, wheel = knobs[k], knobs[k].wheel
             assert wheel is not None
             color = knob.solved_color(weights)
             if wheel.has_color(color):
-                asked[knob.lights[0]] = as_rgb(color)
+                mixed_emissions[knob.lights[0]] = as_rgb(color)
             else:  # off, but it may serve once other wheels have left their colours
                 color = np.zeros(3)
             knobs[k] = knob.at_slot(wheel.slot_for(color))
-        return replace(self, knobs=tuple(knobs), asked=asked)
+        return replace(self, knobs=tuple(knobs), mixed_emissions=mixed_emissions)
 
     @cached_property
     def has_equal_mixes(self) -> bool:

@@ -244,7 +244,7 @@ class Session:
         if snapshot.version != self.version:
             return None
         if solution is not None:
-            self.live_answer.accept(solution.weights, solution.problem.reduction.asked)
+            self.live_answer.accept(solution.weights, solution.problem.reduction.mixed_emissions)
             self._keep_answer()
         findings = self.findings
         if judgement is not None:
@@ -256,7 +256,7 @@ class Session:
     def findings(self) -> protocol.Findings:
         """Findings that need no analysis."""
         answer, bases = self.live_answer, [view.basis for view in self.views]
-        findings = answer_findings(bases, self.weights, answer.lamps, answer.asked)
+        findings = answer_findings(bases, self.weights, answer.lamps, answer.mixed_emissions)
         if self.is_painted:
             return findings
         return replace(findings, headline=unpainted_headline(self.live_answer))

@@ -79,8 +79,10 @@ def test_a_wheel_shows_one_of_its_slots(make_basis, tmp_path):
     write_lighting(tmp_path / "a.json", solution.lighting)
     for lamp in read_lighting(tmp_path / "a.json").values():
         assert [x for x, drive in lamp.drives.items() if drive > 0] == [lamp.slot]
-        assert lamp.asked is not None
-        assert lamp.slot_delta_e == pytest.approx(lamp.lamp.distances(np.array(lamp.asked)).min())
+        assert lamp.mixed_emission is not None
+        assert lamp.slot_delta_e == pytest.approx(
+            lamp.lamp.distances(np.array(lamp.mixed_emission)).min()
+        )
 
 
 def test_two_limits_of_a_lamp_hold(make_basis):
