@@ -178,11 +178,11 @@ def _slot_note(light: LightSetting) -> str:
 
 
 def spoken_wheels(lights: Iterable[LightSetting]) -> str:
-    """Return where colour wheels are, in a sentence; "" if none is on."""
+    """Return which slots were chosen for colour wheels, in a sentence; "" if none was."""
     slots = [
-        f"{light.name} at {', '.join(filter(None, (light.slot, _slot_note(light))))}"
+        f"{light.name} at {light.slot}, {_slot_note(light)}"
         for light in lights
-        if light.slot and not light.part_of
+        if light.slot_delta_e is not None and not light.part_of
     ]
     if not slots:
         return ""

@@ -19,6 +19,7 @@ from lightpaint.lighting.fit import Fit, resolve_for_targets
 from lightpaint.lighting.live.live import LiveSolver
 from lightpaint.lighting.live.live_view import LiveView
 from lightpaint.lighting.solve import solve
+from lightpaint.report.phrases import spoken_lamp, spoken_wheels
 from lightpaint.target.target import Target
 
 SIZE = (5, 4)
@@ -131,6 +132,19 @@ def test_a_wheel_can_be_left_open(make_basis):
     assert light.mixed_emission is None
     assert light.slot_delta_e is None
     assert [x for x, drive in light.drives.items() if drive > 0] == ["open"]
+
+
+def test_slots_that_were_chosen_are_said(make_basis):
+    basis, target, constraints = _case(make_basis, 5, wheel="open")
+    lights = solve(basis, target, constraints=constraints).lighting.lights
+    chosen = lights[1]
+    assert spoken_wheels(lights) == (
+        "Colour wheels, each at the closest slot to what was solved: profile at "
+        f"{chosen.slot}, ΔE {chosen.slot_delta_e:.1f} off."
+    )
+    assert spoken_lamp(chosen).endswith(f" (ΔE {chosen.slot_delta_e:.1f} off)")
+    assert spoken_lamp(lights[0]).startswith("open ")
+    assert spoken_wheels(lights[:1]) == ""
 
 
 def test_a_colour_chooses_the_closest_slot(make_basis):
