@@ -17,20 +17,26 @@ The picture gets 2 % of noise, and is solved
 Errors are relative to the picture without noise (RMS). Before, lamps of six emitters with so many
 drives are solved, in turns with the same lights with three channels each: for a picture whose
 colours all lamps can mix, and for one of known drives, many of which are 0 or 1; literally, and as
-a display shows it, with any colours and by default. `--drives-only` ends there.
+a display shows it, with any colours and by default. `--drives-only` ends there. At last larger
+shows of the same types are read, and their levels leave for this machine while they change.
 """
 
 from __future__ import annotations
 
 import argparse
+import copy
+import socket
 import subprocess
 import sys
 import tempfile
 import time
+import zipfile
+from contextlib import suppress
 from dataclasses import replace
 from pathlib import Path
 from subprocess import DEVNULL
 from typing import Any
+from xml.etree import ElementTree
 
 import numpy as np
 
@@ -41,7 +47,7 @@ import lightpaint as lp  # noqa: E402
 from lightpaint.basis.basis import Basis, Origin  # noqa: E402
 from lightpaint.basis.lights import BasisLight  # noqa: E402
 from lightpaint.dmx.levels import decode_levels  # noqa: E402
-from lightpaint.dmx.mvr import read_rig  # noqa: E402
+from lightpaint.dmx.mvr import DESCRIPTION, read_rig  # noqa: E402
 from lightpaint.dmx.network.console_link import ConsoleLink  # noqa: E402
 from lightpaint.dmx.network.console_receiver import ConsoleReceiver  # noqa: E402
 from lightpaint.dmx.network.console_target import PROTOCOLS, network_universes  # noqa: E402
@@ -204,6 +210,64 @@ def speed(drives: int) -> None:
     print(f"preferred mixes of all: {1000 * (time.process_time() - begin_s):.0f} ms")
 
 
+def large_show(folder: Path, count: int) -> Path:
+    """Return a show with so many copies of the fixtures of the shipped one, at free addresses."""
+    path = folder / f"{count}.mvr"
+    with zipfile.ZipFile(SHOW) as old, zipfile.ZipFile(path, "w") as new:
+        root = ElementTree.fromstring(old.read(DESCRIPTION))
+        parents = [(x, e) for x in root.iter("ChildList") for e in x.findall("Fixture")]
+        for k in range(count):
+            parent, fixture = parents[k % len(parents)]
+            made = copy.deepcopy(fixture)
+            made.find("FixtureID").text = str(1000 + k)
+            made.find("Addresses/Address").text = str(1 + 512 * (k // 16) + 30 * (k % 16))
+            parent.append(made)
+        for parent, fixture in parents:
+            parent.remove(fixture)
+        new.writestr(DESCRIPTION, ElementTree.tostring(root))
+        for name in set(old.namelist()) - {DESCRIPTION}:
+            new.writestr(name, old.read(name))
+    return path
+
+
+def console(read: int, sent: int) -> None:
+    """Print the times of a show with so many fixtures, and of sending to another."""
+    with tempfile.TemporaryDirectory() as folder:
+        path = large_show(Path(folder), read)
+        begin_s = time.process_time()
+        read_rig(path)
+        print(f"a show of {read} fixtures is read in {time.process_time() - begin_s:.3f} s")
+        rig = read_rig(large_show(Path(folder), sent))
+    rng = np.random.default_rng(SEED)
+    lights = [light for fixture in rig.fixtures for light in fixture.lights]
+
+    def drives() -> Any:
+        return {x.name: {e.name: float(rng.random()) for e in x.emitters} for x in lights}
+
+    with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as port:
+        port.bind(("127.0.0.1", 0))
+        with ConsoleLink.open(f"sacn://127.0.0.1:{port.getsockname()[1]}", rig) as link:
+            look, start = drives(), time.monotonic()
+            link.show(look)
+            port.recv(1024)
+            print(
+                f"first packet of {sent} fixtures after {1000 * (time.monotonic() - start):.0f} ms"
+            )
+            port.setblocking(False)
+            count, end, begin = 0, time.monotonic() + 3, time.process_time()
+            while time.monotonic() < end:
+                link.show(drives())
+                time.sleep(0.01)
+                with suppress(BlockingIOError):
+                    while port.recv(1024):
+                        count += 1
+            share = (time.process_time() - begin) / 3
+    frames = count / 3 / len(rig.universes)
+    print(
+        f"{frames:.0f} frames a second leave while all levels change, {100 * share:.0f} % of a core"
+    )
+
+
 if __name__ == "__main__":
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("--spp", type=int, default=64)
@@ -213,3 +277,4 @@ if __name__ == "__main__":
     speed(asked.drives)
     if not asked.drives_only:
         compare(asked.spp)
+        console(76, 100)

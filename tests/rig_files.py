@@ -73,6 +73,7 @@ def gdtf(
     *,
     geometries: str = f'<Geometry Name="Body">{BEAM}</Geometry>',
     described: str = f"<Emitters>{RGBW}</Emitters>",
+    wheels: str = "",
     name: str = "Lamp",
     root: str = "Body",
 ) -> bytes:
@@ -80,6 +81,7 @@ def gdtf(
     return zipped(
         {
             "description.xml": f'<GDTF DataVersion="1.2"><FixtureType Name="{name}">'
+            f"<Wheels>{wheels}</Wheels>"
             f"<PhysicalDescriptions>{described}</PhysicalDescriptions>"
             f"<Geometries>{geometries}</Geometries>"
             f'<DMXModes><DMXMode Name="One" Geometry="{root}"><DMXChannels>{channels}'

@@ -79,7 +79,7 @@ def test_a_lighting_that_is_written_fits_its_schema(tmp_path: Path) -> None:
 
 
 def test_a_summary_that_is_written_fits_its_schema() -> None:
-    light = LightRow("lamp", 1.0, (1.0, 1.0, 1.0), kelvin=3200.0)
+    light = LightRow("lamp", 1.0, (1.0, 1.0, 1.0), kelvin=3200.0, drives={"red": 0.5})
     done = SummaryRow("dusk", "done", "", "dusk", delta_e=1.5, view=("srgb", 0.0), lights=(light,))
     failed = SummaryRow("dawn", "failed", "no such painting", "dawn")
     written = json.loads(summary_json([done, failed]))

@@ -83,3 +83,13 @@ def test_a_summary_has_rgb_and_kelvin_of_each_light() -> None:
     assert (first["key"], first["key R"], first["key G"], first["key B"]) == ("2", "3", "2", "1")
     assert (first["key K"], first["'=fill K"], first["'=fill R"]) == ("3200", "", "0")
     assert (second["key R"], second["'=fill"], second["'=fill R"]) == ("3", "", "")
+
+
+def test_a_summary_has_the_drives_of_lamps_behind_all_else() -> None:
+    lamp = LightRow("par", 1.0, (1.0, 1.0, 1.0), drives={"red": 0.25, "white": 1.0})
+    row = SummaryRow("evening", "done", "", "evening", lights=(LightRow("key", 2.0), lamp))
+    failed = SummaryRow("dawn", "failed", "no such painting", "dawn")
+    [first, second] = csv.DictReader(io.StringIO(summary_csv([row, failed])))
+    assert [*first][-2:] == ["par drive red", "par drive white"]
+    assert (first["par drive red"], first["par drive white"]) == ("0.25", "1")
+    assert second["par drive red"] == ""

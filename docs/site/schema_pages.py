@@ -66,6 +66,7 @@ def lighting_schema() -> Schema:
     drives = {"type": "object", "additionalProperties": {"type": "number"}}
     errors = {"type": "object", "additionalProperties": {"type": ["number", "null"]}}
     light["properties"] |= {"drives": drives, "drive_errors": errors}
+    light["properties"] |= {"slot": {"type": "string"}, "slot_delta_e": {"type": "number"}}
     rgb = list_of([{"type": "number"}] * 3)
     key = {
         "type": "object",

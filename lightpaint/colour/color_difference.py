@@ -30,6 +30,14 @@ def delta_e(a: Floats, b: Floats) -> Floats:
     return ciede2000(lab(np.clip(a, 0, 1)), lab(np.clip(b, 0, 1)))
 
 
+def lab_of_lights(colors: Doubles) -> Doubles:
+    """Return what a white surface looks like in lights, equally bright in all: CIE L*a*b*, (…, 3).
+
+    colors: (…, 3) linear Rec.709, of a luminance > 0; channels may be negative.
+    """
+    return lab(colors / (colors @ _MATRIX[1])[..., None])
+
+
 def lab(image: Floats) -> Doubles:
     """Return linear Rec.709 (…, 3), white = 1, as CIE L*a*b* under D65, (…, 3)."""
     x, y = REC709[6:]

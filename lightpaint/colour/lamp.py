@@ -3,6 +3,8 @@
 A stage light has four to eight kinds of LEDs, its emitters, each of which dims from 0 to 1, its
 drive. Its emission is Σ dⱼ eⱼ. More than three emitters can mix most colours in many ways; a
 preference chooses one of these, so that the emission stays the same (docs/method.md).
+
+A lamp with a colour wheel has the wheel's slots for emitters, of which one shines at a time.
 """
 
 from collections.abc import Iterator, Sequence
@@ -14,12 +16,14 @@ import numpy as np
 
 from lightpaint.arrays import RGB, Bools, Doubles, Indices
 from lightpaint.colour.color import cct_and_duv, luminance
+from lightpaint.colour.color_difference import ciede2000, lab_of_lights
 from lightpaint.colour.emitter_preference import Preference
 from lightpaint.colour.spectra.best_mix import best_mix
 from lightpaint.colour.spectra.spectrum import WAVELENGTHS, Spectrum
 
-#: Most emitters of a lamp: the mixes that are compared grow exponentially with their number.
-MAX_EMITTERS = 10
+#: Most emitters of a lamp: the mixes that are compared grow exponentially with their number. Most
+#: slots of a colour wheel, which mix nothing.
+MAX_EMITTERS, MAX_SLOTS = 10, 40
 
 #: Round-off of drives, relative to their range, and of a determinant relative to its columns.
 ROUND_OFF, SINGULAR = 1e-7, 1e-6
@@ -67,11 +71,13 @@ class Lamp:
     power_share: the largest power of all emitters together, relative to that of all at full; of
     emitters of unknown power, the sum of their drives relative to their number.
     prefer: what to save, or use most, among mixes of the same colour.
+    is_wheel: whether they are slots of a colour wheel, of which one shines at a time.
     """
 
     emitters: tuple[LampEmitter, ...]
     power_share: float | None = None
     prefer: Preference = "watts"
+    is_wheel: bool = False
 
     @cached_property
     def names(self) -> tuple[str, ...]:
@@ -107,8 +113,10 @@ class Lamp:
 
     def drives_for(self, emission: Doubles) -> Doubles:
         """Return the preferred drives (e,) that mix an emission (3,); of one that it cannot mix,
-        those of the nearest that it can.
+        those of the nearest that it can. A wheel is at the slot of the closest colour.
         """
+        if self.is_wheel:
+            return self._drives_on_wheel(emission)
         mixes = _mixes_of(self)
         drives = mixes.values(emission)
         if not len(drives):
@@ -138,8 +146,38 @@ class Lamp:
             return None
         return np.asarray(self.levels[:, None] * np.array(spectra, np.float64))
 
+    def distances(self, color: Doubles) -> Doubles:
+        """Return how far a colour (3,) is from that of each emitter, (e,), in CIEDE2000 of a white
+        surface.
+        """
+        return np.asarray(ciede2000(self._looks, lab_of_lights(color)))
+
+    @cached_property
+    def _looks(self) -> Doubles:
+        return lab_of_lights(self.columns)
+
+    def slot_for(self, color: Doubles, slots: Bools | None = None) -> int:
+        """Return the place of the emitter whose colour is closest to a colour (3,); of black, that
+        of the brightest one.
+
+        slots: (e,), those to choose from, all by default.
+        """
+        is_black = float(luminance(color)) <= 0
+        values = -self.levels * self.most if is_black else self.distances(color)
+        return int(np.argmin(values if slots is None else np.where(slots, values, np.inf)))
+
+    def _drives_on_wheel(self, emission: Doubles) -> Doubles:
+        """Return the drives of a wheel at its closest slot, as bright as an emission (3,)."""
+        slot, drives = self.slot_for(emission), np.zeros(len(self.emitters))
+        level = max(float(luminance(emission)), 0.0) / self.levels[slot]
+        drives[slot] = min(level, self.most[slot])
+        return drives
+
     def can_mix(self, emission: Doubles) -> bool:
         """Return whether some drives mix an emission (3,)."""
+        if self.is_wheel:
+            made = self.mix(self._drives_on_wheel(emission))
+            return bool(np.abs(made - emission).max() <= ROUND_OFF * np.abs(emission).max())
         return len(_mixes_of(self).values(emission)) > 0
 
     def watts_for(self, emission: Doubles) -> float | None:
@@ -151,8 +189,14 @@ class Lamp:
         return float(self.drives_for(emission) @ np.array(known))
 
     def brightest(self, color: Doubles) -> float:
-        """Return the largest factor by which a colour (3,) can be mixed; 0 if it cannot be."""
+        """Return the largest factor by which a colour (3,) can be mixed; 0 if it cannot be. A wheel
+        shows its closest slot as bright as that.
+        """
         from scipy.optimize import linprog
+
+        if self.is_wheel:
+            slot = self.slot_for(color)
+            return float(self.most[slot] * self.levels[slot] / luminance(color))
 
         count = len(self.emitters)
         size = np.abs(color).max()
@@ -165,6 +209,23 @@ class Lamp:
             [0.0] * count + [-1.0], A_eq=equal, b_eq=np.zeros(3), bounds=bounds, **limits
         )
         return float(found.x[-1]) if found.success else 0.0
+
+    def corners(self, least: float, most: float) -> Doubles:
+        """Return emissions (k, 3) whose mixes, shares of 1 together, are all that the lamp can emit
+        between two luminances, within its limit of power; none if there is no such emission.
+        """
+        size, powers = float(self.levels.max()), self.powers
+        share = float(powers @ self.most) if self.power_share is None else self.power_share
+        most = min(most, float(self.levels @ self.most))
+        # What is left below a limit is one more drive, without light.
+        equations = np.hstack([np.array([powers, self.levels / size]), np.eye(2)])
+        limits = np.append(self.most, [share, (most - least) / size])
+        right = np.array([share, most / size])
+        found = [drives for _, drives in _corners(equations, limits, right, 0)]
+        drives = np.concatenate(found) if most >= least else np.zeros((0, len(limits)))
+        room = ROUND_OFF * np.maximum(limits, ROUND_OFF)
+        fits = ((drives >= -room) & (drives <= limits + room)).all(axis=1)
+        return _hull(np.clip(drives[fits, : len(self.most)], 0, self.most) @ self.columns)
 
     def drive_errors(self, drives: Doubles, errors: Sequence[float | None]) -> list[float | None]:
         """Return the standard error of each drive for those of the emission's channels; None for a
@@ -205,6 +266,20 @@ class Lamp:
     def _whites(self) -> Bools:
         """(e,), the emitters whose colour is a white."""
         return np.array([_is_white(x) for x in self.columns])
+
+
+def _hull(points: Doubles) -> Doubles:
+    """Return those of some points (k, 3) of which all others are mixes."""
+    from scipy.spatial import ConvexHull
+
+    if len(points) < 2:
+        return points
+    middle = points.mean(axis=0)
+    _, sizes, axes = np.linalg.svd(points - middle, full_matrices=False)
+    flat = (points - middle) @ axes[sizes > SINGULAR * sizes[0]].T
+    if flat.shape[1] > 1:
+        return np.asarray(points[ConvexHull(flat).vertices])
+    return np.asarray(points[[flat.argmin(), flat.argmax()]] if flat.size else points[:1])
 
 
 def _is_white(color: Doubles) -> bool:

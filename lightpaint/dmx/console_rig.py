@@ -75,6 +75,25 @@ class RigFilter:
 
 
 @dataclass(frozen=True)
+class RigSlot:
+    """A slot of a colour wheel: the level that chooses it, and the first and last that mean it."""
+
+    level: int
+    first: int
+    last: int
+
+
+@dataclass(frozen=True)
+class RigWheel:
+    """A colour wheel of a light. channel: its place among those of the fixture. slots: one for each
+    of the light's emitters, in their order.
+    """
+
+    channel: int
+    slots: tuple[RigSlot, ...]
+
+
+@dataclass(frozen=True)
 class RigLight:
     """A light of a fixture: all its beams together, or one of its pixels.
 
@@ -90,6 +109,7 @@ class RigLight:
     and in their place; `dimmers` set the sum's luminance. Empty for other lights.
     whites: places of channels that set its colour temperature, whose curves give kelvin; its
     emitters are its coolest and its warmest white, whose drives add up to what `dimmers` set.
+    wheel: a colour wheel, whose slots are its emitters, one at a time; `dimmers` set its drive.
     """
 
     name: str
@@ -104,6 +124,7 @@ class RigLight:
     filters: tuple[RigFilter, ...] = ()
     chromaticity: tuple[int, ...] = ()
     whites: tuple[int, ...] = ()
+    wheel: RigWheel | None = None
 
     @property
     def is_controlled(self) -> bool:

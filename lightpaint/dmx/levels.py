@@ -2,7 +2,8 @@
 
 A drive is the share of an emitter's light at full, 0 to 1. A light's first dimmer carries its
 largest drive and its emitters the others relative to that, as on a console; so small drives keep
-the resolution of the emitters' channels. Its further dimmers are at full, all else is at rest.
+the resolution of the emitters' channels. Its further dimmers are at full, all else is at rest. A
+colour wheel goes to the slot of the largest drive, which the dimmer carries.
 """
 
 from collections.abc import Mapping, Sequence
@@ -56,6 +57,8 @@ def decode_levels(rig: ConsoleRig, universes: Mapping[int, bytes]) -> dict[str, 
 
 def _levels_of(fixture: RigFixture, light: RigLight, drives: Drives) -> dict[int, int]:
     """Return the levels of the channels of a light, by their places among the fixture's."""
+    if not light.is_controlled:
+        return {}
     channels = fixture.channels
     levels = {k: _level(1.0, channels[k]) for k in (*light.dimmers[1:], *light.masters)}
     wanted = [min(max(drives.get(x.name, 0.0), 0.0), 1.0) for x in light.emitters]
@@ -72,6 +75,11 @@ def _levels_of(fixture: RigFixture, light: RigLight, drives: Drives) -> dict[int
         dimmer, kelvin = white_for_drives(light, wanted)
         levels |= {k: _level(kelvin, channels[k]) for k in light.whites}
         return levels | {k: _level(dimmer, channels[k]) for k in light.dimmers[:1]}
+    if light.wheel is not None:
+        slot = int(np.argmax(wanted))
+        # A dark wheel rests.
+        levels |= {light.wheel.channel: light.wheel.slots[slot].level} if wanted[slot] else {}
+        return levels | {k: _level(wanted[slot], channels[k]) for k in light.dimmers[:1]}
     top = 1.0
     for k in light.dimmers[:1]:
         # Emitters make up for a dimmer that is rounded up; they could not for one rounded down.
@@ -105,6 +113,9 @@ def _drives_of(
         found = drives_of_xy(light, dimmer, [share(k) for k in light.chromaticity])
     elif light.whites:
         found = drives_of_white(light, dimmer, mean(light.whites))
+    elif light.wheel is not None:
+        level = _read(universes, fixture, channels[light.wheel.channel])
+        found = [dimmer * (x.first <= level <= x.last) for x in light.wheel.slots]
     else:
         found = [dimmer * _forward(x.curve, mean(x.channels)) for x in light.emitters]
     return dict(zip(names, found, strict=True))

@@ -334,6 +334,7 @@ def _placed(name: str, light: ModeLight, matrix: Doubles, target: Doubles | None
         light.filters,
         light.chromaticity,
         light.whites,
+        light.wheel,
     )
 
 
@@ -347,10 +348,9 @@ def _head(head: ModeHead, matrix: Doubles, lights: Sequence[RigLight]) -> RigHea
 
 
 def _uncontrolled(light: RigLight) -> RigLight:
-    """Return a light without its channels."""
+    """Return a light that no channel sets."""
     emitters = tuple(replace(x, channels=()) for x in light.emitters)
-    nothing: dict[str, Any] = {"filters": (), "chromaticity": (), "whites": ()}
-    return replace(light, emitters=emitters, dimmers=(), masters=(), **nothing)
+    return replace(light, emitters=emitters, dimmers=(), masters=(), filters=(), chromaticity=())
 
 
 def _three(values: Doubles) -> Position:

@@ -79,10 +79,10 @@ def scene_text(rig: ConsoleRig, unit: float, room: Room | None) -> str:
     return "\n".join([*lines, "</scene>", ""])
 
 
-def lights_text(rig: ConsoleRig, unit: float) -> str:
+def lights_text(rig: ConsoleRig, unit: float, *, open_wheels: bool = False) -> str:
     """Return the lights file: all lights of the rig with their emitters.
 
-    unit: candelas of an intensity of 1.
+    unit: candelas of an intensity of 1. open_wheels: whether colour wheels stay open.
     """
     lines = [f"# Lights of {_comment(rig.name)}. Others in the scene stay as they are."]
     lines += [f"cd_per_unit = {unit:g}"]
@@ -93,6 +93,9 @@ def lights_text(rig: ConsoleRig, unit: float) -> str:
             lines += ["", f"[light.{_quoted(light.name)}]", "emitters = ["]
             lines += [f"    {_emitter(x, light, fixture)}," for x in light.emitters]
             lines += ["]"]
+            if light.wheel is not None:
+                brightest = max(light.emitters, key=lambda x: x.candela)
+                lines += [f"wheel = {_quoted(brightest.name) if open_wheels else 'true'}"]
             if light.whites:  # which share the light of one lamp
                 lines += [f"power_share = {1 / len(light.emitters):g}"]
     return "\n".join([*lines, ""])
@@ -105,8 +108,8 @@ def lights_of(rig: ConsoleRig) -> list[RigLight]:
 
 def _candela(light: RigLight) -> float:
     amounts = [x.candela for x in light.emitters]
-    # Of two whites that share their light, each is all of it.
-    return max(amounts) if light.whites else sum(amounts)
+    # Of two whites that share their light, each is all of it, and so is each slot of a wheel.
+    return max(amounts) if light.whites or light.wheel else sum(amounts)
 
 
 def _emitter(emitter: RigEmitter, light: RigLight, fixture: RigFixture) -> str:

@@ -164,6 +164,11 @@ class LinearProblem:
             full = self.full.with_windows(windows)
         return replace(self, reduction=reduction, full=full)  # type: ignore[type-var]
 
+    def with_slots(self, weights: Doubles) -> Self:
+        """Return this problem with colour wheels at the slots closest to weights (n, 3)."""
+        reduction, full = (x.with_slots(weights) for x in (self.reduction, self.full))
+        return replace(self, reduction=reduction, full=full)  # type: ignore[type-var]
+
 
 @dataclass(frozen=True, kw_only=True)
 class SummedProblem(LinearProblem):

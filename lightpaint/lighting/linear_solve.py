@@ -3,6 +3,9 @@
 With `sparse`, the choice of lights is not a convex problem. A greedy search adds one light at a
 time, always the one that helps most, and at K exchanges lights as long as that helps. Each trial
 solves for its lights in full, so the answer is optimal for the lights it uses.
+
+Nor is the choice of a slot of a colour wheel. It comes after the solve for a mix of slots, in whose
+colours each lamp gets the closest slot; then all are solved for again, with these slots.
 """
 
 from collections.abc import Collection, Sequence
@@ -127,7 +130,22 @@ class LinearAnswer(Generic[_Problem]):
 
 
 def solve_linear(problem: _Problem, start: Doubles) -> LinearAnswer[_Problem]:
-    """Solve the squares from weights (n, 3); with `sparse`, for the best lights alone."""
+    """Solve the squares from weights (n, 3); with `sparse`, for the best lights alone. Colour
+    wheels come to the closest slots.
+    """
+    mixed = solve_mixed(problem, start)
+    if not mixed.problem.reduction.open_wheels:
+        return mixed
+    answer = solve_reduction(mixed.problem.with_slots(mixed.weights), mixed.weights)
+    certificate, former = answer.lighting.certificate, mixed.lighting.certificate
+    assert certificate is not None
+    assert former is not None
+    lighting = answer.lighting.with_certificate(replace(certificate, curve=former.curve))
+    return replace(answer, lighting=lighting, tried=mixed.tried)
+
+
+def solve_mixed(problem: _Problem, start: Doubles) -> LinearAnswer[_Problem]:
+    """Solve as `solve_linear` does, but for colour wheels, which mix their slots."""
     count = problem.constraints.sparse
     if count is None or not problem.full.knobs:
         return solve_reduction(problem, start)
@@ -200,6 +218,7 @@ def make_answer(
         labels=labels_and_effects,
         reached=reached,
         lamps=problem.reduction.lamps,
+        mixed_emissions=problem.reduction.mixed_emissions,
         **fields,
     )
     return LinearAnswer(problem, lighting, weights)
@@ -227,7 +246,12 @@ def _lamps_at_most(reduction: Reduction, optimum: ReducedOptimum) -> dict[int, b
     An emitter at 0 holds a lamp back no more than a channel at 0 does other lights.
     """
     held, scale = optimum.multipliers, np.abs(optimum.multipliers).max(initial=0)
-    is_held = (optimum.x >= reduction.upper) & (held < -MIN_PULL * scale)
+    # Slots that a wheel does not show are at 0, whatever they would do.
+    is_held = (
+        (optimum.x >= reduction.upper)
+        & (reduction.upper > reduction.lower)
+        & (held < -MIN_PULL * scale)
+    )
     capped = {
         cap.unknowns[0]: bool(multiplier)
         for cap, multiplier in zip(reduction.caps, optimum.cap_multipliers, strict=True)

@@ -18,6 +18,7 @@ from lightpaint.lighting.linear_solve import (
     LinearAnswer,
     make_answer,
     solve_linear,
+    solve_mixed,
     solve_reduction,
 )
 from lightpaint.lighting.loss.lit_pixels import DeferredSquares, LitPixels
@@ -38,7 +39,7 @@ from lightpaint.lighting.solution import Solution
 from lightpaint.lighting.unknowns.reduced_problem import (
     ReducedOptimum,
     ReducedSolver,
-    nearest_unknowns,
+    nearest_weights,
     solve_reduced,
 )
 from lightpaint.lighting.unknowns.white_mixes import next_whites
@@ -108,15 +109,34 @@ def solve(
 def solution_of(problem: Problem, *, start: Doubles | None = None) -> Solution:
     """Solve a problem. start: (n, 3), where to begin, its own start by default.
 
-    If its loss is not linear, rounds of linear problems lead to the optimum.
+    If its loss is not linear, rounds of linear problems lead to the optimum. Colour wheels come to
+    the slots that are closest there, and the lights to the optimum with these.
     """
     begin = problem.start if start is None else start
     if problem.is_linear:
         return _solve_squares(problem, begin)
     blocks = _blocks_of(problem)
+    mixed, reached = _solve_rounds(problem, begin, blocks)
+    if not mixed.problem.reduction.open_wheels:
+        return mixed
+    reductions = {name: getattr(mixed.problem, name) for name in ("reduction", "full")}
+    at_slots = replace(problem, **reductions).with_slots(mixed.weights)
+    start_at_slots = nearest_weights(at_slots.reduction, mixed.weights)
+    solution = _descend(at_slots, start_at_slots, reached, blocks)
+    curve = mixed.certificate.curve
+    return replace(solution, tried=mixed.tried).with_certificate_fields(curve=curve)
+
+
+def _solve_rounds(
+    problem: Problem, begin: Doubles, blocks: BinnedPixels | None
+) -> tuple[Solution, Bools]:
+    """Solve a loss that is not linear from weights (n, 3), with mixed slots of colour wheels.
+
+    Also return, (n, 3), in which channels lights reach something.
+    """
     # The literal squares come first; they also show what each light reaches.
     all_lights = replace(problem, constraints=_without_sparse(problem.constraints))
-    first = _solve_squares(replace(all_lights, loss=problem.squares), begin)
+    first = _solution(solve_mixed(replace(all_lights, loss=problem.squares), begin))
     reached = first.reached
     all_lights = all_lights.with_whites(first.problem.reduction)
     if len(begin) >= MANY_LIGHTS:
@@ -124,9 +144,8 @@ def solution_of(problem: Problem, *, start: Doubles | None = None) -> Solution:
     solution = _descend(all_lights, first.weights, reached, blocks)
     if problem.constraints.sparse is not None:
         # The lights are chosen at the optimum of all lights.
-        chosen = _solve_squares(
-            replace(solution.problem, constraints=problem.constraints), solution.weights
-        )
+        sparse_problem = replace(solution.problem, constraints=problem.constraints)
+        chosen = _solution(solve_mixed(sparse_problem, solution.weights))
         sparse = chosen.problem
         restricted = replace(problem, reduction=sparse.reduction, full=sparse.full)
         reached = chosen.reached
@@ -134,7 +153,7 @@ def solution_of(problem: Problem, *, start: Doubles | None = None) -> Solution:
             _descend(restricted, chosen.weights, reached, blocks), tried=chosen.tried
         )
         first = chosen
-    return solution.with_certificate_fields(curve=first.certificate.curve)
+    return solution.with_certificate_fields(curve=first.certificate.curve), reached
 
 
 def _blocks_of(problem: Problem) -> BinnedPixels | None:
@@ -319,8 +338,7 @@ def nearest_to_current(problem: Problem) -> Doubles:
     """Return the weights (n, 3) nearest to those to start from that constraints allow."""
     current, reduction = problem.reference, problem.reduction
     if len(current) >= MANY_LIGHTS:
-        all_lights = np.ones(len(current), dtype=bool)
-        nearest = reduction.weights(nearest_unknowns(reduction, current, all_lights))
+        nearest = nearest_weights(reduction, current)
         if np.allclose(nearest, current, rtol=1e-9, atol=0):
             return nearest
     pull = pull_to_current(problem.basis.power, current)

@@ -165,6 +165,30 @@ def spoken_drives(drives: Mapping[str, float]) -> str:
     return ", ".join(lit) or "all emitters off"
 
 
+def spoken_lamp(light: LightSetting) -> str:
+    """Return what a lamp of emitters does, `red 100 %, white 8 %`; of one with a colour wheel also
+    how far its slot is from the colour that was solved for.
+    """
+    note = _slot_note(light)
+    return f"{spoken_drives(light.drives)}{note and f' ({note})'}"
+
+
+def _slot_note(light: LightSetting) -> str:
+    return "" if light.slot_delta_e is None else f"ΔE {light.slot_delta_e:.1f} off"
+
+
+def spoken_wheels(lights: Iterable[LightSetting]) -> str:
+    """Return which slots were chosen for colour wheels, in a sentence; "" if none was."""
+    slots = [
+        f"{light.name} at {light.slot}, {_slot_note(light)}"
+        for light in lights
+        if light.slot_delta_e is not None and not light.part_of
+    ]
+    if not slots:
+        return ""
+    return f"Colour wheels, each at the closest slot to what was solved: {some_of(slots, '; ')}."
+
+
 #: Which of several mixes of a lamp's emitters an answer has, by the preference.
 PREFERENCE_TEXTS = {
     "watts": "the one that needs the least power",
@@ -177,7 +201,7 @@ PREFERENCE_TEXTS = {
 def spoken_preference(lights: Iterable[LightSetting]) -> str:
     """Return which mix of emitters lamps have, in a sentence; "" without lamps."""
     lamps = [x.lamp for x in lights if x.lamp is not None and not x.part_of and x.mix is None]
-    preferences = [lamp.prefer for lamp in lamps]
+    preferences = [lamp.prefer for lamp in lamps if not lamp.is_wheel]
     if not preferences:
         return ""
     return (

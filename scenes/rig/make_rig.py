@@ -28,6 +28,9 @@ HERE = Path(__file__).resolve().parent
 #: Where names of this rig become identifiers.
 NAMESPACE = uuid.UUID("5b0b6f5c-6a39-4b8e-9f6e-3d4d2f6b7c11")
 
+#: First level at which a shutter is open.
+OPEN = 32
+
 #: Time of every file in the archives, so that equal sources make equal bytes.
 TIME = (1980, 1, 1, 0, 0, 0)
 
@@ -129,10 +132,13 @@ def write_type(path: Path, kind: Kind) -> None:
     made.emitters = [_emitter(x) for x in kind.emitters]
     made.geometries = pygdtf.Geometries([_geometry(kind)])
     made.dmx_modes = pygdtf.DmxModes([_mode(kind)])
-    made.attributes = [
-        pygdtf.Attribute(name=x.attribute.str_link, pretty=x.attribute.str_link)
-        for x in made.dmx_modes[0]._dmx_channels
+    functions = [
+        function
+        for channel in made.dmx_modes[0]._dmx_channels
+        for function in channel.logical_channels[0].channel_functions
     ]
+    names = dict.fromkeys(function.attribute.str_link for function in functions)
+    made.attributes = [pygdtf.Attribute(name=name, pretty=name) for name in names]
     pygdtf.FixtureTypeWriter(made).write_gdtf(path)
 
 
@@ -176,7 +182,7 @@ def _mode(kind: Kind) -> pygdtf.DmxMode:
     if kind.moves:
         rows += [("Pan", "Yoke", 2, "32768/2", (270, -270), None)]
         rows += [("Tilt", "Head", 2, "32768/2", (-130, 130), None)]
-        rows += [("Shutter1", lamp, 1, "32/1", (0, 1), None)]
+        rows += [("Shutter1", lamp, 1, f"{OPEN}/1", (0, 1), None)]
     rows += [("Dimmer", lamp, n, f"0/{n}", (0, 1), None)]
     rows += [(f"ColorAdd_{x.suffix}", lamp, n, f"0/{n}", (0, 1), x.name) for x in kind.emitters]
     if kind.zoom is not None:
@@ -200,17 +206,26 @@ def _channel(
     emitter: str | None,
 ) -> pygdtf.DmxChannel:
     link = pygdtf.NodeLink("Attributes", attribute)
-    start, end = physical
-    function = pygdtf.ChannelFunction(
-        name=f"{attribute} 1",
-        attribute=link,
-        default=pygdtf.DmxValue(default),
-        physical_from=pygdtf.PhysicalValue(start),
-        physical_to=pygdtf.PhysicalValue(end),
-        emitter=pygdtf.NodeLink("EmitterCollect", emitter),
-    )
-    logical = pygdtf.LogicalChannel(attribute=link, channel_functions=[function])
-    initial = pygdtf.NodeLink("", f"{geometry}_{attribute}.{attribute}.{attribute} 1")
+    # What each range of levels does, from its first one: a shutter is closed, open, or flashes.
+    ranges = [(f"{attribute} 1", attribute, 0, physical)]
+    if attribute == "Shutter1":
+        ranges = [("Closed", attribute, 0, (0, 0)), ("Open", attribute, OPEN, (1, 1))]
+        ranges += [("Strobe", f"{attribute}Strobe", OPEN + 32, (1, 20))]
+    functions = [
+        pygdtf.ChannelFunction(
+            name=name,
+            attribute=pygdtf.NodeLink("Attributes", controlled),
+            dmx_from=pygdtf.DmxValue(f"{first}/1"),
+            default=pygdtf.DmxValue(default),
+            physical_from=pygdtf.PhysicalValue(start),
+            physical_to=pygdtf.PhysicalValue(end),
+            emitter=pygdtf.NodeLink("EmitterCollect", emitter),
+        )
+        for name, controlled, first, (start, end) in ranges
+    ]
+    logical = pygdtf.LogicalChannel(attribute=link, channel_functions=functions)
+    resting = "Open" if attribute == "Shutter1" else ranges[0][0]
+    initial = pygdtf.NodeLink("", f"{geometry}_{attribute}.{attribute}.{resting}")
     return pygdtf.DmxChannel(
         *(1, offsets, None, link),
         initial_function=initial,

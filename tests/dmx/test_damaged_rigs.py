@@ -35,6 +35,29 @@ CHANNELS = (
     + channel("Shutter1", "8", default="32/1")
 )
 
+#: A type with a colour wheel.
+WHEELS = (
+    '<Wheel Name="W"><Slot Name="Open" Color="0.3127,0.3290,100"/><Slot Name="Red" '
+    'Filter="F"/></Wheel>'
+)
+FILTERS = (
+    '<Filters><Filter Name="F" Color="0.6,0.3,9"><Measurement Physical="100" Transmission="20">'
+    '<MeasurementPoint WaveLength="450" Energy="0.1"/><MeasurementPoint WaveLength="650" '
+    'Energy="0.9"/></Measurement></Filter></Filters>'
+)
+WHEEL_CHANNELS = channel("Dimmer", "1", geometry="Cell") + channel(
+    "Color1", "2", geometry="Cell", function='Wheel="W"'
+).replace(
+    "/></LogicalChannel>",
+    '><ChannelSet Name="Open" DMXFrom="0/1" WheelSlotIndex="1"/><ChannelSet Name="Red" '
+    'DMXFrom="9/1" PhysicalFrom="-0.5" PhysicalTo="0.5" WheelSlotIndex="2"/></ChannelFunction>'
+    "</LogicalChannel>",
+)
+TYPES = {
+    "mixing": gdtf(CHANNELS, geometries=GEOMETRIES, described=DESCRIBED),
+    "wheel": gdtf(WHEEL_CHANNELS, geometries=GEOMETRIES, described=FILTERS, wheels=WHEELS),
+}
+
 
 def _texts(text: str) -> Iterator[str]:
     """The text with each value replaced by each odd one."""
@@ -43,9 +66,12 @@ def _texts(text: str) -> Iterator[str]:
             yield text[: match.start()] + value + text[match.end() :]
 
 
+@pytest.mark.parametrize("kind", TYPES)
 @pytest.mark.parametrize("step", [7, nightly(1)])
-def test_types_with_odd_values_are_read_or_are_one_line(step: int, tmp_path: Path) -> None:
-    data = gdtf(CHANNELS, geometries=GEOMETRIES, described=DESCRIBED)
+def test_types_with_odd_values_are_read_or_are_one_line(
+    step: int, kind: str, tmp_path: Path
+) -> None:
+    data = TYPES[kind]
     path, text = tmp_path / "a.mvr", unzipped(data)["description.xml"].decode()
     assert read_rig(write_mvr(path, layered(fixture()), lamp=data)).fixtures
     for odd in [*_texts(text)][::step]:

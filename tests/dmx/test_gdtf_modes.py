@@ -367,3 +367,33 @@ def test_a_fixture_whose_channels_dim_nothing_has_no_light() -> None:
     mode = read_mode(gdtf(channel("Pan", "1")))
     assert mode.lights == ()
     assert "no channel of it dims light, so it is left out" in mode.remarks
+
+
+def _shutter(default: int) -> str:
+    """A shutter that is closed up to 31, open up to 63, and flashes above."""
+    functions = "".join(
+        f'<ChannelFunction Name="{name}" Attribute="{attribute}" DMXFrom="{first}/1" '
+        f'Default="{default}/1" PhysicalFrom="{start}" PhysicalTo="{end}"/>'
+        for name, attribute, first, start, end in (
+            ("Closed", "Shutter1", 0, 0, 0),
+            ("Open", "Shutter1", 32, 1, 1),
+            ("Flash", "Shutter1Strobe", 64, 1, 20),
+        )
+    )
+    return (
+        '<DMXChannel DMXBreak="1" Offset="6" Geometry="Beam" InitialFunction="Beam_Shutter1.'
+        f'Shutter1.Open"><LogicalChannel Attribute="Shutter1">{functions}</LogicalChannel>'
+        "</DMXChannel>"
+    )
+
+
+@pytest.mark.parametrize(
+    ("default", "sent", "remark"),
+    [(40, 40, ""), (200, 47, "flashes"), (0, 0, "its shutter rests closed")],
+)
+def test_nothing_flashes_and_a_closed_shutter_is_named(
+    default: int, sent: int, remark: str
+) -> None:
+    mode = read_mode(gdtf(RGBW_CHANNELS + _shutter(default)))
+    assert mode.channels[5].default == sent
+    assert (remark in " ".join(map(str, mode.remarks))) if remark else not mode.remarks

@@ -300,10 +300,6 @@ WRONG = {
     ),
     "a share of nothing": ({"power_share": 0.5}, "without the emitters that share it"),
     "share": ({"emitters": RGBW, "power_share": 2}, "expected a share of full power"),
-    "both limits": (
-        {"emitters": RGBW, "power_share": 0.5, "limits": {"max": 1}},
-        "limits and power_share: give one",
-    ),
 }
 
 

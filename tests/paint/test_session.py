@@ -135,6 +135,35 @@ def test_lamps_of_emitters_show_their_drives(basis: lp.Basis):
     np.testing.assert_allclose(lamp.mix(drives), session.weights[1], atol=1e-5)
 
 
+def test_a_colour_wheel_says_its_slot_and_how_far_it_is_off(basis: lp.Basis):
+    slots = [
+        {"name": name, "xy": xy, "Y": level}
+        for name, xy, level in (("open", [0.31, 0.33], 4.0), ("red", [0.69, 0.3], 0.6))
+    ]
+    keys = {"light": {basis.names[1]: {"emitters": slots, "wheel": True}}}
+    session = session_of(basis.with_requests(SceneRequests(keys, "hall.lights.toml")))
+    session.handle(*paint(1, (2, 9, 3, 12), 0.9))
+    light = _light(session, 1)
+    asked, lamp = np.array(session.live_answer.mixed_emissions[1]), session.live_answer.lamps[1]
+    assert sorted(light.drives)[0] == 0 < sorted(light.drives)[1]
+    slot = int(np.argmax(light.drives))
+    assert light.slot_delta_e == pytest.approx(lamp.distances(asked)[slot])
+    assert light.slot_delta_e == pytest.approx(lamp.distances(asked).min())
+    # The exact answer says it of its own colour.
+    snapshot = session.snapshot()
+    solution = snapshot.solution()
+    assert solution is not None
+    session.accept_solution(snapshot, solution)
+    assert session.live_answer.mixed_emissions == solution.problem.reduction.mixed_emissions
+    assert _light(session, 1).slot_delta_e == solution.lighting[basis.names[1]].slot_delta_e
+
+
+def _light(session: Any, k: int) -> Any:
+    lights = session.findings.lights
+    assert lights is not None
+    return lights[k]
+
+
 def test_drives_come_during_a_stroke_and_cost_little_of_its_time(basis: lp.Basis):
     emitters = [{"name": "red", "xy": [0.7, 0.299], "Y": 1.0}, {"name": "w", "rgb": [1, 1, 1]}]
     keys = {"light": {basis.names[1]: {"emitters": emitters}}}

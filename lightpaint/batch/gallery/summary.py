@@ -76,7 +76,7 @@ class LightRow:
     """A light in a look.
 
     y: luminance of its emission, in the scene's unit. hex: its colour. share: of its image, if it
-    is a texel.
+    is a texel. drives: of a lamp of emitters, by their names.
     """
 
     name: str
@@ -87,6 +87,7 @@ class LightRow:
     duv: float | None = None
     stops: float | None = None
     share: float | None = None
+    drives: Mapping[str, float] = field(default_factory=dict)
 
 
 @dataclass(frozen=True)
@@ -250,7 +251,8 @@ def lights_of_answer(folder: Path, report: Mapping[str, Any]) -> tuple[LightRow,
             measures = lighting.photometry(light)
             stops = (report.get("lights") or {}).get(light.name, {}).get("stops")
             values = (light.emission, measures.hex, measures.kelvin, measures.duv, stops)
-            rows.append(LightRow(light.name, measures.y, *values, share=shares.get(k)))
+            row = LightRow(light.name, measures.y, *values, share=shares.get(k))
+            rows.append(replace(row, drives=dict(light.drives)))
         return tuple(rows)
     return ()
 
@@ -387,12 +389,13 @@ def summary_json(rows: Iterable[SummaryRow]) -> str:
 
 
 def summary_csv(rows: list[SummaryRow]) -> str:
-    """Return summary.csv: a line for each row, and five columns for each light.
+    """Return summary.csv: a line for each row, five columns for each light, and one for each drive.
 
     These are the luminance of its emission, under its name, the emission in R, G and B, and its
-    colour temperature in kelvin, if it has one. Where illuminance was measured, two columns for
-    each plane come before them, one for the UGR of each observer, one for the power of all lamps,
-    and one for planes that do not get what was wished for.
+    colour temperature in kelvin, if it has one; behind all, the drives of lamps of emitters. Where
+    illuminance was measured, two columns for each plane come before them, one for the UGR of each
+    observer, one for the power of all lamps, and one for planes that do not get what was wished
+    for.
     """
     names = list(dict.fromkeys(light.name for row in rows for light in row.lights))
     planes = list(dict.fromkeys(plane.name for row in rows for plane in row.planes))
@@ -403,13 +406,18 @@ def summary_csv(rows: list[SummaryRow]) -> str:
     measured += [f"{name}{GLARE_COLUMN}" for name in observers]
     measured += [POWER_COLUMN, MISSED_COLUMN] if planes else []
     columns = _light_columns(names, taken={*COLUMNS, *measured})
+    drives = list(dict.fromkeys((x.name, e) for row in rows for x in row.lights for e in x.drives))
+    columns += [f"{name} drive {emitter}" for name, emitter in drives]
     table.writerow([*COLUMNS, *map(plain_cell, measured), *map(plain_cell, columns)])
     for row in rows:
         lights = {light.name: _light_cells(light) for light in row.lights}
         cells = [_cell(getattr(row, column)) for column in COLUMNS]
         cells += _measured_cells(row, planes, observers)
         empty_cells = [""] * len(LIGHT_COLUMNS)
-        table.writerow([*cells, *(x for name in names for x in lights.get(name, empty_cells))])
+        cells += [x for name in names for x in lights.get(name, empty_cells)]
+        of_lamps = {light.name: light.drives for light in row.lights}
+        cells += [_cell(of_lamps.get(name, {}).get(emitter)) for name, emitter in drives]
+        table.writerow(cells)
     return text.getvalue()
 
 

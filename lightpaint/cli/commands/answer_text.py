@@ -40,7 +40,7 @@ from lightpaint.report.diagnosis_sentences import (
 from lightpaint.report.glare_text import GLARE_HEADINGS, glare_rows
 from lightpaint.report.measures import energy_shares
 from lightpaint.report.page.constraint_section import closer_choice
-from lightpaint.report.phrases import spoken_drives, spoken_percent, spoken_preference
+from lightpaint.report.phrases import spoken_lamp, spoken_percent, spoken_preference, spoken_wheels
 from lightpaint.report.planes_text import HEADINGS, glare_by_title, plane_rows, planes_sentences
 from lightpaint.sentences import Sentence, SourceKey
 
@@ -69,6 +69,8 @@ def show_look(look: Look, folder: Path, *, table: Table = "short") -> None:
         _show_all(look)
     else:
         _show_short(look)
+    if wheels := spoken_wheels(look.lighting.lights):
+        terminal.tell(wheels)
     terminal.write("")
     if look.planes is not None:
         show_planes(look.planes)
@@ -350,7 +352,7 @@ def _show_all(look: Look) -> None:
 
 def _constraint_text(light: LightSetting) -> str:
     """Return the constraint on a light, of a lamp the drives of its emitters."""
-    text = light.constraint if light.lamp is None else spoken_drives(light.drives)
+    text = light.constraint if light.lamp is None else spoken_lamp(light)
     return text + "*" * light.is_active
 
 

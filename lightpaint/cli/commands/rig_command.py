@@ -27,6 +27,7 @@ def rig(
     gdtf_folder: Path | None,
     zoom: float | None,
     pixels: bool,
+    open_wheels: bool,
 ) -> CommandOutcome:
     """Run `lightpaint rig SHOW.mvr -o F.xml`."""
     if room is not None and only_lights:
@@ -40,7 +41,7 @@ def rig(
     unit = cd_per_unit(content.rig)
     texts = {
         output: scene_text(content.rig, unit, None if only_lights else surroundings.room),
-        lights_file_beside(output): lights_text(content.rig, unit),
+        lights_file_beside(output): lights_text(content.rig, unit, open_wheels=open_wheels),
     }
     files = [*texts, *(folder / name for name in surroundings.files)]
     _check(files, [show, *([] if room is None else [room])], folder, force=force)

@@ -307,6 +307,11 @@ def _rig(parser: argparse.ArgumentParser) -> None:
         action="store_true",
         help="write a scene with nothing but the lights, to include in another",
     )
+    parser.add_argument(
+        "--open-wheels",
+        action="store_true",
+        help="leave colour wheels open (default: each lamp gets the slot closest to its answer)",
+    )
     add_rig_reading(parser, has_zoom=True)
     add_output(
         parser,

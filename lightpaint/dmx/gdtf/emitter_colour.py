@@ -96,7 +96,7 @@ def emitter_colour(suffix: str, link: str | None, emitters: Sequence[Element]) -
     element = by_name.get((link or name).casefold(), by_name.get(name))
     if element is None:
         return EmitterColour(name, xy, share, is_usual=True)
-    found = _parsed(element.get("Color"))
+    found = parsed_colour(element.get("Color"))
     measured = library("pygdtf").Emitter(xml_node=element)
     wave = measured.dominant_wave_length
     own = found[0] if found else _spectral(measured.measurements)
@@ -105,7 +105,7 @@ def emitter_colour(suffix: str, link: str | None, emitters: Sequence[Element]) -
     candela, curve = _measured_light(measured.measurements)
     return EmitterColour(
         " ".join(element.get("Name", "").lower().split()) or name,
-        _bounded(own or xy),
+        bounded(own or xy),
         found[1] if found and found[1] > 0 else share,
         candela,
         curve,
@@ -113,17 +113,17 @@ def emitter_colour(suffix: str, link: str | None, emitters: Sequence[Element]) -
     )
 
 
-def _parsed(text: str | None) -> tuple[Chromaticity, float] | None:
+def parsed_colour(text: str | None) -> tuple[Chromaticity, float] | None:
     """Return chromaticity and Y of the text of a colour; None if there is none."""
     if not text:
         return None
     numbers = [float(x) for x in text.split(",")]
     if len(numbers) < 2 or not 0 < numbers[1] <= 1:
         return None
-    return _bounded((numbers[0], numbers[1])), numbers[2] if len(numbers) > 2 else 0.0
+    return bounded((numbers[0], numbers[1])), numbers[2] if len(numbers) > 2 else 0.0
 
 
-def _bounded(xy: Chromaticity) -> Chromaticity:
+def bounded(xy: Chromaticity) -> Chromaticity:
     """Return the chromaticity as a light may have it: positive X, Y and Z."""
     x, y = max(xy[0], 0.0), max(xy[1], LEAST_Y)
     size = max(x + y, 1.0)
@@ -163,9 +163,14 @@ def _measured_light(measurements: Sequence[Any]) -> tuple[float | None, Curve]:
     return top, () if is_straight or rising[-1] != (1.0, 1.0) else tuple(rising)
 
 
+def possible_kelvin(kelvin: float) -> float:
+    """Return the colour temperature that a file means, in the range that lamps have."""
+    return min(max(kelvin, 1000.0), 100_000.0)
+
+
 def xy_of_kelvin(kelvin: float) -> Chromaticity:
     """Return the chromaticity of a black body."""
-    [uv] = uv_of_black_body(np.array([min(max(kelvin, 1000.0), 100_000.0)]))
+    [uv] = uv_of_black_body(np.array([possible_kelvin(kelvin)]))
     return xy_of(xyz_of(uv))
 
 
@@ -204,7 +209,7 @@ SPACES: Mapping[str, ColourSpace] = {
 
 def primaries_of(space: ColourSpace) -> list[EmitterColour]:
     """Return red, green and blue of a space, whose sum is its white."""
-    corners = [_bounded(xy) for xy in space.corners]
+    corners = [bounded(xy) for xy in space.corners]
     columns = np.array([(x / y, 1.0, (1 - x - y) / y) for x, y in corners]).T
     (x, y), names = space.white, ("red", "green", "blue")
     shares = np.maximum(np.linalg.solve(columns, [x / y, 1.0, (1 - x - y) / y]), 1e-5)
@@ -223,7 +228,7 @@ def colour_space(name: str | None, main: Sequence[Element], more: Sequence[Eleme
     element = next(iter((*named, *main)), None)
     if element is None:
         return SPACES["sRGB"]
-    colours = [_parsed(element.get(key)) for key in ("Red", "Green", "Blue", "WhitePoint")]
+    colours = [parsed_colour(element.get(key)) for key in ("Red", "Green", "Blue", "WhitePoint")]
     if element.get("Mode") != "Custom" or None in colours:
         return SPACES.get(element.get("Mode", "sRGB"), SPACES["sRGB"])
     red, green, blue, white = (x[0] for x in colours if x is not None)
@@ -264,6 +269,23 @@ def density_of(suffix: str, filters: Sequence[Element], link: str | None) -> tup
     return as_rgb(places @ densities / (places @ places)), False
 
 
+def filter_spectrum(element: Element) -> tuple[Doubles, Doubles, float] | None:
+    """Return wavelengths in nanometres and transmissions in any unit, (k,) each, of a filter all
+    the way in, and the share of light that it lets through; None if it was not measured.
+    """
+    measured = library("pygdtf").Filter(xml_node=element).measurements
+    for x in sorted(measured, key=lambda x: -float(x.physical)):
+        spectrum = _spectrum(x)
+        if len(spectrum) > 1 and x.transmission > 0:
+            return spectrum[:, 0], spectrum[:, 1], _as_share(x.transmission)
+    return None
+
+
+def _as_share(transmission: float) -> float:
+    """Return a transmission as a share of 1: files have percentages, too."""
+    return float(transmission) / 100 if transmission > 1 else float(transmission)
+
+
 def _transmissions(element: Element) -> list[tuple[float, Doubles]]:
     """Return how far in a filter is, 0 to 1, and its transmission there in linear Rec.709."""
     points = []
@@ -272,10 +294,9 @@ def _transmissions(element: Element) -> list[tuple[float, Doubles]]:
         if len(spectrum) > 1 and measurement.physical > 0 and measurement.transmission > 0:
             xy = xy_of_spectrum(*spectrum.T)
             if xy is not None:
-                percent = float(measurement.transmission)
-                level = percent / 100 if percent > 1 else percent
+                level = _as_share(measurement.transmission)
                 points.append((measurement.physical / 100, level * rgb_of_xy(xy) / _equal_energy()))
-    colour = _parsed(element.get("Color"))
+    colour = parsed_colour(element.get("Color"))
     if not points and colour is not None and colour[1] > 0:
         points.append((1.0, min(colour[1], 100.0) / 100 * rgb_of_xy(colour[0])))
     return points

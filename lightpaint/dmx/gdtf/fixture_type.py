@@ -56,7 +56,9 @@ class FixtureType:
         tree, channels = self._parts(name)
         kept = [x for x in channels if breaks is None or x.dmx.dmx_break in breaks]
         with reading(self.file):
-            mode = ModeReader(name, tree, kept, self._described, zoom=zoom).read(pixels=pixels)
+            wheels = self._element.findall("Wheels/Wheel")
+            reader = ModeReader(name, tree, kept, self._described, wheels, zoom=zoom)
+            mode = reader.read(pixels=pixels)
             numbers = [(*x.xy, x.candela) for light in mode.lights for x in light.emitters]
             if not np.isfinite(numbers).all():
                 raise ValueError("light that is not finite")

@@ -49,6 +49,14 @@ class ChannelFunction:
         start, end = self.physical
         return (end, start) if self.element.get("DMXInvert") == "Yes" else (start, end)
 
+    @property
+    def open_level(self) -> int:
+        """The level at which its value is largest: the middle of its levels if it is equal."""
+        start, end = self.ends
+        if start == end:
+            return (self.first + self.last) // 2
+        return self.first if start > end else self.last
+
     def value_at(self, level: int) -> float:
         """Return what it does at a level."""
         span = max(self.last - self.first, 1)
@@ -70,6 +78,10 @@ class ModeChannel:
     dmx: DmxChannel
     node: int
     functions: tuple[ChannelFunction, ...]
+
+    def function_at(self, level: int) -> ChannelFunction | None:
+        """Return the function that a level is in; None if there is none."""
+        return next((x for x in self.functions if x.first <= level <= x.last), None)
 
     def function(self, attribute: str) -> ChannelFunction | None:
         """Return the function with this attribute that has most levels; None if there is none."""

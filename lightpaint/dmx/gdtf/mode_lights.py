@@ -16,7 +16,8 @@ import numpy as np
 
 from lightpaint.arrays import Doubles
 from lightpaint.dmx.color_mixing import can_invert
-from lightpaint.dmx.console_rig import DmxChannel, RigEmitter, RigFilter
+from lightpaint.dmx.console_rig import DmxChannel, RigEmitter, RigFilter, RigWheel
+from lightpaint.dmx.gdtf.color_wheel import SlotColour, wheel_slots
 from lightpaint.dmx.gdtf.emitter_colour import (
     SPACES,
     USUAL_FILTERS,
@@ -32,6 +33,7 @@ from lightpaint.dmx.gdtf.emitter_colour import (
 from lightpaint.dmx.gdtf.geometry_tree import Placed
 from lightpaint.dmx.gdtf.mode_channels import ChannelFunction, Curve, ModeChannel, curve_of
 from lightpaint.dmx.gdtf.mode_heads import ModeHead, mode_heads
+from lightpaint.dmx.gdtf.shutters import shutter_levels
 from lightpaint.dmx.spot_cone import solid_angle
 from lightpaint.sentences import Hint, Sentence
 
@@ -61,6 +63,9 @@ _PLACEHOLDER = Sentence(
     Hint("gdtf_folder"),
 )
 
+#: Channels that choose a slot of a colour wheel.
+_COLOR_WHEEL = re.compile(r"Color\d+")
+
 #: Channels of the colour temperature, and the kelvin that they can mean.
 _WARMTH = re.compile(r"CT[OBC]")
 LEAST_KELVIN, MOST_KELVIN = 1000.0, 25_000.0
@@ -88,6 +93,7 @@ class ModeLight:
     filters: tuple[RigFilter, ...] = ()
     chromaticity: tuple[int, ...] = ()
     whites: tuple[int, ...] = ()
+    wheel: RigWheel | None = None
 
 
 @dataclass(frozen=True)
@@ -128,8 +134,8 @@ class _Beam:
 class ModeReader:
     """The lights of one mode, from its geometries and channels.
 
-    elements: returns the elements at a path of the type's physical descriptions. zoom: wanted beam
-    angle in degrees; None for the one that the file rests at.
+    elements: returns the elements at a path of the type's physical descriptions. wheels: of the
+    type. zoom: wanted beam angle in degrees; None for the one that the file rests at.
     """
 
     def __init__(
@@ -138,6 +144,7 @@ class ModeReader:
         tree: Sequence[Placed],
         channels: Sequence[ModeChannel],
         elements: Callable[[str], list[Element]],
+        wheels: Sequence[Element] = (),
         *,
         zoom: float | None,
     ) -> None:
@@ -150,14 +157,22 @@ class ModeReader:
         # These are asked for each beam, of which there may be hundreds.
         self.emitter_colour = cache(partial(emitter_colour, emitters=tuple(self.emitters)))
         self._with_attribute, self._shape = cache(self._find_attribute), cache(self._set_curve)
+        levels, remarks = shutter_levels(self.channels)
+        for k, level in levels.items():
+            self.dmx[k] = replace(self.dmx[k], default=level)
+        for remark in remarks:
+            self._remark(remark)
         self.beams = self._beams(zoom)
         self.way = self._way()
         self.whites: list[int] = []
+        self.wheels, self.slots = wheels, list[SlotColour]()
+        self.wheel: RigWheel | None = None
 
     def read(self, *, pixels: bool) -> FixtureMode:
         """Return the mode. pixels: True for a light for each beam that has channels of its own."""
         groups = self._groups(pixels=pixels)
         self.whites = self._white_channels() if len(groups) == 1 else []
+        self.wheel = self._wheel() if len(groups) == 1 and not self.whites else None
         candelas, emission = self._candelas()
         if self._is_placeholder():
             lone = self._lone_light(groups[0], candelas)
@@ -308,7 +323,8 @@ class ModeReader:
             self._shape(k, _DIMMER)
         emitters = self._emitters(beams, candelas)
         filters, chromaticity = self._filters(beams), self._chromaticity(beams)
-        is_plain = not (filters or chromaticity or self.whites or any(x.channels for x in emitters))
+        is_plain = not (filters or chromaticity or any(x.channels for x in emitters))
+        is_plain = is_plain and not (self.whites or self.wheel)
         if is_plain and not own:
             if not parts:
                 return None
@@ -328,6 +344,7 @@ class ModeReader:
             filters,
             chromaticity,
             tuple(self.whites),
+            self.wheel,
         )
 
     def _lone_light(
@@ -373,7 +390,7 @@ class ModeReader:
                 added = candelas[beam.node, colour.name]
                 totals[colour.name] = totals.get(colour.name, 0.0) + added
         watts = [x.watts for x in beams if x.watts is not None]
-        parts = 1 if self.whites else len(colours)
+        parts = len(colours) if self._shine_together else 1
         share = sum(watts) / parts if len(watts) == len(beams) else None
         return [
             RigEmitter(name, x.xy, totals[name], tuple(sorted(channels[name])), x.curve, share)
@@ -399,16 +416,43 @@ class ModeReader:
         if found and (self.way is _XY or self._filters([beam])):
             space = replace(SPACES["sRGB"], white=beam.xy)
             return [(x, []) for x in primaries_of(space)]
+        if self.slots:
+            return [(x.colour, []) for x in self.slots]
         if self.whites:
             return [(x, []) for x in whites_of(beam.kelvin, self._white_range())]
         return [(EmitterColour("white", beam.xy, 1.0), [])]
+
+    @property
+    def _shine_together(self) -> bool:
+        """False for emitters that are all the light of one lamp in turn: whites, slots."""
+        return not (self.whites or self.slots)
+
+    def _wheel(self) -> RigWheel | None:
+        """Return the colour wheel of all beams, for a lamp that mixes no colours and can be dimmed;
+        None without one of at least two slots. Set its slots.
+        """
+        if self.way is not None or not self._common_dimmers or self._is_placeholder():
+            return None
+        for k, match in self._with_attribute(_COLOR_WHEEL):
+            if all(self.channels[k].node in beam.placed.ancestry for beam in self.beams):
+                kelvin = self.beams[0].kelvin
+                slots = wheel_slots(self.channels[k], match[0], self.wheels, self.filters, kelvin)
+                if len(slots) > 1:
+                    self.slots = slots
+                    self._remark(f"{match[0]} is a wheel of {len(slots)} colours, one at a time")
+                    return RigWheel(k, tuple(x.slot for x in slots))
+        return None
+
+    @property
+    def _common_dimmers(self) -> set[int]:
+        """The places of the dimmers of all beams."""
+        return set.intersection(*(self._dimmers(beam) for beam in self.beams))
 
     def _white_channels(self) -> list[int]:
         """Return the places of the channels that set the colour temperature of all beams, for a
         lamp that mixes no other colours and can be dimmed.
         """
-        own = set.intersection(*(self._dimmers(beam) for beam in self.beams))
-        if self.way is not None or not own or self._is_placeholder():
+        if self.way is not None or not self._common_dimmers or self._is_placeholder():
             return []
         for k, _ in self._with_attribute(_WARMTH):
             function = self._warmth_of(k)
@@ -489,6 +533,7 @@ class ModeReader:
     def _remark_resting(self, lights: Sequence[ModeLight]) -> None:
         """Remark on channels that change the colour, but rest."""
         used = {k for light in lights for k in (*light.chromaticity, *light.whites)}
+        used |= {light.wheel.channel for light in lights if light.wheel is not None}
         for light in lights:
             used |= {k for x in light.emitters for k in x.channels}
             used |= {k for x in light.filters for k in x.channels}
@@ -528,8 +573,8 @@ class ModeReader:
         candelas = {}
         for beam in self.beams:
             flux = USUAL_LUMENS / len(self.beams) if known is None else beam.flux or 0.0
-            # Two whites are all the light of one lamp in turn.
-            total = 1.0 if self.whites else sum(x.share for x in by_beam[beam.node])
+            together = sum(x.share for x in by_beam[beam.node])
+            total = together if self._shine_together else 1.0
             for x in by_beam[beam.node]:
                 candelas[beam.node, x.name] = flux * x.share / total / angles[beam.node]
         return candelas, "LuminousFlux" if known is not None else f"{USUAL_LUMENS:g} lm"

@@ -59,6 +59,8 @@ class LightSetting:
     part_of: of an emitter that is a light, as in a basis of spectra, the name of its lamp. mix,
     mix_errors: of a lamp of such lights, the drives of its emitters and their standard errors; None
     where they follow from the emission.
+    mixed_emission: of a lamp with a colour wheel that shines, the emission that the solve found
+    before the wheel came to a slot, unless the slot was fixed.
     """
 
     name: str
@@ -81,12 +83,15 @@ class LightSetting:
     part_of: str = ""
     mix: tuple[float, ...] | None = None
     mix_errors: tuple[float | None, ...] | None = None
+    mixed_emission: RGB | None = None
 
     def __post_init__(self) -> None:
         if len(self.name) > MAX_NAME:
             raise LightingError(f"a light has a name of more than {MAX_NAME} characters")
         if not self.members:
             object.__setattr__(self, "members", (self.name,))
+        if self.mixed_emission is not None and (self.lamp is None or not self.lamp.is_wheel):
+            raise LightingError(f"light {self.name!r} has no colour wheel, and a colour for it")
         if self.mix is not None and (
             self.lamp is None
             or len(self.mix) != len(self.lamp.emitters)
@@ -95,6 +100,7 @@ class LightSetting:
             raise LightingError(f"light {self.name!r} has drives that are not of its emitters")
         self._check_errors()
         values = {"emission": self.emission, "weight": self.weight}
+        values |= {} if self.mixed_emission is None else {"mixed_emission": self.mixed_emission}
         for name, rgb in values.items():
             if not all(map(is_amount, map(abs, rgb) if self._may_be_negative else rgb)):
                 raise LightingError(
@@ -141,6 +147,7 @@ class LightSetting:
             weight=emission if weight is None else weight,
             mix=None,
             mix_errors=None,
+            mixed_emission=None,
             constraint="",
             is_active=False,
             standard_error=None,
@@ -179,6 +186,25 @@ class LightSetting:
         if self.lamp is None or self.lamp.powers_at_full is None:
             return None
         return np.asarray(np.array(list(self.drives.values())) @ self.lamp.powers_at_full)
+
+    @cached_property
+    def slot(self) -> str:
+        """The name of the slot at which its colour wheel is; "" without a wheel, or while it is
+        off.
+        """
+        is_wheel = self.lamp is not None and self.lamp.is_wheel
+        return next((name for name, drive in self.drives.items() if is_wheel and drive > 0), "")
+
+    @property
+    def slot_delta_e(self) -> float | None:
+        """The distance of the slot's colour from that which the solve asked for, in CIEDE2000 of a
+        white surface; None where none was asked for, or the lamp is off.
+        """
+        if self.lamp is None or self.mixed_emission is None or not self.slot:
+            return None
+        return float(
+            self.lamp.distances(np.array(self.mixed_emission))[self.lamp.names.index(self.slot)]
+        )
 
     @property
     def is_partly_reached(self) -> bool:
@@ -414,13 +440,15 @@ class Lighting(Shown, Mapping[str, LightSetting]):
         labels: Sequence[tuple[str, bool]] | None = None,
         reached: Bools | None = None,
         lamps: Mapping[int, Lamp] | None = None,
+        mixed_emissions: Mapping[int, RGB] | None = None,
         **fields: Any,
     ) -> "Lighting":
         """Make a lighting of weights (n, 3) in the order of `lights`, which may be those of a
         basis.
 
         labels: for each light its `constraint` and whether this `is_active`. reached: (n, 3).
-        lamps: what mixes a light from emitters, by the light's index.
+        lamps: what mixes a light from emitters, by the light's index. mixed_emissions: see
+        `LightSetting`.
         """
         if isinstance(lights, Basis):
             fields.setdefault("scene_identity", lights.origin.scene_identity)
@@ -438,6 +466,7 @@ class Lighting(Shown, Mapping[str, LightSetting]):
                 label,
                 (bool(channels[0]), bool(channels[1]), bool(channels[2])),
                 (lamps or {}).get(k),
+                (mixed_emissions or {}).get(k),
             )
             for k, (light, weight, label, channels) in enumerate(
                 zip(lights, weights, labels or [("", False)] * count, is_reached, strict=True)
@@ -487,6 +516,7 @@ def _setting(
     label: tuple[str, bool],
     reached: tuple[bool, bool, bool],
     lamp: Lamp | None,
+    mixed_emission: RGB | None,
 ) -> LightSetting:
     # One unit of weight is unit-white emission, so that here the two are the same numbers.
     return LightSetting(
@@ -505,6 +535,7 @@ def _setting(
         lamp=lamp,
         is_outside_gamut=light.is_outside_gamut,
         part_of=light.lamp,
+        mixed_emission=mixed_emission,
     )
 
 

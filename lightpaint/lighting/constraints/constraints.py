@@ -33,13 +33,14 @@ from lightpaint.lighting.constraints.values import (
     parse_scale,
     parse_start,
     parse_strength,
+    parse_wheel,
     parse_whites,
 )
 from lightpaint.sentences import Sentence, SourceKey
 from lightpaint.validation import MAX_LISTED
 
 #: Keys of the constraints on one light, the first of which describe the lamp that it is.
-LAMP_KEYS = ("emitters", "power_share")
+LAMP_KEYS = ("emitters", "power_share", "wheel")
 LIGHT_KEYS = ("lock", "off", "limits", "color", "kelvin", "duv", "primaries", *LAMP_KEYS)
 
 #: Keys that determine the colours of a light, which can have one of them.
@@ -56,7 +57,8 @@ class LightConstraint:
     ends of a range of white, the LEDs of a fixture; None if any colour will do.
     whites: the range of white that it keeps to, if there is one.
     emitters: the emitters that mix its light, of which each dims between bounds. power_share: their
-    largest power together, relative to that of all at full.
+    largest power together, relative to that of all at full. wheel: whether they are slots of a
+    colour wheel, one of which shines at a time; or the name of the slot at which it stays.
     label: all this in few words. where: the name of the source in errors.
     """
 
@@ -68,6 +70,7 @@ class LightConstraint:
     whites: WhiteRange | None = None
     emitters: tuple[EmitterRequest, ...] = ()
     power_share: float | None = None
+    wheel: bool | str = False
     label: str = ""
     where: SourceKey = field(default_factory=SourceKey)
 
@@ -119,8 +122,9 @@ class LightConstraint:
                     "of its colours open: lock it at a colour",
                 )
             lock, primaries = Lock(lock.level, primaries[0]), None
+        wheel = parse_wheel(table, key, [x.name for x in emitters])
         is_off, label = "off" in table, _label(table)
-        return cls(lock, is_off, least, most, primaries, whites, emitters, share, label, key)
+        return cls(lock, is_off, least, most, primaries, whites, emitters, share, wheel, label, key)
 
 
 def _check_emitters(
@@ -130,7 +134,15 @@ def _check_emitters(
     if "emitters" not in table:
         if "power_share" in table:
             raise ConstraintError(where, " has power_share without the emitters that share it")
+        if "wheel" in table:
+            raise ConstraintError(where, " has wheel without emitters, which are its slots")
         return
+    mixing = {"power_share": "power_share" in table, "kelvin": len(primaries or ()) > 1}
+    if "wheel" in table and any(mixing.values()):
+        key = next(key for key, is_there in mixing.items() if is_there)
+        raise ConstraintError(
+            where, f" has wheel and {key}, and a wheel shows one slot at a time: leave {key} out"
+        )
     if "kelvin" in table and "limits" in table and len(primaries or ()) > 1:
         raise ConstraintError(
             where,
@@ -143,8 +155,6 @@ def _check_emitters(
             f" has emitters and {_first_key(table, COLOR_KEYS)!r}, and its emitters already say "
             "which colours it can mix: give one colour, or leave it out",
         )
-    if "limits" in table and "power_share" in table:
-        raise ConstraintError(where, " has limits and power_share: give one of them")
 
 
 def _label(table: Mapping[str, Any]) -> str:

@@ -11,7 +11,7 @@ import numpy as np
 from lightpaint.arrays import RGB, Doubles, as_rgb
 from lightpaint.basis.lights import BasisLight
 from lightpaint.colour.color import luminance
-from lightpaint.colour.lamp import MAX_EMITTERS, LampEmitter
+from lightpaint.colour.lamp import MAX_EMITTERS, MAX_SLOTS, LampEmitter
 from lightpaint.colour.photometry import photometry
 from lightpaint.colour.planckian_locus import matching_functions
 from lightpaint.colour.primaries import REC709, rgb_to_xyz
@@ -108,10 +108,10 @@ def parse_emitters(table: Mapping[str, Any], light: SourceKey) -> tuple[EmitterR
             f" is {one_line(repr(value))}: expected a list of emitters, "
             '[{name = "red", xy = [0.69, 0.31], cd = 900}]',
         )
-    if len(value) > MAX_EMITTERS:
-        raise ConstraintError(
-            where, f" lists {len(value)} emitters: at most {MAX_EMITTERS} can be mixed"
-        )
+    is_wheel = bool(table.get("wheel"))
+    if len(value) > (most := MAX_SLOTS if is_wheel else MAX_EMITTERS):
+        kind, what = ("slots", "be on a wheel") if is_wheel else ("emitters", "be mixed")
+        raise ConstraintError(where, f" lists {len(value)} {kind}: at most {most} can {what}")
     emitters = tuple(_parse_emitter(x, where / str(k + 1)) for k, x in enumerate(value))
     names = [x.name for x in emitters]
     if repeated := [name for name in names if names.count(name) > 1]:

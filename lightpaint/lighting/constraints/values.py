@@ -10,7 +10,7 @@ from lightpaint.arrays import RGB, as_rgb
 from lightpaint.colour.color import hex_to_rgb, kelvin_to_rgb, luminance
 from lightpaint.colour.emitter_preference import Preference
 from lightpaint.colour.white_range import WhiteRange, white_range
-from lightpaint.display_text import known_keys
+from lightpaint.display_text import known_keys, some_names
 from lightpaint.errors import ColorError, ConstraintError
 from lightpaint.files import one_line
 from lightpaint.sentences import SourceKey
@@ -258,6 +258,17 @@ def parse_power_share(table: Mapping[str, Any], where: SourceKey) -> float | Non
     return None if value is None else float(value)
 
 
+def parse_wheel(table: Mapping[str, Any], where: SourceKey, slots: Sequence[str]) -> bool | str:
+    """Return whether emitters are slots of a colour wheel, or the name of one at which it stays."""
+    value = table.get("wheel", False)
+    if not (isinstance(value, bool) or value in slots):
+        raise ConstraintError(
+            where / "wheel",
+            f" is {one_line(repr(value))}: expected true, or one of its slots, {some_names(slots)}",
+        )
+    return cast("bool | str", value)
+
+
 def describe_constraint(key: str, value: Any) -> str:
     """Return a key and its value in few words, for tables."""
     if value is True:
@@ -266,6 +277,8 @@ def describe_constraint(key: str, value: Any) -> str:
         return f"limits {_text(value.get('min', 0))} to {_text(value.get('max', '∞'))}"
     if key == "emitters":
         return " + ".join(str(emitter["name"]) for emitter in value)
+    if key == "wheel":
+        return f"wheel at {value}"
     if key == "power_share":
         return f"{100 * value:g}% of full power"
     if key == "kelvin" and isinstance(value, Sequence):

@@ -36,7 +36,7 @@ from lightpaint.lighting.loss.pixel_bins import block_side
 from lightpaint.lighting.loss.weight_penalty import PaintTerms, joint_pull, pull_to_current
 from lightpaint.lighting.normal_equations import NormalEquations
 from lightpaint.lighting.unknowns.gamuts import Gamuts, PaintedLight
-from lightpaint.lighting.unknowns.reduced_problem import solve_reduced
+from lightpaint.lighting.unknowns.reduced_problem import nearest_weights, solve_reduced
 from lightpaint.lighting.unknowns.reduction import Reduction
 from lightpaint.lighting.unknowns.white_mixes import (
     LastMultipliers,
@@ -91,6 +91,7 @@ class LiveSolver:
         self._fit, self._constraints, self._reduction = fit, constraints, reduction
         self._whites: WhiteLimits | None = None
         self._untouched: Doubles | None = None
+        self._mixed_emissions: Mapping[int, RGB] = {}
         self._within, self._gamuts_of = reduction, tuple[LiveView, ...]()
         self._answers_left = 0
         self._last_multipliers = LastMultipliers(close=MET_UNDER_BRUSH)
@@ -131,6 +132,13 @@ class LiveSolver:
         return {k: lamp.while_painting for k, lamp in self._reduction.lamps.items()}
 
     @property
+    def mixed_emissions(self) -> Mapping[int, RGB]:
+        """The emissions that lamps with colour wheels had in the last answer before these came to
+        their slots, by the light's index.
+        """
+        return self._mixed_emissions
+
+    @property
     def mode(self) -> Space:
         """The space of the answers."""
         return self._fit.space or "linear"
@@ -159,6 +167,7 @@ class LiveSolver:
         """
         views = tuple(view for view in self._views if view.is_painted)
         if not views:
+            self._mixed_emissions = {}
             return self._unpainted_answer()
         if not self._is_kept_to:
             # Weights that the constraints forbid may well be closer to the painting.
@@ -169,6 +178,31 @@ class LiveSolver:
         if not (while_painting and self._answers_left and self._last_read == views):
             self._read_paint(views, unpainted)
         self._answers_left -= 1
+        # After a change of the painting the last answer may be worse than the current lighting.
+        starts = start, self._unpainted_answer()
+        mixed = self._improve(starts, views, unpainted, while_moving=while_moving)
+        if not self._within.open_wheels:
+            return mixed
+        mixing, self._within = self._within, self._within.with_slots(mixed)
+        self._mixed_emissions = self._within.mixed_emissions
+        at_slots = nearest_weights(self._within, mixed)
+        weights = self._improve((at_slots,), views, unpainted, while_moving=while_moving)
+        self._within = mixing
+        return weights
+
+    def _improve(
+        self,
+        starts: tuple[Doubles, ...],
+        views: tuple[LiveView, ...],
+        unpainted: float,
+        *,
+        while_moving: bool,
+    ) -> Doubles:
+        """Return the best weights (n, 3) within the present reduction, from the best of some, the
+        first of which are the last ones.
+
+        unpainted: the weight of each unpainted pixel. while_moving: as for `answer`.
+        """
         reduction, pull = self._within, self._pull
 
         def best(equations: NormalEquations, begin: Doubles) -> Doubles:
@@ -177,11 +211,10 @@ class LiveSolver:
         allowed = partial(_allowed, reduction)
 
         if self._has_tiles and not while_moving:
-            return best(reduce(add, (x.tiles().equations(unpainted) for x in views)), start)
+            return best(reduce(add, (x.tiles().equations(unpainted) for x in views)), starts[0])
         films = self._joint_films(views)
         pixels = films.pixels(unpainted, self._fit.transform)
-        # After a change of the painting the last answer may be worse than the current lighting.
-        starts = allowed(start), self._unpainted_answer()
+        starts = allowed(starts[0]), *starts[1:]
         if self._are_many:
             self._within, weights = self._many.improve(
                 films.rows, pixels, starts, reduction, self._solve_some, pull, _allowed
@@ -192,7 +225,8 @@ class LiveSolver:
     def _unpainted_answer(self) -> Doubles:
         """Return the answer without paint, (n, 3)."""
         if self._untouched is None:
-            self._untouched = _nearest(self._reference, self._views, self._reduction)
+            at_slots = self._reduction.with_slots(self._reference)
+            self._untouched = _nearest(self._reference, self._views, at_slots)
         return self._untouched
 
     def _read_paint(self, views: tuple[LiveView, ...], unpainted: float) -> None:

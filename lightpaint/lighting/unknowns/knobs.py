@@ -22,6 +22,10 @@ from lightpaint.sentences import SourceKey
 #: Share by which a lower limit may exceed an upper one before they contradict: round-off.
 ROUND_OFF = 1e-12
 
+#: Luminance of a mix of slots, relative to the brightest one, that is round-off of a lamp that is
+#: off.
+DARK = 1e-6
+
 
 def _dimmer_limits(
     constraint: LightConstraint, direction: Doubles, light: BasisLight
@@ -133,6 +137,27 @@ class Unknown:
 
 
 @dataclass(frozen=True)
+class ColorWheel:
+    """A colour wheel, whose slots are the unknowns of a knob.
+
+    lamp: of which they are the emitters. lower, upper: (e,), bounds of each while it shines; the
+    first is above the second for a slot that limits exclude.
+    """
+
+    lamp: Lamp
+    lower: Doubles
+    upper: Doubles
+
+    def has_color(self, emission: Doubles) -> bool:
+        """Return whether an emission (3,) is more than round-off."""
+        return float(luminance(emission)) > DARK * float(self.lamp.levels.max())
+
+    def slot_for(self, color: Doubles) -> int:
+        """Return the place of the allowed slot closest to a colour (3,)."""
+        return self.lamp.slot_for(color, self.lower <= self.upper)
+
+
+@dataclass(frozen=True)
 class Knob:
     """An independent control of the lighting: a light, or several on one dimmer.
 
@@ -142,6 +167,8 @@ class Knob:
     emitters, if it does; an unknown of 1 is then as bright as the lamp can be in that white.
     gamut: the gamut that confines the light, if it would leave it otherwise: all of it, or the part
     towards one `side` (white_mixes.py).
+    wheel: a colour wheel that has still to come to one of its slots, of which the unknowns are a
+    mix until then.
     """
 
     lights: tuple[int, ...]
@@ -152,6 +179,7 @@ class Knob:
     gamut: ColorHull | None = None
     side: int | None = None
     lamp: Lamp | None = None
+    wheel: ColorWheel | None = None
 
     @cached_property
     def is_free(self) -> bool:
@@ -161,11 +189,42 @@ class Knob:
             for u, axis in zip(self.unknowns, np.eye(3), strict=True)
         )
 
+    def has_drives_of(self, lamp: Lamp) -> bool:
+        """Return whether its unknowns are the drives of a lamp's emitters."""
+        colors = [x.columns[0][1] for x in self.unknowns]
+        return len(self.lights) == 1 and np.array_equal(colors, lamp.columns)
+
     def switched_off(self) -> "Knob":
         """Return the knob fixed at 0."""
         return replace(
             self, unknowns=tuple(replace(u, lower=0.0, upper=0.0) for u in self.unknowns)
         )
+
+    @property
+    def has_open_wheel(self) -> bool:
+        """True if a wheel has still to come to a slot, and the light may be on."""
+        return self.wheel is not None and any(x.upper > 0 for x in self.unknowns)
+
+    def solved_color(self, weights: Doubles) -> Doubles:
+        """Return the emission (3,) that the mix of slots has in weights (n, 3) of lights, or of
+        emitters that are lights.
+        """
+        assert self.wheel is not None
+        if len(self.lights) == 1:
+            return np.asarray(weights[self.lights[0]])
+        lamp = self.wheel.lamp
+        return lamp.mix(weights[list(self.lights), 0] / lamp.levels)
+
+    def at_slot(self, slot: int) -> "Knob":
+        """Return the knob of a wheel that stays at a slot, by its place."""
+        assert self.wheel is not None
+        bounds = [(0.0, 0.0)] * len(self.unknowns)
+        bounds[slot] = float(self.wheel.lower[slot]), float(self.wheel.upper[slot])
+        unknowns = tuple(
+            replace(x, lower=low, upper=high)
+            for x, (low, high) in zip(self.unknowns, bounds, strict=True)
+        )
+        return replace(self, unknowns=unknowns, limit=None, wheel=None)
 
     def with_window(self, window: tuple[int, int]) -> "Knob":
         """Return the knob as a mix of two other whites of its range."""
@@ -277,25 +336,78 @@ def lamp_of(
             f" lists emitters, and {light.name!r} can only be dimmed as a whole: leave them out",
         )
     emitters = tuple(x.in_light(light, cd_per_unit) for x in constraint.emitters)
-    return Lamp(emitters, constraint.power_share, prefer or "watts")
+    is_wheel = constraint.wheel is not False
+    return Lamp(emitters, constraint.power_share, prefer or "watts", is_wheel)
 
 
 def lamp_knob(k: int, light: BasisLight, constraint: LightConstraint, lamp: Lamp) -> Knob:
-    """Make the knob of a lamp, whose unknowns are the drives of its emitters."""
+    """Make the knob of a lamp, whose unknowns are the drives of its emitters; under limits of power
+    and luminance, the corners of what it can emit.
+    """
+    if lamp.is_wheel:
+        return _wheel_knob(k, light, constraint, lamp)
     lower, upper = np.zeros(len(lamp.most)), lamp.most
-    unknowns = tuple(
-        Unknown(((k, rgb),), 0.0, most)
-        for rgb, most in zip(lamp.columns, upper.tolist(), strict=True)
-    )
-    if lamp.power_share is not None:
-        return Knob((k,), unknowns, (tuple(map(float, lamp.powers)), 0.0, lamp.power_share))
+    unknowns = _unknowns_of(k, lamp.columns, upper)
     least, most = _luminance_limits(constraint, light, "mixes emitters")
-    if least == 0 and np.isinf(most):
+    is_unlimited = least == 0 and np.isinf(most)
+    if lamp.power_share is not None and is_unlimited:
+        return Knob((k,), unknowns, (tuple(map(float, lamp.powers)), 0.0, lamp.power_share))
+    if lamp.power_share is not None:
+        return _corner_knob(k, light, constraint, lamp, (least, most))
+    if is_unlimited:
         return Knob((k,), unknowns)
     coefficients = np.asarray(luminance(lamp.columns), np.float64)
     _check_room(constraint, light, least, min(most, float(coefficients @ upper)))
     _check_room(constraint, light, lower, upper)
     return Knob((k,), unknowns, (tuple(map(float, coefficients)), least, most))
+
+
+def _unknowns_of(k: int, colors: Doubles, upper: Doubles) -> tuple[Unknown, ...]:
+    """Return an unknown of light k for each of some colours (e, 3), from 0 to `upper` (e,)."""
+    pairs = zip(colors, upper.tolist(), strict=True)
+    return tuple(Unknown(((k, rgb),), 0.0, high) for rgb, high in pairs)
+
+
+def _corner_knob(
+    k: int,
+    light: BasisLight,
+    constraint: LightConstraint,
+    lamp: Lamp,
+    limits: tuple[float, float],
+) -> Knob:
+    """Make the knob of a lamp under two limits, which mixes the corners of what it can emit.
+
+    What bounds, power and luminance allow is convex: its corners, in shares of 1, mix all of it.
+    """
+    least, most = limits
+    corners = lamp.corners(least, most)
+    _check_room(constraint, light, least, most if len(corners) else -np.inf)
+    if least == 0:  # black is a corner, too, and takes no share
+        corners = corners[np.abs(corners).max(axis=1) > 0]
+    unknowns = _unknowns_of(k, corners, np.full(len(corners), np.inf))
+    return Knob((k,), unknowns, ((1.0,) * len(corners), 1.0 if least > 0 else 0.0, 1.0))
+
+
+def _wheel_knob(k: int, light: BasisLight, constraint: LightConstraint, lamp: Lamp) -> Knob:
+    """Make the knob of a lamp with a colour wheel: at its slot, if the constraint names it, or at
+    the one that is closest to a colour.
+
+    Until the slot is chosen, the unknowns are shares of the light of all slots.
+    """
+    least, most = _luminance_limits(constraint, light, "has a colour wheel")
+    lower, upper = least / lamp.levels, np.minimum(lamp.most, most / lamp.levels)
+    roomiest = int(np.argmax(upper - lower))
+    _check_room(constraint, light, lower[roomiest], upper[roomiest])
+    wheel = ColorWheel(lamp, lower, upper)
+    unknowns = _unknowns_of(k, lamp.columns, np.where(lower <= upper, upper, 0.0))
+    knob = Knob((k,), unknowns, ((1.0,) * len(unknowns), 0.0, 1.0), wheel=wheel)
+    if isinstance(constraint.wheel, str):
+        slot = lamp.names.index(constraint.wheel)
+        _check_room(constraint, light, lower[slot], upper[slot])
+        return knob.at_slot(slot)
+    if constraint.primaries is not None:
+        return knob.at_slot(wheel.slot_for(np.array(constraint.primaries[0])))
+    return knob
 
 
 def dimmer_knob(
@@ -347,6 +459,8 @@ def tied_knob(
     for k in members:
         constraint = constraints[k] or LightConstraint()
         direction, least, most = _tied_direction(tie, names, lights[k], constraint)
+        if k in lamps and lamps[k].is_wheel:
+            direction = _on_wheel(lamps[k], constraint, direction)
         if k in lamps and not constraint.is_fixed:
             most = min(most, _brightest(lamps[k], direction, lights[k], constraint))
         lower, upper = max(lower, least), min(upper, most)
@@ -405,6 +519,8 @@ def fixed_emission(
     if constraint.lock is None:
         return np.zeros(3)
     emission = locked_emission(light, constraint.lock, constraint.where)
+    if lamp is not None and lamp.is_wheel:
+        emission = _on_wheel(lamp, constraint, emission)
     if lamp is not None and not lamp.can_mix(emission):
         raise ConstraintError(
             constraint.where,
@@ -412,6 +528,15 @@ def fixed_emission(
             f"{', '.join(lamp.names)} cannot mix: {_range_of(lamp, emission)}",
         )
     return emission
+
+
+def _on_wheel(lamp: Lamp, constraint: LightConstraint, emission: Doubles) -> Doubles:
+    """Return an emission (3,) in the colour of the slot that is closest, or the constraint's."""
+    if isinstance(constraint.wheel, str):
+        slot = lamp.names.index(constraint.wheel)
+    else:
+        slot = lamp.slot_for(emission)
+    return np.asarray(lamp.columns[slot] * luminance(emission) / lamp.levels[slot])
 
 
 def _range_of(lamp: Lamp, emission: Doubles) -> str:

@@ -50,14 +50,14 @@ class WholeLamps:
             [single] = [replace(knob, lights=places, unknowns=self._moved(knob.unknowns))]
             return (single,)
         lamp = lamps.get(knob.lights[0])
-        colors = [x.columns[0][1] for x in knob.unknowns]
-        if len(knob.lights) > 1 or lamp is None or not np.array_equal(colors, lamp.columns):
-            return (replace(knob, lights=places, unknowns=(self._dimmer(knob, lamps),)),)
+        if lamp is None or not knob.has_drives_of(lamp):
+            mixes = tuple(self._of_parts(x, lamps) for x in knob.unknowns)
+            return (replace(knob, lights=places, unknowns=mixes),)
         unknowns = tuple(
             replace(x, columns=((part, np.full(3, level)),))
             for x, part, level in zip(knob.unknowns, places, lamp.levels, strict=True)
         )
-        if knob.limit is None:
+        if knob.limit is None and knob.wheel is None:
             return tuple(Knob((k,), (x,)) for k, x in zip(places, unknowns, strict=True))
         return (replace(knob, lights=places, unknowns=unknowns),)
 
@@ -68,9 +68,8 @@ class WholeLamps:
             for x in unknowns
         )
 
-    def _dimmer(self, knob: Knob, lamps: dict[int, Lamp]) -> Unknown:
-        """Return the unknown of lights of one colour each, by the drives that mix it at full."""
-        [unknown] = knob.unknowns
+    def _of_parts(self, unknown: Unknown, lamps: dict[int, Lamp]) -> Unknown:
+        """Return an unknown of whole lights by the drives that mix its colours at full."""
         columns: list[tuple[int, Doubles]] = []
         for k, color in unknown.columns:
             lamp = lamps.get(k)

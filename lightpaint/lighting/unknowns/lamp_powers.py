@@ -14,7 +14,7 @@ def watts_of_unknowns(knobs: Sequence[Knob], lamps: Mapping[int, Lamp]) -> Doubl
     powers = list[float]()
     for knob in knobs:
         lamp = lamps.get(knob.lights[0]) if len(knob.lights) == 1 else None
-        if lamp is not None and len(lamp.emitters) == len(knob.unknowns) > 1:
+        if lamp is not None and knob.has_drives_of(lamp):
             powers += [x.watts or 0.0 for x in lamp.emitters]
             continue
         for unknown in knob.unknowns:

@@ -71,6 +71,12 @@ def nearest_unknowns(reduction: Reduction, start: Doubles, reached: Bools) -> Do
     return x
 
 
+def nearest_weights(reduction: Reduction, weights: Doubles) -> Doubles:
+    """Return the weights (n, 3) nearest to others within the limits of each knob."""
+    all_lights = np.ones(len(weights), dtype=bool)
+    return reduction.weights(nearest_unknowns(reduction, weights, all_lights))
+
+
 def _nearest_in_group(group: KnobGroup, start: Doubles, low: Doubles, high: Doubles) -> Doubles:
     """Return the x of knobs, (k, u), between bounds (k, u), whose emissions are nearest to
     `start`.

@@ -14,7 +14,7 @@ from itertools import pairwise
 
 import numpy as np
 
-from lightpaint.arrays import Bools, Doubles, Indices, as_rgb
+from lightpaint.arrays import RGB, Bools, Doubles, Indices, as_rgb
 from lightpaint.basis.lights import BasisLight
 from lightpaint.colour.lamp import Lamp
 from lightpaint.errors import ConstraintError
@@ -61,6 +61,8 @@ class Reduction:
     gamuts: colours that lights without other constraints keep to.
     lamps: what mixes a light from emitters, by the light's index.
     requirements: sums that the answer has to reach, if there are any.
+    mixed_emissions: the emissions, by the light's index, of lamps with colour wheels before these
+    came to their slots.
     """
 
     fixed_weights: Doubles
@@ -70,6 +72,7 @@ class Reduction:
     gamuts: Gamuts | None = None
     lamps: Mapping[int, Lamp] = field(default_factory=dict)
     requirements: Requirements | None = None
+    mixed_emissions: Mapping[int, RGB] = field(default_factory=dict)
 
     @cached_property
     def unknowns(self) -> tuple[Unknown, ...]:
@@ -107,6 +110,27 @@ class Reduction:
         if self.gamuts is None:
             return ()
         return tuple(k for k, knob in enumerate(self.knobs) if _has_any_colour(knob))
+
+    @cached_property
+    def open_wheels(self) -> tuple[int, ...]:
+        """Places of the knobs of colour wheels that have still to come to a slot."""
+        return tuple(k for k, knob in enumerate(self.knobs) if knob.has_open_wheel)
+
+    def with_slots(self, weights: Doubles) -> "Reduction":
+        """Return the reduction with each colour wheel at the slot that comes closest to the colour
+        of its lamp in weights (n, 3).
+        """
+        knobs, mixed_emissions = [*self.knobs], {**self.mixed_emissions}
+        for k in self.open_wheels:
+            knob, wheel = knobs[k], knobs[k].wheel
+            assert wheel is not None
+            color = knob.solved_color(weights)
+            if wheel.has_color(color):
+                mixed_emissions[knob.lights[0]] = as_rgb(color)
+            else:  # off, but it may serve once other wheels have left their colours
+                color = np.zeros(3)
+            knobs[k] = knob.at_slot(wheel.slot_for(color))
+        return replace(self, knobs=tuple(knobs), mixed_emissions=mixed_emissions)
 
     @cached_property
     def has_equal_mixes(self) -> bool:
@@ -452,6 +476,8 @@ def _reduce_to(constraints: Constraints, lights: Sequence[BasisLight]) -> Reduct
             fixed[k] = fixed_emission(light, constraint, lamps.get(k))
         elif constraint is None:
             knobs.append(Knob.of_any_colour(k, is_scalar=light.is_scalar))
+        elif k in lamps and lamps[k].is_wheel:
+            knobs.append(lamp_knob(k, light, constraint, lamps[k]))
         elif light.is_scalar or (
             constraint.primaries is not None and len(constraint.primaries) == 1
         ):

@@ -88,7 +88,8 @@ class LightAnswer:
     that is not white. share: of the light in the picture. error: its uncertainty, in words.
     is_constrained: whether a constraint limits it. is_unreached: whether no paint depends on it.
     emission: linear, in the unit of the light. swatch: its colour for a screen, as in CSS. is_on:
-    whether it shines. drives: of the emitters of a lamp, 0 to 1, in their order.
+    whether it shines. drives: of the emitters of a lamp, 0 to 1, in their order. slot_delta_e: of a
+    lamp with a colour wheel, how far its slot is from the colour that was solved for.
     """
 
     emission: RGB
@@ -101,6 +102,7 @@ class LightAnswer:
     is_constrained: bool | None = field(default=None, metadata=OPTIONAL)
     is_unreached: bool | None = field(default=None, metadata=OPTIONAL)
     drives: tuple[float, ...] | None = field(default=None, metadata=OPTIONAL)
+    slot_delta_e: float | None = field(default=None, metadata=OPTIONAL)
 
 
 @dataclass(frozen=True)

@@ -6,7 +6,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from lightpaint.arrays import Doubles
+from lightpaint.arrays import RGB, Doubles
 from lightpaint.basis.basis import Basis
 from lightpaint.basis.lights import Lights
 from lightpaint.colour.display.view_transform import ViewTransform
@@ -35,6 +35,8 @@ class LiveAnswer:
         requests: In effect now, including those of a slider that still moves.
         before_slider: Those before the slider moved; None while none moves.
         weights: (n, 3), the last answer.
+        mixed_emissions: The emissions that lamps with colour wheels had in it before these came to
+            their slots, by the light's index.
     """
 
     def __init__(
@@ -51,6 +53,7 @@ class LiveAnswer:
         self.before_slider: SessionRequests | None = None
         self._basis = views[0].basis
         self.weights = self._basis.current_weights
+        self.mixed_emissions: Mapping[int, RGB] = {}
         self._settings, self._base_constraints, self._transform = settings, constraints, transform
         self._planes: SessionPlanes | None = None
         self._wishes: tuple[SessionRequests, tuple[str, ...], WishesInEffect | None] | None = None
@@ -176,6 +179,11 @@ class LiveAnswer:
         self.weights = self._live.answer(
             self.weights, while_moving=is_moving, while_painting=while_painting
         )
+        self.mixed_emissions = self._live.mixed_emissions
+
+    def accept(self, weights: Doubles, mixed_emissions: Mapping[int, RGB] | None = None) -> None:
+        """Show weights (n, 3) that were found elsewhere. mixed_emissions: as the attribute."""
+        self.weights, self.mixed_emissions = weights, mixed_emissions or {}
 
     def _fit(self, requests: SessionRequests) -> Settings:
         settings = requests.settings(self._settings)

@@ -244,7 +244,7 @@ class Session:
         if snapshot.version != self.version:
             return None
         if solution is not None:
-            self.live_answer.weights = solution.weights
+            self.live_answer.accept(solution.weights, solution.problem.reduction.mixed_emissions)
             self._keep_answer()
         findings = self.findings
         if judgement is not None:
@@ -255,9 +255,8 @@ class Session:
     @property
     def findings(self) -> protocol.Findings:
         """Findings that need no analysis."""
-        findings = answer_findings(
-            [view.basis for view in self.views], self.weights, self.live_answer.lamps
-        )
+        answer, bases = self.live_answer, [view.basis for view in self.views]
+        findings = answer_findings(bases, self.weights, answer.lamps, answer.mixed_emissions)
         if self.is_painted:
             return findings
         return replace(findings, headline=unpainted_headline(self.live_answer))
@@ -459,7 +458,7 @@ class Session:
         self._update_answer()
         if weights is not None:
             lights = self.views[0].basis.lights
-            self.live_answer.weights = weights_by_name(weights, names or lights.names, lights)
+            self.live_answer.accept(weights_by_name(weights, names or lights.names, lights))
         return self._patch_messages(changes)
 
     def _keep_answer(self) -> None:

@@ -6,7 +6,7 @@ from typing import Any
 
 import numpy as np
 
-from lightpaint.arrays import Doubles, as_rgb
+from lightpaint.arrays import RGB, Doubles, as_rgb
 from lightpaint.basis.basis import Basis
 from lightpaint.basis.lights import BasisLight
 from lightpaint.colour.color import LUMINANCE, luminance, rgb_to_hex
@@ -131,16 +131,20 @@ def _emitter_info(emitter: LampEmitter) -> EmitterInfo:
 
 
 def answer_findings(
-    bases: Sequence[Basis], weights: Doubles, lamps: Mapping[int, Lamp] | None = None
+    bases: Sequence[Basis],
+    weights: Doubles,
+    lamps: Mapping[int, Lamp] | None = None,
+    mixed_emissions: Mapping[int, RGB] | None = None,
 ) -> Findings:
     """Return the immediate findings on each light: emission, change, colour, share of the picture.
 
     With several views, `shares` has its part of each. lamps: what mixes a light from emitters, by
-    the light's index.
+    the light's index. mixed_emissions: of lamps with colour wheels before these came to
+    their slots.
     """
     lit = [(basis.totals * weights) @ LUMINANCE for basis in bases]
     lights = tuple(
-        _light_answer(light, weight, share, (lamps or {}).get(k))
+        _light_answer(light, weight, share, (lamps or {}).get(k), (mixed_emissions or {}).get(k))
         for k, (light, weight, share) in enumerate(
             zip(bases[0].lights, weights, _shares(sum(lit)), strict=True)
         )
@@ -155,7 +159,7 @@ def _shares(lit: Doubles) -> tuple[float, ...]:
 
 
 def _light_answer(
-    light: BasisLight, weight: Doubles, share: float, lamp: Lamp | None
+    light: BasisLight, weight: Doubles, share: float, lamp: Lamp | None, mixed: RGB | None
 ) -> LightAnswer:
     colour = photometry(as_rgb(weight), unit=light.unit)
     current, answered = (
@@ -172,7 +176,15 @@ def _light_answer(
         is_on=answered > OFF * current,
         share=share,
         drives=None if lamp is None else tuple(lamp.drives_for(weight).tolist()),
+        slot_delta_e=None if lamp is None else _slot_distance(lamp, weight, mixed),
     )
+
+
+def _slot_distance(lamp: Lamp, weight: Doubles, mixed: RGB | None) -> float | None:
+    """Return how far the slot of a wheel that shines is from the mix before it, in CIEDE2000."""
+    if mixed is None or not weight.any():
+        return None
+    return float(lamp.distances(np.array(mixed))[lamp.slot_for(weight)])
 
 
 @dataclass(frozen=True)

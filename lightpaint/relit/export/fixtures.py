@@ -59,6 +59,16 @@ class EmitterDrive:
 
 
 @dataclass(frozen=True)
+class WheelSlot:
+    """The slot at which a colour wheel is. delta_e: how far that is from the colour of the solve,
+    in CIEDE2000; None where the slot was given.
+    """
+
+    slot: str
+    delta_e: float | None
+
+
+@dataclass(frozen=True)
 class FixturePlace:
     """The place of a fixture, in scene units.
 
@@ -88,7 +98,8 @@ class Fixture:
     red, green, blue: linear emission in `unit`. y: its luminance. lumen, luminous: None unless the
     lighting has an absolute scale. kelvin, duv, hex: None if undefined. dmx: None for fixed lights.
     emitters: its emitters in the scene. place: place of the emitter, if it has only one and the
-    place is known. drives: of a lamp that mixes its light, in the order of its emitters.
+    place is known. drives: of a lamp that mixes its light, in the order of its emitters. wheel: of
+    a lamp with a colour wheel that is on.
     """
 
     name: str
@@ -107,6 +118,7 @@ class Fixture:
     dmx: Dmx | None
     place: FixturePlace | None = None
     drives: tuple[EmitterDrive, ...] = ()
+    wheel: WheelSlot | None = None
 
 
 def fixtures_of(lighting: Lighting) -> list[Fixture]:
@@ -153,6 +165,7 @@ def _fixture(lighting: Lighting, light: LightSetting, full: Mapping[str, float])
         dmx,
         _place_of(lighting, light),
         _drives_of(light),
+        WheelSlot(light.slot, light.slot_delta_e) if light.slot else None,
     )
 
 
@@ -221,6 +234,9 @@ COLUMNS = (
 #: Ends of the names of the columns of an emitter, and what they hold.
 ENDS, DRIVE_KEYS = ("", "_coarse", "_fine"), ("drive", "coarse", "fine")
 
+#: Columns of colour wheels.
+WHEEL_COLUMNS = ("wheel_slot", "wheel_delta_e")
+
 
 def fixtures_csv(lighting: Lighting) -> str:
     """Return a table with a line for each fixture; undefined numbers are empty cells.
@@ -229,27 +245,36 @@ def fixtures_csv(lighting: Lighting) -> str:
     """
     text = io.StringIO()
     table = csv.writer(text, lineterminator="\n")
-    lamps = (light.lamp for light in lighting.lights if light.lamp is not None)
+    lamps = [light.lamp for light in lighting.lights if light.lamp is not None]
     names = [*dict.fromkeys(name for lamp in lamps for name in lamp.names)]
     columns = (*COLUMNS, *(plain_cell(f"drive_{name}{end}") for name in names for end in ENDS))
+    if has_wheels := any(lamp.is_wheel for lamp in lamps):
+        columns = (*columns, *WHEEL_COLUMNS)
     if not lighting.animation:
-        table.writerows([columns, *(_cells_of(x, names) for x in fixtures_of(lighting))])
+        table.writerows(
+            [columns, *(_cells_of(x, names, has_wheels=has_wheels) for x in fixtures_of(lighting))]
+        )
         return text.getvalue()
     table.writerow(("frame", *columns))
     for frame, fixtures in _fixtures_by_frame(lighting).items():
-        table.writerows([[str(frame), *_cells_of(x, names)] for x in fixtures])
+        rows = (_cells_of(x, names, has_wheels=has_wheels) for x in fixtures)
+        table.writerows([[str(frame), *row] for row in rows])
     return text.getvalue()
 
 
-def _cells_of(fixture: Fixture, emitters: Sequence[str]) -> list[str]:
-    """Return the cells of a fixture's line. emitters: names of those of all fixtures."""
+def _cells_of(fixture: Fixture, emitters: Sequence[str], *, has_wheels: bool) -> list[str]:
+    """Return the cells of a fixture's line. emitters: names of those of all fixtures. has_wheels:
+    whether one of these has a colour wheel.
+    """
     record = asdict(fixture)
     by_name = {x["name"]: x for x in record.pop("drives")}
     drives = [by_name.get(name, {}).get(key) for name in emitters for key in DRIVE_KEYS]
     dmx_values = record.pop("dmx") or dict.fromkeys(("dimmer", "red", "green", "blue"))
     place = record.pop("place") or asdict(FixturePlace())
+    wheel = record.pop("wheel") or dict.fromkeys(("slot", "delta_e"))
     record["emitters"] = " ".join(fixture.emitters)
-    return [_cell(x) for x in (*record.values(), *dmx_values.values(), *place.values(), *drives)]
+    values = [*record.values(), *dmx_values.values(), *place.values(), *drives]
+    return [_cell(x) for x in (*values, *(wheel.values() if has_wheels else ()))]
 
 
 def fixtures_json(lighting: Lighting) -> str:

@@ -20,11 +20,11 @@ FORMAT: Literal["lightpaint-dmx 1"] = "lightpaint-dmx 1"
 class LevelRow:
     """A channel that a light sets.
 
-    emitter: which it sets; `dimmer`, the name of a filter, x or y of a chromaticity, or `kelvin`
-    for one that sets several; pan or tilt of a head that is aimed, by the first light on it. drive:
-    of the emitter, 0 to 1; None for several. universe: as the network numbers it. channels: 1 to
-    512, that of the coarse byte first. value: of all bytes. An emitter without a channel of its own
-    has a row for its drive alone.
+    emitter: which it sets; `dimmer`, the name of a filter, x or y of a chromaticity, `kelvin` or
+    `wheel` for one that sets several; pan or tilt of a head that is aimed, by the first light on
+    it. drive: of the emitter, 0 to 1; None for several. universe: as the network numbers it.
+    channels: 1 to 512, that of the coarse byte first. value: of all bytes. An emitter without a
+    channel of its own has a row for its drive alone; of a wheel only the slot that is on.
     """
 
     fixture_id: str
@@ -37,16 +37,19 @@ class LevelRow:
     value: int | None
 
 
-#: What stands for an emitter in the rows of a dimmer and of a colour temperature.
-DIMMER, KELVIN = "dimmer", "kelvin"
+#: What stands for an emitter in the rows of a dimmer, of a colour temperature, and of a wheel.
+DIMMER, KELVIN, WHEEL = "dimmer", "kelvin", "wheel"
 
 
 def light_channels(light: RigLight) -> list[tuple[str, int]]:
     """Return what a light sets, and the place of the channel among those of its fixture."""
+    if not light.is_controlled:
+        return []
     return [
         *((DIMMER, k) for k in (*light.masters, *light.dimmers)),
         *((name, k) for name, k in zip("xy", light.chromaticity, strict=False)),
         *((KELVIN, k) for k in light.whites),
+        *((WHEEL, x.channel) for x in (light.wheel,) if x is not None),
         *((x.name, k) for x in light.filters for k in x.channels),
         *((x.name, k) for x in light.emitters for k in x.channels),
     ]
@@ -74,6 +77,8 @@ def _rows(
             drive, setting = of_light.get(name), _setting(fixture, k, levels, universes)
             yield LevelRow(*named, name, drive, *setting)
         for name in sorted(of_light.keys() - {name for name, _ in set_by}):
+            if light.wheel is not None and not of_light[name]:
+                continue  # a slot that is not shown
             yield LevelRow(*named, name, of_light[name], None, (), None)
         for name, k in _aim_channels(fixture, light):
             yield LevelRow(*named, name, None, *_setting(fixture, k, levels, universes))

@@ -35,7 +35,7 @@ from lightpaint.report.diagnosis_sentences import (
 from lightpaint.report.measures import energy_shares
 from lightpaint.report.page.figures import data_uri, thumbnail
 from lightpaint.report.page.html import html
-from lightpaint.report.phrases import spoken_drives, spoken_percent, spoken_preference
+from lightpaint.report.phrases import spoken_lamp, spoken_percent, spoken_preference, spoken_wheels
 
 #: Width of the map of an image in pixels.
 MAP_WIDTH = 144
@@ -144,7 +144,8 @@ def lights_table(
         shown = [rows[k] for k in visible_indices]
         folded = [(note, [rows[k] for k in other_indices])]
     has_scale = solution.lighting.cd_per_unit is not None
-    lead = " ".join(filter(None, (lead, spoken_preference(solution.lighting.lights))))
+    lights = solution.lighting.lights
+    lead = " ".join(filter(None, (lead, spoken_preference(lights), spoken_wheels(lights))))
     return html("lights", lead=lead, shown=shown, folded=folded, has_scale=has_scale)
 
 
@@ -264,7 +265,7 @@ def _constraint_note(setting: LightSetting) -> str:
     """Return the constraint on a light, and whether it holds the light."""
     note = " (limits it)" if setting.is_active else ""
     if setting.lamp is not None:
-        return f"{spoken_drives(setting.drives)}{note}"
+        return f"{spoken_lamp(setting)}{note}"
     return f"{setting.constraint}{note}" if setting.constraint else ""
 
 

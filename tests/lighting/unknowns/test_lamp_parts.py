@@ -70,6 +70,34 @@ def test_the_drives_are_the_bounded_least_squares_of_scipy(make_basis):
     assert [*lamps["a"].drives.values()] == pytest.approx(expected[:4], abs=1e-5)
 
 
+def test_a_wheel_shows_one_of_its_slots(make_basis, tmp_path):
+    basis = _basis(make_basis)
+    wheel = {"emitters": EMITTERS, "wheel": True}
+    constraints = Constraints.of({"a": wheel, "b": wheel})
+    solution = solve(basis, _target(basis, DRIVES), constraints=constraints, literal=True)
+    assert solution.certificate.converged
+    write_lighting(tmp_path / "a.json", solution.lighting)
+    for lamp in read_lighting(tmp_path / "a.json").values():
+        assert [x for x, drive in lamp.drives.items() if drive > 0] == [lamp.slot]
+        assert lamp.mixed_emission is not None
+        assert lamp.slot_delta_e == pytest.approx(
+            lamp.lamp.distances(np.array(lamp.mixed_emission)).min()
+        )
+
+
+def test_two_limits_of_a_lamp_hold(make_basis):
+    basis = _basis(make_basis)
+    limits = {"min": 2.0, "max": 6.0}
+    lamp = {"emitters": EMITTERS, "power_share": 0.3, "limits": limits}
+    constraints = Constraints.of({"a": lamp, "b": lamp})
+    solution = solve(basis, _target(basis, DRIVES * 1.3), constraints=constraints, literal=True)
+    assert solution.certificate.converged
+    for x in solution.lighting.of_lamps().values():
+        drives = np.array([*x.drives.values()])
+        assert drives @ x.lamp.powers <= 0.3 + SAME
+        assert 2 - SAME <= drives @ x.lamp.levels <= 6 + SAME
+
+
 def test_a_lamp_has_the_colour_and_the_spectrum_of_its_drives(make_basis):
     basis = _basis(make_basis)
     solved = solve(basis, _target(basis, DRIVES), constraints=Constraints.of(LAMPS), literal=True)

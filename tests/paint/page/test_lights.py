@@ -97,6 +97,28 @@ def test_a_lamp_of_emitters_shows_a_bar_for_each_drive(painter: Painter) -> None
     assert drives.get_attribute("aria-label") == "Drives: red 50 %, white 13 %"
 
 
+@pytest.mark.nightly
+def test_a_colour_wheel_shows_its_slot_and_how_far_it_is_off(painter: Painter) -> None:
+    painter.page.evaluate(
+        """() => {
+            const { store } = window.painter;
+            const [first, ...others] = store.value.lights;
+            const emitters = [{ name: 'open', swatch: '#fff' }, { name: 'red', swatch: '#f00' }];
+            const [answer, ...answers] = store.value.lightAnswers;
+            store.set({
+                lights: [{ ...first, emitters, address: 'Spot 1 2.21' }, ...others],
+                lightAnswers: [{ ...answer, drives: [0, 0.7], slot_delta_e: 7.04 }, ...answers],
+            });
+        }"""
+    )
+    slot = painter.page.locator('[data-light="key"] .wheel-slot')
+    assert slot.inner_text() == "red, ΔE 7.0 off"
+    assert painter.page.locator('[data-light="key"] .lamp-notes').inner_text().startswith("2.21")
+    # Under the brush only its drives are known.
+    painter.tell(kind="answer", version=9, exact=False, drives=[[0.5, 0], None])
+    assert slot.count() == 0
+
+
 def test_a_blackout_of_the_console_takes_two_presses(painter: Painter) -> None:
     assert painter.page.get_by_role("checkbox", name="Console").count() == 0  # there is none
     console = {"address": "sacn://127.0.0.1, universe 1", "is_on": False, "is_dark": False}

@@ -187,7 +187,7 @@ class Appearance:
 
     @property
     def hidden_lights(self) -> tuple[str, ...]:
-        """The lights of the place, and of the paint in question, that the samples do not determine."""
+        """The lights of place and paint in question that the samples do not determine."""
         of_area = () if self.area_lights is None else self.area_lights.names
         names = dict.fromkeys((*self.local_lights, *of_area))
         return tuple(name for name in names if name in self.undetermined_lights)

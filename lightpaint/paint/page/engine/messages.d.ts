@@ -515,7 +515,8 @@ export interface AnswerChoice {
  * that is not white. share: of the light in the picture. error: its uncertainty, in words.
  * is_constrained: whether a constraint limits it. is_unreached: whether no paint depends on it.
  * emission: linear, in the unit of the light. swatch: its colour for a screen, as in CSS. is_on:
- * whether it shines. drives: of the emitters of a lamp, 0 to 1, in their order.
+ * whether it shines. drives: of the emitters of a lamp, 0 to 1, in their order. slot_delta_e: of a
+ * lamp with a colour wheel, how far its slot is from the colour that was solved for.
  */
 export interface LightAnswer {
   emission: RGB;
@@ -528,6 +529,7 @@ export interface LightAnswer {
   is_constrained?: boolean;
   is_unreached?: boolean;
   drives?: number[];
+  slot_delta_e?: number;
 }
 
 /**

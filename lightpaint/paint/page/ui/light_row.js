@@ -91,7 +91,7 @@ export class LightRow extends Component {
           ${this.renderButtons()}
         </div>
         ${this.renderNumbers()}
-        ${light.emitters.length > 0 && html`<${Drives} emitters=${light.emitters} drives=${answer?.drives ?? []} />`}
+        ${light.emitters.length > 0 && html`<${Drives} emitters=${light.emitters} drives=${answer?.drives ?? []} address=${light.address} slotDeltaE=${answer?.slot_delta_e} />`}
         ${hasSlider && !light.is_fixed && this.renderDimmer()}
       </div>
       ${isOpen && html`<${LightConstraints} ...${this.props} />`}
@@ -200,15 +200,25 @@ export function Share({ share, pointerShare }) {
     <i style=${{ '--share': String(value) }}></i><span>${percentText(value)}</span></span>`;
 }
 
-/** The drives of a lamp's emitters, a bar for each.
- * @param {{emitters: Light["emitters"], drives: number[]}} props */
-function Drives({ emitters, drives }) {
+/** The drives of a lamp's emitters, a bar for each. Below them, universe and channel on a console,
+ * and the slot of a colour wheel with how far it is from the colour of the solve.
+ * @param {{emitters: Light["emitters"], drives: number[], address?: string, slotDeltaE?: number}} props */
+function Drives({ emitters, drives, address, slotDeltaE }) {
   const text = emitters.map(({ name }, j) => `${name} ${percentText(drives[j] ?? 0)}`).join(', ');
+  const slot = emitters.find((_, j) => (drives[j] ?? 0) > 0)?.name ?? '';
+  const isOff =
+    slotDeltaE !== undefined &&
+    t('{slot}, ΔE {distance} off', { slot, distance: slotDeltaE.toFixed(1) });
+  const place = address?.split(' ').at(-1);
   return html`<span class="drives" role="img" aria-label=${t('Drives: {text}', { text })} data-tip=${text}>
     ${emitters.map(
       ({ name, swatch }, j) =>
         html`<i key=${name} style=${{ '--drive': String(drives[j] ?? 0), color: swatch }}></i>`,
-    )}</span>`;
+    )}</span>
+    <span class="lamp-notes">
+      ${place && html`<span data-tip=${t('{fixture}: universe and channel', { fixture: address ?? '' })}>${place}</span>`}
+      ${isOff && html`<span class="wheel-slot" data-tip=${t('Its colour wheel is at the slot closest to the colour of the solve')}>${isOff}</span>`}
+    </span>`;
 }
 
 /** Remarks below the picture, where they do not change the height of the row.

@@ -311,7 +311,10 @@ export function answerUpdate(message, ui) {
 /** The answers with drives of emitters that are known under the brush.
  * @param {Ui["lightAnswers"]} answers @param {readonly (number[] | null)[]} drives */
 const withDrives = (answers, drives) =>
-  answers.map((answer, k) => (drives[k] ? { ...answer, drives: drives[k] } : answer));
+  answers.map((answer, k) =>
+    // How far a slot is off is known at the end of a stroke.
+    drives[k] ? { ...answer, drives: drives[k], slot_delta_e: undefined } : answer,
+  );
 
 /** @param {Events["progress"]} message @param {Ui} ui @returns {Partial<Ui>} */
 export function progressUpdate({ task, done, total, unit }, ui) {

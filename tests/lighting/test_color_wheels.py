@@ -1,0 +1,241 @@
+"""Lamps with a colour wheel: its slot is chosen after the solve, and all is solved again."""
+
+import json
+from typing import Any
+
+import numpy as np
+import pytest
+from least_squares import stack_rows
+from nightly import seeds
+from scipy.optimize import lsq_linear, nnls
+
+from lightpaint.colour.color import luminance
+from lightpaint.colour.color_difference import ciede2000, lab
+from lightpaint.errors import ConstraintError
+from lightpaint.lighting.analysis.analysis import analyse
+from lightpaint.lighting.animated_solve import solve_frames
+from lightpaint.lighting.answer.lighting_file import read_lighting, write_lighting
+from lightpaint.lighting.constraints.constraints import Constraints
+from lightpaint.lighting.fit import Fit, resolve_for_targets
+from lightpaint.lighting.live.live import LiveSolver
+from lightpaint.lighting.live.live_view import LiveView
+from lightpaint.lighting.problem import Problem
+from lightpaint.lighting.solve import solve
+from lightpaint.report.phrases import spoken_lamp, spoken_wheels
+from lightpaint.target.target import Target
+
+SIZE = (5, 4)
+
+SLOTS = [
+    {"name": name, "xy": xy, "Y": level, "watts": 400}
+    for name, xy, level in (
+        ("open", [0.31, 0.32], 6.0),
+        ("red", [0.69, 0.30], 0.5),
+        ("amber", [0.55, 0.43], 2.5),
+        ("green", [0.25, 0.66], 2.0),
+        ("blue", [0.15, 0.07], 0.3),
+        ("magenta", [0.38, 0.18], 0.9),
+        ("cto", [0.41, 0.39], 4.0),
+    )
+]
+
+#: Float64 of these conditions, and the oracle's own tolerance.
+SAME = 1e-8
+
+
+def _case(make_basis: Any, seed: int, wheel: Any = True, **more: Any) -> Any:
+    spot = {"emitters": SLOTS, "wheel": wheel, **more}
+    lights = {"spot": spot, "profile": {"emitters": SLOTS, "wheel": True}, "wash": {}}
+    basis = make_basis(3, SIZE, seed=seed, names=[*lights])
+    rng = np.random.default_rng(seed)
+    image = (rng.random((*SIZE, 3)) * rng.uniform(0.5, 6) * rng.random(3)).astype(np.float32)
+    target = Target("t", image, rng.random(SIZE).astype(np.float32), everything=False)
+    return basis, target, Constraints.of(lights)
+
+
+def _mixed_best(rows: Any, y: Any, columns: Any) -> Any:
+    """The emissions (2, 3) of the best mix of slots, whose shares are 1 at most together, by nnls:
+    with a heavy row that makes the shares and what is left of each lamp 1.
+    """
+    count = len(columns)
+    part = rows.reshape(len(y), 3, 3)
+    A = np.hstack(
+        [part[:, 0] @ columns.T, part[:, 1] @ columns.T, part[:, 2], np.zeros((len(y), 2))]
+    )
+    heavy = 1e5 * np.abs(A).max()
+    sums = np.zeros((2, A.shape[1]))
+    for k in range(2):
+        sums[k, k * count : (k + 1) * count], sums[k, -2 + k] = heavy, heavy
+    x, _ = nnls(np.vstack([A, sums]), np.append(y, [heavy, heavy]), maxiter=10_000)
+    return x[:count] @ columns, x[count : 2 * count] @ columns
+
+
+@pytest.mark.parametrize("seed", list(seeds(8, 60)))
+def test_each_wheel_is_at_the_slot_closest_to_the_best_mix(make_basis, seed):
+    basis, target, constraints = _case(make_basis, seed)
+    solution = solve(basis, target, constraints=constraints, literal=True)
+    assert solution.certificate.converged
+    rows, y = stack_rows(basis, target)
+    lamp = solution.problem.reduction.lamps[0]
+    mixed = _mixed_best(rows, y, lamp.columns)
+    chosen = []
+    for name, color in zip(("spot", "profile"), mixed, strict=True):
+        light = solution.lighting[name]
+        if (
+            luminance(color) < 1e-6 * lamp.levels.max()
+        ):  # it is off, and may come on at its open slot
+            assert light.mixed_emission is None
+            assert light.slot in ("open", "")
+            chosen.append(lamp.columns[0])
+            continue
+        # The row of the oracle weighs 1e5 times as much as the painting.
+        assert np.allclose(light.mixed_emission, color, atol=1e-4 * np.abs(color).max())
+        looks = lab(np.array([*lamp.columns, color]) / luminance([*lamp.columns, color])[:, None])
+        distances = ciede2000(looks[:-1], looks[-1])
+        slot = int(np.argmin(distances))
+        chosen.append(lamp.columns[slot])
+        if not any(light.drives.values()):  # off, now that other wheels are at slots
+            continue
+        assert light.slot == lamp.names[slot]
+        assert light.slot_delta_e == pytest.approx(distances.min(), rel=1e-2, abs=0.05)
+        assert sum(drive > 0 for drive in light.drives.values()) == 1
+    # With these slots, the answer is that of scipy with a dimmer each.
+    part = rows.reshape(len(y), 3, 3)
+    A = np.column_stack([part[:, 0] @ chosen[0], part[:, 1] @ chosen[1], part[:, 2]])
+    best = lsq_linear(A, y, ([0.0] * 5, [1, 1, np.inf, np.inf, np.inf]), tol=1e-14)
+    drives = [max(solution.lighting[x].drives.values()) for x in ("spot", "profile")]
+    found = np.append(drives, solution.weights[2])
+    # Both are solutions of the same least squares.
+    assert np.square(A @ found - y).sum() <= 2 * best.cost * (1 + SAME) + SAME * (y @ y)
+
+
+@pytest.mark.parametrize("fit", [{}, {"hold": 0.1}, {"space": "display"}])
+def test_no_fit_mixes_slots(make_basis, fit):
+    basis, target, constraints = _case(make_basis, 3)
+    solution = solve(basis, target, constraints=constraints, **fit)
+    for name in ("spot", "profile"):
+        light = solution.lighting[name]
+        assert sum(drive > 0 for drive in light.drives.values()) <= 1
+        assert np.allclose(light.emission, light.lamp.mix(np.array([*light.drives.values()])))
+    [analysis] = analyse(solution)
+    assert [x.mixed_emission for x in analysis.solution.lighting.lights] == [
+        x.mixed_emission for x in solution.lighting.lights
+    ]
+
+
+def test_sparse_lights_have_slots(make_basis):
+    basis, target, constraints = _case(make_basis, 4)
+    chosen = solve(basis, target, constraints=constraints.and_then(Constraints.of(sparse=1)))
+    on = [x for x in chosen.lighting.lights if any(x.emission)]
+    assert len(on) <= 1
+    assert all(sum(d > 0 for d in x.drives.values()) <= 1 for x in chosen.lighting.lights)
+
+
+def test_a_wheel_can_be_left_open(make_basis):
+    basis, target, constraints = _case(make_basis, 5, wheel="open")
+    light = solve(basis, target, constraints=constraints).lighting["spot"]
+    assert light.mixed_emission is None
+    assert light.slot_delta_e is None
+    assert [x for x, drive in light.drives.items() if drive > 0] == ["open"]
+
+
+def test_each_frame_of_a_shot_has_slots(make_basis):
+    basis, first, constraints = _case(make_basis, 1)
+    targets = first, _case(make_basis, 2)[1]
+    fit = Fit(literal=True)
+    problems = [Problem.of(basis, x, constraints=constraints, fit=fit) for x in targets]
+    for solution in solve_frames(problems, [1, 20]):
+        assert solution.certificate.converged
+        for light in solution.lighting.lights[:2]:
+            assert sum(drive > 0 for drive in light.drives.values()) <= 1
+            assert np.allclose(light.emission, light.lamp.mix(np.array([*light.drives.values()])))
+
+
+def test_slots_that_were_chosen_are_said(make_basis):
+    basis, target, constraints = _case(make_basis, 5, wheel="open")
+    lights = solve(basis, target, constraints=constraints).lighting.lights
+    chosen = lights[1]
+    assert spoken_wheels(lights) == (
+        "Colour wheels, each at the closest slot to what was solved: profile at "
+        f"{chosen.slot}, ΔE {chosen.slot_delta_e:.1f} off."
+    )
+    assert spoken_lamp(chosen).endswith(f" (ΔE {chosen.slot_delta_e:.1f} off)")
+    assert spoken_lamp(lights[0]).startswith("open ")
+    assert spoken_wheels(lights[:1]) == ""
+
+
+def test_a_colour_chooses_the_closest_slot(make_basis):
+    basis, target, constraints = _case(make_basis, 5, color="#ff2010")
+    light = solve(basis, target, constraints=constraints).lighting["spot"]
+    assert light.slot == "red"
+
+
+def test_limits_leave_out_slots_that_are_too_dark(make_basis):
+    basis, target, constraints = _case(make_basis, 6, limits={"min": 2.2, "max": 2.3})
+    light = solve(basis, target, constraints=constraints).lighting["spot"]
+    assert light.slot in ("open", "amber", "cto")
+    assert 2.2 - 1e-9 <= luminance(np.array(light.emission)) <= 2.3 + 1e-9
+
+
+def test_a_locked_wheel_has_the_colour_of_a_slot(make_basis):
+    basis, target, constraints = _case(make_basis, 6, lock="#0000ff 0.2")
+    light = solve(basis, target, constraints=constraints).lighting["spot"]
+    assert light.slot == "blue"
+    assert luminance(np.array(light.emission)) == pytest.approx(0.2)
+
+
+def test_the_file_says_slot_and_distance(make_basis, tmp_path):
+    basis, target, constraints = _case(make_basis, 7)
+    lighting = solve(basis, target, constraints=constraints).lighting
+    file = tmp_path / "lighting.json"
+    write_lighting(file, lighting)
+    data = json.loads(file.read_text())["lights"]["spot"]
+    assert data["is_wheel"] is True
+    assert data["slot"] == lighting["spot"].slot
+    assert data["slot_delta_e"] == pytest.approx(lighting["spot"].slot_delta_e)
+    assert read_lighting(file)["spot"] == lighting["spot"]
+
+
+@pytest.mark.parametrize("space", ["linear", "display"])
+def test_under_the_brush_wheels_are_at_slots(make_basis, space):
+    basis, target, constraints = _case(make_basis, 8)
+    view = LiveView(basis, target.image.copy(), target.importance.copy())
+    fit = resolve_for_targets(Fit(literal=True, space=space), [target])
+    live = LiveSolver([view], fit=fit, constraints=constraints)
+    answer = live.answer(basis.current_weights)
+    assert all(live.lamps[k].can_mix(answer[k]) for k in (0, 1))
+    assert 0 in live.mixed_emissions
+    again = live.answer(answer, while_painting=True)
+    assert all(live.lamps[k].can_mix(again[k]) for k in (0, 1))
+    if space == "linear":
+        exact = solve(basis, target, constraints=constraints, literal=True)
+        assert np.allclose(answer, exact.weights, atol=1e-6 * exact.weights.max())
+
+
+def test_before_paint_wheels_are_at_slots(make_basis):
+    basis, _, constraints = _case(make_basis, 8)
+    view = LiveView(basis, np.zeros((*SIZE, 3), np.float32), np.zeros(SIZE, np.float32))
+    live = LiveSolver([view], fit=Fit(literal=True, space="linear"), constraints=constraints)
+    answer = live.answer(basis.current_weights)
+    assert all(live.lamps[k].can_mix(answer[k]) for k in (0, 1))
+    assert live.mixed_emissions == {}
+
+
+WRONG = {
+    "no slots": ({"wheel": True}, "has wheel without emitters, which are its slots"),
+    "unknown slot": ({"emitters": SLOTS, "wheel": "pink"}, "expected true, or one of its slots, "),
+    "number": ({"emitters": SLOTS, "wheel": 3}, "is 3: expected true, or one of its slots"),
+    "power": ({"emitters": SLOTS, "wheel": True, "power_share": 0.5}, "wheel and power_share"),
+    "whites": ({"emitters": SLOTS, "wheel": True, "kelvin": [2700, 6500]}, "wheel and kelvin"),
+    "too many": (
+        {"emitters": [{**SLOTS[0], "name": str(k)} for k in range(41)], "wheel": True},
+        "lists 41 slots: at most 40",
+    ),
+}
+
+
+@pytest.mark.parametrize("case", WRONG)
+def test_mistakes_are_named(case):
+    table, message = WRONG[case]
+    with pytest.raises(ConstraintError, match=message):
+        Constraints.of({"spot": table})
