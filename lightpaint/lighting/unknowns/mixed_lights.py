@@ -53,7 +53,7 @@ class _Group:
             group.lights.shape[1] == 1
             and 3 <= group.columns.shape[1] <= MAX_EMITTERS
             and not group.is_free
-            and bool(np.isfinite(high).all())
+            and bool(np.isfinite([low, high]).all())
         )
         mixes = EmissionMixes.of(group.columns, low, high) if is_lamp else None
         return cls(group.places, group.lights, group.columns, mixes)
