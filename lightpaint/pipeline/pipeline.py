@@ -13,6 +13,7 @@ from lightpaint.lighting.analysis.analysis import Analysis, analyse, with_findin
 from lightpaint.lighting.animated_solve import solve_frames
 from lightpaint.lighting.answer.lighting import Lighting
 from lightpaint.lighting.answer.lighting_keys import LightingKey
+from lightpaint.lighting.held_mixes import choose_held_mixes
 from lightpaint.lighting.problem import Problem
 from lightpaint.lighting.solution import Solution
 from lightpaint.lighting.solve import solution_of
@@ -160,7 +161,7 @@ def answer_job(
             for basis in problem.views.bases:
                 make_ahead(basis, prepare_page)
         solution = solution_of(problem)
-    solution = _reduce_noise(job, solution, listen)
+    solution = choose_held_mixes(_reduce_noise(job, solution, listen))
     del problem  # some of its arrays are as large as the pictures
     release_freed_memory()
     level_errors = () if placement is None else placement.level_errors

@@ -17,6 +17,7 @@ from lightpaint.colour.color import LUMINANCE, luminance, rgb_to_hex
 from lightpaint.display_text import some_names, some_of
 from lightpaint.lighting.analysis.appearance.constraint_kinds import KEYS_BY_KIND
 from lightpaint.lighting.analysis.appearance.limiting_reasons import Reason
+from lightpaint.lighting.answer.light_rendering import renderings_of
 from lightpaint.lighting.answer.lighting import LightSetting
 from lightpaint.lighting.wishes.planes_answer import PlanesAnswer
 from lightpaint.pipeline.job.settings import Settings
@@ -38,7 +39,12 @@ from lightpaint.report.diagnosis_sentences import (
 )
 from lightpaint.report.measures import energy_shares
 from lightpaint.report.page.constraint_section import closer_choice
-from lightpaint.report.phrases import spoken_drives, spoken_percent, spoken_preference
+from lightpaint.report.phrases import (
+    rendering_sentences,
+    spoken_drives,
+    spoken_percent,
+    spoken_preference,
+)
 from lightpaint.report.planes_text import HEADINGS, plane_rows, planes_sentences
 from lightpaint.sentences import Sentence, SourceKey
 
@@ -70,6 +76,7 @@ def show_look(look: Look, folder: Path, *, table: Table = "short") -> None:
     terminal.write("")
     if look.planes is not None:
         show_planes(look.planes)
+    _show_renderings(look)
     terminal.tell(fit_sentence(look.solution, instead="--literal turns this off"))
     certificate = look.solution.certificate
     if curve := certificate.curve:
@@ -97,6 +104,20 @@ def show_planes(answer: PlanesAnswer) -> None:
     for sentence in planes_sentences(answer):
         terminal.tell(sentence)
     terminal.write("")
+
+
+def _show_renderings(look: Look) -> None:
+    """Print what lamps reach of the Rf that was asked for."""
+    lamps = [x.lamp for x in look.lighting.lights if x.lamp is not None]
+    if not any(lamp.searches_rendering for lamp in lamps):
+        return
+    sentences = rendering_sentences(renderings_of(look.lighting))
+    for sentence in sentences[:SHORT_LIST_LIGHTS]:
+        terminal.tell(sentence)
+    if more := sentences[SHORT_LIST_LIGHTS:]:
+        terminal.tell(f"The report has the Rf of {len(more)} lamps more.")
+    if sentences:
+        terminal.write("")
 
 
 def _sentences(look: Look, table: Table) -> list[str]:

@@ -58,7 +58,10 @@ class LightSetting:
     may be negative.
     part_of: of an emitter that is a light, as in a basis of spectra, the name of its lamp. mix,
     mix_errors: of a lamp of such lights, the drives of its emitters and their standard errors; None
-    where they follow from the emission.
+    where they follow from the emission. solved_mix: the drives of its emitters that the solve
+    found, where the lamp has others since, which leave the picture as it is. held_mix_change: the
+    CIEDE2000 that few pixels of the picture would exceed with the mix that the lamp prefers, from
+    which the picture holds it back; None where nothing does.
     """
 
     name: str
@@ -81,6 +84,8 @@ class LightSetting:
     part_of: str = ""
     mix: tuple[float, ...] | None = None
     mix_errors: tuple[float | None, ...] | None = None
+    solved_mix: tuple[float, ...] | None = None
+    held_mix_change: float | None = None
 
     def __post_init__(self) -> None:
         if len(self.name) > MAX_NAME:
@@ -141,6 +146,8 @@ class LightSetting:
             weight=emission if weight is None else weight,
             mix=None,
             mix_errors=None,
+            solved_mix=None,
+            held_mix_change=None,
             constraint="",
             is_active=False,
             standard_error=None,
@@ -519,6 +526,7 @@ def whole_lamp(parts: Sequence[LightSetting]) -> LightSetting:
     drives = np.array([x.emission[0] for x in parts]) / lamp.levels
     errors = [None if x.standard_error is None else x.standard_error[0] for x in parts]
     emission = as_rgb(lamp.mix(drives))
+    solved = [x.solved_mix or (drive,) for x, drive in zip(parts, drives.tolist(), strict=True)]
     return replace(
         first,
         name=first.part_of,
@@ -532,6 +540,7 @@ def whole_lamp(parts: Sequence[LightSetting]) -> LightSetting:
         lamp=lamp,
         part_of="",
         mix=tuple(drives.tolist()),
+        solved_mix=tuple(x for [x] in solved) if any(x.solved_mix for x in parts) else None,
         mix_errors=tuple(
             None if x is None else float(x / y) for x, y in zip(errors, lamp.levels, strict=True)
         ),
@@ -553,6 +562,7 @@ def parts_of(light: LightSetting) -> tuple[LightSetting, ...]:
             part_of=light.name,
             mix=None,
             mix_errors=None,
+            solved_mix=None,
             standard_error=None,
             interval=None,
         )

@@ -30,6 +30,7 @@ from lightpaint.lighting.constraints.values import (
     parse_power_share,
     parse_preference,
     parse_primaries,
+    parse_rf,
     parse_scale,
     parse_start,
     parse_strength,
@@ -40,7 +41,7 @@ from lightpaint.validation import MAX_LISTED
 
 #: Keys of the constraints on one light, the first of which describe the lamp that it is.
 LAMP_KEYS = ("emitters", "power_share")
-LIGHT_KEYS = ("lock", "off", "limits", "color", "kelvin", "duv", "primaries", *LAMP_KEYS)
+LIGHT_KEYS = ("lock", "off", "limits", "color", "kelvin", "duv", "primaries", "rf", *LAMP_KEYS)
 
 #: Keys that determine the colours of a light, which can have one of them.
 COLOR_KEYS = ("color", "kelvin", "primaries")
@@ -56,7 +57,8 @@ class LightConstraint:
     ends of a range of white, the LEDs of a fixture; None if any colour will do.
     whites: the range of white that it keeps to, if there is one.
     emitters: the emitters that mix its light, of which each dims between bounds. power_share: their
-    largest power together, relative to that of all at full.
+    largest power together, relative to that of all at full. least_rf: the fidelity index Rf that
+    their mix needs.
     label: all this in few words. where: the name of the source in errors.
     """
 
@@ -68,6 +70,7 @@ class LightConstraint:
     whites: WhiteRange | None = None
     emitters: tuple[EmitterRequest, ...] = ()
     power_share: float | None = None
+    least_rf: float | None = None
     label: str = ""
     where: SourceKey = field(default_factory=SourceKey)
 
@@ -101,7 +104,7 @@ class LightConstraint:
         primaries = parse_primaries(table, key)
         whites = parse_whites(table, key)
         emitters = parse_emitters(table, key)
-        share = parse_power_share(table, key)
+        share, least_rf = parse_power_share(table, key), parse_rf(table, key)
         _check_emitters(table, key, primaries)
         if lock is not None and primaries is not None:
             if lock.level is None or lock.color is not None or isinstance(lock.level.amount, tuple):
@@ -120,7 +123,8 @@ class LightConstraint:
                 )
             lock, primaries = Lock(lock.level, primaries[0]), None
         is_off, label = "off" in table, _label(table)
-        return cls(lock, is_off, least, most, primaries, whites, emitters, share, label, key)
+        lamp = emitters, share, least_rf
+        return cls(lock, is_off, least, most, primaries, whites, *lamp, label, key)
 
 
 def _check_emitters(

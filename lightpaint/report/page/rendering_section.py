@@ -7,6 +7,7 @@ from markupsafe import Markup
 from lightpaint.lighting.answer.light_rendering import LightRendering, renderings_of
 from lightpaint.lighting.answer.lighting import Lighting
 from lightpaint.report.page.html import html
+from lightpaint.report.phrases import rendering_sentences
 
 
 def rendering_section(lighting: Lighting) -> Markup:
@@ -15,7 +16,7 @@ def rendering_section(lighting: Lighting) -> Markup:
     if not found:
         return Markup("")
     lamps = [{"name": name, "cells": _cells(x)} for name, x in found.items()]
-    return html("rendering", lamps=lamps)
+    return html("rendering", lamps=lamps, sentences=rendering_sentences(found))
 
 
 def rendering_numbers(lighting: Lighting) -> dict[str, dict[str, Any]] | None:
@@ -25,10 +26,16 @@ def rendering_numbers(lighting: Lighting) -> dict[str, dict[str, Any]] | None:
             **({} if x.color is None else vars(x.color)),
             "best_rf": x.best_rf,
             "lm_per_w": x.lm_per_w,
+            **({} if x.wanted_rf is None else _wish(x)),
         }
         for name, x in renderings_of(lighting).items()
     }
     return numbers or None
+
+
+def _wish(found: LightRendering) -> dict[str, Any]:
+    keys = ("wanted_rf", "watts", "plain_rf", "plain_watts", "held_mix_change")
+    return {key: getattr(found, key) for key in keys}
 
 
 def _cells(found: LightRendering) -> list[str]:
