@@ -293,7 +293,11 @@ def verify_result(
     predicted, attributes = read_estimate(path)
     view = _read_view(path, attributes.get(VIEW_KEY, "{}"))
     relit = load_scene(
-        relit_xml, sensor=view.sensor, parameters=view.parameters, use_lights_file=False
+        relit_xml,
+        sensor=view.sensor,
+        parameters=view.parameters,
+        use_lights_file=False,
+        lamps=["*"],
     )
     if view.is_spectral:
         relit = replace(relit, is_spectral=True)
