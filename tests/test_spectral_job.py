@@ -80,6 +80,7 @@ def test_a_painting_becomes_a_drive_of_each_emitter(room: Path):
         assert list(lighting[lamp].drives.values()) == pytest.approx(drives, abs=0.03)
     report = json.loads((room.with_name("out") / "report.json").read_text())
     assert set(report["rendering"]) == set(DRIVES)
+    assert {x["name"] for x in report["surfaces"]} >= {"floor", "ball"}
     text = (room.with_name("out") / "relit.xml").read_text()
     assert text.count('<spectrum name="') == len(DRIVES)
     assert spectra_csv(lighting).splitlines()[0] == "nm,panel,bulb"
