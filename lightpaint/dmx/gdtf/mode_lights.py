@@ -376,7 +376,15 @@ class ModeReader:
         parts = 1 if self.whites else len(colours)
         share = sum(watts) / parts if len(watts) == len(beams) else None
         return [
-            RigEmitter(name, x.xy, totals[name], tuple(sorted(channels[name])), x.curve, share)
+            RigEmitter(
+                name,
+                x.xy,
+                totals[name],
+                tuple(sorted(channels[name])),
+                x.curve,
+                share,
+                spectrum=x.spectrum,
+            )
             for name, x in colours.items()
         ]
 
