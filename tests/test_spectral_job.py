@@ -5,6 +5,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from command import run_refused, spawn, succeed
 from renderer import LIGHTS, write_room
 from webs import batwing, cosine, ies_text, street, write_web
 
@@ -153,3 +154,18 @@ def test_a_luminaire_mixes_spectra_into_its_web(web: str, room: Path) -> None:
     assert ('type="ies"' in relit) == (web != "cosine")
     remarks = [str(x) for x in _job(room, picture).remarks]
     assert any("import lightpaint.mitsuba" in x for x in remarks) == (web != "cosine")
+
+
+def test_scalar_variants_and_saved_bases_are_refused_in_one_line(room: Path) -> None:
+    folder = room.parent
+    write_rgb(folder / "painting.exr", np.ones((20, 24, 3), np.float32))
+    solve = ("solve", "room.xml", "painting.exr", "--spectral")
+    line = run_refused(folder, *solve, "--variant", "scalar_rgb", by=spawn)
+    assert "spectra are only rendered where one pass renders all lights" in line
+    succeed(folder, "basis", "room.xml", "--spp", 2, "-o", "room.basis.exr")
+    line = run_refused(folder, "solve", "room.basis.exr", "painting.exr", "--spectral")
+    assert "--spectral cannot change a saved basis" in line
+    line = run_refused(folder, *solve, "--rf", "panel=120")
+    assert "--rf panel is 120" in line
+    line = run_refused(folder, *solve, "--kelvin", "panel=2700:6500")
+    assert "has a range of kelvin" in line
