@@ -72,7 +72,7 @@ def _turn_freely(solution: Solution, parts: tuple[int, ...]) -> bool:
 
 @dataclass(frozen=True)
 class _Picture:
-    """Some pixels of the picture of a solution.
+    """The picture of a solution, in some of its pixels.
 
     planes: (n, p, 3), of each light. transform: of the display. shown: (p, 3), L*a*b* of the
     picture.

@@ -1,4 +1,4 @@
-"""How a lighting with spectra changes the colours of objects, against daylight.
+"""Colours of objects under a lighting with spectra, and by daylight.
 
 Two lights that are white alike show a surface in different colours (metamerism). The light on an
 object is that of the lamps in their shares there, each with its spectrum.
