@@ -5,7 +5,9 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from command import run_refused, spawn, succeed
 from renderer import LIGHTS, write_room
+from webs import batwing, cosine, ies_text, street, write_web
 
 from lightpaint import Constraints, Job, Painting, SceneFile, Settings, run
 from lightpaint.basis.render.basis_render import render_basis
@@ -79,6 +81,7 @@ def test_a_painting_becomes_a_drive_of_each_emitter(room: Path):
         assert list(lighting[lamp].drives.values()) == pytest.approx(drives, abs=0.03)
     report = json.loads((room.with_name("out") / "report.json").read_text())
     assert set(report["rendering"]) == set(DRIVES)
+    assert {x["name"] for x in report["surfaces"]} >= {"floor", "ball"}
     text = (room.with_name("out") / "relit.xml").read_text()
     assert text.count('<spectrum name="') == len(DRIVES)
     assert spectra_csv(lighting).splitlines()[0] == "nm,panel,bulb"
@@ -124,13 +127,45 @@ def test_a_lamp_that_is_off_is_verified_as_well(room: Path) -> None:
     assert look.verification.agrees
 
 
-def test_luminaires_do_not_go_with_spectra(room: Path) -> None:
-    from webs import batwing, ies_text
+#: Photometric webs: of positive spots, of spots of which some are negative, and without an axis.
+WEBS = {"cosine": cosine, "batwing": batwing, "street": street}
 
-    (room.parent / "lamp.ies").write_text(ies_text(batwing), encoding="ascii")
-    toml = 'cd_per_unit = 1\n[light.bulb]\nphotometry = "lamp.ies"\n'
-    (room.parent / "room.lights.toml").write_text(toml, encoding="utf-8")
-    picture = room.with_name("painting.exr")
-    write_rgb(picture, np.ones((20, 24, 3), np.float32))
-    with pytest.raises(SceneError, match="has luminaires of photometric files"):
-        _job(room, picture)
+
+@pytest.mark.parametrize(
+    "web", ["batwing", *(pytest.param(x, marks=pytest.mark.nightly) for x in ("cosine", "street"))]
+)
+def test_a_luminaire_mixes_spectra_into_its_web(web: str, room: Path) -> None:
+    """The verification is Mitsuba's own render of the written scene."""
+    planes = np.arange(0, 361, 30.0).tolist() if web == "street" else [0.0]
+    write_web(room.with_name("lamp.ies"), ies_text(WEBS[web], planes))
+    file = room.with_name("room.lights.toml")
+    text = file.read_text().replace("[light.bulb]", '[light.bulb]\nphotometry = "lamp.ies"')
+    file.write_text("cd_per_unit = 1000\n" + text)
+    picture = _paint(room)
+    [look] = run(_job(room, picture, verify_spp=256))
+    assert look.verification is not None
+    assert look.verification.agrees
+    assert verify_result(room.with_name("out")).agrees
+    lighting = read_lighting(room.with_name("out") / "lighting.json")
+    for lamp, drives in DRIVES.items():
+        assert list(lighting[lamp].drives.values()) == pytest.approx(drives, abs=0.03)
+    relit = (room.with_name("out") / "relit.xml").read_text()
+    assert relit.count('<spectrum name="') >= len(DRIVES)
+    assert ('type="ies"' in relit) == (web != "cosine")
+    remarks = [str(x) for x in _job(room, picture).remarks]
+    assert any("import lightpaint.mitsuba" in x for x in remarks) == (web != "cosine")
+
+
+def test_scalar_variants_and_saved_bases_are_refused_in_one_line(room: Path) -> None:
+    folder = room.parent
+    write_rgb(folder / "painting.exr", np.ones((20, 24, 3), np.float32))
+    solve = ("solve", "room.xml", "painting.exr", "--spectral")
+    line = run_refused(folder, *solve, "--variant", "scalar_rgb", by=spawn)
+    assert "spectra are only rendered where one pass renders all lights" in line
+    succeed(folder, "basis", "room.xml", "--spp", 2, "-o", "room.basis.exr")
+    line = run_refused(folder, "solve", "room.basis.exr", "painting.exr", "--spectral")
+    assert "--spectral cannot change a saved basis" in line
+    line = run_refused(folder, *solve, "--rf", "panel=120")
+    assert "--rf panel is 120" in line
+    line = run_refused(folder, *solve, "--kelvin", "panel=2700:6500")
+    assert "has a range of kelvin" in line

@@ -2,9 +2,10 @@
 
     python docs/images/spectra.py [--spp 256]
 
-A room with a red dress and some colours, lit by a lamp at 3200 K: mixed from red, green and blue
-LEDs, and from these and a white one so that colours come out best (Rf of TM-30). A grey card looks
-the same under both. Below each mix stands its Rf.
+A room with a red dress and some colours, lit by a lamp of red, green, blue and amber LEDs, and a
+painting of it at 3200 K. lightpaint solves that twice: as it is, which takes the mix of the least
+power, and with `rf = 80`. A grey card looks the same under both. Below each stands its Rf, and the
+power that the answer names.
 """
 
 from __future__ import annotations
@@ -16,27 +17,25 @@ from pathlib import Path
 import numpy as np
 from PIL import Image, ImageDraw, ImageFont
 
-from lightpaint import Basis, load_scene, render_basis
+from lightpaint import Basis, Constraints, Lighting, Target, load_scene, render_basis, solve
 from lightpaint.colour.color import kelvin_to_rgb
-from lightpaint.colour.lamp import Lamp, LampEmitter
-from lightpaint.colour.spectra.color_rendering import color_rendering
-from lightpaint.colour.spectra.spectrum import rgb_of_powers, spectrum_of
 from lightpaint.colour.srgb import encode_display, to_8_bit
+from lightpaint.lighting.answer.light_rendering import renderings_of
 
 HERE = Path(__file__).resolve().parent
 WIDTH, HEIGHT, FOOT = 320, 200, 22
 
 #: Brightness of the picture.
-EXPOSURE = 30.0
+EXPOSURE = 75.0
 
-#: LEDs, as Gaussians: peaks and widths in nanometres, and a share of full. The white one is a blue
-#: LED with a phosphor.
-LEDS = {
-    "red": [(632, 8, 1.0)],
-    "green": [(523, 14, 1.0)],
-    "blue": [(455, 10, 1.0)],
-    "white": [(450, 9, 0.5), (575, 55, 1.0)],
-}
+#: Peaks and widths of LEDs in nanometres, and lumens per watt.
+LEDS = {"red": (632, 8, 70), "green": (523, 14, 110), "blue": (455, 10, 22), "amber": (595, 8, 60)}
+
+#: Lumens of each LED at full.
+LUMENS = 4000.0
+
+#: Candela of the white that is painted.
+CANDELA = 150.0
 
 SPHERE = """<shape type="sphere"><point name="center" x="{x}" y="{y}" z="{r}"/>
     <float name="radius" value="{r}"/><bsdf type="diffuse"><rgb name="reflectance" value="{rgb}"/>
@@ -62,47 +61,59 @@ ROOM = f"""<scene version="3.0.0">
 
 
 def main() -> None:
-    """Render the two mixes, and write the picture."""
+    """Solve for the two mixes, and write the picture."""
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--spp", type=int, default=256)
     spp = parser.parse_args().spp
-    lamp = lamp_of_leds()
     with tempfile.TemporaryDirectory() as folder:
         write_dress(Path(folder) / "dress.ply")
         (Path(folder) / "room.xml").write_text(ROOM)
-        scene = load_scene(Path(folder) / "room.xml").with_lamps({"lamp": lamp})
-        basis = render_basis(scene, spp=spp)
-    white = np.asarray(kelvin_to_rgb(3200.0))
-    three = np.append(np.linalg.solve(lamp.columns[:3].T, white), 0)
-    best = lamp.best_rendering(white)
-    shown = [panel(basis, lamp, x) for x in (three, best)]
+        scene = load_scene(Path(folder) / "room.xml")
+        seen_in_rgb = render_basis(scene, spp=spp)
+        answers = [answer(seen_in_rgb, **wish) for wish in ({}, {"rf": 80})]
+        lamp = answers[0]["lamp"].lamp
+        assert lamp is not None
+        seen = render_basis(scene.with_lamps({"lamp": lamp}), spp=spp)
+    shown = [panel(seen, found) for found in answers]
     Image.fromarray(np.hstack(shown)).save(HERE / "spectra.webp", quality=90)
 
 
-def lamp_of_leds() -> Lamp:
-    """Return a lamp of four LEDs, with more light of each than is needed."""
-    waves = np.arange(380, 781.0)
-    emitters = []
-    for name, peaks in LEDS.items():
-        power = sum(share * np.exp(-0.5 * ((waves - nm) / sd) ** 2) for nm, sd, share in peaks)
-        spectrum = spectrum_of(waves, np.asarray(power))
-        red, green, blue = (4 * rgb_of_powers(spectrum)).tolist()
-        emitters.append(LampEmitter(name, (red, green, blue), spectrum=spectrum))
-    return Lamp(tuple(emitters))
+def answer(basis: Basis, **wish: float) -> Lighting:
+    """Return the answer to a painting in 3200 K, for a lamp of LEDs of which `wish` is asked."""
+    white = CANDELA * np.asarray(kelvin_to_rgb(3200.0), np.float32)
+    image = basis.mix(white[None])
+    painting = Target("3200 K", image, np.ones(basis.size, np.float32), everything=True)
+    lights = {"lamp": {"emitters": emitters(), **wish}}
+    constraints = Constraints.of(lights, cd_per_unit=1)
+    return solve(basis, painting, constraints=constraints, literal=True).lighting
 
 
-def panel(basis: Basis, lamp: Lamp, drives: np.ndarray) -> np.ndarray:
-    """Return the room under a mix, (h, w, 3) 8 bits, with its Rf below."""
-    weights = np.repeat((drives * lamp.levels)[:, None], 3, axis=1)
+def emitters() -> list[dict[str, object]]:
+    """Return the emitters of the lamp as a lights file has them."""
+    waves = np.arange(380, 781, 5.0)
+    return [
+        {
+            "name": name,
+            "spectrum": [[nm, float(np.exp(-0.5 * ((nm - peak) / width) ** 2))] for nm in waves],
+            "lm": LUMENS,
+            "watts": LUMENS / efficacy,
+        }
+        for name, (peak, width, efficacy) in LEDS.items()
+    ]
+
+
+def panel(basis: Basis, lighting: Lighting) -> np.ndarray:
+    """Return the room under an answer, (h, w, 3) 8 bits, with its Rf and power below."""
+    found, light = renderings_of(lighting)["lamp"], lighting["lamp"]
     # As a camera shows it that is balanced for that white.
-    light = basis.mix(weights) * (EXPOSURE / np.asarray(kelvin_to_rgb(3200.0), np.float32))
-    assert lamp.powers_at_full is not None
-    found = color_rendering(drives @ lamp.powers_at_full)
-    assert found is not None
+    white = EXPOSURE / CANDELA / np.asarray(kelvin_to_rgb(3200.0), np.float32)
+    shown = basis.mix(lighting.weights_for(basis)) * white
     page = Image.new("RGB", (WIDTH, HEIGHT + FOOT), "white")
-    page.paste(Image.fromarray(to_8_bit(encode_display(light))), (0, 0))
-    names = " + ".join(x for x, d in zip(lamp.names, drives, strict=True) if d > 1e-3)
-    text = f"{names}: {found.kelvin:.0f} K, Rf {found.rf:.0f}"
+    page.paste(Image.fromarray(to_8_bit(encode_display(shown))), (0, 0))
+    assert found.color is not None
+    names = " + ".join(name for name, drive in light.drives.items() if drive > 1e-3)
+    kelvin = round(found.color.kelvin, -1)
+    text = f"{names}: {kelvin:.0f} K, Rf {found.color.rf:.0f}, {found.watts:.0f} W"
     ImageDraw.Draw(page).text((8, HEIGHT + 4), text, "black", ImageFont.load_default(12))
     return np.array(page)
 

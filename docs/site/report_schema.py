@@ -13,6 +13,7 @@ from lightpaint.lighting.analysis.appearance.delivery import Delivery
 from lightpaint.lighting.analysis.appearance.limiting_reasons import Reason
 from lightpaint.lighting.analysis.appearance.unpainted_change import UnpaintedChange
 from lightpaint.lighting.analysis.diagnosis import Place
+from lightpaint.lighting.analysis.surface_colors import SurfaceColor
 from lightpaint.lighting.fit import Fit
 from lightpaint.placement.suggestion import MoveSuggestion, Suggestion
 from lightpaint.report.report_json import FORMAT
@@ -66,6 +67,7 @@ def report_schema() -> Schema:
         "fit": _fit(),
         "lights": _by_name(_light()),
         "rendering": _by_name(_rendering()),
+        "surfaces": _list(_record(**_fields(SurfaceColor, "name", "daylight", "seen", "delta_e"))),
         "missed": _missed(region),
         "uncertainty": _record(excess=_NUMBER, most_uncertain=_TEXT, halving_spp=_NUMBER),
         "verification": _verification(size),
@@ -80,6 +82,7 @@ def report_schema() -> Schema:
 
 def _rendering() -> Schema:
     names = ("kelvin", "duv", "ra", "r9", "rf", "rg", "best_rf", "lm_per_w")
+    names += ("wanted_rf", "watts", "plain_rf", "plain_watts", "held_mix_change")
     return _record(**_all(_NUMBER, *names))
 
 

@@ -279,6 +279,7 @@ def distributed_renderer(
             parameters=dict(relit.parameters),
             variant=variant,
             use_lights_file=False,
+            lamps=("*",),
         )
         files = tuple(map(str, scene.content.read_files))
         height, width = relit.size

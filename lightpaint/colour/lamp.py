@@ -18,7 +18,9 @@ from lightpaint.arrays import RGB, Bools, Doubles, Indices
 from lightpaint.colour.color import cct_and_duv, luminance
 from lightpaint.colour.color_difference import ciede2000, lab_of_lights
 from lightpaint.colour.emitter_preference import Preference
-from lightpaint.colour.spectra.best_mix import best_mix
+from lightpaint.colour.spectra.best_mix import best_mix, cheapest_mix
+from lightpaint.colour.spectra.color_rendering import fidelity
+from lightpaint.colour.spectra.mix_fidelity import MARGIN, MixFidelity
 from lightpaint.colour.spectra.spectrum import WAVELENGTHS, Spectrum
 
 #: Most emitters of a lamp: the mixes that are compared grow exponentially with their number. Most
@@ -31,6 +33,10 @@ ROUND_OFF, SINGULAR = 1e-7, 1e-6
 #: The least colour temperature of a white emitter, in kelvin, and the largest Duv: amber LEDs are
 #: warmer, lime ones farther from Planck's locus.
 WARMEST_WHITE, WHITE_DUV = 2200.0, 0.02
+
+#: Share of the largest brightness at which no bound restricts the mixes of a colour, and steps of
+#: the search for the largest at which a mix renders colours well enough.
+DARK, DIMMINGS = 1e-3, 10
 
 #: Weight of the power among mixes that a preference for something else leaves equal.
 SECOND = 1e-6
@@ -72,12 +78,15 @@ class Lamp:
     emitters of unknown power, the sum of their drives relative to their number.
     prefer: what to save, or use most, among mixes of the same colour.
     is_wheel: whether they are slots of a colour wheel, of which one shines at a time.
+    least_rf: the fidelity index Rf that these mixes need, if they can reach it; else the highest
+    counts.
     """
 
     emitters: tuple[LampEmitter, ...]
     power_share: float | None = None
     prefer: Preference = "watts"
     is_wheel: bool = False
+    least_rf: float | None = None
 
     @cached_property
     def names(self) -> tuple[str, ...]:
@@ -123,20 +132,39 @@ class Lamp:
             drives = mixes.values(self.mix(self._nearest_drives(emission)))
         if not len(drives):  # round-off at a corner of what it can mix
             return self._nearest_drives(emission)
+        return self.preferred(drives)
+
+    def mixes(self, emission: Doubles) -> Doubles:
+        """Return drives (k, e) between which lie all that mix an emission (3,); none if it cannot
+        be mixed.
+        """
+        return _mixes_of(self).values(emission)
+
+    def preferred(self, corners: Doubles) -> Doubles:
+        """Return the drives (e,) of its preference between corners (k, e), which mix one colour."""
         # The cheapest comes first, for colours of which nothing tells how they render others.
-        drives = drives[np.argsort(self._costs(drives), kind="stable")]
-        if self.prefer == "rf" and self.powers_at_full is not None:
-            return best_mix(drives, self.powers_at_full)
-        return np.asarray(drives[0])
+        corners = corners[np.argsort(self._costs(corners), kind="stable")]
+        if self.searches_rendering and len(corners) > 1:
+            return np.array(_rendering_mix(self, tuple(map(tuple, corners.tolist()))))
+        return np.asarray(corners[0])
+
+    @property
+    def searches_rendering(self) -> bool:
+        """True if it counts how mixes of the same colour render others, and their spectra are
+        known.
+        """
+        counts = self.prefer == "rf" or self.least_rf is not None
+        return counts and self.powers_at_full is not None
 
     @cached_property
     def while_painting(self) -> "Lamp":
-        """The lamp without a preference that takes a second to find."""
-        return replace(self, prefer="watts") if self.prefer == "rf" else self
+        """The lamp without a search for its mix."""
+        prefer: Preference = "watts" if self.prefer == "rf" else self.prefer
+        return replace(self, prefer=prefer, least_rf=None)
 
     def best_rendering(self, emission: Doubles) -> Doubles:
         """Return the drives (e,) of the highest Rf found that mix an emission (3,)."""
-        return replace(self, prefer="rf").drives_for(emission)
+        return replace(self, prefer="rf", least_rf=None).drives_for(emission)
 
     @cached_property
     def powers_at_full(self) -> Doubles | None:
@@ -227,6 +255,41 @@ class Lamp:
         fits = ((drives >= -room) & (drives <= limits + room)).all(axis=1)
         return _hull(np.clip(drives[fits, : len(self.most)], 0, self.most) @ self.columns)
 
+    def brightest_mix(self, color: Doubles) -> tuple[Doubles, float]:
+        """Return drives (e,) and the factor of a colour (3,) that they mix: the largest, or of
+        those whose Rf is enough.
+
+        Where no mix of the colour has that Rf, those of the best.
+        """
+        most = self.brightest(color) or 1.0
+        if self.least_rf is None or not self.searches_rendering:
+            return self.drives_for(most * color), most
+        if self._renders(most * color):
+            return self.drives_for(most * color), most
+        low, high = DARK * most, most
+        if not self._renders(low * color):
+            drives = self.drives_for(low * color)
+            room = self._room(drives)
+            return drives * room, low * room
+        for _ in range(DIMMINGS):
+            middle = (low + high) / 2
+            low, high = (middle, high) if self._renders(middle * color) else (low, middle)
+        return self.drives_for(low * color), low
+
+    def _renders(self, emission: Doubles) -> bool:
+        """Return whether some mix of an emission (3,) has the Rf that is asked for."""
+        assert self.powers_at_full is not None
+        assert self.least_rf is not None
+        return fidelity(self.drives_for(emission) @ self.powers_at_full) >= self.least_rf
+
+    def _room(self, drives: Doubles) -> float:
+        """Return the largest factor of drives (e,) within their bounds."""
+        lit = drives > 0
+        room = float((self.most[lit] / drives[lit]).min(initial=np.inf))
+        if self.power_share is not None:
+            room = min(room, self.power_share / float(drives @ self.powers))
+        return room
+
     def drive_errors(self, drives: Doubles, errors: Sequence[float | None]) -> list[float | None]:
         """Return the standard error of each drive for those of the emission's channels; None for a
         drive at 0 or at its largest, which small errors do not move, and where they are unknown.
@@ -262,6 +325,13 @@ class Lamp:
             return np.asarray(SECOND * power - drives @ bright / bright.sum())
         return np.asarray(power)
 
+    @property
+    def emitter_costs(self) -> Doubles:
+        """(e,), what a search counts against each emitter at full: power, or less white."""
+        if self.prefer == "white" and self._whites.any():
+            return self._costs(np.eye(len(self.emitters)))
+        return self.powers
+
     @cached_property
     def _whites(self) -> Bools:
         """(e,), the emitters whose colour is a white."""
@@ -285,6 +355,25 @@ def _hull(points: Doubles) -> Doubles:
 def _is_white(color: Doubles) -> bool:
     white = cct_and_duv(color)
     return white is not None and white[0] >= WARMEST_WHITE and abs(white[1]) <= WHITE_DUV
+
+
+@lru_cache(1024)
+def _rendering_mix(lamp: Lamp, corners: tuple[tuple[float, ...], ...]) -> tuple[float, ...]:
+    """Return the drives between corners that render colours as well as a lamp needs; the first
+    corner if the colour is far from white.
+    """
+    mixes, powers = np.array(corners), lamp.powers_at_full
+    assert powers is not None
+    fidelity = MixFidelity.of(powers, mixes[0])
+    if fidelity is None:
+        return corners[0]
+    if lamp.prefer == "rf":
+        return tuple(best_mix(mixes, fidelity.rf).tolist())
+    assert lamp.least_rf is not None
+    least = lamp.least_rf + MARGIN
+    if lamp.prefer == "fewest" and (enough := fidelity.rf(mixes) >= least).any():
+        return corners[int(np.argmax(enough))]
+    return tuple(cheapest_mix(mixes, lamp.emitter_costs, fidelity.rf, least).tolist())
 
 
 @dataclass(frozen=True)

@@ -10,6 +10,7 @@ from functools import cached_property
 import numpy as np
 
 from lightpaint.arrays import RGB, Position
+from lightpaint.colour.spectra.spectrum import Spectrum
 from lightpaint.display_text import some_names
 from lightpaint.errors import RigError
 
@@ -50,7 +51,7 @@ class RigEmitter:
     channels: places, among those of the fixture, of all channels that set it.
     curve: pairs of a share of what its channels control and the share of light that this gives,
     from (0, 0) to (1, 1), both rising; straight if there are none.
-    watts: power at full, if known.
+    watts: power at full, if known. spectrum: if it was measured.
     """
 
     name: str
@@ -59,6 +60,7 @@ class RigEmitter:
     channels: tuple[int, ...]
     curve: tuple[tuple[float, float], ...] = ()
     watts: float | None = None
+    spectrum: Spectrum | None = None
 
 
 @dataclass(frozen=True)

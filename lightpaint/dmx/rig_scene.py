@@ -2,6 +2,7 @@
 
 import json
 import math
+import re
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import PurePosixPath
@@ -9,6 +10,7 @@ from pathlib import PurePosixPath
 import numpy as np
 
 from lightpaint.arrays import Doubles
+from lightpaint.colour.spectra.spectrum import WAVELENGTHS, Spectrum
 from lightpaint.dmx.console_rig import ConsoleRig, RigEmitter, RigFixture, RigLight
 from lightpaint.dmx.spot_cone import spot_cone
 from lightpaint.scene.checks.tokens import tag
@@ -79,10 +81,13 @@ def scene_text(rig: ConsoleRig, unit: float, room: Room | None) -> str:
     return "\n".join([*lines, "</scene>", ""])
 
 
-def lights_text(rig: ConsoleRig, unit: float, *, open_wheels: bool = False) -> str:
+def lights_text(
+    rig: ConsoleRig, unit: float, *, open_wheels: bool = False, stem: str = "rig"
+) -> str:
     """Return the lights file: all lights of the rig with their emitters.
 
-    unit: candelas of an intensity of 1. open_wheels: whether colour wheels stay open.
+    unit: candelas of an intensity of 1. open_wheels: whether colour wheels stay open. stem: of the
+    files of spectra, as in `spectrum_tables`.
     """
     lines = [f"# Lights of {_comment(rig.name)}. Others in the scene stay as they are."]
     lines += [f"cd_per_unit = {unit:g}"]
@@ -91,7 +96,7 @@ def lights_text(rig: ConsoleRig, unit: float, *, open_wheels: bool = False) -> s
     for fixture in rig.fixtures:
         for light in fixture.lights:
             lines += ["", f"[light.{_quoted(light.name)}]", "emitters = ["]
-            lines += [f"    {_emitter(x, light, fixture)}," for x in light.emitters]
+            lines += [f"    {_emitter(x, light, fixture, stem)}," for x in light.emitters]
             lines += ["]"]
             if light.wheel is not None:
                 brightest = max(light.emitters, key=lambda x: x.candela)
@@ -99,6 +104,30 @@ def lights_text(rig: ConsoleRig, unit: float, *, open_wheels: bool = False) -> s
             if light.whites:  # which share the light of one lamp
                 lines += [f"power_share = {1 / len(light.emitters):g}"]
     return "\n".join([*lines, ""])
+
+
+def spectrum_tables(rig: ConsoleRig, stem: str) -> dict[str, str]:
+    """Return a table for each spectrum that was measured, by the name of its file.
+
+    stem: with which the names of files begin.
+    """
+    return {
+        _spectrum_file(stem, fixture, emitter): _table(emitter.spectrum)
+        for fixture in rig.fixtures
+        for light in fixture.lights
+        for emitter in light.emitters
+        if emitter.spectrum is not None
+    }
+
+
+def _spectrum_file(stem: str, fixture: RigFixture, emitter: RigEmitter) -> str:
+    parts = (stem, *(re.sub(r"[^\w-]+", "_", x) for x in (fixture.kind, emitter.name)))
+    return f"{'.'.join(parts)}.csv"
+
+
+def _table(spectrum: Spectrum) -> str:
+    pairs = zip(WAVELENGTHS.tolist(), spectrum, strict=True)
+    return "\n".join(["nm,power", *(f"{nm},{power:g}" for nm, power in pairs), ""])
 
 
 def lights_of(rig: ConsoleRig) -> list[RigLight]:
@@ -112,7 +141,7 @@ def _candela(light: RigLight) -> float:
     return max(amounts) if light.whites or light.wheel else sum(amounts)
 
 
-def _emitter(emitter: RigEmitter, light: RigLight, fixture: RigFixture) -> str:
+def _emitter(emitter: RigEmitter, light: RigLight, fixture: RigFixture, stem: str) -> str:
     """Return an emitter as an inline table of TOML."""
     x, y = emitter.xy
     channels = emitter.channels or light.dimmers
@@ -121,7 +150,10 @@ def _emitter(emitter: RigEmitter, light: RigLight, fixture: RigFixture) -> str:
     channels = light.chromaticity or channels
     byte_counts = [len(fixture.channels[k].offsets) for k in channels]
     bits = min(8 * min(byte_counts, default=1), MAX_BITS)
-    fields = [f"name = {_quoted(emitter.name)}", f"xy = [{x:.5g}, {y:.5g}]"]
+    color = f"xy = [{x:.5g}, {y:.5g}]"
+    if emitter.spectrum is not None:
+        color = f"spectrum = {_quoted(_spectrum_file(stem, fixture, emitter))}"
+    fields = [f"name = {_quoted(emitter.name)}", color]
     fields += [f"cd = {emitter.candela:.6g}", "max = 1", f"bits = {bits}"]
     if emitter.watts is not None:
         fields.append(f"watts = {emitter.watts:.6g}")

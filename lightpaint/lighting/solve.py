@@ -14,6 +14,7 @@ from lightpaint.lighting.constraints.absolute_scale import with_sure_scale
 from lightpaint.lighting.constraints.constraints import Constraints
 from lightpaint.lighting.constraints.constraints_file import constraints_of
 from lightpaint.lighting.fit import Fit
+from lightpaint.lighting.held_mixes import choose_held_mixes
 from lightpaint.lighting.linear_solve import (
     LinearAnswer,
     make_answer,
@@ -103,7 +104,7 @@ def solve(
     given = constraints_of(problem.lights.requests).and_then(constraints or Constraints())
     with_sure_scale(given, problem.lights)
     begin = problem.start if start is None else start.weights_for(problem.basis)
-    return solution_of(replace(problem, start=begin))
+    return choose_held_mixes(solution_of(replace(problem, start=begin)))
 
 
 def solution_of(problem: Problem, *, start: Doubles | None = None) -> Solution:

@@ -25,9 +25,6 @@ from lightpaint.luminaires.web import PhotometricWeb
 from lightpaint.luminaires.web_file import read_web
 from lightpaint.luminaires.web_frame import world_from_web
 
-#: The variant whose emitters these are.
-VARIANT = mi.variant()
-
 #: Solid angle of all directions.
 SPHERE = 4 * math.pi
 
@@ -118,8 +115,10 @@ class _Luminaire(mi.Emitter):
         return self._intensity.eval(si, active)
 
     def sample_wavelengths(self, si, sample, active=True):
-        """Return no wavelengths, and the colour: RGB variants have none."""
-        return mi.Color0f(), self._color(si, active)
+        """Return wavelengths, none in RGB, and the colour there divided by their density."""
+        if not mi.is_spectral:
+            return mi.Color0f(), self._color(si, active)
+        return self._intensity.sample_spectrum(si, mi.sample_shifted(sample), active)
 
     def is_environment(self) -> bool:
         """Return False."""
@@ -173,6 +172,7 @@ class LuminairePoint(_Luminaire):
     def eval_direction(self, it, ds, active=True):
         """Return its light divided by the square of the distance."""
         si = dr.zeros(mi.SurfaceInteraction3f)
+        si.wavelengths = it.wavelengths
         candela = self._table.candela(-ds.d, active)
         return self._color(si, active) * (candela / dr.square(ds.dist))
 
@@ -184,9 +184,10 @@ class LuminairePoint(_Luminaire):
         """Return a ray in a direction of equal density, and its light divided by that."""
         direction = mi.warp.square_to_uniform_sphere(sample3)
         si = dr.zeros(mi.SurfaceInteraction3f)
+        waves, color = self.sample_wavelengths(si, sample1, active)
         candela = self._table.candela(direction, active)
-        ray = mi.Ray3f(self._position, direction, time, mi.Color0f())
-        return ray, self._color(si, active) * (SPHERE * candela)
+        ray = mi.Ray3f(self._position, direction, time, waves)
+        return ray, color * (SPHERE * candela)
 
     def sample_position(self, time, sample, active=True):
         """Return its place."""
@@ -196,7 +197,7 @@ class LuminairePoint(_Luminaire):
 
     def eval(self, si, active=True):
         """Return 0: no ray hits a point."""
-        return mi.Color3f(0)
+        return mi.Spectrum(0)
 
     def bbox(self) -> Any:
         """Return its place, as a box without a size."""
@@ -253,6 +254,7 @@ class LuminaireArea(_Luminaire):
     def eval_direction(self, it, ds, active=True):
         """Return the radiance from the place of a direction sample."""
         si = dr.zeros(mi.SurfaceInteraction3f)
+        si.wavelengths = it.wavelengths
         return self._radiance(si, -ds.d, dr.dot(ds.d, ds.n), active)
 
     def pdf_direction(self, it, ds, active=True):
@@ -265,10 +267,11 @@ class LuminaireArea(_Luminaire):
         direction = mi.warp.square_to_uniform_sphere(sample3)
         si = dr.zeros(mi.SurfaceInteraction3f)
         si.p, si.n = ps.p, ps.n
+        si.wavelengths, color = self.sample_wavelengths(si, sample1, active)
         candela = self._candela(direction, active)
         ray = si.spawn_ray(direction)
         ray.time = mi.Float(time)
-        return ray, self._color(si, active) * (SPHERE * candela)
+        return ray, color * (SPHERE * candela)
 
     def sample_position(self, time, sample, active=True):
         """Return a place on the shape."""

@@ -8,10 +8,13 @@ from lightpaint.errors import BackendError
 
 _MODULE = "lightpaint.luminaires.emitter_plugins"
 
+#: Variants that have the emitters, and keep them while another is set.
+_registered: set[str] = set()
+
 
 def can_have_luminaires(variant: str) -> bool:
     """Return whether a variant of Mitsuba runs these emitters at full speed: those of Dr.Jit do."""
-    return variant.endswith("_rgb") and not variant.startswith("scalar")
+    return variant.endswith(("_rgb", "_spectral")) and not variant.startswith("scalar")
 
 
 def check_can_have_luminaires(variant: str) -> None:
@@ -30,10 +33,13 @@ def register_luminaires() -> None:
     if variant is None or not can_have_luminaires(variant):
         return
     module = sys.modules.get(_MODULE)
+    if variant in _registered:
+        return
     if module is None:
         importlib.import_module(_MODULE)
-    elif variant != module.VARIANT:
+    else:
         importlib.reload(module)  # its base class is that of the variant
+    _registered.add(variant)
 
 
 def register_luminaires_always() -> None:

@@ -7,12 +7,15 @@ from typing import Any
 
 from lightpaint.arrays import as_rgb, release_freed_memory
 from lightpaint.basis.basis import Basis
+from lightpaint.colour.spectra.spectrum_source import daylight
 from lightpaint.images.estimate import Estimate, write_estimate
 from lightpaint.keywords import keywords
 from lightpaint.lighting.analysis.analysis import Analysis, analyse, with_findings
+from lightpaint.lighting.analysis.surface_colors import SurfaceColor, surface_colors
 from lightpaint.lighting.animated_solve import solve_frames
 from lightpaint.lighting.answer.lighting import Lighting
 from lightpaint.lighting.answer.lighting_keys import LightingKey
+from lightpaint.lighting.held_mixes import choose_held_mixes
 from lightpaint.lighting.problem import Problem
 from lightpaint.lighting.solution import Solution
 from lightpaint.lighting.solve import solution_of
@@ -61,6 +64,7 @@ from lightpaint.relit.verification_render import (
 from lightpaint.report.basis_memo import make_ahead
 from lightpaint.report.page.page import prepare_page
 from lightpaint.scene.scene import Scene
+from lightpaint.scene.surface_spectra import render_reflectances
 from lightpaint.sentences import Hint, Sentence, Word
 
 #: Advice on stages that every answer needs.
@@ -160,7 +164,7 @@ def answer_job(
             for basis in problem.views.bases:
                 make_ahead(basis, prepare_page)
         solution = solution_of(problem)
-    solution = _reduce_noise(job, solution, listen)
+    solution = choose_held_mixes(_reduce_noise(job, solution, listen))
     del problem  # some of its arrays are as large as the pictures
     release_freed_memory()
     level_errors = () if placement is None else placement.level_errors
@@ -270,6 +274,7 @@ def _finish_view(
         placement=rig.placement,
         move_suggestion=rig.move,
         planes=rig.planes,
+        surfaces=_surface_colors(scene, solution),
     )
     # The files of the relit scene come to its final folder together with the report.
     with stage("report", listen, Sentence(" (", Hint("report", False), " skips it)")):
@@ -278,6 +283,14 @@ def _finish_view(
     for remark in look.remarks:
         listen.say(remark if len(job.views) == 1 else Sentence(f"{view.folder.name}: ", remark))
     return look
+
+
+def _surface_colors(scene: Scene | None, solution: Solution) -> tuple[SurfaceColor, ...]:
+    """Return the colours of objects under an answer that was found with spectra."""
+    objects = solution.basis.objects
+    if scene is None or not scene.is_spectral or objects is None:
+        return ()
+    return surface_colors(solution, render_reflectances(scene, objects), daylight())
 
 
 def _write_prediction(

@@ -148,9 +148,15 @@ def set_emission(
 def set_spectrum(changes: Changes, emitter: Emitter, powers: Doubles) -> None:
     """Set the emission of `emitter` to a spectrum. powers: (81,) at WAVELENGTHS, for luminance."""
     assert emitter.kind is not None
+    changes.set("spectrum", emitter.kind.parameter, spectrum_text(powers))
+
+
+def spectrum_text(powers: Doubles) -> str:
+    """Return a spectrum as XML has it. powers: (81,) at WAVELENGTHS, for luminance."""
+    if not powers.any():  # a spectrum without power, which Mitsuba refuses
+        return "0"
     values = zip(WAVELENGTHS.tolist(), (powers / LUMINANCE_OF_POWER).tolist(), strict=True)
-    text = ", ".join(f"{wave}:{value:.6g}" for wave, value in values)
-    changes.set("spectrum", emitter.kind.parameter, text)
+    return ", ".join(f"{wave}:{value:.6g}" for wave, value in values)
 
 
 def set_image(changes: Changes, emitter: Emitter, image: Floats, *, stem: str) -> dict[str, Floats]:

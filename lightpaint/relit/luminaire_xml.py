@@ -12,6 +12,7 @@ from lightpaint.luminaires.luminaire_request import NUMBER_KEYS
 from lightpaint.luminaires.plugin_names import AREA_PLUGIN, POINT_PLUGIN
 from lightpaint.luminaires.spot_sum import SpotPart, spots_of
 from lightpaint.luminaires.web_frame import EMITTER_FROM_WEB, world_from_web
+from lightpaint.relit.emission_xml import spectrum_text
 from lightpaint.scene.checks.tokens import tag
 from lightpaint.scene.lights.emitters import Emitter
 from lightpaint.scene.lights.hung_luminaires import (
@@ -20,6 +21,7 @@ from lightpaint.scene.lights.hung_luminaires import (
     luminaire_lines,
     matrix_text,
     panel_lines,
+    rgb_text,
 )
 from lightpaint.scene.scene import Scene
 
@@ -31,22 +33,28 @@ def luminaire_of(scene: Scene, emitter: Emitter) -> HungLuminaire | None:
 
 
 def luminaire_xml(
-    scene: Scene, emitter: Emitter, level: RGB, sampling_weight: float | None
+    scene: Scene,
+    emitter: Emitter,
+    level: RGB,
+    sampling_weight: float | None,
+    powers: Doubles | None = None,
 ) -> list[str]:
     """Return the XML of a luminaire at a level, line by line, for the place of its element.
 
-    sampling_weight: None for its own.
+    sampling_weight: None for its own. powers: (81,), the spectrum of its level, in the place of a
+    colour.
     """
     hung = luminaire_of(scene, emitter)
     assert hung is not None
     weight = emitter.sampling_weight if sampling_weight is None else sampling_weight
     props = scene.parsed.state.nodes[emitter.node].props
     numbers = {key: float(props[key]) for key in NUMBER_KEYS if key in props}
-    file = str(props["filename"])
+    file, shown = str(props["filename"]), np.array(level) if powers is None else powers
+    intensity = _intensity(shown)
     if emitter.plugin == AREA_PLUGIN:
         name = "" if hung.is_panel else str(props.id())
         lines = luminaire_lines(
-            AREA_PLUGIN, name, file, numbers, level, None, sampling_weight=weight
+            AREA_PLUGIN, name, file, numbers, intensity, None, sampling_weight=weight
         )
         if not hung.is_panel:
             return lines
@@ -54,12 +62,18 @@ def luminaire_xml(
         matrix = np.array(shape["to_world"].matrix, np.float64).reshape(4, 4)
         return panel_lines(hung.name, str(shape.plugin_name()), matrix, lines)
     matrix = np.array(props["to_world"].matrix, np.float64).reshape(4, 4)
-    if spots := _spots(hung):
-        candela = np.multiply(level, hung.scale)
-        return _spot_lines(hung.name, spots, matrix, numbers, candela, weight)
+    if spots := _spots(hung, is_spectral=powers is not None):
+        return _spot_lines(hung.name, spots, matrix, numbers, hung.scale * shown, weight)
     return luminaire_lines(
-        POINT_PLUGIN, hung.name, file, numbers, level, matrix, sampling_weight=weight
+        POINT_PLUGIN, hung.name, file, numbers, intensity, matrix, sampling_weight=weight
     )
+
+
+def _intensity(level: Doubles) -> str:
+    """Return the XML of an intensity: a colour (3,) or a spectrum (81,)."""
+    if len(level) == 3:
+        return tag("rgb", name="intensity", value=rgb_text(level.tolist()))
+    return tag("spectrum", name="intensity", value=spectrum_text(level))
 
 
 def written_emission(scene: Scene, emitter: Emitter, level: RGB) -> RGB:
@@ -82,7 +96,7 @@ def plugin_remark(scene: Scene) -> str | None:
         x.name
         for x in scene.emitters
         if (hung := luminaire_of(scene, x)) is not None
-        and (x.plugin == AREA_PLUGIN or not _spots(hung))
+        and (x.plugin == AREA_PLUGIN or not _spots(hung, is_spectral=scene.is_spectral))
     ]
     if not names:
         return None
@@ -92,8 +106,12 @@ def plugin_remark(scene: Scene) -> str | None:
     )
 
 
-def _spots(hung: HungLuminaire) -> tuple[SpotPart, ...]:
-    return spots_of(hung.request.web)
+def _spots(hung: HungLuminaire, *, is_spectral: bool = False) -> tuple[SpotPart, ...]:
+    """Return the spots that add up to a luminaire; none with spectra if some are negative, which
+    spectra of Mitsuba are not.
+    """
+    spots = spots_of(hung.request.web)
+    return () if is_spectral and any(x.candela < 0 for x in spots) else spots
 
 
 def _spot_lines(
@@ -106,7 +124,7 @@ def _spot_lines(
 ) -> list[str]:
     """Return the XML of spots, the first of which has the name of the luminaire.
 
-    level: (3,), by which their candela are multiplied.
+    level: a colour (3,) or a spectrum (81,), by which their candela are multiplied.
     """
     turn, tilt = numbers.get("turn", 0.0), numbers.get("tilt", 0.0)
     hung = np.eye(4)
@@ -114,12 +132,11 @@ def _spot_lines(
     hung[:3, :3] = world_from_web(matrix[:3, :3], turn=turn, tilt=tilt) @ EMITTER_FROM_WEB.T
     lines: list[str] = []
     for k, spot in enumerate(spots if level.any() else spots[:1]):
-        colour = " ".join(f"{np.float32(spot.candela * x):.9g}" for x in level)
         inner = [
             matrix_text(hung),
             tag("float", name="beam_width", value=f"{spot.beam:.9g}"),
             tag("float", name="cutoff_angle", value=f"{spot.cutoff:.9g}"),
-            tag("rgb", name="intensity", value=colour),
+            _intensity(spot.candela * level),
         ]
         if weight != 1:
             inner.append(tag("float", name="sampling_weight", value=f"{weight:g}"))

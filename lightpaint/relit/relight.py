@@ -100,7 +100,11 @@ def _loaded(path: Path, scene: Scene) -> Scene:
     while True:
         try:
             return load_scene(
-                path, sensor=scene.sensor, parameters=parameters, use_lights_file=False
+                path,
+                sensor=scene.sensor,
+                parameters=parameters,
+                use_lights_file=False,
+                lamps=["*"],
             )
         except SceneError as error:
             unused_parameters = set(parameters) & set(UNUSED_PARAMETER.findall(str(error)))

@@ -269,7 +269,7 @@ def _edit(edit: _Edits, folder: Path, scene: Scene, stem: str) -> tuple[bytes, d
     for offset in sorted({*edit.settings, *edit.texel_images, *edit.moved}):
         if offset in edit.settings and luminaire_of(scene, edit.settings[offset][0]) is not None:
             # It has the place that it was moved to.
-            lines = luminaire_xml(scene, *edit.settings[offset])
+            lines = luminaire_xml(scene, *edit.settings[offset], edit.spectra.get(offset))
             xml.replace_by_lines(xml.element_at(offset), lines)
             continue
         changes = Changes(xml, xml.element_at(offset))
@@ -279,11 +279,8 @@ def _edit(edit: _Edits, folder: Path, scene: Scene, stem: str) -> tuple[bytes, d
             emitter, rgb, weight = edit.settings[offset]
             if weight is not None:
                 changes.set("float", "sampling_weight", f"{weight:g}")
-            if offset in edit.spectra and any(rgb):
+            if offset in edit.spectra:
                 set_spectrum(changes, emitter, edit.spectra[offset])
-            elif offset in edit.spectra and emitter.kind is not None:
-                # A colour of 0 is a spectrum without power, which Mitsuba refuses.
-                changes.set("spectrum", emitter.kind.parameter, "0")
             else:
                 images |= set_emission(changes, scene, emitter, rgb, stem=stem)
         if offset in edit.texel_images:

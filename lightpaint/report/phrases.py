@@ -10,6 +10,7 @@ from lightpaint.colour.color import luminance
 from lightpaint.display_text import some_names, some_of
 from lightpaint.lighting.analysis.appearance.unpainted_change import UnpaintedChange
 from lightpaint.lighting.analysis.diagnosis import Place
+from lightpaint.lighting.answer.light_rendering import LightRendering
 from lightpaint.lighting.answer.lighting import LightSetting
 
 CHANNELS = ("red", "green", "blue")
@@ -206,8 +207,55 @@ def spoken_preference(lights: Iterable[LightSetting]) -> str:
         return ""
     return (
         "Of the mixes of emitters that give the same light, each lamp has "
-        f"{PREFERENCE_TEXTS[preferences[0]]}."
+        f"{PREFERENCE_TEXTS[preferences[0]]}"
+        + (", of those that have its Rf." if any(x.least_rf for x in lamps) else ".")
     )
+
+
+#: What is said of the highest Rf that was found.
+OUT_OF_REACH = "is the most these emitters give at this colour"
+
+
+def rendering_sentences(renderings: Mapping[str, LightRendering]) -> list[str]:
+    """Return what lamps reach of the Rf that was asked for, and what it costs, a sentence each."""
+    return [
+        f"{name}: {_spoken_rendering(x)}."
+        for name, x in renderings.items()
+        if x.wanted_rf is not None
+    ]
+
+
+def _spoken_rendering(found: LightRendering) -> str:
+    assert found.wanted_rf is not None
+    if found.color is None:
+        return "its light is coloured, and Rf compares whites"
+    rf, most = (f"{round(x, 1):g}" for x in (found.color.rf, found.best_rf or found.color.rf))
+    if found.color.rf >= found.wanted_rf:
+        return f"Rf {rf}, as asked for" + _spoken_cost(found)
+    is_held = found.held_mix_change is not None
+    reason = "leaves the picture as it is" if is_held else OUT_OF_REACH
+    text = f"Rf {rf} {reason}"
+    if found.wanted_rf < 100:
+        text += f"; {found.wanted_rf:g} was asked for"
+    if is_held:
+        text += (
+            f". Rf {most} {OUT_OF_REACH}; the mix that was asked for changes the picture by "
+            f"{found.held_mix_change:.1f} ΔE"
+        )
+        if found.wanted_rf < 100:
+            text += ". It counts first once the lamp has a fixed colour"
+    return text + _spoken_cost(found)
+
+
+def _spoken_cost(found: LightRendering) -> str:
+    """Return what the Rf of a lamp costs, with what joins it to a sentence; "" for nothing."""
+    watts, plain, rf = found.watts, found.plain_watts, found.plain_rf
+    if watts is None or plain is None or rf is None or found.color is None:
+        return ""
+    spoken, spoken_plain = f"{watts:.3g} W", f"{plain:.3g} W"
+    if spoken == spoken_plain:
+        return f". It takes {spoken}, with that or without"
+    return f". It takes {spoken}, instead of {spoken_plain} for Rf {round(rf, 1):g}"
 
 
 def spoken_percents(shares: Iterable[float]) -> list[str]:

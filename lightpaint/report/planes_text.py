@@ -147,7 +147,9 @@ def _missed(answer: PlanesAnswer, outcome: WishOutcome) -> str:
             return f"{text}, as much as the other wishes leave."
         count = answer.lamps
         more = math.ceil(count * (wish.asked / reached - 1)) if reached > 0 else 0
-        advice = f"; about {more} more lamps like these {count} would do" if more else ""
+        these = "this one" if count == 1 else f"these {count}"
+        lamps = "one more lamp" if more == 1 else f"{more} more lamps"
+        advice = f"; about {lamps} like {these} would do" if more else ""
         return f"{text}: all lamps are at full{advice}."
     if wish.kind == "uniformity":
         return f"{title}: a uniformity of {reached:.2f}, wished for {wish.asked:g}."

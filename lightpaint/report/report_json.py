@@ -77,6 +77,7 @@ def report_numbers(answer: ReportedAnswer, *, missed: Residual | None = None) ->
         "fit": _fit(solution, predicted, answer.unconstrained),
         "lights": _lights(basis, solution, uncertainty),
         "rendering": rendering_numbers(solution.lighting),
+        "surfaces": [vars(x) for x in answer.surfaces] or None,
         "missed": None if diagnosis is None else _missed(solution, diagnosis, transform),
         "uncertainty": None if uncertainty is None else _uncertainty(basis, solution, uncertainty),
         "verification": None if verification is None else verification_numbers(verification),

@@ -9,6 +9,7 @@ from lightpaint.lighting.analysis.appearance.appearance import Appearance
 from lightpaint.lighting.analysis.appearance.color_choices import Choices
 from lightpaint.lighting.analysis.diagnosis import Diagnosis
 from lightpaint.lighting.analysis.noise.uncertainty import Uncertainty
+from lightpaint.lighting.analysis.surface_colors import SurfaceColor
 from lightpaint.lighting.solution import Solution
 from lightpaint.lighting.wishes.planes_answer import PlanesAnswer
 from lightpaint.placement.suggestion import MoveSuggestion, Suggestion
@@ -26,7 +27,8 @@ class ReportedAnswer:
     diagnosis, unconstrained, suggestions, hung: without them the report has no such section.
     turn: the turn of a spot that would help most, if any. appearance: the result of
     `compare_appearance`, if known. color_choices: the answers of other colours, if known. planes:
-    what it gives on measuring planes, if there are any.
+    what it gives on measuring planes, if there are any. surfaces: colours of objects under it, if
+    it has spectra.
     """
 
     basis: Basis
@@ -44,3 +46,4 @@ class ReportedAnswer:
     appearance: Appearance | None = None
     color_choices: Choices = ()
     planes: PlanesAnswer | None = None
+    surfaces: Sequence[SurfaceColor] = ()

@@ -247,6 +247,11 @@ class Scene(SceneFiles, Shown):
         return self.parsed.materials()
 
     @property
+    def rgb_metals(self) -> list[str]:
+        """Names of its conductors whose indices of refraction are RGB colours."""
+        return self.parsed.rgb_metals()
+
+    @property
     def in_rgb(self) -> "Scene":
         """This scene for renders in RGB."""
         return replace(self, is_spectral=False) if self.is_spectral else self

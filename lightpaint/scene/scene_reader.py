@@ -64,6 +64,7 @@ def load_scene(
     split: Mapping[str, object] | None = None,
     symmetric: Iterable[str] | None = None,
     map_size: object = None,
+    lamps: Iterable[str] = (),
 ) -> Scene:
     """Read a Mitsuba scene XML and find its lights.
 
@@ -94,6 +95,8 @@ def load_scene(
             those of the lights file, which this replaces.
         map_size: Columns and rows, such as `(1024, 512)`, at which `relight` writes the images of
             split lights; by default one pixel for each texel.
+        lamps: Names or patterns of lights whose colour may lie outside Rec.709, besides those
+            whose emitters the lights file lists: `["*"]` for a relit scene.
 
     Raises:
         SceneError: If the scene is invalid, with Mitsuba's own message if Mitsuba rejects it.
@@ -135,7 +138,9 @@ def load_scene(
         facts = with_split(whole, parsed, sizes, mirrored)
     check_film(path, facts["film"], facts["spp"])
     check_emitters(path, facts["emitters"])
-    facts["emitters"] = _with_colors_of_lamps(facts["emitters"], selection)
+    facts["emitters"] = _with_colors_of_lamps(
+        facts["emitters"], [*selection.requests.lamps, *lamps]
+    )
     chosen = _select_lights(path, facts["emitters"], selection, group_alike=group_alike)
     if len(adjusted := _adjusted_images(chosen)) < len(sizes):
         # An image of which nothing is adjusted stays as it is, in full detail.
@@ -180,12 +185,11 @@ def with_layout(scene: Scene, image: str, layout: TexelLayout) -> Scene:
 
 
 def _with_colors_of_lamps(
-    emitters: Sequence[Emitter], selection: LightsFile
+    emitters: Sequence[Emitter], patterns: Sequence[str]
 ) -> tuple[Emitter, ...]:
-    """Return the emitters, of which those may be adjusted whose colour is outside Rec.709 and whose
-    lamp the lights file describes, as in a scene that was relit.
+    """Return the emitters, of which those may be adjusted whose colour is outside Rec.709 and that
+    are lamps, as in a scene that was relit. patterns: names or patterns of lamps.
     """
-    patterns = selection.requests.lamps
 
     def is_lamp(emitter: Emitter) -> bool:
         return any(emitter.name == x or fnmatchcase(emitter.name, x) for x in patterns)

@@ -257,6 +257,18 @@ class ParsedScene:
         nodes = self._nodes_of(mi.ObjectType.BSDF)
         return frozenset(str(self.state.nodes[k].props.plugin_name()) for k in nodes)
 
+    def rgb_metals(self) -> list[str]:
+        """Return the ids, else the kinds, of conductors whose eta or k is an RGB colour."""
+        import mitsuba as mi
+
+        found = []
+        for k in self._nodes_of(mi.ObjectType.BSDF):
+            props = self.state.nodes[k].props
+            kind, values = str(props.plugin_name()), [props[x] for x in ("eta", "k") if x in props]
+            if "conductor" in kind and any(isinstance(x, mi.ScalarColor3d) for x in values):
+                found.append(str(props.id()) or kind)
+        return found
+
     def has_media(self) -> bool:
         import mitsuba as mi
 

@@ -1,5 +1,6 @@
 """Spectra of lights: known illuminants, files as instruments write them, and mistakes in these."""
 
+import json
 from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 
@@ -216,3 +217,20 @@ def test_threads_get_the_numbers_of_one():
     with ThreadPoolExecutor(4) as pool:
         found = list(pool.map(lambda x: color_rendering(np.array(x)), spectra))
     assert [None if x is None else x.ra for x in found] == pytest.approx(FLUORESCENT, abs=0.6)
+
+
+LUXPY = json.loads(Path(__file__).with_name("luxpy_figures.json").read_text())["lights"]
+
+
+@pytest.mark.parametrize("name", LUXPY)
+def test_luxpy_has_the_same_rendering(name: str):
+    """Another implementation, by `luxpy_figures.py`: lamps, daylight and mixes of LEDs."""
+    expected = LUXPY[name]
+    found = color_rendering(np.array(expected["powers"]))
+    assert found is not None
+    # luxpy's Ra is the mean of eight whole numbers, each of which is off by up to .5.
+    assert found.ra == pytest.approx(expected["ra"], abs=0.5)
+    # CIE 13.3 takes the reference at the colour temperature, whose formulas differ by a few kelvin.
+    assert found.r9 == pytest.approx(expected["r9"], abs=0.3)
+    assert found.rf == pytest.approx(expected["rf"], abs=3e-3)
+    assert found.rg == pytest.approx(expected["rg"], abs=3e-3)

@@ -8,9 +8,22 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from rig_files import EXAMPLE, UPRIGHT, fixture, layered, unzipped, write_mvr, zipped
+from command import succeed
+from rig_files import (
+    EXAMPLE,
+    UPRIGHT,
+    channel,
+    fixture,
+    gdtf,
+    layered,
+    unzipped,
+    write_mvr,
+    zipped,
+)
 
+from lightpaint.basis.render.render_origin import basis_lights
 from lightpaint.colour.photometry import spot_flux
+from lightpaint.colour.spectra.spectrum_source import read_spectrum
 from lightpaint.dmx import rig_room
 from lightpaint.dmx.mvr import PlacedModel, read_rig, read_show
 from lightpaint.dmx.rig_room import room_of_scene, room_of_show
@@ -22,6 +35,8 @@ from lightpaint.dmx.rig_scene import (
     lights_text,
     scene_text,
 )
+from lightpaint.lighting.constraints.constraints_file import constraints_of
+from lightpaint.lighting.unknowns.reduction import lamps_by_name
 from lightpaint.scene.scene_reader import load_scene
 
 ROOM = EXAMPLE.with_name("room.xml")
@@ -90,6 +105,43 @@ def test_the_lights_file_has_all_emitters() -> None:
             assert math.isclose(found["cd"], emitter.candela, rel_tol=1e-5)
             assert (found["max"], found["watts"]) == (1, emitter.watts)
             assert found["bits"] == (8 if light.name.startswith("1") else 16)
+
+
+#: A red of 630 nm as an instrument measures it, with noise below zero.
+MEASURED = {600: -0.002, 610: 0.08, 620: 0.55, 630: 1.0, 640: 0.45, 650: 0.05, 660: -0.001}
+
+
+def _show_of_measured_red(folder: Path, *, color: str = "") -> Path:
+    points = "".join(
+        f'<MeasurementPoint WaveLength="{nm}" Energy="{x}"/>' for nm, x in MEASURED.items()
+    )
+    measured = f'<Measurement Physical="100" LuminousIntensity="0">{points}</Measurement>'
+    emitters = f'<Emitters><Emitter Name="Red"{color}>{measured}</Emitter></Emitters>'
+    lamp = gdtf(channel("ColorAdd_R", "1"), described=emitters)
+    fixtures = fixture("A"), fixture("B", number="2", address="2")
+    return write_mvr(folder / "a.mvr", layered(*fixtures), lamp=lamp)
+
+
+def test_measured_spectra_are_files_beside_the_lights_file(tmp_path: Path) -> None:
+    succeed(tmp_path, "rig", _show_of_measured_red(tmp_path), "-o", "show.xml")
+    # Two fixtures of one type share it.
+    assert [x.name for x in tmp_path.glob("*.csv")] == ["show.Lamp.red.csv"]
+    waves, powers = read_spectrum(tmp_path / "show.Lamp.red.csv")
+    clipped = np.maximum([*MEASURED.values()], 0)
+    expected = np.interp(waves, [*MEASURED], clipped, left=0, right=0)
+    assert powers / powers.max() == pytest.approx(expected, abs=1e-5)
+    scene = load_scene(tmp_path / "show.xml")
+    lamps = lamps_by_name(constraints_of(scene.requests), basis_lights(scene))
+    assert {x.name for x in scene.with_lamps(lamps).lights} >= {"1 A/red", "2 B/red"}
+
+
+def test_a_spectrum_of_another_colour_than_the_files_does_not_count(tmp_path: Path) -> None:
+    show = _show_of_measured_red(tmp_path, color=' Color="0.3,0.6,40"')
+    [light, _] = lights_of(read_rig(show))
+    assert light.emitters[0].spectrum is None
+    assert light.emitters[0].xy == (0.3, 0.6)
+    show = _show_of_measured_red(tmp_path, color=' Color="0.7,0.29,20"')
+    assert lights_of(read_rig(show))[0].emitters[0].spectrum is not None
 
 
 def test_names_with_marks_survive_both_files(tmp_path: Path) -> None:

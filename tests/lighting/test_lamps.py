@@ -300,6 +300,8 @@ WRONG = {
     ),
     "a share of nothing": ({"power_share": 0.5}, "without the emitters that share it"),
     "share": ({"emitters": RGBW, "power_share": 2}, "expected a share of full power"),
+    "an Rf that none has": ({"emitters": RGBW, "rf": 120}, "rf is 120: expected the least Rf"),
+    "an Rf in words": ({"emitters": RGBW, "rf": ">= 85"}, "rf is '>= 85': expected the least Rf"),
 }
 
 
@@ -324,6 +326,14 @@ IMPOSSIBLE = {
     "a lock it cannot mix": (
         {"emitters": RGBW, "lock": "#ffffff 900"},
         "emitters red, green, blue, white cannot mix",
+    ),
+    "an Rf without spectra": (
+        {"emitters": RGBW, "rf": 85},
+        "rf is 85, and nothing says which spectrum its emitters red, green, blue, white of 'par'",
+    ),
+    "an Rf of a light without emitters": (
+        {"rf": 85},
+        "nothing says which spectrum its emitters of 'par' have: add emitters",
     ),
     "limits by channel": (
         {"emitters": RGBW, "limits": {"max": [1, 1, 1]}},

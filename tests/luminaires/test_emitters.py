@@ -3,7 +3,7 @@
 import gc
 import subprocess
 import sys
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -18,7 +18,7 @@ from lightpaint.luminaires.registration import check_can_have_luminaires
 from lightpaint.luminaires.web import turned
 from lightpaint.luminaires.web_file import read_web
 from lightpaint.luminaires.web_frame import hanging_frame, world_from_web
-from lightpaint.scene.runtime.variant import use_variant
+from lightpaint.scene.runtime.variant import spectral_variant, use_variant
 
 #: The renderer's numbers are float32; angles near the axis lose half of their digits.
 SINGLE = 2e-4
@@ -194,6 +194,53 @@ def test_light_traced_from_it_carries_its_flux(tmp_path: Path, plugin: str) -> N
     error = carried.std() / np.sqrt(carried.size)
     assert carried.mean() == pytest.approx(800, abs=4 * error)
     assert error < 5
+
+
+def _spectral_lamp(folder: Path, plugin: str, waves: Sequence[float], powers: Doubles) -> Any:
+    """A lamp of 1000 cd times the cosine to z, with a spectrum straight between these points."""
+    import mitsuba as mi
+
+    points = {"wavelengths": waves, "values": powers}
+    spectrum = {key: ", ".join(map(str, np.array(x).tolist())) for key, x in points.items()}
+    web = write_web(folder / "lamp.ies", ies_text(cosine))
+    emitter = {"type": plugin, "filename": str(web), "intensity": {"type": "irregular"} | spectrum}
+    if plugin == "iesarea":
+        small = mi.ScalarTransform4f().scale(0.01)
+        emitter = {"type": "rectangle", "to_world": small, "emitter": emitter}
+    return mi.load_dict({"type": "scene", "x": emitter})
+
+
+@pytest.mark.parametrize("plugin", ["ies", "iesarea"])
+def test_with_spectra_the_web_scales_and_the_spectrum_colours(tmp_path: Path, plugin: str) -> None:
+    import drjit as dr
+    import mitsuba as mi
+
+    waves, powers = [420.0, 500.0, 580.0, 660.0], np.array([0.5, 2.0, 1.0, 0.25])
+    with spectral_variant():
+        scene = _spectral_lamp(tmp_path, plugin, waves, powers)
+        it = dr.zeros(mi.SurfaceInteraction3f, 1)
+        it.wavelengths = mi.Spectrum(*waves)
+        it.p = mi.Point3f(float(2 * np.sin(np.radians(60))), 0, 1)
+        _, arriving = scene.emitters()[0].sample_direction(it, mi.Point2f(0.5))
+        # 2 m away, 60 degrees from the axis. The panel is a hundredth of that in size.
+        assert np.array(arriving).ravel() == pytest.approx(1000 * 0.5 / 4 * powers, rel=2e-3)
+
+
+@pytest.mark.parametrize("plugin", ["ies", "iesarea"])
+def test_with_spectra_light_traced_from_it_carries_its_power(tmp_path: Path, plugin: str) -> None:
+    import mitsuba as mi
+
+    with spectral_variant():
+        scene = _spectral_lamp(tmp_path, plugin, [400.0, 700.0], np.ones(2))
+        numbers = mi.load_dict({"type": "independent"})
+        numbers.seed(1, 50_000)
+        draws = numbers.next_1d(), numbers.next_2d(), numbers.next_2d()
+        _, weight = scene.emitters()[0].sample_ray(0.0, *draws)
+        carried = np.array(weight, float).mean(axis=0)
+        error = carried.std() / np.sqrt(carried.size)
+        # 1000 π lumens at full, times 300 nm of power 1.
+        assert carried.mean() == pytest.approx(1000 * np.pi * 300, abs=4 * error)
+        assert error < 0.01 * carried.mean()
 
 
 def test_plain_mitsuba_has_them_after_an_import(tmp_path: Path) -> None:

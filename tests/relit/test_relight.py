@@ -13,10 +13,13 @@ import pytest
 from command import succeed
 from renderer import CORNELL, LIGHTS, REPOSITORY, mitsuba_render, one_pass, write_room
 
+from lightpaint.basis.render.basis_render import render_basis
 from lightpaint.errors import LightingError, OutputError, SceneError
 from lightpaint.images.formats.exr import write_rgb
 from lightpaint.lighting.answer.combination import combine
 from lightpaint.lighting.answer.lighting import Lighting, LightSetting
+from lightpaint.lighting.constraints.constraints_file import constraints_of
+from lightpaint.lighting.unknowns.reduction import reduce_to
 from lightpaint.relit.relight import check_relightable, relight, scene_patch
 from lightpaint.relit.verification_render import verify
 from lightpaint.scene.scene import Scene
@@ -148,6 +151,23 @@ def test_all_lights_off_still_loads(tmp_path: Path, small_room: Scene) -> None:
     black = lighting_of(small_room, {light.name: (0, 0, 0) for light in small_room.lights})
     relit = relight(small_room, black, tmp_path / "out" / "relit.xml")
     assert mitsuba_render(relit, seed=0, spp=4).max() == 0
+
+
+def test_a_scene_whose_every_lamp_is_outside_rec_709_is_written_and_verified(
+    tmp_path: Path,
+) -> None:
+    """As one lamp of LEDs is that was painted in a pure colour."""
+    path = write_room(tmp_path, lights=LIGHTS["bulb"])
+    emitters = '[{name = "red", rgb = [6.1, -0.41, -0.07]}]'
+    (tmp_path / "room.lights.toml").write_text(f"[light.bulb]\nemitters = {emitters}\n")
+    scene = load_scene(path)
+    basis = render_basis(scene, spp=16)
+    weights = np.array([[3.05, -0.205, -0.035]])
+    lamps = reduce_to(constraints_of(scene.requests), basis.lights).lamps
+    lighting = Lighting.of_weights(basis, weights, lamps=lamps)
+    relit = relight(scene, lighting, tmp_path / "out" / "relit.xml")
+    assert relit.light("bulb").emission == pytest.approx((3.05, -0.205, -0.035))
+    assert verify(combine(basis, lighting), relit, spp=16).agrees
 
 
 def test_verification_agrees_and_a_tampered_scene_does_not(

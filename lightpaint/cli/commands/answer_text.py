@@ -17,6 +17,7 @@ from lightpaint.colour.color import LUMINANCE, luminance, rgb_to_hex
 from lightpaint.display_text import some_names, some_of
 from lightpaint.lighting.analysis.appearance.constraint_kinds import KEYS_BY_KIND
 from lightpaint.lighting.analysis.appearance.limiting_reasons import Reason
+from lightpaint.lighting.answer.light_rendering import renderings_of
 from lightpaint.lighting.answer.lighting import LightSetting
 from lightpaint.lighting.wishes.planes_answer import PlanesAnswer
 from lightpaint.photometry.glare import GlareReading
@@ -40,7 +41,13 @@ from lightpaint.report.diagnosis_sentences import (
 from lightpaint.report.glare_text import GLARE_HEADINGS, glare_rows
 from lightpaint.report.measures import energy_shares
 from lightpaint.report.page.constraint_section import closer_choice
-from lightpaint.report.phrases import spoken_lamp, spoken_percent, spoken_preference, spoken_wheels
+from lightpaint.report.phrases import (
+    rendering_sentences,
+    spoken_lamp,
+    spoken_percent,
+    spoken_preference,
+    spoken_wheels,
+)
 from lightpaint.report.planes_text import HEADINGS, glare_by_title, plane_rows, planes_sentences
 from lightpaint.sentences import Sentence, SourceKey
 
@@ -74,6 +81,7 @@ def show_look(look: Look, folder: Path, *, table: Table = "short") -> None:
     terminal.write("")
     if look.planes is not None:
         show_planes(look.planes)
+    _show_renderings(look)
     terminal.tell(fit_sentence(look.solution, instead="--literal turns this off"))
     certificate = look.solution.certificate
     if curve := certificate.curve:
@@ -112,6 +120,20 @@ def show_glare(readings: Mapping[str, GlareReading]) -> None:
         for row in glare_rows(readings):
             table.row(*row)
         terminal.print_table(table)
+
+
+def _show_renderings(look: Look) -> None:
+    """Print what lamps reach of the Rf that was asked for."""
+    lamps = [x.lamp for x in look.lighting.lights if x.lamp is not None]
+    if not any(lamp.searches_rendering for lamp in lamps):
+        return
+    sentences = rendering_sentences(renderings_of(look.lighting))
+    for sentence in sentences[:SHORT_LIST_LIGHTS]:
+        terminal.tell(sentence)
+    if more := sentences[SHORT_LIST_LIGHTS:]:
+        terminal.tell(f"The report has the Rf of {len(more)} lamps more.")
+    if sentences:
+        terminal.write("")
 
 
 def _sentences(look: Look, table: Table) -> list[str]:

@@ -9,7 +9,14 @@ from lightpaint.cli.output.vocabulary import spoken
 from lightpaint.dmx.console_rig import address_text
 from lightpaint.dmx.mvr import KindSummary, Show, read_show
 from lightpaint.dmx.rig_room import RoomFiles, room_of_scene, room_of_show
-from lightpaint.dmx.rig_scene import Room, cd_per_unit, lights_of, lights_text, scene_text
+from lightpaint.dmx.rig_scene import (
+    Room,
+    cd_per_unit,
+    lights_of,
+    lights_text,
+    scene_text,
+    spectrum_tables,
+)
 from lightpaint.errors import OutputError, RigError
 from lightpaint.files import check_files, check_writable, write_bytes, write_text
 from lightpaint.scene.lights.lights_file import lights_file_beside
@@ -41,8 +48,12 @@ def rig(
     unit = cd_per_unit(content.rig)
     texts = {
         output: scene_text(content.rig, unit, None if only_lights else surroundings.room),
-        lights_file_beside(output): lights_text(content.rig, unit, open_wheels=open_wheels),
+        lights_file_beside(output): lights_text(
+            content.rig, unit, open_wheels=open_wheels, stem=output.stem
+        ),
     }
+    tables = spectrum_tables(content.rig, output.stem)
+    texts |= {folder / name: text for name, text in tables.items()}
     files = [*texts, *(folder / name for name in surroundings.files)]
     _check(files, [show, *([] if room is None else [room])], folder, force=force)
     with staged(folder) as stage:

@@ -303,6 +303,13 @@ def _add_colors(group: argparse._ArgumentGroup, add: AddOption) -> None:
         arguments.primaries,
         "restrict the light to colours that a fixture with these LEDs can mix",
     )
+    add(
+        "--rf",
+        "NAME=85",
+        arguments.light_number,
+        "of all mixes of the lamp's emitters that look the same, take one whose fidelity index Rf "
+        "(TM-30) is at least this; if none is, the best",
+    )
 
 
 def _add_preferences(group: argparse._ArgumentGroup) -> None:

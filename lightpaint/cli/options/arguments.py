@@ -69,6 +69,15 @@ def light_value(text: str) -> tuple[str, Any]:
     return name.strip(), _value(value)
 
 
+def light_number(text: str) -> tuple[str, float]:
+    """Parse a number for a light, `NAME=85`."""
+    name, value = light_value(text)
+    try:
+        return name, parse_number(value)
+    except (AttributeError, TypeError, ValueError):
+        raise argparse.ArgumentTypeError(f"{text!r} is not NAME=NUMBER") from None
+
+
 def _value(text: str) -> Any:
     """Return three numbers with commas as a list; anything else as text."""
     parts = text.strip().split(",")

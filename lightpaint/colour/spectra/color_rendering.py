@@ -61,13 +61,28 @@ def fidelity(powers: Doubles) -> float:
 
 #: Held by the thread that asks colour-science, whose scale of numbers is one for all threads: two
 #: at a time leave it wrong (findings/colour_science_threads_leave_its_scale_wrong.sh).
-_ONE_AT_A_TIME = Lock()
+ONE_AT_A_TIME = Lock()
 
 
 @lru_cache(1024)
 def _of_spectrum(spectrum: Spectrum) -> ColorRendering:
-    with _ONE_AT_A_TIME:
+    with ONE_AT_A_TIME:
         return _computed(spectrum)
+
+
+@lru_cache(256)
+def samples_under_reference(spectrum: Spectrum) -> Doubles:
+    """Return J', a' and b' of CAM02-UCS, (99, 3), of TM-30's samples under the light with which it
+    compares this one.
+    """
+    quality = colour_science().quality
+    with ONE_AT_A_TIME, warnings.catch_warnings():
+        warnings.simplefilter("ignore")  # as below
+        found = quality.colour_fidelity_index(
+            _distribution(spectrum), additional_data=True, method="CIE 2017"
+        )
+    _, reference = found.colorimetry_data
+    return np.asarray(reference.Jpapbp, np.float64)
 
 
 def _computed(spectrum: Spectrum) -> ColorRendering:

@@ -4,6 +4,7 @@ Files are tables of two columns, nanometres and power, or IES TM-27 (.spdx).
 """
 
 import re
+from functools import cache
 from pathlib import Path
 from xml.parsers import expat
 
@@ -11,7 +12,7 @@ import numpy as np
 
 from lightpaint.arrays import Doubles
 from lightpaint.colour.primaries import colour_science
-from lightpaint.colour.spectra.spectrum import black_body
+from lightpaint.colour.spectra.spectrum import WAVELENGTHS, black_body, spectrum_of
 from lightpaint.errors import ColorError
 from lightpaint.file_reading import read_bytes, read_text
 from lightpaint.files import one_line
@@ -54,8 +55,6 @@ def named_spectrum(name: str, folder: Path) -> tuple[Doubles, Doubles]:
         kelvin = float(match[1])
         if not KELVINS[0] <= kelvin <= KELVINS[1]:
             raise ColorError(f"{kelvin:g} K: expected {KELVINS[0]:g} to {KELVINS[1]:g}")
-        from lightpaint.colour.spectra.spectrum import WAVELENGTHS
-
         return WAVELENGTHS.astype(np.float64), np.array(black_body(kelvin))
     illuminants = colour_science().SDS_ILLUMINANTS
     if name in illuminants:
@@ -66,6 +65,12 @@ def named_spectrum(name: str, folder: Path) -> tuple[Doubles, Doubles]:
         '("led.csv", "led.spdx"), a black body ("3200K blackbody") or an illuminant of the CIE '
         '("D65", "A", "FL2")'
     )
+
+
+@cache
+def daylight() -> Doubles:
+    """Return D65, (81,) at WAVELENGTHS, for luminance 1."""
+    return np.array(spectrum_of(*named_spectrum("D65", Path())))
 
 
 def read_spectrum(path: Path) -> tuple[Doubles, Doubles]:

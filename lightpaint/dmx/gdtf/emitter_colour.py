@@ -1,5 +1,6 @@
 """Colours of emitters, filters and lamps in a GDTF file, and usual ones where a file has none."""
 
+import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from functools import cache
@@ -11,8 +12,11 @@ import numpy as np
 from lightpaint.arrays import RGB, Doubles, as_rgb
 from lightpaint.colour.planckian_locus import uv_of_black_body, xy_of, xy_of_spectrum, xyz_of
 from lightpaint.colour.primaries import REC709, rgb_to_xyz
+from lightpaint.colour.spectra.spectrum import Spectrum, spectrum_of, xyz_of_powers
+from lightpaint.colour.spectra.spectrum_source import FEWEST_POINTS
 from lightpaint.dmx.gdtf.mode_channels import Curve
 from lightpaint.dmx.rig_archive import library
+from lightpaint.errors import ColorError
 
 #: Chromaticity of CIE 1931.
 Chromaticity = tuple[float, float]
@@ -22,6 +26,9 @@ LEAST_Y, LEAST_TRANSMISSION = 0.002, 0.002
 
 #: Least area of the triangle of three colours in the diagram of chromaticities, times two.
 LEAST_AREA = 1e-4
+
+#: Largest distance, in x and y, of the colours of an emitter and of its measured spectrum.
+SAME_COLOUR = 0.03
 
 #: Name of an emitter, its usual chromaticity and its usual share of a fixture's luminance, by what
 #: follows `ColorAdd_`. Some programs write A and L.
@@ -74,7 +81,8 @@ class EmitterColour:
 
     xy: its chromaticity. share: its luminance relative to others of the file. candela: what was
     measured at full, if it was. curve: pairs of a share of full, and of the light that was measured
-    there. is_usual: whether the file has no colour, so that this is a usual one.
+    there. is_usual: whether the file has no colour, so that this is a usual one. spectrum: at full;
+    None if it was not measured, or the file's colour is another.
     """
 
     name: str
@@ -83,6 +91,7 @@ class EmitterColour:
     candela: float | None = None
     curve: Curve = ()
     is_usual: bool = False
+    spectrum: Spectrum | None = None
 
 
 def emitter_colour(suffix: str, link: str | None, emitters: Sequence[Element]) -> EmitterColour:
@@ -110,6 +119,7 @@ def emitter_colour(suffix: str, link: str | None, emitters: Sequence[Element]) -
         candela,
         curve,
         is_usual=own is None,
+        spectrum=_measured_spectrum(measured.measurements, own),
     )
 
 
@@ -137,6 +147,22 @@ def _spectral(measurements: Sequence[Any]) -> Chromaticity | None:
         if len(points) > 1:
             return xy_of_spectrum(*points.T)
     return None
+
+
+def _measured_spectrum(measurements: Sequence[Any], own: Chromaticity | None) -> Spectrum | None:
+    """Return the spectrum that was measured at the highest level, if it has the emitter's colour.
+
+    own: this colour, None if the file has none.
+    """
+    full = max(measurements, key=lambda x: float(x.physical), default=None)
+    points = np.zeros((0, 2)) if full is None else _spectrum(full)
+    if own is None or len(points) < FEWEST_POINTS:
+        return None
+    try:
+        found = spectrum_of(*points.T)
+    except ColorError:  # nobody sees it
+        return None
+    return found if math.dist(xy_of(xyz_of_powers(found)), own) < SAME_COLOUR else None
 
 
 def _spectrum(measurement: Any) -> Doubles:

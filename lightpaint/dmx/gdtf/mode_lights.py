@@ -393,7 +393,15 @@ class ModeReader:
         parts = len(colours) if self._shine_together else 1
         share = sum(watts) / parts if len(watts) == len(beams) else None
         return [
-            RigEmitter(name, x.xy, totals[name], tuple(sorted(channels[name])), x.curve, share)
+            RigEmitter(
+                name,
+                x.xy,
+                totals[name],
+                tuple(sorted(channels[name])),
+                x.curve,
+                share,
+                spectrum=x.spectrum,
+            )
             for name, x in colours.items()
         ]
 

@@ -61,6 +61,10 @@ class LightSetting:
     where they follow from the emission.
     mixed_emission: of a lamp with a colour wheel that shines, the emission that the solve found
     before the wheel came to a slot, unless the slot was fixed.
+    solved_mix: the drives of its emitters that the solve
+    found, where the lamp has others since, which leave the picture as it is. held_mix_change: the
+    CIEDE2000 that few pixels of the picture would exceed with the mix that the lamp prefers, from
+    which the picture holds it back; None where nothing does.
     """
 
     name: str
@@ -84,6 +88,8 @@ class LightSetting:
     mix: tuple[float, ...] | None = None
     mix_errors: tuple[float | None, ...] | None = None
     mixed_emission: RGB | None = None
+    solved_mix: tuple[float, ...] | None = None
+    held_mix_change: float | None = None
 
     def __post_init__(self) -> None:
         if len(self.name) > MAX_NAME:
@@ -148,6 +154,8 @@ class LightSetting:
             mix=None,
             mix_errors=None,
             mixed_emission=None,
+            solved_mix=None,
+            held_mix_change=None,
             constraint="",
             is_active=False,
             standard_error=None,
@@ -550,6 +558,7 @@ def whole_lamp(parts: Sequence[LightSetting]) -> LightSetting:
     drives = np.array([x.emission[0] for x in parts]) / lamp.levels
     errors = [None if x.standard_error is None else x.standard_error[0] for x in parts]
     emission = as_rgb(lamp.mix(drives))
+    solved = [x.solved_mix or (drive,) for x, drive in zip(parts, drives.tolist(), strict=True)]
     return replace(
         first,
         name=first.part_of,
@@ -563,6 +572,7 @@ def whole_lamp(parts: Sequence[LightSetting]) -> LightSetting:
         lamp=lamp,
         part_of="",
         mix=tuple(drives.tolist()),
+        solved_mix=tuple(x for [x] in solved) if any(x.solved_mix for x in parts) else None,
         mix_errors=tuple(
             None if x is None else float(x / y) for x, y in zip(errors, lamp.levels, strict=True)
         ),
@@ -584,6 +594,7 @@ def parts_of(light: LightSetting) -> tuple[LightSetting, ...]:
             part_of=light.name,
             mix=None,
             mix_errors=None,
+            solved_mix=None,
             standard_error=None,
             interval=None,
         )

@@ -27,7 +27,7 @@ MAX_BYTES = 2**23
 PLAIN_FIELDS = ("target", "scene_identity", "cd_per_unit", "up")
 
 #: Fields of a light's lamp, which its file has beside the others.
-LAMP_FIELDS = ("emitters", "power_share", "prefer", "is_wheel")
+LAMP_FIELDS = ("emitters", "power_share", "prefer", "is_wheel", "least_rf")
 
 #: Key of a lamp whose drives are the answer, found with spectra; its emission follows from them.
 SPECTRAL = "is_spectral"
@@ -208,13 +208,16 @@ def _lamp_fields(light: LightSetting, lamp: Lamp) -> dict[str, Any]:
         fields[SPECTRAL] = True
     if light.standard_error is not None or any(x is not None for x in light.mix_errors or ()):
         fields["drive_errors"] = dict(light.drive_errors)
+    if light.solved_mix is not None:
+        fields["solved_mix"] = light.solved_mix
+    if light.held_mix_change is not None:
+        fields["held_mix_change"] = light.held_mix_change
     emitters = [fields_of(x, "watts", "spectrum") for x in lamp.emitters]
     if light.mixed_emission is not None:
         fields |= {"mixed_emission": light.mixed_emission}
     wheel = {"slot": light.slot or None, "slot_delta_e": light.slot_delta_e}
     fields |= {key: value for key, value in wheel.items() if value is not None}
-    named = fields_of(lamp, "power_share", "prefer", "is_wheel")
-    return fields | named | {"emitters": emitters}
+    return fields | fields_of(lamp, *LAMP_FIELDS[1:]) | {"emitters": emitters}
 
 
 def _photometry(lighting: Lighting, light: LightSetting) -> dict[str, Any]:

@@ -30,6 +30,7 @@ from lightpaint.lighting.constraints.values import (
     parse_power_share,
     parse_preference,
     parse_primaries,
+    parse_rf,
     parse_scale,
     parse_start,
     parse_strength,
@@ -41,7 +42,7 @@ from lightpaint.validation import MAX_LISTED
 
 #: Keys of the constraints on one light, the first of which describe the lamp that it is.
 LAMP_KEYS = ("emitters", "power_share", "wheel")
-LIGHT_KEYS = ("lock", "off", "limits", "color", "kelvin", "duv", "primaries", *LAMP_KEYS)
+LIGHT_KEYS = ("lock", "off", "limits", "color", "kelvin", "duv", "primaries", "rf", *LAMP_KEYS)
 
 #: Keys that determine the colours of a light, which can have one of them.
 COLOR_KEYS = ("color", "kelvin", "primaries")
@@ -59,6 +60,7 @@ class LightConstraint:
     emitters: the emitters that mix its light, of which each dims between bounds. power_share: their
     largest power together, relative to that of all at full. wheel: whether they are slots of a
     colour wheel, one of which shines at a time; or the name of the slot at which it stays.
+    least_rf: the fidelity index Rf that their mix needs.
     label: all this in few words. where: the name of the source in errors.
     """
 
@@ -71,6 +73,7 @@ class LightConstraint:
     emitters: tuple[EmitterRequest, ...] = ()
     power_share: float | None = None
     wheel: bool | str = False
+    least_rf: float | None = None
     label: str = ""
     where: SourceKey = field(default_factory=SourceKey)
 
@@ -104,7 +107,7 @@ class LightConstraint:
         primaries = parse_primaries(table, key)
         whites = parse_whites(table, key)
         emitters = parse_emitters(table, key)
-        share = parse_power_share(table, key)
+        share, least_rf = parse_power_share(table, key), parse_rf(table, key)
         _check_emitters(table, key, primaries)
         if lock is not None and primaries is not None:
             if lock.level is None or lock.color is not None or isinstance(lock.level.amount, tuple):
@@ -124,7 +127,8 @@ class LightConstraint:
             lock, primaries = Lock(lock.level, primaries[0]), None
         wheel = parse_wheel(table, key, [x.name for x in emitters])
         is_off, label = "off" in table, _label(table)
-        return cls(lock, is_off, least, most, primaries, whites, emitters, share, wheel, label, key)
+        lamp = emitters, share, wheel, least_rf
+        return cls(lock, is_off, least, most, primaries, whites, *lamp, label, key)
 
 
 def _check_emitters(

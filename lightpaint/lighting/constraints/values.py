@@ -269,6 +269,18 @@ def parse_wheel(table: Mapping[str, Any], where: SourceKey, slots: Sequence[str]
     return cast("bool | str", value)
 
 
+def parse_rf(table: Mapping[str, Any], where: SourceKey) -> float | None:
+    """Return the least fidelity index Rf of a lamp's mix."""
+    value = table.get("rf")
+    if value is not None and not (is_number(value) and 0 < value <= 100):
+        raise ConstraintError(
+            where / "rf",
+            f" is {one_line(repr(value))}: expected the least Rf of TM-30, above 0 and at most "
+            "100, like 85",
+        )
+    return None if value is None else float(value)
+
+
 def describe_constraint(key: str, value: Any) -> str:
     """Return a key and its value in few words, for tables."""
     if value is True:
@@ -279,6 +291,8 @@ def describe_constraint(key: str, value: Any) -> str:
         return " + ".join(str(emitter["name"]) for emitter in value)
     if key == "wheel":
         return f"wheel at {value}"
+    if key == "rf":
+        return f"Rf ≥ {value:g}"
     if key == "power_share":
         return f"{100 * value:g}% of full power"
     if key == "kelvin" and isinstance(value, Sequence):

@@ -14,6 +14,7 @@ from lightpaint.colour.color_hull import ColorHull
 from lightpaint.colour.emitter_preference import Preference
 from lightpaint.colour.lamp import Lamp
 from lightpaint.colour.white_range import WhiteRange
+from lightpaint.display_text import some_names
 from lightpaint.errors import ConstraintError
 from lightpaint.lighting.constraints.constraints import LightConstraint, Tie
 from lightpaint.lighting.constraints.values import Level, Lock
@@ -328,7 +329,10 @@ def lamp_of(
     prefer: Preference | None,
 ) -> Lamp | None:
     """Return the lamp of a light, if its constraint lists emitters."""
-    if constraint is None or not constraint.emitters or light.is_fixed:
+    if constraint is None or light.is_fixed:
+        return None
+    _check_rendering(light, constraint)
+    if not constraint.emitters:
         return None
     if light.is_scalar:
         raise ConstraintError(
@@ -337,7 +341,21 @@ def lamp_of(
         )
     emitters = tuple(x.in_light(light, cd_per_unit) for x in constraint.emitters)
     is_wheel = constraint.wheel is not False
-    return Lamp(emitters, constraint.power_share, prefer or "watts", is_wheel)
+    return Lamp(emitters, constraint.power_share, prefer or "watts", is_wheel, constraint.least_rf)
+
+
+def _check_rendering(light: BasisLight, constraint: LightConstraint) -> None:
+    """Raise ConstraintError for an Rf of emitters whose spectra are unknown."""
+    if constraint.least_rf is None:
+        return
+    missing = [x.name for x in constraint.emitters if x.spectrum is None]
+    if missing or not constraint.emitters:
+        unknown = f"its emitters {some_names(missing)}" if missing else "its emitters"
+        raise ConstraintError(
+            constraint.where / "rf",
+            f" is {constraint.least_rf:g}, and nothing says which spectrum {unknown} of "
+            f"{light.name!r} have: add emitters, each with its spectrum, to the lights file",
+        )
 
 
 def lamp_knob(k: int, light: BasisLight, constraint: LightConstraint, lamp: Lamp) -> Knob:

@@ -14,6 +14,7 @@ from lightpaint.arrays import Doubles, as_rgb
 from lightpaint.basis.lights import BasisLight
 from lightpaint.colour.color import luminance
 from lightpaint.colour.lamp import Lamp
+from lightpaint.errors import ConstraintError
 from lightpaint.lighting.unknowns.knobs import Knob, Unknown
 
 
@@ -49,6 +50,12 @@ class WholeLamps:
         if not any(self.lights[k].lamp for k in knob.lights):
             [single] = [replace(knob, lights=places, unknowns=self._moved(knob.unknowns))]
             return (single,)
+        if knob.whites is not None:
+            raise ConstraintError(
+                f"light {self.lights[knob.lights[0]].name!r} has a range of kelvin, and where each "
+                "emitter has a picture a lamp has one white or any colour: give one temperature, "
+                "or leave it out"
+            )
         lamp = lamps.get(knob.lights[0])
         if lamp is None or not knob.has_drives_of(lamp):
             mixes = tuple(self._of_parts(x, lamps) for x in knob.unknowns)
@@ -70,13 +77,16 @@ class WholeLamps:
 
     def _of_parts(self, unknown: Unknown, lamps: dict[int, Lamp]) -> Unknown:
         """Return an unknown of whole lights by the drives that mix its colours at full."""
-        columns: list[tuple[int, Doubles]] = []
+        columns, upper = list[tuple[int, Doubles]](), unknown.upper
         for k, color in unknown.columns:
-            lamp = lamps.get(k)
-            brightest = 1.0 if lamp is None else lamp.brightest(color) or 1.0
-            weights = self.weights(k, lamp, brightest * color) / brightest
+            if (lamp := lamps.get(k)) is None:
+                weights = self.weights(k, lamp, color)
+            else:
+                drives, brightest = lamp.brightest_mix(color)
+                weights = np.repeat((drives * lamp.levels / brightest)[:, None], 3, axis=1)
+                upper = min(upper, brightest)
             columns += zip(self.parts[k], weights, strict=True)
-        return replace(unknown, columns=tuple(columns))
+        return replace(unknown, columns=tuple(columns), upper=max(upper, unknown.lower))
 
 
 def part_lamps(lamp: Lamp) -> list[Lamp]:

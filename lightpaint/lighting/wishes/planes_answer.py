@@ -130,7 +130,8 @@ def planes_answer(
         )
         for k, wish in enumerate(wished.wishes)
     )
-    movable = {light for knob in reduction.knobs for light in knob.lights}
+    lights = wished.illuminance.lights
+    movable = {lights[k].lamp or lights[k].name for x in reduction.knobs for k in x.lights}
     return PlanesAnswer(
         wished,
         weights,

@@ -150,7 +150,7 @@ def render_verification(
     with tempfile.TemporaryDirectory(prefix="lightpaint-") as place:
         relit = relight(scene, lighting, Path(place) / RELIT)
         if relit.sensor != scene.sensor:
-            relit = load_scene(relit.path, sensor=scene.sensor, use_lights_file=False)
+            relit = load_scene(relit.path, sensor=scene.sensor, use_lights_file=False, lamps=["*"])
         predicted = combine(basis, lighting)
         result = verify_in_stages(
             predicted, relit, basis, lighting, spp=basis.origin.spp, progress=progress

@@ -40,6 +40,11 @@ def remarks_of_scene(scene: Scene, *, is_rendered: bool = True) -> list[str]:
         )
     if obstacles := [f"{x.name!r} {x.obstacle}" for x in scene.emitters if x.obstacle]:
         remarks.append(f"not adjusted: {some_names(obstacles, '; ')}")
+    if scene.is_spectral and (metals := scene.rgb_metals):
+        remarks.append(
+            f"{some_names(metals)}: eta and k in RGB, which Mitsuba's spectral variants show too "
+            "dark; give the metal by its name (material) or by spectra"
+        )
     # Python code gets the same text as a warning.
     note = use_variant().note
     if not note and is_rendered:

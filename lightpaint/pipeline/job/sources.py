@@ -70,6 +70,7 @@ class SceneFile(ReadOnce):
         split: Columns and rows of lights that are images, `16x8`, by name, or layouts of texels.
         symmetric: Names of those whose images are symmetric.
         map_size: Columns and rows of their images in the relit scene, `1024x512`.
+        lamps: Names or patterns of lights whose colour may lie outside Rec.709.
 
     Examples:
         >>> lp.SceneFile("room.xml").content.size
@@ -90,6 +91,7 @@ class SceneFile(ReadOnce):
     split: Mapping[str, str] | None = None
     symmetric: Sequence[str] | None = None
     map_size: str | None = None
+    lamps: Sequence[str] = ()
 
     @cached_property
     def content(self) -> Scene:

@@ -4,7 +4,7 @@ from collections.abc import Sequence
 
 from lightpaint.basis.render.integrators import check_renders_spectra
 from lightpaint.basis.render.render_origin import basis_lights
-from lightpaint.errors import LightpaintError, SceneError
+from lightpaint.errors import LightpaintError
 from lightpaint.lighting.constraints.constraints import Constraints
 from lightpaint.lighting.unknowns.reduction import lamps_by_name
 from lightpaint.pipeline.job.settings import Settings
@@ -16,17 +16,10 @@ def spectral_scenes(scenes: Sequence[Scene], constraints: Constraints) -> list[S
     """Return scenes with a light for each emitter of their lamps.
 
     Raises SceneError if a light that is adjusted has no emitters with spectra, or the scene cannot
-    be rendered with them, like one with luminaires.
+    be rendered with them.
     """
     found = []
     for scene in scenes:
-        if scene.luminaires:
-            raise SceneError(
-                f"{scene.path} has luminaires of photometric files, which are rendered in RGB "
-                "alone: leave ",
-                Hint("spectral", True),
-                " out",
-            )
         if not scene.is_spectral:
             check_renders_spectra(scene)
             scene = scene.with_lamps(lamps_by_name(constraints, basis_lights(scene)))

@@ -121,5 +121,11 @@ def new_answer(
 
 def reload_relit(relit: Scene, path: Path, sensor: int) -> Scene:
     """Load a relit scene again from `path`, with its parameters."""
-    scene = load_scene(path, sensor=sensor, parameters=relit.parameters, use_lights_file=False)
+    scene = load_scene(
+        path,
+        sensor=sensor,
+        parameters=relit.parameters,
+        use_lights_file=False,
+        lamps=["*"],
+    )
     return replace(scene, is_spectral=relit.is_spectral)

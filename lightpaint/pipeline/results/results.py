@@ -17,6 +17,7 @@ from lightpaint.keywords import keywords
 from lightpaint.lighting.analysis.analysis import Analysis
 from lightpaint.lighting.analysis.diagnosis import Diagnosis
 from lightpaint.lighting.analysis.noise.uncertainty import Uncertainty
+from lightpaint.lighting.analysis.surface_colors import SurfaceColor
 from lightpaint.lighting.answer.lighting import Lighting
 from lightpaint.lighting.solution import Solution
 from lightpaint.lighting.wishes.planes_answer import PlanesAnswer
@@ -87,6 +88,7 @@ class Look:
         move_suggestion: The turn of a spot that would help most, if suggestions were requested and
             one surely helps.
         planes: What the answer gives on measuring planes; None without any.
+        surfaces: Colours of objects under the answer and by daylight; none without spectra.
 
     Examples:
         >>> look = lp.paint_with_light(None, "painting.exr", "evening", basis="room.basis.exr")
@@ -105,6 +107,7 @@ class Look:
     placement: Placement | None = None
     move_suggestion: MoveSuggestion | None = None
     planes: PlanesAnswer | None = None
+    surfaces: tuple[SurfaceColor, ...] = ()
 
     def __repr__(self) -> str:
         return f"Look(of {self.target.name}: {self.verdict})"
@@ -262,6 +265,7 @@ def _reported_answer(look: Look, command: str) -> ReportedAnswer:
         appearance=look.analysis.appearance,
         color_choices=look.analysis.color_choices,
         planes=look.planes,
+        surfaces=look.surfaces,
     )
 
 
@@ -293,7 +297,11 @@ def verify_result(
     predicted, attributes = read_estimate(path)
     view = _read_view(path, attributes.get(VIEW_KEY, "{}"))
     relit = load_scene(
-        relit_xml, sensor=view.sensor, parameters=view.parameters, use_lights_file=False
+        relit_xml,
+        sensor=view.sensor,
+        parameters=view.parameters,
+        use_lights_file=False,
+        lamps=["*"],
     )
     if view.is_spectral:
         relit = replace(relit, is_spectral=True)

@@ -124,7 +124,7 @@ def report_page(
             cd_per_unit=solution.lighting.cd_per_unit,
             is_clean=looks.is_clean,
         ),
-        rendering=rendering_section(solution.lighting),
+        rendering=rendering_section(solution.lighting, answer.surfaces),
         sure=sure_section(basis, solution, answer.uncertainty),
         command=answer.command,
     )

@@ -356,7 +356,7 @@ def _with_panel(
         "",
         file,
         turned,
-        _level(parsed, node),
+        tag("rgb", name="intensity", value=rgb_text(_level(parsed, node))),
         None,
         sampling_weight=float(props.get("sampling_weight", 1.0)),
     )
@@ -378,25 +378,29 @@ def luminaire_lines(
     name: str,
     file: str,
     numbers: Mapping[str, float],
-    level: Sequence[float],
+    intensity: str,
     matrix: Doubles | None,
     *,
     sampling_weight: float = 1.0,
 ) -> list[str]:
     """Return the XML of a luminaire's emitter, line by line.
 
-    name: its id; "" for none. level: RGB. matrix: (4, 4); None on a shape.
+    name: its id; "" for none. intensity: its XML. matrix: (4, 4); None on a shape.
     """
-    colour = " ".join(f"{np.float32(x):.9g}" for x in level)
     inner = [tag("string", name="filename", value=file)]
     inner += [tag("float", name=key, value=f"{x:.9g}") for key, x in numbers.items()]
     inner += [] if matrix is None else [matrix_text(matrix)]
-    inner.append(tag("rgb", name="intensity", value=colour))
+    inner.append(intensity)
     if sampling_weight != 1:
         inner.append(tag("float", name="sampling_weight", value=f"{sampling_weight:g}"))
     head = {"id": name} if name else {}
     start = tag("emitter", type=plugin, **head).replace("/>", ">")
     return [start, *(f"    {line}" for line in inner), "</emitter>"]
+
+
+def rgb_text(rgb: Sequence[float]) -> str:
+    """Return a colour as XML has it."""
+    return " ".join(f"{np.float32(x):.9g}" for x in rgb)
 
 
 def panel_lines(name: str, shape: str, matrix: Doubles, emitter: Sequence[str]) -> list[str]:

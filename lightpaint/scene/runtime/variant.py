@@ -104,6 +104,7 @@ def spectral_variant() -> Iterator[None]:
         try:
             mi.set_variant(spectral)
             _current = Backend(spectral, backend.llvm)
+            register_luminaires()
             yield
         finally:
             mi.set_variant(backend.variant)

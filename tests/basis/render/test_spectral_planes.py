@@ -23,6 +23,7 @@ from lightpaint.colour.spectra.spectrum_source import named_spectrum
 from lightpaint.errors import SceneError
 from lightpaint.lighting.answer.combination import combine
 from lightpaint.lighting.answer.lighting import Lighting
+from lightpaint.pipeline.job.remarks import remarks_of_scene
 from lightpaint.relit.relight import relight
 from lightpaint.relit.verification_render import verify
 from lightpaint.scene.properties.measuring_points import MeasuringPoints
@@ -108,6 +109,44 @@ def test_a_room_under_d65_is_that_of_rgb(tmp_path: Path):
         a, b = (_blocks(x) for x in (in_rgb.image(name), spectral.image(f"{name}/d65")))
         white = np.percentile(luminance(a), 95)
         assert delta_e(a / white, b / white).max() < 1  # colours are upsampled to spectra
+
+
+#: Materials of RGB and their largest ΔE to RGB under D65: colours are upsampled, saturated ones as
+#: well, and Mitsuba has a metal's indices of refraction for three colours and for all wavelengths.
+MATERIALS = {
+    "grey": ('type="diffuse"><rgb name="reflectance" value=".5 .5 .5"/>', 0.3),
+    "saturated": ('type="diffuse"><rgb name="reflectance" value=".9 0 0"/>', 0.3),
+    "plastic": ('type="roughplastic"><rgb name="diffuse_reflectance" value=".1 .3 .6"/>', 0.3),
+    "gold": ('type="roughconductor"><string name="material" value="Au"/>', 5.0),
+}
+
+
+@pytest.mark.parametrize("material", MATERIALS)
+def test_materials_under_d65_are_those_of_rgb(material: str, tmp_path: Path):
+    bsdf, largest = MATERIALS[material]
+    scene = load_scene(_floor_of(tmp_path, bsdf))
+    in_rgb = render_basis(scene, spp=64, seed=1).image("lamp").mean(axis=(0, 1))
+    spectral = render_basis(scene.with_lamps({"lamp": _lamp(d65=D65)}), spp=64, seed=1)
+    a, b = (x / in_rgb.max() for x in (in_rgb, spectral.image("lamp/d65").mean(axis=(0, 1))))
+    assert delta_e(a, b) < largest
+    assert scene.rgb_metals == []
+
+
+def test_metals_whose_indices_are_rgb_are_named(tmp_path: Path):
+    """Mitsuba shows them too dark (findings/mitsuba_rgb_conductors_are_darker_...)."""
+    bsdf = 'type="roughconductor"><rgb name="eta" value="1.5"/><rgb name="k" value="3"/>'
+    scene = load_scene(_floor_of(tmp_path, bsdf)).with_lamps({"lamp": _lamp(d65=D65)})
+    assert scene.rgb_metals == ["roughconductor"]
+    [remark] = [x for x in map(str, remarks_of_scene(scene)) if "eta and k in RGB" in x]
+    assert remark.startswith("roughconductor: ")
+    assert not [x for x in map(str, remarks_of_scene(scene.in_rgb)) if "eta and k" in x]
+
+
+def _floor_of(folder: Path, bsdf: str) -> Path:
+    plain = f'type="diffuse">\n        <spectrum name="reflectance" value="{PAIRS}"/>'
+    assert plain in FLOOR
+    (folder / "floor.xml").write_text(FLOOR.replace(plain, bsdf))
+    return folder / "floor.xml"
 
 
 def _blocks(image: np.ndarray) -> np.ndarray:

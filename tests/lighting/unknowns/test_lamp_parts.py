@@ -8,6 +8,7 @@ import pytest
 from scipy.optimize import lsq_linear
 
 from lightpaint.colour.spectra.spectrum import rgb_of_powers
+from lightpaint.errors import ConstraintError
 from lightpaint.lighting.analysis.analysis import analyse
 from lightpaint.lighting.answer.combination import combine
 from lightpaint.lighting.answer.lighting_file import read_lighting, write_lighting
@@ -167,6 +168,13 @@ def test_off_lock_colour_and_ties_are_of_whole_lamps(make_basis):
     found, drives = _drives(basis, Constraints.of(LAMPS, tie=[["a", "b"]]))
     assert drives["a"] == pytest.approx(drives["b"], rel=1e-6)
     assert np.flatnonzero(drives["a"]).size
+
+
+def test_a_range_of_white_is_refused_in_one_line(make_basis):
+    basis = _basis(make_basis)
+    constraints = Constraints.of({**LAMPS, "b": {"emitters": EMITTERS, "kelvin": [2700, 5000]}})
+    with pytest.raises(ConstraintError, match="light 'b' has a range of kelvin, and where each"):
+        reduce_to(constraints, basis.lights)
 
 
 def test_an_unknown_lamp_is_named_with_the_others(make_basis):

@@ -23,9 +23,9 @@ from lightpaint.colour.color import luminance
 from lightpaint.colour.color_difference import ciede2000, lab
 from lightpaint.display_text import visible
 from lightpaint.keywords import keywords
-from lightpaint.lighting.analysis.appearance.display_difference import display_transform
 from lightpaint.lighting.analysis.appearance.washes import AreaWashes, Washes
 from lightpaint.lighting.analysis.appearance.wish_parts import WishKind, WishPart, wish_parts
+from lightpaint.lighting.display import display_transform
 from lightpaint.lighting.solution import Solution
 from lightpaint.target.target import Target
 from lightpaint.target.wish_finding import find_wishes

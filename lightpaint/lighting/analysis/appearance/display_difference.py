@@ -10,9 +10,8 @@ import numpy.typing as npt
 from lightpaint.arrays import Bools, Doubles, Floats
 from lightpaint.basis.planes import Planes
 from lightpaint.colour.color_difference import ciede2000, lab
-from lightpaint.colour.display.exposure import choose_exposure
 from lightpaint.colour.display.view_transform import ViewTransform
-from lightpaint.colour.srgb import decode_display
+from lightpaint.lighting.display import display_light, display_transform
 from lightpaint.lighting.loss.painting import at_least_mask, target_light
 from lightpaint.lighting.problem import Problem
 
@@ -160,22 +159,6 @@ class PaintComparison:
         ends = zip((top, left), self.weight.shape, strict=True)
         bottom, right = (self.step * min(start // self.step + BLOCK, n) for start, n in ends)
         return top, left, bottom, right
-
-
-def display_light(pixels: Doubles, transform: ViewTransform) -> Doubles:
-    """Return the light that a display emits for light (..., 3), white = 1."""
-    if transform.name == "srgb":  # encoding and decoding cancel
-        return np.asarray(np.clip(pixels * 2.0**transform.stops, 0, 1))
-    return np.asarray(decode_display(transform.encode(pixels)), np.float64)
-
-
-def display_transform(problem: Problem) -> ViewTransform:
-    """Return the view of the painting or, if it holds light, sRGB at a fitting exposure."""
-    target = problem.views.targets[0]
-    chosen = problem.fit.transform or target.transform
-    if chosen is not None:
-        return chosen
-    return ViewTransform("srgb", choose_exposure(target.image[target.importance > 0][None]))
 
 
 def _starts(length: int) -> npt.NDArray[np.int_]:

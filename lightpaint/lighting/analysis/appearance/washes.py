@@ -15,7 +15,7 @@ from lightpaint.arrays import Bools, Doubles, Floats
 from lightpaint.colour.color_difference import lab
 from lightpaint.colour.display.view_transform import ViewTransform
 from lightpaint.images.pixel_blocks import block_mean, fitting_factor
-from lightpaint.lighting.analysis.appearance.display_difference import display_light
+from lightpaint.lighting.display import display_light
 from lightpaint.threads import one_thread
 
 #: Standard deviation of the blur, relative to the width of the picture.
