@@ -5,6 +5,8 @@ bounds are nearly the same. A factor of those that were free serves the others b
 held unknown is a constraint on the step, and a released one a further row.
 """
 
+from dataclasses import dataclass
+
 import numpy as np
 
 from lightpaint.arrays import Bools, Doubles, Indices
@@ -17,6 +19,9 @@ from lightpaint.progress import cancellation_check
 #: Unknowns that may differ from those of the factor, as a share of these: with more, a new factor
 #: is as quick.
 MAX_CHANGED_SHARE = 1 / 6
+
+#: Columns to keep beside a factor, as a share of its unknowns.
+MAX_KEPT_SHARE = 1 / 3
 
 #: Most steps, least fall of the objective by one of them, relative to what its slope promises, and
 #: the shortest part of a step.
@@ -32,6 +37,7 @@ class FreeFactor:
         self._rows = np.zeros(0, np.intp)  # the unknowns of the factor
         self._factor: Doubles | None = None  # None if it is singular, or nearly so
         self._regular = np.zeros(len(M), bool)
+        self._beside = _SolvedColumns.none(0)
 
     def newton_step(self, free: Bools, gradient: Doubles) -> Doubles:
         """Return the step, (n,), to the optimum of the free unknowns; the others do not move.
@@ -68,6 +74,7 @@ class FreeFactor:
         pivots = np.square(factor.diagonal())
         is_regular = not failed and pivots.min() >= SUSPECT_PIVOT
         self._rows, self._factor = rows, factor if is_regular else None
+        self._beside = _SolvedColumns.none(rows.size)
         self._regular[:] = False
         self._regular[rows] = is_regular
         if not failed:
@@ -86,24 +93,71 @@ class FreeFactor:
         assert factor is not None
         half = blas.dtrsv(factor, -gradient[rows], lower=1)
         if held.size or added.size:
-            k = added.size
-            beside = np.zeros((rows.size, k + held.size), order="F")
-            beside[:, :k] = self._M[np.ix_(added, rows)].T
-            beside[held, k + np.arange(held.size)] = 1
-            beside = blas.dtrsm(1.0, factor, beside, lower=1, overwrite_b=1)
-            small = -(beside.T @ beside)
+            k, unknowns = added.size, np.concatenate([added, rows[held]])
+            columns, which = self._columns_beside(unknowns)
+            small = -columns.products[np.ix_(which, which)]
             small[:k, :k] += self._M[np.ix_(added, added)] + RIDGE * rows.size**0.5 * np.eye(k)
             if not _is_regular(small[:k, :k]):
                 return False
-            right = -(beside.T @ half)
+            right = -(columns.solved.T @ half)[which]
             right[:k] -= gradient[added]
-            pushes = np.linalg.solve(small, right)
-            half -= beside @ pushes
-            move[added] = pushes[:k]
+            pushes = np.zeros(len(columns.products))
+            pushes[which] = np.linalg.solve(small, right)
+            half -= columns.solved @ pushes
+            move[added] = pushes[which[:k]]
             self._regular[added] = True
         move[rows] = blas.dtrsv(factor, half, lower=1, trans=1)
         move[rows[held]] = 0
         return True
+
+    def _columns_beside(self, unknowns: Indices) -> tuple["_SolvedColumns", Indices]:
+        """Return the solved columns of these unknowns among others, and their places there.
+
+        From step to step nearly the same unknowns differ from those of the factor, so that few
+        columns are new.
+        """
+        kept = self._beside
+        new = [x for x in unknowns.tolist() if x not in kept.places]
+        if len(kept.places) + len(new) > max(MAX_KEPT_SHARE * self._rows.size, unknowns.size):
+            kept, new = _SolvedColumns.none(self._rows.size), unknowns.tolist()
+        if new:
+            _, blas = large_libraries()
+            place = np.searchsorted(self._rows, new)
+            is_held = self._rows[np.minimum(place, self._rows.size - 1)] == new
+            columns = np.zeros((self._rows.size, len(new)), order="F")
+            columns[place[is_held], np.flatnonzero(is_held)] = 1
+            added = np.array(new, np.intp)[~is_held]
+            columns[:, ~is_held] = self._M[np.ix_(added, self._rows)].T
+            kept = kept.joined(new, blas.dtrsm(1.0, self._factor, columns, lower=1, overwrite_b=1))
+        self._beside = kept
+        return kept, np.array([kept.places[x] for x in unknowns.tolist()], np.intp)
+
+
+@dataclass(frozen=True)
+class _SolvedColumns:
+    """Columns L⁻¹ c beside a Cholesky factor L of r unknowns, and their inner products.
+
+    places: the column of each unknown: a unit vector of one of the factor's, and for others the
+    elements of M that join it to these. solved: (r, m). products: (m, m).
+    """
+
+    places: dict[int, int]
+    solved: Doubles
+    products: Doubles
+
+    @classmethod
+    def none(cls, rows: int) -> "_SolvedColumns":
+        """Return no columns beside a factor of so many unknowns."""
+        return cls({}, np.zeros((rows, 0), order="F"), np.zeros((0, 0)))
+
+    def joined(self, unknowns: list[int], solved: Doubles) -> "_SolvedColumns":
+        """Return these columns and those of further unknowns, (r, k)."""
+        across = self.solved.T @ solved
+        products = np.block([[self.products, across], [across.T, solved.T @ solved]])
+        places = {**self.places, **{x: len(self.places) + k for k, x in enumerate(unknowns)}}
+        # In the order of LAPACK, column after column.
+        both = np.concatenate([self.solved.T, solved.T]).T
+        return _SolvedColumns(places, both, products)
 
 
 def projected_newton(

@@ -45,7 +45,7 @@ class Optimum:
     the upper, >= 0 at the lower limit.
     kkt_residual: largest violation of the above, after scaling (see `kkt_residual`).
     sweeps: Gauss–Seidel passes; steps: of Newton's method on what is free.
-    tolerance: the limit for kkt_residual, raised to the round-off of M x − b.
+    tolerance: the limit for kkt_residual, raised to the round-off of M x − b where it is not met.
     """
 
     x: Doubles
@@ -142,7 +142,7 @@ class QuadraticFamily:
             residual,
             sweeps,
             steps,
-            max(tolerance, q.round_off(x)),
+            tolerance if residual <= tolerance else max(tolerance, q.round_off(x)),
         )
 
 

@@ -179,7 +179,9 @@ class _Steps:
                 stays = ((point.x <= low) & (slope > 0)) | ((point.x >= high) & (slope < 0))
                 lower, systems = self._step(point, counts & ~stays, guess=step < GUESSED_STEPS)
             if lower is None:
-                most = max(tolerance, self._round_off(point.w, scale) / size)
+                most = tolerance
+                if residual > most:
+                    most = max(most, self._round_off(point.w, scale) / size)
                 if residual > most or any(is_suspect(matrix) for matrix in systems):
                     return None
                 return Optimum(point.x, slope * scale, NO_CAPS, residual, 0, step, most)

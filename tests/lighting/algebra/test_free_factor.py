@@ -7,7 +7,11 @@ import pytest
 from threadpoolctl import ThreadpoolController
 
 from lightpaint.lighting.algebra import optimum as optimum_module
-from lightpaint.lighting.algebra.free_factor import FreeFactor, projected_newton
+from lightpaint.lighting.algebra.free_factor import (
+    FreeFactor,
+    _SolvedColumns,
+    projected_newton,
+)
 from lightpaint.lighting.algebra.optimum import QuadraticFamily, minimise
 from lightpaint.lighting.algebra.quadratic import Quadratic, kkt_residual, scaled
 from lightpaint.threads import one_thread
@@ -36,6 +40,32 @@ def test_steps_from_set_to_set_are_those_of_each_set_alone() -> None:
         np.testing.assert_allclose(step, expected, atol=1e-9 * np.abs(expected).max())  # precision
         assert not step[~free].any()
         assert factor.knows_regular(free)
+
+
+def test_columns_beside_a_factor_are_solved_once(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Sets that wander by one unknown a step, half of which return."""
+    (M, b), rng, solved = _problem(1, n=200, pixels=300), np.random.default_rng(2), []
+    joined = _SolvedColumns.joined
+
+    def counted(self: Any, unknowns: Any, columns: Any) -> Any:
+        solved.append(len(unknowns))
+        return joined(self, unknowns, columns)
+
+    monkeypatch.setattr(_SolvedColumns, "joined", counted)
+    factor, free = FreeFactor(M), rng.random(200) < 0.7
+    changed: list[int] = []
+    for step in range(120):
+        if step:
+            # One that changed before turns back in every other step.
+            turned = rng.choice(changed) if step % 2 == 0 else rng.integers(200)
+            free[turned] = ~free[turned]
+            changed.append(int(turned))
+        gradient = M @ rng.random(200) - b
+        moved = factor.newton_step(free, gradient)
+        expected = np.zeros(200)
+        expected[free] = -np.linalg.solve(M[np.ix_(free, free)], gradient[free])
+        np.testing.assert_allclose(moved, expected, atol=1e-9 * np.abs(expected).max())  # precision
+    assert 0 < sum(solved) < 100  # at every step a dozen differ from those of the factor
 
 
 def test_lights_that_are_alike_and_lights_that_show_nothing() -> None:
