@@ -3,6 +3,8 @@
 from collections.abc import Callable, Sequence
 from functools import partial
 
+import numpy as np
+
 from lightpaint.errors import LightpaintError
 from lightpaint.paint.background_threads import BackgroundThreads, LatestWork, StoppedError
 from lightpaint.paint.protocol import Message, Notice, ProgressReport
@@ -35,7 +37,7 @@ class PlaneMeasurements:
         show: Callable[[], Message],
         on_measured: Callable[[], None],
     ) -> None:
-        self._subject, self._access, self._publisher = subjects[0], access, publisher
+        self._subjects, self._access, self._publisher = tuple(subjects), access, publisher
         self._threads, self._rig, self._show = threads, rig, show
         self._on_measured = on_measured
         self._work = LatestWork(self._measure, publisher.publish)
@@ -45,7 +47,7 @@ class PlaneMeasurements:
     @property
     def is_wanted(self) -> bool:
         """True if the session has measuring planes."""
-        return self._subject.settings.planes is not None
+        return self._subjects[0].settings.planes is not None
 
     def follow(self) -> None:
         """Measure the planes, unless that was done with the lights where they are now.
@@ -69,6 +71,7 @@ class PlaneMeasurements:
     def _measure(self, requests: SessionRequests) -> None:
         """Measure the planes with the lights of these requests, and publish the state with them."""
         # Imported here: a session without planes needs no renderer.
+        from lightpaint.paint.rig.plane_sight import plane_sight
         from lightpaint.pipeline.wished_planes import constraints_for_planes, measure_planes
 
         def report(label: str, done: int, total: int, unit: str = "passes") -> None:
@@ -76,20 +79,26 @@ class PlaneMeasurements:
             self._check(requests)
             self._publisher.report_progress(TASK, done, total, unit)
 
-        settings = self._subject.settings
+        settings = self._subjects[0].settings
         assert settings.planes is not None
         try:
             with MITSUBA.low_priority():
                 scene = self._rig.moved_scene(requests.placed)
-                every = constraints_for_planes(scene, self._subject.constraints, settings)
+                every = constraints_for_planes(scene, self._subjects[0].constraints, settings)
                 scale = every.cd_per_unit
                 measured = measure_planes(scene, settings.planes, settings, scale, listener(report))
+                points = np.concatenate([x.points for x in measured.file.planes])
+                views = (
+                    self._rig.moved_scene(requests.placed, k) for k in range(len(self._subjects))
+                )
+                sights = tuple(plane_sight(view, points) for view in views)
             planes = SessionPlanes(
                 measured.illuminance,
                 measured.file.power,
                 measured.floor_m2,
                 requests.place_key,
                 measured.file.cases,
+                sights,
             )
             self._publisher.publish_made(partial(self._accept, planes))
             self._on_measured()

@@ -66,29 +66,6 @@ export interface ConsoleInfo {
 }
 
 /**
- * A plane on which illuminance is measured, in one of the cases if there are several.
- *
- * size: rows and columns of a picture of it. cells: row and column of each point. points: where
- * they are, in units of the scene.
- */
-export interface MeasuredPlane {
-  name: string;
-  size: [number, number];
-  cells: [number, number][];
-  points: number[][];
-}
-
-/**
- * The measuring planes. floor_m2: the area that power is divided by; null without one.
- * budget_watts: the most power that is allowed; null if any is.
- */
-export interface PlanesInfo {
-  planes: MeasuredPlane[];
-  floor_m2: number | null;
-  budget_watts: number | null;
-}
-
-/**
  * An emitter of a lamp, such as its red LEDs. swatch: its colour for a screen, as in CSS.
  */
 export interface EmitterInfo {
@@ -191,6 +168,40 @@ export interface Camera {
   y_axis: number[];
   forward: number[];
   is_parallel: boolean;
+}
+
+/**
+ * A plane on which illuminance is measured, in one of the cases if there are several.
+ *
+ * name: as people read it, with the case. plane, case: names of both; "" is the light of the
+ * scene. size: rows and columns of a picture of it. cells: row and column of each point. points:
+ * where they are, in units of the scene. sides: of the cell of each point, across and along, six
+ * numbers; null for listed points. seen: for each view, the indices of the points that nothing
+ * covers in its picture, which may lie beyond its edges.
+ */
+export interface MeasuredPlane {
+  name: string;
+  plane: string;
+  case: string;
+  size: [number, number];
+  cells: [number, number][];
+  points: number[][];
+  sides: number[][] | null;
+  seen: number[][];
+}
+
+/**
+ * The measuring planes.
+ *
+ * floor_m2: the area that power is divided by; null without one. budget_watts: the most power that
+ * is allowed; null if any is. cameras: the camera of each view; null for one that is not a
+ * pinhole.
+ */
+export interface PlanesInfo {
+  planes: MeasuredPlane[];
+  floor_m2: number | null;
+  budget_watts: number | null;
+  cameras: (Camera | null)[];
 }
 
 /**
