@@ -18,7 +18,6 @@ from lightpaint.lighting.constraints.constraints import Constraints
 from lightpaint.paint.server.address import Reach
 from lightpaint.paint.store.session_requests import (
     DEFAULT_NEAR,
-    IGNORE_WISHES,
     SessionRequests,
 )
 from lightpaint.pipeline.job.settings import Settings
@@ -76,8 +75,6 @@ def paint(
         # In the painter no light moves unless somebody moves it.
         is_still = subjects[0].lets_lights_move and not requests.placed
         words = (*options, *["--no-move"] * is_still)
-        if settings.planes is not None and not requests.ignores_wishes:
-            words += ("--planes", quote(settings.planes))
         return from_any_folder(command_for_paintings(sources[0].path, paintings, words, requests))
 
     fixtures = None
@@ -240,8 +237,6 @@ def options_of(requests: SessionRequests) -> list[str]:
     if requests.start and "near" not in requests.values:
         options.append(f"--near {DEFAULT_NEAR:g}")
     for key, value in requests.values.items():
-        if key == IGNORE_WISHES:
-            continue
         option = f"--{key.replace('_', '-')}"
         options.append(option if value is True else f"{option} {value}")
     return options

@@ -275,7 +275,8 @@ class SessionRequests:
         fit_values = {key: self.values[key] for key in FIT_KEYS if key in self.values}
         if "hold" in fit_values and base.unpainted:
             fit_values["unpainted"] = 0.0
-        return replace(base, **fit_values)
+        ignored = {IGNORE_WISHES: True} if self.ignores_wishes else {}
+        return replace(base, **fit_values, **ignored)
 
 
 def _hold_once(
