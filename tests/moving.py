@@ -29,13 +29,17 @@ class MovingStudio:
         lights: str | None = None,
         settings: Settings | None = None,
         constraints: Constraints | None = None,
+        *,
+        subject: Subject | None = None,
     ) -> None:
         self.folder = folder
-        path = folder / "room.xml"
-        self.scene = load_scene(path if path.exists() else write_room(folder, lights=lights))
-        settings = settings or Settings(spp=16, use_cache=False)
-        asked = Constraints() if constraints is None else constraints
-        subject = Subject("room", folder, scene=self.scene, settings=settings, constraints=asked)
+        if subject is None:
+            path = folder / "room.xml"
+            scene = load_scene(path if path.exists() else write_room(folder, lights=lights))
+            settings = settings or Settings(spp=16, use_cache=False)
+            constraints = Constraints() if constraints is None else constraints
+            subject = Subject("room", folder, scene, settings=settings, constraints=constraints)
+        self.scene = subject.loaded_scene
         self.messages: list[Message] = []
         self.studio = Studio(
             [subject], lambda identity: Store.open(folder / "session.db", identity)

@@ -133,12 +133,22 @@ def _scene_on_film(
             every = constraints_for_planes(scene, constraints, settings)
             check_planes(scene, settings.planes, every)
 
+    def prepare(scene: Scene) -> Scene:
+        if not settings.spectral:
+            return scene
+        from lightpaint.pipeline.job.spectral_job import check_spectral, spectral_scenes
+
+        every = constraints_of(scene.requests).and_then(constraints)
+        check_spectral(settings, every)
+        return spectral_scenes([scene], every)[0]
+
     if isinstance(source, Scene):
-        check(source)
-        return on_film(source, settings.quality, settings.resolution)
+        scene = prepare(on_film(source, settings.quality, settings.resolution))
+        check(scene)
+        return scene
     # Errors that need no renderer are raised before the scene is loaded.
     file_length(Path(source.path), "scene file", SceneError)
-    scene = LazyScene(source, settings)
+    scene = LazyScene(source, settings, prepare)
     if scene.record is not None:
         _check_constraints(scene.record.lights, constraints, settings, check_lamps)
     else:

@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, Any
 from lightpaint.cli.output import lines, terminal
 from lightpaint.cli.output.lines import CommandOutcome, output_mode
 from lightpaint.colour.display.view_transform import TransformChoice
-from lightpaint.errors import OutputError
+from lightpaint.errors import LightpaintError, OutputError
 from lightpaint.lighting.constraints.constraints import Constraints
 from lightpaint.paint.server.address import Reach
 from lightpaint.paint.store.session_requests import (
@@ -22,6 +22,7 @@ from lightpaint.paint.store.session_requests import (
 )
 from lightpaint.pipeline.job.settings import Settings
 from lightpaint.pipeline.job.sources import BasisFile, GroupsFile, SceneFile
+from lightpaint.sentences import Hint
 
 if TYPE_CHECKING:
     from lightpaint.dmx.console_rig import ConsoleRig
@@ -69,6 +70,10 @@ def paint(
     from lightpaint.paint.subject_factory import make_subjects
 
     check_installed()
+    if console is not None and settings.spectral:
+        raise LightpaintError(
+            Hint("spectral", True), " does not go with ", Hint("rig"), ": leave one out"
+        )
     from lightpaint.cli.output.vocabulary import from_any_folder
 
     def command(paintings: Mapping[str, str], requests: "SessionRequests") -> str:

@@ -237,7 +237,7 @@ def _paint(parser: argparse.ArgumentParser) -> None:
     add_pattern(parser)
     add_constraints(parser)
     add_budget(parser)
-    add_fields(parser, Settings, "error", "cd_per_unit", "planes", "watts")
+    add_fields(parser, Settings, "error", "cd_per_unit", "planes", "watts", "spectral")
     add_cache(parser)
     add_view(parser, is_repeatable=True)
     # The parser is kept for the command that answers exported paintings.

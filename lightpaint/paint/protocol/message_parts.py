@@ -42,7 +42,8 @@ class LightInfo:
     whether one number stands for all channels. scale: factor of its stored plane. name, label: its
     name in the scene, and as people read it. unit: of its emission. emitters: those that mix the
     light of a lamp, if its lights file lists them. address: its fixture and first channel on a
-    console; "" if unknown.
+    console; "" if unknown. lamp: of which it is an emitter, where renders have spectra; "" for a
+    whole light.
     """
 
     name: str
@@ -59,6 +60,7 @@ class LightInfo:
     scale: float
     emitters: tuple[EmitterInfo, ...] = ()
     address: str = ""
+    lamp: str = ""
 
 
 @dataclass(frozen=True)

@@ -44,9 +44,8 @@ def seen_points(loaded: Any, camera: Camera, points: Doubles) -> Bools:
         rays = np.flatnonzero(is_open)
         if not rays.size:
             break
-        origins, ends = mi.Point3f(starts[rays].T), mi.Float(left[rays])
-        ray = mi.Ray3f(origins, mi.Vector3f(directions[rays].T), ends, 0.0, mi.Color0f())
-        si = loaded.ray_intersect(ray)
+        ray = mi.Ray3f(mi.Point3f(starts[rays].T), mi.Vector3f(directions[rays].T))
+        si = loaded.ray_intersect(mi.Ray3f(ray, mi.Float(left[rays])))
         is_hit = np.array(si.is_valid()).ravel()
         flags, kinds = si.bsdf().flags(), (mi.BSDFFlags.Null, mi.BSDFFlags.DeltaTransmission)
         is_clear = np.any([np.array(mi.has_flag(flags, kind)).ravel() for kind in kinds], axis=0)

@@ -82,7 +82,8 @@ export interface EmitterInfo {
  * whether one number stands for all channels. scale: factor of its stored plane. name, label: its
  * name in the scene, and as people read it. unit: of its emission. emitters: those that mix the
  * light of a lamp, if its lights file lists them. address: its fixture and first channel on a
- * console; "" if unknown.
+ * console; "" if unknown. lamp: of which it is an emitter, where renders have spectra; "" for a
+ * whole light.
  */
 export interface LightInfo {
   name: string;
@@ -99,6 +100,7 @@ export interface LightInfo {
   scale: number;
   emitters: EmitterInfo[];
   address: string;
+  lamp: string;
 }
 
 /**
@@ -527,7 +529,9 @@ export interface AnswerChoice {
  * is_constrained: whether a constraint limits it. is_unreached: whether no paint depends on it.
  * emission: linear, in the unit of the light. swatch: its colour for a screen, as in CSS. is_on:
  * whether it shines. drives: of the emitters of a lamp, 0 to 1, in their order. slot_delta_e: of a
- * lamp with a colour wheel, how far its slot is from the colour that was solved for.
+ * lamp with a colour wheel, how far its slot is from the colour that was solved for. rendering:
+ * how the lamp renders colours, in words; null where its spectra are unknown, and of lights far
+ * from white.
  */
 export interface LightAnswer {
   emission: RGB;
@@ -541,6 +545,7 @@ export interface LightAnswer {
   is_unreached?: boolean;
   drives?: number[];
   slot_delta_e?: number;
+  rendering?: string;
 }
 
 /**
