@@ -51,7 +51,7 @@ class WishDelivery:
 
     layers: ids of its layers. brightness, color: share of the asked change that came; null if none
     was asked. delta_e: of its lit parts, against the painting. name: of the layer, group or stroke.
-    kind: `layer`, `group` or `wish`.
+    kind: `layer`, `group` or `wish`. is_darker: whether it asks for less light.
     """
 
     name: str
@@ -60,6 +60,7 @@ class WishDelivery:
     brightness: float | None
     color: float | None
     delta_e: float
+    is_darker: bool = False
 
 
 @dataclass(frozen=True)

@@ -297,7 +297,7 @@ def _wish_deliveries(analyses: Sequence[Analysis]) -> tuple[WishDelivery, ...]:
 def wish_delivery(delivery: Delivery) -> WishDelivery:
     """Return one entry of that list."""
     x = delivery
-    return WishDelivery(x.name, x.kind, x.layers, x.brightness, x.color, x.delta_e)
+    return WishDelivery(x.name, x.kind, x.layers, x.brightness, x.color, x.delta_e, x.is_darker)
 
 
 def unpainted_text(

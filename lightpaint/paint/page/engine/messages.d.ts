@@ -493,7 +493,7 @@ export interface Closeness {
  *
  * layers: ids of its layers. brightness, color: share of the asked change that came; null if none
  * was asked. delta_e: of its lit parts, against the painting. name: of the layer, group or stroke.
- * kind: `layer`, `group` or `wish`.
+ * kind: `layer`, `group` or `wish`. is_darker: whether it asks for less light.
  */
 export interface WishDelivery {
   name: string;
@@ -502,6 +502,7 @@ export interface WishDelivery {
   brightness: number | null;
   color: number | null;
   delta_e: number;
+  is_darker: boolean;
 }
 
 /**
