@@ -11,6 +11,9 @@ import { colourOf, luxText, scaleTop } from './plane_picture.js';
 /** @typedef {import("../ui_state.js").Ui} Ui */
 /** @typedef {import("./plane_cells.js").PlaneCell} PlaneCell */
 
+/** Share of the time that drawing takes at most while a stroke is made; at rest, all is drawn. */
+const LARGEST_SHARE = 0.1;
+
 /** Return whether the planes can be drawn in the picture of the view. @param {Ui} ui */
 export const hasPlanesInView = ({ planes, view }) => Boolean(planes?.cameras[view]);
 
@@ -66,10 +69,16 @@ export function PlanesOverlay({ ui, panes }) {
   const ref = useRef(/** @type {HTMLCanvasElement | null} */ (null));
   const pane = panes.find(({ kind }) => kind === 'solution');
   const cells = pane ? shownCells(ui) : [];
+  const nextMs = useRef(0);
   useLayoutEffect(() => {
-    if (ref.current && pane && cells.length) draw(ref.current, cells, pane, ui);
+    const beginMs = performance.now();
+    if (!ref.current || !pane || !cells.length || (ui.isLive && beginMs < nextMs.current)) return;
+    draw(ref.current, cells, pane, ui);
+    const endMs = performance.now();
+    nextMs.current = endMs + (endMs - beginMs) / LARGEST_SHARE;
   }, [
     cells.length,
+    ui.isLive,
     ui.planes,
     ui.planesReading,
     ui.planeCase,
