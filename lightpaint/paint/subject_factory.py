@@ -1,6 +1,7 @@
 """Subjects made from files or from objects in memory, and checked before any render."""
 
 from collections.abc import Callable, Mapping, Sequence
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -133,19 +134,11 @@ def _scene_on_film(
             every = constraints_for_planes(scene, constraints, settings)
             check_planes(scene, settings.planes, every)
 
-    def prepare(scene: Scene) -> Scene:
-        if not settings.spectral:
-            return scene
-        from lightpaint.pipeline.job.spectral_job import check_spectral, spectral_scenes
-
-        every = constraints_of(scene.requests).and_then(constraints)
-        check_spectral(settings, every)
-        return spectral_scenes([scene], every)[0]
-
+    prepare = partial(_with_spectra, settings=settings, constraints=constraints)
     if isinstance(source, Scene):
-        scene = prepare(on_film(source, settings.quality, settings.resolution))
-        check(scene)
-        return scene
+        whole = prepare(on_film(source, settings.quality, settings.resolution))
+        check(whole)
+        return whole
     # Errors that need no renderer are raised before the scene is loaded.
     file_length(Path(source.path), "scene file", SceneError)
     scene = LazyScene(source, settings, prepare)
@@ -157,6 +150,20 @@ def _scene_on_film(
     if settings.planes is not None:  # mistakes in their file show before the painter opens
         _ = scene.scene
     return scene
+
+
+def _with_spectra(scene: Scene, *, settings: Settings, constraints: Constraints) -> Scene:
+    """Return a scene with a light for each emitter if settings ask for spectra, else as it is.
+
+    Raises LightpaintError if it cannot be rendered with spectra.
+    """
+    if not settings.spectral:
+        return scene
+    from lightpaint.pipeline.job.spectral_job import check_spectral, spectral_scenes
+
+    every = constraints_of(scene.requests).and_then(constraints)
+    check_spectral(settings, every)
+    return spectral_scenes([scene], every)[0]
 
 
 def _check_size(basis: Basis, name: str) -> None:

@@ -1,4 +1,4 @@
-"""Where pictures show measuring planes: the camera of a view, and the points that it sees."""
+"""Measuring planes as pictures show them: the camera of a view, and the points that it sees."""
 
 from typing import Any
 
@@ -60,7 +60,7 @@ def seen_points(loaded: Any, camera: Camera, points: Doubles) -> Bools:
 
 def _ways_to(camera: Camera, points: Doubles) -> Doubles:
     """Return the vectors from where rays begin to the points that they reach, (p, 3)."""
-    offsets = points - np.array(camera.origin)
+    offsets: Doubles = points - np.array(camera.origin)
     if not camera.is_parallel:
         return offsets
     forward = np.array(camera.forward) / np.linalg.norm(camera.forward)

@@ -2,6 +2,7 @@
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
+from itertools import islice
 from typing import Any
 
 import numpy as np
@@ -12,7 +13,7 @@ from lightpaint.basis.lights import BasisLight
 from lightpaint.colour.color import LUMINANCE, luminance, rgb_to_hex
 from lightpaint.colour.lamp import Lamp, LampEmitter
 from lightpaint.colour.photometry import photometry
-from lightpaint.colour.spectra.color_rendering import color_rendering
+from lightpaint.colour.spectra.color_rendering import ColorRendering, color_rendering
 from lightpaint.lighting.analysis.analysis import Analysis
 from lightpaint.lighting.analysis.appearance.appearance import INVISIBLE, Appearance
 from lightpaint.lighting.analysis.appearance.delivery import Delivery, merge_views
@@ -270,14 +271,18 @@ def judge(analyses: Sequence[Analysis], painted: Sequence[int]) -> Judgement:
 
 def _renderings(lighting: Lighting) -> dict[str, str]:
     """Return how lamps of known spectra render colours, in words, by name."""
-    lamps = [x for x in lighting.of_lamps().lights if x.powers is not None]
-    found = {light.name: color_rendering(light.powers) for light in lamps[:MAX_RENDERED_LAMPS]}
-    return {
-        name: f"{x.kelvin:.0f} K, Duv {x.duv:+.3f}, Ra {x.ra:.0f}, R9 {x.r9:.0f}, "
-        f"Rf {x.rf:.0f}, Rg {x.rg:.0f}"
-        for name, x in found.items()
-        if x is not None
-    }
+    powers = {x.name: x.powers for x in lighting.of_lamps().lights if x.powers is not None}
+    known = islice(powers.items(), MAX_RENDERED_LAMPS)
+    found = {name: color_rendering(values) for name, values in known}
+    return {name: _rendering_text(x) for name, x in found.items() if x is not None}
+
+
+def _rendering_text(color: ColorRendering) -> str:
+    text = (
+        f"{color.kelvin:.0f} K, Duv {color.duv:+.3f}, Ra {color.ra:.0f}, R9 {color.r9:.0f}, "
+        f"Rf {color.rf:.0f}, Rg {color.rg:.0f}"
+    )
+    return text.replace("-", "\N{MINUS SIGN}")
 
 
 def _worst_view(painted: Sequence[int], analyses: Sequence[Analysis]) -> int:

@@ -32,7 +32,7 @@ from lightpaint.photometry.measuring_plane import (
 
 @dataclass(frozen=True)
 class PlaneSight:
-    """How the picture of a view shows measuring points.
+    """The sight of measuring points in the picture of a view.
 
     camera: of the view; None for one that is not a pinhole. is_seen: (p,), whether nothing covers a
     point there.
