@@ -71,11 +71,15 @@ export function PlanesOverlay({ ui, panes }) {
   const cells = pane ? shownCells(ui) : [];
   const nextMs = useRef(0);
   useLayoutEffect(() => {
-    const beginMs = performance.now();
-    if (!ref.current || !pane || !cells.length || (ui.isLive && beginMs < nextMs.current)) return;
-    draw(ref.current, cells, pane, ui);
-    const endMs = performance.now();
-    nextMs.current = endMs + (endMs - beginMs) / LARGEST_SHARE;
+    const drawNow = () => {
+      const beginMs = performance.now();
+      if (ref.current && pane && cells.length) draw(ref.current, cells, pane, ui);
+      const endMs = performance.now();
+      nextMs.current = endMs + (endMs - beginMs) / LARGEST_SHARE;
+    };
+    const waitMs = ui.isLive ? nextMs.current - performance.now() : 0;
+    const timer = waitMs > 0 ? setTimeout(drawNow, waitMs) : drawNow();
+    return () => clearTimeout(timer ?? undefined);
   }, [
     cells.length,
     ui.isLive,
