@@ -9,6 +9,7 @@ import numpy as np
 from patience import PATIENCE_S
 from renderer import write_room
 
+from lightpaint.lighting.constraints.constraints import Constraints
 from lightpaint.paint import protocol
 from lightpaint.paint.protocol import Message
 from lightpaint.paint.store.store import Store
@@ -23,13 +24,22 @@ class MovingStudio:
     """A studio of the test room, and all that it says."""
 
     def __init__(
-        self, folder: Path, lights: str | None = None, settings: Settings | None = None
+        self,
+        folder: Path,
+        lights: str | None = None,
+        settings: Settings | None = None,
+        constraints: Constraints | None = None,
+        *,
+        subject: Subject | None = None,
     ) -> None:
         self.folder = folder
-        path = folder / "room.xml"
-        self.scene = load_scene(path if path.exists() else write_room(folder, lights=lights))
-        settings = settings or Settings(spp=16, use_cache=False)
-        subject = Subject("room", folder, scene=self.scene, settings=settings)
+        if subject is None:
+            path = folder / "room.xml"
+            scene = load_scene(path if path.exists() else write_room(folder, lights=lights))
+            settings = settings or Settings(spp=16, use_cache=False)
+            constraints = Constraints() if constraints is None else constraints
+            subject = Subject("room", folder, scene, settings=settings, constraints=constraints)
+        self.scene = subject.loaded_scene
         self.messages: list[Message] = []
         self.studio = Studio(
             [subject], lambda identity: Store.open(folder / "session.db", identity)

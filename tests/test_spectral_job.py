@@ -6,7 +6,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from command import run_refused, spawn, succeed
-from renderer import LIGHTS, write_room
+from spectral_room import DRIVES, LEVELS, write_spectral_room
 from webs import batwing, cosine, ies_text, street, write_web
 
 from lightpaint import Constraints, Job, Painting, SceneFile, Settings, run
@@ -21,25 +21,11 @@ from lightpaint.pipeline.results.results import verify_result
 from lightpaint.relit.export.spectra_table import spectra_csv
 from lightpaint.scene.scene_reader import load_scene
 
-LEVELS = {"red": 4.0, "green": 8.0, "blue": 1.5}
-PEAKS = {"red": (630, 12), "green": (525, 16), "blue": (455, 12)}
-DRIVES = {"panel": (0.5, 0.2, 0.7), "bulb": (0.1, 0.3, 0.0)}
-
 
 @pytest.fixture
 def room(tmp_path: Path) -> Path:
     """A room whose lamps have three LEDs each, and a sky that stays."""
-    path = write_room(tmp_path, lights="".join(LIGHTS[x] for x in ("panel", "bulb", "sky")))
-    waves = np.arange(380, 781, 5.0)
-    for name, (peak, width) in PEAKS.items():
-        table = np.stack([waves, np.exp(-0.5 * ((waves - peak) / width) ** 2)], axis=1)
-        np.savetxt(tmp_path / f"{name}.csv", table, delimiter=",")
-    emitters = ", ".join(
-        f'{{name = "{x}", spectrum = "{x}.csv", Y = {y}}}' for x, y in LEVELS.items()
-    )
-    tables = "".join(f"[light.{lamp}]\nemitters = [{emitters}]\n" for lamp in DRIVES)
-    (tmp_path / "room.lights.toml").write_text('lights = ["panel", "bulb"]\n' + tables)
-    return path
+    return write_spectral_room(tmp_path)
 
 
 def _paint(path: Path) -> Path:

@@ -16,6 +16,7 @@ writes beside itself
     painter-lamps.jpg   spots dimmed together, two of them with a gel, under a master
     painter-sky.jpg     the table under a sky in texels, some of which are painted on its map
     painter-side-by-side.jpg   three looks side by side, in the light theme
+    painter-planes.jpg  lux on the desks of the office, over the picture of the answer
     painter-tour.jpg, painter-keys.jpg, painter-settings.jpg, painter-analysis.jpg  a step of the
                         tour, the shortcuts, the settings, and why an answer is no closer
     lights.webp     somebody drags a spot, aims it by a click, paints, and lets the lights move;
@@ -405,6 +406,26 @@ def _type(page: Page, label: str, text: str) -> None:
     field.press("Enter")
 
 
+def lux_on_desks(hand: Hand) -> None:
+    """The office darker, while its desks keep the lux that are wished for."""
+    page, on = hand.page, hand.of_painting
+    page.keyboard.press("a")
+    page.get_by_role("button", name="By numbers", exact=True).click()
+    _type(page, "Brighter", "-1")
+    page.get_by_role("button", name="Apply", exact=True).click()
+    for title in ("Colour", "Adjust by numbers", "Layers", "Lights"):  # there is room for planes
+        page.locator(".fold-head button", has_text=title).first.click()
+    page.locator(".is-planes").wait_for(timeout=1000 * PATIENCE_S)
+    page.get_by_role("checkbox", name="Lux in the picture").check()
+    page.get_by_role("button", name="Hide room in the picture").click()
+    page.keyboard.press("b")
+    page.get_by_role("button", name="Blink", exact=True).click()
+    page.keyboard.press("k")
+    hand.wait()
+    page.mouse.move(*on(0.37, 0.83))
+    page.wait_for_timeout(1500)
+
+
 def selected(hand: Hand) -> None:
     """A stop more on what a spot lights, and a gradient on a wall within a soft lasso."""
     on, page = hand.of_painting, hand.page
@@ -501,7 +522,7 @@ def painter(
     with tempfile.TemporaryDirectory() as own:
         words = [
             "paint",
-            str(SCENES / scene / "scene.xml"),
+            str(SCENES / scene) if scene.endswith(".xml") else str(SCENES / scene / "scene.xml"),
             *more,
             f"--spp={spp}",
             f"--port={port}",
@@ -547,6 +568,7 @@ def main() -> None:
         "selection",
         "lamps",
         "sky",
+        "planes",
         "lights",
         "reference",
         "looks",
@@ -571,6 +593,11 @@ def main() -> None:
         with painter("table", asked.spp, asked.port) as url, using(url) as hand:
             painted_sky(hand)
             hand.page.screenshot(path=HERE / "painter-sky.jpg", type="jpeg", quality=88)
+    if asked.only in (None, "planes"):
+        planes = f"--planes={SCENES / 'office/office.planes.toml'}"
+        with painter("office/office.xml", asked.spp, asked.port, planes) as url, using(url) as hand:
+            lux_on_desks(hand)
+            hand.page.screenshot(path=HERE / "painter-planes.jpg", type="jpeg", quality=88)
     if asked.only in (None, "reference"):
         with painter("gallery", asked.spp, asked.port) as url, using(url) as hand:
             page = hand.page

@@ -102,7 +102,7 @@ class SessionAccess:
         with self.lock:
             snapshot = self.session.snapshot(requests)
             weights = self.session.weights
-        return snapshot, Lighting.of_weights(snapshot.bases[0], weights)
+        return snapshot, snapshot.lighting_of(weights)
 
 
 _Page = TypeVar("_Page")

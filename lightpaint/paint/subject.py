@@ -33,12 +33,14 @@ PREVIEW_SPP = (2, 8, 32, 128)
 class LazyScene:
     """A scene by its file.
 
-    checks: called with the scene once it is loaded; they raise if it cannot be painted. remarks:
-    for the user; the cache keeps them for the next session.
+    prepare: returns the scene that is rendered, from the one on its film. checks: called with it
+    once it is loaded; they raise if it cannot be painted. remarks: for the user; the cache keeps
+    them for the next session.
     """
 
     file: SceneFile
     settings: Settings
+    prepare: Callable[[Scene], Scene] = lambda scene: scene
     checks: list[Callable[[Scene], None]] = field(default_factory=list)
     remarks: tuple[str, ...] = ()
     _key: str = ""
@@ -61,7 +63,8 @@ class LazyScene:
         file = {name: value for name, value in vars_of(self.file).items() if value is not None}
         names = {key: list(members) for key, members in (file.get("groups") or {}).items()}
         lights = {"lights": list(file["lights"])} if "lights" in file else {}
-        film = {"quality": self.settings.quality, "resolution": self.settings.resolution}
+        kept = ("quality", "resolution", "spectral")
+        film = {name: getattr(self.settings, name) for name in kept}
         parameters = {key: str(value) for key, value in self.file.parameters.items()}
         return {**file, **lights, **film, "groups": names, "parameters": parameters}
 
@@ -83,6 +86,7 @@ class LazyScene:
 
         self._began_s, self._clock_s = time.time(), _clock_s()
         scene = on_film(self.file.content, self.settings.quality, self.settings.resolution)
+        scene = self.prepare(scene)
         if self.record is not None and self.record.identity != scene.identity:
             raise PaintError(
                 f"{self.file.path} is not what it was when this session was opened: its files have "

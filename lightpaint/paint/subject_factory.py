@@ -1,6 +1,7 @@
 """Subjects made from files or from objects in memory, and checked before any render."""
 
 from collections.abc import Callable, Mapping, Sequence
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -16,6 +17,7 @@ from lightpaint.lighting.constraints.constraints import Constraints, LightConstr
 from lightpaint.lighting.constraints.constraints_file import constraints_of
 from lightpaint.lighting.joined_views import check_same_lights
 from lightpaint.lighting.unknowns.reduction import reduce_to
+from lightpaint.lighting.wishes.wished_light import check_powers
 from lightpaint.paint.layers.layer_files import check_kind
 from lightpaint.paint.session_file import check_view_names, session_identity
 from lightpaint.paint.store.session_requests import SessionRequests
@@ -100,7 +102,7 @@ def make_subject(
         loaded = content(source)
         basis = loaded.basis if isinstance(loaded, LightGroups) else loaded
         _check_size(basis, _name_of(source))
-        _check_constraints(basis.lights, constraints, check_lamps)
+        _check_constraints(basis.lights, constraints, settings, check_lamps)
         groups = loaded if isinstance(loaded, LightGroups) else None
         fields = {"basis": basis, "groups": groups}
     name = _name_of(source)
@@ -125,27 +127,43 @@ def _scene_on_film(
     def check(scene: Scene) -> None:
         from lightpaint.basis.render.render_origin import basis_lights
 
-        _check_constraints(basis_lights(scene), constraints, check_lamps)
+        _check_constraints(basis_lights(scene), constraints, settings, check_lamps)
         if settings.planes is not None:
             from lightpaint.pipeline.wished_planes import check_planes, constraints_for_planes
 
             every = constraints_for_planes(scene, constraints, settings)
             check_planes(scene, settings.planes, every)
 
+    prepare = partial(_with_spectra, settings=settings, constraints=constraints)
     if isinstance(source, Scene):
-        check(source)
-        return on_film(source, settings.quality, settings.resolution)
+        whole = prepare(on_film(source, settings.quality, settings.resolution))
+        check(whole)
+        return whole
     # Errors that need no renderer are raised before the scene is loaded.
     file_length(Path(source.path), "scene file", SceneError)
-    scene = LazyScene(source, settings)
+    scene = LazyScene(source, settings, prepare)
     if scene.record is not None:
-        _check_constraints(scene.record.lights, constraints, check_lamps)
+        _check_constraints(scene.record.lights, constraints, settings, check_lamps)
     else:
         _check_named_lamps(source, check_lamps)
     scene.checks.append(check)
     if settings.planes is not None:  # mistakes in their file show before the painter opens
         _ = scene.scene
     return scene
+
+
+def _with_spectra(scene: Scene, *, settings: Settings, constraints: Constraints) -> Scene:
+    """Return a scene with a light for each emitter if settings ask for spectra, else as it is.
+
+    Raises LightpaintError if it cannot be rendered with spectra.
+    """
+    if not settings.spectral:
+        return scene
+    from lightpaint.pipeline.job.spectral_job import check_spectral, spectral_scenes
+
+    every = constraints_of(scene.requests).and_then(constraints)
+    check_spectral(settings, every)
+    return spectral_scenes([scene], every)[0]
 
 
 def _check_size(basis: Basis, name: str) -> None:
@@ -161,11 +179,17 @@ def _check_size(basis: Basis, name: str) -> None:
         )
 
 
-def _check_constraints(lights: Lights, constraints: Constraints, check_lamps: CheckLamps) -> None:
-    """Raise ConstraintError unless lights can meet these constraints and their lights file's."""
+def _check_constraints(
+    lights: Lights, constraints: Constraints, settings: Settings, check_lamps: CheckLamps
+) -> None:
+    """Raise ConstraintError unless lights can meet these constraints and their lights file's, and
+    have the power that a limit in the settings needs.
+    """
     all_constraints = constraints_of(lights.requests).and_then(constraints)
     reduction = reduce_to(with_sure_scale(all_constraints, lights), lights)
     check_lamps({lights[k].name: lamp.names for k, lamp in reduction.lamps.items()})
+    if settings.watts is not None:
+        check_powers(reduction, [light.name for light in lights], "a limit of power")
 
 
 def _check_named_lamps(source: SceneFile, check_lamps: CheckLamps) -> None:

@@ -83,6 +83,8 @@ class MeasuringPlane:
             over all directions perpendicular to them.
         covered_by: Ids of the shapes that cover points of its grid closely, one for each point
             that is left out.
+        sides: (p, 2, 3), the two sides of each point's cell, across and along, in scene units; None
+            for listed points.
 
     Examples:
         >>> up = np.array([[0.0, 1, 0], [0, 1, 0]])
@@ -102,6 +104,7 @@ class MeasuringPlane:
     wishes: Wishes = field(default_factory=Wishes)
     is_cylindrical: bool = False
     covered_by: tuple[str, ...] = ()
+    sides: Doubles | None = None
 
     def __post_init__(self) -> None:
         if not isinstance(self.name, str):
@@ -120,6 +123,10 @@ class MeasuringPlane:
             )
         if self.cells.shape != (count, 2):
             raise SceneError(f"plane {self.name!r} has cells {self.cells.shape}: expected (p, 2)")
+        if self.sides is not None and np.shape(self.sides) != (count, 2, 3):
+            raise SceneError(
+                f"plane {self.name!r} has sides {np.shape(self.sides)}: expected (p, 2, 3)"
+            )
 
     def __len__(self) -> int:
         return len(self.points)

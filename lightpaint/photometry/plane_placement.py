@@ -66,27 +66,28 @@ class PlaneRequest:
 class _Cells:
     """Cells of a rectangle or a quadrilateral.
 
-    points: (p, 3), their centres. normals: (p, 3). cells: (p, 2), row and column. spacing, area:
-    metres between neighbours, and square metres of a cell. covered_by: ids of the shapes that
-    cover points which were left out, one for each.
+    points: (p, 3), their centres. normals: (p, 3). cells: (p, 2), row and column. sides: (p, 2, 3),
+    of each cell, across and along; zero for listed points. spacing, area: metres between
+    neighbours, and square metres of a cell. covered_by: ids of the shapes that cover points which
+    were left out, one for each.
     """
 
     points: Doubles
     normals: Doubles
     cells: Indices
+    sides: Doubles
     spacing: float
     area: float
     covered_by: tuple[str, ...] = ()
 
     def only(self, is_kept: Bools) -> "_Cells":
         """Return the cells that are kept."""
-        return _Cells(
-            self.points[is_kept],
-            self.normals[is_kept],
-            self.cells[is_kept],
-            self.spacing,
-            self.area,
-            self.covered_by,
+        return replace(
+            self,
+            points=self.points[is_kept],
+            normals=self.normals[is_kept],
+            cells=self.cells[is_kept],
+            sides=self.sides[is_kept],
         )
 
 
@@ -122,6 +123,7 @@ def place_plane(request: PlaneRequest, room: RoomRays) -> MeasuringPlane:
         request.wishes,
         is_cylindrical,
         covered_by=grid.covered_by,
+        sides=None if request.points is not None else grid.sides,
     )
 
 
@@ -144,7 +146,8 @@ def cell_counts(sides: tuple[float, float], grid: float | None) -> tuple[int, in
 def _listed(points: Doubles, room: RoomRays) -> _Cells:
     """Return listed points, which are measured from above."""
     cells = np.stack([np.zeros(len(points), int), np.arange(len(points))], axis=1)
-    return _Cells(points, np.tile(room.up, (len(points), 1)), cells, 0.0, 0.0)
+    ups = np.tile(room.up, (len(points), 1))
+    return _Cells(points, ups, cells, np.zeros((len(points), 2, 3)), 0.0, 0.0)
 
 
 def _rectangle(
@@ -164,7 +167,8 @@ def _rectangle(
     area = float(np.linalg.norm(np.cross(across, along))) / (rows * columns)
     spacing = max(sides[0] / columns, sides[1] / rows)
     cells = np.stack([row, column], axis=1)
-    return _Cells(points, np.tile(normal, (len(points), 1)), cells, spacing, area)
+    cell_sides = np.tile([across / columns, along / rows], (len(points), 1, 1))
+    return _Cells(points, np.tile(normal, (len(points), 1)), cells, cell_sides, spacing, area)
 
 
 def _between_corners(request: PlaneRequest, room: RoomRays) -> _Cells:
@@ -192,8 +196,12 @@ def _between_corners(request: PlaneRequest, room: RoomRays) -> _Cells:
         + np.outer(u * v, c)
         + np.outer((1 - u) * v, d)
     )
+    # The derivatives of that map by column and row.
+    across_cell = (np.outer(1 - v, b - a) + np.outer(v, c - d)) / columns
+    along_cell = (np.outer(1 - u, d - a) + np.outer(u, c - b)) / rows
     area = 0.5 * float(np.linalg.norm(np.cross(c - a, d - b))) / len(points)
-    return _Cells(points, grid.normals, grid.cells, grid.spacing, area)
+    sides = np.stack([across_cell, along_cell], axis=1)
+    return replace(grid, points=points, sides=sides, area=area)
 
 
 def _turned(normal: Doubles, middle: Doubles, room: RoomRays) -> Doubles:
@@ -209,8 +217,7 @@ def _over_floor(request: PlaneRequest, room: RoomRays) -> _Cells:
     grid = _on_surface(request, shapes, room.up, room)
     lifted = grid.points + request.height * room.up
     _check_height(request, grid.points, lifted, room)
-    grid = _Cells(lifted, grid.normals, grid.cells, grid.spacing, grid.area)
-    return _kept_from_walls(request, grid, room)
+    return _kept_from_walls(request, replace(grid, points=lifted), room)
 
 
 def _on_wall(request: PlaneRequest, name: str, room: RoomRays) -> _Cells:
@@ -261,7 +268,7 @@ def _on_surface(
         for angle in 2 * np.pi * np.arange(WALL_DIRECTIONS) / WALL_DIRECTIONS:
             offset = 0.999 * margin * (math.cos(angle) * across + math.sin(angle) * along)
             is_hit &= room.hits_of(shapes, grid.points + offset, -normal)[0]
-    return _Cells(places, grid.normals, grid.cells, grid.spacing, grid.area).only(is_hit)
+    return replace(grid, points=places).only(is_hit)
 
 
 def _sides(normal: Doubles, up: Doubles) -> tuple[Doubles, Doubles]:
@@ -359,6 +366,7 @@ def _side_by_side(grids: Sequence[_Cells]) -> _Cells:
         np.concatenate([grid.points for grid in grids]),
         np.concatenate([grid.normals for grid in grids]),
         np.concatenate(cells),
+        np.concatenate([grid.sides for grid in grids]),
         max(grid.spacing for grid in grids),
         float(np.concatenate(areas).mean()) if sum(map(len, areas)) else 0.0,
         covered_by=tuple(name for grid in grids for name in grid.covered_by),

@@ -157,7 +157,7 @@ def answer_job(
     with stage("solving", listen, SOLVE_ADVICE):
         problem = problem_of(job, bases)
         bases.clear()
-        required = None if planes is None else require(problem, planes, listen)
+        required = None if planes is None else require(problem, planes, job.settings, listen)
         problem = problem if required is None else required.problem
         release_freed_memory()
         if job.settings.report:

@@ -173,9 +173,16 @@ def planes_of_job(job: Job, lights: Lights, listen: Listener) -> MeasuredPlanes 
     return with_glare(planes, scene, settings, listen)
 
 
-def require(problem: Problem, planes: MeasuredPlanes, listen: Listener) -> RequiredProblem:
-    """Return the problem under the wishes for planes, and say what is not within reach."""
-    required = with_wishes(problem, planes.wished_of(problem.reduction))
+def require(
+    problem: Problem, planes: MeasuredPlanes, settings: Settings, listen: Listener
+) -> RequiredProblem:
+    """Return the problem under the wishes for planes, unless settings ignore them, and say what is
+    not within reach.
+    """
+    wished = planes.wished_of(problem.reduction)
+    if settings.ignore_wishes:
+        return RequiredProblem(without_wishes(problem), wished, np.zeros(0))
+    required = with_wishes(problem, wished)
     if required.shares.any():
         listen.note("not all that planes ask for is within reach: as much of it as there can be")
     return required
@@ -191,6 +198,9 @@ def answer_on_planes(
         solution.weights,
         floor_m2=planes.floor_m2,
         glare=planes.glare,
+        are_ignored=(
+            solution.problem.reduction.requirements is None and not required.wished.is_empty
+        ),
     )
     return _with_costs(answer, solution, planes)
 

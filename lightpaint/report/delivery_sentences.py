@@ -33,10 +33,13 @@ def spoken_deliveries(deliveries: Sequence[Delivery], told: str = "") -> str:
     entries = [entry for entry in main_deliveries(deliveries) if entry.least is not None]
     if len(entries) == 1 and is_unnamed(entries[0]):
         shares = entries[0].spoken_shares
-        return f"{shares[:1].upper()}{shares[1:]} of what was asked for came."
+        end = "" if entries[0].is_overdone else " of what was asked for came"
+        return f"{shares[:1].upper()}{shares[1:]}{end}."
     if len(entries) > 1 and all(entry.is_met and not entry.layers for entry in entries):
         least = min(entry.least for entry in entries if entry.least is not None)
-        return f"Of each of {len(entries)} wishes at least {spoken_share(least)} came."
+        text = f"Of each of {len(entries)} wishes at least {spoken_share(least)} came."
+        overdone = [entry for entry in entries if entry.is_overdone][:MAX_WISHES]
+        return " ".join([text, *(f"{spoken_delivery(entry)}." for entry in overdone)])
     by_share = sorted(entries, key=lambda entry: entry.least or 0.0)
     shown = [entry for entry in entries if entry in by_share[:MAX_WISHES]]
     spoken = [spoken_delivery(entry) for entry in shown]

@@ -60,7 +60,8 @@ def planes_sentences(answer: PlanesAnswer) -> list[str]:
     """Return what is missed, what the power is, what the wishes cost, what glare is unknown, and
     where the figures of presets come from.
     """
-    sentences = [_missed(answer, outcome) for outcome in answer.missed]
+    sentences = ["The wishes and limits did not bind this answer."] if answer.are_ignored else []
+    sentences += [_missed(answer, outcome) for outcome in answer.missed]
     if not answer.missed and answer.outcomes:
         what = "All wishes for the planes are" if answer.readings else "The limit of power is"
         sentences.append(f"{what} met.")
@@ -141,6 +142,8 @@ def _missed(answer: PlanesAnswer, outcome: WishOutcome) -> str:
     title = plane_title(wish.plane, wish.case)
     if wish.kind == "mean":
         text = f"{title}: {reached:.0f} of {wish.asked:g} lx"
+        if answer.are_ignored:
+            return f"{text}."
         if (limit := answer.binding_limit) is not None:
             return f"{text}, as much as the limit of {limit:.4g} W leaves."
         if not answer.all_at_full:

@@ -190,10 +190,33 @@ def test_wishes_are_listed():
     assert spoken_deliveries([replace(parts[0], brightness=0.5), parts[1]]) == (
         "Vase: 50 %. Top left: 95 %."
     )
+    darker = replace(parts[0], brightness=2.01, is_darker=True)
+    text = "Of each of 2 wishes at least 95 % came. Vase: darkened twice as much as painted."
+    assert spoken_deliveries([darker, parts[1]]) == text
     nothing = replace(LANTERN, brightness=None)
     assert spoken_deliveries([nothing, RIM]) == "95 % of what was asked for came."
     other_way = replace(LANTERN, brightness=-0.3)
     assert spoken_deliveries([MOON, other_way]).endswith("Lantern: 0 %.")
+
+
+@pytest.mark.parametrize(
+    ("changes", "text"),
+    [
+        ({"brightness": 1.24}, "brightness 124 %, colour 50 %"),
+        ({"brightness": 1.4}, "brightened 1.4 times as much as painted, colour 50 %"),
+        (
+            {"brightness": 2.01, "is_darker": True},
+            "darkened twice as much as painted, colour 50 %",
+        ),
+        ({"color": 1.5}, "brightness 90 %, coloured 1.5 times as much as painted"),
+        ({"brightness": 1.5, "color": None}, "brightened 1.5 times as much as painted"),
+    ],
+)
+def test_too_much_is_said_as_a_ratio_and_with_its_direction(changes: Any, text: str) -> None:
+    painting = replace(PAINTING, **changes)
+    assert painting.spoken_shares == text
+    if painting.is_overdone:
+        assert spoken_deliveries([painting]) == f"{text[0].upper()}{text[1:]}."
 
 
 def test_the_report_has_a_bar_for_each_part():

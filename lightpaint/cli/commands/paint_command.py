@@ -13,16 +13,16 @@ from typing import TYPE_CHECKING, Any
 from lightpaint.cli.output import lines, terminal
 from lightpaint.cli.output.lines import CommandOutcome, output_mode
 from lightpaint.colour.display.view_transform import TransformChoice
-from lightpaint.errors import OutputError
+from lightpaint.errors import LightpaintError, OutputError
 from lightpaint.lighting.constraints.constraints import Constraints
 from lightpaint.paint.server.address import Reach
 from lightpaint.paint.store.session_requests import (
     DEFAULT_NEAR,
-    IGNORE_WISHES,
     SessionRequests,
 )
 from lightpaint.pipeline.job.settings import Settings
 from lightpaint.pipeline.job.sources import BasisFile, GroupsFile, SceneFile
+from lightpaint.sentences import Hint
 
 if TYPE_CHECKING:
     from lightpaint.dmx.console_rig import ConsoleRig
@@ -70,14 +70,16 @@ def paint(
     from lightpaint.paint.subject_factory import make_subjects
 
     check_installed()
+    if console is not None and settings.spectral:
+        raise LightpaintError(
+            Hint("spectral", True), " does not go with ", Hint("rig"), ": leave one out"
+        )
     from lightpaint.cli.output.vocabulary import from_any_folder
 
     def command(paintings: Mapping[str, str], requests: "SessionRequests") -> str:
         # In the painter no light moves unless somebody moves it.
         is_still = subjects[0].lets_lights_move and not requests.placed
         words = (*options, *["--no-move"] * is_still)
-        if settings.planes is not None and not requests.ignores_wishes:
-            words += ("--planes", quote(settings.planes))
         return from_any_folder(command_for_paintings(sources[0].path, paintings, words, requests))
 
     fixtures = None
@@ -240,8 +242,6 @@ def options_of(requests: SessionRequests) -> list[str]:
     if requests.start and "near" not in requests.values:
         options.append(f"--near {DEFAULT_NEAR:g}")
     for key, value in requests.values.items():
-        if key == IGNORE_WISHES:
-            continue
         option = f"--{key.replace('_', '-')}"
         options.append(option if value is True else f"{option} {value}")
     return options

@@ -241,7 +241,7 @@ def _paint_arguments(
     [folder] = folders_of(options.output and Path(options.output), [session_name])
     # The command that the page shows for exported paintings has only options that `solve` knows.
     excluded = ["output", "new", "layers", "host", "port", "with_browser", "view", "exposure"]
-    excluded += ["rig", "gdtf", "pixels", "target", "universes", "priority", "positions", "planes"]
+    excluded += ["rig", "gdtf", "pixels", "target", "universes", "priority", "positions"]
     excluded += ["as_json", "is_quiet", "is_verbose", "json_progress"]
     excluded += ["lights"] * isinstance(source, GroupsFile) + ["sensors"] * (len(sources) > 1)
     return {

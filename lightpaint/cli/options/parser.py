@@ -202,7 +202,7 @@ def _solve(parser: argparse.ArgumentParser) -> None:
     add_verification(parser)
     add_fields(parser, Settings, "report")
     add_tolerances(parser)
-    add_fields(parser, Settings, "cd_per_unit", "planes", "watts")
+    add_fields(parser, Settings, "cd_per_unit", "planes", "watts", "ignore_wishes")
     add_lights(parser)
     add_split(parser)
     add_map_size(parser)
@@ -237,7 +237,7 @@ def _paint(parser: argparse.ArgumentParser) -> None:
     add_pattern(parser)
     add_constraints(parser)
     add_budget(parser)
-    add_fields(parser, Settings, "error", "cd_per_unit", "planes")
+    add_fields(parser, Settings, "error", "cd_per_unit", "planes", "watts", "spectral")
     add_cache(parser)
     add_view(parser, is_repeatable=True)
     # The parser is kept for the command that answers exported paintings.

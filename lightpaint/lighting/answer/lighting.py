@@ -135,7 +135,7 @@ class LightSetting:
         emission = self.emission
         if self.part_of and self.lamp is not None:
             [emitter] = self.lamp.emitters
-            emission = as_rgb(emission[0] * _own_color(emitter))
+            emission = as_rgb(emission[0] * color_of_emitter(emitter))
         if (self.plugin, self.unit) != PROJECTOR:
             return emission
         r, g, b = (math.pi * channel for channel in emission)
@@ -424,8 +424,11 @@ class Lighting(Shown, Mapping[str, LightSetting]):
         return {x: self.at_frame(x) for x in key_span(self.animation)} if self.animation else {}
 
     def of_lamps(self) -> "Lighting":
-        """Return the lighting with a light for each lamp, also where emitters are lights."""
-        if not any(light.part_of for light in self.lights):
+        """Return the lighting with a light for each lamp, also where emitters are lights.
+
+        Without their lamps, as of a saved basis without a lights file, emitters stay lights.
+        """
+        if not any(light.part_of and light.lamp is not None for light in self.lights):
             return self
         groups = groupby(self.lights, key=lambda light: light.part_of or light.name)
         return replace(self, lights=tuple(whole_lamp(tuple(parts)) for _, parts in groups))
@@ -552,7 +555,7 @@ def whole_lamp(parts: Sequence[LightSetting]) -> LightSetting:
     first = parts[0]
     if not first.part_of:
         return first
-    emitters = [_of_its_color(x.lamp.emitters[0]) for x in parts if x.lamp is not None]
+    emitters = [in_own_color(x.lamp.emitters[0]) for x in parts if x.lamp is not None]
     assert first.lamp is not None
     lamp = replace(first.lamp, emitters=tuple(emitters))
     drives = np.array([x.emission[0] for x in parts]) / lamp.levels
@@ -602,12 +605,12 @@ def parts_of(light: LightSetting) -> tuple[LightSetting, ...]:
     )
 
 
-def _of_its_color(emitter: LampEmitter) -> LampEmitter:
+def in_own_color(emitter: LampEmitter) -> LampEmitter:
     """Return an emitter, whose emission has its luminance in each channel, in its own colour."""
-    return replace(emitter, emission=as_rgb(emitter.emission[0] * _own_color(emitter)))
+    return replace(emitter, emission=as_rgb(emitter.emission[0] * color_of_emitter(emitter)))
 
 
-def _own_color(emitter: LampEmitter) -> Doubles:
+def color_of_emitter(emitter: LampEmitter) -> Doubles:
     """Return the colour of an emitter's spectrum, (3,), of luminance 1."""
     assert emitter.spectrum is not None
     color = rgb_of_powers(emitter.spectrum)

@@ -1,6 +1,7 @@
 """Constraints of each light, resolved from names and patterns."""
 
 from collections.abc import Sequence
+from dataclasses import replace
 from fnmatch import fnmatchcase
 from typing import Any
 
@@ -46,6 +47,17 @@ def tables_by_light(
                 merged[id(below)] = merge_tables(below, wish)
             tables[k] = merged[id(below)], origin
     return tables
+
+
+def constraints_on_parts(
+    constraints: Constraints, lights: Sequence[BasisLight]
+) -> tuple[Constraints, Constraints]:
+    """Return the constraints on single emitters of lamps, by their names, and all others."""
+    names = {light.name for light in lights if light.lamp}
+    is_part = [name in names for name, _, _ in constraints.lights]
+    own = tuple(x for x, is_own in zip(constraints.lights, is_part, strict=True) if is_own)
+    rest = tuple(x for x, is_own in zip(constraints.lights, is_part, strict=True) if not is_own)
+    return Constraints(lights=own), replace(constraints, lights=rest)
 
 
 def tied_lights(

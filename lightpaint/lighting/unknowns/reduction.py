@@ -20,7 +20,11 @@ from lightpaint.colour.lamp import Lamp
 from lightpaint.errors import ConstraintError
 from lightpaint.lighting.algebra.quadratic import Cap
 from lightpaint.lighting.constraints.constraints import Constraints, LightConstraint
-from lightpaint.lighting.constraints.light_patterns import constraints_by_light, tied_lights
+from lightpaint.lighting.constraints.light_patterns import (
+    constraints_by_light,
+    constraints_on_parts,
+    tied_lights,
+)
 from lightpaint.lighting.constraints.requirements import Requirements
 from lightpaint.lighting.unknowns.gamuts import Gamuts
 from lightpaint.lighting.unknowns.knobs import (
@@ -417,10 +421,13 @@ def _reduce_parts(constraints: Constraints, lights: Sequence[BasisLight]) -> Red
     whole = WholeLamps.of(lights)
     if not whole.has_parts:
         return _reduce_to(constraints, lights)
-    by_light = constraints_by_light(constraints, whole.lights)
-    lamps = _lamps(constraints, whole.lights, by_light)
+    of_emitters, of_lamps = constraints_on_parts(constraints, lights)
+    by_light = constraints_by_light(of_lamps, whole.lights)
+    lamps = _lamps(of_lamps, whole.lights, by_light)
     if not lamps:  # nothing says what the emitters have in common
         return _reduce_to(constraints, lights)
+    constraints = of_lamps
+    _check_ties(constraints, lights)
     colored = [
         replace(light, emission=as_rgb(emission_of_parts([lights[i] for i in parts], lamps[k])))
         if k in lamps
@@ -438,7 +445,47 @@ def _reduce_parts(constraints: Constraints, lights: Sequence[BasisLight]) -> Red
         for k, lamp in lamps.items()
         for i, part in zip(whole.parts[k], part_lamps(lamp), strict=True)
     }
-    return Reduction(np.concatenate(fixed), tuple(labels), tuple(knobs), lamps=of_parts)
+    reduction = Reduction(np.concatenate(fixed), tuple(labels), tuple(knobs), lamps=of_parts)
+    return _with_constrained_parts(reduction, of_emitters, lights)
+
+
+def _check_ties(constraints: Constraints, lights: Sequence[BasisLight]) -> None:
+    """Raise ConstraintError for ties that name emitters of lamps."""
+    names = {light.name: light.lamp for light in lights if light.lamp}
+    for tie in constraints.ties:
+        for name in tie.lights:
+            if name in names:
+                raise ConstraintError(
+                    tie.where,
+                    f": {name!r} is an emitter of {names[name]!r}: tie lamps, not their emitters",
+                )
+
+
+def _with_constrained_parts(
+    reduction: Reduction, constraints: Constraints, lights: Sequence[BasisLight]
+) -> Reduction:
+    """Return the unknowns with constraints on single emitters of lamps, too."""
+    by_part = constraints_by_light(constraints, lights)
+    fixed, labels = reduction.fixed_weights.copy(), list(reduction.labels)
+    knobs = {knob.lights: knob for knob in reduction.knobs}
+    for k, constraint in enumerate(by_part):
+        if constraint is None:
+            continue
+        if (k,) not in knobs:
+            raise ConstraintError(
+                constraint.where,
+                f" is on an emitter of {lights[k].lamp!r}, whose own constraint rules all of its "
+                "emitters: leave one of the two out",
+            )
+        labels[k] = ", ".join(filter(None, [labels[k], constraint.label]))
+        if constraint.is_fixed:
+            fixed[k] = fixed_emission(lights[k], constraint, reduction.lamps[k])
+            del knobs[k,]
+        else:
+            knobs[k,] = dimmer_knob(k, lights[k], constraint, reduction.lamps[k])
+    return replace(
+        reduction, fixed_weights=fixed, labels=tuple(labels), knobs=tuple(knobs.values())
+    )
 
 
 def lamps_by_name(constraints: Constraints, lights: Sequence[BasisLight]) -> dict[str, Lamp]:

@@ -51,7 +51,8 @@ class PlanesAnswer:
     more. lamps: their number, without those that stay as they are. cost_delta_e: the mean CIEDE2000
     to the painting beyond that of an answer without wishes; None without a painting.
     budget_delta_e: the same beyond one whose power is not limited, where the limit binds. glare:
-    that observers see; None if it was not measured.
+    that observers see; None if it was not measured. are_ignored: whether the answer was found
+    without the wishes.
     """
 
     wished: WishedLight
@@ -64,6 +65,7 @@ class PlanesAnswer:
     cost_delta_e: float | None = None
     budget_delta_e: float | None = None
     glare: Glare | None = None
+    are_ignored: bool = False
 
     @property
     def binding_limit(self) -> float | None:
@@ -114,11 +116,12 @@ def planes_answer(
     prices: Doubles | None = None,
     cost_delta_e: float | None = None,
     glare: Glare | None = None,
+    are_ignored: bool = False,
 ) -> PlanesAnswer:
     """Return what weights (n, 3) give.
 
     reduction: of the lights. prices: of each wish, (w,), in watts per unit; see `WishOutcome`.
-    glare: of all lights, as measured.
+    glare: of all lights, as measured. The others are those of `PlanesAnswer`.
     """
     watts = _power(reduction, wished, weights)
     sums = np.einsum("mnc,nc->m", wished.requirements.rows, weights)
@@ -142,6 +145,7 @@ def planes_answer(
         len(movable),
         cost_delta_e,
         glare=glare,
+        are_ignored=are_ignored,
     )
 
 

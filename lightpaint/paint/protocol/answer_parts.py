@@ -51,7 +51,7 @@ class WishDelivery:
 
     layers: ids of its layers. brightness, color: share of the asked change that came; null if none
     was asked. delta_e: of its lit parts, against the painting. name: of the layer, group or stroke.
-    kind: `layer`, `group` or `wish`.
+    kind: `layer`, `group` or `wish`. is_darker: whether it asks for less light.
     """
 
     name: str
@@ -60,6 +60,7 @@ class WishDelivery:
     brightness: float | None
     color: float | None
     delta_e: float
+    is_darker: bool = False
 
 
 @dataclass(frozen=True)
@@ -89,7 +90,9 @@ class LightAnswer:
     is_constrained: whether a constraint limits it. is_unreached: whether no paint depends on it.
     emission: linear, in the unit of the light. swatch: its colour for a screen, as in CSS. is_on:
     whether it shines. drives: of the emitters of a lamp, 0 to 1, in their order. slot_delta_e: of a
-    lamp with a colour wheel, how far its slot is from the colour that was solved for.
+    lamp with a colour wheel, how far its slot is from the colour that was solved for. rendering:
+    how the lamp renders colours, in words; null where its spectra are unknown, and of lights far
+    from white.
     """
 
     emission: RGB
@@ -103,6 +106,7 @@ class LightAnswer:
     is_unreached: bool | None = field(default=None, metadata=OPTIONAL)
     drives: tuple[float, ...] | None = field(default=None, metadata=OPTIONAL)
     slot_delta_e: float | None = field(default=None, metadata=OPTIONAL)
+    rendering: str | None = field(default=None, metadata=OPTIONAL)
 
 
 @dataclass(frozen=True)

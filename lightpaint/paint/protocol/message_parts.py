@@ -25,31 +25,6 @@ class ConsoleInfo:
 
 
 @dataclass(frozen=True)
-class MeasuredPlane:
-    """A plane on which illuminance is measured, in one of the cases if there are several.
-
-    size: rows and columns of a picture of it. cells: row and column of each point. points: where
-    they are, in units of the scene.
-    """
-
-    name: str
-    size: tuple[int, int]
-    cells: tuple[tuple[int, int], ...]
-    points: tuple[tuple[float, ...], ...]
-
-
-@dataclass(frozen=True)
-class PlanesInfo:
-    """The measuring planes. floor_m2: the area that power is divided by; null without one.
-    budget_watts: the most power that is allowed; null if any is.
-    """
-
-    planes: tuple[MeasuredPlane, ...]
-    floor_m2: float | None
-    budget_watts: float | None
-
-
-@dataclass(frozen=True)
 class EmitterInfo:
     """An emitter of a lamp, such as its red LEDs. swatch: its colour for a screen, as in CSS."""
 
@@ -67,7 +42,8 @@ class LightInfo:
     whether one number stands for all channels. scale: factor of its stored plane. name, label: its
     name in the scene, and as people read it. unit: of its emission. emitters: those that mix the
     light of a lamp, if its lights file lists them. address: its fixture and first channel on a
-    console; "" if unknown.
+    console; "" if unknown. lamp: of which it is an emitter, where renders have spectra; "" for a
+    whole light.
     """
 
     name: str
@@ -84,6 +60,7 @@ class LightInfo:
     scale: float
     emitters: tuple[EmitterInfo, ...] = ()
     address: str = ""
+    lamp: str = ""
 
 
 @dataclass(frozen=True)
@@ -162,6 +139,42 @@ class Camera:
     y_axis: Place
     forward: Place
     is_parallel: bool
+
+
+@dataclass(frozen=True)
+class MeasuredPlane:
+    """A plane on which illuminance is measured, in one of the cases if there are several.
+
+    name: as people read it, with the case. plane, case: names of both; "" is the light of the
+    scene. size: rows and columns of a picture of it. cells: row and column of each point. points:
+    where they are, in units of the scene. sides: of the cell of each point, across and along, six
+    numbers; null for listed points. seen: for each view, the indices of the points that nothing
+    covers in its picture, which may lie beyond its edges.
+    """
+
+    name: str
+    plane: str
+    case: str
+    size: tuple[int, int]
+    cells: tuple[tuple[int, int], ...]
+    points: tuple[tuple[float, ...], ...]
+    sides: tuple[tuple[float, ...], ...] | None
+    seen: tuple[tuple[int, ...], ...]
+
+
+@dataclass(frozen=True)
+class PlanesInfo:
+    """The measuring planes.
+
+    floor_m2: the area that power is divided by; null without one. budget_watts: the most power that
+    is allowed; null if any is. cameras: the camera of each view; null for one that is not a
+    pinhole.
+    """
+
+    planes: tuple[MeasuredPlane, ...]
+    floor_m2: float | None
+    budget_watts: float | None
+    cameras: tuple[Camera | None, ...]
 
 
 @dataclass(frozen=True)

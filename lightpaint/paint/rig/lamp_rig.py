@@ -43,6 +43,7 @@ from lightpaint.scene.properties.pose import Pose, Site, motion_of
 from lightpaint.scene.runtime.render_lock import MITSUBA
 from lightpaint.scene.scene import Scene
 from lightpaint.scene.surfaces import render_features
+from lightpaint.sentences import Hint
 
 #: Number of rendered planes, each of all views, that are cached for undo.
 MAX_RENDERED = 32
@@ -214,6 +215,8 @@ class LampRig:
         scene = self.scene
         if scene.has_media:
             return "stands in a scene with fog or the like"
+        if scene.is_spectral:
+            return "is rendered with its spectrum"
         if values and "kind" in values:
             return ""
         light = scene.light(name)
@@ -224,6 +227,12 @@ class LampRig:
         if "kind" in values:
             if self.scene.has_media:
                 raise PaintError(f"{name} stands in fog or the like: it cannot be hung here")
+            if self.scene.is_spectral:
+                raise PaintError(
+                    f"{name} has no spectrum: it cannot be hung where lights are rendered with "
+                    "theirs; open the scene without ",
+                    Hint("spectral", True),
+                )
             return site_of_new(new_emitter(name, values))
         light = self.scene.light(name)
         if reason := self.why_not(name):

@@ -36,7 +36,7 @@ from lightpaint.placement.search.new_light_search import SearchSize, usual_pace
 from lightpaint.progress import cancellable
 from lightpaint.scene.properties.pose import Pose, Site
 from lightpaint.scene.runtime.render_lock import MITSUBA
-from lightpaint.sentences import Sentence
+from lightpaint.sentences import Hint, Sentence
 
 #: Freedom of lights without one in the lights file: largest distance, relative to the size of the
 #: room, and largest turn in degrees.
@@ -152,6 +152,12 @@ class LightPlacer:
         snapshot = self._access.snapshot()
         if not snapshot.painted_views:
             raise PaintError("nothing is painted yet: paint first, so that the search has a goal")
+        if self._rig.scene.is_spectral:
+            raise PaintError(
+                "with spectra all lights stay where they are: open the scene without ",
+                Hint("spectral", True),
+                " to search for places",
+            )
         if request.new_type is not None:
             self._new_lights(request, snapshot)
         elif not self._freedoms(snapshot):

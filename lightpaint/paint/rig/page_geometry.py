@@ -48,24 +48,31 @@ def in_this_thread() -> Iterator[None]:
 
 def camera_of(scene: Scene, loaded: Any) -> Camera | None:
     """Return the camera of `scene`; None for one whose rays do not go through a pinhole."""
-    corners = np.array([(0, 0), (1, 0), (0, 1), (0.7, 0.6)])
+    corners = np.array([(0, 0), (1, 0), (0, 1), (1, 1), (0.7, 0.6)])
     origin, direction = _rays(scene, loaded, corners)
     if np.allclose(direction, direction[0], atol=1e-5):
         x_axis, y_axis, forward = origin[1] - origin[0], origin[2] - origin[0], direction[0]
         expected = origin[0] + 0.7 * x_axis + 0.6 * y_axis
-        is_straight = np.linalg.norm(expected - origin[3]) <= STRAIGHT * np.linalg.norm(x_axis)
+        is_straight = np.linalg.norm(expected - origin[4]) <= STRAIGHT * np.linalg.norm(x_axis)
         return _camera(scene, origin[0], x_axis, y_axis, forward, is_parallel=True, ok=is_straight)
     eye = _crossing(origin, direction)
     off = np.linalg.norm(np.cross(origin - eye, direction), axis=1)
     if (off > STRAIGHT * max(float(np.linalg.norm(origin - eye, axis=1).max()), STRAIGHT)).any():
         return None
-    # All rays end in one plane before the eye, which the first ray meets after a length of 1.
-    middle = _rays(scene, loaded, np.array([(0.5, 0.5)]))[1][0]
-    ends = direction / (direction @ middle)[:, None]
-    x_axis, y_axis = ends[1] - ends[0], ends[2] - ends[0]
-    expected = ends[0] + 0.7 * x_axis + 0.6 * y_axis
-    is_straight = np.linalg.norm(expected - ends[3]) <= STRAIGHT
-    return _camera(scene, eye, x_axis, y_axis, ends[0], is_parallel=False, ok=bool(is_straight))
+    # The rays to the corners end at those of a parallelogram, which need not face the middle ray:
+    # the picture may be a part of the film, or the lens shifted.
+    others = np.stack([direction[1], direction[2], -direction[3]], axis=1)
+    if abs(np.linalg.det(others)) < STRAIGHT**3:
+        return None
+    lengths = np.linalg.solve(others, direction[0])
+    x_axis, y_axis = (
+        lengths[0] * direction[1] - direction[0],
+        lengths[1] * direction[2] - direction[0],
+    )
+    expected = direction[0] + 0.7 * x_axis + 0.6 * y_axis
+    off_ray = np.linalg.norm(np.cross(expected, direction[4])) / np.linalg.norm(expected)
+    is_straight = bool(lengths.min() > 0 and off_ray <= STRAIGHT)
+    return _camera(scene, eye, x_axis, y_axis, direction[0], is_parallel=False, ok=is_straight)
 
 
 def _crossing(origin: Doubles, direction: Doubles) -> Doubles:

@@ -57,6 +57,10 @@ def changed_requests(
         case protocol.StartFromLamps():
             if not message.is_on:
                 return "start from the scene", requests.with_start({})
+            if any(light.lamp for light in lights):
+                raise PaintError(
+                    "a solve with spectra starts from the scene as it is: lock lights instead"
+                )
             pairs = zip(lights, weights, strict=True)
             start = {light.name: emission for light, emission in pairs if not light.is_fixed}
             start = {name: emission.tolist() for name, emission in start.items()}

@@ -2,6 +2,7 @@
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
+from itertools import islice
 from typing import Any
 
 import numpy as np
@@ -12,11 +13,13 @@ from lightpaint.basis.lights import BasisLight
 from lightpaint.colour.color import LUMINANCE, luminance, rgb_to_hex
 from lightpaint.colour.lamp import Lamp, LampEmitter
 from lightpaint.colour.photometry import photometry
+from lightpaint.colour.spectra.color_rendering import ColorRendering, color_rendering
 from lightpaint.lighting.analysis.analysis import Analysis
 from lightpaint.lighting.analysis.appearance.appearance import INVISIBLE, Appearance
 from lightpaint.lighting.analysis.appearance.delivery import Delivery, merge_views
 from lightpaint.lighting.analysis.appearance.limiting_reasons import Reason
 from lightpaint.lighting.analysis.appearance.unpainted_change import UnpaintedChange
+from lightpaint.lighting.answer.lighting import Lighting, color_of_emitter, in_own_color
 from lightpaint.lighting.fit import DEFAULT_HOLD
 from lightpaint.paint.layers.canvases import Canvases
 from lightpaint.paint.layers.layer_stack import Layer
@@ -75,6 +78,8 @@ from lightpaint.report.verdict import (
 #: under which one is off.
 WHITE, OFF = 0.02, 1e-4
 
+#: Number of lamps whose rendering of colours is found with each exact answer, at 30 ms each.
+MAX_RENDERED_LAMPS = 32
 
 #: Phrase for an answer that is farther from the paint.
 WORSE_TEXT = "Farther from the paint than the current lighting, which undo brings back"
@@ -121,8 +126,14 @@ def light_info(
         is_scalar=light.is_scalar,
         scale=scale,
         address=address,
-        emitters=() if lamp is None else tuple(map(_emitter_info, lamp.emitters)),
+        emitters=() if lamp is None else tuple(map(_emitter_info, _own_emitters(light, lamp))),
+        lamp=light.lamp,
     )
+
+
+def _own_emitters(light: BasisLight, lamp: Lamp) -> tuple[LampEmitter, ...]:
+    """Return the emitters of a lamp, or the one that a light is, in their own colours."""
+    return tuple(map(in_own_color, lamp.emitters)) if light.lamp else lamp.emitters
 
 
 def _emitter_info(emitter: LampEmitter) -> EmitterInfo:
@@ -161,7 +172,10 @@ def _shares(lit: Doubles) -> tuple[float, ...]:
 def _light_answer(
     light: BasisLight, weight: Doubles, share: float, lamp: Lamp | None, mixed: RGB | None
 ) -> LightAnswer:
-    colour = photometry(as_rgb(weight), unit=light.unit)
+    own = weight
+    if light.lamp and lamp is not None:
+        own = weight[0] * color_of_emitter(lamp.emitters[0])
+    colour = photometry(as_rgb(own), unit=light.unit)
     current, answered = (
         float(luminance(np.asarray(x, np.float64))) for x in (light.emission, weight)
     )
@@ -192,20 +206,26 @@ class Judgement:
     """The analysis of an answer, for the page.
 
     worst: of the view with the largest error. closeness: of each view; None for unpainted ones.
-    lights: `error`, `is_constrained` and `is_unreached` of each, as in `LightAnswer`. deliveries:
-    of all views together.
+    lights: `error`, `is_constrained`, `is_unreached` and `rendering` of each, as in `LightAnswer`.
+    deliveries: of all views together.
     """
 
     worst: Closeness
     closeness: tuple[Closeness | None, ...]
-    lights: tuple[tuple[str | None, bool, bool], ...]
+    lights: tuple[tuple[str | None, bool, bool, str | None], ...]
     deliveries: tuple[WishDelivery, ...] = ()
 
     def complete(self, findings: Findings) -> Findings:
         """Return immediate findings with the results of the analysis."""
         lights = tuple(
-            replace(light, error=error, is_constrained=is_held, is_unreached=is_unreached)
-            for light, (error, is_held, is_unreached) in zip(
+            replace(
+                light,
+                error=error,
+                is_constrained=is_held,
+                is_unreached=is_unreached,
+                rendering=rendering,
+            )
+            for light, (error, is_held, is_unreached, rendering) in zip(
                 findings.lights or (), self.lights, strict=True
             )
         )
@@ -231,17 +251,38 @@ def judge(analyses: Sequence[Analysis], painted: Sequence[int]) -> Judgement:
     """
     solution = analyses[0].solution
     errors = spoken_errors(analyses[0].uncertainty, len(solution.basis.names))
-    settings = solution.lighting.lights
+    settings, renderings = solution.lighting.lights, _renderings(solution.lighting)
     by_view = {view: _closeness(entry) for view, entry in zip(painted, analyses, strict=True)}
     return Judgement(
         worst=by_view[_worst_view(painted, analyses)],
         closeness=tuple(by_view.get(k) for k in range(max(painted) + 1)),
         lights=tuple(
-            (error, entry.is_active, not any(entry.reached))
+            (
+                error,
+                entry.is_active,
+                not any(entry.reached),
+                renderings.get(entry.part_of or entry.name),
+            )
             for error, entry in zip(errors, settings, strict=True)
         ),
         deliveries=_wish_deliveries(analyses),
     )
+
+
+def _renderings(lighting: Lighting) -> dict[str, str]:
+    """Return how lamps of known spectra render colours, in words, by name."""
+    powers = {x.name: x.powers for x in lighting.of_lamps().lights if x.powers is not None}
+    known = islice(powers.items(), MAX_RENDERED_LAMPS)
+    found = {name: color_rendering(values) for name, values in known}
+    return {name: _rendering_text(x) for name, x in found.items() if x is not None}
+
+
+def _rendering_text(color: ColorRendering) -> str:
+    text = (
+        f"{color.kelvin:.0f} K, Duv {color.duv:+.3f}, Ra {color.ra:.0f}, R9 {color.r9:.0f}, "
+        f"Rf {color.rf:.0f}, Rg {color.rg:.0f}"
+    )
+    return text.replace("-", "\N{MINUS SIGN}")
 
 
 def _worst_view(painted: Sequence[int], analyses: Sequence[Analysis]) -> int:
@@ -261,7 +302,7 @@ def _wish_deliveries(analyses: Sequence[Analysis]) -> tuple[WishDelivery, ...]:
 def wish_delivery(delivery: Delivery) -> WishDelivery:
     """Return one entry of that list."""
     x = delivery
-    return WishDelivery(x.name, x.kind, x.layers, x.brightness, x.color, x.delta_e)
+    return WishDelivery(x.name, x.kind, x.layers, x.brightness, x.color, x.delta_e, x.is_darker)
 
 
 def unpainted_text(

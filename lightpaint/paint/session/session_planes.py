@@ -6,7 +6,7 @@ from functools import cached_property
 
 import numpy as np
 
-from lightpaint.arrays import Doubles
+from lightpaint.arrays import Bools, Doubles
 from lightpaint.basis.lights import Lights
 from lightpaint.lighting.constraints.requirements import Requirements
 from lightpaint.lighting.unknowns.reduction import Reduction
@@ -14,6 +14,7 @@ from lightpaint.lighting.wishes.planes_answer import WishOutcome, planes_answer
 from lightpaint.lighting.wishes.required_problem import requirements_within_reach
 from lightpaint.lighting.wishes.wished_light import WishedLight, watts_allowed, wished_light
 from lightpaint.paint.protocol import (
+    Camera,
     MeasuredPlane,
     PlaneLight,
     PlanesInfo,
@@ -21,14 +22,32 @@ from lightpaint.paint.protocol import (
     PlaneWish,
 )
 from lightpaint.photometry.illuminance import Illuminance
-from lightpaint.photometry.measuring_plane import LightCase, PowerBudget, plane_title
+from lightpaint.photometry.measuring_plane import (
+    LightCase,
+    MeasuringPlane,
+    PowerBudget,
+    plane_title,
+)
+
+
+@dataclass(frozen=True)
+class PlaneSight:
+    """The sight of measuring points in the picture of a view.
+
+    camera: of the view; None for one that is not a pinhole. is_seen: (p,), whether nothing covers a
+    point there.
+    """
+
+    camera: Camera | None
+    is_seen: Bools
 
 
 @dataclass(frozen=True)
 class SessionPlanes:
     """Measured planes. place_key: of the places of all lights when they were measured.
 
-    floor_m2: the area that power is divided by; 0 without one. cases: in which wishes hold.
+    floor_m2: the area that power is divided by; 0 without one. cases: in which wishes hold. sights:
+    of each view.
     """
 
     illuminance: Illuminance
@@ -36,6 +55,7 @@ class SessionPlanes:
     floor_m2: float
     place_key: str
     cases: tuple[LightCase, ...] = ()
+    sights: tuple[PlaneSight, ...] = ()
 
     def for_lights(self, lights: Lights) -> "SessionPlanes":
         """Return the planes as `lights` light them; those that were not measured give nothing."""
@@ -73,21 +93,38 @@ class SessionPlanes:
     @cached_property
     def info(self) -> PlanesInfo:
         """The planes and their wishes for clients."""
-        limit = watts_allowed(self.budget, self.floor_m2)
         return PlanesInfo(
             tuple(
-                MeasuredPlane(
-                    name=plane_title(plane.name, case),
-                    size=plane.picture_size,
-                    cells=tuple((int(row), int(column)) for row, column in plane.cells),
-                    points=tuple(tuple(map(float, point)) for point in np.round(plane.points, 4)),
-                )
+                self._plane_info(plane, case)
                 for case in [case.name for case in self.cases] or [""]
                 for plane in self.illuminance.planes
             ),
             floor_m2=self.floor_m2 or None,
-            budget_watts=limit,
+            budget_watts=watts_allowed(self.budget, self.floor_m2),
+            cameras=tuple(sight.camera for sight in self.sights),
         )
+
+    def _plane_info(self, plane: MeasuringPlane, case: str) -> MeasuredPlane:
+        """Return a plane in a case for clients."""
+        points = self.illuminance.points_of(plane.name)
+        sides = None if plane.sides is None else plane.sides.reshape(-1, 6)
+        return MeasuredPlane(
+            name=plane_title(plane.name, case),
+            plane=plane.name,
+            case=case,
+            size=plane.picture_size,
+            cells=tuple((int(row), int(column)) for row, column in plane.cells),
+            points=_rounded(plane.points),
+            sides=None if sides is None else _rounded(sides),
+            seen=tuple(
+                tuple(np.flatnonzero(sight.is_seen[points]).tolist()) for sight in self.sights
+            ),
+        )
+
+
+def _rounded(vectors: Doubles) -> tuple[tuple[float, ...], ...]:
+    """Return vectors with four decimals: tenths of millimetres."""
+    return tuple(tuple(map(float, vector)) for vector in np.round(vectors, 4))
 
 
 @dataclass(frozen=True)

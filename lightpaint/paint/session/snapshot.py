@@ -19,8 +19,11 @@ from lightpaint.lighting.analysis.appearance.unpainted_change import (
     unpainted_change,
 )
 from lightpaint.lighting.analysis.noise.noise_correction import correct_noise
+from lightpaint.lighting.answer.lighting import Lighting
 from lightpaint.lighting.constraints.constraints import Constraints
+from lightpaint.lighting.constraints.constraints_file import constraints_of
 from lightpaint.lighting.fit import Colors
+from lightpaint.lighting.linear_problem import reduce_lights
 from lightpaint.lighting.problem import Problem
 from lightpaint.lighting.solution import Solution
 from lightpaint.lighting.solve import solution_of
@@ -70,6 +73,13 @@ class SessionSnapshot:
         if len(self.bases) == 1:
             return ("",)
         return tuple(self.bases[k].origin.sensor for k in self.painted_views)
+
+    def lighting_of(self, weights: Doubles) -> Lighting:
+        """Return the lighting of weights (n, 3), with what mixes each light."""
+        basis = self.bases[0]
+        every = constraints_of(basis.requests).and_then(self.constraints)
+        lamps = reduce_lights(every, basis.lights, self.settings).lamps
+        return Lighting.of_weights(basis, weights, lamps=lamps)
 
     def solution(self) -> Solution | None:
         """Return the exact answer; None if nothing is painted. Raises LightpaintError."""

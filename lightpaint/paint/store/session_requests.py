@@ -275,7 +275,8 @@ class SessionRequests:
         fit_values = {key: self.values[key] for key in FIT_KEYS if key in self.values}
         if "hold" in fit_values and base.unpainted:
             fit_values["unpainted"] = 0.0
-        return replace(base, **fit_values)
+        ignores = base.ignore_wishes or self.ignores_wishes
+        return replace(base, **fit_values, ignore_wishes=ignores)
 
 
 def _hold_once(

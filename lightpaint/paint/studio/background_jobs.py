@@ -155,8 +155,7 @@ class BackgroundJobs:
         if solution is not None:
             lighting = with_findings(solution, analyse(solution)).lighting
         elif is_moved:
-            basis = snapshot.bases[0]
-            lighting = Lighting.of_weights(basis, lighting.weights_for(basis))
+            lighting = snapshot.lighting_of(lighting.weights_for(snapshot.bases[0]))
         return subjects, snapshot, dimmed(lighting, snapshot.requests.master)
 
     def _run_export(self, message: protocol.Export, stop_count: int) -> None:

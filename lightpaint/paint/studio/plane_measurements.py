@@ -3,15 +3,17 @@
 from collections.abc import Callable, Sequence
 from functools import partial
 
+import numpy as np
+
 from lightpaint.errors import LightpaintError
 from lightpaint.paint.background_threads import BackgroundThreads, LatestWork, StoppedError
 from lightpaint.paint.protocol import Message, Notice, ProgressReport
 from lightpaint.paint.rig.lamp_rig import LampRig
-from lightpaint.paint.session.session_planes import SessionPlanes
+from lightpaint.paint.session.session_planes import PlaneSight, SessionPlanes
 from lightpaint.paint.session_access import Publisher, SessionAccess
 from lightpaint.paint.store.session_requests import SessionRequests
 from lightpaint.paint.subject import Subject
-from lightpaint.progress import listener
+from lightpaint.progress import Progress, listener
 from lightpaint.scene.runtime.render_lock import MITSUBA
 
 #: The name of the task in reports of progress.
@@ -35,7 +37,7 @@ class PlaneMeasurements:
         show: Callable[[], Message],
         on_measured: Callable[[], None],
     ) -> None:
-        self._subject, self._access, self._publisher = subjects[0], access, publisher
+        self._subjects, self._access, self._publisher = tuple(subjects), access, publisher
         self._threads, self._rig, self._show = threads, rig, show
         self._on_measured = on_measured
         self._work = LatestWork(self._measure, publisher.publish)
@@ -44,8 +46,9 @@ class PlaneMeasurements:
 
     @property
     def is_wanted(self) -> bool:
-        """True if the session has measuring planes."""
-        return self._subject.settings.planes is not None
+        """True if the session has measuring planes, or a limit of power."""
+        settings = self._subjects[0].settings
+        return (settings.planes, settings.watts) != (None, None)
 
     def follow(self) -> None:
         """Measure the planes, unless that was done with the lights where they are now.
@@ -68,29 +71,15 @@ class PlaneMeasurements:
 
     def _measure(self, requests: SessionRequests) -> None:
         """Measure the planes with the lights of these requests, and publish the state with them."""
-        # Imported here: a session without planes needs no renderer.
-        from lightpaint.pipeline.wished_planes import constraints_for_planes, measure_planes
 
         def report(label: str, done: int, total: int, unit: str = "passes") -> None:
             del label  # rounds of samples have labels of their own
             self._check(requests)
             self._publisher.report_progress(TASK, done, total, unit)
 
-        settings = self._subject.settings
-        assert settings.planes is not None
         try:
             with MITSUBA.low_priority():
-                scene = self._rig.moved_scene(requests.placed)
-                every = constraints_for_planes(scene, self._subject.constraints, settings)
-                scale = every.cd_per_unit
-                measured = measure_planes(scene, settings.planes, settings, scale, listener(report))
-            planes = SessionPlanes(
-                measured.illuminance,
-                measured.file.power,
-                measured.floor_m2,
-                requests.place_key,
-                measured.file.cases,
-            )
+                planes = self._measured(requests, report)
             self._publisher.publish_made(partial(self._accept, planes))
             self._on_measured()
         except StoppedError:
@@ -100,6 +89,38 @@ class PlaneMeasurements:
             self._publisher.publish(Notice(text=str(error), tone="warn"))
         finally:
             self._publisher.publish(ProgressReport(task=TASK, done=1, total=1, unit=""))
+
+    def _measured(self, requests: SessionRequests, progress: Progress) -> SessionPlanes:
+        """Return the planes with the lights of these requests; without a planes file, no planes and
+        a limit of power.
+        """
+        # Imported here: a session without planes needs no renderer.
+        from lightpaint.paint.rig.plane_sight import plane_sight
+        from lightpaint.pipeline.wished_planes import (
+            constraints_for_planes,
+            limited_power,
+            measure_planes,
+        )
+
+        settings, sights = self._subjects[0].settings, tuple[PlaneSight, ...]()
+        if settings.planes is None:
+            assert settings.watts is not None
+            measured = limited_power(settings.watts, self._access.session.basis.lights)
+        else:
+            views = [self._rig.moved_scene(requests.placed, k) for k in range(len(self._subjects))]
+            every = constraints_for_planes(views[0], self._subjects[0].constraints, settings)
+            scale, listen = every.cd_per_unit, listener(progress)
+            measured = measure_planes(views[0], settings.planes, settings, scale, listen)
+            points = np.concatenate([plane.points for plane in measured.file.planes])
+            sights = tuple(plane_sight(view, points) for view in views)
+        return SessionPlanes(
+            measured.illuminance,
+            measured.file.power,
+            measured.floor_m2,
+            requests.place_key,
+            measured.file.cases,
+            sights,
+        )
 
     def _check(self, requests: SessionRequests) -> None:
         """Raise StoppedError if lights have moved since."""

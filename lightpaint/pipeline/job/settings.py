@@ -69,6 +69,8 @@ class Settings(Fit):
         planes: Path of a planes file, with wishes for illuminance: the answer meets
             these, and comes as close to the painting as it then can. Needs a scene.
         watts: Largest power of all lamps together, in place of that of the planes file.
+        ignore_wishes: Whether only the painting counts: planes are measured and reported, and
+            neither their wishes nor limits of power bind the answer.
         verify: Whether to render the relit scene and compare it with the prediction, with at most
             as many samples as the basis, so that it takes no longer.
         verify_spp: Samples per pixel of the verification on the whole film, instead of that limit.
@@ -273,6 +275,16 @@ class Settings(Fit):
             theme="Lights",
         ),
     ] = None
+    ignore_wishes: Annotated[
+        bool,
+        Option(
+            "--ignore-wishes",
+            "only the painting counts: the report says what planes and power come to, and their "
+            "wishes and limits do not bind",
+            default="the answer meets them",
+            theme="Lights",
+        ),
+    ] = False
     verify: Annotated[
         bool,
         Option(
@@ -397,6 +409,7 @@ class SettingsByName(TypedDict, total=False):
     cd_per_unit: float | None
     planes: str | None
     watts: float | None
+    ignore_wishes: bool
     verify: bool
     verify_spp: int | None
     report: bool

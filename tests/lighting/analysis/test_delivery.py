@@ -68,6 +68,9 @@ def test_brightness_that_came_is_a_share_of_the_asked_lightness(make_basis: Any,
     [delivery] = _measure(make_basis, now, asked, got, Wish("Day", WHOLE)).deliveries
     assert delivery.brightness == pytest.approx(share, abs=1e-4)
     assert delivery.color is None
+    assert not delivery.is_darker
+    [back] = _measure(make_basis, asked, now, got, Wish("Night", WHOLE)).deliveries
+    assert back.is_darker
     assert delivery.is_met == (share >= 0.75)
     assert delivery.asked_brightness == pytest.approx(
         colour_science().delta_E([40, 0, 0], [60, 0, 0], method="CIE 2000"), rel=1e-3

@@ -6,17 +6,30 @@ import numpy as np
 from axe import violations
 from painter_page import Painter
 
+CAMERA = {
+    "origin": [0, 0, 0],
+    "x_axis": [1, 0, 0],
+    "y_axis": [0, 1, 0],
+    "forward": [0, 0, 1],
+    "is_parallel": False,
+}
+
 PLANES = {
     "planes": [
         {
             "name": "desk",
+            "plane": "desk",
+            "case": "",
             "size": [2, 3],
             "cells": [[0, 0], [0, 1], [0, 2], [1, 0], [1, 1]],
             "points": [[0, 0, 1]] * 5,
+            "sides": None,
+            "seen": [[0, 1, 2, 3, 4]],
         }
     ],
     "floor_m2": 20.0,
     "budget_watts": 60.0,
+    "cameras": [CAMERA],
 }
 
 

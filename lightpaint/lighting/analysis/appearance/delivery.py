@@ -42,6 +42,9 @@ MOST = 0.95
 #: The least share of a change that has to come for a wish to have come.
 MIN_DELIVERED = 0.75
 
+#: The share from which too much came: it is then said as a ratio, and not in percent.
+OVERDONE = 1.25
+
 
 @keywords()
 @dataclass(frozen=True)
@@ -61,6 +64,7 @@ class Delivery:
         group: The name of its group of layers; "" without one.
         kind: `group` for all layers of a group; `layer` for a whole layer; `wish` for a part of a
             layer or of a painting without layers.
+        is_darker: Whether it asks for less light, and not for more.
 
     Examples:
         >>> [delivery] = lp.compare_appearance(lp.solve(basis, target)).deliveries
@@ -78,6 +82,7 @@ class Delivery:
     layers: tuple[int, ...] = ()
     group: str = ""
     kind: WishKind = "wish"
+    is_darker: bool = False
 
     def __repr__(self) -> str:
         return f"Delivery({self.spoken})"
@@ -112,10 +117,26 @@ class Delivery:
     def spoken_shares(self) -> str:
         """The same without the name."""
         brightness, color = self.brightness, self.color
-        if brightness is not None and color is not None:
-            return f"brightness {spoken_share(brightness)}, colour {spoken_share(color)}"
+        is_overdone = self.is_overdone
+        if is_overdone or (brightness is not None and color is not None):
+            parts = (("brightness", brightness), ("colour", color))
+            return ", ".join(self._spoken_part(part, x) for part, x in parts if x is not None)
         share = brightness if color is None else color
         return "no visible change" if share is None else spoken_share(share)
+
+    @property
+    def is_overdone(self) -> bool:
+        """True if much more came than it asks for."""
+        return max(self.brightness or 0.0, self.color or 0.0) >= OVERDONE
+
+    def _spoken_part(self, part: str, share: float) -> str:
+        """Return `brightness 98 %` or, of too much, `darkened 1.4 times as much as painted`."""
+        if share < OVERDONE:
+            return f"{part} {spoken_share(share)}"
+        times = "twice" if round(share, 1) == 2 else f"{share:.1f} times"
+        if part == "colour":
+            return f"coloured {times} as much as painted"
+        return f"{'darkened' if self.is_darker else 'brightened'} {times} as much as painted"
 
 
 def spoken_share(share: float) -> str:
@@ -255,7 +276,12 @@ def _delivery(part: WishPart, wish: AreaWashes, rest: AreaWashes) -> Delivery:
         layers=part.layers,
         group=part.group,
         kind=part.kind,
+        is_darker=bool(_mean_luminance(wish.asked, wish) < _mean_luminance(wish.now, wish)),
     )
+
+
+def _mean_luminance(light: Floats, washes: AreaWashes) -> float:
+    return float(washes.weight.ravel() @ luminance(light.reshape(-1, 3)))
 
 
 class _Colors(NamedTuple):

@@ -66,29 +66,6 @@ export interface ConsoleInfo {
 }
 
 /**
- * A plane on which illuminance is measured, in one of the cases if there are several.
- *
- * size: rows and columns of a picture of it. cells: row and column of each point. points: where
- * they are, in units of the scene.
- */
-export interface MeasuredPlane {
-  name: string;
-  size: [number, number];
-  cells: [number, number][];
-  points: number[][];
-}
-
-/**
- * The measuring planes. floor_m2: the area that power is divided by; null without one.
- * budget_watts: the most power that is allowed; null if any is.
- */
-export interface PlanesInfo {
-  planes: MeasuredPlane[];
-  floor_m2: number | null;
-  budget_watts: number | null;
-}
-
-/**
  * An emitter of a lamp, such as its red LEDs. swatch: its colour for a screen, as in CSS.
  */
 export interface EmitterInfo {
@@ -105,7 +82,8 @@ export interface EmitterInfo {
  * whether one number stands for all channels. scale: factor of its stored plane. name, label: its
  * name in the scene, and as people read it. unit: of its emission. emitters: those that mix the
  * light of a lamp, if its lights file lists them. address: its fixture and first channel on a
- * console; "" if unknown.
+ * console; "" if unknown. lamp: of which it is an emitter, where renders have spectra; "" for a
+ * whole light.
  */
 export interface LightInfo {
   name: string;
@@ -122,6 +100,7 @@ export interface LightInfo {
   scale: number;
   emitters: EmitterInfo[];
   address: string;
+  lamp: string;
 }
 
 /**
@@ -191,6 +170,40 @@ export interface Camera {
   y_axis: number[];
   forward: number[];
   is_parallel: boolean;
+}
+
+/**
+ * A plane on which illuminance is measured, in one of the cases if there are several.
+ *
+ * name: as people read it, with the case. plane, case: names of both; "" is the light of the
+ * scene. size: rows and columns of a picture of it. cells: row and column of each point. points:
+ * where they are, in units of the scene. sides: of the cell of each point, across and along, six
+ * numbers; null for listed points. seen: for each view, the indices of the points that nothing
+ * covers in its picture, which may lie beyond its edges.
+ */
+export interface MeasuredPlane {
+  name: string;
+  plane: string;
+  case: string;
+  size: [number, number];
+  cells: [number, number][];
+  points: number[][];
+  sides: number[][] | null;
+  seen: number[][];
+}
+
+/**
+ * The measuring planes.
+ *
+ * floor_m2: the area that power is divided by; null without one. budget_watts: the most power that
+ * is allowed; null if any is. cameras: the camera of each view; null for one that is not a
+ * pinhole.
+ */
+export interface PlanesInfo {
+  planes: MeasuredPlane[];
+  floor_m2: number | null;
+  budget_watts: number | null;
+  cameras: (Camera | null)[];
 }
 
 /**
@@ -480,7 +493,7 @@ export interface Closeness {
  *
  * layers: ids of its layers. brightness, color: share of the asked change that came; null if none
  * was asked. delta_e: of its lit parts, against the painting. name: of the layer, group or stroke.
- * kind: `layer`, `group` or `wish`.
+ * kind: `layer`, `group` or `wish`. is_darker: whether it asks for less light.
  */
 export interface WishDelivery {
   name: string;
@@ -489,6 +502,7 @@ export interface WishDelivery {
   brightness: number | null;
   color: number | null;
   delta_e: number;
+  is_darker: boolean;
 }
 
 /**
@@ -516,7 +530,9 @@ export interface AnswerChoice {
  * is_constrained: whether a constraint limits it. is_unreached: whether no paint depends on it.
  * emission: linear, in the unit of the light. swatch: its colour for a screen, as in CSS. is_on:
  * whether it shines. drives: of the emitters of a lamp, 0 to 1, in their order. slot_delta_e: of a
- * lamp with a colour wheel, how far its slot is from the colour that was solved for.
+ * lamp with a colour wheel, how far its slot is from the colour that was solved for. rendering:
+ * how the lamp renders colours, in words; null where its spectra are unknown, and of lights far
+ * from white.
  */
 export interface LightAnswer {
   emission: RGB;
@@ -530,6 +546,7 @@ export interface LightAnswer {
   is_unreached?: boolean;
   drives?: number[];
   slot_delta_e?: number;
+  rendering?: string;
 }
 
 /**

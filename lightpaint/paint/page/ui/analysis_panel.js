@@ -6,9 +6,11 @@ import { Button, Choice } from './controls.js';
 import { numberText, progressText, joinUnits } from './format.js';
 import { Icon } from './icons.js';
 import { overlayOf } from './display_state.js';
-import { updateDisplay } from './tools.js';
+import { overlaysOf, updateDisplay } from './tools.js';
 import { t } from '../language/language.js';
 import { shortcutsOf } from './key_bindings.js';
+import { luxLegend } from './planes/plane_overlay.js';
+import { SCALE_GRADIENT } from './planes/plane_picture.js';
 
 /** @typedef {import("./ui_state.js").Ui} Ui */
 /** @typedef {import("./shortcuts.js").App} App */
@@ -36,6 +38,7 @@ const OVERLAYS = [
     label: t('Importance'),
     tip: t('What is painted, and how much it counts'),
   },
+  { value: 'lux', label: t('Lux'), tip: t('Illuminance on the measuring planes') },
 ];
 
 const PAINTED_LABEL = t('painted');
@@ -58,13 +61,15 @@ export function AnalysisPanel({ ui, app }) {
     const panel = /** @type {HTMLElement | null | undefined} */ (frame.current?.closest('.fold'));
     if (panel && ui.reasons.length && isVisible(panel)) panel.scrollIntoView({ block: 'nearest' });
   }, [ui.reasons]);
+  const available = /** @type {(string | null)[]} */ (overlaysOf(ui));
+  const choices = OVERLAYS.filter(({ value }) => available.includes(value));
   // The first reason is also below the pictures.
   const sentences = (ui.reasons.length ? ui.reasons : ui.sentences).filter(
     (text) => text !== ui.headline,
   );
   return html`<div class="truth" ref=${frame}>
     <${Choice} label=${t('Overlay')} value=${ui.display.overlay} 
-      choices=${OVERLAYS.map((choice) => ({ ...choice, keys: shortcutsOf(ui, 'overlay') }))}
+      choices=${choices.map((choice) => ({ ...choice, keys: shortcutsOf(ui, 'overlay') }))}
       change=${choose} />
     ${sentences.map((text) => html`<p key=${text}>${joinUnits(text)}</p>`)}
     <div class="row">
@@ -127,20 +132,28 @@ export function Legend({ ui, app, panes }) {
     panes.find(({ kind }) => kind === legendKind) ??
     (overlay === 'falsecolor' ? panes[0] : undefined);
   if (!overlay || !pane) return null;
-  const { label } = OVERLAYS.find(({ value }) => value === overlay) ?? OVERLAYS[0];
+  const { title, texts } = legendTexts(ui, overlay, maxWeight);
   const isOld = overlay === 'beyond' && !ui.reasons.length;
   const { left, top, isLow } = placeLegend(pane, ui.state.size);
+  return html`<div class=${`legend ${isLow ? 'is-low' : ''}`}
+    style=${{ top: `${top}px`, left: `${left}px` }}>
+    <b>${title}${isOld && ui.deltaE !== null ? t(': computing …') : ''}</b>
+    <i class=${`is-${overlay}`} style=${overlay === 'lux' ? { background: SCALE_GRADIENT } : {}}></i>
+    ${texts.map((text, k) => html`<span key=${k}>${text}</span>`)}
+  </div>`;
+}
+
+/** Return the title of a legend and what stands at its colours. @param {Ui} ui
+ * @param {string} overlay @param {number} maxWeight the greatest importance */
+function legendTexts(ui, overlay, maxWeight) {
+  if (overlay === 'lux') return luxLegend(ui);
+  const title = OVERLAYS.find(({ value }) => value === overlay)?.label ?? '';
   const texts = LEGEND_TEXTS[overlay].map((text) =>
     text === PAINTED_LABEL && maxWeight > 1
       ? t('weight {number} ×', { number: numberText(maxWeight, 2) })
       : text,
   );
-  return html`<div class=${`legend ${isLow ? 'is-low' : ''}`}
-    style=${{ top: `${top}px`, left: `${left}px` }}>
-    <b>${label}${isOld && ui.deltaE !== null ? t(': computing …') : ''}</b>
-    <i class=${`is-${overlay}`}></i>
-    ${texts.map((text, k) => html`<span key=${k}>${text}</span>`)}
-  </div>`;
+  return { title, texts };
 }
 
 /** @param {{ui: Ui, app: App}} props */

@@ -6,6 +6,7 @@ import { AnswerChoices } from './answer_choices.js';
 import { Button, TruncatedText, reveal } from './controls.js';
 import { lightText, numberText, shortenName } from './format.js';
 import { imageOf } from './images/light_images.js';
+import { luxAtPointer } from './planes/plane_overlay.js';
 import { pointingHint } from './lamp_fields.js';
 import { isAnswerHidden, saveLook } from './look_actions.js';
 import { toolHint } from './tools.js';
@@ -111,7 +112,8 @@ export function PointerStatus({ ui }) {
     .filter(({ share }) => share >= 0.01)
     .sort((a, b) => b.share - a.share)
     .slice(0, 5);
-  return html`<p class="here" id="lp-status">${object && html`<span class="object">${shortenName(object, 40)}</span>`}
+  const lux = luxAtPointer(ui);
+  return html`<p class="here" id="lp-status">${lux && html`<strong>${lux}</strong>`}${object && html`<span class="object">${shortenName(object, 40)}</span>`}
     <span class="light-here">${lightText(exposedLight)}${
       ui.tool === 'pick' && html` · RGB ${exposedLight.map((x) => numberText(x, 3)).join(' ')}`
     }</span>

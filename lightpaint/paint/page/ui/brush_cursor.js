@@ -94,5 +94,5 @@ function probePane(engine, { kind, left, top, scale }, x, y) {
   const result = engine.probe(px, py);
   if (!result) return null;
   const light = engine.lightAt(kind, px, py);
-  return { ...result, light, paint: engine.paintAt(kind, px, py, light) };
+  return { ...result, place: [px, py], light, paint: engine.paintAt(kind, px, py, light) };
 }

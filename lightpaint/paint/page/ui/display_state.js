@@ -4,14 +4,16 @@ import { comparedDisplay } from './look_comparison.js';
 import { withOriginal } from './original_scene.js';
 
 /** @typedef {import("./engine_interface.js").RGB} RGB */
-/** @typedef {import("./engine_interface.js").Display} Display */
+/** @typedef {import("./engine_interface.js").DrawnDisplay} DrawnDisplay */
 /** @typedef {import("./ui_state.js").Light} Light */
 /** @typedef {import("./ui_state.js").Ui} Ui */
 
 /** Return what is drawn: the chosen display with temporary changes.
- * @param {Ui} ui @returns {Display} */
+ * @param {Ui} ui @returns {DrawnDisplay} */
 export function effectiveDisplay(ui) {
-  const display = { ...ui.display, overlay: overlayOf(ui), master: ui.master };
+  const overlay = overlayOf(ui);
+  /** @type {DrawnDisplay} */
+  const display = { ...ui.display, overlay: overlay === 'lux' ? null : overlay, master: ui.master };
   const hasSolo = ui.solo.length > 0;
   if (hasSolo || ui.mute.length) {
     display.visibleLights = ui.lights.map((_, k) =>
@@ -36,9 +38,11 @@ export function effectiveDisplay(ui) {
   return display;
 }
 
-/** Return the overlay. The importance brush shows the importance by default. @param {Ui} ui */
-export function overlayOf({ display, tool }) {
-  return display.overlay ?? (tool === 'weight' ? 'importance' : null);
+/** Return the overlay. The importance brush shows the importance by default. Lux need planes in the
+ * view. @param {Ui} ui */
+export function overlayOf({ display, tool, planes, view }) {
+  const overlay = display.overlay === 'lux' && !planes?.cameras[view] ? null : display.overlay;
+  return overlay ?? (tool === 'weight' ? 'importance' : null);
 }
 
 /** Return the extra exposure of a light shown alone, in whole stops, so that one of many is

@@ -41,7 +41,7 @@
  * @property {number} stops
  * @property {string} transform
  * @property {boolean} clean
- * @property {null | "missed" | "beyond" | "falsecolor" | "importance"} overlay
+ * @property {null | "missed" | "beyond" | "falsecolor" | "importance" | "lux"} overlay
  * @property {boolean[] | null} visibleLights
  * @property {RGB[] | null} solutionWeights
  * @property {RGB[] | null} otherWeights
@@ -49,6 +49,10 @@
  * @property {RGB[][] | null} lookMixes weights of each of the looks that are side by side
  * @property {number} master factor of the answer's weights, but for fixed lights
  */
+
+/** What the engine draws; lux are drawn over its pictures.
+ * @typedef {Omit<Display, 'overlay'> & {overlay: import("../../../viewer/drawing/view.js").Overlay}}
+ *   DrawnDisplay */
 
 /** @typedef {"brush" | "eraser" | "weight" | "pick" | "fill" | "line" | "adjust" | "select" | "gradient" | "neutral"} Tool */
 
@@ -73,9 +77,10 @@
 
 /**
  * What is under the pointer. `object`: its name; `index`: its number, -1 for none. `shares`: each
- * light's share of the answer there. `light`: light of the picture under the pointer.
- * @typedef {{object: string | null, index: number, shares: number[], light: RGB,
- *   paint: RGB}} Probe paint: what to paint with, as the hand does, to have that light there */
+ * light's share of the answer there. `place`: column and row in the picture, not rounded. `light`: light of
+ * the picture under the pointer.
+ * @typedef {{object: string | null, index: number, shares: number[], place: [number, number],
+ *   light: RGB, paint: RGB}} Probe paint: what to paint with, as the hand does, to have that light there */
 /** Numbers of objects, (height, width).
  * @typedef {{data: ArrayLike<number>, width: number, height: number}} Objects */
 
@@ -83,7 +88,7 @@
  * @typedef {object} Engine
  * @property {HTMLElement} element where the pictures are drawn
  * @property {(width: number, height: number) => void} resize in CSS pixels
- * @property {(display: Display) => void} show
+ * @property {(display: DrawnDisplay) => void} show
  * @property {(canvases: HTMLCanvasElement[], width: number, height: number) => void} showLooks draws
  *   the looks that are side by side on canvases of one size, in CSS pixels; none: the pictures again
  * @property {(settings: ToolSettings) => void} setTool
@@ -105,7 +110,7 @@
  * @property {(kind: Kind, x: number, y: number) => RGB} lightAt
  * @property {(kind: Kind, x: number, y: number, light?: RGB) => RGB} paintAt what to paint with, in the manner
  *   that is in the hand, to have that light there
- * @property {(x: number, y: number) => Omit<Probe, 'light' | 'paint'> | null} probe
+ * @property {(x: number, y: number) => Omit<Probe, 'light' | 'paint' | 'place'> | null} probe
  * @property {() => Objects | null} objects which object each pixel shows, once that is known
  * @property {(change: import("../engine/messages.js").ChangeLayers) => void} changeLayers one step, or
  *   while a slider moves none yet

@@ -56,6 +56,32 @@ export function project(camera, point) {
   return { x: x / s, y: y / s, isAhead: s > 0 };
 }
 
+/** Depth of the plane before the camera at which polygons are cut, relative to their deepest corner. */
+const NEAR_SHARE = 1e-3;
+
+/**
+ * Return the corners of a polygon in pixels of the picture, without the part behind the camera.
+ * @param {Camera} camera @param {number[][]} corners in the scene @returns {[number, number][]} fewer
+ *   or more than there were; none if all of it lies behind the camera
+ */
+export function projectPolygon(camera, corners) {
+  const { origin, x_axis: xAxis, y_axis: yAxis, forward, is_parallel: isParallel } = camera;
+  const seen = corners.map((point) =>
+    coefficients(xAxis, yAxis, forward, subtract(point, origin)),
+  );
+  const near = NEAR_SHARE * Math.max(...seen.map(([, , depth]) => depth));
+  if (!(near > 0)) return [];
+  return seen.flatMap((corner, k) => {
+    const next = seen[(k + 1) % seen.length];
+    const kept = corner[2] >= near ? [corner] : [];
+    if (corner[2] >= near !== next[2] >= near) {
+      const share = (near - corner[2]) / (next[2] - corner[2]);
+      kept.push(add(corner, subtract(next, corner), share));
+    }
+    return kept.map(([x, y, s]) => /** @type {[number, number]} */ (isParallel ? [x, y] : [x / s, y / s]));
+  });
+}
+
 /** Return the same for a direction: a point that is infinitely far away. @param {Camera} camera
  * @param {number[]} direction */
 export function projectDirection(camera, direction) {

@@ -24,7 +24,7 @@ import { lightCountText, percentText } from './format.js';
 import { Icon } from './icons.js';
 import { comparedAnswer, isAnswerHidden } from './look_actions.js';
 import { ImageRow } from './images/image_row.js';
-import { LightRow } from './light_row.js';
+import { LightRow, RENDERING_TIP } from './light_row.js';
 import { t } from '../language/language.js';
 
 /** @typedef {import("./ui_state.js").Ui} Ui */
@@ -164,6 +164,8 @@ function Group({ name, ui, app, members, isMany }) {
   const share = members.reduce((sum, k) => sum + (ui.lightAnswers[k]?.share ?? 0), 0);
   const isSolo = members.every((k) => ui.solo.includes(k));
   const solo = ui.solo.filter((k) => !members.includes(k));
+  // Emitters of a lamp, whose light is that of all of them together.
+  const rendering = ui.lights[members[0]].lamp && ui.lightAnswers[members[0]]?.rendering;
   return html`<div class="light-group" role="group" aria-label=${name}>
     <div class="group-head">
       <button type="button" class="group-name" aria-expanded=${String(open)} data-tip=${name}
@@ -179,6 +181,7 @@ function Group({ name, ui, app, members, isMany }) {
       <${GroupDimmer} app=${app} lights=${members} label=${t('{name}, dim', { name })} isPlain />
       <span class="stops">${levelsText(ui, members)}</span>
     </div>
+    ${rendering && html`<span class="rendering faint" data-tip=${RENDERING_TIP}>${rendering}</span>`}
     ${open && renderRows(ui, app, members, isMany, name)}
   </div>`;
 }

@@ -23,6 +23,11 @@ import { t } from '../language/language.js';
  * A share that is shown as 3 % is less. */
 const MIN_TINT_SHARE = 0.035;
 
+/** About the line on the rendering of colours. */
+export const RENDERING_TIP = t(
+  'How this light renders colours: colour temperature, distance from white, Ra and R9 of CIE 13.3, Rf and Rg of TM-30',
+);
+
 /** @typedef {import("./ui_state.js").Light} Light */
 /** @typedef {import("./ui_state.js").LightAnswer} LightAnswer */
 /** @typedef {import("./ui_state.js").Constraints} Constraints */
@@ -93,6 +98,7 @@ export class LightRow extends Component {
         ${this.renderNumbers()}
         ${light.emitters.length > 0 && html`<${Drives} emitters=${light.emitters} drives=${answer?.drives ?? []} address=${light.address} slotDeltaE=${answer?.slot_delta_e} />`}
         ${hasSlider && !light.is_fixed && this.renderDimmer()}
+        ${isOpen && !light.lamp && answer?.rendering && html`<span class="rendering faint" data-tip=${RENDERING_TIP}>${answer.rendering}</span>`}
       </div>
       ${isOpen && html`<${LightConstraints} ...${this.props} />`}
       ${isOpen && ui && html`<${LampFields} k=${k} ui=${ui} app=${app} />`}
@@ -130,7 +136,9 @@ export class LightRow extends Component {
   renderNumbers() {
     const { light, rgb, answer, isLive } = this.props;
     const level = luminance(rgb);
-    const match = toKelvin(rgb);
+    // The weight of a lamp's emitter is a level, without its colour.
+    const match = light.lamp ? null : toKelvin(rgb);
+    const swatch = light.lamp ? light.emitters[0]?.swatch : toHex(atFullBrightness(rgb));
     const kelvin = isLive || !answer ? match?.kelvin : answer.kelvin;
     const isTintSeen = (answer?.share ?? 1) >= MIN_TINT_SHARE;
     const white = kelvin && whiteText(kelvin, (isTintSeen && match?.green) || 0);
@@ -140,7 +148,7 @@ export class LightRow extends Component {
     // The error bar of the previous answer stays until the next one is known.
     return html`<div class=${`light-numbers ${this.props.hasSlider ? '' : 'is-two'}`}>
       <span class=${`dot ${level > 0 ? '' : 'is-off'}`} aria-hidden="true"
-        style=${{ background: level > 0 ? toHex(atFullBrightness(rgb)) : 'none' }}></span>
+        style=${{ background: level > 0 ? swatch : 'none' }}></span>
       <span class="values" data-tip=${level > 0 ? fullText : undefined}
         >${level > 0 ? value : t('off')}</span>
       ${

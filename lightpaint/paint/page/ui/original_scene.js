@@ -6,7 +6,7 @@ import { HeldButton } from './held_button.js';
 import { t } from '../language/language.js';
 
 /** @typedef {import("./ui_state.js").Ui} Ui */
-/** @typedef {import("./engine_interface.js").Display} Display */
+/** @typedef {import("./engine_interface.js").DrawnDisplay} DrawnDisplay */
 /** @typedef {import("./shortcuts.js").App} App */
 
 /** @param {App} app */
@@ -21,7 +21,7 @@ export function hideOriginal({ store }) {
 
 /** Return a display with the original scene where it has the answer or a look. In blink, which has
  * one of two pictures, it is the one that is seen.
- * @param {Display} display @returns {Display} */
+ * @param {DrawnDisplay} display @returns {DrawnDisplay} */
 export function withOriginal(display) {
   const kinds = [display.left, display.right];
   const index = kinds.findIndex((kind) => kind !== 'painting' && kind !== 'present');

@@ -21,6 +21,7 @@ import { gradientOf } from './selection/gradient_options.js';
 import { SelectionOutline } from './selection/selection_outline.js';
 import { firstHint, flowOf, updateDisplay } from './tools.js';
 import { LampMarks } from './lamp_marks.js';
+import { PlanesOverlay } from './planes/plane_overlay.js';
 import { PairMarks } from './references/reference_picture.js';
 import { LampLasso } from './lamps/lamp_lasso.js';
 import { Legend } from './analysis_panel.js';
@@ -200,6 +201,7 @@ export function Stage({ ui, app }) {
   useLayoutEffect(() => store.set({ fit }), [fit?.toPrecision(6)]);
   return html`<div class=${`stage is-${ui.tool} ${ui.dragAdjustment ? 'is-asking' : ''} ${ui.clickAction ? 'is-pointing' : ''} ${ui.drag ? 'is-dragging' : ''} ${inset ? 'has-inset' : ''}`} ref=${frame} style=${aroundInset(inset)} tabindex="0" role="application" inert=${Boolean(ui.mix?.more)}
     aria-label=${t('Pictures. Arrow keys move the brush, Enter paints, Shift Enter a line.')} aria-describedby="lp-status">
+    ${ui.ready && html`<${PlanesOverlay} ui=${ui} panes=${panes} />`}
     ${ui.ready && html`<${ObjectOutline} ui=${ui} engine=${engine} panes=${panes} />`}
     ${ui.ready && html`<${SelectionOutline} ui=${ui} engine=${engine} panes=${panes} />`}
     ${ui.ready && html`<${LayerMask} ui=${ui} engine=${engine} panes=${panes} />`}

@@ -5,6 +5,7 @@ import { toHex } from './paint_colour.js';
 import { paintText } from './format.js';
 import { exposureOf } from './display_state.js';
 import { paneAt } from './pointer_input.js';
+import { luxAtPointer } from './planes/plane_overlay.js';
 import { t } from '../language/language.js';
 
 /** @typedef {import("./engine_interface.js").Engine} Engine */
@@ -19,6 +20,8 @@ export function PointerLabel({ ui, engine, rings }) {
   const { dragAdjustment, probe, tool } = ui;
   if (dragAdjustment)
     return html`<div class="near asking" ref=${ref} role="status">${adjustmentText(dragAdjustment)}</div>`;
+  const lux = luxAtPointer(ui);
+  if (lux && !ui.isLive) return html`<div class="near" ref=${ref} aria-hidden="true">${lux}</div>`;
   if (tool !== 'pick' || !probe) return null;
   const exposedPaint = probe.paint.map((x) => Math.max(0, x) * 2 ** exposureOf(ui.state));
   return html`<div class="near picking" ref=${ref} aria-hidden="true">

@@ -15,7 +15,7 @@ import {
   LAYOUTS,
   updateDisplay,
   nextValue,
-  OVERLAYS,
+  overlaysOf,
   resizeBrush,
   swapColours,
   TOOLS,
@@ -273,7 +273,9 @@ export const SHORTCUTS = [
         command: 'overlay',
         description: t('next overlay'),
         act: ({ store }) =>
-          updateDisplay(store, { overlay: nextValue(OVERLAYS, store.value.display.overlay) }),
+          updateDisplay(store, {
+            overlay: nextValue(overlaysOf(store.value), store.value.display.overlay),
+          }),
       },
     ],
   },

@@ -233,10 +233,16 @@ export function togglePanels(store) {
 export const nextValue = (values, value) => values[(values.indexOf(value) + 1) % values.length];
 
 export const LAYOUTS = /** @type {const} */ (['side', 'wipe', 'blink', 'inset']);
-export const OVERLAYS = /** @type {const} */ ([
+const OVERLAYS = /** @type {const} */ ([
   null,
   'missed',
   'beyond',
   'falsecolor',
   'importance',
+  'lux',
 ]);
+
+/** Return the overlays of the view: lux only where it shows measuring planes.
+ * @param {import("./ui_state.js").Ui} ui */
+export const overlaysOf = ({ planes, view }) =>
+  OVERLAYS.filter((overlay) => overlay !== 'lux' || planes?.cameras[view]);

@@ -138,21 +138,22 @@ export const countRows = ({ lights, images }) =>
 /** Smallest number of lights with a common prefix that are folded together. */
 const MIN_PREFIX_GROUP = 3;
 
-/** Return the group of a light: its dimmer, its group or, with many lights, its name's prefix.
+/** Return the group of a light: its dimmer, its group, the lamp of which it is an emitter or, with many
+ * lights, its name's prefix.
  * @param {Ui} ui @param {number} k @returns {string | null} */
 function groupOf(ui, k) {
-  const { name, group } = ui.lights[k];
+  const { name, group, lamp } = ui.lights[k];
   const image = imageOf(ui.images, k);
   if (image) return image.name;
   const tie = findTie(ui, k);
   const others = tie && (tie.length === 2 ? tie[1] : t('{count} more', { count: tie.length - 1 }));
   if (tie) return t('{name} and {others}, tied', { name: tie[0], others });
-  return group ?? (countRows(ui) > MAX_ROWS_WITH_SLIDERS ? namePrefix(name) : null);
+  return group ?? (lamp || null) ?? (countRows(ui) > MAX_ROWS_WITH_SLIDERS ? namePrefix(name) : null);
 }
 
 /** @param {Ui} ui @param {number} k */
 function isPrefixGroup(ui, k) {
-  return !ui.lights[k].group && !findTie(ui, k);
+  return !ui.lights[k].group && !ui.lights[k].lamp && !findTie(ui, k);
 }
 
 /** `window` of `window_12`, `cyc` of `cyc left`. @param {string} name @returns {string | null} */

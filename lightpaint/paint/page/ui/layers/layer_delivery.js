@@ -51,8 +51,33 @@ export const percentOf = (share) => Math.max(Math.round(100 * share), 0);
 export const knownShares = ({ brightness, color }) =>
   [brightness, color].filter((share) => share !== null);
 
-/** Say how much came: `98 % of the brightness and 43 % of the colour came`. @param {Shares} shares */
-function deliveryText({ brightness, color }) {
+/** Share from which too much came, as in `OVERDONE` of delivery.py. */
+const OVERDONE = 1.25;
+
+/** Say by how much too much came. @param {Shares & {is_darker?: boolean}} delivery */
+function overdoneTexts({ brightness, color, is_darker: isDarker }) {
+  const [lit, coloured] = [brightness ?? 0, color ?? 0].map((share) => share.toFixed(1));
+  const texts = [];
+  if ((brightness ?? 0) >= OVERDONE)
+    texts.push(
+      isDarker
+        ? t('darkened {number} times as much as painted', { number: lit })
+        : t('brightened {number} times as much as painted', { number: lit }),
+    );
+  else if (brightness !== null)
+    texts.push(t('{value} % of the brightness came', { value: percentOf(brightness) }));
+  if ((color ?? 0) >= OVERDONE)
+    texts.push(t('coloured {number} times as much as painted', { number: coloured }));
+  else if (color !== null)
+    texts.push(t('{value} % of the colour came', { value: percentOf(color) }));
+  return texts.join(', ');
+}
+
+/** Say how much came: `98 % of the brightness and 43 % of the colour came`.
+ * @param {Shares & {is_darker?: boolean}} delivery */
+function deliveryText(delivery) {
+  const { brightness, color } = delivery;
+  if (Math.max(brightness ?? 0, color ?? 0) >= OVERDONE) return overdoneTexts(delivery);
   const [value, colour] = [percentOf(brightness ?? 0), percentOf(color ?? 0)];
   if (brightness === null) return t('{value} % of the change of colour came', { value: colour });
   if (color === null) return t('{value} % of the change of brightness came', { value });

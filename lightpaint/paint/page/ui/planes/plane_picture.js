@@ -1,4 +1,7 @@
-/** False colours of the illuminance on a measuring plane, a pixel for each of its cells. */
+/** False colours of illuminance, and the picture of a measuring plane, a pixel for each of its cells. */
+
+import { numberText } from '../format.js';
+import { t } from '../../language/language.js';
 
 /** @typedef {import("../../engine/messages.js").MeasuredPlane} MeasuredPlane */
 
@@ -12,6 +15,33 @@ const COLOURS = [
   [98, 200, 98],
   [248, 230, 60],
 ];
+
+/** The colours of the scale, for a style sheet. */
+export const SCALE_GRADIENT = `linear-gradient(to right, ${COLOURS.map((rgb) => `rgb(${rgb.join(' ')})`).join(', ')})`;
+
+/** Number of levels of the scale. */
+const STEPS = 10;
+
+/** @param {number} lux */
+export const luxText = (lux) => t('{value} lx', { value: numberText(Number(lux.toPrecision(3))) });
+
+/** Return the illuminance of the brightest colour: of the planes in a case, rounded up as in the
+ * isolux pictures of reports. @param {import("../../engine/messages.js").PlanesInfo} info
+ * @param {import("../../engine/messages.js").PlanesReading} reading @param {string} shownCase */
+export function scaleTop(info, reading, shownCase) {
+  const inCase = reading.planes.filter((_, k) => info.planes[k].case === shownCase);
+  return roundedUp(Math.max(0, ...inCase.map(({ most }) => most)));
+}
+
+/** Return lx, rounded up to one of about ten steps of 1, 2 or 5 times a power of ten.
+ * @param {number} most */
+export function roundedUp(most) {
+  if (!(most > 0)) return 1;
+  const raw = most / STEPS;
+  const power = 10 ** Math.floor(Math.log10(raw));
+  const step = power * ([1, 2, 5].find((k) => raw <= power * k * (1 + 1e-9)) ?? 10);
+  return step * Math.ceil(most / step - 1e-9);
+}
 
 /** Return the colour of a share of the scale, 0 to 1. @param {number} share @returns {number[]} */
 export function colourOf(share) {
