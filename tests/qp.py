@@ -1,9 +1,11 @@
-"""Convex quadratics solved by quadprog, the dual active-set method of Goldfarb and Idnani."""
+"""Convex quadratics by quadprog, the active-set method of Goldfarb and Idnani, and by Clarabel."""
 
 from typing import Any
 
+import clarabel
 import numpy as np
 import quadprog
+from scipy import sparse
 
 
 def least(
@@ -33,3 +35,23 @@ def least(
         M * scale[:, None] * scale, b * scale, columns / sizes, values, len(equal)
     )
     return optimum[0] * scale
+
+
+def least_by_interior_points(
+    M: Any, b: Any, lower: Any, upper: Any, rows: Any, required: Any
+) -> tuple[Any, Any]:
+    """x that minimises ½ xᵀM x − bᵀx over lower ≤ x ≤ upper and rows · x ≥ required, and the
+    multipliers of the rows, by Clarabel (Goulart and Chen 2024).
+    """
+    n = b.size
+    limits = np.vstack([-rows, -np.eye(n), np.eye(n)])
+    values = np.concatenate([-required, -lower, upper])
+    settings = clarabel.DefaultSettings()
+    settings.verbose = False
+    settings.tol_gap_abs = settings.tol_gap_rel = settings.tol_feas = 1e-11
+    cones = [clarabel.NonnegativeConeT(len(values))]
+    solver = clarabel.DefaultSolver(
+        sparse.triu(M).tocsc(), -b, sparse.csc_matrix(limits), values, cones, settings
+    )
+    solution = solver.solve()
+    return np.array(solution.x), np.array(solution.z)[: len(rows)]

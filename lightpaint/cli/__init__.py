@@ -2,9 +2,9 @@
 """The command line: parsing, calls of the library, and printing.
 
 Results go to stdout, progress and remarks to stderr. Exit code 0: done; 1: done, but a check failed
-(`verify` found a disagreement, an answer is not close enough); 2: an error that the user can fix,
-in one line; 70: a bug in lightpaint; 130: interrupted; 143: terminated; 129: its terminal has
-closed.
+(`verify` found a disagreement, an answer is not close enough, or misses wishes for planes); 2: an
+error that the user can fix, in one line; 70: a bug in lightpaint; 130: interrupted; 143:
+terminated; 129: its terminal has closed.
 """
 
 from collections.abc import Sequence

@@ -73,6 +73,11 @@ class ColorHull:
         rgb /= luminance(rgb)[:, None]
         return rgb
 
+    @cached_property
+    def middle(self) -> Doubles:
+        """The colour in the middle of the corners, (3,), linear with luminance 1."""
+        return np.asarray(self.primaries.mean(axis=0))
+
     def fan(self, side: int) -> Doubles:
         """Return the colours at the corners, (3, 3), of the triangle between a side and the centre.
 
@@ -82,7 +87,7 @@ class ColorHull:
         primaries = self.primaries
         return np.stack(
             [
-                primaries.mean(axis=0),
+                self.middle,
                 primaries[side % len(primaries)],
                 primaries[(side + 1) % len(primaries)],
             ]
@@ -104,7 +109,7 @@ class ColorHull:
     @cached_property
     def _corners_from_middle(self) -> tuple[Doubles, Doubles]:
         """The chromaticity of the centre, (2,), and the directions from there to the corners."""
-        middle = chromaticity(self.primaries.mean(axis=0))
+        middle = chromaticity(self.middle)
         return middle, chromaticity(self.primaries) - middle
 
     @cached_property

@@ -136,7 +136,8 @@ def _outcome(
         return results_document | ({"variations": variations} if variations else {})
 
     has_failures = look_set is not None and look_set.failures
-    return CommandOutcome(document, 1 if shortfalls or has_failures else 0)
+    has_missed_wishes = any(look.planes is not None and look.planes.missed for *_, look in results)
+    return CommandOutcome(document, 1 if shortfalls or has_missed_wishes or has_failures else 0)
 
 
 def _show(job: Job, looks: Sequence[Look], table: Table) -> None:

@@ -52,8 +52,8 @@ from lightpaint.version import __version__
 
 #: Exit codes, for scripts.
 EXIT_CODES = (
-    "Exit codes: 0 done; 1 done, but a check failed (verify, --max-miss, --min-fit) or a look "
-    "of a batch did; 2 an error that you can fix, in one line; 70 a bug in lightpaint; "
+    "Exit codes: 0 done; 1 done, but a check failed (verify, --max-miss, --min-fit), wishes for "
+    "planes are missed (plan, solve) or a look of a batch failed; 2 an error that you can fix, in one line; 70 a bug in lightpaint; "
     "130 Ctrl-C, 143 SIGTERM, 129 the terminal closed."
 )
 

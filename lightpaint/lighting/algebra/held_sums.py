@@ -3,8 +3,8 @@
 A primal-dual active set (Hintermüller, Ito, Kunisch, SIAM Journal on Optimization 13, 2002): with a
 guess of the bounds and sums that hold, the rest is one linear system. Bounds that it then violates
 are added to the guess, what pulls the wrong way leaves it, and at last comes the sum that is missed
-most. From the answer to a similar problem that takes a few steps. It may cycle, where the method of
-multipliers (required_sums.py) goes on.
+most. From interior points near the optimum that takes one or two steps. It may cycle, where the
+method of multipliers (required_sums.py) goes on.
 """
 
 from dataclasses import dataclass
@@ -64,18 +64,29 @@ class HeldSums:
         )
 
     def minimise(
-        self, b: Doubles, start: Doubles, duals: Doubles, *, tolerance: float, close: float
+        self,
+        b: Doubles,
+        start: Doubles,
+        duals: Doubles,
+        *,
+        near: Doubles | None = None,
+        tolerance: float,
+        close: float,
     ) -> tuple[Optimum, Doubles] | None:
-        """Minimise for b, (k,), from an answer, (k,), and multipliers, (m,), of a similar problem.
+        """Minimise for b, (k,), with the bounds that hold an answer, (k,), to a similar problem,
+        and its multipliers, (m,).
 
-        tolerance: of the KKT residual. close: the largest miss of a sum. Return the optimum, and
-        the multipliers of the sums; None if the guesses cycle, or leave it.
+        near: (k,), where unknowns stay that change nothing; by default that answer. tolerance: of
+        the KKT residual. close: the largest miss of a sum. Return the optimum, and the multipliers
+        of the sums; None if the guesses cycle, or leave it.
         """
         b, held = b / self.root, duals > 0
         x = np.clip(start * self.root, self.lower, self.upper)
         is_fixed = self.lower >= self.upper
         low = is_fixed | (x <= self.lower)
         high = ~low & (x >= self.upper)
+        if near is not None:
+            x = np.clip(near * self.root, self.lower, self.upper)
         size = float(np.abs(b).max(initial=0)) or 1.0
         seen, check = set[bytes](), cancellation_check()
         is_repeated = False
@@ -95,7 +106,7 @@ class HeldSums:
             room = close * np.maximum(np.abs(self.least), np.abs(self.rows) @ np.abs(x))
             new_low = is_fixed | np.where(low, gradient > -pull, x < self.lower - reach)
             new_high = ~new_low & np.where(high, gradient < pull, x > self.upper + reach)
-            new_held = held & (multipliers > 0)
+            new_held = held & (multipliers > -pull)
             is_same = (new_low == low).all() and (new_high == high).all()
             if is_same and (new_held == held).all():
                 missed = np.where(held, 0.0, self.least - sums - room)
@@ -160,4 +171,4 @@ class HeldSums:
             return None
         unscaled = x / self.root
         optimum = Optimum(unscaled, gradient * self.root, NO_CAPS, residual, 0, steps, limit)
-        return optimum, multipliers / self.lengths
+        return optimum, np.maximum(multipliers, 0) / self.lengths

@@ -6,18 +6,18 @@ Unlike caps, the sums may share unknowns and have coefficients of either sign, a
 thousands, few of which hold. The method of multipliers (Hestenes 1969, Powell 1969; for
 inequalities Rockafellar, SIAM Journal on Control 12, 1974) solves problems without requirements: a
 penalty draws x to the sums that it misses, and their multipliers, updated each time, replace it.
-At its end the multipliers prove the optimum as those of bounds do. Where an active set finds the
-optimum at once (held_sums.py), which is the rule from a similar problem, that suffices.
+At its end the multipliers prove the optimum as those of bounds do. It serves where Newton's method
+on the multipliers (dual_newton.py), which is far quicker, does not end.
 """
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 
-from lightpaint.arrays import Bools, Doubles
-from lightpaint.lighting.algebra.held_sums import HeldSums
+from lightpaint.arrays import Bools, Doubles, Indices
+from lightpaint.lighting.algebra.dual_newton import DualNewton, NearAnswer
 from lightpaint.lighting.algebra.method import Method
 from lightpaint.lighting.algebra.optimum import TOLERANCE, Optimum, QuadraticFamily
 from lightpaint.lighting.algebra.quadratic import Cap
@@ -34,6 +34,9 @@ CLOSE, MAX_UPDATES, MAX_CHANGES = 1e-9, 60, 40
 #: Diagonal of M, relative to the largest, below which an unknown is scaled as if it had this one:
 #: a light that no painted pixel sees still lights what is required.
 LEAST_DIAGONAL = 1e-6
+
+#: Unknowns from which an interior point takes longer than some steps of Newton's method.
+MANY_UNKNOWNS = 256
 
 #: Bisections that end a step where the penalty is least.
 BISECTIONS = 40
@@ -61,7 +64,8 @@ class RequiredOptimum:
 class RequiredSums:
     """Problems with one M and the same sums, which differ in b.
 
-    M: (k, k). rows: (m, k), R. least: (m,), r. lower, upper, caps, method: as in `minimise`.
+    M: (k, k). rows: (m, k), R. least: (m,), r. lower, upper, caps, method: as in `minimise`. parts:
+    places of unknowns that M joins with no others; all are one without.
     """
 
     def __init__(
@@ -74,6 +78,7 @@ class RequiredSums:
         upper: Doubles,
         caps: Iterable[Cap] = (),
         method: Method = "polished",
+        parts: Sequence[Indices] = (),
     ) -> None:
         self._M, self._rows, self._least = M, rows, least
         self._limits: dict[str, Any] = {
@@ -88,10 +93,19 @@ class RequiredSums:
             "mk,k->m", np.square(rows), 1 / np.maximum(power, LEAST_DIAGONAL * largest)
         )
         self._sizes = np.where(spread > 0, spread, 1.0)
-        self._held: HeldSums | None = None
-        if not self._limits["caps"] and method == "polished":
-            root = np.sqrt(np.maximum(power, LEAST_DIAGONAL * largest))
-            self._held = HeldSums.of(M, rows, least, lower=lower, upper=upper, root=root)
+        self._nothing_of_caps = np.zeros(len(self._limits["caps"]))
+        self._newton: DualNewton | None = None
+        if method == "polished":
+            self._newton = DualNewton(
+                M,
+                rows,
+                least,
+                lower=lower,
+                upper=upper,
+                caps=self._limits["caps"],
+                least_diagonal=LEAST_DIAGONAL,
+                parts=parts,
+            )
         self._penalty = PENALTY
         self._families: dict[bytes, QuadraticFamily] = {}
 
@@ -101,19 +115,23 @@ class RequiredSums:
         start: Doubles,
         *,
         multipliers: Doubles | None = None,
+        cap_multipliers: Doubles | None = None,
         close: float = CLOSE,
         **options: Any,
     ) -> RequiredOptimum:
         """Minimise for b, (k,), from start, (k,), and the multipliers, (m,), of a similar problem.
 
-        close: the largest miss of a sum to end at. options: of `QuadraticFamily.minimise`.
+        cap_multipliers: (c,), of its caps. close: the largest miss of a sum to end at. options: of
+        `QuadraticFamily.minimise`.
         """
         duals = np.zeros(len(self._least)) if multipliers is None else multipliers
-        if self._held is not None:
-            tolerance = options.get("tolerance", TOLERANCE)
-            held = self._held.minimise(b, start, duals, tolerance=tolerance, close=CLOSE)
-            if held is not None:
-                return RequiredOptimum(*held, miss=0.0)
+        if self._newton is not None:
+            of_caps = self._nothing_of_caps if cap_multipliers is None else cap_multipliers
+            near = NearAnswer(start, duals, of_caps)
+            found = self._newton_from(b, near, options)
+            if isinstance(found, RequiredOptimum):
+                return found
+            start, duals = found.x, found.multipliers
         x, last, check = start, np.inf, cancellation_check()
         for _ in range(MAX_UPDATES):
             check()
@@ -135,6 +153,22 @@ class RequiredSums:
             last = miss
         short = float(((self._least - self._rows @ x) / sizes).max(initial=0))
         return RequiredOptimum(optimum, duals, max(short, 0.0))
+
+    def _newton_from(
+        self, b: Doubles, near: NearAnswer, options: dict[str, Any]
+    ) -> RequiredOptimum | NearAnswer:
+        """Return the optimum by Newton's method on the multipliers; where that does not find it,
+        an answer near it.
+        """
+        assert self._newton is not None
+        tolerance = options.get("tolerance", TOLERANCE)
+        # From nowhere, interior points lead there sooner, if unknowns are few.
+        if near.multipliers.any() or len(b) > MANY_UNKNOWNS:
+            found = self._newton.minimise(b, near, tolerance=tolerance)
+            if found is not None:
+                return RequiredOptimum(*found, miss=0.0)
+        inside = self._newton.from_inside(b, near, tolerance=tolerance)
+        return inside if isinstance(inside, NearAnswer) else RequiredOptimum(*inside, miss=0.0)
 
     @property
     def _weights(self) -> Doubles:

@@ -256,6 +256,12 @@ class Knob:
         unknowns = tuple(Unknown(((light, rgb),)) for rgb in primaries)
         return replace(self, unknowns=unknowns, limit=limit, gamut=gamut, side=side)
 
+    def dimming(self, color: Doubles) -> "Knob":
+        """Return the knob as a dimmer of one colour, (3,), linear with luminance 1."""
+        [light] = self.lights
+        least, most = (0.0, np.inf) if self.limit is None else self.limit[1:]
+        return replace(self, unknowns=(Unknown(((light, color),), least, most),), limit=None)
+
     def _mixing(self, colors: Doubles, window: tuple[int, int]) -> "Knob":
         [light] = self.lights
         unknowns = tuple(

@@ -267,6 +267,7 @@ class ReducedSolver:
     ) -> None:
         self._reduction, self._pull, self._method = reduction, pull, method
         self._required, self._close = required, close
+        self._required_caps: Doubles | None = None
         self._last: NormalEquations | None = None
         self._pulled: NormalEquations | None = None
         self._families: list[QuadraticFamily] = []
@@ -400,10 +401,15 @@ class ReducedSolver:
             )
         right, begin = block.right_side(b), x[block.unknowns]
         found = self._sums.minimise(
-            right, begin, multipliers=self._required, close=self._close, **options
+            right,
+            begin,
+            multipliers=self._required,
+            cap_multipliers=self._required_caps,
+            close=self._close,
+            **options,
         )
-        self._required = found.multipliers
         optimum = found.optimum
+        self._required, self._required_caps = found.multipliers, optimum.cap_multipliers
         if found.miss > self._close:
             residual = max(optimum.kkt_residual, found.miss)
             optimum = replace(optimum, kkt_residual=residual)

@@ -162,6 +162,18 @@ class Reduction:
             )
         return replace(self, requirements=requirements, is_joined=True)
 
+    def at_middle_colors(self) -> "Reduction":
+        """Return the reduction with each light that keeps to a gamut as a dimmer of the colour in
+        its middle, which all parts of the gamut have.
+        """
+        if not self.gamut_knobs:
+            return self
+        knobs = [*self.knobs]
+        for k in self.gamut_knobs:
+            assert self.gamuts is not None
+            knobs[k] = knobs[k].dimming(self.gamuts[knobs[k].lights[0]].middle)
+        return replace(self, knobs=tuple(knobs), gamuts=None)
+
     def confined_to_sides(self, sides: Mapping[int, int | None]) -> "Reduction":
         """Return the reduction with knobs, by their places, confined to a side of their gamuts; to
         the whole gamut where the side is None.

@@ -118,6 +118,8 @@ def next_whites(
         if not (windows or sides):
             break
         reduction = reduction.with_windows(windows).confined_to_sides(sides)
+        if reduction.requirements is not None:
+            options["required"] = optimum.required
         optimum = solve_reduced(equations, reduction, _snap(groups, optimum.weights), **options)
     return reduction, optimum
 
@@ -159,7 +161,8 @@ def _next_gamut_parts(
     by its side; None for a whole gamut.
     """
     beyond = _knobs_outside_gamuts(reduction, optimum.weights)
-    if not reduction.has_sides and len(beyond) + len(reduction.confined_knobs) <= MANY_CONFINED:
+    most = MANY_CONFINED if reduction.requirements is None else 0
+    if not reduction.has_sides and len(beyond) + len(reduction.confined_knobs) <= most:
         return dict.fromkeys(beyond)
     sides: dict[int, int | None] = {**_sides_outside(reduction, optimum.weights)}
     for k in reduction.confined_knobs:

@@ -48,7 +48,9 @@ def requirements_within_reach(
     had to be given up, (w,). reduction: of the lights, without requirements.
     """
     requirements = wished.requirements
-    shares = shares_given_up(wished, reduction.with_requirements(requirements))
+    # What tinted light would add to a wish is nothing to rely on: a painting chooses the colours.
+    own = reduction.at_middle_colors()
+    shares = shares_given_up(wished, own.with_requirements(requirements))
     if shares.any():
         requirements = requirements.lowered(wished.slack_of(shares) * (1 + 1e-9))
     return requirements, shares
