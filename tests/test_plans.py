@@ -238,6 +238,12 @@ def test_a_painting_is_answered_under_the_wishes(tmp_path: Path):
     drives = drives_of(tmp_path / "limited")
     assert 40 * sum(drives.values()) <= 30 * (1 + 1e-6)
 
+    wishes = ("--planes", "room.planes.toml", "--watts", "20")
+    missed = run(tmp_path, "solve", "room.xml", "mood.png", *wishes, "-o", "missed", *options)
+    assert missed.returncode == 1
+    assert "of 300 lx, as much as the limit of 20 W leaves." in missed.stdout
+    assert (tmp_path / "missed/lighting.json").is_file()
+
 
 def test_a_limit_of_power_costs_the_picture_something_beside_the_lux(tmp_path: Path):
     write_room(tmp_path, batwing, planes=PLANES.replace("mean = 300", "mean = 100"))

@@ -53,8 +53,8 @@ from lightpaint.version import __version__
 #: Exit codes, for scripts.
 EXIT_CODES = (
     "Exit codes: 0 done; 1 done, but a check failed (verify, --max-miss, --min-fit), wishes for "
-    "planes are missed (plan, solve) or a look of a batch failed; 2 an error that you can fix, in one line; 70 a bug in lightpaint; "
-    "130 Ctrl-C, 143 SIGTERM, 129 the terminal closed."
+    "planes are missed (plan, solve) or a look of a batch failed; 2 an error that you can fix, in "
+    "one line; 70 a bug in lightpaint; 130 Ctrl-C, 143 SIGTERM, 129 the terminal closed."
 )
 
 
@@ -137,6 +137,13 @@ def _measure(parser: argparse.ArgumentParser) -> None:
     add_split(parser)
     add_fields(parser, Settings, "cd_per_unit", default="that of the lights file")
     add_fields(parser, Settings, "spp", default="as many as --error needs")
+    _add_measuring_error(parser)
+    add_fields(parser, Settings, "seed", "use_cache")
+    add_output(parser, "DIR", "folder for tables and pictures (default: measured/)")
+    add_fields(parser, Settings, "force")
+
+
+def _add_measuring_error(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--error",
         type=arguments.parsed_by(parse_share),
@@ -144,9 +151,6 @@ def _measure(parser: argparse.ArgumentParser) -> None:
         help="measure until the mean of each plane is known this well, at 95%%, and its points "
         "with this standard error (default: 2%%)",
     )
-    add_fields(parser, Settings, "seed", "use_cache")
-    add_output(parser, "DIR", "folder for tables and pictures (default: measured/)")
-    add_fields(parser, Settings, "force")
 
 
 def _template(parser: argparse.ArgumentParser) -> None:
@@ -361,7 +365,9 @@ def _plan(parser: argparse.ArgumentParser) -> None:
     add_lights(parser)
     add_split(parser)
     add_constraints(parser)
-    add_fields(parser, Settings, "watts", "error", "seed", "cd_per_unit")
+    add_fields(parser, Settings, "watts")
+    _add_measuring_error(parser)
+    add_fields(parser, Settings, "seed", "cd_per_unit")
     add_cache(parser)
     add_output(parser, "DIR", "result folder (default: named after the scene)")
     add_fields(parser, Settings, "force")

@@ -205,12 +205,7 @@ class DualNewton:
         matrix.flat[:: k + 1] += NEARNESS
         with one_thread():
             for _ in range(MAX_INTERIORS):
-                infinite = np.full(sums.least.size, np.inf)
-                limits = sums.rows, sums.least, infinite, np.ones(infinite.size), ()
-                bounds = self._lower, self._upper, np.ones(k)
-                inside = interior_point(
-                    Quadratic(matrix, b + NEARNESS * start, *bounds, *limits, size), x
-                )
+                inside = interior_point(self._with_caps(matrix, b, start, sums, size), start)
                 if inside is None:
                     return near
                 x, pushes = inside.x, np.maximum(inside.multipliers, 0)
@@ -227,6 +222,15 @@ class DualNewton:
                 break
         pushes = np.append(pushes, np.zeros(sums.least.size - pushes.size))
         return NearAnswer(x / self._root, *self._multipliers(sums, pushes))
+
+    def _with_caps(
+        self, M: Doubles, b: Doubles, start: Doubles, sums: _Sums, size: float
+    ) -> Quadratic:
+        """Return the scaled problem with the pull to start, (k,), and the sums as caps."""
+        infinite, ones = np.full(sums.least.size, np.inf), np.ones(sums.least.size)
+        bounds = self._lower, self._upper, np.ones(start.size)
+        right = b + NEARNESS * start
+        return Quadratic(M, right, *bounds, sums.rows, sums.least, infinite, ones, (), size)
 
     def _ascend(
         self, b: Doubles, x: Doubles, sums: _Sums, pushes: Doubles

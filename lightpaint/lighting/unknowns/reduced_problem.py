@@ -398,6 +398,7 @@ class ReducedSolver:
                 upper=p.upper,
                 caps=p.caps,
                 method=self._method,
+                parts=_channel_parts(reduction) if equations.coupling is None else (),
             )
         right, begin = block.right_side(b), x[block.unknowns]
         found = self._sums.minimise(
@@ -419,6 +420,16 @@ class ReducedSolver:
         """Return the problems with a matrix (k, k) and the bounds and caps of `problem`."""
         p = problem
         return QuadraticFamily(M, lower=p.lower, upper=p.upper, caps=p.caps, method=self._method)
+
+
+def _channel_parts(reduction: Reduction) -> list[Indices]:
+    """Return the unknowns of each set of channels that only requirements couple; none where some
+    unknowns move no light.
+    """
+    if reduction.blocks[0].unknowns.size < len(reduction.unknowns):
+        return []
+    apart = replace(reduction, requirements=None, is_joined=False)
+    return [block.unknowns for block in apart.blocks]
 
 
 def _lit(equations: NormalEquations, reduction: Reduction) -> Bools:

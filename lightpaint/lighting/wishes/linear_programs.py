@@ -80,8 +80,9 @@ def _evened(reduction: Reduction, program: Program, watts: Doubles, slack: Doubl
 
 
 def shares_given_up(wished: WishedLight, reduction: Reduction) -> Doubles:
-    """Return the least share of each wish, (w,), that has to be given up so that all others hold:
-    all 0 if all can be met.
+    """Return the shares of all wishes, (w,), that have to be given up: those whose sum, with the
+    largest once more, is least, so that no plane starves for a little more light on another. All
+    are 0 if all wishes can be met.
     """
     watts = watts_of_unknowns(reduction.knobs, reduction.lamps)
     if not watts.any():
@@ -111,8 +112,8 @@ def _solve(
         # What has to be given up is given up by a hair more than that.
         least = least - slack * (1 + CLOSE)
     given = np.zeros((len(rows), 0))
-    if slack is None:
-        given = np.zeros((len(rows), len(wished.wishes)))
+    if slack is None:  # the last column is of the largest share
+        given = np.zeros((len(rows), len(wished.wishes) + 1))
         for k, wish in enumerate(wished.wishes):
             given[wish.rows, k] = 0.0 if wish.is_hard else wish.size
     count = len(reduction.unknowns)
@@ -128,6 +129,10 @@ def _solve(
     )
     used = [k for wish in wished.wishes if _length(wish.rows) == 1 for k in _places(wish.rows)]
     fixed_rows, fixed_least = _cap_rows(reduction, columns.shape[1])
+    if slack is None:
+        largest = np.hstack([np.zeros((len(wished.wishes), count)), _at_least_each(wished)])
+        fixed_rows = np.vstack([fixed_rows, largest])
+        fixed_least = np.append(fixed_least, np.zeros(len(largest)))
     check = cancellation_check()
     for _ in range(MAX_ROUNDS):
         check()
@@ -146,7 +151,7 @@ def _solve(
         used += more
     multipliers = np.zeros(len(rows))
     multipliers[used] = duals[: len(used)] / sizes[used]
-    found = x[count:] if shares is None else shares
+    found = x[count:-1] if shares is None else shares
     found = np.where(found < LEAST_SHARE, 0.0, found)
     return Program(x[:count], found, multipliers, float(costs @ x))
 
@@ -177,6 +182,12 @@ def _cap_rows(reduction: Reduction, columns: int) -> tuple[Doubles, Doubles]:
                 rows.append(sign * row)
                 least.append(sign * limit)
     return np.array(rows).reshape(-1, columns), np.array(least)
+
+
+def _at_least_each(wished: WishedLight) -> Doubles:
+    """Return rows, (w, w + 1), that are >= 0 where the last number is the largest."""
+    count = len(wished.wishes)
+    return np.hstack([-np.eye(count), np.ones((count, 1))])
 
 
 def _length(rows: slice) -> int:

@@ -141,6 +141,20 @@ def test_a_budget_is_kept_where_light_is_given_up(make_basis):
     assert shares_given_up(wished, reduction)[0] > 0
 
 
+def test_two_desks_share_what_a_budget_leaves(make_basis):
+    """The lamps of the second give a tenth more: the sum of shares alone would serve only it."""
+    desks = [_plane("first", 4, mean=500.0), _plane("second", 5, mean=500.0)]
+    basis, _, illuminance = _case(make_basis, desks, count=2)
+    light = np.zeros((9, 2, 1))
+    light[:4, 0], light[4:, 1] = 600.0, 660.0
+    illuminance = replace(illuminance, matrix=light * LUMINANCE)
+    reduction = reduce_to(_lamps(2), basis.lights)
+    wished = wished_light(illuminance, PowerBudget(watts=40.0), reduction)
+    shares = shares_given_up(wished, reduction.with_requirements(wished.requirements))
+    # Equal drives d1 + d2 = 1 would give .4 and .34; equal shares need 600 d1 = 660 d2.
+    assert shares[:2] == pytest.approx([1 - 600 * 660 / 1260 / 500] * 2, rel=1e-4)
+
+
 def test_noise_makes_a_wish_ask_for_more(make_basis):
     basis = make_basis(LAMPS, (5, 4))
     desk = _plane("desk", 8, mean=500.0, uniformity=0.3, most=1500.0)
