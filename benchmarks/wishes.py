@@ -6,8 +6,9 @@ Draws a hall (hall.py) of so many lights, renders a basis of that size and measu
 at about that many points of its floor, 0.8 m high. Each lamp mixes a warm and a cool white, or has
 any colour (`--lamps colors`), or any up to a luminance (`limits`). The painting is the hall with
 random levels of both whites; the wishes are a mean a fifth above what the answer gives, and a
-uniformity above its own. Prints, of the literal answer (squares of linear light) and of the default one to a picture as a display shows
-it, the seconds of both solves, their ratio, how many rows hold, and what the floor gets.
+uniformity above its own. Prints, of the literal answer (squares of linear light) and of the default
+one to a picture as a display shows it, the seconds of both solves, their ratio, how many rows hold,
+and what the floor gets. SciPy's linear programs are loaded before.
 """
 
 import argparse
@@ -17,6 +18,7 @@ from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
+import scipy.optimize  # noqa: F401
 from hall import write_floor, write_hall
 
 from lightpaint.basis.render.basis_render import render_basis
