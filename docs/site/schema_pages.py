@@ -80,7 +80,10 @@ def lighting_schema() -> Schema:
     properties = {
         "format": {"const": FORMAT},
         "lightpaint": {"type": "string"},
-        **{name: head[name] for name in ("target", "scene_identity", "cd_per_unit", "up")},
+        **{
+            name: head[name]
+            for name in ("target", "scene_identity", "cd_per_unit", "up", "observer")
+        },
         "lights": {"type": "object", "additionalProperties": light},
         "places": {"type": "object", "additionalProperties": place},
         "keys": {"type": "array", "items": key},

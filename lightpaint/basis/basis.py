@@ -50,6 +50,7 @@ class Origin:
     scene, so that no single render reproduces the basis exactly.
     extra_spp: mean number of additional samples per pixel where a painting needed them (see
     `Basis.extra`).
+    observer: what sees it, of a basis with spectra; "" for RGB.
     """
 
     scene: str
@@ -64,6 +65,7 @@ class Origin:
     integrator: str = ""
     is_composed: bool = False
     extra_spp: float = 0.0
+    observer: str = ""
 
     def __post_init__(self) -> None:
         if not 0 <= self.extra_spp <= MAX_SAMPLES:

@@ -201,7 +201,7 @@ def _render_sums(
     spp = scene.spp if requested_spp is None else requested_spp
     parts = plan_parts(scene, spp)
     file = replace(job_fields(task, cache)["scenes"][0])
-    film = SceneFilm(file, settings.quality, settings.resolution, tuple(map(str, scene.read_files)))
+    film = SceneFilm(file, settings.quality, settings.resolution, tuple(map(str, file.read_files)))
     spool = Spool(scene, parts, seed=settings.seed, start=None)
     _obtain_guide_table(engine, film, scene, settings.seed, None, spool)
     paintings = tuple(
@@ -289,7 +289,8 @@ def distributed_renderer(
             samples = height * width * sum(passes[k][1] for k in range_)
             name, expected_s = f"{task.look} {range_.start}", samples * SAMPLE_S
             bounds = range_.start, range_.stop
-            items.append(Passes(name, scene, task.final, *bounds, files, expected_s))
+            item = Passes(name, scene, task.final, *bounds, files, expected_s)
+            items.append(replace(item, observer=relit.observer if relit.is_spectral else None))
         results = {}
         sums, next_item = np.zeros((2, height, width, 3), np.float64), 0
         for count, result in enumerate(engine.run(items)):

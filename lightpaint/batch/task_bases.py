@@ -137,7 +137,7 @@ def save_former_looks(bases: Sequence[Basis], stack: ExitStack) -> tuple[str, ..
 
 def _scene_files(scene: SceneFile) -> tuple[str, ...]:
     """Return all files of a scene."""
-    return tuple(map(str, scene.content.read_files))
+    return tuple(map(str, scene.read_files))
 
 
 def obtain_placed_bases(

@@ -134,6 +134,7 @@ ENDINGS = {
     "lights_file": (".toml",),
     "lighting": (".json",),
     "planes": (".toml",),
+    "observer": (".csv", ".txt", ".dat"),
     "rig": (".mvr",),
 }
 

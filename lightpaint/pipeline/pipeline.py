@@ -55,6 +55,7 @@ from lightpaint.progress import (
 from lightpaint.relit.detection_power import LightShares, with_light_tests
 from lightpaint.relit.verification import Verification
 from lightpaint.relit.verification_render import (
+    SPECTRAL_DOUBLINGS,
     VerificationBudget,
     refine_by_rendering,
     verification_budget,
@@ -351,6 +352,7 @@ def _verify(
         verification = verify(predicted, budget.scene, **options)
         verification = with_light_tests(verification, predicted, LightShares.of(basis, lighting))
     else:
+        options["doublings"] = budget.doublings
         verification = verify_in_stages(predicted, budget.scene, basis, lighting, **options)
     listen.note(f"verified with {verification.spp} samples per pixel")
     return verification
@@ -363,14 +365,19 @@ def _budget(settings: Settings, basis: Basis, relit: Scene) -> VerificationBudge
     if settings.time_s is None and settings.error is None:
         # A cached basis may have many times the requested samples.
         spp = min(spp, settings.basis_spp or relit.spp)
-    return verification_budget(
+    budget = verification_budget(
         relit, basis.size, spp, most_spp=max_spp, asked_spp=settings.verify_spp
+    )
+    is_limited = settings.verify_spp is not None or settings.time_s is not None
+    return replace(
+        budget, doublings=SPECTRAL_DOUBLINGS if relit.is_spectral and not is_limited else 0
     )
 
 
 def _verification_text(budget: VerificationBudget, basis: Basis, *, is_fixed: bool) -> Sentence:
     """Return the remark on how long a verification takes, shown before it starts."""
     height, width = budget.scene.size
+    budget = budget.largest
     limit = "" if is_fixed else "at most "
     subject = f"verification of {limit}{budget.spp} samples per pixel on {width}x{height}"
     hint = Sentence(" (", Hint("verify", False), " skips it)")

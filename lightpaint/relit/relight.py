@@ -74,7 +74,7 @@ def relight(scene: Scene, lighting: Lighting, path: str | Path) -> Scene:
             write_bytes(file, content)
         else:
             write_rgb(file, content)
-    relit = replace(_loaded(path, scene), is_spectral=bool(spectra))
+    relit = replace(_loaded(path, scene), is_spectral=bool(spectra), observer=lighting.observer)
     with_spectrum = {x for name in spectra for x in lighting.members[name]}
     emissions = {emitter.name: emitter.emission for emitter in relit.emitters}
     for emitter, new_emission in settings_of(scene, lighting.emission):
@@ -119,6 +119,13 @@ def spectra_of(lighting: Lighting) -> dict[str, Doubles]:
     """Return the spectra of the lamps of a lighting that was found with spectra."""
     powers = {x.name: x.powers for x in lighting.lights if x.mix is not None}
     return {name: spectrum for name, spectrum in powers.items() if spectrum is not None}
+
+
+def solved_identity(scene: Scene, lighting: Lighting) -> str:
+    """Return the identity of `scene` as a basis for that lighting would have it."""
+    scene = scene_of(scene, lighting)
+    lamps = {x.name: x.lamp for x in lighting.lights if x.lamp is not None and x.mix is not None}
+    return (scene.with_lamps(lamps, lighting.observer) if lamps else scene).identity
 
 
 def settle(scene: Scene, lighting: Lighting, path: Path, home: Path) -> bool:

@@ -1,7 +1,8 @@
 """Renders the relit scene independently, and compares it with the prediction.
 
-By default a verification has at most as many samples as its basis. `verify_in_stages` stops as soon
-as it is conclusive. It is a group-sequential test: it examines the render after a few samples, and
+By default a verification has at most as many samples as its basis; of spectra, which Mitsuba's own
+integrator renders with more noise, this number may be doubled. `verify_in_stages` stops as soon as
+it is conclusive. It is a group-sequential test: it examines the render after a few samples, and
 again each time their number has grown by a third to a half. It continues while an error in a large
 part of the light would probably not be detected and more samples would help. That depends on the
 noise, but not on how well prediction and render agree, so the difference in standard errors has the
@@ -70,6 +71,10 @@ CHECKED, LARGE_SHARE = 0.65, 1 / 7
 #: Share of the picture's light that may stay unchecked although more samples would check it.
 UNCHECKED = 0.1
 
+#: How often the samples of a verification with spectra may be doubled. At equal samples lamps of
+#: narrow LEDs have two to four times the noise of the basis (docs/benchmarks.md).
+SPECTRAL_DOUBLINGS = 4
+
 #: Minimum samples per pixel of a verification; with fewer, a smaller film is just as good.
 FEWEST = 4
 
@@ -126,6 +131,7 @@ def verify_in_stages(
     lighting: Lighting,
     *,
     spp: int,
+    doublings: int = 0,
     seed: int = 0,
     progress: Progress = silent,
 ) -> Verification:
@@ -134,15 +140,17 @@ def verify_in_stages(
     It stops when an error would probably be detected in lights that make up CHECKED of the
     picture's light, including every light with a share of LARGE or more; or when all samples would
     check less than UNCHECKED in addition. predicted: the sum of `basis` under `lighting`, of the
-    size of `relit` or on a reduced film of it. spp: maximum samples per pixel.
+    size of `relit` or on a reduced film of it. spp: maximum samples per pixel. doublings: how often
+    that may be doubled.
     """
-    lights, stages = LightShares.of(basis, lighting), stages_of(spp, relit.film.block_pixels)
+    lights = LightShares.of(basis, lighting)
+    stages = stages_of(spp, relit.film.block_pixels, doublings=doublings)
     limit = limit_of_tests(len(stages))
     relit = sampled_by(relit, shares_of_emitters(relit, lighting, lights.luminance()))
 
     def is_enough(estimate: Estimate, done: int) -> bool:
         verified = estimate.reduced(whole_factor(estimate.size, predicted.size) or 1)
-        return can_tell(predicted, verified, lights, done / spp, limit=limit)
+        return can_tell(predicted, verified, lights, done / stages[-1], limit=limit)
 
     verified, done = render_in_stages(
         relit,
@@ -177,15 +185,16 @@ def shares_of_emitters(
     return of_emitters
 
 
-def stages_of(spp: int, block_pixels: int = 1) -> list[int]:
-    """Return the samples per pixel at each look; the last is `spp`.
+def stages_of(spp: int, block_pixels: int = 1, *, doublings: int = 0) -> list[int]:
+    """Return the samples per pixel at each look; `spp` is one, and then its doubles are.
 
     Both halves have equal numbers, in multiples of `block_pixels`.
     """
     step = 2 * block_pixels
     stages = [spp * part // ALL_PARTS for part in LOOKS]
     looks = {max(samples // step * step, step) for samples in stages if samples >= FIRST_LOOK}
-    return [*sorted(samples for samples in looks if samples < spp), spp]
+    doubled = [spp << k for k in range(doublings + 1)]
+    return [*sorted(samples for samples in looks if samples < spp), *doubled]
 
 
 def can_tell(
@@ -222,12 +231,19 @@ class VerificationBudget:
     """The size and the samples of a verification.
 
     scene: the relit scene on the film to render. spp: samples per pixel. share: its samples
-    relative to those of the basis.
+    relative to those of the basis. doublings: how often both may be doubled.
     """
 
     scene: Scene
     spp: int
     share: float
+    doublings: int = 0
+
+    @property
+    def largest(self) -> "VerificationBudget":
+        """This budget after all doublings."""
+        factor = 1 << self.doublings
+        return replace(self, spp=factor * self.spp, share=factor * self.share, doublings=0)
 
 
 def verification_budget(

@@ -15,6 +15,7 @@ from typing import Any, TypeVar
 
 from lightpaint.arrays import RGB, Floats, Position
 from lightpaint.colour.lamp import Lamp
+from lightpaint.colour.spectra.observer import EYE, Observer
 from lightpaint.display_text import Listed, Shown, some_of
 from lightpaint.keywords import keywords
 from lightpaint.luminaires.plugin_names import LUMINAIRE_PLUGINS
@@ -46,6 +47,7 @@ from lightpaint.scene.properties.emission import ENVIRONMENTS, read_emitted_imag
 from lightpaint.scene.properties.film import Film, camera_named, reduced, reduction
 from lightpaint.scene.properties.integrator import Integrator, IntegratorChoice
 from lightpaint.scene.properties.measuring_points import MeasuringPoints
+from lightpaint.scene.properties.observed_spectra import bands_of
 from lightpaint.scene.properties.pose import Pose, motion_of, upward_axis
 from lightpaint.scene.properties.site import EmitterPlace, Site
 from lightpaint.scene.runtime.kernel_threads import kernels
@@ -147,6 +149,7 @@ class Scene(SceneFiles, Shown):
         old_sites: Sites in the file of the emitters that `moved` has moved, by name.
         points: Points of `at_points`, which replace the film's pixels; None for a film.
         is_spectral: Whether it is rendered with spectra, from `with_lamps`.
+        observer: What sees those: the eye, or a camera.
 
     Examples:
         >>> scene = lp.load_scene("room.xml")
@@ -181,6 +184,7 @@ class Scene(SceneFiles, Shown):
     old_sites: Mapping[str, Site] = field(default_factory=dict)
     points: MeasuringPoints | None = None
     is_spectral: bool = False
+    observer: Observer = EYE
 
     def __post_init__(self) -> None:
         for name in ("lights", "emitters"):
@@ -202,14 +206,22 @@ class Scene(SceneFiles, Shown):
             return content
         structure: list[Any] = [(x.name, x.member_names, x.is_fixed) for x in self.lights]
         if self.is_spectral:
-            structure += ["spectral", *(x.spectrum for x in self.lights)]
+            structure += [self._spectral_kind, *(x.spectrum for x in self.lights)]
         return hashlib.sha256(repr((content, structure)).encode()).hexdigest()[:32]
 
     @property
     def light_identities(self) -> tuple[str, ...]:
         """Identity of the image of each light; see `Light.identity`."""
-        unlit_content = self._seen(self.unlit_content) + ("spectral" if self.is_spectral else "")
+        unlit_content = self._seen(self.unlit_content) + self._spectral_kind
         return tuple(light.identity(unlit_content) for light in self.lights)
+
+    @property
+    def _spectral_kind(self) -> str:
+        """What tells its renders with spectra from others, for identities; "" for RGB."""
+        if not self.is_spectral:
+            return ""
+        observer = self.observer
+        return f"spectral{(observer.name, observer.sensitivities) if observer.is_camera else ''}"
 
     def _seen(self, content: str) -> str:
         """Return a hash of the scene as that of the scene seen at its points, if it has any."""
@@ -232,14 +244,14 @@ class Scene(SceneFiles, Shown):
         check_grouping(members, self.emitters, scene=str(self.path))
         return replace(self, lights=lights_of(self.emitters, members, fixed))
 
-    def with_lamps(self, lamps: Mapping[str, Lamp]) -> "Scene":
+    def with_lamps(self, lamps: Mapping[str, Lamp], observer: Observer = EYE) -> "Scene":
         """Return this scene for renders with spectra, in which each emitter of a lamp is a light.
 
-        lamps: by name of each light that is adjusted. Raises SceneError if one cannot be rendered
-        with spectra.
+        lamps: by name of each light that is adjusted. observer: what sees it. Raises SceneError if
+        one cannot be rendered with spectra.
         """
         lights = lights_of_lamps(self.lights, lamps, scene=str(self.path))
-        return replace(self, lights=lights, is_spectral=True)
+        return replace(self, lights=lights, is_spectral=True, observer=observer)
 
     @property
     def materials(self) -> frozenset[str]:
@@ -421,11 +433,18 @@ class Scene(SceneFiles, Shown):
         The film is replaced by a box-filtered RGB float32 film of the same size, for basis and
         verification alike. A light set to black is never sampled. The scene and what refers to it
         must be released before another is loaded. Image lights and the rest are black or as
-        authored, since other multiples need files. views: other sensors. evenly: `with_texels`.
+        authored, since other multiples need files. views: other sensors. evenly: for the one pass,
+        which samples texels evenly (`with_texels`), and wavelengths by itself; other renders with
+        spectra record what the observer sees.
         """
         named, path = emission or {}, str(self.path)
         settings = settings_for(self.lights, self.emitters, named, scene=path, evenly=evenly)
-        return self.parsed.instantiate(settings, self.film, *(view.film for view in views))
+        films = (self.film, *(view.film for view in views))
+        bands = None
+        if self.is_spectral and not evenly:
+            emissions = [(x.node, x.kind.parameter) for x in self.emitters if x.kind is not None]
+            bands = bands_of(self.parsed.state, emissions, self.observer)
+        return self.parsed.instantiate(settings, *films, bands=bands)
 
     @MITSUBA.acquired()
     def while_loaded(

@@ -13,6 +13,7 @@ from lightpaint.errors import SceneError
 from lightpaint.images.estimate import Estimate
 from lightpaint.images.pixel_blocks import block_mean
 from lightpaint.progress import Progress, silent
+from lightpaint.scene.properties.observed_spectra import as_seen
 from lightpaint.scene.runtime.kernel_threads import kernels
 from lightpaint.scene.runtime.render_lock import tracing
 from lightpaint.scene.scene import Scene
@@ -247,6 +248,8 @@ def render_pass(loaded: Any, scene: Scene, *, seed: int, spp: int) -> Floats:
     spp //= film.block_pixels
     with kernels():
         image = np.array(mi.render(loaded, sensor=scene.camera(loaded), seed=seed, spp=spp))
+    if scene.is_spectral:
+        image = as_seen(image, scene.observer)
     # Wrapping integrators append further channels after R, G and B.
     return block_mean(image[..., :3], film.block)
 

@@ -26,6 +26,7 @@ from lightpaint.scene.properties.integrator import (
     read_integrator,
     replace_integrator,
 )
+from lightpaint.scene.properties.observed_spectra import Bands
 from lightpaint.scene.properties.pose import Motion, moved_parameters
 from lightpaint.scene.runtime.kernel_threads import kernels, kernels_for_all_sizes
 from lightpaint.scene.runtime.mitsuba_errors import mitsuba_errors
@@ -181,10 +182,13 @@ class ParsedScene:
             names[node] = name
         return names
 
-    def instantiate(self, settings: Mapping[int, EmitterSetting], *films: Film) -> Any:
+    def instantiate(
+        self, settings: Mapping[int, EmitterSetting], *films: Film, bands: Bands | None = None
+    ) -> Any:
         """Build an `mi.Scene` with emitter settings, by node.
 
-        films: replace those of their sensors; other sensors keep their films.
+        films: replace those of their sensors; other sensors keep their films. bands: what they
+        record in place of RGB.
         """
         import mitsuba as mi
 
@@ -205,7 +209,7 @@ class ParsedScene:
                     and state.nodes[props[key].index()].type == mi.ObjectType.Film
                 ):
                     del props[key]
-            props["film"] = film.load()
+            props["film"] = film.load(bands)
         with kernels_for_all_sizes():
             with self._resolving(), mitsuba_errors(self.path, self.integrator_choice):
                 scene = mi.parser.instantiate(self._config(), state)

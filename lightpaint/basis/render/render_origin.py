@@ -110,6 +110,7 @@ def origin_of(
         halves=halves,
         passes=passes,
         integrator="" if scene.integrator_choice is None else str(scene.integrator_choice),
+        observer=scene.observer.name if scene.is_spectral else "",
     )
 
 

@@ -223,7 +223,7 @@ def emitters_seen(scene: Scene) -> Bools:
 
     if scene.integrator.hide_emitters:
         return np.zeros(scene.size, dtype=bool)
-    loaded: Any = scene.load({light.name: WHITE for light in scene.lights})
+    loaded: Any = scene.in_rgb.load({light.name: WHITE for light in scene.lights})
     direct = mi.load_dict({"type": "path", "max_depth": 1})
     spp = -(-SEEN_SAMPLES // scene.film.block_pixels)
     image = as_float32(

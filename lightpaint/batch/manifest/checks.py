@@ -172,19 +172,15 @@ def check_sequence(mistakes: Mistakes, table: Table) -> None:
 def settings_of(manifest: Manifest, label: str, look: Mapping[str, Any]) -> Settings:
     mistakes = manifest.mistakes
     values = mistakes.settings(look.get("settings", {}), label)
-    if "planes" in values:
-        values["planes"] = str(manifest.folder / values["planes"])
+    for name in ("planes", "observer"):
+        if name in values:
+            values[name] = str(manifest.folder / values[name])
     steps = look.get("want", SOLVE_STEPS)
     if "scene" in look and values.get("sun"):
         mistakes.add(
             label,
             "sun adds texels for one look, and looks share their basis: leave it out here, and "
             "solve that look alone for its sun",
-        )
-    if values.pop("spectral", False):
-        mistakes.add(
-            label,
-            "spectral goes with solve, not with a batch: leave it out, and solve that look alone",
         )
     if "scene" in look:
         values["sun"] = 0  # also instead of that in a lights file

@@ -170,8 +170,17 @@ class _Sources:
         if "lights_file" in values:
             values["lights_file"] = str(self._base / values["lights_file"])
         values["parameters"] = {k: str(v) for k, v in values.get("parameters", {}).items()}
+        values |= self._spectra(look.get("settings", {}))
         file = SceneFile(path, **{**values, "sensor": sensor})
         return self._scenes.setdefault(repr(file), file)
+
+    def _spectra(self, settings: Mapping[str, Any]) -> dict[str, Any]:
+        """Return how the scene is rendered with spectra, if it is."""
+        if settings.get("spectral") is not True:
+            return {}
+        observer = settings.get("observer")
+        is_file = isinstance(observer, str)
+        return {"spectral": True, "observer": str(self._base / observer) if is_file else None}
 
     def basis(self, look: Mapping[str, Any]) -> BasisFile | GroupsFile | None:
         file: BasisFile | GroupsFile

@@ -1,6 +1,6 @@
 """Interpolation of lightings for the frames of a sequence, even in stops or perceived colour."""
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import replace
 from math import floor
 
@@ -13,7 +13,7 @@ from lightpaint.colour.color import cct_and_duv, kelvin_to_rgb, luminance
 from lightpaint.colour.hue_names import WHITE_DUV
 from lightpaint.display_text import some_names
 from lightpaint.errors import LightingError
-from lightpaint.lighting.answer.lighting import Lighting
+from lightpaint.lighting.answer.lighting import Lighting, LightSetting
 
 #: Stops below the brighter end at which a light that is off begins or ends, in `log`.
 OFF_STOPS = 10.0
@@ -65,15 +65,37 @@ def interpolate(ends: Sequence[Lighting], share: float, *, space: Space) -> Ligh
             "the lightings of a sequence are of different lights, or of lights in other groups"
         )
     mix = _mix_in_stops if space == "log" else _mix_in_oklab
-    lights = tuple(
-        light
-        if light.is_fixed
-        else with_emission(
-            light, mix(np.array(light.emission), np.array(second[light.name].emission), share)
-        )
-        for light in first.lights
-    )
+
+    def between(light: LightSetting) -> LightSetting:
+        end = second[light.name]
+        if light.is_fixed:
+            return light
+        if light.mix is not None and end.mix is not None:
+            return _mix_of_drives(light, end, share, mix)
+        return with_emission(light, mix(np.array(light.emission), np.array(end.emission), share))
+
+    lights = tuple(map(between, first.lights))
     return replace(first, lights=lights, certificate=None)
+
+
+def _mix_of_drives(
+    first: LightSetting,
+    second: LightSetting,
+    share: float,
+    mix: Callable[[Doubles, Doubles, float], Doubles],
+) -> LightSetting:
+    """Return a lamp between two of its mixes: evenly in the shares of its emitters, and at the
+    brightness that `mix` gives to greys.
+    """
+    drives = [np.array(x.mix) for x in (first, second)]
+    y = [float(luminance(np.array(x.emission))) for x in (first, second)]
+    level = float(mix(np.full(3, y[0]), np.full(3, y[1]), share)[0])
+    # A lamp that is off has the mix of the other end.
+    parts = [(a / b, s) for a, b, s in zip(drives, y, (1 - share, share), strict=True) if b > 0]
+    if not parts or level == 0:
+        return first.with_mix(0 * drives[0])
+    weight = sum(s for _, s in parts) or 1.0
+    return first.with_mix(np.asarray(sum(s * x for x, s in parts) * (level / weight)))
 
 
 def _mix_in_stops(first: Doubles, second: Doubles, share: float) -> Doubles:

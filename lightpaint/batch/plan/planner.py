@@ -288,7 +288,7 @@ class _Planner:
         scene = scenes[0] if scenes else None
         basis = None if entry.basis is None else entry.basis.content
         groups = basis if isinstance(basis, LightGroups) else None
-        source_files = _files_of_lighting_look(entry, scene, groups)
+        source_files = _files_of_lighting_look(entry, groups)
         if entry.lighting:
             _check_given_lighting(entry, scene, basis)
         if scene is not None:
@@ -398,11 +398,9 @@ def _check_by_sums(job: Job) -> None:
         raise BatchError(f"want = ['lights'] takes sums alone, and {reason}: want 'solve' instead")
 
 
-def _files_of_lighting_look(
-    entry: LookEntry, scene: Scene | None, groups: LightGroups | None
-) -> tuple[Path, ...]:
+def _files_of_lighting_look(entry: LookEntry, groups: LightGroups | None) -> tuple[Path, ...]:
     """Return the files that a look with a given or combined lighting reads."""
-    files: tuple[Path, ...] = () if scene is None else scene.read_files
+    files = entry.scenes[0].read_files if entry.scenes else ()
     if groups is not None:
         files += tuple(groups.files)
     elif entry.basis is not None:

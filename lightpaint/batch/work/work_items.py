@@ -10,6 +10,7 @@ from typing import Any, Literal, Protocol
 
 from lightpaint.basis.render.render_parts import Part
 from lightpaint.batch.manifest.keys import Final
+from lightpaint.colour.spectra.observer import Observer
 from lightpaint.lighting.fit import Emitters
 from lightpaint.pipeline.job.sources import Painting, SceneFile, vars_of
 from lightpaint.scene.quality_presets import Quality
@@ -226,7 +227,8 @@ class SumsOfRows:
 class Passes:
     """An item that renders passes of a final render. relit: the scene. final: its options.
 
-    first, last: range of passes; the last one is not included.
+    first, last: range of passes; the last one is not included. observer: what sees it, of a render
+    with spectra.
     """
 
     name: str
@@ -239,6 +241,7 @@ class Passes:
     kind: Literal["passes"] = "passes"
     output_folder: str = ""
     local_files: tuple[str, ...] = ()
+    observer: Observer | None = None
 
     @property
     def input_files(self) -> tuple[str, ...]:
@@ -253,10 +256,9 @@ class Passes:
 
 def scene_with_paths(scene: SceneFile, move: PathMap) -> SceneFile:
     """Return the same scene with other paths."""
-    lights_file = scene.lights_file
-    return replace(
-        scene, path=move(scene.path), lights_file=None if lights_file is None else move(lights_file)
-    )
+    others = {name: getattr(scene, name) for name in ("lights_file", "observer")}
+    moved = {name: None if path is None else move(path) for name, path in others.items()}
+    return replace(scene, path=move(scene.path), **moved)
 
 
 def render_seconds(samples: int, lights: int) -> float:

@@ -147,7 +147,8 @@ class PassRenderer:
     def __init__(self, scene: Scene, final: Final) -> None:
         self._scene, self._final = scene, final
         self._passes = passes_of(scene, final.spp)
-        self._loaded_scene: Any = scene.load()
+        with scene.variant():
+            self._loaded_scene: Any = scene.load()
 
     def sum(self, passes: range) -> dict[int, Doubles]:
         """Return the undivided sums, (h, w, 3), of the given passes for each half, by the half."""
@@ -155,7 +156,7 @@ class PassRenderer:
         for k in passes:
             half, spp = self._passes[k]
             seed, stream = self._final.seed, Stream.VERIFICATION
-            with tracing():
+            with self._scene.variant(), tracing():
                 pass_total = pass_sum(
                     self._loaded_scene, self._scene, k, spp, seed=seed, stream=stream
                 )
@@ -224,10 +225,12 @@ class WorkerCache:
 
     def frame(self, item: Passes) -> PassRenderer:
         """Return the renderer of passes; it stays loaded until another scene's item comes."""
-        key = repr((item.relit, item.final))
+        key = repr((item.relit, item.final, item.observer))
         if not isinstance(self._renderer, PassRenderer) or self._renderer_key != key:
             self.release_renderer()
             scene = self.film(SceneFilm(item.relit, None, item.final.resolution))
+            if item.observer is not None:
+                scene = replace(scene, is_spectral=True, observer=item.observer)
             self._renderer, self._renderer_key = PassRenderer(scene, item.final), key
         return self._renderer
 

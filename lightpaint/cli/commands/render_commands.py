@@ -42,7 +42,7 @@ from lightpaint.pipeline.templates import (
     template_of_basis,
 )
 from lightpaint.progress import stage
-from lightpaint.relit.relight import scene_of
+from lightpaint.relit.relight import solved_identity
 from lightpaint.scene.quality_presets import on_film, samples
 from lightpaint.scene.runtime.variant import use_variant
 from lightpaint.scene.scene import Scene
@@ -280,13 +280,15 @@ def relight(
         place.check()
     for lighting, place in zip(answers, results, strict=True):
         folder = place.folder
-        if lighting.scene_identity not in ("", scene_of(scene_on_film, lighting).identity):
+        if lighting.scene_identity not in ("", solved_identity(scene_on_film, lighting)):
             terminal.say(f"{folder}: the lighting was solved for an earlier state of the scene")
         with terminal.TerminalListener() as listen:
             options: dict[str, Any] = {"spp": settings.spp, "seed": settings.seed}
             relight_look({"": scene_on_film}, lighting, place, progress=listen, **options)
             listen.note(f"{folder} relit and rendered")
-        terminal.write(f"{folder}: relit.xml, relit.exr, relit.png")
+        camera = lighting.observer
+        seen = f", as {camera.name} sees the scene" if camera.is_camera else ""
+        terminal.write(f"{folder}: relit.xml, relit.exr, relit.png{seen}")
     return CommandOutcome(
         lambda: {"results": [_relit(*x) for x in zip(lightings, results, strict=True)]}
     )

@@ -97,7 +97,7 @@ def add_method(parser: argparse.ArgumentParser) -> None:
     """Add the options for how a painting is solved."""
     add_fit(parser)
     add_fields(parser, Settings, "unpainted", "emitters", "resize", "noise_correction", "refine")
-    add_fields(parser, Settings, "method", "sun", "spectral", "suggest")
+    add_fields(parser, Settings, "method", "sun", "spectral", "observer", "suggest")
 
 
 def add_verification(parser: argparse.ArgumentParser) -> None:

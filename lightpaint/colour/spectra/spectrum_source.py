@@ -4,6 +4,7 @@ Files are tables of two columns, nanometres and power, or IES TM-27 (.spdx).
 """
 
 import re
+from collections.abc import Sequence
 from functools import cache
 from pathlib import Path
 from xml.parsers import expat
@@ -81,13 +82,34 @@ def read_spectrum(path: Path) -> tuple[Doubles, Doubles]:
     if path.suffix.lower() in TM27:
         points = _points_of_tm27(read_bytes(path, "spectrum", ColorError, limit=MAX_BYTES), path)
     else:
-        points = _points_of_table(read_text(path, "spectrum", ColorError, limit=MAX_BYTES), path)
+        text = read_text(path, "spectrum", ColorError, limit=MAX_BYTES)
+        points = _points_of_table(text, path, "nanometres and power", 2)
+    waves, powers = _measured(points, path, "the power")
+    return waves, powers[:, 0]
+
+
+def read_sensitivities(path: Path) -> tuple[Doubles, Doubles]:
+    """Return nanometres (k,), rising, and the sensitivities (k, 3), >= 0, of a camera's channels.
+
+    Raises ColorError for a file that is missing, or has no three curves of visible light.
+    """
+    text = read_text(path, "observer", ColorError, limit=MAX_BYTES)
+    points = _points_of_table(text, path, "nanometres, red, green and blue", 4)
+    return _measured(points, path, "the sensitivity")
+
+
+def _measured(points: list[tuple[float, ...]], path: Path, what: str) -> tuple[Doubles, Doubles]:
+    """Return nanometres (k,) and values (k, n) of measured points, checked, without their noise.
+
+    what: the values in words.
+    """
     if not FEWEST_POINTS <= len(points) <= MAX_POINTS:
         raise ColorError(
             path, f" has {len(points)} points: expected {FEWEST_POINTS} to {MAX_POINTS}"
         )
-    waves, powers = np.array(points, np.float64).T
-    if not (np.isfinite(waves).all() and np.isfinite(powers).all()):
+    table = np.array(points, np.float64)
+    waves, values = table[:, 0], table[:, 1:]
+    if not np.isfinite(table).all():
         raise ColorError(path, " has a number that is not finite")
     if (falls := np.flatnonzero(np.diff(waves) <= 0)).size:
         k = int(falls[0])
@@ -99,19 +121,23 @@ def read_spectrum(path: Path) -> tuple[Doubles, Doubles]:
         raise ColorError(
             path, f" covers {waves[0]:g} to {waves[-1]:g} nm: expected {low:g} to {high:g} at least"
         )
-    if powers.min() < -NOISE * powers.max():
-        k = int(powers.argmin())
+    if values.min() < -NOISE * values.max():
+        k = int(values.min(axis=1).argmin())
         raise ColorError(
             path,
-            f" has the power {powers[k]:g} at {waves[k]:g} nm: a light has none below 0, apart "
+            f" has {what} {values[k].min():g} at {waves[k]:g} nm: there is none below 0, apart "
             f"from noise of {100 * NOISE:g} % of the largest",
         )
-    return waves, np.maximum(powers, 0)
+    return waves, np.maximum(values, 0)
 
 
-def _points_of_table(text: str, path: Path) -> list[tuple[float, float]]:
-    """Return the points of a table, whose first lines may be a heading."""
-    points: list[tuple[float, float]] = []
+def _points_of_table(text: str, path: Path, what: str, width: int) -> list[tuple[float, ...]]:
+    """Return the points of a table, whose first lines may be a heading.
+
+    what: its columns in words. width: their number.
+    """
+    points: list[tuple[float, ...]] = []
+    wrong = ""
     for number, line in enumerate(text.splitlines(), 1):
         # A comma between digits of a semicolon's or tab's table is a decimal one.
         if ";" in line or "\t" in line:
@@ -119,23 +145,30 @@ def _points_of_table(text: str, path: Path) -> list[tuple[float, float]]:
         cells = re.split(r"[,;\s]+", line.split("#")[0].strip(" ,;\t"))
         if cells == [""]:
             continue
-        try:
-            wave, power = map(float, cells)
-        except ValueError:
-            if not points:
-                continue
-            raise ColorError(
-                path, f" has {one_line(repr(line))} in line {number}: expected nanometres and power"
-            ) from None
-        points.append((wave, power))
+        if len(cells) == width and _are_numbers(cells):
+            points.append(tuple(map(float, cells)))
+        elif points or (_are_numbers(cells) and not wrong):
+            wrong = f" has {one_line(repr(line))} in line {number}: expected {what}"
+            if points:
+                raise ColorError(path, wrong)
+    if wrong and not points:
+        raise ColorError(path, wrong)
     return points
 
 
-def _points_of_tm27(data: bytes, path: Path) -> list[tuple[float, float]]:
+def _are_numbers(cells: Sequence[str]) -> bool:
+    try:
+        list(map(float, cells))
+    except ValueError:
+        return False
+    return True
+
+
+def _points_of_tm27(data: bytes, path: Path) -> list[tuple[float, ...]]:
     """Return the points of IES TM-27. A document type, which entities need, is refused."""
     parser = expat.ParserCreate()
     parser.buffer_text = True
-    points: list[tuple[float, float]] = []
+    points: list[tuple[float, ...]] = []
     open_waves: list[str] = []
     texts: list[str] = []
     depth = 0

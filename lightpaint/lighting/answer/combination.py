@@ -59,6 +59,8 @@ def dimmed(lighting: Lighting, factor: float) -> Lighting:
     def setting(light: LightSetting) -> LightSetting:
         if light.is_fixed:
             return light
+        if light.mix is not None:
+            return light.with_mix(factor * np.array(light.mix))
         emission, weight = (as_rgb(factor * np.asarray(x)) for x in (light.emission, light.weight))
         return light.with_emission(emission, weight=weight)
 

@@ -15,6 +15,7 @@ from lightpaint.basis.lights import BasisLight, Lights
 from lightpaint.colour.color import luminance
 from lightpaint.colour.lamp import Lamp, LampEmitter
 from lightpaint.colour.photometry import Photometry, photometry
+from lightpaint.colour.spectra.observer import EYE, Observer
 from lightpaint.colour.spectra.spectrum import rgb_of_powers
 from lightpaint.dataframes import CHANNELS, by_channel, number, pandas, xarray
 from lightpaint.display_text import Shown, some_names, some_of
@@ -145,12 +146,24 @@ class LightSetting:
         """Return the light at another emission, which no solve has found.
 
         It has no constraint and no error bars. What the basis cannot tell of it stays: channels
-        that reach nothing, too few samples. weight: by default the same numbers.
+        that reach nothing, too few samples. weight: by default the same numbers. A lamp whose
+        drives were the answer gets those of the nearest emission that it can mix.
         """
+        if self.mix is not None and self.lamp is not None:
+            return self.with_mix(self.lamp.drives_for(np.array(emission)))
+        return self._changed(emission, emission if weight is None else weight)
+
+    def with_mix(self, drives: Doubles) -> "LightSetting":
+        """Return the lamp at other drives (e,) of its emitters, which no solve has found."""
+        assert self.lamp is not None
+        emission = as_rgb(self.lamp.mix(drives))
+        return replace(self._changed(emission, emission), mix=tuple(drives.tolist()))
+
+    def _changed(self, emission: RGB, weight: RGB) -> "LightSetting":
         return replace(
             self,
             emission=emission,
-            weight=emission if weight is None else weight,
+            weight=weight,
             mix=None,
             mix_errors=None,
             mixed_emission=None,
@@ -251,6 +264,7 @@ class Lighting(Shown, Mapping[str, LightSetting]):
         up: The direction in the scene that is up, for pan and tilt.
         animation: The lights at painted frames of a shot over which they change, at least two, in
             order; none for lights that stay the same. `lights` are then those of the first key.
+        observer: What saw its picture, if that was rendered with spectra.
 
     Examples:
         >>> lighting = lp.read_lighting("lighting.json")
@@ -270,6 +284,7 @@ class Lighting(Shown, Mapping[str, LightSetting]):
     places: tuple[EmitterPlace, ...] = ()
     up: Position = (0.0, 1.0, 0.0)
     animation: tuple[LightingKey, ...] = ()
+    observer: Observer = EYE
 
     def __repr__(self) -> str:
         rgb = [" ".join(f"{v:.4g}" for v in light.emission) for light in self.lights]

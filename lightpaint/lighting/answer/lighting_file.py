@@ -24,7 +24,7 @@ FORMAT = "lightpaint-lighting 1"
 MAX_BYTES = 2**23
 
 #: Fields of a lighting that its file has under their own names.
-PLAIN_FIELDS = ("target", "scene_identity", "cd_per_unit", "up")
+PLAIN_FIELDS = ("target", "scene_identity", "cd_per_unit", "up", "observer")
 
 #: Fields of a light's lamp, which its file has beside the others.
 LAMP_FIELDS = ("emitters", "power_share", "prefer", "is_wheel", "least_rf")
@@ -77,6 +77,8 @@ def lighting_fields(lighting: Lighting) -> dict[str, Any]:
             for light in lighting.lights
         },
     }
+    if lighting.observer.is_camera:
+        data["observer"] = asdict(lighting.observer)
     if lighting.animation:
         data["keys"] = [_key_fields(lighting, key) for key in lighting.animation]
     if lighting.places:

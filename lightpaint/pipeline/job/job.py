@@ -58,7 +58,7 @@ from lightpaint.pipeline.job.sources import (
     check_nothing_unused,
     content,
 )
-from lightpaint.pipeline.job.spectral_job import check_spectral, spectral_scenes
+from lightpaint.pipeline.job.spectral_job import check_spectral, observer_of, spectral_scene
 from lightpaint.pipeline.results.answer_folder import answer_files
 from lightpaint.pipeline.results.planes_folder import files_of_planes
 from lightpaint.pipeline.results.result_folder import ResultFolder
@@ -195,7 +195,8 @@ class Job:
         scale = Constraints(cd_per_unit=self.settings.cd_per_unit)
         all_constraints = all_constraints.and_then(scale)
         if self.settings.spectral:
-            scenes = spectral_scenes(scenes, all_constraints)
+            observer = observer_of(self.settings.observer)
+            scenes = [spectral_scene(scene, all_constraints, observer) for scene in scenes]
         if scenes and bases:
             check_same_view(scenes[0], bases[0])
         check_places(self.placement, scenes)
@@ -325,7 +326,8 @@ class Job:
         if self.settings.planes is not None:
             files += files_of_planes(self.folder, self.settings.planes)
         reads = [file for target in targets for file in target.files]
-        reads += [Path(x) for x in (self.settings.planes,) if x is not None]
+        settings = self.settings
+        reads += [Path(x) for x in (settings.planes, settings.observer) if x is not None]
         reads += [file for scene in scenes for file in scene.read_files]
         others = (*self.given_bases, self.placement)
         reads += [Path(x.path) for x in others if isinstance(x, BasisFile | PlacementFile)]

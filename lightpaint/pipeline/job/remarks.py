@@ -38,6 +38,11 @@ def remarks_of_scene(scene: Scene, *, is_rendered: bool = True) -> list[str]:
         remarks.append(
             f"rendered with {scene.integrator_choice} instead of the scene's own integrator"
         )
+    if scene.is_spectral and (camera := scene.observer).is_camera:
+        remarks.append(
+            f"seen by the camera {camera.name}, whose colours in daylight differ from the eye's by "
+            f"a mean ΔE of {camera.color_error:.1f}"
+        )
     if obstacles := [f"{x.name!r} {x.obstacle}" for x in scene.emitters if x.obstacle]:
         remarks.append(f"not adjusted: {some_names(obstacles, '; ')}")
     if scene.is_spectral and (metals := scene.rgb_metals):

@@ -10,6 +10,7 @@ from lightpaint.lighting.algebra.method import Method
 from lightpaint.lighting.fit import Colors, Emitters, Fit, Space
 from lightpaint.scene.limits import MAX_SPP, MAX_TEXELS
 from lightpaint.scene.quality_presets import Quality, samples
+from lightpaint.sentences import Hint
 from lightpaint.validation import a, between, number, parse_share, whole
 
 #: Maximum number of rounds of rendering and solving again: a larger number is a typing error.
@@ -62,6 +63,8 @@ class Settings(Fit):
             as many as the lights file says, by default none.
         spectral: Whether to render with the spectra of the lamps' emitters, in the lights file, and
             find a drive for each; needs a scene.
+        observer: Path of a table with the sensitivities of a camera, which sees the picture in
+            place of the eye; with `spectral`.
         move_lights: Whether to move the lights that may move.
         animate: True to find a lighting for each painted frame of a shot, and lights that change
             smoothly between them, instead of one lighting for all.
@@ -226,6 +229,17 @@ class Settings(Fit):
             theme="Lights",
         ),
     ] = False
+    observer: Annotated[
+        str | None,
+        a(str, "the path of a table of sensitivities"),
+        Option(
+            "--observer FILE",
+            "with --spectral: the camera that sees the picture, by a table of nanometres and the "
+            "sensitivities of red, green and blue",
+            default="the eye",
+            theme="Lights",
+        ),
+    ] = None
     move_lights: Annotated[
         bool,
         Option(
@@ -348,6 +362,11 @@ class Settings(Fit):
                 f"verify is False and verify_spp {self.verify_spp}: expected either no "
                 "verification, or its samples"
             )
+        if self.observer is not None and not self.spectral:
+            raise LightpaintError(
+                f"observer is {self.observer!r}, and a camera sees spectra alone: also pass ",
+                Hint("spectral", True),
+            )
         if self.resolution is not None:
             from lightpaint.scene.properties.film import check_resolution  # late: it needs NumPy
 
@@ -404,6 +423,7 @@ class SettingsByName(TypedDict, total=False):
     suggest: int
     sun: int | None
     spectral: bool
+    observer: str | None
     move_lights: bool
     animate: bool
     cd_per_unit: float | None

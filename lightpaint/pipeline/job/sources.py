@@ -16,7 +16,9 @@ from lightpaint.basis.lightgroups.light_groups import LightGroups, read_light_gr
 from lightpaint.colour.display.view_transform import TransformChoice
 from lightpaint.errors import BasisError
 from lightpaint.keywords import keywords
+from lightpaint.lighting.constraints.constraints_file import constraints_of
 from lightpaint.pipeline.job.settings import Settings
+from lightpaint.pipeline.job.spectral_job import observer_of, spectral_scene
 from lightpaint.placement.placement import PlacementRecord, read_placement
 from lightpaint.scene.scene import Scene
 from lightpaint.scene.scene_reader import load_scene
@@ -28,7 +30,7 @@ from lightpaint.target.target_reader import Paint, read_over_look, read_target
 SAMPLING_SETTINGS = ("spp", "exact_spp", "time_s", "error", "quality", "resolution")
 RENDER_SETTINGS = (
     *SAMPLING_SETTINGS,
-    *("refine", "suggest", "sun", "planes", "spectral", "verify_spp"),
+    *("refine", "suggest", "sun", "planes", "spectral", "observer", "verify_spp"),
 )
 NOT_IN_GROUPS = (*RENDER_SETTINGS, "seed", "noise_correction", "cd_per_unit", "emitters")
 
@@ -71,6 +73,9 @@ class SceneFile(ReadOnce):
         symmetric: Names of those whose images are symmetric.
         map_size: Columns and rows of their images in the relit scene, `1024x512`.
         lamps: Names or patterns of lights whose colour may lie outside Rec.709.
+        spectral: Whether each emitter of its lamps is a light, under its spectrum in the lights
+            file.
+        observer: With `spectral`, the table of a camera's sensitivities; None for the eye.
 
     Examples:
         >>> lp.SceneFile("room.xml").content.size
@@ -92,11 +97,24 @@ class SceneFile(ReadOnce):
     symmetric: Sequence[str] | None = None
     map_size: str | None = None
     lamps: Sequence[str] = ()
+    spectral: bool = False
+    observer: str | None = None
 
     @cached_property
     def content(self) -> Scene:
         """The scene, loaded on first use."""
-        return load_scene(**vars_of(self))
+        fields = vars_of(self)
+        spectral, observer = fields.pop("spectral"), fields.pop("observer")
+        scene = load_scene(**fields)
+        if not spectral:
+            return scene
+        return spectral_scene(scene, constraints_of(scene.requests), observer_of(observer))
+
+    @property
+    def read_files(self) -> tuple[Path, ...]:
+        """All files of the scene, and that of its observer."""
+        observers = [] if self.observer is None else [Path(self.observer)]
+        return (*self.content.read_files, *observers)
 
 
 @keywords()

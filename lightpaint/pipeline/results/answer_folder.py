@@ -69,7 +69,11 @@ def write_answer(
 
 
 def with_places(lighting: Lighting, scene: Scene | None) -> Lighting:
-    """Return a lighting that says where lights are, those of `scene` if it does not."""
+    """Return a lighting that says where lights are, those of `scene` if it does not, and what sees
+    the scene with spectra.
+    """
+    if scene is not None and scene.is_spectral:
+        lighting = replace(lighting, observer=scene.observer)
     if scene is None or lighting.places:
         return lighting
     return replace(lighting, places=scene.emitter_places, up=scene.up)
@@ -128,4 +132,4 @@ def reload_relit(relit: Scene, path: Path, sensor: int) -> Scene:
         use_lights_file=False,
         lamps=["*"],
     )
-    return replace(scene, is_spectral=relit.is_spectral)
+    return replace(scene, is_spectral=relit.is_spectral, observer=relit.observer)

@@ -2,10 +2,11 @@
 
 import json
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import asdict, dataclass, replace
 from pathlib import Path
 
 from lightpaint.basis.basis import Basis, Origin
+from lightpaint.colour.spectra.observer import EYE, Observer
 from lightpaint.display_text import some_names
 from lightpaint.errors import ImageError, OutputError, SceneError
 from lightpaint.files import is_name, one_line, write_bytes, write_text
@@ -196,6 +197,8 @@ def write_predicted(
     view = {"sensor": origin.sensor, "spp": spp, "basis_spp": origin.spp, **film, **parameters}
     if scene is not None and scene.is_spectral:
         view["is_spectral"] = True
+        if scene.observer.is_camera:
+            view["observer"] = asdict(scene.observer)
     write_estimate(path, predicted, {VIEW_KEY: json.dumps(view)})
 
 
@@ -304,7 +307,7 @@ def verify_result(
         lamps=["*"],
     )
     if view.is_spectral:
-        relit = replace(relit, is_spectral=True)
+        relit = replace(relit, is_spectral=True, observer=view.observer)
     if view.width is not None and view.height is not None:
         film = (view.height, view.width)
         # A scene that was edited by hand may have another film, which `verify` refuses.
@@ -326,7 +329,7 @@ class _RecordedView:
 
     spp: samples per pixel. width, height: film of the verification; None for the whole film.
     parameters: values of `$name` parameters of the scene. is_spectral: whether it is rendered with
-    spectra.
+    spectra. observer: what sees these.
     """
 
     sensor: str | None = None
@@ -335,6 +338,7 @@ class _RecordedView:
     height: int | None = None
     parameters: Mapping[str, str] | None = None
     is_spectral: bool = False
+    observer: Observer = EYE
 
     def __post_init__(self) -> None:
         if self.spp == 0:

@@ -140,6 +140,7 @@ def render_table(
         ("Image", f"{width} × {height} pixels{_full_size(basis, verification)}"),
         ("Basis", f"{origin.method}, {_samples(basis)}"),
         ("Integrator", f"{origin.integrator}, not the scene's own" if origin.integrator else ""),
+        ("Observer", origin.observer),
         ("Emitters seen directly", f"in {emitter_pixels} pixels{_seen_note(ignored_pixels)}"),
     ]
     missed, noise = relative_residual(solution), noise_residual(solution, predicted)

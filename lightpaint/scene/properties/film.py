@@ -17,6 +17,7 @@ from lightpaint.display_text import some_names
 from lightpaint.errors import SceneError
 from lightpaint.images.pixel_blocks import blocks_in, left_over, whole_factor
 from lightpaint.scene.limits import MAX_PIXELS, MAX_SPP
+from lightpaint.scene.properties.observed_spectra import Bands
 
 #: Maximum number of sizes that an error lists.
 LISTED_SIZES = 8
@@ -63,21 +64,24 @@ class Film:
         """
         return self.block**2
 
-    def load(self) -> Any:
-        """Create a Mitsuba film with a box filter and RGB float32 pixels, covering all blocks."""
+    def load(self, bands: Bands | None = None) -> Any:
+        """Create a Mitsuba film with a box filter and float32 pixels, covering all blocks.
+
+        Its pixels are RGB or, in a spectral variant, those of `bands`.
+        """
         import mitsuba as mi
 
         width, height = (side * self.block for side in self.pixels)
+        rgb = {"type": "hdrfilm", "pixel_format": "rgb"}
         return mi.load_dict(
             {
-                "type": "hdrfilm",
+                **(rgb if bands is None else {"type": "specfilm", **bands.channels()}),
                 "width": self.size[0],
                 "height": self.size[1],
                 "crop_width": width,
                 "crop_height": height,
                 "crop_offset_x": self.crop_offset[0],
                 "crop_offset_y": self.crop_offset[1],
-                "pixel_format": "rgb",
                 "component_format": "float32",
                 "rfilter": {"type": "box"},
             }

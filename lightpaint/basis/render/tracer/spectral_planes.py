@@ -2,8 +2,8 @@
 
 The scene is loaded with all lamps at white, whose spectrum is D65. The colour that a path adds to
 the plane of an emitter is a sum over its wavelengths: its light there relative to D65, times the
-emitter's power, times the CIE's standard observer of 1931, in linear Rec.709. So one path serves
-all emitters of a lamp.
+emitter's power, times the response of the observer, in linear Rec.709. So one path serves all
+emitters of a lamp.
 
 Import this module after setting a Dr.Jit variant, since its array types do not exist before.
 """
@@ -19,8 +19,7 @@ import numpy as np
 from lightpaint.arrays import Doubles, Floats, aligned
 from lightpaint.basis.render.tracer.light_planes import LightPlanes
 from lightpaint.basis.render.tracer.wavelengths import BINS, FIRST_NM, PACKETS, SPACING
-from lightpaint.colour.planckian_locus import matching_functions
-from lightpaint.colour.primaries import REC709, rgb_to_xyz
+from lightpaint.colour.spectra.observer import EYE, Observer
 from lightpaint.colour.spectra.spectrum import WAVELENGTHS, Spectrum
 from lightpaint.scene.scene import Scene
 
@@ -32,7 +31,7 @@ class ColorTables:
     """
 
     def __init__(self, scene: Scene, light_of: Any) -> None:
-        tables = [_color_table(light.spectrum) for light in scene.lights]
+        tables = [_color_table(light.spectrum, scene.observer) for light in scene.lights]
         padded = np.concatenate([np.array(tables), np.zeros((len(tables), BINS, 1))], axis=2)
         self._colors = mi.Float(aligned(padded.ravel(), np.float32))
         # The planes of a lamp follow one another.
@@ -85,20 +84,19 @@ class SpectralPlanes(LightPlanes):
             active &= plane < last
 
 
-def _color_table(spectrum: Spectrum | None) -> Doubles:
+def _color_table(spectrum: Spectrum | None, observer: Observer) -> Doubles:
     """Return the linear Rec.709 (BINS, 3) of light of 1 in each bin, for one wavelength of a path.
 
-    spectrum: of an emitter, whose light is relative to D65; None for light as it is in the scene.
+    spectrum: of an emitter, whose light is relative to D65, for luminance 1; None for light as it
+    is in the scene.
     """
     waves: Doubles = FIRST_NM + 0.5 + np.arange(BINS, dtype=np.float64)
-    metres, observer = matching_functions()
-    xyz = np.stack([np.interp(waves, metres * 1e9, x) for x in observer.T], axis=1)
     if spectrum is None:
-        xyz *= mi.MI_CIE_Y_NORMALIZATION
+        share = np.full(BINS, mi.MI_CIE_Y_NORMALIZATION)
     else:
         powers = np.interp(waves, WAVELENGTHS, spectrum)
-        xyz *= (powers / (powers @ xyz[:, 1]) / _d65(waves))[:, None]
-    return np.asarray(SPACING * np.linalg.solve(rgb_to_xyz(REC709), xyz.T).T)
+        share = powers / (powers @ EYE.curves(waves)[:, 1]) / _d65(waves)
+    return np.asarray(SPACING * share[:, None] * observer.response(waves))
 
 
 def _d65(waves: Doubles) -> Doubles:
