@@ -1,45 +1,31 @@
 """A solve with spectra from files to files, and what does not go with it."""
 
 import json
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 import pytest
 from command import run_refused, spawn, succeed
-from spectral_room import DRIVES, LEVELS, write_spectral_room
+from spectral_room import DRIVES, paint_spectral_room, write_spectral_room
 from webs import batwing, cosine, ies_text, street, write_web
 
 from lightpaint import Constraints, Job, Painting, SceneFile, Settings, run
-from lightpaint.basis.render.basis_render import render_basis
-from lightpaint.basis.render.render_origin import basis_lights
+from lightpaint.colour.spectra.observer import EYE, read_observer
 from lightpaint.errors import LightpaintError, SceneError
 from lightpaint.images.formats.exr import write_rgb
 from lightpaint.lighting.answer.lighting_file import read_lighting
-from lightpaint.lighting.constraints.constraints_file import constraints_of
-from lightpaint.lighting.unknowns.reduction import lamps_by_name
 from lightpaint.pipeline.results.results import verify_result
 from lightpaint.relit.export.spectra_table import spectra_csv
+from lightpaint.relit.relight import relight
 from lightpaint.scene.scene_reader import load_scene
+from lightpaint.scene.scene_render import Stream, render
 
 
 @pytest.fixture
 def room(tmp_path: Path) -> Path:
     """A room whose lamps have three LEDs each, and a sky that stays."""
     return write_spectral_room(tmp_path)
-
-
-def _paint(path: Path) -> Path:
-    """Write the picture of DRIVES."""
-    scene = load_scene(path)
-    lamps = lamps_by_name(constraints_of(scene.requests), basis_lights(scene))
-    basis = render_basis(scene.with_lamps(lamps), spp=256, seed=3)
-    weights = np.ones((len(basis.lights), 3))
-    for lamp, drives in DRIVES.items():
-        for (name, level), drive in zip(LEVELS.items(), drives, strict=True):
-            weights[basis.names.index(f"{lamp}/{name}")] = level * drive
-    picture = path.with_name("painting.exr")
-    write_rgb(picture, basis.mix(weights).astype(np.float32))
-    return picture
 
 
 def _job(path: Path, picture: Path, **fields: object) -> Job:
@@ -55,7 +41,7 @@ def _job(path: Path, picture: Path, **fields: object) -> Job:
 
 
 def test_a_painting_becomes_a_drive_of_each_emitter(room: Path):
-    [look] = run(_job(room, _paint(room), verify_spp=256))
+    [look] = run(_job(room, paint_spectral_room(room), verify_spp=256))
     assert look.verification is not None
     assert look.verification.agrees
     # With other random numbers, from the files alone.
@@ -72,6 +58,10 @@ def test_a_painting_becomes_a_drive_of_each_emitter(room: Path):
     assert text.count('<spectrum name="') == len(DRIVES)
     assert spectra_csv(lighting).splitlines()[0] == "nm,panel,bulb"
 
+
+#: A camera, of Gaussians, and its wavelengths.
+CAMERA_WAVES = np.arange(380, 781, 10.0)
+CAMERA = np.stack([np.exp(-0.5 * ((CAMERA_WAVES - x) / 35) ** 2) for x in (600, 540, 460)], axis=1)
 
 WRONG = {
     "suggest": ({"suggest": 1}, "spectral=True does not go with suggest"),
@@ -104,13 +94,50 @@ def test_a_lamp_without_spectra_is_named(room: Path):
 
 def test_a_lamp_that_is_off_is_verified_as_well(room: Path) -> None:
     """And reasons for what is missed name the lamp, not its emitters."""
-    picture = _paint(room)
+    picture = paint_spectral_room(room)
     off = Constraints.of({"bulb": {"off": True}})
     [look] = run(_job(room, picture, constraints=off))
     lighting = read_lighting(room.with_name("out") / "lighting.json")
     assert lighting.emission["bulb"] == (0, 0, 0)
     assert look.verification is not None
     assert look.verification.agrees
+
+
+def test_a_camera_sees_its_own_picture(room: Path) -> None:
+    """It is solved, verified, relit and verified again as the camera sees it."""
+    table = np.column_stack([CAMERA_WAVES, CAMERA])
+    np.savetxt(room.with_name("camera.csv"), table, delimiter=",", header="nm,R,G,B")
+    camera = {"observer": str(room.with_name("camera.csv"))}
+    job = _job(room, paint_spectral_room(room, read_observer(Path(camera["observer"]))), **camera)
+    assert any("seen by the camera camera.csv" in str(x) for x in job.remarks)
+    [look] = run(job)
+    assert look.basis.origin.observer == "camera.csv"
+    assert look.verification is not None
+    assert look.verification.agrees
+    # Without the lights file and the camera's.
+    room.with_name("camera.csv").unlink()
+    assert verify_result(room.with_name("out")).agrees
+    lighting = read_lighting(room.with_name("out") / "lighting.json")
+    assert lighting.observer.name == "camera.csv"
+    for lamp, drives in DRIVES.items():
+        assert list(lighting[lamp].drives.values()) == pytest.approx(drives, abs=0.03)
+    relit = relight(load_scene(room), lighting, room.with_name("again.xml"))
+    picture = render(relit, spp=256, seed=5, stream=Stream.SECOND_VERIFICATION)
+    difference = picture.image.mean(axis=(0, 1)) - look.predicted.image.mean(axis=(0, 1))
+    # Four standard errors of each channel's mean over the picture.
+    noise = np.hypot(
+        *(np.square(x.half_difference).sum(axis=(0, 1)) for x in (picture, look.predicted))
+    )
+    assert (np.abs(difference) < 4 * np.sqrt(noise) / picture.image[..., 0].size).all()
+    # The eye sees something else.
+    eye = replace(relit, observer=EYE)
+    seen = render(eye, spp=256, seed=5, stream=Stream.SECOND_VERIFICATION).image.mean(axis=(0, 1))
+    assert (np.abs(seen - picture.image.mean(axis=(0, 1))) > 4 * np.abs(difference)).any()
+
+
+def test_a_camera_needs_spectra() -> None:
+    with pytest.raises(LightpaintError, match="a camera sees spectra alone: also pass spectral=T"):
+        Settings(observer="camera.csv")
 
 
 #: Photometric webs: of positive spots, of spots of which some are negative, and without an axis.
@@ -127,7 +154,7 @@ def test_a_luminaire_mixes_spectra_into_its_web(web: str, room: Path) -> None:
     file = room.with_name("room.lights.toml")
     text = file.read_text().replace("[light.bulb]", '[light.bulb]\nphotometry = "lamp.ies"')
     file.write_text("cd_per_unit = 1000\n" + text)
-    picture = _paint(room)
+    picture = paint_spectral_room(room)
     [look] = run(_job(room, picture, verify_spp=256))
     assert look.verification is not None
     assert look.verification.agrees
