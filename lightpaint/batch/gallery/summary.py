@@ -59,8 +59,10 @@ COLUMNS = (
     "fingerprint",
 )
 
-#: Suffixes of a light's columns: luminance, emission, kelvin.
+#: Suffixes of a light's columns: luminance, emission, kelvin; and, where the spectra of a lamp are
+#: known in some look, its distance from Planck's locus, and how it renders colours.
 LIGHT_COLUMNS = ("", " R", " G", " B", " K")
+RENDERING_COLUMNS = (" Duv", " Ra", " Rf")
 
 #: Columns of a plane: its mean illuminance, and the ratio of its least to that. And the columns of
 #: the glare of an observer, of the power of all lamps, in watts, and of the planes that do not get
@@ -76,7 +78,8 @@ class LightRow:
     """A light in a look.
 
     y: luminance of its emission, in the scene's unit. hex: its colour. share: of its image, if it
-    is a texel. drives: of a lamp of emitters, by their names.
+    is a texel. drives: of a lamp of emitters, by their names. ra, rf: how a lamp of known spectra
+    renders colours, as in report.json.
     """
 
     name: str
@@ -88,6 +91,8 @@ class LightRow:
     stops: float | None = None
     share: float | None = None
     drives: Mapping[str, float] = field(default_factory=dict)
+    ra: float | None = None
+    rf: float | None = None
 
 
 @dataclass(frozen=True)
@@ -251,7 +256,9 @@ def lights_of_answer(folder: Path, report: Mapping[str, Any]) -> tuple[LightRow,
             measures = lighting.photometry(light)
             stops = (report.get("lights") or {}).get(light.name, {}).get("stops")
             values = (light.emission, measures.hex, measures.kelvin, measures.duv, stops)
-            row = LightRow(light.name, measures.y, *values, share=shares.get(k))
+            rendering = (report.get("rendering") or {}).get(light.name, {})
+            indices = {key: rendering.get(key) for key in ("ra", "rf")}
+            row = LightRow(light.name, measures.y, *values, share=shares.get(k), **indices)
             rows.append(replace(row, drives=dict(light.drives)))
         return tuple(rows)
     return ()
@@ -305,11 +312,7 @@ def watts_of_answer(folder: Path) -> float | None:
     """
     with suppress(LightpaintError):
         lights = read_lighting(folder / "lighting.json").lights
-        watts = [
-            light.lamp.watts_for(np.array(light.emission))
-            for light in lights
-            if light.lamp is not None
-        ]
+        watts = [light.watts for light in lights if light.lamp is not None]
         known = [x for x in watts if x is not None]
         return sum(known) if len(known) == len(watts) > 0 else None
     return None
@@ -392,10 +395,10 @@ def summary_csv(rows: list[SummaryRow]) -> str:
     """Return summary.csv: a line for each row, five columns for each light, and one for each drive.
 
     These are the luminance of its emission, under its name, the emission in R, G and B, and its
-    colour temperature in kelvin, if it has one; behind all, the drives of lamps of emitters. Where
-    illuminance was measured, two columns for each plane come before them, one for the UGR of each
-    observer, one for the power of all lamps, and one for planes that do not get what was wished
-    for.
+    colour temperature in kelvin, if it has one, and where the spectra of lamps are known Duv, Ra and
+    Rf; behind all, the drives of lamps of emitters. Where illuminance was measured, two columns for
+    each plane come before them, one for the UGR of each observer, one for the power of all lamps,
+    and one for planes that do not get what was wished for.
     """
     names = list(dict.fromkeys(light.name for row in rows for light in row.lights))
     planes = list(dict.fromkeys(plane.name for row in rows for plane in row.planes))
@@ -405,15 +408,17 @@ def summary_csv(rows: list[SummaryRow]) -> str:
     measured = [f"{name}{ending}" for name in planes for ending in PLANE_COLUMNS]
     measured += [f"{name}{GLARE_COLUMN}" for name in observers]
     measured += [POWER_COLUMN, MISSED_COLUMN] if planes else []
-    columns = _light_columns(names, taken={*COLUMNS, *measured})
+    has_spectra = any(light.rf is not None for row in rows for light in row.lights)
+    endings = LIGHT_COLUMNS + (RENDERING_COLUMNS if has_spectra else ())
+    columns = _light_columns(names, endings, taken={*COLUMNS, *measured})
     drives = list(dict.fromkeys((x.name, e) for row in rows for x in row.lights for e in x.drives))
     columns += [f"{name} drive {emitter}" for name, emitter in drives]
     table.writerow([*COLUMNS, *map(plain_cell, measured), *map(plain_cell, columns)])
     for row in rows:
-        lights = {light.name: _light_cells(light) for light in row.lights}
+        lights = {light.name: _light_cells(light)[: len(endings)] for light in row.lights}
         cells = [_cell(getattr(row, column)) for column in COLUMNS]
         cells += _measured_cells(row, planes, observers)
-        empty_cells = [""] * len(LIGHT_COLUMNS)
+        empty_cells = [""] * len(endings)
         cells += [x for name in names for x in lights.get(name, empty_cells)]
         of_lamps = {light.name: light.drives for light in row.lights}
         cells += [_cell(of_lamps.get(name, {}).get(emitter)) for name, emitter in drives]
@@ -432,28 +437,30 @@ def _measured_cells(row: SummaryRow, planes: Sequence[str], observers: Sequence[
     return [_cell(x) for x in [*values, row.watts, "; ".join(row.missed_planes)]] if planes else []
 
 
-def _light_columns(names: Sequence[str], taken: set[str]) -> list[str]:
-    """Return the headings of five columns for each light, no two of them equal.
+def _light_columns(names: Sequence[str], endings: Sequence[str], taken: set[str]) -> list[str]:
+    """Return the headings of the columns of each light, no two of them equal.
 
-    taken: the other columns.
+    endings: of its columns. taken: the other columns.
     They begin with its name; with `light` before it where that would be the heading of another
     column, as for lights called `state`, or `key` beside `key R`.
     """
     taken, headings = set(taken), list[str]()
     for name in sorted(names, key=len):
         own = name
-        while taken & {f"{own}{ending}" for ending in LIGHT_COLUMNS}:
+        while taken & {f"{own}{ending}" for ending in endings}:
             own = f"light {own}"
-        taken |= {f"{own}{ending}" for ending in LIGHT_COLUMNS}
+        taken |= {f"{own}{ending}" for ending in endings}
         headings.append(own)
     heading_of = dict(zip(sorted(names, key=len), headings, strict=True))
-    return [f"{heading_of[name]}{ending}" for name in names for ending in LIGHT_COLUMNS]
+    return [f"{heading_of[name]}{ending}" for name in names for ending in endings]
 
 
 def _light_cells(light: LightRow) -> list[str]:
     rgb = light.emission or ("", "", "")
     kelvin = "" if light.kelvin is None else f"{light.kelvin:.0f}"
-    return [f"{light.y:.6g}", *(x if x == "" else f"{x:.6g}" for x in rgb), kelvin]
+    duv = "" if light.rf is None or light.duv is None else f"{light.duv:.4f}"
+    indices = ["" if x is None else f"{x:.1f}" for x in (light.ra, light.rf)]
+    return [f"{light.y:.6g}", *(x if x == "" else f"{x:.6g}" for x in rgb), kelvin, duv, *indices]
 
 
 def _cell(value: Any) -> str:

@@ -201,6 +201,14 @@ class LightSetting:
         errors = self.lamp.drive_errors(drives, self.standard_error)
         return dict(zip(self.drives, errors, strict=True))
 
+    @property
+    def watts(self) -> float | None:
+        """Power of its emitters; None if that of one is unknown."""
+        known = [] if self.lamp is None else [x.watts for x in self.lamp.emitters]
+        if not known or None in known:
+            return None
+        return sum(x * (w or 0.0) for x, w in zip(self.drives.values(), known, strict=True))
+
     @cached_property
     def powers(self) -> Doubles | None:
         """(81,), the spectrum of its emission; None if a spectrum of its emitters is unknown."""

@@ -4,7 +4,7 @@ Constraints speak of lamps. So the unknowns are first those of lamps, with an em
 each unknown moves the weights of the pictures of the lamp's emitters instead.
 """
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from itertools import groupby
 
@@ -14,6 +14,7 @@ from lightpaint.arrays import Doubles, as_rgb
 from lightpaint.basis.lights import BasisLight
 from lightpaint.colour.color import luminance
 from lightpaint.colour.lamp import Lamp
+from lightpaint.display_text import some_names
 from lightpaint.errors import ConstraintError
 from lightpaint.lighting.unknowns.knobs import Knob, Unknown
 
@@ -36,6 +37,23 @@ class WholeLamps:
     def has_parts(self) -> bool:
         """True if some light is an emitter of a lamp."""
         return any(light.lamp for light in self.lights)
+
+    def check_emitters(self, lights: Sequence[BasisLight], lamps: Mapping[int, Lamp]) -> None:
+        """Raise ConstraintError if a lamp has other emitters than those whose pictures there are.
+
+        lights: of which these are. lamps: by the index of the whole light.
+        """
+        for k, lamp in lamps.items():
+            own = self.lights[k]
+            if not own.lamp:
+                continue
+            rendered = [lights[i].name.removeprefix(f"{own.name}/") for i in self.parts[k]]
+            if rendered != list(lamp.names):
+                raise ConstraintError(
+                    f"light {own.name!r} has the emitters {some_names(lamp.names)}, and was "
+                    f"rendered with {some_names(rendered)}: give it those in the lights file, and "
+                    "render again"
+                )
 
     def weights(self, k: int, lamp: Lamp | None, emission: Doubles) -> Doubles:
         """Return the weights (parts, 3) at which light k has an emission (3,)."""

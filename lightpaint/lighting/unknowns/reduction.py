@@ -440,6 +440,7 @@ def _reduce_parts(constraints: Constraints, lights: Sequence[BasisLight]) -> Red
         return _reduce_to(constraints, lights)
     constraints = of_lamps
     _check_ties(constraints, lights)
+    whole.check_emitters(lights, lamps)
     colored = [
         replace(light, emission=as_rgb(emission_of_parts([lights[i] for i in parts], lamps[k])))
         if k in lamps

@@ -6,16 +6,18 @@ from pathlib import Path
 import mitsuba as mi
 import numpy as np
 import pytest
-from led_rooms import DRIVES, write_led_room
 from nightly import nightly
+from spectral_room import DRIVES, write_spectral_room
 
 from lightpaint.basis.basis import Basis
 from lightpaint.basis.render.basis_render import render_basis
 from lightpaint.basis.render.render_origin import basis_lights
-from lightpaint.colour.color_difference import delta_e
+from lightpaint.colour.color import luminance
+from lightpaint.colour.color_difference import ciede2000, delta_e, lab
 from lightpaint.colour.lamp import Lamp, LampEmitter
+from lightpaint.colour.primaries import colour_science
 from lightpaint.colour.spectra.observer import EYE, Observer
-from lightpaint.colour.spectra.spectrum import WAVELENGTHS, spectrum_of
+from lightpaint.colour.spectra.spectrum import WAVELENGTHS, Spectrum, spectrum_of
 from lightpaint.colour.spectra.spectrum_source import named_spectrum
 from lightpaint.lighting.answer.combination import combine
 from lightpaint.lighting.answer.lighting import Lighting
@@ -26,7 +28,7 @@ from lightpaint.relit.detection_power import LightShares, with_light_tests
 from lightpaint.relit.relight import relight
 from lightpaint.relit.verification_render import verify
 from lightpaint.scene.properties import observed_spectra
-from lightpaint.scene.runtime.variant import spectral_variant
+from lightpaint.scene.runtime.variant import spectral_variant, use_variant
 from lightpaint.scene.scene_reader import load_scene
 from lightpaint.scene.scene_render import Stream, render
 
@@ -131,13 +133,50 @@ def test_a_conductor_reflects_by_its_eta_and_k(tmp_path: Path):
     assert found == pytest.approx(expected, rel=2e-3)  # bins of 1 nm
 
 
+def _gaussian(peak: float, width: float) -> Spectrum:
+    return spectrum_of(WAVES, np.exp(-0.5 * ((WAVES - peak) / width) ** 2))
+
+
+LEDS = {"red": LED, "green": _gaussian(523, 14), "blue": _gaussian(455, 10)}
+#: A blue LED with a phosphor.
+PHOSPHOR = np.exp(-0.5 * ((WAVES - 575) / 55) ** 2)
+WHITE = spectrum_of(WAVES, PHOSPHOR + 0.5 * np.exp(-0.5 * ((WAVES - 450) / 9) ** 2))
+
+
+@pytest.mark.parametrize("name", [*LEDS, "white"])
+def test_sixteen_paths_show_colours_as_all_wavelengths_do(name: str):
+    """Of 190 surfaces, whose greatest difference is below 0.3."""
+    use_variant()
+    from lightpaint.basis.render.tracer.wavelengths import (
+        BINS,
+        FIRST_NM,
+        packets_for,
+        spacing_of,
+    )
+
+    spectrum = {**LEDS, "white": WHITE}[name]
+    packets = packets_for([spectrum])
+    assert packets == (2 if name == "white" else 4)
+    assert packets_for([spectrum, LED]) == 4
+    shifts = ((np.arange(16) + 0.5) / 16 * spacing_of(packets)).astype(int)
+    bins = (shifts[:, None] + spacing_of(packets) * np.arange(4 * packets)).ravel()
+    fine = FIRST_NM + 0.5 + np.arange(BINS)
+    training = colour_science().characterisation.read_training_data_rawtoaces_v1()
+    values = np.array(training.values, np.float64).T
+    surfaces = np.array([np.interp(fine, WAVELENGTHS, x) for x in values])
+    light = np.interp(fine, WAVELENGTHS, spectrum)[:, None] * EYE.response(fine)
+    light /= luminance(light.sum(axis=0))
+    few = surfaces[:, bins] @ light[bins] * (BINS / len(bins))
+    assert ciede2000(lab(few), lab(surfaces @ light)).max() < 0.3
+
+
 @pytest.fixture(scope="module")
 def relit_room(tmp_path_factory: pytest.TempPathFactory):
     """A room of LEDs, predicted with hardly any noise; its relit scene; the light of its
     LEDs, and the picture of a red one.
     """
     folder = tmp_path_factory.mktemp("room")
-    scene = load_scene(write_led_room(folder))
+    scene = load_scene(write_spectral_room(folder))
     lamps = lamps_by_name(constraints_of(scene.requests), basis_lights(scene))
     basis = render_basis(scene.with_lamps(lamps), spp=4096, seed=1)
     weights, parts = np.ones((len(basis.lights), 3)), {}

@@ -34,7 +34,7 @@ from lightpaint.basis.render.tracer.light_planes import LightPlanes, lights_by_i
 from lightpaint.basis.render.tracer.path_tracer import Rules, View, trace_paths, trace_samples
 from lightpaint.basis.render.tracer.point_surfaces import PointSurfaces
 from lightpaint.basis.render.tracer.sobol import SobolPairs
-from lightpaint.basis.render.tracer.spectral_planes import ColorTables, SpectralPlanes
+from lightpaint.basis.render.tracer.spectral_planes import ColorTables, SpectralPlanes, packets_of
 from lightpaint.basis.render.tracer.texel_table import TexelTable
 from lightpaint.basis.render.tracer.wavelengths import RgbPaths, SpectralPaths
 from lightpaint.scene.runtime.kernel_threads import kernels
@@ -223,7 +223,7 @@ def view_of(scene: Scene, loaded: Any) -> View:
     camera = scene.camera(loaded)
     width, height = (int(v) // scene.film.block for v in camera.film().crop_size())
     points = None if scene.points is None else PointSurfaces(scene.points)
-    paths = SpectralPaths() if scene.is_spectral else RgbPaths()
+    paths = SpectralPaths(packets_of(scene)) if scene.is_spectral else RgbPaths()
     return View(loaded, camera, width, height, points, paths)
 
 

@@ -18,10 +18,15 @@ import numpy as np
 
 from lightpaint.arrays import Doubles, Floats, aligned
 from lightpaint.basis.render.tracer.light_planes import LightPlanes
-from lightpaint.basis.render.tracer.wavelengths import BINS, FIRST_NM, PACKETS, SPACING
+from lightpaint.basis.render.tracer.wavelengths import BINS, FIRST_NM, packets_for, spacing_of
 from lightpaint.colour.spectra.observer import EYE, Observer
 from lightpaint.colour.spectra.spectrum import WAVELENGTHS, Spectrum
 from lightpaint.scene.scene import Scene
+
+
+def packets_of(scene: Scene) -> int:
+    """Return the number of packets of wavelengths of the paths of a spectral scene."""
+    return packets_for(x.spectrum for x in scene.lights if x.spectrum is not None)
 
 
 class ColorTables:
@@ -31,7 +36,8 @@ class ColorTables:
     """
 
     def __init__(self, scene: Scene, light_of: Any) -> None:
-        tables = [_color_table(light.spectrum, scene.observer) for light in scene.lights]
+        spacing = spacing_of(packets_of(scene))
+        tables = [spacing * _color_table(x.spectrum, scene.observer) for x in scene.lights]
         padded = np.concatenate([np.array(tables), np.zeros((len(tables), BINS, 1))], axis=2)
         self._colors = mi.Float(aligned(padded.ravel(), np.float32))
         # The planes of a lamp follow one another.
@@ -42,8 +48,10 @@ class ColorTables:
     def color(self, plane, light, active):
         """Return the RGB of light at the wavelengths of paths for a plane."""
         first, rgb = plane * BINS + light.first_bin, mi.Color3f(0)
-        for k in range(4 * PACKETS):
-            color = dr.gather(mi.Vector4f, self._colors, first + k * SPACING, active)
+        packets = len(light.packets)
+        for k in range(4 * packets):
+            place = first + k * spacing_of(packets)
+            color = dr.gather(mi.Vector4f, self._colors, place, active)
             value = light.at(k)
             rgb += mi.Color3f(value * color.x, value * color.y, value * color.z)
         return rgb
@@ -85,7 +93,7 @@ class SpectralPlanes(LightPlanes):
 
 
 def _color_table(spectrum: Spectrum | None, observer: Observer) -> Doubles:
-    """Return the linear Rec.709 (BINS, 3) of light of 1 in each bin, for one wavelength of a path.
+    """Return the linear Rec.709 (BINS, 3) of light of 1 in each bin.
 
     spectrum: of an emitter, whose light is relative to D65, for luminance 1; None for light as it
     is in the scene.
@@ -96,7 +104,7 @@ def _color_table(spectrum: Spectrum | None, observer: Observer) -> Doubles:
     else:
         powers = np.interp(waves, WAVELENGTHS, spectrum)
         share = powers / (powers @ EYE.curves(waves)[:, 1]) / _d65(waves)
-    return np.asarray(SPACING * share[:, None] * observer.response(waves))
+    return np.asarray(share[:, None] * observer.response(waves))
 
 
 def _d65(waves: Doubles) -> Doubles:

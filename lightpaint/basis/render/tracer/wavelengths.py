@@ -10,25 +10,47 @@ Import this module after setting a Dr.Jit variant, since its array types do not 
 
 # mypy: disable-error-code="no-untyped-def, no-untyped-call"
 
+from collections.abc import Iterable
 from typing import Any, NamedTuple
 
 import drjit as dr
 import mitsuba as mi
+import numpy as np
 
 from lightpaint.basis.render.tracer.sobol import TIME
+from lightpaint.colour.spectra.spectrum import STEP, Spectrum
 
 #: The first wavelength in nanometres, and the number of bins of 1 nm that follow.
 FIRST_NM, BINS = 380, 400
 
-#: Packets of four wavelengths, and the distance in nanometres between two wavelengths of a path.
-PACKETS = 4
-SPACING = BINS // (4 * PACKETS)
+#: Packets of four wavelengths of a path where all emitters are broad, and where one is narrow.
+BROAD_PACKETS, NARROW_PACKETS = 2, 4
+
+#: Width in nanometres of a broad spectrum: twice the distance between eight wavelengths.
+BROAD_NM = 100.0
+
+
+def packets_for(spectra: Iterable[Spectrum]) -> int:
+    """Return the number of packets that a path needs for emitters of these spectra.
+
+    Eight wavelengths show lamps of a white LED as cleanly as RGB does, and narrow LEDs with twice
+    the variance; sixteen show those as well (docs/benchmarks.md).
+    """
+    is_broad = all(width_of(x) >= BROAD_NM for x in spectra)
+    return BROAD_PACKETS if is_broad else NARROW_PACKETS
+
+
+def width_of(spectrum: Spectrum) -> float:
+    """Return the width in nanometres of an even spectrum whose power is as concentrated."""
+    power = np.array(spectrum)
+    return float(STEP * power.sum() ** 2 / np.square(power).sum())
 
 
 class PowerByWavelength(NamedTuple):
     """Light at the wavelengths of a path.
 
-    first_bin: bin of the first; others follow every SPACING. packets: values at four each.
+    first_bin: bin of the first; others follow at `spacing_of` their number. packets: values at four
+    each.
     """
 
     first_bin: Any
@@ -37,6 +59,11 @@ class PowerByWavelength(NamedTuple):
     def at(self, k: int):
         """Return the value at wavelength k."""
         return self.packets[k // 4][k % 4]
+
+
+def spacing_of(packets: int) -> int:
+    """Return the distance in bins between two wavelengths of a path."""
+    return BINS // (4 * packets)
 
 
 class RgbPaths:
@@ -68,34 +95,37 @@ class RgbPaths:
 
 
 class SpectralPaths(RgbPaths):
-    """Paths whose light is power at wavelengths. first_bin: of each path, if these are known."""
+    """Paths whose light is power at wavelengths.
 
-    packets = PACKETS
+    packets: of four wavelengths. first_bin: of each path, if these are known.
+    """
 
-    def __init__(self, first_bin=None) -> None:
-        self._first_bin = first_bin
+    def __init__(self, packets, first_bin=None) -> None:
+        self.packets, self._first_bin = packets, first_bin
 
     def along(self, numbers, term):
-        shift = mi.UInt32(numbers.pair(term, TIME).y * SPACING)
-        return SpectralPaths(dr.minimum(shift, SPACING - 1))
+        spacing = spacing_of(self.packets)
+        shift = mi.UInt32(numbers.pair(term, TIME).y * spacing)
+        return SpectralPaths(self.packets, dr.minimum(shift, spacing - 1))
 
     def at(self, si, packet):
-        first = mi.Float(self._first_bin) + (FIRST_NM + 0.5 + 4 * SPACING * packet)
+        spacing = spacing_of(self.packets)
+        first = mi.Float(self._first_bin) + (FIRST_NM + 0.5 + 4 * spacing * packet)
         there = mi.SurfaceInteraction3f(si)
-        there.wavelengths = mi.Spectrum(*(first + SPACING * k for k in range(4)))
+        there.wavelengths = mi.Spectrum(*(first + spacing * k for k in range(4)))
         return there
 
     def from_camera(self, weight):
         # The camera chose wavelengths of its own, whose weights do not belong to these.
         _, of_wavelengths = mi.sample_rgb_spectrum(mi.sample_shifted(mi.Float(0)))
-        return [mi.Spectrum(weight[0] / of_wavelengths[0])] * PACKETS
+        return [mi.Spectrum(weight[0] / of_wavelengths[0])] * self.packets
 
     def light(self, values):
         return PowerByWavelength(self._first_bin, values)
 
     def gray(self, values):
         total = sum(x[0] + x[1] + x[2] + x[3] for x in values)
-        return total * (1 / (4 * PACKETS))
+        return total * (1 / (4 * self.packets))
 
 
 def each_emission(waves, emitter, si, active):
