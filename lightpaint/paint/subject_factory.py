@@ -159,11 +159,15 @@ def _with_spectra(scene: Scene, *, settings: Settings, constraints: Constraints)
     """
     if not settings.spectral:
         return scene
-    from lightpaint.pipeline.job.spectral_job import check_spectral, spectral_scenes
+    from lightpaint.pipeline.job.spectral_job import (
+        check_spectral,
+        observer_of,
+        spectral_scene,
+    )
 
     every = constraints_of(scene.requests).and_then(constraints)
     check_spectral(settings, every)
-    return spectral_scenes([scene], every)[0]
+    return spectral_scene(scene, every, observer_of(settings.observer))
 
 
 def _check_size(basis: Basis, name: str) -> None:

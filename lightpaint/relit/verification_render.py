@@ -71,8 +71,8 @@ CHECKED, LARGE_SHARE = 0.65, 1 / 7
 #: Share of the picture's light that may stay unchecked although more samples would check it.
 UNCHECKED = 0.1
 
-#: How often the samples of a verification with spectra may be doubled. At equal samples lamps of
-#: narrow LEDs have two to four times the noise of the basis (docs/benchmarks.md).
+#: How often the samples of a verification with spectra may be doubled. At equal samples pictures of
+#: narrow LEDs have five to seven times the variance of the basis (docs/benchmarks.md).
 SPECTRAL_DOUBLINGS = 4
 
 #: Minimum samples per pixel of a verification; with fewer, a smaller film is just as good.

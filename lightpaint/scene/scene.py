@@ -53,7 +53,7 @@ from lightpaint.scene.properties.site import EmitterPlace, Site
 from lightpaint.scene.runtime.kernel_threads import kernels
 from lightpaint.scene.runtime.mitsuba_errors import mitsuba_errors, render_errors
 from lightpaint.scene.runtime.render_lock import MITSUBA
-from lightpaint.scene.runtime.variant import spectral_variant
+from lightpaint.scene.runtime.variant import is_in_spectra, spectral_variant
 from lightpaint.scene.scene_tree import ParsedScene, darkened, with_elements, with_motions
 
 _Result_T = TypeVar("_Result_T")
@@ -217,7 +217,7 @@ class Scene(SceneFiles, Shown):
 
     @property
     def _spectral_kind(self) -> str:
-        """What tells its renders with spectra from others, for identities; "" for RGB."""
+        """Text that tells its renders with spectra from others, for identities; "" for RGB."""
         if not self.is_spectral:
             return ""
         observer = self.observer
@@ -441,7 +441,8 @@ class Scene(SceneFiles, Shown):
         settings = settings_for(self.lights, self.emitters, named, scene=path, evenly=evenly)
         films = (self.film, *(view.film for view in views))
         bands = None
-        if self.is_spectral and not evenly:
+        # Questions of geometry load it in RGB.
+        if self.is_spectral and not evenly and is_in_spectra():
             emissions = [(x.node, x.kind.parameter) for x in self.emitters if x.kind is not None]
             bands = bands_of(self.parsed.state, emissions, self.observer)
         return self.parsed.instantiate(settings, *films, bands=bands)

@@ -395,10 +395,10 @@ def summary_csv(rows: list[SummaryRow]) -> str:
     """Return summary.csv: a line for each row, five columns for each light, and one for each drive.
 
     These are the luminance of its emission, under its name, the emission in R, G and B, and its
-    colour temperature in kelvin, if it has one, and where the spectra of lamps are known Duv, Ra and
-    Rf; behind all, the drives of lamps of emitters. Where illuminance was measured, two columns for
-    each plane come before them, one for the UGR of each observer, one for the power of all lamps,
-    and one for planes that do not get what was wished for.
+    colour temperature in kelvin, if it has one, and where the spectra of lamps are known Duv, Ra
+    and Rf; behind all, the drives of lamps of emitters. Where illuminance was measured, two columns
+    for each plane come before them, one for the UGR of each observer, one for the power of all
+    lamps, and one for planes that do not get what was wished for.
     """
     names = list(dict.fromkeys(light.name for row in rows for light in row.lights))
     planes = list(dict.fromkeys(plane.name for row in rows for plane in row.planes))

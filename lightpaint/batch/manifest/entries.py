@@ -179,8 +179,8 @@ class _Sources:
         if settings.get("spectral") is not True:
             return {}
         observer = settings.get("observer")
-        is_file = isinstance(observer, str)
-        return {"spectral": True, "observer": str(self._base / observer) if is_file else None}
+        path = str(self._base / observer) if isinstance(observer, str) else None
+        return {"spectral": True, "observer": path}
 
     def basis(self, look: Mapping[str, Any]) -> BasisFile | GroupsFile | None:
         file: BasisFile | GroupsFile

@@ -256,9 +256,16 @@ class Passes:
 
 def scene_with_paths(scene: SceneFile, move: PathMap) -> SceneFile:
     """Return the same scene with other paths."""
-    others = {name: getattr(scene, name) for name in ("lights_file", "observer")}
-    moved = {name: None if path is None else move(path) for name, path in others.items()}
-    return replace(scene, path=move(scene.path), **moved)
+
+    def moved(path: str | None) -> str | None:
+        return None if path is None else move(path)
+
+    return replace(
+        scene,
+        path=move(scene.path),
+        lights_file=moved(scene.lights_file),
+        observer=moved(scene.observer),
+    )
 
 
 def render_seconds(samples: int, lights: int) -> float:

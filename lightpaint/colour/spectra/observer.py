@@ -1,4 +1,4 @@
-"""What sees a picture of spectra: the eye, or a camera by its three sensitivities.
+"""Observers of pictures of spectra: the eye, or a camera by its three sensitivities.
 
 A picture is linear Rec.709 in either case. For the eye that is a matrix of CIE 1931 XYZ. A camera
 has no such matrix, since two spectra of one colour differ to it; its input transform is the matrix
@@ -31,7 +31,7 @@ INDEPENDENT = 1e-3
 
 @dataclass(frozen=True)
 class Observer:
-    """What sees a picture of spectra.
+    """An observer of a picture of spectra.
 
     name: for people. sensitivities: (81, 3) at WAVELENGTHS, the response of a camera's channels to
     power, 1 at the largest of each; empty for the eye.
@@ -59,7 +59,7 @@ class Observer:
             metres, values = matching_functions()
             grid = metres * 1e9
         found = np.stack([np.interp(waves, grid, x, left=0, right=0) for x in values.T], axis=-1)
-        return np.maximum(found, 0)  # a value of the CIE's table is −3e-22
+        return np.asarray(np.maximum(found, 0))  # a value of the CIE's table is −3e-22
 
     @cached_property
     def matrix(self) -> Doubles:
@@ -72,7 +72,7 @@ class Observer:
         """Return the linear Rec.709 (k, 3) of light of 1 nm at wavelengths (k,). D65 of luminance 1
         is white (1, 1, 1).
         """
-        return self.curves(waves) @ self.matrix.T
+        return np.asarray(self.curves(waves) @ self.matrix.T)
 
     @cached_property
     def color_error(self) -> float:
@@ -132,10 +132,10 @@ def _input_transform(sensitivities: tuple[RGB, ...]) -> Doubles:
     def matrix_of(parameters: Doubles) -> Doubles:
         # Rows that sum to 1 keep white.
         first = parameters.reshape(3, 2)
-        return np.column_stack([first, 1 - first.sum(axis=1)])
+        return np.asarray(np.column_stack([first, 1 - first.sum(axis=1)]))
 
     def difference(parameters: Doubles) -> Doubles:
-        return np.ravel(lab(raw @ matrix_of(parameters).T) - lab(seen))
+        return np.asarray(np.ravel(lab(raw @ matrix_of(parameters).T) - lab(seen)))
 
     # The linear least-squares answer under that condition is the start.
     reduced = raw[:, :2] - raw[:, 2:]

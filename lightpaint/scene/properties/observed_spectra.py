@@ -25,7 +25,7 @@ EVEN_SHARE = 0.25
 
 @dataclass(frozen=True)
 class Bands:
-    """What a film records: integrals of radiance over the curves of an observer.
+    """The bands that a film records: integrals of radiance over the curves of an observer.
 
     curves: (401, 3) at WAVES, >= 0. emitted: (401,), the density with which other wavelengths are
     sampled as well; 0 if the curves suffice.

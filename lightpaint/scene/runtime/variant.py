@@ -111,6 +111,11 @@ def spectral_variant() -> Iterator[None]:
             _current = backend
 
 
+def is_in_spectra() -> bool:
+    """Return whether Mitsuba renders spectra now, in a block of `spectral_variant`."""
+    return use_variant().variant.endswith(SPECTRAL)
+
+
 def _warn_of(backend: Backend) -> None:
     """Warn of a slow backend at the line that called lightpaint: Python shows it once for each."""
     frame, level = sys._getframe(), 1
