@@ -1,4 +1,4 @@
-"""What renders with spectra cost, and how exact they are.
+"""Measure the cost and the exactness of renders with spectra.
 
     python benchmarks/spectra.py [--rounds 3] [--spp 256] [--resolution 1/2] [SCENE …]
 

@@ -2,6 +2,7 @@
 
 from collections.abc import Mapping, Sequence
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
@@ -65,29 +66,16 @@ def measure(
     if (earlier := measured_origin(output)) is not None:
         terminal.say(f"{output} had a measurement, {earlier}: it is replaced (-o names another)")
     with terminal.TerminalListener() as listen:
-        measured = measure_illuminance(
-            content,
-            found.planes,
-            spp=settings.spp,
-            error=settings.error or found.error,
-            cd_per_unit=unit,
-            weights=weights,
-            seed=settings.seed,
-            use_cache=settings.use_cache,
-            progress=listen,
-        )
-        glare = None
-        if found.observers:
-            glare = measure_glare(
-                content,
-                found.observers,
-                error=settings.error or found.error,
-                cd_per_unit=unit,
-                weights=weights,
-                seed=settings.seed,
-                use_cache=settings.use_cache,
-                progress=listen,
-            )
+        options: dict[str, Any] = {
+            "error": settings.error or found.error,
+            "cd_per_unit": unit,
+            "weights": weights,
+            "seed": settings.seed,
+            "use_cache": settings.use_cache,
+            "progress": listen,
+        }
+        measured = measure_illuminance(content, found.planes, spp=settings.spp, **options)
+        glare = measure_glare(content, found.observers, **options) if found.observers else None
     origin = content.path.name + ("" if lighting is None else f" lit by {lighting.name}")
     with staged(output) as folder:
         write_readings(folder, measured, weights, origin, glare=glare)

@@ -98,7 +98,7 @@ class _Part:
         return np.asarray(own @ self.factor.divided(free, own.T))
 
 
-class _Sums:
+class _CountedSums:
     """The sums that count so far, each scaled to length 1.
 
     which: (w,), their numbers. rows: (w, k), least: (w,), lengths: (w,).
@@ -167,7 +167,7 @@ class DualNewton:
         tolerance: of the KKT residual. Return the optimum, and the multipliers of the sums; None if
         the steps do not end.
         """
-        b, sums = b / self._root, _Sums(len(b))
+        b, sums = b / self._root, _CountedSums(len(b))
         size = float(np.abs(b).max(initial=0)) or 1.0
         x = np.clip(near.x * self._root, self._lower, self._upper)
         duals = self._all_multipliers(near)
@@ -195,7 +195,7 @@ class DualNewton:
         """Minimise by interior points, which wishes that hardly leave room do not slow down, and by
         the limits that hold at their end (held_sums.py); where that fails, return an answer nearby.
         """
-        b, sums, k = b / self._root, _Sums(len(b)), len(b)
+        b, sums, k = b / self._root, _CountedSums(len(b)), len(b)
         size = float(np.abs(b).max(initial=0)) or 1.0
         start = x = np.clip(near.x * self._root, self._lower, self._upper)
         self._join(sums, np.flatnonzero(near.multipliers > 0))
@@ -224,7 +224,7 @@ class DualNewton:
         return NearAnswer(x / self._root, *self._multipliers(sums, pushes))
 
     def _with_caps(
-        self, M: Doubles, b: Doubles, start: Doubles, sums: _Sums, size: float
+        self, M: Doubles, b: Doubles, start: Doubles, sums: _CountedSums, size: float
     ) -> Quadratic:
         """Return the scaled problem with the pull to start, (k,), and the sums as caps."""
         infinite, ones = np.full(sums.least.size, np.inf), np.ones(sums.least.size)
@@ -233,7 +233,7 @@ class DualNewton:
         return Quadratic(M, right, *bounds, sums.rows, sums.least, infinite, ones, (), size)
 
     def _ascend(
-        self, b: Doubles, x: Doubles, sums: _Sums, pushes: Doubles
+        self, b: Doubles, x: Doubles, sums: _CountedSums, pushes: Doubles
     ) -> tuple[Doubles, Doubles, int] | None:
         """Maximise the dual function from multipliers (w,) of the sums, which are more at the end.
 
@@ -265,7 +265,7 @@ class DualNewton:
         return minimise(curvature, missed + curvature @ pushes, start=pushes).x - pushes
 
     def _along(
-        self, b: Doubles, x: Doubles, sums: _Sums, pushes: Doubles, move: Doubles
+        self, b: Doubles, x: Doubles, sums: _CountedSums, pushes: Doubles, move: Doubles
     ) -> tuple[Doubles | None, Doubles]:
         """Return the end of a step of the multipliers, where the dual function rises no longer, and
         x there; None if that fails.
@@ -295,7 +295,9 @@ class DualNewton:
                 part = low[0] + (high[0] - low[0]) * min(max(share, 0.1), 0.9)
         return found, moved
 
-    def _least_for(self, b: Doubles, x: Doubles, sums: _Sums, pushes: Doubles) -> Doubles | None:
+    def _least_for(
+        self, b: Doubles, x: Doubles, sums: _CountedSums, pushes: Doubles
+    ) -> Doubles | None:
         """Return the optimum under bounds, (k,), for multipliers (w,), from x, (k,)."""
         right, found = b + pushes @ sums.rows, np.empty_like(x)
         for part in self._parts:
@@ -305,7 +307,7 @@ class DualNewton:
             found[part.places] = least
         return found
 
-    def _join_missed(self, sums: _Sums, x: Doubles) -> bool:
+    def _join_missed(self, sums: _CountedSums, x: Doubles) -> bool:
         """Add the sums that x, (k,), misses most; return whether there are any."""
         shorts = self._least - np.concatenate([self._rows @ (x / self._root), self._cap_rows @ x])
         shorts[sums.which] = 0
@@ -321,7 +323,7 @@ class DualNewton:
         sums.join(places[most], rows[most], self._least[places[most]])
         return bool(most.size)
 
-    def _join(self, sums: _Sums, places: Indices) -> None:
+    def _join(self, sums: _CountedSums, places: Indices) -> None:
         sums.join(places, self._rows_of(places), self._least[places])
 
     def _rows_of(self, places: Indices) -> Doubles:
@@ -337,7 +339,7 @@ class DualNewton:
         caps = near.of_caps
         return np.concatenate([near.multipliers, np.maximum(caps, 0), np.maximum(-caps, 0)])
 
-    def _multipliers(self, sums: _Sums, pushes: Doubles) -> tuple[Doubles, Doubles]:
+    def _multipliers(self, sums: _CountedSums, pushes: Doubles) -> tuple[Doubles, Doubles]:
         """Return the multipliers of all sums, (m,), and of caps, (c,)."""
         multipliers = np.zeros(self._least.size)
         multipliers[sums.which] = pushes / sums.lengths
@@ -348,7 +350,9 @@ class DualNewton:
         terms = np.abs(self._M) @ np.abs(x) + np.abs(b) + np.abs(pushed)
         return 4 * EPSILON * float(terms.max(initial=0)) / size
 
-    def _optimum(self, optimum: Optimum, sums: _Sums, pushes: Doubles) -> tuple[Optimum, Doubles]:
+    def _optimum(
+        self, optimum: Optimum, sums: _CountedSums, pushes: Doubles
+    ) -> tuple[Optimum, Doubles]:
         """Return an optimum in scaled unknowns in the unknowns themselves, and the multipliers of
         the sums, (m,).
         """

@@ -150,7 +150,7 @@ def planes_in_view(*, cases: tuple[str, ...] = ("",), camera: Any = PINHOLE) -> 
 
 
 def lux_on(*lights: list[float]) -> dict[str, Any]:
-    """What an answer gives on planes, from the lx at the points of each."""
+    """Return what an answer gives on planes, from the lx at the points of each."""
     rest = {"mean_error": 1, "uniformity": 1, "wishes": []}
     planes = [
         {"mean": sum(lux) / len(lux), "least": min(lux), "most": max(lux), "lux": lux, **rest}
