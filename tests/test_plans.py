@@ -214,7 +214,7 @@ def test_a_painting_is_answered_under_the_wishes(tmp_path: Path):
         tmp_path, "solve", "room.xml", "mood.png", "--planes", "room.planes.toml", *options
     )
     assert "All wishes for the planes are met." in output
-    assert "the picture is by ΔE" in output
+    assert "the answer is by ΔE" in output
     scene = load_scene(tmp_path / "room.xml")
     found = read_planes(tmp_path / "room.planes.toml", scene)
     lighting = read_lighting(tmp_path / "mood/lighting.json")
@@ -243,6 +243,10 @@ def test_a_painting_is_answered_under_the_wishes(tmp_path: Path):
     assert missed.returncode == 1
     assert "of 300 lx, as much as the limit of 20 W leaves." in missed.stdout
     assert (tmp_path / "missed/lighting.json").is_file()
+    ignored = run(tmp_path, "solve", "room.xml", "mood.png", *wishes, "--ignore-wishes", *options)
+    assert ignored.returncode == 0
+    assert ignored.stdout.count("The lamps take") == 1
+    assert "Only 20 W are allowed." in ignored.stdout
 
 
 def test_a_limit_of_power_costs_the_picture_something_beside_the_lux(tmp_path: Path):

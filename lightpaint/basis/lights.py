@@ -60,9 +60,11 @@ class BasisLight:
                 f"light {self.name!r} has the emission {list(self.emission)}: need three numbers "
                 f"from 0 to {BRIGHTEST:g}"
             )
-        if self.unit_flux and not all(map(is_amount, self.unit_flux)):
+        # Of all that stays together; a lamp outside Rec.709 has channels below zero.
+        flux = self.unit_flux or ()
+        if not all(map(is_amount, map(abs, flux) if self.is_fixed else flux)):
             raise BasisError(
-                f"light {self.name!r} has a flux of {list(self.unit_flux)} at unit emission: need "
+                f"light {self.name!r} has a flux of {list(flux)} at unit emission: need "
                 f"three numbers from 0 to {BRIGHTEST:g}"
             )
 

@@ -13,6 +13,7 @@ from typing import Any, Literal
 import numpy as np
 
 from lightpaint.arrays import Floats
+from lightpaint.colour.primaries import REC709, rgb_to_xyz
 from lightpaint.errors import SizeError
 from lightpaint.images.bands import LARGE_PICTURE
 from lightpaint.images.estimate import box_mean, shifted
@@ -37,6 +38,9 @@ Quality = Literal["fast", "high"]
 #: Pixels that pad a picture for Open Image Denoise. At unpadded borders even a flat picture comes
 #: out 0.7 to 1.2 times as bright; with padding, within half a percent.
 MARGIN = 16
+
+#: Light below zero, relative to the mean of a picture, from which lamps are outside Rec.709.
+NEGATIVE = 1e-3
 
 #: Memory in megabytes that Open Image Denoise may use for a large picture, besides the picture.
 TILES_MB = 512
@@ -93,12 +97,22 @@ def denoised(
     # The network was trained on pictures of ordinary brightness, but the units of scenes are
     # arbitrary.
     scaled = image / np.float32(mean)
+    # Networks and filters take light for 0 or more, which lamps outside Rec.709 are as XYZ.
+    if scaled.min() >= -NEGATIVE:
+        return _denoised_light(scaled, features, quality) * np.float32(mean)
+    to_xyz = rgb_to_xyz(REC709)
+    clean = _denoised_light(scaled @ to_xyz.T.astype(np.float32), features, quality)
+    return clean @ np.linalg.inv(to_xyz).T.astype(np.float32) * np.float32(mean)
+
+
+def _denoised_light(image: Floats, features: Features | None, quality: Quality) -> Floats:
+    """Return light, (h, w, 3) and mostly 0 or more, without its noise."""
     if oidn_is_installed():
         try:
-            return _denoise_with_oidn(scaled, features, quality) * np.float32(mean)
+            return _denoise_with_oidn(image, features, quality)
         except (ImportError, OSError, RuntimeError):  # the library does not load here
             pass
-    return _denoise_with_filter(scaled, features) * np.float32(mean)
+    return _denoise_with_filter(image, features)
 
 
 def oidn_is_installed() -> bool:

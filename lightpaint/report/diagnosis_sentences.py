@@ -307,7 +307,8 @@ def _spoken_error(solved: float, low: float, high: float) -> str:
         return f"0 … {high:.2g}"
     if high > MAX_TIMES * solved:
         return UNDETERMINED
-    below, above = (spoken_percent(float(side / solved)) for side in (solved - low, high - solved))
+    sides = solved - max(low, 0), high - solved  # there is no less light than none
+    below, above = (spoken_percent(float(side / solved)) for side in sides)
     if below == above:
         return f"± {below}"
     return f"{f'−{below}' if low < solved else '0'} … {f'+{above}' if high > solved else '0'}"

@@ -73,8 +73,8 @@ def planes_sentences(answer: PlanesAnswer) -> list[str]:
     sentences += _prices(answer)
     if answer.cost_delta_e is not None:
         cost = answer.cost_delta_e
-        text = f"by ΔE {cost:.1f} further" if cost >= LEAST_COST else "no further"
-        sentences.append(f"With these wishes the picture is {text} from the painting.")
+        text = f"is by ΔE {cost:.1f} further from" if cost >= LEAST_COST else "comes as near to"
+        sentences.append(f"With these wishes the answer {text} what was painted.")
     if answer.budget_delta_e is not None and answer.budget_delta_e >= LEAST_COST:
         limit, cost = answer.binding_limit, answer.budget_delta_e
         sentences.append(f"Of that, the limit of {limit:.4g} W costs ΔE {cost:.1f}.")
@@ -160,6 +160,8 @@ def _missed(answer: PlanesAnswer, outcome: WishOutcome) -> str:
         return f"{title}: up to {reached:.0f} lx, wished for at most {wish.asked:g}."
     if wish.kind == "ratio":
         return f"{title}: {reached:.2f} of the mean of {wish.to}, wished for {wish.asked:g}."
+    if answer.are_ignored:  # what they take follows
+        return f"Only {wish.asked:g} W are allowed."
     return f"The lamps take {reached:.4g} W, where {wish.asked:g} W are allowed."
 
 

@@ -64,6 +64,16 @@ def test_it_is_closer_to_the_truth(method: str, guided: bool, scale: float):
     assert denoised_image.mean() == pytest.approx(truth.mean(), rel=0.05)
 
 
+def test_light_below_zero_keeps_its_colour(method: str):
+    """Lamps outside Rec.709 have negative channels, with noise of either sign."""
+    truth, noisy, features = _picture()
+    blue = np.float32([[0.05, 0, 0], [0, 0.2, 0], [-0.15, -0.05, 1]])
+    mean = denoised(noisy @ blue, features).mean(axis=(0, 1))
+    # Five percent of the mean light, as above.
+    largest = float((truth @ blue).mean(axis=(0, 1)).max())
+    np.testing.assert_allclose(mean, (truth @ blue).mean(axis=(0, 1)), atol=0.05 * largest)
+
+
 def test_features_of_another_size_are_not_used(method: str):
     _, noisy, features = _picture()
     np.testing.assert_array_equal(denoised(noisy, features.reduced(2)), denoised(noisy))

@@ -11,12 +11,12 @@ from nightly import seeds
 from scipy.optimize import lsq_linear
 
 from lightpaint.colour.color import cct_and_duv, kelvin_to_rgb
-from lightpaint.errors import ConstraintError, LightingError
+from lightpaint.errors import BasisError, ConstraintError, LightingError
 from lightpaint.lighting.analysis.analysis import analyse
 from lightpaint.lighting.answer.lighting_file import read_lighting, write_lighting
 from lightpaint.lighting.constraints.constraints import Constraints
 from lightpaint.lighting.constraints.constraints_file import read_constraints
-from lightpaint.lighting.constraints.light_patterns import constraints_by_light
+from lightpaint.lighting.constraints.light_patterns import constraints_by_light, tables_by_light
 from lightpaint.lighting.solve import solve
 from lightpaint.lighting.unknowns.reduction import reduce_to
 from lightpaint.target.target import Target
@@ -359,3 +359,17 @@ def test_what_a_lamp_cannot_do_is_one_line(make_basis, case):
     basis, target, constraints = _case(make_basis, 1, par=table)
     with pytest.raises(ConstraintError, match=message):
         solve(basis, target, constraints=constraints)
+
+
+def test_a_lamp_that_stays_may_be_described(make_basis):
+    """A rig's lights file has the emitters of all lamps, also when --lights chooses some."""
+    [light, _] = make_basis(2, SIZE, seed=1).lights
+    # Together with others it may radiate less than nothing in a channel.
+    fixed = [replace(light, is_fixed=True, emission=(1, 1, 1), unit_flux=(-0.7, 1.9, 17))]
+    described = {"emitters": RGBW, "power_share": 0.5}
+    [(table, _)] = tables_by_light(Constraints.of({light.name: described}), fixed)
+    assert table == {}
+    with pytest.raises(ConstraintError, match="is fixed, since it is not among the lights"):
+        tables_by_light(Constraints.of({light.name: described | {"off": True}}), fixed)
+    with pytest.raises(BasisError, match="has a flux of"):
+        replace(light, unit_flux=(-0.7, 1.9, 17))

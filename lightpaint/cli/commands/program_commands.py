@@ -22,7 +22,7 @@ from lightpaint.lighting.answer.lighting import Lighting
 from lightpaint.lighting.answer.lighting_file import read_lighting
 from lightpaint.pipeline.job.sources import GroupsFile, SceneFile, content
 from lightpaint.relit.exported_answer import Source
-from lightpaint.relit.formats import names_of_forms, write_content, writers_of
+from lightpaint.relit.formats import FORMS, names_of_forms, write_content, writers_of
 from lightpaint.sentences import Hint
 from lightpaint.storage.staging import finish
 
@@ -49,6 +49,9 @@ def export(
         raise LightpaintError(
             f"{others[0]} takes a lighting.json, and {sessions[0]} is a session, which cues take"
         )
+    if unknown := [form for form in others if form not in FORMS]:
+        known = ", ".join((*FORMS, CUES))
+        raise LightpaintError(f"there is no form {unknown[0]!r}: known are {known}")
     if len(lightings) > 1 and others:
         raise LightpaintError(
             f"{others[0]} takes one lighting, not {len(lightings)}; cues take all"

@@ -136,7 +136,8 @@ def _outcome(
         return results_document | ({"variations": variations} if variations else {})
 
     has_failures = look_set is not None and look_set.failures
-    has_missed_wishes = any(look.planes is not None and look.planes.missed for *_, look in results)
+    answers = [look.planes for *_, look in results if look.planes is not None]
+    has_missed_wishes = any(x.missed and not x.are_ignored for x in answers)
     return CommandOutcome(document, 1 if shortfalls or has_missed_wishes or has_failures else 0)
 
 

@@ -1,6 +1,6 @@
 """Constraints of each light, resolved from names and patterns."""
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from fnmatch import fnmatchcase
 from typing import Any
@@ -9,6 +9,7 @@ from lightpaint.basis.lights import BasisLight
 from lightpaint.display_text import some_names, with_similar_name
 from lightpaint.errors import ConstraintError
 from lightpaint.lighting.constraints.constraints import (
+    LAMP_KEYS,
     Constraints,
     LightConstraint,
     Tie,
@@ -41,12 +42,17 @@ def tables_by_light(
     tables: list[tuple[dict[str, Any], str]] = [({}, "")] * len(lights)
     for name, wish, origin in constraints.lights:
         merged: dict[int, dict[str, Any]] = {}
-        for k in _match_lights(name, lights, origin, only_keeps=wish == {"lock": True}):
+        for k in _match_lights(name, lights, origin, only_keeps=_only_keeps(wish)):
             below = tables[k][0]
             if id(below) not in merged:
                 merged[id(below)] = merge_tables(below, wish)
             tables[k] = merged[id(below)], origin
     return tables
+
+
+def _only_keeps(wish: Mapping[str, Any]) -> bool:
+    """Return whether keys only say what a light is or that it stays, as a fixed light does."""
+    return wish == {"lock": True} or wish.keys() <= {*LAMP_KEYS}
 
 
 def constraints_on_parts(

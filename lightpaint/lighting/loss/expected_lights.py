@@ -35,6 +35,10 @@ DARK = 0.01
 #: benchmarks/intent.py paints hues that are off by 0.25, benchmarks/briefs.py moods of 1 to 3.
 MEANT_STOPS, SHARPNESS = 0.5, 8
 
+#: Largest change in stops that a light is expected to make: one that hardly shines where it is
+#: asked for has no mean change to speak of.
+MOST_STOPS = 64.0
+
 #: Factor by which a colour that was given as numbers is meant more clearly than a painted one.
 EXACT_FACTOR = 4.0
 
@@ -252,7 +256,8 @@ class ExpectedLights:
         excess = (amount / MEANT_STOPS) ** SHARPNESS
         clarity = np.asarray(excess / (1 + excess), np.float64)
         emission, painted = (
-            np.asarray(current * 2.0**x) for x in (luminance(change)[:, None], change)
+            np.asarray(current * 2.0 ** np.clip(x, -MOST_STOPS, MOST_STOPS))
+            for x in (luminance(change)[:, None], change)
         )
         return cls(emission, clarity, painted)
 
