@@ -150,6 +150,7 @@ PARTS: dict[str, tuple[str, ...]] = {
     "lighting.analysis.appearance.limiting_reasons": ("Reason", "Loosening"),
     "lighting.analysis.appearance.unpainted_change": ("UnpaintedChange",),
     "lighting.analysis.diagnosis": ("Place",),
+    "colour.spectra.observer": ("Observer",),
     "lighting.analysis.surface_colors": ("SurfaceColor",),
     "placement.suggestion": ("MoveSuggestion",),
     "placement.new_lights": ("Mirror",),
