@@ -63,13 +63,16 @@ def test_architecture_is_a_start_of_a_few_pages() -> None:
     assert len(text.split()) <= 1500
 
 
-def test_decisions_are_numbered_and_whole() -> None:
+def test_decisions_are_numbered_and_short() -> None:
+    """A title is what was decided; one to four sentences say why."""
     text = (ROOT / "docs" / "decisions.md").read_text()
-    records = re.split(r"^### ", text, flags=re.M)[1:]
-    numbers = [record.partition(".")[0] for record in records]
+    records = [x.partition("\n") for x in re.split(r"^### ", text, flags=re.M)[1:]]
+    numbers = [title.partition(".")[0] for title, _, _ in records]
     assert numbers == [str(n) for n in range(1, len(records) + 1)]
-    parts = [re.findall(r"^\*(\w+)\.\* \S", record, re.M) for record in records]
-    assert [x for x in parts if x != ["Context", "Decision", "Consequence"]] == []
+    reasons = {title: body.partition("\n## ")[0].split() for title, _, body in records}
+    assert [x for x, words in reasons.items() if not 5 <= len(words) <= 85] == []
+    ends = {x: sum(word.endswith((".", ".)")) for word in words) for x, words in reasons.items()}
+    assert [x for x, count in ends.items() if not 1 <= count <= 4] == []
 
 
 #: Characters of a paragraph: six lines of 100, and half a word at the end of each.
