@@ -22,7 +22,7 @@ from lightpaint.sentences import Hint, Word
 sys.path.insert(0, str(REPOSITORY / "docs" / "site"))
 
 from api_pages import GROUPS, PARTS
-from command_pages import write_commands
+from command_pages import DOCUMENTS, write_commands
 from page_repair import short_type
 from site_check import check_site
 from staging import stage
@@ -131,6 +131,10 @@ def test_every_option_of_every_command_is_in_the_reference(tmp_path: Path) -> No
         shown = " ".join(re.findall(r"^\.\. option:: (.*)$", page, re.MULTILINE))
         options = [x for action in parser._actions for x in action.option_strings]
         assert [x for x in options if not re.search(rf"(?<![\w-]){x}(?![\w-])", shown)] == []
+
+
+def test_the_reference_says_what_each_command_prints_for_programs() -> None:
+    assert set(DOCUMENTS) == set(COMMANDS)
 
 
 @pytest.mark.parametrize("name", COMMANDS)

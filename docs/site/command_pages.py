@@ -2,6 +2,7 @@
 
 import argparse
 import re
+import tomllib
 from pathlib import Path
 
 from lightpaint.cli.options.option_groups import by_theme
@@ -9,6 +10,11 @@ from lightpaint.cli.options.parser import COMMANDS, EXIT_CODES, command_parser
 
 _SPECIAL = re.compile(r"([\\*`|_])")
 _OPTION = re.compile(r"(?<![\w-])(--?[a-z][a-z-]*)(?![\w-])")
+
+#: What `--json` prints, by command, in reStructuredText.
+DOCUMENTS: dict[str, str] = tomllib.loads(
+    Path(__file__).with_name("json_documents.toml").read_text("utf-8")
+)
 
 
 def write_commands(folder: Path) -> None:
@@ -44,6 +50,7 @@ def _page(name: str, command: argparse.ArgumentParser) -> str:
     for title, actions in by_theme(command).items():
         parts.append(_title(title, "-"))
         parts += [_option(action, command) for action in actions]
+    parts += [_title("What --json prints", "-"), DOCUMENTS[name]]
     return "\n\n".join(parts) + "\n"
 
 
