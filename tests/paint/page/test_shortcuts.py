@@ -61,7 +61,7 @@ def test_every_key_is_in_the_list_and_in_the_tip_of_its_control(new_painter: Any
     assert {one["command"] for one in table if one["shortcut"] not in shown} == LISTED_ONLY
 
 
-def test_the_document_lists_the_keys_of_the_page(new_painter: Any) -> None:
+def test_the_keys_that_the_document_names_are_those_of_the_page(new_painter: Any) -> None:
     painter: Painter = new_painter()
     keys = painter.page.evaluate(
         """async () => {
@@ -75,7 +75,8 @@ def test_the_document_lists_the_keys_of_the_page(new_painter: Any) -> None:
     document = (REPOSITORY / "docs" / "painter.md").read_text()
     [table] = re.findall(r"\| key \| does \|\n\|[-|]+\|\n((?:\|.*\n)+)", document)
     assert len(rows) > 40
-    assert table.splitlines() == rows
+    assert len(named := table.splitlines()) > 15
+    assert named == [row for row in rows if row in named]
 
 
 @pytest.mark.nightly
