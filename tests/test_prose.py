@@ -19,6 +19,9 @@ EMPTY = (
     "robust|seamless|seamlessly|simply|state-of-the-art|utilize|very"
 )
 
+#: A pronoun where the noun is clearer: `the flux of the lamp`, not `that of the lamp`.
+PRONOUN = re.compile(r"(?<!so )(?<!say )\b(?:that|those) of\b")
+
 #: A denial without an article, other than of an amount, a degree or a time.
 NO_ARTICLE = re.compile(
     r"(?<!there )(?<!There )(?<!where )\bis no "
@@ -59,7 +62,16 @@ def test_what_a_thing_is_not_has_an_article() -> None:
     assert {p.name: x for p in places if (x := NO_ARTICLE.findall(p.read_text("utf-8")))} == {}
 
 
+@pytest.mark.parametrize("page", DOCUMENTS, ids=lambda path: path.name)
+def test_nouns_are_repeated(page: Path) -> None:
+    text = " ".join(page.read_text("utf-8").split())
+    assert re.findall(rf".{{40}}{PRONOUN.pattern}.{{20}}", text) == []
+
+
 def test_the_checks_would_find_it() -> None:
+    assert PRONOUN.findall("The flux is that of the lamp, so that of two one is off.") == [
+        "that of"
+    ]
     assert NO_ARTICLE.findall("It is no scene. There is no light.") == ["is no scene"]
     long = "It " + "is said " * MAX_WORDS + "here."
     assert [x for x in sentences(f"Short one. {long}") if len(x.split()) > MAX_WORDS] == [long]
