@@ -1,6 +1,6 @@
 """What the algebra costs: normal equations, solves and strokes, without a renderer.
 
-    python benchmarks/algebra.py [--repeats N]
+    python benchmarks/algebra.py [--repeats N] [--csv FILE]
 
 Five tables: forming M and b against a plain float64 BLAS product of the same shape; the solve,
 M given, of one channel against scipy's nnls on the Cholesky factor of M, and of three; the solve
@@ -10,11 +10,13 @@ from one basis.
 
 import argparse
 import time
+from collections import defaultdict
 from collections.abc import Callable
 from functools import partial
 from typing import Any
 
 import numpy as np
+from rows import add_csv, write_rows
 from scipy.optimize import nnls
 
 from lightpaint.basis.basis import Basis, Origin
@@ -34,6 +36,9 @@ from lightpaint.threads import one_thread
 
 HEIGHT, WIDTH, BRUSH = 360, 640, 64
 
+#: Least times by the number of lights, then by column.
+Rows = defaultdict[int, dict[str, str]]
+
 #: What is asked of the lights, as `Constraints.of` takes it.
 ASKED: dict[str, dict[str, Any]] = {
     "nothing": {},
@@ -50,15 +55,18 @@ def main() -> None:
     """Print the tables."""
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("--repeats", type=int, default=9)
-    repeats = parser.parse_args().repeats
-    gram(repeats)
-    solves(repeats)
-    constrained(repeats)
-    strokes(4 * repeats)
+    add_csv(parser)
+    options = parser.parse_args()
+    repeats, rows = options.repeats, Rows(dict)
+    gram(repeats, rows)
+    solves(repeats, rows)
+    constrained(repeats, rows)
+    strokes(4 * repeats, rows)
+    write_rows(options.csv, [{"lights": n, **row} for n, row in sorted(rows.items())])
     looks()
 
 
-def gram(repeats: int) -> None:
+def gram(repeats: int, rows: Rows) -> None:
     """M, b and ‖Ψ‖² of a whole picture, against products of the same blocks in float64."""
     print(f"normal equations, {WIDTH}x{HEIGHT}, three channels, ms (least of the runs)")
     print(f"{'lights':>8s}{'ours':>10s}{'product':>10s}{'ratio':>8s}")
@@ -74,12 +82,13 @@ def gram(repeats: int) -> None:
 
         ours_s = timed(lambda p=(images, target, importance): inner_products(*p), repeats)
         base = timed(product, repeats)
+        rows[n][f"normal equations, {WIDTH}x{HEIGHT}, ms"] = least_ms(ours_s)
         print(
             f"{n:8d}{1e3 * min(ours_s):10.1f}{1e3 * min(base):10.1f}{min(base) / min(ours_s):8.2f}"
         )
 
 
-def solves(repeats: int) -> None:
+def solves(repeats: int, rows: Rows) -> None:
     """M given, from all lights at 1."""
     print("\nsolve, M given, ms (least / median of the runs)")
     print(
@@ -111,31 +120,36 @@ def solves(repeats: int) -> None:
             free_reduction,
             three().weights,
         )
-        optimum = one()
+        optimum, scipy_s = one(), timed(by_scipy, min(repeats, 3))
+        three_s, second_s = timed(three, repeats), timed(second, repeats)
         print(
-            f"{n:8d}{pair(timed(one, repeats)):>18s}"
-            f"{pair(timed(by_scipy, min(repeats, 3))):>18s}"
+            f"{n:8d}{pair(timed(one, repeats)):>18s}{pair(scipy_s):>18s}"
             f"{np.count_nonzero(optimum.x == 0):6d}{optimum.kkt_residual:10.0e}"
-            f"{pair(timed(three, repeats)):>18s}{pair(timed(second, repeats)):>18s}"
+            f"{pair(three_s):>18s}{pair(second_s):>18s}"
         )
+        rows[n]["solve, ms"] = least_ms(three_s)
+        rows[n]["from another answer, ms"] = least_ms(second_s)
+        rows[n]["nnls, ms"] = least_ms(scipy_s)
 
 
-def constrained(repeats: int) -> None:
+def constrained(repeats: int, rows: Rows) -> None:
     """What it costs to ask something of the lights: three channels, M given, from the present."""
     print("\nsolve with something asked, M given, ms (least / median of the runs)")
     print(f"{'lights':>8s}" + "".join(f"{name:>18s}" for name in ASKED))
     for n in (12, 64):
         basis, target = scene(n)
         cells = []
-        for constraints in ASKED.values():
+        for name, constraints in ASKED.items():
             problem = Problem.of(basis, target, constraints=Constraints.of(**constraints))
             equations, start = problem.with_pull(problem.equations), problem.start
             solve = partial(solve_reduced, equations, problem.reduction, start)
-            cells.append(f"{pair(timed(solve, 4 * repeats)):>18s}")
+            solve_s = timed(solve, 4 * repeats)
+            cells.append(f"{pair(solve_s):>18s}")
+            rows[n][f"{name}, ms"] = least_ms(solve_s)
         print(f"{n:8d}{''.join(cells)}")
 
 
-def strokes(count: int) -> None:
+def strokes(count: int, rows: Rows) -> None:
     """Print what a square of new colour, or of new importance, costs, and the next answer."""
     print(f"\nstroke of {BRUSH}x{BRUSH} pixels in {WIDTH}x{HEIGHT}, ms (least / median)")
     print(f"{'lights':>8s}{'painted':>12s}{'update':>16s}{'solve':>16s}{'together':>16s}")
@@ -167,6 +181,7 @@ def strokes(count: int) -> None:
             together = [sum(parts) for parts in zip(updates, solves, strict=True)]
             times = "".join(f"{pair(each):>16s}" for each in (updates, solves, together))
             print(f"{n:8d}{kind:>12s}{times}")
+            rows[n][f"stroke of {kind}, {BRUSH}x{BRUSH}, ms"] = least_ms(together)
 
 
 def looks() -> None:
@@ -225,6 +240,11 @@ def timed(work: Callable[[], object], repeats: int) -> list[float]:
         work()
         seconds.append(time.perf_counter() - start)
     return seconds
+
+
+def least_ms(seconds: list[float]) -> str:
+    """Least, in milliseconds."""
+    return f"{1e3 * min(seconds):.2f}"
 
 
 def pair(seconds: list[float]) -> str:

@@ -24,6 +24,7 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+from rows import add_csv, write_rows
 
 ROOT = Path(__file__).parent.parent
 
@@ -43,6 +44,7 @@ def main() -> None:
     parser.add_argument("--spp", type=int, default=32)
     parser.add_argument("--repeats", type=int, default=2)
     parser.add_argument("--serve", metavar="BASIS", help=argparse.SUPPRESS)
+    add_csv(parser)
     options = parser.parse_args()
     if options.serve:
         serve(options.serve)
@@ -56,19 +58,29 @@ def main() -> None:
         lp.write_basis(path, obtain_basis(scene.reduced(options.resolution), spp=options.spp))
         versions = [Version(x, path) for x in (options.before.absolute(), ROOT)]
         print(HEAD)
-        rows = []
+        rows, table = [], []
         for name in versions[0].names:
             runs = [[x.measure(name) for x in versions] for _ in range(options.repeats)]
             rows.append(np.min(runs, axis=0))
-            print_row(name, rows[-1])
-        print_row("all", np.sum(rows, axis=0))
+            table.append(print_row(name, rows[-1]))
+        table.append(print_row("all", np.sum(rows, axis=0)))
+        write_rows(options.csv, [{"scene": options.scene, **row} for row in table])
 
 
-def print_row(name: str, figures: np.ndarray) -> None:
-    """Print the figures (2, 2) of both versions, and their ratios."""
+def print_row(name: str, figures: np.ndarray) -> dict[str, str]:
+    """Print the figures (2, 2) of both versions and their ratios, and return them by column."""
     (exact, live), (exact_now, live_now) = figures
-    solve = f"{exact:18.2f}{exact_now:7.2f}{exact_now / exact:7.2f}"
-    print(f"{name:12s}{solve}{live:20.2f}{live_now:7.2f}{live_now / live:7.2f}", flush=True)
+    row = {
+        "painting": name,
+        "solve before, s": f"{exact:.2f}",
+        "solve now, s": f"{exact_now:.2f}",
+        "ratio": f"{exact_now / exact:.2f}",
+        "brush before, ms": f"{live:.2f}",
+        "brush now, ms": f"{live_now:.2f}",
+        "ratio of the brush": f"{live_now / live:.2f}",
+    }
+    print("{:12s}{:>18s}{:>7s}{:>7s}{:>20s}{:>7s}{:>7s}".format(*row.values()), flush=True)
+    return row
 
 
 class Version:

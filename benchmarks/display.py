@@ -1,6 +1,7 @@
 """How long a fit of what a display shows takes, beside rounds over all pixels alone.
 
     python benchmarks/display.py BASIS PAINTING [--views srgb agx filmic] [--repeats N]
+                                 [--csv FILE]
 
 The solve, in seconds of the processor: from a sample of the pixels and exact in the end, and by
 rounds over all of them alone, one after the other in one process; how far apart both end, beside
@@ -20,6 +21,7 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+from rows import add_csv, write_rows
 
 import lightpaint as lp
 from lightpaint.lighting.loss import warm_start
@@ -34,7 +36,9 @@ def main() -> None:
     parser.add_argument("painting")
     parser.add_argument("--views", nargs="+", default=["srgb", "filmic", "agx"])
     parser.add_argument("--repeats", type=int, default=3)
+    add_csv(parser)
     options = parser.parse_args()
+    rows: list[dict[str, str]] = []
     basis, target = lp.read_basis(options.basis), lp.read_target(options.painting)
     stops = target.transform.stops if target.transform is not None else 0.0
     height, width = basis.size
@@ -68,6 +72,18 @@ def main() -> None:
             f"{cpu_s:6.2f} {clock:6.2f} {cpu_s / literal[0]:5.2f}x",
             flush=True,
         )
+        row = {
+            "film": f"{width}x{height}",
+            "samples per pixel": str(basis.origin.spp),
+            "view": name,
+            "sampled, s": f"{a:.2f}",
+            "all pixels, s": f"{b:.2f}",
+            "weights apart": f"{difference / (size * expected.weights).max():.0e}",
+            "command, s": f"{cpu_s:.2f}",
+            "ratio to a literal solve": f"{cpu_s / literal[0]:.2f}",
+        }
+        rows.append(row)
+        write_rows(options.csv, rows)
 
 
 def timed(basis: lp.Basis, target: lp.Target, view: Any, *, sample: int) -> tuple[float, Solution]:

@@ -1,6 +1,6 @@
 """How far weights are off, by samples and resolution, against a basis of many more samples.
 
-    python benchmarks/quality.py SCENE TARGET [--mask M.exr] [--reference 1/4x4096]
+    python benchmarks/quality.py SCENE TARGET [--mask M.exr] [--reference 1/4x4096] [--csv FILE]
 
 The error of a light is that of the luminance of its weight, relative; "mean" weighs lights by
 their share of the picture's energy, "worst" is the largest of lights with 2 % of it or more.
@@ -13,6 +13,7 @@ import time
 from pathlib import Path
 
 import numpy as np
+from rows import add_csv, write_rows
 
 from lightpaint import Basis, Scene, load_scene, read_target, render_basis, solve
 from lightpaint.colour.color import luminance
@@ -32,6 +33,7 @@ def main() -> None:
     parser.add_argument("target")
     parser.add_argument("--mask")
     parser.add_argument("--reference", default="1/4x4096", metavar="RESOLUTIONxSPP")
+    add_csv(parser)
     options = parser.parse_args()
     scene = load_scene(options.scene)
     target = read_target(Path(options.target), mask=options.mask)
@@ -40,6 +42,7 @@ def main() -> None:
     reference, truth = weights(scene.reduced(resolution), target, int(spp), seed=1000)
     image = truth.astype(np.float32)
     shares = energy_shares(reference, solve(reference, target).lighting)
+    rows: list[dict[str, object]] = []
     print("resolution   spp  seconds  mean  worst  picture")
     for resolution in RESOLUTIONS:
         small = scene.reduced(resolution)
@@ -52,11 +55,17 @@ def main() -> None:
             error = np.abs(luminance(estimate - truth)) / np.maximum(luminance(truth), 1e-12)
             residual = reference.mix(estimate - truth)
             picture = np.sqrt(np.square(residual).mean() / np.square(reference.mix(image)).mean())
-            print(
-                f"{resolution:10s} {spp:5d} {taken_s:8.1f} {100 * (error @ shares):4.0f} % "
-                f"{100 * error[shares > 0.02].max():4.0f} % {100 * picture:6.1f} %",
-                flush=True,
-            )
+            row: dict[str, object] = {
+                "film": resolution,
+                "samples per pixel": spp,
+                "s": f"{taken_s:.1f}",
+                "mean error": f"{100 * (error @ shares):.0f} %",
+                "worst light of 2 % and more": f"{100 * error[shares > 0.02].max():.0f} %",
+                "picture": f"{100 * picture:.1f} %",
+            }
+            rows.append({"scene": Path(options.scene).parent.name, **row})
+            print("{:10s} {:5d} {:>8s} {:>6s} {:>6s} {:>8s}".format(*row.values()), flush=True)
+            write_rows(options.csv, rows)
 
 
 def weights(scene: Scene, target: Target, spp: int, *, seed: int) -> tuple[Basis, np.ndarray]:

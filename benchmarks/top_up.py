@@ -20,6 +20,7 @@ from pathlib import Path
 
 import numpy as np
 import numpy.typing as npt
+from rows import add_csv, write_rows
 
 from lightpaint import (
     Basis,
@@ -49,8 +50,8 @@ REPOSITORY = Path(__file__).parent.parent
 #: Seed of the long render, and size of the film.
 LONG_SEED, REDUCTION = 90_000, 4
 
-#: Characters of a column.
-WIDTHS = (8, 8, 11, 10, 8, 8)
+#: Characters of each column.
+WIDTHS = {"spp": 8, "CPU s": 8, "mean": 11, "worst": 10, "bias": 8, "held": 8}
 
 
 @dataclass
@@ -63,18 +64,22 @@ class Runs:
     seconds: list[float] = field(default_factory=list)
     spp: list[float] = field(default_factory=list)
 
-    def row(self) -> str:
-        """Return the figures of a line."""
+    def row(self) -> dict[str, str]:
+        """Return the figures of a line, by column."""
         errors, count = np.array(self.errors), len(self.errors)
         worst = np.sqrt(np.square(errors).mean(axis=0)).max()
         scatter = errors.std(axis=0, ddof=1) / np.sqrt(count)
         is_varying = scatter > 0  # not so for a light that is off each time
         bias = np.abs(errors.mean(axis=0)[is_varying] / scatter[is_varying]).max()
         coverage = (np.abs(errors) <= np.array(self.told)).mean()
-        return (
-            f"{np.mean(self.spp):8.0f}{np.mean(self.seconds):8.1f}{100 * np.mean(self.mean):9.2f} %"
-            f"{100 * worst:8.1f} %{bias:8.1f}{coverage:8.2f}"
-        )
+        return {
+            "spp": f"{np.mean(self.spp):.0f}",
+            "CPU s": f"{np.mean(self.seconds):.1f}",
+            "mean": f"{100 * np.mean(self.mean):.2f} %",
+            "worst": f"{100 * worst:.1f} %",
+            "bias": f"{bias:.1f}",
+            "held": f"{coverage:.2f}",
+        }
 
     @property
     def cost(self) -> float:
@@ -90,14 +95,16 @@ def main() -> None:
     parser.add_argument("--seeds", type=int, default=6)
     parser.add_argument("--long-spp", type=int, default=1024)
     parser.add_argument("--keep", type=Path, metavar="FOLDER")
+    add_csv(parser)
     options = parser.parse_args()
+    rows: list[dict[str, str]] = []
     scene = load_scene(REPOSITORY / "scenes" / "gallery" / "scene.xml").reduced(f"1/{REDUCTION}")
     with tempfile.TemporaryDirectory() as folder:
         truth = long_render(scene, options.long_spp, options.keep or Path(folder))
-        names = ("spp", "CPU s", "mean", "worst", "bias", "held")
-        print(f"{'':34s}" + "".join(f"{x:>{w}s}" for x, w in zip(names, WIDTHS, strict=True)))
+        print(f"{'':34s}" + "".join(f"{name:>{width}s}" for name, width in WIDTHS.items()))
         for name in options.paintings:
-            compare(name, scene, truth, options, Path(folder))
+            rows += compare(name, scene, truth, options, Path(folder))
+            write_rows(options.csv, rows)
 
 
 def long_render(scene: Scene, spp: int, keep: Path) -> Basis:
@@ -111,8 +118,8 @@ def long_render(scene: Scene, spp: int, keep: Path) -> Basis:
 
 def compare(
     name: str, scene: Scene, truth: Basis, options: argparse.Namespace, folder: Path
-) -> None:
-    """Measure one painting."""
+) -> list[dict[str, str]]:
+    """Measure one painting, and return a row for each way to spread samples."""
     target = painting(name)
     best = without_noise(_job(scene, target, options, 0, folder), _solution(truth, target))
     rest = error_bars(best)
@@ -145,9 +152,13 @@ def compare(
             runs.spp.append(basis.origin.mean_spp)
     goal = f"asked for {100 * options.error:g} %"
     print(f"{name}, {goal}; the long render knows each light to ± {largest_error:.1f} %")
-    print(f"{'  where they are needed':34s}{uneven.row()}")
-    print(f"{'  in all pixels':34s}{everywhere.row()}")
+    rows = []
+    for samples, runs in (("where they are needed", uneven), ("in all pixels", everywhere)):
+        row = runs.row()
+        print(f"{'  ' + samples:34s}" + "".join(f"{row[x]:>{w}s}" for x, w in WIDTHS.items()))
+        rows.append({"painting": name, "samples": samples, **row})
     print(f"  gain {everywhere.cost / uneven.cost:.1f}x", flush=True)
+    return rows
 
 
 def painting(name: str) -> Target:
