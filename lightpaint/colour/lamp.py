@@ -4,7 +4,8 @@ A stage light has four to eight kinds of LEDs, its emitters, each of which dims 
 drive. Its emission is Σ dⱼ eⱼ. More than three emitters can mix most colours in many ways; a
 preference chooses one of these, so that the emission stays the same (docs/method.md).
 
-A lamp with a colour wheel has the wheel's slots for emitters, of which one shines at a time.
+A lamp with a colour wheel has the wheel's slots for emitters, of which one shines at a time; one
+that mixes its light has emitters whose light each slot filters.
 """
 
 from collections.abc import Iterator, Sequence
@@ -14,10 +15,11 @@ from itertools import combinations, product
 
 import numpy as np
 
-from lightpaint.arrays import RGB, Bools, Doubles, Indices
+from lightpaint.arrays import RGB, Bools, Doubles, Indices, as_rgb
 from lightpaint.colour.color import cct_and_duv, luminance
 from lightpaint.colour.color_difference import ciede2000, lab_of_lights
 from lightpaint.colour.emitter_preference import Preference
+from lightpaint.colour.primaries import REC709, REC2020, rgb_to_xyz
 from lightpaint.colour.spectra.best_mix import best_mix, cheapest_mix
 from lightpaint.colour.spectra.color_rendering import fidelity
 from lightpaint.colour.spectra.mix_fidelity import MARGIN, MixFidelity
@@ -37,6 +39,9 @@ WARMEST_WHITE, WHITE_DUV = 2200.0, 0.02
 #: Share of the largest brightness at which no bound restricts the mixes of a colour, and steps of
 #: the search for the largest at which a mix renders colours well enough.
 DARK, DIMMINGS = 1e-3, 10
+
+#: Least share of light that a filter lets through, a density of 4.
+OPAQUE = 1e-4
 
 #: Weight of the power among mixes that a preference for something else leaves equal.
 SECOND = 1e-6
@@ -71,6 +76,29 @@ class LampEmitter:
 
 
 @dataclass(frozen=True)
+class SlotFilter:
+    """A slot of a colour wheel in front of emitters that mix their light.
+
+    transmission: the share that it lets through of red, green and blue of BT.2020, 0 to 1.
+    """
+
+    name: str
+    transmission: RGB
+
+    @property
+    def is_open(self) -> bool:
+        """True if it lets all light through."""
+        return self.transmission == (1, 1, 1)
+
+    def filtered(self, emission: RGB) -> RGB:
+        """Return the light, linear Rec.709, that it lets through of an emission."""
+        passed = np.maximum(self.transmission, OPAQUE)
+        xyz = rgb_to_xyz(REC709) @ np.array(emission)
+        wide = passed * np.linalg.solve(rgb_to_xyz(REC2020), xyz)
+        return as_rgb(np.linalg.solve(rgb_to_xyz(REC709), rgb_to_xyz(REC2020) @ wide))
+
+
+@dataclass(frozen=True)
 class Lamp:
     """A lamp of several emitters.
 
@@ -80,6 +108,7 @@ class Lamp:
     is_wheel: whether they are slots of a colour wheel, of which one shines at a time.
     least_rf: the fidelity index Rf that these mixes need, if they can reach it; else the highest
     counts.
+    behind: the slot of a colour wheel through which its emitters shine; "" where it is open.
     """
 
     emitters: tuple[LampEmitter, ...]
@@ -87,6 +116,14 @@ class Lamp:
     prefer: Preference = "watts"
     is_wheel: bool = False
     least_rf: float | None = None
+    behind: str = ""
+
+    def behind_slot(self, slot: SlotFilter) -> "Lamp":
+        """Return the lamp with each emitter as a slot filters it."""
+        if slot.is_open:
+            return replace(self, behind="")
+        emitters = tuple(replace(x, emission=slot.filtered(x.emission)) for x in self.emitters)
+        return replace(self, emitters=emitters, behind=slot.name)
 
     @cached_property
     def names(self) -> tuple[str, ...]:

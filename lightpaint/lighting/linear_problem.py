@@ -4,6 +4,7 @@ A literal fit in linear light needs nothing of a basis but M, b and norms. Sums 
 picture add, so that each machine can sum its part of the basis and send no image.
 """
 
+from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import TYPE_CHECKING, Self
@@ -34,6 +35,7 @@ from lightpaint.lighting.loss.weight_penalty import PaintTerms, joint_pull
 from lightpaint.lighting.normal_equations import NormalEquations
 from lightpaint.lighting.unknowns.gamuts import Gamuts
 from lightpaint.lighting.unknowns.reduction import Reduction, reduce_to
+from lightpaint.lighting.unknowns.slot_search import improve_slots
 from lightpaint.sentences import Hint, Word
 from lightpaint.target.target import Target, titled
 
@@ -167,6 +169,28 @@ class LinearProblem:
     def with_slots(self, weights: Doubles) -> Self:
         """Return this problem with colour wheels at the slots closest to weights (n, 3)."""
         reduction, full = (x.with_slots(weights) for x in (self.reduction, self.full))
+        return replace(self, reduction=reduction, full=full)  # type: ignore[type-var]
+
+    def with_better_slots(self, weights: Doubles) -> Self | None:
+        """Return this problem with colour wheels at slots that bring the picture closer than
+        weights (n, 3), its solution; None if no other slot of a single wheel does.
+        """
+        reduction = self.reduction
+        if not reduction.wheels:
+            return None
+        norm2, equations = float(np.sum(self.norm2)), self.with_pull(self.solved)
+        better = improve_slots(equations, reduction, weights, norm2)
+        moved = {k: x.at for k, x in better.slots.items() if x.at != reduction.slots[k].at}
+        return self.at_slots(moved) if moved else None
+
+    def at_slots(self, places: Mapping[int, int]) -> Self:
+        """Return this problem with wheels, by the place of the knob, at other slots."""
+        reduction, full = (x.at_slots(places) for x in (self.reduction, self.full))
+        return replace(self, reduction=reduction, full=full)  # type: ignore[type-var]
+
+    def with_final_slots(self) -> Self:
+        """Return this problem with colour wheels that stay at their slots."""
+        reduction, full = (replace(x, slots={}) for x in (self.reduction, self.full))
         return replace(self, reduction=reduction, full=full)  # type: ignore[type-var]
 
 

@@ -5,7 +5,8 @@ time, always the one that helps most, and at K exchanges lights as long as that 
 solves for its lights in full, so the answer is optimal for the lights it uses.
 
 Nor is the choice of a slot of a colour wheel. It comes after the solve for a mix of slots, in whose
-colours each lamp gets the closest slot; then all are solved for again, with these slots.
+colours each lamp gets the closest slot; then all are solved for again, with these slots, and a
+short search moves single wheels where the loss falls.
 """
 
 from collections.abc import Collection, Sequence
@@ -131,17 +132,27 @@ class LinearAnswer(Generic[_Problem]):
 
 def solve_linear(problem: _Problem, start: Doubles) -> LinearAnswer[_Problem]:
     """Solve the squares from weights (n, 3); with `sparse`, for the best lights alone. Colour
-    wheels come to the closest slots.
+    wheels come to slots.
     """
-    mixed = solve_mixed(problem, start)
-    if not mixed.problem.reduction.open_wheels:
+    mixed = answer = solve_mixed(problem, start)
+    if mixed.problem.reduction.open_wheels:
+        answer = solve_reduction(mixed.problem.with_slots(mixed.weights), mixed.weights)
+    if not answer.problem.reduction.slots:
         return mixed
-    answer = solve_reduction(mixed.problem.with_slots(mixed.weights), mixed.weights)
+    if (better := answer.problem.with_better_slots(answer.weights)) is not None:
+        trial = solve_reduction(better, answer.weights)
+        answer = min(answer, trial, key=_loss_with_pull)
+    answer = replace(answer, problem=answer.problem.with_final_slots())
     certificate, former = answer.lighting.certificate, mixed.lighting.certificate
     assert certificate is not None
     assert former is not None
     lighting = answer.lighting.with_certificate(replace(certificate, curve=former.curve))
     return replace(answer, lighting=lighting, tried=mixed.tried)
+
+
+def _loss_with_pull(answer: LinearAnswer[_Problem]) -> float:
+    problem = answer.problem
+    return float(problem.with_pull(problem.solved).objective(answer.weights).sum())
 
 
 def solve_mixed(problem: _Problem, start: Doubles) -> LinearAnswer[_Problem]:

@@ -118,14 +118,23 @@ def solution_of(problem: Problem, *, start: Doubles | None = None) -> Solution:
         return _solve_squares(problem, begin)
     blocks = _blocks_of(problem)
     mixed, reached = _solve_rounds(problem, begin, blocks)
-    if not mixed.problem.reduction.open_wheels:
+    solution = mixed
+
+    def with_slots_of(found: Problem, weights: Doubles) -> Solution:
+        at_slots = replace(problem, reduction=found.reduction, full=found.full)
+        near = nearest_weights(at_slots.reduction, weights)
+        return _descend(at_slots, near, reached, blocks)
+
+    if mixed.problem.reduction.open_wheels:
+        solution = with_slots_of(mixed.problem.with_slots(mixed.weights), mixed.weights)
+    if not solution.problem.reduction.slots:
         return mixed
-    reductions = {name: getattr(mixed.problem, name) for name in ("reduction", "full")}
-    at_slots = replace(problem, **reductions).with_slots(mixed.weights)
-    start_at_slots = nearest_weights(at_slots.reduction, mixed.weights)
-    solution = _descend(at_slots, start_at_slots, reached, blocks)
-    curve = mixed.certificate.curve
-    return replace(solution, tried=mixed.tried).with_certificate_fields(curve=curve)
+    if (better := solution.problem.with_better_slots(solution.weights)) is not None:
+        trial = with_slots_of(better, solution.weights)
+        solution = min(solution, trial, key=loss_with_pull)
+    final, curve = solution.problem.with_final_slots(), mixed.certificate.curve
+    solution = replace(solution, problem=final, tried=mixed.tried)
+    return solution.with_certificate_fields(curve=curve)
 
 
 def _solve_rounds(

@@ -180,14 +180,15 @@ def _slot_note(light: LightSetting) -> str:
 
 def spoken_wheels(lights: Iterable[LightSetting]) -> str:
     """Return which slots were chosen for colour wheels, in a sentence; "" if none was."""
-    slots = [
-        f"{light.name} at {light.slot}, {_slot_note(light)}"
-        for light in lights
-        if light.slot_delta_e is not None and not light.part_of
-    ]
+    slots = []
+    for light in (x for x in lights if not x.part_of):
+        if light.slot_delta_e is not None:
+            slots.append(f"{light.name} at {light.slot}, {_slot_note(light)}")
+        elif light.lamp is not None and light.lamp.behind:
+            slots.append(f"{light.name} behind {light.lamp.behind}")
     if not slots:
         return ""
-    return f"Colour wheels, each at the closest slot to what was solved: {some_of(slots, '; ')}."
+    return f"Colour wheels: {some_of(slots, '; ')}."
 
 
 #: Which of several mixes of a lamp's emitters an answer has, by the preference.

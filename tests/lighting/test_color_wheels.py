@@ -11,6 +11,7 @@ from scipy.optimize import lsq_linear, nnls
 
 from lightpaint.colour.color import luminance
 from lightpaint.colour.color_difference import ciede2000, lab
+from lightpaint.colour.primaries import REC709, REC2020, rgb_to_xyz
 from lightpaint.errors import ConstraintError
 from lightpaint.lighting.analysis.analysis import analyse
 from lightpaint.lighting.animated_solve import solve_frames
@@ -21,6 +22,7 @@ from lightpaint.lighting.live.live import LiveSolver
 from lightpaint.lighting.live.live_view import LiveView
 from lightpaint.lighting.problem import Problem
 from lightpaint.lighting.solve import solve
+from lightpaint.lighting.unknowns import slot_search
 from lightpaint.report.phrases import spoken_lamp, spoken_wheels
 from lightpaint.target.target import Target
 
@@ -38,6 +40,9 @@ SLOTS = [
         ("cto", [0.41, 0.39], 4.0),
     )
 ]
+
+#: Seed of a case in which other slots than the closest ones are better.
+GREEDY_IS_WRONG = 0
 
 #: Float64 of these conditions, and the oracle's own tolerance.
 SAME = 1e-8
@@ -71,7 +76,8 @@ def _mixed_best(rows: Any, y: Any, columns: Any) -> Any:
 
 
 @pytest.mark.parametrize("seed", list(seeds(8, 60)))
-def test_each_wheel_is_at_the_slot_closest_to_the_best_mix(make_basis, seed):
+def test_each_wheel_begins_at_the_slot_closest_to_the_best_mix(make_basis, monkeypatch, seed):
+    monkeypatch.setattr(slot_search, "MAX_TRIALS", 0)
     basis, target, constraints = _case(make_basis, seed)
     solution = solve(basis, target, constraints=constraints, literal=True)
     assert solution.certificate.converged
@@ -107,6 +113,52 @@ def test_each_wheel_is_at_the_slot_closest_to_the_best_mix(make_basis, seed):
     found = np.append(drives, solution.weights[2])
     # Both are solutions of the same least squares.
     assert np.square(A @ found - y).sum() <= 2 * best.cost * (1 + SAME) + SAME * (y @ y)
+
+
+def _least_squares(rows: Any, y: Any, columns: Any) -> float:
+    """The least loss with a dimmer of 0 to 1 for each column (k, 3) of the first lights, and a last
+    light of any colour.
+    """
+    part, count = rows.reshape(len(y), 3, 3), len(columns)
+    A = np.column_stack([*(part[:, k] @ columns[k] for k in range(count)), part[:, 2]])
+    upper = [1.0] * count + [np.inf] * 3
+    return 2 * lsq_linear(A, y, ([0.0] * (count + 3), upper), tol=1e-14).cost
+
+
+@pytest.mark.parametrize("seed", list(seeds(6, 40)))
+def test_no_other_slot_of_a_single_wheel_is_better(make_basis, monkeypatch, seed):
+    basis, target, constraints = _case(make_basis, seed)
+    found = solve(basis, target, constraints=constraints, literal=True)
+    rows, y = stack_rows(basis, target)
+    lamp = found.problem.reduction.lamps[0]
+    slots = [lamp.names.index(found.lighting[x].slot or "open") for x in ("spot", "profile")]
+    own = _least_squares(rows, y, lamp.columns[slots])
+    for wheel in range(2):
+        for slot in range(len(SLOTS)):
+            other = [*slots]
+            other[wheel] = slot
+            # Moves that gain less than MIN_GAIN are not made.
+            assert _least_squares(rows, y, lamp.columns[other]) >= own * (
+                1 - slot_search.MIN_GAIN
+            ) - SAME * (y @ y)
+    monkeypatch.setattr(slot_search, "MAX_TRIALS", 0)
+    closest = solve(basis, target, constraints=constraints, literal=True)
+    losses = [x.problem.objective(x.weights).sum() for x in (found, closest)]
+    assert losses[0] <= losses[1] * (1 + SAME)
+
+
+@pytest.mark.parametrize("fit", [{"literal": True}, {"space": "display"}])
+def test_the_closest_slots_of_all_wheels_are_not_always_the_best(make_basis, monkeypatch, fit):
+    basis, target, constraints = _case(make_basis, GREEDY_IS_WRONG)
+    found = solve(basis, target, constraints=constraints, **fit)
+    monkeypatch.setattr(slot_search, "MAX_TRIALS", 0)
+    closest = solve(basis, target, constraints=constraints, **fit)
+    slots = [
+        [x[name].slot for name in ("spot", "profile")] for x in (found.lighting, closest.lighting)
+    ]
+    assert slots[0] != slots[1]
+    losses = [x.problem.objective(x.weights).sum() for x in (found, closest)]
+    assert losses[0] < 0.99 * losses[1]
 
 
 @pytest.mark.parametrize("fit", [{}, {"hold": 0.1}, {"space": "display"}])
@@ -156,8 +208,7 @@ def test_slots_that_were_chosen_are_said(make_basis):
     lights = solve(basis, target, constraints=constraints).lighting.lights
     chosen = lights[1]
     assert spoken_wheels(lights) == (
-        "Colour wheels, each at the closest slot to what was solved: profile at "
-        f"{chosen.slot}, ΔE {chosen.slot_delta_e:.1f} off."
+        f"Colour wheels: profile at {chosen.slot}, ΔE {chosen.slot_delta_e:.1f} off."
     )
     assert spoken_lamp(chosen).endswith(f" (ΔE {chosen.slot_delta_e:.1f} off)")
     assert spoken_lamp(lights[0]).startswith("open ")
@@ -197,7 +248,8 @@ def test_the_file_says_slot_and_distance(make_basis, tmp_path):
 
 
 @pytest.mark.parametrize("space", ["linear", "display"])
-def test_under_the_brush_wheels_are_at_slots(make_basis, space):
+def test_under_the_brush_wheels_are_at_the_closest_slots(make_basis, monkeypatch, space):
+    monkeypatch.setattr(slot_search, "MAX_TRIALS", 0)
     basis, target, constraints = _case(make_basis, 8)
     view = LiveView(basis, target.image.copy(), target.importance.copy())
     fit = resolve_for_targets(Fit(literal=True, space=space), [target])
@@ -239,3 +291,111 @@ def test_mistakes_are_named(case):
     table, message = WRONG[case]
     with pytest.raises(ConstraintError, match=message):
         Constraints.of({"spot": table})
+
+
+#: A lamp that mixes a cool and a warm white, behind a wheel.
+WHITES = [
+    {"name": "cool white", "xy": [0.313, 0.324], "Y": 4.0, "watts": 400},
+    {"name": "warm white", "xy": [0.44, 0.403], "Y": 3.0, "watts": 400},
+]
+FILTERS = [
+    {"name": "open", "transmission": [1, 1, 1]},
+    {"name": "red", "transmission": [0.9, 0.01, 0.0]},
+    {"name": "congo", "transmission": [0.1, 0.0, 0.7]},
+    {"name": "green", "transmission": [0.05, 0.8, 0.02]},
+]
+
+
+def _filtered_case(make_basis: Any, painted: Any, **more: Any) -> Any:
+    """A wash behind a wheel, alone, and paint of one linear colour where it shines."""
+    lights = {"wash": {"emitters": WHITES, "power_share": 0.5, "wheel": FILTERS, **more}}
+    basis = make_basis(1, SIZE, seed=3, names=["wash"])
+    image = (basis.images[0] * np.array(painted)).astype(np.float32)
+    target = Target("t", image, np.ones(SIZE, np.float32), everything=True)
+    return basis, target, Constraints.of(lights)
+
+
+@pytest.mark.parametrize(
+    ("painted", "slot"),
+    [
+        ((1.5, 1.4, 1.3), "open"),
+        ((1.2, 0.02, 0.01), "red"),
+        ((0.2, 0.02, 1.5), "congo"),
+        ((0.05, 1.0, 0.1), "green"),
+    ],
+)
+def test_a_wheel_in_front_of_emitters_leaves_open_only_for_the_painted_colour(
+    make_basis, painted, slot
+):
+    basis, target, constraints = _filtered_case(make_basis, painted)
+    light = solve(basis, target, constraints=constraints, literal=True).lighting["wash"]
+    assert light.slot == light.lamp.behind == ("" if slot == "open" else slot)
+    assert light.slot_delta_e is None
+    assert [*light.drives] == ["cool white", "warm white"]
+    # What it emits is the mix of its emitters, each filtered in BT.2020.
+    passed = next(x["transmission"] for x in FILTERS if x["name"] == slot)
+    wide = rgb_to_xyz(REC2020)
+    mixed = np.zeros(3)
+    for emitter, drive in zip(WHITES, light.drives.values(), strict=True):
+        x, y = emitter["xy"]
+        xyz = drive * emitter["Y"] * np.array([x / y, 1, (1 - x - y) / y])
+        mixed += wide @ (np.maximum(passed, 1e-4) * np.linalg.solve(wide, xyz))
+    # Y is 0.2126 R + 0.7152 G + 0.0722 B, of four digits.
+    assert np.allclose(np.linalg.solve(rgb_to_xyz(REC709), mixed), light.emission, rtol=1e-4)
+
+
+def test_a_gain_that_nobody_sees_leaves_the_wheel_open(make_basis, monkeypatch):
+    """The colour of a filter that is nearly clear: its slot is better by less than 1 % of it."""
+    pale = {"name": "pale", "transmission": [1.0, 0.985, 1.0]}
+    paint = (1.5, 1.4, 1.5)
+    basis, target, constraints = _filtered_case(make_basis, paint, wheel=[FILTERS[0], pale])
+    solution = solve(basis, target, constraints=constraints, literal=True)
+    assert solution.lighting["wash"].slot == ""
+    monkeypatch.setattr(slot_search, "VISIBLE", 0.0)
+    eager = solve(basis, target, constraints=constraints, literal=True)
+    assert eager.lighting["wash"].slot == "pale"
+    errors = [
+        np.sqrt(x.problem.objective(x.weights).sum() / x.problem.norm2.sum())
+        for x in (solution, eager)
+    ]
+    assert 0 < errors[0] - errors[1] < 0.01
+
+
+def test_a_slot_in_front_of_emitters_comes_back_from_the_file(make_basis, tmp_path):
+    basis, target, constraints = _filtered_case(make_basis, (1.2, 0.02, 0.01))
+    lighting = solve(basis, target, constraints=constraints).lighting
+    file = tmp_path / "lighting.json"
+    write_lighting(file, lighting)
+    data = json.loads(file.read_text())["lights"]["wash"]
+    assert (data["slot"], data["behind"]) == ("red", "red")
+    assert read_lighting(file)["wash"] == lighting["wash"]
+    assert spoken_wheels(lighting.lights) == "Colour wheels: wash behind red."
+
+
+def test_a_range_of_white_and_one_colour_leave_a_filter_open(make_basis):
+    leds = [
+        {"name": name, "xy": xy, "Y": 2.0}
+        for name, xy in (("red", [0.69, 0.30]), ("green", [0.2, 0.7]), ("blue", [0.15, 0.05]))
+    ]
+    for more in ({"kelvin": [3000, 5000], "power_share": False}, {"color": "#ffaa66"}):
+        basis, target, constraints = _filtered_case(
+            make_basis, (1.2, 0.02, 0.01), emitters=leds, **more
+        )
+        light = solve(basis, target, constraints=constraints, literal=True).lighting["wash"]
+        assert light.lamp.behind == ""
+
+
+WRONG_FILTERS = {
+    "empty": ([], "is \\[\\]: expected a list of at most 40 slots"),
+    "no name": ([{"transmission": [1, 1, 1]}], "name is None"),
+    "too much": ([{"name": "a", "transmission": [1.2, 1, 1]}], "expected the shares of red"),
+    "twice": ([FILTERS[0], FILTERS[0]], "has two slots named 'open'"),
+    "other key": ([{**FILTERS[0], "xy": [0.3, 0.3]}], "xy"),
+}
+
+
+@pytest.mark.parametrize("case", WRONG_FILTERS)
+def test_mistakes_of_filters_are_named(case):
+    wheel, message = WRONG_FILTERS[case]
+    with pytest.raises(ConstraintError, match=message):
+        Constraints.of({"wash": {"emitters": WHITES, "wheel": wheel}})

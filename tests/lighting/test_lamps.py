@@ -235,11 +235,62 @@ def test_drives_are_in_the_file_and_return(make_basis, tmp_path):
     assert read_lighting(tmp_path / "a.json").lights == lighting.lights
 
 
+def test_drives_that_somebody_changed_are_refused_with_the_emission_that_they_mix(
+    make_basis, tmp_path
+):
+    basis, target, constraints = _case(make_basis, 4, par={"emitters": RGBW})
+    lighting = solve(basis, target, constraints=constraints).lighting
+    file = tmp_path / "a.json"
+    write_lighting(file, lighting)
+    data = json.loads(file.read_text())
+    light = data["lights"]["par"]
+    light["drives"]["red"] = 0.123
+    file.write_text(json.dumps(data))
+    with pytest.raises(LightingError, match="light 'par' has drives that mix ") as caught:
+        read_lighting(file)
+    # What it says to do helps, both of it.
+    words = str(caught.value).partition("that mix ")[2].partition(", and the emission")[0]
+    mixed = [float(x) for x in words.split()]
+    changed = {**data, "lights": {"par": {**light, "emission": mixed, "weight": mixed}}}
+    file.write_text(json.dumps(changed))
+    emission = lighting["par"].lamp.mix(np.array([*light["drives"].values()]))
+    assert read_lighting(file)["par"].emission == pytest.approx(emission, rel=1e-5)
+    del light["drives"]
+    file.write_text(json.dumps(data))
+    assert read_lighting(file)["par"].drives == pytest.approx(lighting["par"].drives, abs=1e-9)
+    light["drives"] = {"pink": 1}
+    file.write_text(json.dumps(data))
+    with pytest.raises(LightingError, match="are not numbers of its emitters, red, green, blue"):
+        read_lighting(file)
+
+
+def test_other_drives_of_the_same_emission_are_no_mistake(make_basis, tmp_path):
+    basis, target, constraints = _case(make_basis, 3, wash={"emitters": SIX})
+    preferred = constraints.and_then(Constraints.of(prefer_emitters="white"))
+    file = tmp_path / "a.json"
+    write_lighting(file, solve(basis, target, constraints=preferred).lighting)
+    data = json.loads(file.read_text())
+    del data["lights"]["wash"]["prefer"]
+    file.write_text(json.dumps(data))
+    assert read_lighting(file)["wash"].lamp.prefer == "watts"
+
+
+def test_rf_of_unknown_spectra_is_refused(make_basis):
+    basis, target, constraints = _case(make_basis, 3, par={"emitters": RGBW})
+    with pytest.raises(ConstraintError, match="prefer_emitters is rf, and nothing says which spec"):
+        solve(
+            basis,
+            target,
+            constraints=constraints.and_then(Constraints.of(prefer_emitters="rf")),
+        )
+
+
 def test_only_lamps_may_be_negative_in_a_file(make_basis, tmp_path):
     basis, target, constraints = _case(make_basis, 4, par={"emitters": RGBW})
     write_lighting(tmp_path / "a.json", solve(basis, target, constraints=constraints).lighting)
     data = json.loads((tmp_path / "a.json").read_text())
     data["lights"]["par"] |= {"emission": [-0.1, 1, 0], "weight": [-0.1, 1, 0]}
+    del data["lights"]["par"]["drives"]  # which follow from the emission
     (tmp_path / "b.json").write_text(json.dumps(data))
     assert read_lighting(tmp_path / "b.json").emission["par"] == (-0.1, 1, 0)
     del data["lights"]["par"]["emitters"]

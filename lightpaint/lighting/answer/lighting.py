@@ -221,8 +221,10 @@ class LightSetting:
         """The name of the slot at which its colour wheel is; "" without a wheel, or while it is
         off.
         """
-        is_wheel = self.lamp is not None and self.lamp.is_wheel
-        return next((name for name, drive in self.drives.items() if is_wheel and drive > 0), "")
+        lit = [name for name, drive in self.drives.items() if drive > 0]
+        if self.lamp is None or not lit:
+            return ""
+        return lit[0] if self.lamp.is_wheel else self.lamp.behind
 
     @property
     def slot_delta_e(self) -> float | None:

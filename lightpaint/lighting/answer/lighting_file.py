@@ -6,7 +6,10 @@ from dataclasses import asdict, replace
 from pathlib import Path
 from typing import Any
 
+import numpy as np
+
 from lightpaint.colour.lamp import Lamp
+from lightpaint.display_text import some_names
 from lightpaint.errors import LightingError
 from lightpaint.file_reading import read_text
 from lightpaint.files import one_line, write_text
@@ -16,6 +19,7 @@ from lightpaint.lighting.answer.lighting import ALL_REACHED, Lighting, LightSett
 from lightpaint.lighting.answer.lighting_keys import LightingKey
 from lightpaint.scene.properties.site import EmitterPlace
 from lightpaint.storage.json_records import fields_of, read_record, strict_json
+from lightpaint.validation import is_number
 from lightpaint.version import __version__
 
 FORMAT = "lightpaint-lighting 1"
@@ -27,7 +31,10 @@ MAX_BYTES = 2**23
 PLAIN_FIELDS = ("target", "scene_identity", "cd_per_unit", "up", "observer")
 
 #: Fields of a light's lamp, which its file has beside the others.
-LAMP_FIELDS = ("emitters", "power_share", "prefer", "is_wheel", "least_rf")
+LAMP_FIELDS = ("emitters", "power_share", "prefer", "is_wheel", "least_rf", "behind")
+
+#: Difference of drives, and of emissions relative to their size, that is rounding of a file.
+SAME_DRIVES = 1e-3
 
 #: Key of a lamp whose drives are the answer, found with spectra; its emission follows from them.
 SPECTRAL = "is_spectral"
@@ -168,7 +175,30 @@ def _read_setting(name: str, data: Mapping[str, Any]) -> LightSetting:
             names, errors = [x["name"] for x in data["emitters"]], data.get("drive_errors", {})
             fields["mix"] = [data["drives"][name] for name in names]
             fields["mix_errors"] = [errors.get(name) for name in names] if errors else None
-    return read_record(LightSetting, fields, others=True)
+    light: LightSetting = read_record(LightSetting, fields, others=True)
+    if light.lamp is not None and light.mix is None and "drives" in data:
+        _check_drives(light, light.lamp, data["drives"])
+    return light
+
+
+def _check_drives(light: LightSetting, lamp: Lamp, drives: Mapping[str, Any]) -> None:
+    """Raise LightingError for drives that somebody has changed, without the emission they mix."""
+    if set(drives) != set(lamp.names) or not all(map(is_number, drives.values())):
+        raise LightingError(
+            f"light {light.name!r} has drives that are not numbers of its emitters, "
+            f"{some_names(lamp.names)}"
+        )
+    written = np.array([drives[name] for name in lamp.names], np.float64)
+    mixed, emission = lamp.mix(written), np.array(light.emission)
+    if np.abs(mixed - emission).max() <= SAME_DRIVES * np.abs(emission).max():
+        return
+    # An emission that they cannot mix has the drives of the nearest that they can.
+    if np.abs(written - np.array([*light.drives.values()])).max() > SAME_DRIVES:
+        own, other = (" ".join(f"{x:.6g}" for x in rgb) for rgb in (mixed, emission))
+        raise LightingError(
+            f"light {light.name!r} has drives that mix {own}, and the emission {other}: set "
+            "emission and weight to what the drives mix, or leave drives out"
+        )
 
 
 def _place_fields(place: EmitterPlace) -> dict[str, Any]:

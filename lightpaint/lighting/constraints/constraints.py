@@ -11,11 +11,17 @@ from typing import Any
 
 from lightpaint.arrays import RGB
 from lightpaint.colour.emitter_preference import Preference
+from lightpaint.colour.lamp import SlotFilter
 from lightpaint.colour.white_range import WhiteRange
 from lightpaint.display_text import some_of
 from lightpaint.errors import ConstraintError
 from lightpaint.keywords import keywords
-from lightpaint.lighting.constraints.emitter_values import EmitterRequest, parse_emitters
+from lightpaint.lighting.constraints.emitter_values import (
+    EmitterRequest,
+    has_slots,
+    parse_emitters,
+    parse_slots,
+)
 from lightpaint.lighting.constraints.requirements import Requirements
 from lightpaint.lighting.constraints.values import (
     Level,
@@ -60,7 +66,8 @@ class LightConstraint:
     emitters: the emitters that mix its light, of which each dims between bounds. power_share: their
     largest power together, relative to that of all at full. wheel: whether they are slots of a
     colour wheel, one of which shines at a time; or the name of the slot at which it stays.
-    least_rf: the fidelity index Rf that their mix needs.
+    least_rf: the fidelity index Rf that their mix needs. slots: of a colour wheel in front of
+    emitters that mix, the first of which it has unless another is chosen.
     label: all this in few words. where: the name of the source in errors.
     """
 
@@ -74,6 +81,7 @@ class LightConstraint:
     power_share: float | None = None
     wheel: bool | str = False
     least_rf: float | None = None
+    slots: tuple[SlotFilter, ...] = ()
     label: str = ""
     where: SourceKey = field(default_factory=SourceKey)
 
@@ -127,7 +135,7 @@ class LightConstraint:
             lock, primaries = Lock(lock.level, primaries[0]), None
         wheel = parse_wheel(table, key, [x.name for x in emitters])
         is_off, label = "off" in table, _label(table)
-        lamp = emitters, share, wheel, least_rf
+        lamp = emitters, share, wheel, least_rf, parse_slots(table, key)
         return cls(lock, is_off, least, most, primaries, whites, *lamp, label, key)
 
 
@@ -142,7 +150,7 @@ def _check_emitters(
             raise ConstraintError(where, " has wheel without emitters, which are its slots")
         return
     mixing = {"power_share": "power_share" in table, "kelvin": len(primaries or ()) > 1}
-    if "wheel" in table and any(mixing.values()):
+    if "wheel" in table and not has_slots(table) and any(mixing.values()):
         key = next(key for key, is_there in mixing.items() if is_there)
         raise ConstraintError(
             where, f" has wheel and {key}, and a wheel shows one slot at a time: leave {key} out"

@@ -11,7 +11,7 @@ import numpy as np
 from lightpaint.arrays import RGB, Doubles, as_rgb
 from lightpaint.basis.lights import BasisLight
 from lightpaint.colour.color import luminance
-from lightpaint.colour.lamp import MAX_EMITTERS, MAX_SLOTS, LampEmitter
+from lightpaint.colour.lamp import MAX_EMITTERS, MAX_SLOTS, LampEmitter, SlotFilter
 from lightpaint.colour.photometry import photometry
 from lightpaint.colour.planckian_locus import matching_functions
 from lightpaint.colour.primaries import REC709, rgb_to_xyz
@@ -27,6 +27,9 @@ from lightpaint.validation import BRIGHTEST, MAX_NAME, is_number
 #: Keys of an emitter: of its colour, one of which it needs, and of its brightness at full.
 COLORS, AMOUNTS = ("xy", "rgb", "spectrum"), ("Y", "cd", "lm")
 EMITTER_KEYS = ("name", *COLORS, *AMOUNTS, "max", "bits", "watts")
+
+#: Keys of a slot of a colour wheel beside emitters that mix.
+SLOT_KEYS = ("name", "transmission")
 
 #: Bits of the channels of fixtures.
 BITS = (8, 16, 24)
@@ -108,7 +111,7 @@ def parse_emitters(table: Mapping[str, Any], light: SourceKey) -> tuple[EmitterR
             f" is {one_line(repr(value))}: expected a list of emitters, "
             '[{name = "red", xy = [0.69, 0.31], cd = 900}]',
         )
-    is_wheel = bool(table.get("wheel"))
+    is_wheel = bool(table.get("wheel")) and not has_slots(table)
     if len(value) > (most := MAX_SLOTS if is_wheel else MAX_EMITTERS):
         kind, what = ("slots", "be on a wheel") if is_wheel else ("emitters", "be mixed")
         raise ConstraintError(where, f" lists {len(value)} {kind}: at most {most} can {what}")
@@ -119,6 +122,47 @@ def parse_emitters(table: Mapping[str, Any], light: SourceKey) -> tuple[EmitterR
             where, f" has two emitters named {repeated[0]!r}: give each a name of its own"
         )
     return emitters
+
+
+def has_slots(table: Mapping[str, Any]) -> bool:
+    """Return whether a wheel is given by its slots, in front of emitters that mix."""
+    return isinstance(table.get("wheel"), list | tuple)
+
+
+def parse_slots(table: Mapping[str, Any], light: SourceKey) -> tuple[SlotFilter, ...]:
+    """Return the slots of a wheel in front of emitters, none without one. Raises
+    ConstraintError."""
+    if not has_slots(table):
+        return ()
+    value, where = table["wheel"], light / "wheel"
+    if not 0 < len(value) <= MAX_SLOTS or not all(isinstance(x, Mapping) for x in value):
+        raise ConstraintError(
+            where,
+            f" is {one_line(repr(value))}: expected a list of at most {MAX_SLOTS} slots, "
+            '[{name = "congo", transmission = [0.1, 0.02, 0.6]}]',
+        )
+    slots = tuple(_parse_slot(x, where / str(k + 1)) for k, x in enumerate(value))
+    names = [x.name for x in slots]
+    if repeated := [name for name in names if names.count(name) > 1]:
+        raise ConstraintError(
+            where, f" has two slots named {repeated[0]!r}: give each a name of its own"
+        )
+    return slots
+
+
+def _parse_slot(table: Mapping[str, Any], where: SourceKey) -> SlotFilter:
+    check_keys(table, SLOT_KEYS, where)
+    name, passed = table.get("name"), table.get("transmission")
+    if not isinstance(name, str) or not 0 < len(name.strip()) <= MAX_NAME:
+        raise ConstraintError(where / "name", f' is {one_line(repr(name))}: expected "congo"')
+    is_list = isinstance(passed, list | tuple) and len(passed) == 3
+    if not is_list or not all(is_number(x) and 0 <= x <= 1 for x in passed or ()):
+        raise ConstraintError(
+            where / "transmission",
+            f" is {one_line(repr(passed))}: expected the shares of red, green and blue of BT.2020 "
+            "that it lets through, [0.1, 0.02, 0.6]",
+        )
+    return SlotFilter(name.strip(), as_rgb(np.array(passed, np.float64)))
 
 
 def _parse_emitter(table: Mapping[str, Any], where: SourceKey) -> EmitterRequest:

@@ -60,7 +60,7 @@ def check_lengths(table: Mapping[str, Any], where: SourceKey) -> None:
     """Raise ConstraintError for a value that is longer than any valid one."""
     for key, value in table.items():
         texts = [*value] if isinstance(value, list | tuple) else [value]
-        if key not in ("primaries", "emitters"):  # which have limits of their own
+        if key not in ("primaries", "emitters", "wheel"):  # which have limits of their own
             texts.append(value)
         if isinstance(value, Mapping):
             texts = [x for pair in value.items() for x in pair]
@@ -261,6 +261,8 @@ def parse_power_share(table: Mapping[str, Any], where: SourceKey) -> float | Non
 def parse_wheel(table: Mapping[str, Any], where: SourceKey, slots: Sequence[str]) -> bool | str:
     """Return whether emitters are slots of a colour wheel, or the name of one at which it stays."""
     value = table.get("wheel", False)
+    if isinstance(value, list | tuple):  # slots in front of emitters that mix
+        return False
     if not (isinstance(value, bool) or value in slots):
         raise ConstraintError(
             where / "wheel",
@@ -289,6 +291,8 @@ def describe_constraint(key: str, value: Any) -> str:
         return f"limits {_text(value.get('min', 0))} to {_text(value.get('max', '∞'))}"
     if key == "emitters":
         return " + ".join(str(emitter["name"]) for emitter in value)
+    if key == "wheel" and not isinstance(value, str):
+        return f"wheel of {len(value)} slots"
     if key == "wheel":
         return f"wheel at {value}"
     if key == "rf":

@@ -277,6 +277,35 @@ class Knob:
         return cls((light,), tuple(Unknown(((light, rgb),)) for rgb in colours))
 
 
+@dataclass(frozen=True)
+class SlotChoice:
+    """A slot of a colour wheel: the knob of a light, and its lamp if the slot changes that."""
+
+    knob: Knob
+    lamp: Lamp | None = None
+
+
+@dataclass(frozen=True)
+class SlotChoices:
+    """The slots that a colour wheel can have. at: the place of the one that it has.
+
+    is_filter: whether they are in front of emitters that mix; the first one then is open.
+    """
+
+    options: tuple[SlotChoice, ...]
+    at: int = 0
+    is_filter: bool = False
+
+    @classmethod
+    def of_wheel(cls, knob: Knob, slot: int) -> "SlotChoices":
+        """Make the choices of a wheel whose slots are emitters. slot: that it has."""
+        wheel = knob.wheel
+        assert wheel is not None
+        places = np.flatnonzero(wheel.lower <= wheel.upper).tolist()
+        options = tuple(SlotChoice(knob.at_slot(place)) for place in places)
+        return cls(options, places.index(slot))
+
+
 @lru_cache(64)
 def brightest_whites(lamp: Lamp, whites: WhiteRange) -> Doubles:
     """Return the luminance, (m,), with which a lamp mixes each white of a range at most."""
@@ -347,7 +376,8 @@ def lamp_of(
         )
     emitters = tuple(x.in_light(light, cd_per_unit) for x in constraint.emitters)
     is_wheel = constraint.wheel is not False
-    return Lamp(emitters, constraint.power_share, prefer or "watts", is_wheel, constraint.least_rf)
+    lamp = Lamp(emitters, constraint.power_share, prefer or "watts", is_wheel, constraint.least_rf)
+    return lamp.behind_slot(constraint.slots[0]) if constraint.slots else lamp
 
 
 def _check_rendering(light: BasisLight, constraint: LightConstraint) -> None:
@@ -384,6 +414,17 @@ def lamp_knob(k: int, light: BasisLight, constraint: LightConstraint, lamp: Lamp
     _check_room(constraint, light, least, min(most, float(coefficients @ upper)))
     _check_room(constraint, light, lower, upper)
     return Knob((k,), unknowns, (tuple(map(float, coefficients)), least, most))
+
+
+def slots_of_lamp(
+    k: int, light: BasisLight, constraint: LightConstraint, cd_per_unit: float | None, lamp: Lamp
+) -> SlotChoices:
+    """Return the slots of the wheel in front of a lamp's emitters, at the first of them."""
+    emitters = tuple(x.in_light(light, cd_per_unit) for x in constraint.emitters)
+    bare = replace(lamp, emitters=emitters)
+    lamps = [bare.behind_slot(slot) for slot in constraint.slots]
+    options = tuple(SlotChoice(lamp_knob(k, light, constraint, x), x) for x in lamps)
+    return SlotChoices(options, is_filter=True)
 
 
 def _unknowns_of(k: int, colors: Doubles, upper: Doubles) -> tuple[Unknown, ...]:

@@ -17,6 +17,7 @@ import numpy as np
 from lightpaint.arrays import RGB, Bools, Doubles, Indices, as_rgb
 from lightpaint.basis.lights import BasisLight
 from lightpaint.colour.lamp import Lamp
+from lightpaint.display_text import some_names
 from lightpaint.errors import ConstraintError
 from lightpaint.lighting.algebra.quadratic import Cap
 from lightpaint.lighting.constraints.constraints import Constraints, LightConstraint
@@ -29,12 +30,14 @@ from lightpaint.lighting.constraints.requirements import Requirements
 from lightpaint.lighting.unknowns.gamuts import Gamuts
 from lightpaint.lighting.unknowns.knobs import (
     Knob,
+    SlotChoices,
     Unknown,
     dimmer_knob,
     fixed_emission,
     lamp_knob,
     lamp_of,
     mixing_knob,
+    slots_of_lamp,
     tied_knob,
     white_lamp_knob,
 )
@@ -67,6 +70,7 @@ class Reduction:
     requirements: sums that the answer has to reach, if there are any.
     mixed_emissions: the emissions, by the light's index, of lamps with colour wheels before these
     came to their slots.
+    slots: the slots that wheels can still have, by the place of the knob.
     """
 
     fixed_weights: Doubles
@@ -77,6 +81,7 @@ class Reduction:
     lamps: Mapping[int, Lamp] = field(default_factory=dict)
     requirements: Requirements | None = None
     mixed_emissions: Mapping[int, RGB] = field(default_factory=dict)
+    slots: Mapping[int, SlotChoices] = field(default_factory=dict)
 
     @cached_property
     def unknowns(self) -> tuple[Unknown, ...]:
@@ -124,7 +129,7 @@ class Reduction:
         """Return the reduction with each colour wheel at the slot that comes closest to the colour
         of its lamp in weights (n, 3).
         """
-        knobs, mixed_emissions = [*self.knobs], {**self.mixed_emissions}
+        knobs, mixed_emissions, slots = [*self.knobs], {**self.mixed_emissions}, {**self.slots}
         for k in self.open_wheels:
             knob, wheel = knobs[k], knobs[k].wheel
             assert wheel is not None
@@ -133,8 +138,26 @@ class Reduction:
                 mixed_emissions[knob.lights[0]] = as_rgb(color)
             else:  # off, but it may serve once other wheels have left their colours
                 color = np.zeros(3)
-            knobs[k] = knob.at_slot(wheel.slot_for(color))
-        return replace(self, knobs=tuple(knobs), mixed_emissions=mixed_emissions)
+            slots[k] = SlotChoices.of_wheel(knob, slot := wheel.slot_for(color))
+            knobs[k] = knob.at_slot(slot)
+        return replace(self, knobs=tuple(knobs), mixed_emissions=mixed_emissions, slots=slots)
+
+    @cached_property
+    def wheels(self) -> tuple[int, ...]:
+        """Places of the knobs of colour wheels that may have another slot, of lights that may be
+        on.
+        """
+        return tuple(k for k in self.slots if any(x.upper > 0 for x in self.knobs[k].unknowns))
+
+    def at_slots(self, places: Mapping[int, int]) -> "Reduction":
+        """Return the reduction with wheels, by the place of the knob, at other slots."""
+        knobs, slots, lamps = [*self.knobs], {**self.slots}, {**self.lamps}
+        for k, place in places.items():
+            option = slots[k].options[place]
+            knobs[k], slots[k] = option.knob, replace(slots[k], at=place)
+            if option.lamp is not None:
+                lamps[option.knob.lights[0]] = option.lamp
+        return replace(self, knobs=tuple(knobs), slots=slots, lamps=lamps)
 
     @cached_property
     def has_equal_mixes(self) -> bool:
@@ -410,6 +433,12 @@ def _lamps(
             made[kind] = lamp_of(light, constraint, scale, prefer)
         if (lamp := made[kind]) is not None:
             lamps[k] = lamp
+    if prefer == "rf" and lamps and all(x.powers_at_full is None for x in lamps.values()):
+        named = some_names(lights[k].name for k in lamps)
+        raise ConstraintError(
+            f"prefer_emitters is rf, and nothing says which spectra the emitters of {named} have: "
+            "give them a spectrum each in the lights file, or prefer watts, white or fewest"
+        )
     return lamps
 
 
@@ -512,7 +541,7 @@ def _reduce_to(constraints: Constraints, lights: Sequence[BasisLight]) -> Reduct
     by_light = constraints_by_light(constraints, lights)
     labels = ["" if constraint is None else constraint.label for constraint in by_light]
     tied, fixed, knobs = tied_lights(constraints, lights), np.zeros((len(lights), 3)), []
-    lamps = _lamps(constraints, lights, by_light)
+    lamps, slots = _lamps(constraints, lights, by_light), dict[int, SlotChoices]()
     for k, (light, constraint) in enumerate(zip(lights, by_light, strict=True)):
         if light.is_fixed:
             fixed[k] = 1
@@ -545,7 +574,10 @@ def _reduce_to(constraints: Constraints, lights: Sequence[BasisLight]) -> Reduct
         elif k in lamps and constraint.whites is not None:
             knobs.append(white_lamp_knob(k, light, constraint, lamps[k]))
         elif k in lamps:
+            if len(constraint.slots) > 1:
+                scale = constraints.cd_per_unit
+                slots[len(knobs)] = slots_of_lamp(k, light, constraint, scale, lamps[k])
             knobs.append(lamp_knob(k, light, constraint, lamps[k]))
         else:
             knobs.append(mixing_knob(k, light, constraint))
-    return Reduction(fixed, tuple(labels), tuple(knobs), lamps=lamps)
+    return Reduction(fixed, tuple(labels), tuple(knobs), lamps=lamps, slots=slots)
