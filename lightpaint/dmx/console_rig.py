@@ -10,6 +10,7 @@ from functools import cached_property
 import numpy as np
 
 from lightpaint.arrays import RGB, Position
+from lightpaint.colour.lamp import SlotFilter
 from lightpaint.colour.spectra.spectrum import Spectrum
 from lightpaint.display_text import some_names
 from lightpaint.errors import RigError
@@ -85,14 +86,29 @@ class RigSlot:
     last: int
 
 
+def filter_drive(slot: str) -> str:
+    """Return the name, among the drives of a light, of a slot that filters what it mixes."""
+    return f"wheel {slot}"
+
+
 @dataclass(frozen=True)
 class RigWheel:
-    """A colour wheel of a light. channel: its place among those of the fixture. slots: one for each
-    of the light's emitters, in their order.
+    """The colour wheels of a light, one behind the other.
+
+    channels: their places among those of the fixture. slots: the combinations of their slots, with
+    one of each wheel. filters: of light that is mixed before it, what each combination is called
+    and lets through, the open one first; empty where combinations are the light's emitters, in
+    their order.
     """
 
-    channel: int
-    slots: tuple[RigSlot, ...]
+    channels: tuple[int, ...]
+    slots: tuple[tuple[RigSlot, ...], ...]
+    filters: tuple[SlotFilter, ...] = ()
+
+    @cached_property
+    def filter_drives(self) -> tuple[str, ...]:
+        """The names, among the drives of the light, of the combinations that filter it."""
+        return tuple(filter_drive(x.name) for x in self.filters)
 
 
 @dataclass(frozen=True)
@@ -111,7 +127,8 @@ class RigLight:
     and in their place; `dimmers` set the sum's luminance. Empty for other lights.
     whites: places of channels that set its colour temperature, whose curves give kelvin; its
     emitters are its coolest and its warmest white, whose drives add up to what `dimmers` set.
-    wheel: a colour wheel, whose slots are its emitters, one at a time; `dimmers` set its drive.
+    wheel: colour wheels, whose slots are its emitters, one at a time, of which `dimmers` set the
+    drive; or that filter what emitters mix.
     """
 
     name: str
@@ -127,6 +144,11 @@ class RigLight:
     chromaticity: tuple[int, ...] = ()
     whites: tuple[int, ...] = ()
     wheel: RigWheel | None = None
+
+    @property
+    def has_slots_for_emitters(self) -> bool:
+        """True if its emitters are the slots of a colour wheel, one of which shines at a time."""
+        return self.wheel is not None and not self.wheel.filters
 
     @property
     def is_controlled(self) -> bool:

@@ -3,7 +3,8 @@
 A drive is the share of an emitter's light at full, 0 to 1. A light's first dimmer carries its
 largest drive and its emitters the others relative to that, as on a console; so small drives keep
 the resolution of the emitters' channels. Its further dimmers are at full, all else is at rest. A
-colour wheel goes to the slot of the largest drive, which the dimmer carries.
+colour wheel goes to the slot of the largest drive, which the dimmer carries; one in front of
+emitters that mix has drives of its own, such as `wheel congo`.
 """
 
 from collections.abc import Mapping, Sequence
@@ -23,6 +24,7 @@ from lightpaint.dmx.console_rig import (
     DmxChannel,
     RigFixture,
     RigLight,
+    RigWheel,
 )
 
 #: Drives by name of emitter.
@@ -59,6 +61,28 @@ def _levels_of(fixture: RigFixture, light: RigLight, drives: Drives) -> dict[int
     """Return the levels of the channels of a light, by their places among the fixture's."""
     if not light.is_controlled:
         return {}
+    return _mixing_levels(fixture, light, drives) | _filter_levels(fixture, light, drives)
+
+
+def _filter_levels(fixture: RigFixture, light: RigLight, drives: Drives) -> dict[int, int]:
+    """Return the levels of colour wheels in front of what a light mixes: at the slots whose drive
+    is largest, or open.
+    """
+    wheel = light.wheel
+    if wheel is None or not wheel.filters:
+        return {}
+    wanted = [drives.get(name, 0.0) for name in wheel.filter_drives]
+    defaults = [fixture.channels[k].default for k in wheel.channels]
+    slots = wheel.slots[int(np.argmax(wanted))]
+    return {
+        # A wheel that rests in its slot stays as it is.
+        k: default if slot.first <= default <= slot.last else slot.level
+        for k, slot, default in zip(wheel.channels, slots, defaults, strict=True)
+    }
+
+
+def _mixing_levels(fixture: RigFixture, light: RigLight, drives: Drives) -> dict[int, int]:
+    """Return the levels of dimmers, and of what mixes or chooses the colour."""
     channels = fixture.channels
     levels = {k: _level(1.0, channels[k]) for k in (*light.dimmers[1:], *light.masters)}
     wanted = [min(max(drives.get(x.name, 0.0), 0.0), 1.0) for x in light.emitters]
@@ -75,10 +99,11 @@ def _levels_of(fixture: RigFixture, light: RigLight, drives: Drives) -> dict[int
         dimmer, kelvin = white_for_drives(light, wanted)
         levels |= {k: _level(kelvin, channels[k]) for k in light.whites}
         return levels | {k: _level(dimmer, channels[k]) for k in light.dimmers[:1]}
-    if light.wheel is not None:
+    if light.wheel is not None and not light.wheel.filters:
         slot = int(np.argmax(wanted))
-        # A dark wheel rests.
-        levels |= {light.wheel.channel: light.wheel.slots[slot].level} if wanted[slot] else {}
+        if wanted[slot]:  # a dark wheel rests
+            turned = zip(light.wheel.channels, light.wheel.slots[slot], strict=True)
+            levels |= {k: x.level for k, x in turned}
         return levels | {k: _level(wanted[slot], channels[k]) for k in light.dimmers[:1]}
     top = 1.0
     for k in light.dimmers[:1]:
@@ -113,12 +138,27 @@ def _drives_of(
         found = drives_of_xy(light, dimmer, [share(k) for k in light.chromaticity])
     elif light.whites:
         found = drives_of_white(light, dimmer, mean(light.whites))
-    elif light.wheel is not None:
-        level = _read(universes, fixture, channels[light.wheel.channel])
-        found = [dimmer * (x.first <= level <= x.last) for x in light.wheel.slots]
+    elif light.wheel is not None and not light.wheel.filters:
+        found = [dimmer * is_shown for is_shown in _shown_slots(fixture, light.wheel, universes)]
     else:
         found = [dimmer * _forward(x.curve, mean(x.channels)) for x in light.emitters]
-    return dict(zip(names, found, strict=True))
+    drives = dict(zip(names, found, strict=True))
+    if light.wheel is not None and light.wheel.filters:
+        shown = _shown_slots(fixture, light.wheel, universes)
+        pairs = zip(light.wheel.filter_drives, shown, strict=True)
+        drives |= {name: 1.0 for name, is_shown in pairs if is_shown}
+    return drives
+
+
+def _shown_slots(
+    fixture: RigFixture, wheel: RigWheel, universes: Mapping[int, bytes]
+) -> list[bool]:
+    """Return which combination of slots the levels of wheels mean; none while one is between."""
+    levels = [_read(universes, fixture, fixture.channels[k]) for k in wheel.channels]
+    return [
+        all(x.first <= level <= x.last for x, level in zip(slots, levels, strict=True))
+        for slots in wheel.slots
+    ]
 
 
 #: Pairs of a level and what it gives, which rises.

@@ -89,7 +89,8 @@ class PlacedModel:
 class KindSummary:
     """The fixtures of one type and mode: their names, and what is known of their lights.
 
-    emission: where it comes from. remarks: what was assumed or left.
+    emission: where it comes from. remarks: what was assumed or left. lacking: colours that the file
+    lacks.
     """
 
     kind: str
@@ -98,6 +99,7 @@ class KindSummary:
     emitters: tuple[str, ...]
     emission: str
     remarks: tuple[str, ...]
+    lacking: tuple[str, ...] = ()
 
 
 @dataclass(frozen=True)
@@ -119,6 +121,7 @@ def read_rig(
     gdtf_folder: str | Path | None = None,
     zoom: float | None = None,
     pixels: bool = False,
+    usual_colors: bool = False,
 ) -> ConsoleRig:
     """Read the fixtures of an MVR, 1.4 to 1.6, with types in GDTF, 1.0 to 1.2.
 
@@ -129,12 +132,16 @@ def read_rig(
         zoom: Beam angle in degrees of all fixtures that have a zoom. None for what they rest at.
         pixels: Whether each beam with channels of its own becomes a light. Otherwise a fixture is
             one light.
+        usual_colors: Whether usual colours stand for those of emitters and filters that a file
+            lacks.
 
     Raises:
         RigError: For a file that is not such a show, is damaged or too large; a missing GDTF, an
-            unknown mode, two fixtures on one address, a channel beyond its universe, no fixture.
+            unknown mode, two fixtures on one address, a channel beyond its universe, no fixture, a
+            fixture without colour data.
     """
-    return read_show(Path(path), gdtf_folder=gdtf_folder, zoom=zoom, pixels=pixels).rig
+    options: dict[str, Any] = {"zoom": zoom, "pixels": pixels, "usual_colors": usual_colors}
+    return read_show(Path(path), gdtf_folder=gdtf_folder, **options).rig
 
 
 def read_show(
@@ -143,13 +150,33 @@ def read_show(
     gdtf_folder: str | Path | None = None,
     zoom: float | None = None,
     pixels: bool = False,
+    usual_colors: bool = False,
 ) -> Show:
     """Read an MVR with what stands around its fixtures. See `read_rig`."""
     folder = None if gdtf_folder is None else Path(gdtf_folder)
     with RigArchive(path, path.name, KIND) as archive:
         root = archive.xml(DESCRIPTION)
         with reading(path.name):
-            return _ShowReader(archive, root, folder, {"zoom": zoom, "pixels": pixels}).read()
+            show = _ShowReader(archive, root, folder, {"zoom": zoom, "pixels": pixels}).read()
+    if not usual_colors:
+        _check_colours(show)
+    return show
+
+
+def _check_colours(show: Show) -> None:
+    """Raise RigError, which lists them, for fixtures whose files lack colours."""
+    lacking = [kind for kind in show.kinds if kind.lacking]
+    if not lacking:
+        return
+    fixtures = [name for kind in lacking for name in kind.fixtures]
+    missing = "; ".join(f"{kind.kind} lacks {some_names(kind.lacking)}" for kind in lacking)
+    raise RigError(
+        f"{show.rig.name} has no colour data for {some_names(fixtures)}: {missing}; give GDTF "
+        "files that have them in a folder with ",
+        Hint("gdtf_folder"),
+        ", or take usual colours with ",
+        Hint("usual_colors", True),
+    )
 
 
 def show_nodes(root: Element) -> Iterator[ShowNode]:
@@ -429,11 +456,12 @@ def _summaries(
     fixtures: Sequence[RigFixture], modes: Sequence[FixtureMode]
 ) -> tuple[KindSummary, ...]:
     """Return a summary for each type and mode, in the order of their first fixtures."""
-    summaries: dict[tuple[str, str], KindSummary] = {}
+    summaries: dict[tuple[str, str, tuple[str, ...]], KindSummary] = {}
     for fixture, mode in zip(fixtures, modes, strict=True):
-        key = fixture.kind, fixture.mode
+        key = fixture.kind, fixture.mode, mode.lacking
         names = tuple(dict.fromkeys(e.name for light in mode.lights for e in light.emitters))
-        new = KindSummary(*key, (), names, mode.emission, mode.remarks)
+        known_of = names, mode.emission, mode.remarks, mode.lacking
+        new = KindSummary(fixture.kind, fixture.mode, (), *known_of)
         known = summaries.setdefault(key, new)
         label = " ".join(filter(None, (fixture.fixture_id, fixture.name)))
         summaries[key] = replace(known, fixtures=(*known.fixtures, label))

@@ -4,10 +4,10 @@ from collections.abc import Collection, Mapping
 from dataclasses import dataclass
 
 from lightpaint.display_text import some_names
-from lightpaint.dmx.console_rig import ConsoleRig
+from lightpaint.dmx.console_rig import ConsoleRig, filter_drive
 from lightpaint.dmx.levels import Drives
 from lightpaint.errors import RigError
-from lightpaint.lighting.answer.lighting import Lighting
+from lightpaint.lighting.answer.lighting import Lighting, LightSetting
 
 #: Drives of emitters, by light.
 RigDrives = Mapping[str, Drives]
@@ -17,14 +17,28 @@ ROUNDING = 1e-6
 
 
 def drives_of(lighting: Lighting) -> dict[str, Drives]:
-    """Return the drives of all lights that have emitters."""
-    return {light.name: light.drives for light in lighting.lights if light.drives}
+    """Return the drives of all lights that have emitters, with that of a colour wheel in front of
+    them.
+    """
+    return {
+        light.name: {**light.drives, **_wheel_drive(light)}
+        for light in lighting.lights
+        if light.drives
+    }
+
+
+def _wheel_drive(light: LightSetting) -> Drives:
+    behind = "" if light.lamp is None else light.lamp.behind
+    return {filter_drive(behind): 1.0} if behind else {}
 
 
 def check_drives(rig: ConsoleRig, drives: RigDrives) -> None:
     """Raise RigError for a light or an emitter that a rig lacks, and for a drive beyond 0 and 1."""
     emitters = {
-        light.name: {emitter.name for emitter in light.emitters}
+        light.name: {
+            *(emitter.name for emitter in light.emitters),
+            *(light.wheel.filter_drives if light.wheel else ()),
+        }
         for fixture in rig.fixtures
         for light in fixture.lights
     }

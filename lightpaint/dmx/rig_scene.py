@@ -10,6 +10,7 @@ from pathlib import PurePosixPath
 import numpy as np
 
 from lightpaint.arrays import Doubles
+from lightpaint.colour.lamp import SlotFilter
 from lightpaint.colour.spectra.spectrum import WAVELENGTHS, Spectrum
 from lightpaint.dmx.console_rig import ConsoleRig, RigEmitter, RigFixture, RigLight
 from lightpaint.dmx.spot_cone import spot_cone
@@ -98,9 +99,12 @@ def lights_text(
             lines += ["", f"[light.{_quoted(light.name)}]", "emitters = ["]
             lines += [f"    {_emitter(x, light, fixture, stem)}," for x in light.emitters]
             lines += ["]"]
-            if light.wheel is not None:
+            if light.has_slots_for_emitters:
                 brightest = max(light.emitters, key=lambda x: x.candela)
                 lines += [f"wheel = {_quoted(brightest.name) if open_wheels else 'true'}"]
+            elif light.wheel is not None and not open_wheels:
+                slots = (f"    {_slot(x)}," for x in light.wheel.filters)
+                lines += ["wheel = [", *slots, "]"]
             if light.whites:  # which share the light of one lamp
                 lines += [f"power_share = {1 / len(light.emitters):g}"]
     return "\n".join([*lines, ""])
@@ -138,7 +142,7 @@ def lights_of(rig: ConsoleRig) -> list[RigLight]:
 def _candela(light: RigLight) -> float:
     amounts = [x.candela for x in light.emitters]
     # Of two whites that share their light, each is all of it, and so is each slot of a wheel.
-    return max(amounts) if light.whites or light.wheel else sum(amounts)
+    return max(amounts) if light.whites or light.has_slots_for_emitters else sum(amounts)
 
 
 def _emitter(emitter: RigEmitter, light: RigLight, fixture: RigFixture, stem: str) -> str:
@@ -158,6 +162,12 @@ def _emitter(emitter: RigEmitter, light: RigLight, fixture: RigFixture, stem: st
     if emitter.watts is not None:
         fields.append(f"watts = {emitter.watts:.6g}")
     return f"{{ {', '.join(fields)} }}"
+
+
+def _slot(slot: SlotFilter) -> str:
+    """Return a slot in front of emitters as an inline table of TOML."""
+    passed = ", ".join(f"{x:.4g}" for x in slot.transmission)
+    return f"{{ name = {_quoted(slot.name)}, transmission = [{passed}] }}"
 
 
 def _quoted(text: str) -> str:

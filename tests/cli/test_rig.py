@@ -6,7 +6,7 @@ from pathlib import Path
 
 import pytest
 from command import run, run_refused, succeed
-from rig_files import EXAMPLE, fixture, layered, write_mvr
+from rig_files import EXAMPLE, channel, fixture, gdtf, layered, write_mvr
 
 from lightpaint.dmx.mvr import read_rig
 from lightpaint.lighting.answer.lighting import Lighting, LightSetting
@@ -80,6 +80,29 @@ def test_a_missing_type_names_the_option(tmp_path: Path) -> None:
     write_mvr(tmp_path / "a.mvr", layered(fixture(spec="x.gdtf")))
     message = run_refused(tmp_path, "rig", "a.mvr")
     assert message.endswith("a.mvr lacks the GDTF x.gdtf: give a folder that has it with --gdtf")
+
+
+def test_fixtures_without_colour_data_are_listed_with_what_they_lack(tmp_path: Path) -> None:
+    lacking = gdtf(described='<Emitters><Emitter Name="Red" Color="0.69,0.3,20"/></Emitters>')
+    own = fixture("b", number="2", address="101", spec="whole.gdtf")
+    write_mvr(tmp_path / "a.mvr", layered(fixture(), own), lamp=lacking, whole=gdtf(name="Whole"))
+    message = run_refused(tmp_path, "rig", "a.mvr")
+    assert message.endswith(
+        "a.mvr has no colour data for 1 PAR: Lamp lacks the colour of green, the colour of blue, "
+        "the colour of white; give GDTF files that have them in a folder with --gdtf, or take "
+        "usual colours with --usual-colors"
+    )
+    assert not (tmp_path / "a.xml").exists()
+    completed = run(tmp_path, "rig", "a.mvr", "--usual-colors")
+    assert completed.returncode == 0
+    assert "its GDTF has no colours of emitters: usual ones are assumed" in completed.stdout
+
+
+def test_a_lamp_of_one_colour_is_white_and_no_error(tmp_path: Path) -> None:
+    white = gdtf(channel("Dimmer", "1"), described="")
+    write_mvr(tmp_path / "a.mvr", layered(fixture()), lamp=white)
+    succeed(tmp_path, "rig", "a.mvr")
+    assert 'name = "white"' in (tmp_path / "a.lights.toml").read_text()
 
 
 def test_an_answer_goes_back_into_its_show(folder: Path) -> None:

@@ -120,7 +120,8 @@ def whites(tmp_path: Path, function: str, more: str = "", beam: str = "") -> Con
         f'FieldAngle="45" PowerConsumption="300" ColorTemperature="6500" {beam}/></Geometry>'
     )
     data = gdtf(channels, geometries=geometry, described="")
-    return read_rig(write_mvr(tmp_path / "a.mvr", layered(fixture()), lamp=data))
+    show = write_mvr(tmp_path / "a.mvr", layered(fixture()), lamp=data)
+    return read_rig(show, usual_colors=True)
 
 
 @pytest.mark.parametrize(
@@ -221,7 +222,7 @@ def _types() -> dict[str, bytes]:
 @pytest.mark.parametrize("kind", [*_types()])
 def test_types_that_do_not_add_emitters_have_red_green_and_blue(kind: str, tmp_path: Path) -> None:
     show = write_mvr(tmp_path / "a.mvr", layered(fixture()), lamp=_types()[kind])
-    rig = read_rig(show)
+    rig = read_rig(show, usual_colors=True)
     [light] = rig.fixtures[0].lights
     assert [x.name for x in light.emitters] == ["red", "green", "blue"]
     assert light.dimmers == (0,)

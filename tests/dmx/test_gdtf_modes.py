@@ -138,6 +138,7 @@ def test_emitters_without_colour_have_their_spectrum_wavelength_or_usual_colour(
         )
         found[name] = mode.lights[0].emitters[0].xy
         assert ("usual ones are assumed" in " ".join(mode.remarks)) == (name == "none")
+        assert mode.lacking == (("the colour of red",) if name == "none" else ())
     # CIE 1931 at 630 nm.
     assert np.allclose(found["line"], (0.7079, 0.2920), atol=1e-4)  # as tables are rounded
     assert np.allclose(found["spectrum"], found["line"], atol=5e-3)
@@ -175,6 +176,21 @@ def test_zoom_is_at_rest_or_as_wanted_and_then_sent() -> None:
         for m in (narrow, wide)
     ]
     assert np.allclose(totals, 5000)
+
+
+def test_what_was_measured_holds_where_the_zoom_rests_and_falls_with_the_solid_angle() -> None:
+    zoom = channel("Zoom", "6,7", default="0/2", function='PhysicalFrom="10" PhysicalTo="50"')
+    measured = 5000 / solid_angle(10, 15) / 4
+    data = gdtf(RGBW_CHANNELS + zoom, described=f"<Emitters>{_measured(measured)}</Emitters>")
+    for wanted in (None, 30):
+        mode = read_mode(data, zoom=wanted)
+        [light] = mode.lights
+        assert mode.emission == "LuminousIntensity"
+        lumens = sum(x.candela for x in light.emitters) * solid_angle(
+            light.beam_angle, light.field_angle
+        )
+        assert math.isclose(lumens, 5000, rel_tol=1e-6)  # as files round
+    assert light.beam_angle > 29
 
 
 #: Three pixels that repeat one geometry of two levels, whose colours are below its first.

@@ -8,15 +8,20 @@ import pygdtf
 import pytest
 from rig_files import channel, fixture, gdtf, layered, write_mvr
 
+from lightpaint.colour.lamp import Lamp, LampEmitter
 from lightpaint.colour.planckian_locus import matching_functions
+from lightpaint.colour.primaries import REC2020, rgb_to_xyz
 from lightpaint.dmx.console_rig import ConsoleRig, RigLight
 from lightpaint.dmx.gdtf.emitter_colour import xy_of_kelvin
 from lightpaint.dmx.gdtf.fixture_type import FixtureType
 from lightpaint.dmx.gdtf.mode_lights import FixtureMode
 from lightpaint.dmx.levels import decode_levels, encode_levels
 from lightpaint.dmx.mvr import read_rig
+from lightpaint.dmx.rig_drives import DriveFade, check_drives, drives_of
 from lightpaint.dmx.rig_scene import cd_per_unit, lights_text, scene_text
 from lightpaint.dmx.spot_cone import solid_angle
+from lightpaint.lighting.answer.lighting import Lighting, LightSetting
+from lightpaint.lighting.constraints.constraints import LightConstraint
 from lightpaint.relit.export.cue_list import Cue, cue_list_csv
 from lightpaint.relit.export.level_table import level_rows
 
@@ -139,8 +144,13 @@ def test_slots_are_emitters_of_the_whole_lamp_in_turn(tmp_path: Path) -> None:
     assert [x.name for x in light.emitters] == ["open", "red", "amber", "blue"]
     assert light.wheel is not None
     # The middle of each slot's levels; the last ends where the wheel spins.
-    assert [x.level for x in light.wheel.slots] == [4, 14, 24, 78]
-    assert [(x.first, x.last) for x in light.wheel.slots] == [(0, 9), (10, 19), (20, 29), (30, 127)]
+    assert [x.level for [x] in light.wheel.slots] == [4, 14, 24, 78]
+    assert [(x.first, x.last) for [x] in light.wheel.slots] == [
+        (0, 9),
+        (10, 19),
+        (20, 29),
+        (30, 127),
+    ]
     full = LUMENS / solid_angle(18, 26)
     # Y of a slot is relative to the lamp's light (DIN SPEC 15800, Slot).
     assert [x.candela / full for x in light.emitters] == pytest.approx([1, 0.09, 0.55, 0.05])
@@ -206,7 +216,7 @@ def test_split_colours_and_spins_are_never_chosen(tmp_path: Path) -> None:
     ]
     wheel = read_mode(wheel_type(tmp_path, sets=sets)).lights[0].wheel
     assert wheel is not None
-    assert [(x.first, x.last) for x in wheel.slots] == [(0, 4), (10, 14), (25, 119)]
+    assert [(x.first, x.last) for [x] in wheel.slots] == [(0, 4), (10, 14), (25, 119)]
 
 
 def test_a_wheel_that_turns_evenly_stops_at_its_slots(tmp_path: Path) -> None:
@@ -215,7 +225,7 @@ def test_a_wheel_that_turns_evenly_stops_at_its_slots(tmp_path: Path) -> None:
     wheel = read_mode(wheel_type(tmp_path, sets=sets, size=2)).lights[0].wheel
     assert wheel is not None
     half_way = [(0 + 32 * 256 - 1) / 2, (32 * 256 + SPIN * 256 - 1) / 2]
-    assert [x.level for x in wheel.slots] == pytest.approx(half_way, abs=0.51)
+    assert [x.level for [x] in wheel.slots] == pytest.approx(half_way, abs=0.51)
 
 
 def test_slots_without_a_name_or_of_the_same_one_are_numbered(tmp_path: Path) -> None:
@@ -236,7 +246,7 @@ def test_levels_of_a_slot_come_back(tmp_path: Path, slot: str, drive: float) -> 
     levels = encode_levels(rig, {light.name: {slot: drive}})
     index = [x.name for x in light.emitters].index(slot)
     assert light.wheel is not None
-    assert levels[1][12] == light.wheel.slots[index].level
+    assert levels[1][12] == light.wheel.slots[index][0].level
     assert int.from_bytes(levels[1][10:12], "big") == round(drive * 65535)
     expected = dict.fromkeys([x.name for x in light.emitters], 0.0) | {slot: drive}
     assert decode_levels(rig, levels)[light.name] == pytest.approx(expected, abs=1 / 65535)
@@ -296,14 +306,133 @@ MIXING = "".join(channel(f"ColorAdd_{x}", str(k)) for k, x in enumerate("RGB", s
 WHEEL = channel("Color1", "5", function='Wheel="Wheel 1"')
 
 
-def test_beside_channels_that_mix_a_wheel_rests() -> None:
-    mode = read_mode(gdtf(channel("Dimmer", "1") + MIXING + WHEEL))
-    assert mode.lights[0].wheel is None
-    assert "at rest: Color1" in mode.remarks
+def _wheel_of(name: str, *slots: tuple[str, str]) -> str:
+    """A wheel of slots by name and colour."""
+    inside = "".join(f'<Slot Name="{slot}" Color="{color}"/>' for slot, color in slots)
+    return f'<Wheel Name="{name}">{inside}</Wheel>'
+
+
+def _turning(attribute: str, offset: str, wheel: str, count: int) -> str:
+    """A channel with a set of ten levels for each slot of a wheel."""
+    sets = "".join(
+        f'<ChannelSet Name="s{k}" DMXFrom="{10 * k}/1" WheelSlotIndex="{k + 1}"/>'
+        for k in range(count)
+    )
+    one = channel(attribute, offset, function=f'Wheel="{wheel}"')
+    return one.replace("/></LogicalChannel>", f">{sets}</ChannelFunction></LogicalChannel>")
+
+
+WHEELS = _wheel_of(
+    "W1", ("Open", "0.3127,0.3290,100"), ("Red", "0.68,0.31,9"), ("Blue", "0.15,0.07,5")
+) + _wheel_of("W2", ("Open", "0.3127,0.3290,100"), ("Red", "0.6,0.33,20"), ("Half", "0.38,0.38,60"))
+TURNING = _turning("Color1", "6", "W1", 3) + _turning("Color2", "7", "W2", 3)
+LAMP = (
+    '<Geometry Name="Body"><Beam Name="Beam" LuminousFlux="5000" BeamAngle="30" FieldAngle="45" '
+    'ColorTemperature="6500" PowerConsumption="300"/></Geometry>'
+)
+
+
+def _rig_of(tmp_path: Path, data: bytes) -> ConsoleRig:
+    show = write_mvr(tmp_path / "a.mvr", layered(fixture("Spot", address="11")), lamp=data)
+    return read_rig(show, usual_colors=True)
+
+
+def test_slots_of_two_wheels_multiply(tmp_path: Path) -> None:
+    data = gdtf(channel("Dimmer", "1") + TURNING, geometries=LAMP, wheels=WHEELS)
+    rig = _rig_of(tmp_path, data)
+    light = _light(rig)
+    by_name = {x.name: x for x in light.emitters}
+    several = ["red + half", "red + red", "blue + half", "blue + red"]  # the brightest first
+    assert [*by_name] == ["open", "red", "blue", "red (2)", "half", *several]
+    both = by_name["blue + half"]
+    wide, full = rgb_to_xyz(REC2020), by_name["open"].candela
+    lamp = np.linalg.solve(wide, _xyz(xy_of_kelvin(6500)))
+
+    def passed(name: str) -> Any:
+        share = by_name[name].candela / full
+        return np.clip(share * np.linalg.solve(wide, _xyz(by_name[name].xy)) / lamp, 0, 1)
+
+    xyz = wide @ (np.maximum(passed("blue") * passed("half"), 1e-4) * lamp)
+    assert both.candela / full == pytest.approx(xyz[1], rel=1e-9)
+    assert both.xy == pytest.approx(tuple(xyz[:2] / xyz.sum()), abs=1e-9)
+    for name in by_name:
+        levels = encode_levels(rig, {light.name: {name: 0.6}})
+        found = decode_levels(rig, levels)[light.name]
+        assert {x for x, drive in found.items() if drive} == {name}
+    assert [*encode_levels(rig, {light.name: {"blue + half": 1.0}})[1][15:17]] == [137, 137]
+
+
+BESIDE = {
+    "emitters": channel("Dimmer", "1") + MIXING,
+    "filters": channel("Dimmer", "1")
+    + "".join(channel(f"ColorSub_{x}", str(k)) for k, x in enumerate("CMY", start=2)),
+    "whites": channel("Dimmer", "1")
+    + channel("CTO", "2,3", function='PhysicalFrom="6500" PhysicalTo="2800"'),
+}
+
+
+@pytest.mark.parametrize("kind", BESIDE)
+def test_wheels_in_front_of_what_a_lamp_mixes_filter_it(tmp_path: Path, kind: str) -> None:
+    import tomllib
+
+    rig = _rig_of(tmp_path, gdtf(BESIDE[kind] + TURNING, geometries=LAMP, wheels=WHEELS))
+    light = _light(rig)
+    assert light.wheel is not None
+    first, *others = light.wheel.filters
+    assert first.is_open
+    assert not any(x.is_open for x in others)
+    table = tomllib.loads(lights_text(rig, 100))["light"]["1 Spot"]
+    assert [x["name"] for x in table["wheel"]] == [x.name for x in light.wheel.filters]
+    assert "wheel" not in tomllib.loads(lights_text(rig, 100, open_wheels=True))["light"]["1 Spot"]
+    [constraint] = [LightConstraint.of(table)]
+    assert [x.name for x in constraint.slots] == [x["name"] for x in table["wheel"]]
+    # A slot has a drive of its own, beside those of emitters; without one the wheels are open.
+    drives = {x.name: 0.4 for x in light.emitters}
+    for name in ("blue", "red + half", ""):
+        sent = {**drives, **({f"wheel {name}": 1.0} if name else {})}
+        check_drives(rig, {light.name: sent})
+        levels = encode_levels(rig, {light.name: sent})
+        found = decode_levels(rig, levels)[light.name]
+        shown = [x for x in found if x.startswith("wheel ")]
+        assert shown == [f"wheel {name or 'open'}"]
+        assert [found[x.name] for x in light.emitters] == pytest.approx(
+            [0.4] * len(drives), abs=0.02
+        )
+    assert [*levels[1][15:17]] == [0, 0]  # where they rest, which is open
+    [*rows] = [x for x in level_rows(rig, {light.name: sent}, {1: 1}) if x.emitter == "wheel"]
+    assert [x.channels for x in rows] == [(16,), (17,)]
+
+
+def test_of_several_slots_alike_the_brightest_remains(tmp_path: Path) -> None:
+    grey = _wheel_of("W2", ("Open", "0.3127,0.3290,100"), ("Grey", "0.3127,0.3290,50"))
+    wheels = _wheel_of("W1", ("Open", "0.3127,0.3290,100"), ("Red", "0.68,0.31,9")) + grey
+    turning = _turning("Color1", "6", "W1", 2) + _turning("Color2", "7", "W2", 2)
+    data = gdtf(channel("Dimmer", "1") + turning, geometries=LAMP, wheels=wheels)
+    assert [x.name for x in _light(_rig_of(tmp_path, data)).emitters] == ["open", "red", "grey"]
+
+
+def test_a_fade_turns_a_wheel_in_its_middle(tmp_path: Path) -> None:
+    rig = _rig_of(tmp_path, gdtf(BESIDE["emitters"] + TURNING, geometries=LAMP, wheels=WHEELS))
+    name = _light(rig).name
+    fade = DriveFade(
+        {name: {"red": 1.0, "wheel red": 1.0}}, {name: {"red": 1.0, "wheel blue": 1.0}}, 0, 2
+    )
+    levels = [encode_levels(rig, fade.at(now))[1][15] for now in (0, 0.9, 1.1, 2)]
+    assert levels == [14, 14, 137, 137]
+
+
+def test_an_answer_sends_the_slot_in_front_of_its_emitters(tmp_path: Path) -> None:
+    rig = _rig_of(tmp_path, gdtf(BESIDE["emitters"] + TURNING, geometries=LAMP, wheels=WHEELS))
+    slot = _light(rig).wheel.filters[3]
+    lamp = Lamp((LampEmitter("red", (1, 0, 0)), LampEmitter("green", (0, 1, 0)))).behind_slot(slot)
+    emission = tuple(lamp.mix(np.array([0.5, 0.2])).tolist())
+    light = LightSetting("1 Spot", "spot", "intensity", "W/sr", emission, emission, lamp=lamp)
+    drives = drives_of(Lighting((light,)))["1 Spot"]
+    assert drives == pytest.approx({"red": 0.5, "green": 0.2, f"wheel {slot.name}": 1.0})
 
 
 def test_a_wheel_without_slots_rests() -> None:
-    mode = read_mode(gdtf(channel("Dimmer", "1") + WHEEL))
-    assert mode.lights[0].wheel is None
-    assert [x.name for x in mode.lights[0].emitters] == ["white"]
-    assert "at rest: Color1" in mode.remarks
+    for more in ("", MIXING):
+        mode = read_mode(gdtf(channel("Dimmer", "1") + more + WHEEL))
+        assert mode.lights[0].wheel is None
+        assert "at rest: Color1" in mode.remarks

@@ -41,7 +41,8 @@ def read_rig_file(rig: RigFile) -> ConsoleRig:
     """Return a rig. Raises RigError for anything else than an MVR with fixtures."""
     from lightpaint.dmx.mvr import read_rig
 
-    return read_rig(rig.path, gdtf_folder=rig.gdtf, pixels=rig.pixels)
+    # The colours of lights are those of the scene and its lights file.
+    return read_rig(rig.path, gdtf_folder=rig.gdtf, pixels=rig.pixels, usual_colors=True)
 
 
 def read_answer(path: Path) -> tuple[Lighting, RigDrives]:

@@ -34,12 +34,15 @@ def rig(
     gdtf_folder: Path | None,
     zoom: float | None,
     pixels: bool,
+    usual_colors: bool,
     open_wheels: bool,
 ) -> CommandOutcome:
     """Run `lightpaint rig SHOW.mvr -o F.xml`."""
     if room is not None and only_lights:
         raise RigError("--only-lights leaves the room out: give --room, or --only-lights")
-    content = read_show(show, gdtf_folder=gdtf_folder, zoom=zoom, pixels=pixels)
+    content = read_show(
+        show, gdtf_folder=gdtf_folder, zoom=zoom, pixels=pixels, usual_colors=usual_colors
+    )
     folder, surroundings = output.parent, RoomFiles(Room(), {})
     if room is not None:
         surroundings = RoomFiles(room_of_scene(room, folder), {})

@@ -162,6 +162,7 @@ def _rig_arguments(options: Namespace, output: Path | None) -> dict[str, Any]:
         "output": output or Path(f"{show.stem}.xml"),
         "room": Path(options.room) if options.room else None,
         "only_lights": options.only_lights,
+        "usual_colors": options.usual_colors,
         "open_wheels": options.open_wheels,
         "force": options.force,
         **rig_reading_of(options),

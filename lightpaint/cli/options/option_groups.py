@@ -326,7 +326,7 @@ OTHER_OPTIONS: dict[Theme, str] = {
     "Lights": "--least --lights --group --lights-file --no-lights-file --no-group-alike --split "
     "--symmetric --pattern",
     "Scene and camera": "--scene --stage --sensor -D --integrator --variant --room --rig --gdtf "
-    "--zoom --pixels --only-lights --open-wheels --planes --lighting",
+    "--zoom --pixels --only-lights --usual-colors --open-wheels --planes --lighting",
     "Verification": "--max-miss --min-fit",
     "Shots, looks and advice": "--frames --variations --keep-going",
     "Looks": "--init --only --dry-run",

@@ -312,9 +312,14 @@ def _rig(parser: argparse.ArgumentParser) -> None:
         help="write a scene with nothing but the lights, to include in another",
     )
     parser.add_argument(
+        "--usual-colors",
+        action="store_true",
+        help="take usual colours of LEDs and filters where a GDTF has none (default: an error)",
+    )
+    parser.add_argument(
         "--open-wheels",
         action="store_true",
-        help="leave colour wheels open (default: each lamp gets the slot closest to its answer)",
+        help="leave colour wheels open (default: the solve chooses their slots)",
     )
     add_rig_reading(parser, has_zoom=True)
     add_output(

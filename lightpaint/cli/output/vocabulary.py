@@ -17,6 +17,7 @@ _OTHER_OPTIONS = {
     "folder": "-o",
     "frames": "--frames",
     "gdtf_folder": "--gdtf",
+    "usual_colors": "--usual-colors",
     "groups": "--group",
     "integrator": "--integrator",
     "layer": "--layer",

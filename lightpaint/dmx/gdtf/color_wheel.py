@@ -5,14 +5,15 @@ Only levels at which a slot stands in the beam count: between two slots a wheel 
 
 import re
 from collections.abc import Sequence
-from dataclasses import dataclass
-from itertools import pairwise
+from dataclasses import dataclass, replace
+from itertools import chain, count, pairwise, product
 from xml.etree.ElementTree import Element
 
 import numpy as np
 
-from lightpaint.arrays import Doubles
-from lightpaint.colour.lamp import MAX_SLOTS
+from lightpaint.arrays import Doubles, as_rgb
+from lightpaint.colour.color_difference import ciede2000, lab_of_lights
+from lightpaint.colour.lamp import MAX_SLOTS, OPAQUE, SlotFilter
 from lightpaint.colour.planckian_locus import C2, matching_functions, xy_of
 from lightpaint.colour.primaries import REC2020, rgb_to_xyz
 from lightpaint.dmx.console_rig import RigSlot
@@ -23,12 +24,19 @@ from lightpaint.dmx.gdtf.emitter_colour import (
     filter_spectrum,
     parsed_colour,
     possible_kelvin,
+    rgb_of_xy,
     xy_of_kelvin,
 )
 from lightpaint.dmx.gdtf.mode_channels import ChannelFunction, ModeChannel, dmx_value
 
 #: What stands between the names of two slots that share the beam.
 _SPLIT = re.compile(r"\s*[/+|&]\s*")
+
+#: Least share of light of a slot that is open.
+CLEAR = 0.9
+
+#: Least share of light of two slots together, and the CIEDE2000 below which colours are alike.
+DARKEST, ALIKE = 0.005, 2.0
 
 #: PhysicalFrom and PhysicalTo of a set that does not say how far a wheel is from a slot.
 _NOT_SAID = (0.0, 1.0)
@@ -82,6 +90,95 @@ def wheel_slots(
             name = _free_name(elements[k - 1], k, {x.colour.name for x in found})
             found.append(SlotColour(slot, _colour(name, elements[k - 1], filters, kelvin)))
     return found
+
+
+@dataclass(frozen=True)
+class SlotCombination:
+    """Slots of wheels one behind the other, one of each: the light behind them, and what they let
+    through of light that is mixed before.
+    """
+
+    slots: tuple[RigSlot, ...]
+    colour: EmitterColour
+    filter: SlotFilter
+
+
+def slot_combinations(
+    wheels: Sequence[Sequence[SlotColour]], kelvin: float
+) -> list[SlotCombination]:
+    """Return the combinations of slots of wheels, of which those of a single wheel come first.
+
+    Transmissions multiply. Of the others, the brightest remain whose colour no brighter one has.
+    kelvin: of the lamp. The open slot of a wheel is its brightest.
+    """
+    opens = [int(np.argmax([x.colour.share for x in slots])) for slots in wheels]
+    every = [*product(*(range(len(x)) for x in wheels))]
+    turned = {c: [j for j, k in enumerate(c) if k != opens[j]] for c in every}
+    found = {c: _combined(c, wheels, opens, kelvin) for c in every}
+    # Of a single wheel they keep its order.
+    single = [c for c in every if len(turned[c]) <= 1]
+    kept = sorted(single, key=lambda c: turned[c] if len(wheels) > 1 else c)[:MAX_SLOTS]
+    several = [c for c in every if len(turned[c]) > 1]
+    for c in sorted(several, key=lambda c: -found[c].colour.share):
+        if len(kept) < MAX_SLOTS and _is_new(found[c], [found[x] for x in kept]):
+            kept.append(c)
+    return _with_own_names([found[c] for c in kept])
+
+
+def _combined(
+    places: Sequence[int],
+    wheels: Sequence[Sequence[SlotColour]],
+    opens: Sequence[int],
+    kelvin: float,
+) -> SlotCombination:
+    """Return a combination by the place of each wheel's slot. opens: places of open slots."""
+    chosen = [wheel[k] for k, wheel in zip(places, wheels, strict=True)]
+    others = [
+        x
+        for x, k, own in zip(chosen, places, opens, strict=True)
+        if k != own or x.colour.share < CLEAR
+    ]
+    lamp = _bt2020(xy_of_kelvin(kelvin))
+    passed = np.ones(3)
+    for x in others:
+        passed = passed * np.clip(x.colour.share * _bt2020(x.colour.xy) / lamp, 0, 1)
+    slots = tuple(x.slot for x in chosen)
+    if len(others) <= 1:
+        colour = (others or chosen)[0].colour
+    else:
+        xyz = rgb_to_xyz(REC2020) @ (np.maximum(passed, OPAQUE) * lamp)
+        name = " + ".join(x.colour.name for x in others)
+        colour = EmitterColour(name, bounded(xy_of(xyz)), float(xyz[1]))
+    return SlotCombination(slots, colour, SlotFilter(colour.name, as_rgb(passed.round(4))))
+
+
+def _is_new(found: SlotCombination, brighter: Sequence[SlotCombination]) -> bool:
+    """Return whether a combination is bright enough to serve, and of another colour than brighter
+    ones.
+    """
+    if found.colour.share < DARKEST:
+        return False
+    looks = lab_of_lights(np.array([rgb_of_xy(x.colour.xy) for x in brighter]))
+    own = lab_of_lights(rgb_of_xy(found.colour.xy))
+    bright = np.array([x.colour.share >= found.colour.share for x in brighter])
+    return not (bright & (ciede2000(looks, own) < ALIKE)).any()
+
+
+def _with_own_names(found: Sequence[SlotCombination]) -> list[SlotCombination]:
+    """Return combinations whose names do not repeat: slots of two wheels may be called alike."""
+    named: list[SlotCombination] = []
+    for x in found:
+        names = {own.colour.name for own in named}
+        free = chain([x.colour.name], (f"{x.colour.name} ({k})" for k in count(2)))
+        name = next(text for text in free if text not in names)
+        colour, slot = replace(x.colour, name=name), replace(x.filter, name=name)
+        named.append(replace(x, colour=colour, filter=slot))
+    return named
+
+
+def _bt2020(xy: Chromaticity) -> Doubles:
+    """Return the linear BT.2020 colour (3,) of luminance 1."""
+    return np.asarray(np.linalg.solve(rgb_to_xyz(REC2020), _xyz(xy)))
 
 
 def _sets_of(function: ChannelFunction, byte_count: int) -> list[_Set]:
@@ -184,8 +281,7 @@ def _filtered(name: str, xy: Chromaticity, percent: float, kelvin: float) -> Emi
     It lets red, green and blue of BT.2020, between which filters' colours lie, through in
     proportion.
     """
-    passed = np.clip(np.linalg.solve(rgb_to_xyz(REC2020), _xyz(xy)), 0, None)
-    lamp = np.linalg.solve(rgb_to_xyz(REC2020), _xyz(xy_of_kelvin(kelvin)))
+    passed, lamp = np.clip(_bt2020(xy), 0, None), _bt2020(xy_of_kelvin(kelvin))
     most = 1 / float(passed.max())
     level = min(percent / 100, most) if percent > 0 else most
     return EmitterColour(name, bounded(xy_of(rgb_to_xyz(REC2020) @ (passed * lamp))), level)

@@ -17,7 +17,7 @@ import numpy as np
 from lightpaint.arrays import Doubles
 from lightpaint.dmx.color_mixing import can_invert
 from lightpaint.dmx.console_rig import DmxChannel, RigEmitter, RigFilter, RigWheel
-from lightpaint.dmx.gdtf.color_wheel import SlotColour, wheel_slots
+from lightpaint.dmx.gdtf.color_wheel import SlotColour, slot_combinations, wheel_slots
 from lightpaint.dmx.gdtf.emitter_colour import (
     SPACES,
     USUAL_FILTERS,
@@ -100,6 +100,8 @@ class ModeLight:
 class FixtureMode:
     """A mode: its channels, its lights, where its emission comes from, what to know of it, and what
     turns.
+
+    lacking: the colours that its file lacks, for which usual ones stand.
     """
 
     name: str
@@ -108,11 +110,15 @@ class FixtureMode:
     emission: str
     remarks: tuple[str, ...] = ()
     heads: tuple[ModeHead, ...] = ()
+    lacking: tuple[str, ...] = ()
 
 
 @dataclass(frozen=True)
 class _Beam:
-    """A beam: its place in the tree, lumens and watts if the file has them, and full angles."""
+    """A beam: its place in the tree, lumens and watts if the file has them, and full angles.
+
+    widened: its solid angle relative to that at which the file's zoom rests.
+    """
 
     node: int
     placed: Placed
@@ -121,6 +127,7 @@ class _Beam:
     kelvin: float
     beam_angle: float
     field_angle: float
+    widened: float = 1.0
 
     @property
     def xy(self) -> tuple[float, float]:
@@ -153,6 +160,7 @@ class ModeReader:
         self.spaces = elements("ColorSpace"), elements("AdditionalColorSpaces/ColorSpace")
         self.profiles = {x.get("Name", ""): x for x in elements("DMXProfiles/DMXProfile")}
         self.remarks: list[str] = []
+        self.lacking: list[str] = []
         self.dmx = [x.dmx for x in self.channels]
         # These are asked for each beam, of which there may be hundreds.
         self.emitter_colour = cache(partial(emitter_colour, emitters=tuple(self.emitters)))
@@ -165,14 +173,14 @@ class ModeReader:
         self.beams = self._beams(zoom)
         self.way = self._way()
         self.whites: list[int] = []
-        self.wheels, self.slots = wheels, list[SlotColour]()
+        self.wheels, self.slots = wheels, list[EmitterColour]()
         self.wheel: RigWheel | None = None
 
     def read(self, *, pixels: bool) -> FixtureMode:
         """Return the mode. pixels: True for a light for each beam that has channels of its own."""
         groups = self._groups(pixels=pixels)
         self.whites = self._white_channels() if len(groups) == 1 else []
-        self.wheel = self._wheel() if len(groups) == 1 and not self.whites else None
+        self.wheel = self._wheel() if len(groups) == 1 else None
         candelas, emission = self._candelas()
         if self._is_placeholder():
             lone = self._lone_light(groups[0], candelas)
@@ -192,8 +200,8 @@ class ModeReader:
             self._remark("no channel of it dims light, so it is left out")
         self._remark_resting(lights)
         heads = mode_heads(self.tree, self.channels, beams)
-        remarks = tuple(self.remarks)
-        return FixtureMode(self.name, tuple(self.dmx), tuple(lights), emission, remarks, heads)
+        known = tuple(self.remarks), heads, tuple(dict.fromkeys(self.lacking))
+        return FixtureMode(self.name, tuple(self.dmx), tuple(lights), emission, *known)
 
     def _is_placeholder(self) -> bool:
         """Return whether the file stands for a type that a program does not know: no beam, and all
@@ -242,12 +250,16 @@ class ModeReader:
         watts = power if "PowerConsumption" in given and power > 0 else None
         angle = min(max(beam.beam_angle, NARROWEST), WIDEST)
         field = min(max(beam.field_angle, angle), WIDEST)
-        if (zoomed := self._zoomed(node, zoom)) is not None:
-            angle, field = zoomed, min(zoomed * field / angle, WIDEST)
-        return _Beam(node, placed, flux, watts, beam.color_temperature, angle, field)
+        ratio = field / angle
+        rest, angle = self._zoomed(node, zoom) or (angle, angle)
+        at_rest, field = (min(x * ratio, WIDEST) for x in (rest, angle))
+        widened = solid_angle(angle, field) / solid_angle(rest, at_rest)
+        return _Beam(node, placed, flux, watts, beam.color_temperature, angle, field, widened)
 
-    def _zoomed(self, node: int, zoom: float | None) -> float | None:
-        """Return the beam angle that a zoom gives, and set it; None without a zoom."""
+    def _zoomed(self, node: int, zoom: float | None) -> tuple[float, float] | None:
+        """Return the beam angles at which a zoom rests and that it gives, and set it; None without
+        a zoom.
+        """
         for k, channel in enumerate(self.channels):
             function = channel.function("Zoom")
             if function is None or channel.node not in self.tree[node].ancestry:
@@ -262,7 +274,8 @@ class ModeReader:
                 if not least <= zoom <= most:
                     used = min(max(zoom, least), most)
                     self._remark(f"its zoom goes from {least:g}° to {most:g}°: {used:g}° is used")
-            return max(function.value_at(self.dmx[k].default), NARROWEST)
+            rest, used = (function.value_at(x.default) for x in (channel.dmx, self.dmx[k]))
+            return max(rest, NARROWEST), max(used, NARROWEST)
         return None
 
     # ---- Lights --------------------------------------------------------------------------------
@@ -417,6 +430,7 @@ class ModeReader:
                 colour = self.emitter_colour(suffix, link)
                 if colour.is_usual:
                     self._remark("its GDTF has no colours of emitters: usual ones are assumed")
+                    self.lacking.append(f"the colour of {colour.name}")
                 colours.append((colour, places))
             return colours
         if self.way is _NAMED_RGB and found:
@@ -425,7 +439,7 @@ class ModeReader:
             space = replace(SPACES["sRGB"], white=beam.xy)
             return [(x, []) for x in primaries_of(space)]
         if self.slots:
-            return [(x.colour, []) for x in self.slots]
+            return [(x, []) for x in self.slots]
         if self.whites:
             return [(x, []) for x in whites_of(beam.kelvin, self._white_range())]
         return [(EmitterColour("white", beam.xy, 1.0), [])]
@@ -436,20 +450,31 @@ class ModeReader:
         return not (self.whites or self.slots)
 
     def _wheel(self) -> RigWheel | None:
-        """Return the colour wheel of all beams, for a lamp that mixes no colours and can be dimmed;
-        None without one of at least two slots. Set its slots.
+        """Return the colour wheels of all beams; None without one of at least two slots.
+
+        Of a lamp that mixes no colours and can be dimmed the slots become the emitters. In front of
+        channels that mix, they filter.
         """
-        if self.way is not None or not self._common_dimmers or self._is_placeholder():
+        mixes = bool(self.way or self.whites)
+        if self._is_placeholder() or not (mixes or self._common_dimmers):
             return None
+        channels, wheels, kelvin = list[int](), list[list[SlotColour]](), self.beams[0].kelvin
         for k, match in self._with_attribute(_COLOR_WHEEL):
             if all(self.channels[k].node in beam.placed.ancestry for beam in self.beams):
-                kelvin = self.beams[0].kelvin
                 slots = wheel_slots(self.channels[k], match[0], self.wheels, self.filters, kelvin)
                 if len(slots) > 1:
-                    self.slots = slots
-                    self._remark(f"{match[0]} is a wheel of {len(slots)} colours, one at a time")
-                    return RigWheel(k, tuple(x.slot for x in slots))
-        return None
+                    channels.append(k)
+                    wheels.append(slots)
+                    turn = "in front of what it mixes" if mixes else "one at a time"
+                    self._remark(f"{match[0]} is a wheel of {len(slots)} colours, {turn}")
+        if not wheels:
+            return None
+        found = slot_combinations(wheels, kelvin)
+        if mixes:  # the open one comes first
+            found.sort(key=lambda x: not x.filter.is_open)
+        filters = tuple(x.filter for x in found) if mixes else ()
+        self.slots = [] if mixes else [x.colour for x in found]
+        return RigWheel(tuple(channels), tuple(x.slots for x in found), filters)
 
     @property
     def _common_dimmers(self) -> set[int]:
@@ -515,10 +540,11 @@ class ModeReader:
         for suffix in (x for x in USUAL_FILTERS if x in channels):
             places = sorted(channels[suffix])
             functions = [self._shape(k, _FILTERED) for k in places]
+            name = {"C": "cyan", "M": "magenta", "Y": "yellow"}[suffix]
             density, is_usual = density_of(suffix, self.filters, functions[0].element.get("Filter"))
             if is_usual:
                 self._remark("its GDTF has no transmission of filters: usual ones are assumed")
-            name = {"C": "cyan", "M": "magenta", "Y": "yellow"}[suffix]
+                self.lacking.append(f"the transmission of {name}")
             filters.append(RigFilter(name, density, tuple(places)))
         if len(filters) < 3 or not can_invert([x.density for x in filters]):
             self._remark("its filters do not tell colours apart: it has one colour")
@@ -541,7 +567,7 @@ class ModeReader:
     def _remark_resting(self, lights: Sequence[ModeLight]) -> None:
         """Remark on channels that change the colour, but rest."""
         used = {k for light in lights for k in (*light.chromaticity, *light.whites)}
-        used |= {light.wheel.channel for light in lights if light.wheel is not None}
+        used |= {k for x in lights if x.wheel is not None for k in x.wheel.channels}
         for light in lights:
             used |= {k for x in light.emitters for k in x.channels}
             used |= {k for x in light.filters for k in x.channels}
@@ -555,7 +581,8 @@ class ModeReader:
         """Return candelas at full by beam and emitter, and where they come from.
 
         What was measured of emitters is taken if it is more than a candela, and its flux agrees
-        with that of the beams; else the flux of the beams, in the luminances of the emitters.
+        with that of the beams; else the flux of the beams, in the luminances of the emitters. A
+        measurement holds where the zoom rests: in a wider beam the same flux has fewer candelas.
         """
         by_beam = {beam.node: [x for x, _ in self._colours(beam)] for beam in self.beams}
         counts: dict[str, int] = {}
@@ -563,7 +590,7 @@ class ModeReader:
             for x in colours:
                 counts[x.name] = counts.get(x.name, 0) + 1
         measured = {
-            (beam.node, x.name): x.candela / counts[x.name]
+            (beam.node, x.name): x.candela / counts[x.name] / beam.widened
             for beam in self.beams
             for x in by_beam[beam.node]
             if x.candela is not None and x.candela > LEAST_CANDELA

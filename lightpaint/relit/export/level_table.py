@@ -49,7 +49,7 @@ def light_channels(light: RigLight) -> list[tuple[str, int]]:
         *((DIMMER, k) for k in (*light.masters, *light.dimmers)),
         *((name, k) for name, k in zip("xy", light.chromaticity, strict=False)),
         *((KELVIN, k) for k in light.whites),
-        *((WHEEL, x.channel) for x in (light.wheel,) if x is not None),
+        *((WHEEL, k) for k in (light.wheel.channels if light.wheel else ())),
         *((x.name, k) for x in light.filters for k in x.channels),
         *((x.name, k) for x in light.emitters for k in x.channels),
     ]
@@ -77,7 +77,7 @@ def _rows(
             drive, setting = of_light.get(name), _setting(fixture, k, levels, universes)
             yield LevelRow(*named, name, drive, *setting)
         for name in sorted(of_light.keys() - {name for name, _ in set_by}):
-            if light.wheel is not None and not of_light[name]:
+            if light.has_slots_for_emitters and not of_light[name]:
                 continue  # a slot that is not shown
             yield LevelRow(*named, name, of_light[name], None, (), None)
         for name, k in _aim_channels(fixture, light):
