@@ -22,13 +22,17 @@ from lightpaint.colour.color import cct_and_duv, luminance, rgb_to_hex
 LUMINOUS_UNITS = {"W/(m² sr)": "cd/m²", "W/sr": "cd", "W/m²": "lx"}
 
 
+#: |Duv| beyond which people see a colour, and a colour temperature says nothing of it.
+WHITE_DUV = 0.02
+
+
 @dataclass(frozen=True)
 class Photometry:
     """The photometric quantities of one light.
 
     y: luminance-weighted emission, 0.2126 R + 0.7152 G + 0.0722 B.
     hex: its display colour, with the brightest channel at full. kelvin, duv: its correlated colour
-    temperature; None if undefined: off, of unknown colour, or far from Planck's locus. flux_w:
+    temperature; None if it is off, of unknown colour, or no white: beyond `WHITE_DUV`. flux_w:
     radiant flux per channel; None for a light without a flux, such as the sun. flux_y: the same,
     luminance-weighted. luminous, luminous_unit, flux_lm: in cd/m², cd or lx, and in lumens; only
     with a scale.
@@ -94,7 +98,8 @@ def photometry(
     colour = emission if is_colour else flux
     has_colour = colour is not None and any(colour)
     temperature = cct_and_duv(np.array(colour)) if has_colour else None
-    kelvin, duv = temperature or (None, None)
+    is_white = temperature is not None and abs(temperature[1]) <= WHITE_DUV
+    kelvin, duv = temperature if temperature is not None and is_white else (None, None)
     scale = cd_per_unit
     return Photometry(
         y=y,

@@ -7,6 +7,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from lightpaint.colour.color import kelvin_to_rgb
 from lightpaint.colour.photometry import (
     lambertian_flux,
     photometry,
@@ -68,6 +69,13 @@ def test_a_light_that_is_off_has_no_colour() -> None:
 
 def test_a_saturated_light_has_a_colour_and_no_temperature() -> None:
     assert photometry((0, 0, 2), unit=INTENSITY).color == "#0000ff"
+
+
+def test_only_whites_have_a_temperature() -> None:
+    for duv, is_white in ((0.019, True), (-0.019, True), (0.021, False), (-0.021, False)):
+        rgb = kelvin_to_rgb(4000, duv)
+        found = photometry((float(rgb[0]), float(rgb[1]), float(rgb[2])), unit=INTENSITY)
+        assert (found.kelvin is not None, found.duv is not None) == (is_white, is_white)
 
 
 def test_a_multiple_has_the_colour_of_its_flux_if_it_is_known() -> None:

@@ -62,9 +62,6 @@ NAME_WIDTH = 30
 #: Share of its current emission at which a light counts as off.
 OFF_SHARE = 2.0**-10
 
-#: Largest distance from Planck's locus of a colour that is shown as a temperature.
-WHITE_MAX_DUV = 0.02
-
 
 def show_look(look: Look, folder: Path, *, table: Table = "short") -> None:
     """Print how close the answer is, what the lights do, and which settings shaped it."""
@@ -334,12 +331,7 @@ def _spoken_color(look: Look, light: LightSetting) -> str:
     if appearance.hex is None:
         factors = [f"{factor:.3g}" for factor in light.weight]
         return "" if len(set(factors)) == 1 else f"× {', '.join(factors)}"
-    is_white = (
-        appearance.kelvin is not None
-        and appearance.duv is not None
-        and abs(appearance.duv) <= WHITE_MAX_DUV
-    )
-    return f"{appearance.kelvin:.0f} K" if is_white else appearance.hex
+    return appearance.hex if appearance.kelvin is None else f"{appearance.kelvin:.0f} K"
 
 
 def _show_all(look: Look) -> None:

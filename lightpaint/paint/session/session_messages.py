@@ -74,9 +74,8 @@ from lightpaint.report.verdict import (
     spoken_whole,
 )
 
-#: Distance from Planck's locus up to which a colour is called white, and part of the current light
-#: under which one is off.
-WHITE, OFF = 0.02, 1e-4
+#: Part of the current light under which one is off.
+OFF = 1e-4
 
 #: Number of lamps whose rendering of colours is found with each exact answer, at 30 ms each.
 MAX_RENDERED_LAMPS = 32
@@ -179,13 +178,12 @@ def _light_answer(
     current, answered = (
         float(luminance(np.asarray(x, np.float64))) for x in (light.emission, weight)
     )
-    is_white = colour.kelvin is not None and colour.duv is not None and abs(colour.duv) <= WHITE
     return LightAnswer(
         emission=as_rgb(weight),
         stops=float(np.log2(answered / current))
         if current > 0 and answered > OFF * current
         else None,
-        kelvin=colour.kelvin if is_white else None,
+        kelvin=colour.kelvin,
         swatch=colour.hex or rgb_to_hex(np.asarray(light.emission, np.float64)),
         is_on=answered > OFF * current,
         share=share,

@@ -40,9 +40,8 @@ from lightpaint.report.page.lights_table import most_visible_lights
 from lightpaint.threads import parallel_map
 from lightpaint.viewer.bundle import bundled, compact_script, source, styles
 
-#: Colour temperatures of the sliders, in kelvin, evenly in mireds; and the distance from Planck's
-#: locus up to which a colour is one.
-COOLEST, WARMEST, STEPS, WHITE = 15000.0, 1500.0, 31, 0.02
+#: Colour temperatures of the sliders, in kelvin, evenly in mireds.
+COOLEST, WARMEST, STEPS = 15000.0, 1500.0, 31
 
 #: Points of the table of a transform: as a curve, as each side of a lattice; its ends in stops.
 CURVE, SIDE, LOW, HIGH = 256, 32, -14.0, 7.0
@@ -235,13 +234,7 @@ def light_data(light: BasisLight) -> dict[str, Any]:
 
 
 def _kelvin(emission: Any, unit: str) -> float | None:
-    light_photometry = photometry(emission, unit=unit)
-    is_white = (
-        light_photometry.kelvin is not None
-        and light_photometry.duv is not None
-        and abs(light_photometry.duv) <= WHITE
-    )
-    return light_photometry.kelvin if is_white else None
+    return photometry(emission, unit=unit).kelvin
 
 
 def kelvin_colors() -> dict[str, Any]:
