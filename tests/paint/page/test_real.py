@@ -6,17 +6,20 @@ or a warning on a console.
 
 import re
 import shlex
+import socket
 import subprocess
 import sys
 import threading
 import time
 from collections.abc import Callable, Iterator
 from dataclasses import replace
+from functools import partial
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
+from console_rigs import COLORS, SacnFields, lamp, open_port, sacn_fields
 from nightly import nightly
 from patience import PATIENCE_S
 from renderer import REPOSITORY
@@ -24,15 +27,20 @@ from renderer import REPOSITORY
 import lightpaint as lp
 from lightpaint.cli.commands.paint_command import command_for_paintings
 from lightpaint.colour.srgb import to_8_bit
+from lightpaint.dmx.console_rig import ConsoleRig
+from lightpaint.dmx.levels import encode_levels
+from lightpaint.dmx.network.console_link import ConsoleLink
 from lightpaint.images.object_map import Objects
 from lightpaint.lighting.analysis.noise.noise_correction import correct_noise
 from lightpaint.paint.server.server import Server
 from lightpaint.paint.store.history_steps import name_in_view
 from lightpaint.paint.store.store import Store
+from lightpaint.paint.studio.console_switch import Console, drives_of_session
 from lightpaint.paint.studio.studio import Studio
 from lightpaint.paint.subject import Subject
 from lightpaint.paint.subject_factory import make_subject
 from lightpaint.pipeline.job.sources import BasisFile
+from lightpaint.scene.lights.lights_file import SceneRequests
 
 H, W, N = 54, 96, 3
 
@@ -88,10 +96,10 @@ FIRM = ("0", *["Shift+}"] * 8)
 class ServedPainter:
     """A painter on a port of its own, in threads of this process."""
 
-    def __init__(self, *subjects: Subject, port: int = 0) -> None:
+    def __init__(self, *subjects: Subject, port: int = 0, **options: Any) -> None:
         self.folder = subjects[0].folder
         self.store: Store | None = None
-        self.studio = Studio(subjects, self._opened)
+        self.studio = Studio(subjects, self._opened, **options)
         self.server = Server(self.studio, port=port)
         self.thread = threading.Thread(target=self.server.run, daemon=True)
         self.thread.start()
@@ -828,3 +836,89 @@ def test_in_a_browser_that_is_zoomed_it_is_sharp_and_in_its_place(
     assert user.look("return document.documentElement.scrollWidth <= innerWidth")
     user.button("Export").click()  # what does not fit is scrolled to
     user.page.get_by_role("dialog", name="Export").wait_for()
+
+
+#: A lamp of the painter with a console, and the linear colours of its emitters at full.
+LAMP = "light 0"
+FULL = {"red": [2, 0, 0], "green": [0, 2, 0], "blue": [0, 0, 2], "white": [1, 1, 1]}
+RIG = ConsoleRig("show.mvr", (lamp(LAMP, 1),))
+
+
+class Wire:
+    """What has arrived at a port."""
+
+    def __init__(self, port: socket.socket) -> None:
+        port.setblocking(False)
+        self.port = port
+        self.address = f"sacn://127.0.0.1:{port.getsockname()[1]}"
+
+    def packets(self) -> list[SacnFields]:
+        """All packets since the last call."""
+        found = []
+        while True:
+            try:
+                found.append(sacn_fields(self.port.recv(2048)))
+            except BlockingIOError:
+                return found
+
+    def has(self, levels: bytes) -> bool:
+        """Return whether the last packet that came has these levels."""
+        packets = self.packets()
+        return bool(packets) and packets[-1].slots == levels
+
+
+@pytest.fixture
+def wire() -> Iterator[Wire]:
+    with open_port() as port:
+        yield Wire(port)
+
+
+@pytest.fixture
+def console_painter(
+    basis: lp.Basis, wire: Wire, tmp_path: Path, without_reasons: None
+) -> Iterator[ServedPainter]:
+    """A painter of a lamp of four emitters at 1.1, and two lights of any colour."""
+    emitters = [{"name": name, "rgb": FULL[name]} for name in COLORS]
+    keys = {"light": {LAMP: {"emitters": emitters}}}
+    requested = basis.with_requests(SceneRequests(keys, "room.lights.toml"))
+    console = Console(RIG, partial(ConsoleLink.open, wire.address, RIG), wire.address)
+    painter = ServedPainter(make_subject(requested, tmp_path / "room"), console=console)
+    yield painter
+    painter.close()
+
+
+@pytest.mark.nightly
+def test_the_lamps_follow_and_go_dark_at_the_second_press(
+    console_painter: ServedPainter, open_page: Any, wire: Wire
+) -> None:
+    user = open_page(console_painter).ready()
+    user.press("0").stroke((20, 10), (60, 10), (20, 30)).still("brush")
+    assert wire.packets() == []  # nothing is sent before it is switched on
+    switch = user.page.get_by_role("checkbox", name="Console")
+    assert not switch.is_checked()
+    switch.click()
+
+    def lit() -> bytes:
+        with console_painter.studio._access.lock:
+            drives = drives_of_session(console_painter.studio.session)
+        return encode_levels(RIG, drives)[1]
+
+    wait_until(lambda: wire.has(lit()), "the answer is not on the wire")
+    dark = encode_levels(RIG, {})[1]
+    assert lit() != dark
+    # One press asks, and is forgotten after a while.
+    user.button("Blackout").click()
+    user.button("Press again").wait_for()
+    user.button("Blackout").wait_for()
+    assert all(x.slots == lit() for x in wire.packets())
+    user.button("Blackout").click()
+    user.button("Press again").click()
+    user.button("Light again").wait_for()
+    wait_until(lambda: wire.has(dark), "it is not dark")
+    # It stays dark while somebody paints on.
+    user.stroke((60, 20), (80, 30)).still("brush", "brush")
+    assert all(x.slots == dark for x in wire.packets())
+    user.button("Light again").click()
+    wait_until(lambda: wire.has(lit()), "it is not lit again")
+    switch.click()
+    wait_until(lambda: any(x.is_last for x in wire.packets()), "the stream has no end")
