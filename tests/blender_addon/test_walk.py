@@ -96,3 +96,19 @@ def test_known_lamps_are_found_from_a_picture_in_blenders_view(
     for name, found in answer["found"].items():
         # What is left of the noise, in a tone curve that is flat in its highlights.
         assert found == pytest.approx(answer["known"].get(name, 1.0), rel=0.1), name
+
+
+@pytest.mark.nightly
+def test_a_lamp_of_emitters_carries_its_drives(
+    blender: list[str], tmp_path: Path, variables: dict[str, str]
+) -> None:
+    found = found_in_blender(blender, HERE / "lamp_drives.py", tmp_path, variables)
+    assert found["before"] == {}
+    assert [*found["shown"]] == ["Point"]
+    # The drives mix the multiplier of the lamp: each emitter is six times one channel.
+    drives = [found["shown"]["Point"][name] for name in ("red", "green", "blue")]
+    assert np.allclose(6 * np.array(drives), found["factors"]["Point"], rtol=1e-5)
+    assert found["discarded"] == {}
+    assert found["applied"]["Point"] != found["shown"]["Point"]
+    assert found["saved"] == found["applied"]
+    assert found["reverted"] == {}
