@@ -170,6 +170,39 @@ def test_the_receiver_of_the_library_reads_it() -> None:
     assert {(x.priority, x.sourceName) for x in arrived.values()} == {(90, "lightpaint")}
 
 
+def test_another_library_decodes_what_leaves_as_artnet() -> None:
+    """That of `stupidArtnet`, which shares nothing with the `pyartnet` that sends."""
+    receivers = pytest.importorskip("stupidArtnet")
+    with open_port() as port:
+        number = port.getsockname()[1]
+    receiver = receivers.StupidArtnetServer(port=number)
+    arrived: dict[int, bytes] = {}
+
+    def take(levels: list[int], universe: int) -> None:
+        arrived[universe] = bytes(levels)
+
+    for universe in (0, 1):
+        receiver.register_listener(universe, callback_function=take)
+    try:
+        with ConsoleLink.open(f"artnet://127.0.0.1:{number}", RIG) as link:
+            link.show(LOOK)  # again and again, also once its thread has opened the port
+            end_s = time.monotonic() + PATIENCE_S
+            while len(arrived) < 2:
+                assert time.monotonic() < end_s, "nothing was decoded"
+                time.sleep(0.01)
+            levels = {universe + 1: x for universe, x in arrived.items()}
+            receiver.close()  # at the next packet
+            link.show({})
+            settle(link)
+    finally:
+        receiver.listen = False
+        receiver.socket_server.close()
+    assert levels == encode_levels(RIG, LOOK)
+    drives = decode_levels(RIG, levels)
+    assert drives["left"]["blue"] == pytest.approx(0.25, abs=ROUNDING)
+    assert drives["right"]["white"] == pytest.approx(0.3, abs=ROUNDING)
+
+
 @pytest.mark.parametrize("protocol", [SACN, ARTNET])
 def test_groups_of_receivers_stay_on_the_interface(protocol: Any) -> None:
     """Multicast and broadcast reach a socket that is not the host of any target; on loopback."""
