@@ -74,13 +74,24 @@ class ConsoleMonitor:
         }
 
     def _light_texts(self) -> dict[str, str]:
-        """Return the drives of each light, with the address of its fixture."""
+        """Return the drives of each light, with the address of its fixture; of a colour wheel that
+        of the slot which shines.
+        """
         assert self._rig is not None
         owners = self._rig.owners
+        wheels = {
+            light.name
+            for fixture in self._rig.fixtures
+            for light in fixture.lights
+            if light.has_slots_for_emitters
+        }
         return {
             f"{light} at {_address_of(owners[light])}": " ".join(
-                f"{name}={drive:.3f}" for name, drive in drives.items()
+                f"{name}={drive:.3f}"
+                for name, drive in drives.items()
+                if drive or light not in wheels
             )
+            or "dark"
             for light, drives in self._drives().items()
         }
 
