@@ -8,8 +8,8 @@ from markupsafe import Markup
 from lightpaint.arrays import Doubles
 from lightpaint.basis.basis import Basis
 from lightpaint.colour.color import cct_and_duv
+from lightpaint.colour.color_difference import hue_name
 from lightpaint.colour.display.view_transform import ViewTransform
-from lightpaint.colour.hue_names import hue_name
 from lightpaint.colour.srgb import to_8_bit
 from lightpaint.display_text import some_names
 from lightpaint.images.denoiser import denoised
