@@ -23,7 +23,7 @@ from lightpaint.keywords import keywords
 # NumPy is imported late, with the curves: --help reads the settings, which have a transform.
 if TYPE_CHECKING:
     from lightpaint.arrays import Floats
-    from lightpaint.colour.display.encoding import Encoding
+    from lightpaint.colour.display.tone_curves import Encoding
 
 #: Maximum exposure in stops; a larger number is a typing error.
 MAX_STOPS = 64.0
