@@ -11,8 +11,7 @@ from functools import cached_property
 import numpy as np
 
 from lightpaint.arrays import Doubles, Floats
-from lightpaint.colour.color import luminance
-from lightpaint.colour.planckian_locus import uv_of, xyz_of
+from lightpaint.colour.color import luminance, uv_of, xyz_of
 from lightpaint.colour.primaries import REC709, rgb_to_xyz
 
 #: Directions in which a polygon is bounded, in degrees; denser where the curve of whites bounds it

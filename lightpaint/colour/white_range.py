@@ -12,8 +12,7 @@ from math import ceil
 import numpy as np
 
 from lightpaint.arrays import Doubles, Floats
-from lightpaint.colour.color import kelvin_to_rgb, luminance
-from lightpaint.colour.planckian_locus import uv_of
+from lightpaint.colour.color import kelvin_to_rgb, luminance, uv_of
 from lightpaint.colour.primaries import REC709, rgb_to_xyz
 
 #: Maximum step between neighbouring whites, in mireds. The chord is less than 3e-5 off the locus,

@@ -8,7 +8,7 @@ import pygdtf
 import pytest
 from rig_files import channel, fixture, gdtf, layered, write_mvr
 
-from lightpaint.colour.planckian_locus import matching_functions
+from lightpaint.colour.color import matching_functions
 from lightpaint.dmx.console_rig import ConsoleRig, RigLight
 from lightpaint.dmx.gdtf.emitter_colour import xy_of_kelvin
 from lightpaint.dmx.gdtf.fixture_type import FixtureType

@@ -12,8 +12,8 @@ from xml.etree.ElementTree import Element
 import numpy as np
 
 from lightpaint.arrays import Doubles
+from lightpaint.colour.color import C2, matching_functions, xy_of
 from lightpaint.colour.lamp import MAX_SLOTS
-from lightpaint.colour.planckian_locus import C2, matching_functions, xy_of
 from lightpaint.colour.primaries import REC2020, rgb_to_xyz
 from lightpaint.dmx.console_rig import RigSlot
 from lightpaint.dmx.gdtf.emitter_colour import (
