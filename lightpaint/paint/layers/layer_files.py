@@ -18,7 +18,7 @@ from lightpaint.arrays import Bools, Floats
 from lightpaint.colour.display.view_transform import ViewTransform
 from lightpaint.errors import ImageError, PaintError
 from lightpaint.images.formats.exr import read_headers, read_parts
-from lightpaint.images.formats.exr_streams import PartHead, write_streamed
+from lightpaint.images.formats.exr_rows import PartHead, write_streamed
 from lightpaint.images.formats.file_kinds import head_of, kind_of
 from lightpaint.images.formats.openraster import (
     RasterGroup,
