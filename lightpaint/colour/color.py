@@ -24,6 +24,19 @@ C2 = 0.014388
 #: beyond 1000 and 100,000 K.
 TABLE_MIREDS = np.concatenate([[5.0], np.geomspace(10, 2000, 400)])
 
+#: Luminance of linear Rec.709 (ITU-R BT.709-6, item 3.2).
+LUMINANCE = np.array([0.2126, 0.7152, 0.0722])
+
+#: Correlated colour temperatures for which the locus is computed, in kelvin.
+KELVIN_RANGE = (1000.0, 100_000.0)
+
+#: |Duv| beyond which a colour has no correlated colour temperature (CIE 15:2018, 9.5).
+LARGEST_DUV = 0.05
+
+#: Number of Newton steps from the nearest tabulated black body to the nearest one, with one to
+#: spare.
+NEWTON_STEPS = 5
+
 
 def uv_of_black_body(kelvin: Doubles) -> Doubles:
     """Return CIE 1960 (u, v), (k, 2), of black bodies at temperatures (k,)."""
@@ -82,20 +95,6 @@ def matching_functions() -> tuple[Doubles, Doubles]:
     text = files("lightpaint.colour").joinpath("cie_1931.csv").read_text("utf-8")
     table = np.loadtxt(text.splitlines(), delimiter=",")
     return table[:, 0] * 1e-9, table[:, 1:]
-
-
-#: Luminance of linear Rec.709 (ITU-R BT.709-6, item 3.2).
-LUMINANCE = np.array([0.2126, 0.7152, 0.0722])
-
-#: Correlated colour temperatures for which the locus is computed, in kelvin.
-KELVIN_RANGE = (1000.0, 100_000.0)
-
-#: |Duv| beyond which a colour has no correlated colour temperature (CIE 15:2018, 9.5).
-LARGEST_DUV = 0.05
-
-#: Number of Newton steps from the nearest tabulated black body to the nearest one, with one to
-#: spare.
-NEWTON_STEPS = 5
 
 
 def luminance(rgb: Floats) -> Floats:

@@ -22,6 +22,25 @@ _MATRIX = np.array(
     ]
 )
 
+#: Maximum distance from Planck's locus, and minimum temperature, of light that is called white.
+WHITE_DUV, WARMEST = 0.015, 2100.0
+
+#: Temperatures in kelvin below which white is warm, and above which it is cool.
+WARM, COOL = 3700.0, 7500.0
+
+#: Upper end of the range of each name, as a hue angle of CIE L*a*b* in degrees.
+HUES = (
+    (20.0, "pink"),
+    (55.0, "red"),
+    (80.0, "orange"),
+    (112.0, "yellow"),
+    (170.0, "green"),
+    (235.0, "turquoise"),
+    (308.0, "blue"),
+    (340.0, "purple"),
+    (360.0, "pink"),
+)
+
 
 def delta_e(a: Floats, b: Floats) -> Floats:
     """Return CIEDE2000, (…,), between two images as shown on a display.
@@ -92,26 +111,6 @@ def _between(h1: Doubles, h2: Doubles) -> Doubles:
 
 def _cos(degrees: Doubles) -> Doubles:
     return np.asarray(np.cos(np.radians(degrees)))
-
-
-#: Maximum distance from Planck's locus, and minimum temperature, of light that is called white.
-WHITE_DUV, WARMEST = 0.015, 2100.0
-
-#: Temperatures in kelvin below which white is warm, and above which it is cool.
-WARM, COOL = 3700.0, 7500.0
-
-#: Upper end of the range of each name, as a hue angle of CIE L*a*b* in degrees.
-HUES = (
-    (20.0, "pink"),
-    (55.0, "red"),
-    (80.0, "orange"),
-    (112.0, "yellow"),
-    (170.0, "green"),
-    (235.0, "turquoise"),
-    (308.0, "blue"),
-    (340.0, "purple"),
-    (360.0, "pink"),
-)
 
 
 def hue_name(rgb: Floats) -> str:

@@ -38,6 +38,18 @@ SLOPE = 6.73
 #: Luminance of the adapting field in cd/m², and of the background relative to white: TM-30.
 ADAPTING, BACKGROUND = 100, 20
 
+#: Rf (n,) of drives (n, e).
+Fidelity = Callable[[Doubles], Doubles]
+
+#: Places on the way between two corners at which a search may begin, and how many begin.
+PLACES, STARTS = np.linspace(0, 1, 17)[1:-1], 3
+
+#: Most corners between which all ways are tried; of more, those to the mean of all.
+MANY_CORNERS = 16
+
+#: Steps of a search, the shares by which it finds slopes, and steps towards a mix that is enough.
+STEPS, SHARE, HALVINGS = 60, 1e-5, 30
+
 
 @dataclass(frozen=True)
 class MixFidelity:
@@ -103,19 +115,6 @@ def _samples_and_observer() -> tuple[Doubles, Doubles]:
         samples = colour.quality.cfi2017.load_TCS_CIE2017(shape).values
         observer = colour.MSDS_CMFS["CIE 1964 10 Degree Standard Observer"].copy().align(shape)
     return np.asarray(samples, np.float64), np.asarray(observer.values, np.float64)
-
-
-#: Rf (n,) of drives (n, e).
-Fidelity = Callable[[Doubles], Doubles]
-
-#: Places on the way between two corners at which a search may begin, and how many begin.
-PLACES, STARTS = np.linspace(0, 1, 17)[1:-1], 3
-
-#: Most corners between which all ways are tried; of more, those to the mean of all.
-MANY_CORNERS = 16
-
-#: Steps of a search, the shares by which it finds slopes, and steps towards a mix that is enough.
-STEPS, SHARE, HALVINGS = 60, 1e-5, 30
 
 
 def best_mix(corners: Doubles, rf: Fidelity) -> Doubles:

@@ -38,6 +38,25 @@ MAX_FILE = 2**31
 TIFF_COLOURS = {0: "grey", 1: "grey", 2: "RGB", 3: "palette", 6: "YCbCr"}
 TIFF_OTHERS = {4: "a mask", 5: "CMYK", 8: "Lab", 9: "Lab", 10: "Lab", 32844: "LogLuv"}
 
+#: Number of pixels converted at a time.
+STRIP_PIXELS = 2**18
+
+#: Fields of a directory (TIFF 6.0, section 8), and their value types: format and size.
+WIDTH, HEIGHT, BITS, COMPRESSION, SAMPLES, PLANAR = 256, 257, 258, 259, 277, 284
+STRIPS = (273, 279)  # offsets, lengths
+TILES = (324, 325)
+ROWS_PER_STRIP, TILE_WIDTH, TILE_HEIGHT = 278, 322, 323
+TYPES = {1: ("B", 1), 3: ("H", 2), 4: ("I", 4), 16: ("Q", 8)}
+
+#: Maximum number of values in a field; supported pictures have fewer.
+MAX_COUNT = 2**22
+
+Fields = dict[int, tuple[int, ...]]
+
+#: Supported colour modes, and names of unsupported ones.
+PSD_COLOURS = {1: "grey", 3: "RGB"}
+PSD_OTHERS = {0: "black and white", 2: "indexed colours", 4: "CMYK", 7: "multichannel", 9: "Lab"}
+
 
 @dataclass(frozen=True)
 class Bitmap:
@@ -215,10 +234,6 @@ def _upright(pixels: npt.NDArray[Any], orientation: int) -> npt.NDArray[Any]:
     return pixels
 
 
-#: Number of pixels converted at a time.
-STRIP_PIXELS = 2**18
-
-
 def transform_of(bitmap: Bitmap) -> ViewTransform | None:
     """Return the view transform declared in a file; None if it declares none."""
     if bitmap.shown is None:
@@ -322,19 +337,6 @@ def unpremultiply(image: Floats, alpha: Floats) -> None:
         image /= np.where(alpha > 0, alpha, np.float32(1))[..., None]
 
 
-#: Fields of a directory (TIFF 6.0, section 8), and their value types: format and size.
-WIDTH, HEIGHT, BITS, COMPRESSION, SAMPLES, PLANAR = 256, 257, 258, 259, 277, 284
-STRIPS = (273, 279)  # offsets, lengths
-TILES = (324, 325)
-ROWS_PER_STRIP, TILE_WIDTH, TILE_HEIGHT = 278, 322, 323
-TYPES = {1: ("B", 1), 3: ("H", 2), 4: ("I", 4), 16: ("Q", 8)}
-
-#: Maximum number of values in a field; supported pictures have fewer.
-MAX_COUNT = 2**22
-
-Fields = dict[int, tuple[int, ...]]
-
-
 def check_tiff(path: Path) -> None:
     """Raise ImageError unless the first picture of a TIFF is complete."""
     size = path.stat().st_size
@@ -420,11 +422,6 @@ def _first_directory(file: BinaryIO) -> Fields:
         if length and name not in fields:
             fields[name] = struct.unpack_from(f"{order}{length}{letter}", value)
     return fields
-
-
-#: Supported colour modes, and names of unsupported ones.
-PSD_COLOURS = {1: "grey", 3: "RGB"}
-PSD_OTHERS = {0: "black and white", 2: "indexed colours", 4: "CMYK", 7: "multichannel", 9: "Lab"}
 
 
 def check_psd(path: Path, *, max_pixels: int) -> bool:

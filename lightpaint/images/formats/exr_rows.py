@@ -43,6 +43,22 @@ READ_BYTES = 2**22
 #: Header of a chunk: its part, its first line, and the number of bytes that follow.
 HEAD = struct.Struct("<iii")
 
+#: Version number of a file; the flag for names longer than LONGEST_NAME characters; and that
+#: length.
+VERSION, LONG_NAMES, LONGEST_NAME = 2, 0x400, 31
+
+#: Upper bound in bytes for the header of a light's part, without its texts.
+PLAIN_HEAD_BYTES = 2048
+
+#: OpenEXR's codes for no compression and for ZIP of 16 lines; and the ZIP level.
+PLAIN, ZIPPED, LEVEL = 0, 3, 4
+
+#: Approximate number of bytes of pixels that are prepared at a time.
+BLOCK_BYTES = 2**18
+
+#: Returns all channels of a part from one row to another.
+Rows = Callable[[int, int], Channels]
+
 
 class RowsUnsupportedError(Exception):
     """A file of an unsupported kind."""
@@ -287,24 +303,6 @@ def _unpacked(compressed: bytes, size: int) -> bytes:
     half = -(-values.size // 2)
     unfiltered[0::2], unfiltered[1::2] = values[:half], values[half:]
     return unfiltered.tobytes()
-
-
-#: Version number of a file; the flag for names longer than LONGEST_NAME characters; and that
-#: length.
-VERSION, LONG_NAMES, LONGEST_NAME = 2, 0x400, 31
-
-#: Upper bound in bytes for the header of a light's part, without its texts.
-PLAIN_HEAD_BYTES = 2048
-
-#: OpenEXR's codes for no compression and for ZIP of 16 lines; and the ZIP level.
-PLAIN, ZIPPED, LEVEL = 0, 3, 4
-
-#: Approximate number of bytes of pixels that are prepared at a time.
-BLOCK_BYTES = 2**18
-
-
-#: Returns all channels of a part from one row to another.
-Rows = Callable[[int, int], Channels]
 
 
 @dataclass(frozen=True)
