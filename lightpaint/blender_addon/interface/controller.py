@@ -13,8 +13,7 @@ from typing import Any
 import bpy
 from bpy.app.handlers import persistent
 
-from ..lamps.lamp_drives import discard_drives
-from ..lamps.lamp_levels import PREVIEWS, discard_levels, grouped_places
+from ..lamps.lamp_levels import PREVIEWS, discard_drives, discard_levels, grouped_places
 from ..lamps.memory import recall, remember
 from ..painter.program import find_program
 from ..shot.cycles_render import RENDERING, ShotRender, put_back_output

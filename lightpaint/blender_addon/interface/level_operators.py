@@ -3,10 +3,17 @@
 
 import bpy
 
-from ..lamps.lamp_drives import keep_drives, show_drives
-from ..lamps.lamp_levels import PREVIEWS, grouped_places, keep_levels, key_levels, show_factors
+from ..lamps.lamp_levels import (
+    PREVIEWS,
+    grouped_places,
+    keep_drives,
+    keep_levels,
+    key_levels,
+    show_drives,
+    show_factors,
+)
+from ..lamps.lamp_units import working_space
 from ..lamps.memory import MEMORY_KEY, recall, remember
-from ..lamps.working_space import working_space
 from ..shot.layer_setup import revert
 from ..shot.shot_home import shot_folder
 from .controller import controller, discard_preview

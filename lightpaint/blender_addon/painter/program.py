@@ -9,7 +9,7 @@ import subprocess
 import threading
 from pathlib import Path
 
-from .socket_client import checked_address, is_loopback
+from .painter_link import checked_address, is_loopback
 
 #: How to install it, for messages.
 INSTALL_TEXT = (
