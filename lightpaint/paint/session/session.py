@@ -32,9 +32,12 @@ from lightpaint.paint.protocol import AnswerUpdate, Message
 from lightpaint.paint.references.likeness_layers import open_request
 from lightpaint.paint.references.reference_table import ReferenceTable
 from lightpaint.paint.session.history import Changes, History, Travel, restore
-from lightpaint.paint.session.live_answer import LiveAnswer, weights_by_name
-from lightpaint.paint.session.live_drives import LiveDrives
-from lightpaint.paint.session.live_readings import LiveReadings
+from lightpaint.paint.session.live_answer import (
+    LiveAnswer,
+    LiveDrives,
+    LiveReadings,
+    weights_by_name,
+)
 from lightpaint.paint.session.moved_lights import MovedLights, NoPlaneSource, Placed, PlaneSource
 from lightpaint.paint.session.request_changes import (
     RequestChange,
