@@ -31,13 +31,14 @@ from lightpaint.paint.rig.added_lights import free_name, values_of, with_level
 from lightpaint.paint.rig.lamp_rig import LampRig
 from lightpaint.paint.rig.pointing import emitter_at_place, pose_change
 from lightpaint.paint.session.moved_lights import Placed, added_names
-from lightpaint.paint.session.page_planes import (
+from lightpaint.paint.session.picture_table import (
+    Picture,
     page_emitters,
     page_factor,
     page_plane,
     plane_scale,
+    plane_thumbnail,
 )
-from lightpaint.paint.session.picture_table import Picture, plane_thumbnail
 from lightpaint.paint.session.session import Session
 from lightpaint.paint.session_access import Publisher, SessionAccess
 from lightpaint.paint.store.history_steps import name_in_view

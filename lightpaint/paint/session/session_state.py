@@ -31,14 +31,15 @@ from lightpaint.paint.protocol import (
 from lightpaint.paint.references.reference_table import Reference, ReferenceTable
 from lightpaint.paint.session import picture_table
 from lightpaint.paint.session.look_library import LookLibrary
-from lightpaint.paint.session.page_planes import (
+from lightpaint.paint.session.picture_table import (
+    Picture,
+    PictureTable,
     opens_plain,
     page_emitters,
     page_plane,
     plane_scale,
     plane_size,
 )
-from lightpaint.paint.session.picture_table import Picture, PictureTable
 from lightpaint.paint.session.session import Session
 from lightpaint.paint.session.session_messages import light_info
 from lightpaint.paint.store.history_steps import name_in_view
