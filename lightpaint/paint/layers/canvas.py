@@ -16,6 +16,7 @@ from lightpaint.lighting.live.live_view import LiveView
 from lightpaint.paint.layers.composed_layers import Change, ComposedLayers
 from lightpaint.paint.layers.composition import AlbedoSource
 from lightpaint.paint.layers.layer_pixels import (
+    SELECTION_ID,
     LayerPixels,
     enclosing,
     is_empty,
@@ -23,7 +24,6 @@ from lightpaint.paint.layers.layer_pixels import (
     shared,
 )
 from lightpaint.paint.layers.layer_stack import Layer, LayerStack
-from lightpaint.paint.layers.selection import SELECTION_ID
 from lightpaint.paint.store.history_steps import Patch, Pixels, Region, Step, slices
 from lightpaint.paint.store.store import StoredComposition
 from lightpaint.target.target import Target

@@ -14,8 +14,8 @@ from lightpaint.images.pixel_blocks import block_mean, fitting_factor
 from lightpaint.paint.layers.canvas import Canvas
 from lightpaint.paint.layers.canvases import Canvases
 from lightpaint.paint.layers.composition import compose_layer
+from lightpaint.paint.layers.layer_pixels import FULL, selection_mask
 from lightpaint.paint.layers.layer_stack import MAX_NAME_LENGTH, Layer
-from lightpaint.paint.layers.selection import FULL, selection_mask
 from lightpaint.paint.presets.lamp_roles import LampRoles
 from lightpaint.paint.presets.presets import Area, LampRequest, LightingPreset, find_preset
 from lightpaint.paint.presets.view_areas import Mask, ViewAreas

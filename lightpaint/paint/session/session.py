@@ -26,8 +26,8 @@ from lightpaint.lighting.constraints.start_lighting import start_weights
 from lightpaint.lighting.solution import Solution
 from lightpaint.paint import protocol
 from lightpaint.paint.layers.canvases import LayeredPaintings
+from lightpaint.paint.layers.layer_pixels import selection_patch
 from lightpaint.paint.layers.layer_stack import PAINTING_ID, LayerStack
-from lightpaint.paint.layers.selection import selection_patch
 from lightpaint.paint.protocol import AnswerUpdate, Message
 from lightpaint.paint.references.likeness_layers import open_request
 from lightpaint.paint.references.reference_table import ReferenceTable

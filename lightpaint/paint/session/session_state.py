@@ -15,8 +15,8 @@ from lightpaint.errors import PaintError
 from lightpaint.images.pixel_blocks import resampled
 from lightpaint.paint.layers.canvas import Canvas
 from lightpaint.paint.layers.canvases import Canvases
+from lightpaint.paint.layers.layer_pixels import selection_mask
 from lightpaint.paint.layers.layer_stack import Layer
-from lightpaint.paint.layers.selection import selection_mask
 from lightpaint.paint.presets.preset_masks import requested_look
 from lightpaint.paint.presets.presets import PRESETS, find_preset
 from lightpaint.paint.protocol import (
