@@ -94,11 +94,11 @@ if TYPE_CHECKING:
     from lightpaint.placement.new_lights import MirroredPair as MirroredPair
     from lightpaint.placement.new_lights import NewLights as NewLights
     from lightpaint.placement.place import place as place
+    from lightpaint.placement.place import suggest_lights as suggest_lights
     from lightpaint.placement.placement import AddedLight as AddedLight
     from lightpaint.placement.placement import Move as Move
     from lightpaint.placement.placement import Placement as Placement
     from lightpaint.placement.rigging import Rigging as Rigging
-    from lightpaint.placement.suggested_lights import suggest_lights as suggest_lights
     from lightpaint.placement.suggestion import Suggestion as Suggestion
     from lightpaint.relit.export.exports import write_exports as write_exports
     from lightpaint.relit.relight import relight as relight
@@ -182,7 +182,7 @@ _HOMES = {
     "template_of_basis": "pipeline.templates",
     "run": "pipeline.pipeline",
     "solve": "lighting.solve",
-    "suggest_lights": "placement.suggested_lights",
+    "suggest_lights": "placement.place",
     "use_variant": "scene.runtime.variant",
     "verdict": "report.verdict",
     "verify": "relit.verification_render",

@@ -41,8 +41,8 @@ from lightpaint.pipeline.wished_planes import (
     planes_of_job,
     require,
 )
+from lightpaint.placement.place import suggest_lights
 from lightpaint.placement.placement import Placement
-from lightpaint.placement.suggested_lights import suggest_lights
 from lightpaint.placement.suggestion import MoveSuggestion, Suggestion
 from lightpaint.progress import (
     Listener,

@@ -68,9 +68,9 @@ from lightpaint.pipeline.results.results import (
     checked_names,
     view_names,
 )
+from lightpaint.placement.place import check_suggestible
 from lightpaint.placement.placement import PlacementRecord
 from lightpaint.placement.rigging import Rigging
-from lightpaint.placement.suggested_lights import check_suggestible
 from lightpaint.relit.export.nuke import spoken_unreadable
 from lightpaint.relit.luminaire_xml import plugin_remark
 from lightpaint.scene.quality_presets import on_film
