@@ -15,9 +15,9 @@ from itertools import combinations, product
 import numpy as np
 
 from lightpaint.arrays import RGB, Bools, Doubles, Indices
+from lightpaint.colour import Preference
 from lightpaint.colour.color import cct_and_duv, luminance
 from lightpaint.colour.color_difference import ciede2000, lab_of_lights
-from lightpaint.colour.emitter_preference import Preference
 from lightpaint.colour.spectra.best_mix import MARGIN, MixFidelity, best_mix, cheapest_mix
 from lightpaint.colour.spectra.color_rendering import fidelity
 from lightpaint.colour.spectra.spectrum import WAVELENGTHS, Spectrum
