@@ -16,10 +16,9 @@ from lightpaint.paint.layers.canvases import Canvases
 from lightpaint.paint.layers.composition import compose_layer
 from lightpaint.paint.layers.layer_pixels import FULL, selection_mask
 from lightpaint.paint.layers.layer_stack import MAX_NAME_LENGTH, Layer
-from lightpaint.paint.presets.lamp_roles import LampRoles
+from lightpaint.paint.presets.lamp_roles import LampRoles, find_roles, light_share
 from lightpaint.paint.presets.presets import Area, LampRequest, LightingPreset, find_preset
 from lightpaint.paint.presets.view_areas import Mask, ViewAreas
-from lightpaint.paint.presets.view_light import find_roles, light_share
 from lightpaint.paint.store.history_steps import Pixels, Region, slices
 
 #: Least and most stops by which the light of lamps changes.

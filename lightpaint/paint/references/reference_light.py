@@ -12,7 +12,7 @@ from lightpaint.errors import PaintError
 from lightpaint.paint.layers.canvas import Canvas
 from lightpaint.paint.layers.composition import compose_layer
 from lightpaint.paint.layers.layer_stack import Layer
-from lightpaint.paint.presets.lamp_roles import LampRoles
+from lightpaint.paint.presets.lamp_roles import LampRoles, find_roles, light_share
 from lightpaint.paint.presets.preset_masks import (
     LampGroup,
     is_divided,
@@ -21,7 +21,6 @@ from lightpaint.paint.presets.preset_masks import (
     reduction,
 )
 from lightpaint.paint.presets.view_areas import MIN_ALBEDO, Mask, ViewAreas
-from lightpaint.paint.presets.view_light import find_roles, light_share
 from lightpaint.paint.references.light_match import (
     MOST_BRIGHTER,
     LampLight,
