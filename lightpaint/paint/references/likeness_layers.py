@@ -9,13 +9,13 @@ from lightpaint.errors import PaintError
 from lightpaint.paint.layers.canvas import Canvas
 from lightpaint.paint.layers.canvases import Canvases
 from lightpaint.paint.layers.layer_stack import MAX_NAME_LENGTH, Layer
-from lightpaint.paint.presets.preset_masks import (
+from lightpaint.paint.presets.presets import (
+    PRESETS,
     open_group,
     open_preset,
     reduced_areas,
     selected_mask,
 )
-from lightpaint.paint.presets.presets import PRESETS
 from lightpaint.paint.presets.view_areas import Mask, ViewAreas
 from lightpaint.paint.protocol import ApplyPreset, LookLike
 from lightpaint.paint.references.light_match import is_soft

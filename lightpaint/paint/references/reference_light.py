@@ -13,7 +13,7 @@ from lightpaint.paint.layers.canvas import Canvas
 from lightpaint.paint.layers.composition import compose_layer
 from lightpaint.paint.layers.layer_stack import Layer
 from lightpaint.paint.presets.lamp_roles import LampRoles, find_roles, light_share
-from lightpaint.paint.presets.preset_masks import (
+from lightpaint.paint.presets.presets import (
     LampGroup,
     is_divided,
     layers_of,

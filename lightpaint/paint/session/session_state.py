@@ -17,8 +17,7 @@ from lightpaint.paint.layers.canvas import Canvas
 from lightpaint.paint.layers.canvases import Canvases
 from lightpaint.paint.layers.layer_pixels import selection_mask
 from lightpaint.paint.layers.layer_stack import Layer
-from lightpaint.paint.presets.preset_masks import requested_look
-from lightpaint.paint.presets.presets import PRESETS, find_preset
+from lightpaint.paint.presets.presets import PRESETS, find_preset, requested_look
 from lightpaint.paint.protocol import (
     ImageInfo,
     PresetInfo,
