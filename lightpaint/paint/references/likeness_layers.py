@@ -18,7 +18,6 @@ from lightpaint.paint.presets.presets import (
 )
 from lightpaint.paint.presets.view_areas import Mask, ViewAreas
 from lightpaint.paint.protocol import ApplyPreset, LookLike
-from lightpaint.paint.references.light_match import is_soft
 from lightpaint.paint.references.likeness import (
     BAND_AREAS,
     CHANGED_RADIUS,
@@ -41,6 +40,7 @@ from lightpaint.paint.references.reference_light import (
     LightLayers,
     distance_of,
     find_light,
+    is_soft,
 )
 from lightpaint.paint.references.reference_table import ReferenceTable
 from lightpaint.paint.references.tones import Tones
