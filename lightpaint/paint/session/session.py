@@ -29,7 +29,7 @@ from lightpaint.paint.layers.canvases import LayeredPaintings
 from lightpaint.paint.layers.layer_pixels import selection_patch
 from lightpaint.paint.layers.layer_stack import PAINTING_ID, LayerStack
 from lightpaint.paint.protocol import AnswerUpdate, Message
-from lightpaint.paint.references.likeness_layers import open_request
+from lightpaint.paint.references.likeness import open_request
 from lightpaint.paint.references.reference_table import ReferenceTable
 from lightpaint.paint.session.history import Changes, History, Travel, restore
 from lightpaint.paint.session.live_answer import (
