@@ -93,8 +93,8 @@ if TYPE_CHECKING:
     from lightpaint.placement.freedom import Freedom as Freedom
     from lightpaint.placement.new_lights import MirroredPair as MirroredPair
     from lightpaint.placement.new_lights import NewLights as NewLights
-    from lightpaint.placement.place import place as place
-    from lightpaint.placement.place import suggest_lights as suggest_lights
+    from lightpaint.placement.place_search import place as place
+    from lightpaint.placement.place_search import suggest_lights as suggest_lights
     from lightpaint.placement.placement import AddedLight as AddedLight
     from lightpaint.placement.placement import Move as Move
     from lightpaint.placement.placement import Placement as Placement
@@ -167,7 +167,7 @@ _HOMES = {
     "measure_glare": "photometry.measure_glare",
     "measure_illuminance": "photometry.measure",
     "paint_with_light": "pipeline.one_call",
-    "place": "placement.place",
+    "place": "placement.place_search",
     "read_basis": "basis.file.basis_file",
     "read_constraints": "lighting.constraints.constraints_file",
     "read_light_groups": "basis.lightgroups.light_groups",
@@ -182,7 +182,7 @@ _HOMES = {
     "template_of_basis": "pipeline.templates",
     "run": "pipeline.pipeline",
     "solve": "lighting.solve",
-    "suggest_lights": "placement.place",
+    "suggest_lights": "placement.place_search",
     "use_variant": "scene.runtime.variant",
     "verdict": "report.verdict",
     "verify": "relit.verification_render",

@@ -26,7 +26,7 @@ from lightpaint.pipeline.results.placement_changes import all_changes, spoken_ch
 from lightpaint.placement.freedom import Freedom
 from lightpaint.placement.lights_to_place import free_light
 from lightpaint.placement.look_goals import on_small_film
-from lightpaint.placement.place import place
+from lightpaint.placement.place_search import place
 from lightpaint.placement.placement import Move, Placement, PlacementRecord
 from lightpaint.placement.rigged_lights import rigged_lights
 from lightpaint.placement.suggestion import MoveSuggestion

@@ -7,7 +7,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from lightpaint.colour.photometry import (
+from lightpaint.colour.luminous_flux import (
     lambertian_flux,
     photometry,
     point_flux,

@@ -14,7 +14,7 @@ from lightpaint.basis.basis import Basis
 from lightpaint.basis.lights import BasisLight, Lights
 from lightpaint.colour.color import luminance
 from lightpaint.colour.lamp import Lamp, LampEmitter
-from lightpaint.colour.photometry import Photometry, photometry
+from lightpaint.colour.luminous_flux import Photometry, photometry
 from lightpaint.colour.spectra.observer import EYE, Observer
 from lightpaint.colour.spectra.spectrum import rgb_of_powers
 from lightpaint.dataframes import CHANNELS, by_channel, number, pandas, xarray

@@ -12,7 +12,7 @@ from lightpaint.arrays import RGB, Doubles, as_rgb
 from lightpaint.basis.lights import BasisLight
 from lightpaint.colour.color import luminance, matching_functions
 from lightpaint.colour.lamp import MAX_EMITTERS, MAX_SLOTS, LampEmitter
-from lightpaint.colour.photometry import photometry
+from lightpaint.colour.luminous_flux import photometry
 from lightpaint.colour.primaries import REC709, rgb_to_xyz
 from lightpaint.colour.spectra.spectrum import Spectrum, spectrum_of
 from lightpaint.colour.spectra.spectrum_source import named_spectrum

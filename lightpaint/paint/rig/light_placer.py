@@ -29,7 +29,7 @@ from lightpaint.paint.store.session_requests import HOLD_KEYS
 from lightpaint.paint.store.store import Store, StoredRecords
 from lightpaint.placement.freedom import Freedom
 from lightpaint.placement.new_lights import NewLights
-from lightpaint.placement.place import place
+from lightpaint.placement.place_search import place
 from lightpaint.placement.placement import Move, Placement
 from lightpaint.placement.rigged_lights import freedom_on
 from lightpaint.placement.search.new_light_search import SearchSize, usual_pace

@@ -12,7 +12,7 @@ from lightpaint.basis.basis import Basis
 from lightpaint.basis.lights import BasisLight
 from lightpaint.colour.color import LUMINANCE, luminance, rgb_to_hex
 from lightpaint.colour.lamp import Lamp, LampEmitter
-from lightpaint.colour.photometry import photometry
+from lightpaint.colour.luminous_flux import photometry
 from lightpaint.colour.spectra.color_rendering import ColorRendering, color_rendering
 from lightpaint.lighting.analysis.analysis import Analysis
 from lightpaint.lighting.analysis.appearance.appearance import INVISIBLE, Appearance

@@ -68,7 +68,7 @@ from lightpaint.pipeline.results.results import (
     checked_names,
     view_names,
 )
-from lightpaint.placement.place import check_suggestible
+from lightpaint.placement.place_search import check_suggestible
 from lightpaint.placement.placement import PlacementRecord
 from lightpaint.placement.rigging import Rigging
 from lightpaint.relit.export.nuke import spoken_unreadable

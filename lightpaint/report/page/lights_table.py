@@ -11,7 +11,7 @@ from lightpaint.basis.basis import Basis
 from lightpaint.basis.light_images import LightImage, light_images
 from lightpaint.basis.lights import BasisLight
 from lightpaint.colour.color import luminance, rgb_to_hex
-from lightpaint.colour.photometry import Photometry
+from lightpaint.colour.luminous_flux import Photometry
 from lightpaint.colour.srgb import encode_display, to_8_bit
 from lightpaint.images.bands import in_turns
 from lightpaint.images.pixel_blocks import block_mean

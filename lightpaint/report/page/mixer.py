@@ -24,7 +24,7 @@ from lightpaint.basis.light_images import LightImage, light_images
 from lightpaint.basis.lights import BasisLight
 from lightpaint.colour.color import kelvin_to_rgb, luminance
 from lightpaint.colour.display.view_transform import ViewTransform, curve_of, lattice_of
-from lightpaint.colour.photometry import photometry
+from lightpaint.colour.luminous_flux import photometry
 from lightpaint.colour.srgb import to_8_bit
 from lightpaint.images.bands import in_turns
 from lightpaint.images.packed_picture import PackedPicture, pack_picture

@@ -17,7 +17,7 @@ from lightpaint.basis.basis import Basis
 from lightpaint.colour.color import LUMINANCE, luminance
 from lightpaint.colour.display.exposure import choose_exposure
 from lightpaint.colour.display.view_transform import ViewTransform
-from lightpaint.colour.photometry import Photometry, photometry
+from lightpaint.colour.luminous_flux import Photometry, photometry
 from lightpaint.colour.srgb import to_8_bit
 from lightpaint.images.denoiser import denoised
 from lightpaint.images.estimate import Estimate

@@ -10,7 +10,7 @@ import numpy as np
 
 from lightpaint.arrays import RGB
 from lightpaint.colour.color import luminance
-from lightpaint.colour.photometry import lambertian_flux, point_flux, spot_flux
+from lightpaint.colour.luminous_flux import lambertian_flux, point_flux, spot_flux
 from lightpaint.errors import SceneError
 from lightpaint.luminaires.plugin_names import AREA_PLUGIN, LUMINAIRE_PLUGINS
 from lightpaint.scene.lights.texels.texel import Texel
