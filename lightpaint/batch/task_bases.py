@@ -27,7 +27,7 @@ from lightpaint.pipeline.job.settings import Settings
 from lightpaint.pipeline.job.sources import SceneFile
 from lightpaint.pipeline.job_bases import obtain
 from lightpaint.pipeline.placed_lights import moved_basis, say_changes
-from lightpaint.placement.placement import PlacementRecord, read_placement
+from lightpaint.placement import PlacementRecord, read_placement
 from lightpaint.progress import Listener
 from lightpaint.report.rig.hung_lights import HungLight
 from lightpaint.report.rig.rig_drawing import rig_drawing

@@ -22,7 +22,7 @@ from lightpaint.paint.store.history_steps import Identity, ViewIdentity
 from lightpaint.paint.store.session_requests import SessionRequests
 from lightpaint.pipeline.job.settings import Settings
 from lightpaint.pipeline.job.sources import SceneFile, vars_of
-from lightpaint.placement.rigging import rigging_of
+from lightpaint.placement import rigging_of
 from lightpaint.progress import Progress, silent
 from lightpaint.scene.quality_presets import samples
 from lightpaint.scene.scene import Scene

@@ -16,7 +16,7 @@ from lightpaint.pipeline.job.settings import Settings
 from lightpaint.pipeline.job.sources import BasisFile, Painting, SceneFile, check_needed
 from lightpaint.pipeline.pipeline import run
 from lightpaint.pipeline.results.results import Look
-from lightpaint.placement.rigging import Rigging
+from lightpaint.placement import Rigging
 from lightpaint.progress import Progress, silent
 from lightpaint.scene.scene import Scene
 from lightpaint.sentences import Hint, Sentence

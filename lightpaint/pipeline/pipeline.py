@@ -41,9 +41,7 @@ from lightpaint.pipeline.wished_planes import (
     planes_of_job,
     require,
 )
-from lightpaint.placement.place_search import suggest_lights
-from lightpaint.placement.placement import Placement
-from lightpaint.placement.suggestion import MoveSuggestion, Suggestion
+from lightpaint.placement import MoveSuggestion, Placement, Suggestion, suggest_lights
 from lightpaint.progress import (
     Listener,
     Progress,

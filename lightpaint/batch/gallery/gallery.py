@@ -44,7 +44,7 @@ from lightpaint.images.formats.png import png_bytes
 from lightpaint.pipeline.job.job import Job
 from lightpaint.pipeline.job.sources import BasisFile, GroupsFile, SceneFile
 from lightpaint.pipeline.results.placement_changes import hung_of
-from lightpaint.placement.placement import PlacementRecord
+from lightpaint.placement import PlacementRecord
 from lightpaint.report.comparison import shorten_to_width
 from lightpaint.report.page.html import html
 from lightpaint.report.rig.hung_lights import LightChange

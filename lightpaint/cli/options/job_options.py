@@ -25,7 +25,7 @@ from lightpaint.lighting.constraints.constraints import LAMP_KEYS, LIGHT_KEYS, C
 from lightpaint.lighting.constraints.constraints_file import read_constraints
 from lightpaint.pipeline.job.settings import Settings
 from lightpaint.pipeline.job.sources import Painting, PlacementFile, SceneFile
-from lightpaint.placement.rigging import Rigging
+from lightpaint.placement import Rigging
 from lightpaint.scene.lights.lights_file import MOVES
 
 if TYPE_CHECKING:

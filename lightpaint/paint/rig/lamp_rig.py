@@ -33,11 +33,16 @@ from lightpaint.paint.rig.page_geometry import (
 from lightpaint.paint.rig.quick_planes import QuickPlanes
 from lightpaint.paint.session.moved_lights import Placed, added_names
 from lightpaint.paint.subject import Subject
-from lightpaint.placement.freedom import Freedom
-from lightpaint.placement.lights_to_place import why_not_searched
-from lightpaint.placement.paths.panel_lights import is_panel, panel_site
-from lightpaint.placement.rigged_lights import freedoms_of, surfaces_of
-from lightpaint.placement.rigging import Rigging, rigging_of
+from lightpaint.placement import (
+    Freedom,
+    Rigging,
+    freedoms_of,
+    is_panel,
+    panel_site,
+    rigging_of,
+    surfaces_of,
+    why_not_searched,
+)
 from lightpaint.scene.properties.pose import Pose, Site, motion_of
 from lightpaint.scene.runtime.render_lock import MITSUBA
 from lightpaint.scene.scene import Scene

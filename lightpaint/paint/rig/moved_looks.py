@@ -26,8 +26,7 @@ from lightpaint.paint.session.snapshot import SessionSnapshot
 from lightpaint.paint.session_access import Publisher, SessionAccess
 from lightpaint.paint.store.history_steps import name_in_view
 from lightpaint.paint.subject import Subject, places_path
-from lightpaint.placement.paths.panel_lights import is_panel
-from lightpaint.placement.placement import AddedLight, Move, PlacementRecord
+from lightpaint.placement import AddedLight, Move, PlacementRecord, is_panel
 from lightpaint.scene.properties.pose import Site
 from lightpaint.scene.scene import Scene
 

@@ -18,7 +18,7 @@ import numpy.typing as npt
 from lightpaint.arrays import Floats, aligned
 from lightpaint.images.denoiser import DARKEST, Features
 from lightpaint.images.surface_filter import SurfaceFilter
-from lightpaint.placement.paths.frozen_paths import FrozenPaths, PathSums
+from lightpaint.placement import FrozenPaths, PathSums
 from lightpaint.scene.properties.film import reduction_to
 from lightpaint.scene.properties.pose import Site
 from lightpaint.scene.runtime.render_lock import tracing

@@ -68,9 +68,7 @@ from lightpaint.pipeline.results.results import (
     checked_names,
     view_names,
 )
-from lightpaint.placement.place_search import check_suggestible
-from lightpaint.placement.placement import PlacementRecord
-from lightpaint.placement.rigging import Rigging
+from lightpaint.placement import PlacementRecord, Rigging, check_suggestible
 from lightpaint.relit.export.nuke import spoken_unreadable
 from lightpaint.relit.luminaire_xml import plugin_remark
 from lightpaint.scene.quality_presets import on_film

@@ -19,7 +19,7 @@ from lightpaint.keywords import keywords
 from lightpaint.lighting.constraints.constraints_file import constraints_of
 from lightpaint.pipeline.job.settings import Settings
 from lightpaint.pipeline.job.spectral_job import observer_of, spectral_scene
-from lightpaint.placement.placement import PlacementRecord, read_placement
+from lightpaint.placement import PlacementRecord, read_placement
 from lightpaint.scene.scene import Scene
 from lightpaint.scene.scene_reader import load_scene
 from lightpaint.sentences import Hint, Sentence

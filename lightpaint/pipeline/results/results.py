@@ -23,8 +23,7 @@ from lightpaint.lighting.answer.lighting import Lighting
 from lightpaint.lighting.solution import Solution
 from lightpaint.lighting.wishes.planes_answer import PlanesAnswer
 from lightpaint.pipeline.results.placement_changes import hung_of
-from lightpaint.placement.placement import Placement
-from lightpaint.placement.suggestion import MoveSuggestion, Suggestion
+from lightpaint.placement import MoveSuggestion, Placement, Suggestion
 from lightpaint.progress import Progress, silent
 from lightpaint.relit.export.exports import EXPORTS
 from lightpaint.relit.verification import Verification
