@@ -16,8 +16,7 @@ from lightpaint.basis.planes import (
     power_and_totals,
     relative_variances,
 )
-from lightpaint.colour.color import luminance
-from lightpaint.colour.display.exposure import choose_exposure
+from lightpaint.colour import choose_exposure, luminance
 from lightpaint.dataframes import CHANNELS, pandas, xarray
 from lightpaint.display_text import Shown, some_names, some_of
 from lightpaint.errors import BasisError

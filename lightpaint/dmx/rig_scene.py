@@ -10,7 +10,7 @@ from pathlib import PurePosixPath
 import numpy as np
 
 from lightpaint.arrays import Doubles
-from lightpaint.colour.spectra.spectrum import WAVELENGTHS, Spectrum
+from lightpaint.colour import WAVELENGTHS, Spectrum
 from lightpaint.dmx.console_rig import ConsoleRig, RigEmitter, RigFixture, RigLight
 from lightpaint.dmx.spot_cone import spot_cone
 from lightpaint.scene.checks.tokens import tag

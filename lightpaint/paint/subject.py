@@ -13,7 +13,7 @@ from lightpaint.basis.basis import Basis, meter_exposure
 from lightpaint.basis.cache import cache, scene_facts
 from lightpaint.basis.cache.scene_facts import SceneFacts
 from lightpaint.basis.lightgroups.light_groups import LightGroups
-from lightpaint.colour.display.view_transform import TransformChoice, ViewTransform
+from lightpaint.colour import TransformChoice, ViewTransform
 from lightpaint.display_text import some_names
 from lightpaint.errors import PaintError
 from lightpaint.files import is_name, one_line, scene_name

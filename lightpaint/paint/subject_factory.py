@@ -8,7 +8,7 @@ from typing import Any
 from lightpaint.basis.basis import Basis
 from lightpaint.basis.lightgroups.light_groups import LightGroups
 from lightpaint.basis.lights import Lights
-from lightpaint.colour.display.view_transform import TransformChoice
+from lightpaint.colour import TransformChoice
 from lightpaint.errors import PaintError, SceneError
 from lightpaint.file_reading import file_length
 from lightpaint.files import scene_name

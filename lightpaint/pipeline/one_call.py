@@ -7,7 +7,7 @@ from typing import Any, overload
 from lightpaint.basis.basis import Basis
 from lightpaint.basis.cache.cached_render import check_same_view
 from lightpaint.basis.lightgroups.light_groups import LightGroups
-from lightpaint.colour.display.view_transform import TransformChoice
+from lightpaint.colour import TransformChoice
 from lightpaint.errors import SceneError, TargetError
 from lightpaint.keywords import keywords
 from lightpaint.lighting.constraints.constraints import Constraints

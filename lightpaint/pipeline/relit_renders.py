@@ -8,8 +8,7 @@ from typing import Any
 
 from lightpaint.arrays import Floats
 from lightpaint.basis.render.separate_renders import emitters_seen
-from lightpaint.colour.display.exposure import choose_exposure
-from lightpaint.colour.display.view_transform import ViewTransform
+from lightpaint.colour import ViewTransform, choose_exposure
 from lightpaint.images.denoiser import Features, denoised, denoiser_text
 from lightpaint.images.estimate import HALF_DIFFERENCE, Estimate, write_estimate
 from lightpaint.images.formats.exr import ExrPart, rgb_channels, write_parts

@@ -20,7 +20,7 @@ import numpy as np
 
 from lightpaint.arrays import Doubles, Floats
 from lightpaint.basis.basis import Basis
-from lightpaint.colour.color import luminance
+from lightpaint.colour import luminance
 from lightpaint.images.estimate import Estimate, box_mean
 from lightpaint.images.pixel_blocks import whole_factor
 from lightpaint.lighting.answer.lighting import Lighting

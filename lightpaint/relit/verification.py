@@ -11,9 +11,7 @@ from statistics import NormalDist
 import numpy as np
 
 from lightpaint.arrays import Bools, Doubles, Floats
-from lightpaint.colour.color import luminance
-from lightpaint.colour.color_difference import delta_e
-from lightpaint.colour.display.exposure import choose_exposure
+from lightpaint.colour import choose_exposure, delta_e, luminance
 from lightpaint.display_text import Shown
 from lightpaint.errors import SizeError
 from lightpaint.images import pixel_blocks

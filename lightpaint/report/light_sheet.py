@@ -13,7 +13,7 @@ from PIL import Image, ImageDraw, ImageFont
 from lightpaint.arrays import Doubles, Floats, Position
 from lightpaint.basis.basis import Basis
 from lightpaint.basis.light_images import LightImage, light_images
-from lightpaint.colour.srgb import encode_display, to_8_bit
+from lightpaint.colour import encode_display, to_8_bit
 from lightpaint.display_text import visible
 from lightpaint.images.denoiser import denoised
 from lightpaint.images.pixel_blocks import block_mean

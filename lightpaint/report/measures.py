@@ -4,7 +4,7 @@ import numpy as np
 
 from lightpaint.arrays import Doubles, Floats
 from lightpaint.basis.basis import Basis
-from lightpaint.colour.color import LUMINANCE
+from lightpaint.colour import LUMINANCE
 from lightpaint.images.bands import sum_by_bands
 from lightpaint.images.estimate import Estimate
 from lightpaint.lighting.analysis.noise.uncertainty import Uncertainty

@@ -17,7 +17,7 @@ import numpy as np
 import numpy.typing as npt
 
 from lightpaint.arrays import Bools, Floats, largest
-from lightpaint.colour.srgb import to_8_bit
+from lightpaint.colour import to_8_bit
 from lightpaint.errors import SizeError
 from lightpaint.images.estimate import box_mean
 from lightpaint.images.formats.library_output import without_pillow_warnings

@@ -12,7 +12,7 @@ from typing import Literal
 
 import numpy as np
 
-from lightpaint.colour.display.view_transform import ViewTransform
+from lightpaint.colour import ViewTransform
 from lightpaint.errors import TargetError
 from lightpaint.images.formats.exr import ExrPart, rgb_channels, write_parts
 from lightpaint.images.picture import AT_LEAST

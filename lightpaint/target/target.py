@@ -8,8 +8,7 @@ import numpy as np
 import numpy.typing as npt
 
 from lightpaint.arrays import Floats
-from lightpaint.colour.color import luminance
-from lightpaint.colour.display.view_transform import ViewTransform
+from lightpaint.colour import ViewTransform, luminance
 from lightpaint.display_text import Shown
 from lightpaint.errors import SizeError, TargetError
 from lightpaint.images.pixel_blocks import whole_factor

@@ -12,8 +12,7 @@ from typing import Literal
 import numpy as np
 
 from lightpaint.arrays import Floats
-from lightpaint.colour.display.view_transform import ViewTransform
-from lightpaint.colour.srgb import to_8_bit
+from lightpaint.colour import ViewTransform, to_8_bit
 from lightpaint.errors import LightpaintError, TargetError
 from lightpaint.file_reading import read_text
 from lightpaint.files import one_line, write_bytes, write_text

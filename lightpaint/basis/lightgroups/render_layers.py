@@ -19,7 +19,7 @@ from lightpaint.arrays import Floats
 from lightpaint.basis.file.basis_file import FORMAT_KEY
 from lightpaint.basis.lightgroups.cryptomatte import declared_mattes, objects_of
 from lightpaint.basis.lightgroups.naming_conventions import is_known, short_names
-from lightpaint.colour.primaries import are_same, converted, to_rec709
+from lightpaint.colour import are_same, converted, to_rec709
 from lightpaint.display_text import some_names
 from lightpaint.errors import BasisError, ImageError
 from lightpaint.images.estimate import HALF_DIFFERENCE

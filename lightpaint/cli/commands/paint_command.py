@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Any
 
 from lightpaint.cli.output import lines, terminal
 from lightpaint.cli.output.lines import CommandOutcome, output_mode
-from lightpaint.colour.display.view_transform import TransformChoice
+from lightpaint.colour import TransformChoice
 from lightpaint.errors import LightpaintError, OutputError
 from lightpaint.lighting.constraints.constraints import Constraints
 from lightpaint.paint.server.address import Reach

@@ -17,7 +17,7 @@ from lightpaint.cli.options.source_options import (
     sequence_of,
 )
 from lightpaint.cli.output.vocabulary import BY_OPTION, from_any_folder
-from lightpaint.colour.display.view_transform import TransformChoice
+from lightpaint.colour import TransformChoice
 from lightpaint.display_text import some_names
 from lightpaint.errors import LOOK_ERRORS, LightpaintError, OutputError, TargetError
 from lightpaint.files import check_files, is_name, is_utf_8, one_line

@@ -7,7 +7,7 @@ import numpy as np
 from lightpaint.arrays import as_rgb
 from lightpaint.basis.cache.cache import Entry
 from lightpaint.cli.output import terminal
-from lightpaint.colour.luminous_flux import Photometry, photometry
+from lightpaint.colour import Photometry, photometry
 from lightpaint.placement import Suggestion
 from lightpaint.relit.verification import Verification
 from lightpaint.report.page.placement_section import spoken_position, spoken_suggestions

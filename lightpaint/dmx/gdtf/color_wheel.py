@@ -12,9 +12,7 @@ from xml.etree.ElementTree import Element
 import numpy as np
 
 from lightpaint.arrays import Doubles
-from lightpaint.colour.color import C2, matching_functions, xy_of
-from lightpaint.colour.lamp import MAX_SLOTS
-from lightpaint.colour.primaries import REC2020, rgb_to_xyz
+from lightpaint.colour import C2, MAX_SLOTS, REC2020, matching_functions, rgb_to_xyz, xy_of
 from lightpaint.dmx.console_rig import RigSlot
 from lightpaint.dmx.gdtf.emitter_colour import (
     Chromaticity,

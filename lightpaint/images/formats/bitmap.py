@@ -19,10 +19,7 @@ import numpy as np
 import numpy.typing as npt
 
 from lightpaint.arrays import Floats
-from lightpaint.colour.display.view_transform import ViewTransform
-from lightpaint.colour.icc import Profile, read_icc
-from lightpaint.colour.primaries import converted
-from lightpaint.colour.srgb import encode_display
+from lightpaint.colour import Profile, ViewTransform, converted, encode_display, read_icc
 from lightpaint.errors import ImageError
 from lightpaint.files import first_line
 from lightpaint.images.formats.library_output import silenced

@@ -19,7 +19,7 @@ import numpy as np
 import numpy.typing as npt
 
 from lightpaint.arrays import Doubles, Floats, as_rgb
-from lightpaint.colour.color import luminance
+from lightpaint.colour import luminance
 from lightpaint.display_text import short_repr
 from lightpaint.images.bands import bands_of
 from lightpaint.keywords import keywords

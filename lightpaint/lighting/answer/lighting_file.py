@@ -6,7 +6,7 @@ from dataclasses import asdict, replace
 from pathlib import Path
 from typing import Any
 
-from lightpaint.colour.lamp import Lamp
+from lightpaint.colour import Lamp
 from lightpaint.errors import LightingError
 from lightpaint.file_reading import read_text
 from lightpaint.files import one_line, write_text

@@ -10,8 +10,7 @@ from dataclasses import dataclass, field
 from typing import Any
 
 from lightpaint.arrays import RGB
-from lightpaint.colour import Preference
-from lightpaint.colour.color_ranges import WhiteRange
+from lightpaint.colour import Preference, WhiteRange
 from lightpaint.display_text import some_of
 from lightpaint.errors import ConstraintError
 from lightpaint.keywords import keywords

@@ -15,12 +15,12 @@ import numpy as np
 
 from lightpaint.arrays import Bools, Doubles, Floats, Indices
 from lightpaint.basis.basis import Basis
-from lightpaint.colour.color import luminance
-from lightpaint.colour.color_ranges import (
+from lightpaint.colour import (
     DIRECTIONS,
     ROUND_OFF,
     ColorHull,
     chromaticity,
+    luminance,
     reach_of,
     sides_of,
     white_range,

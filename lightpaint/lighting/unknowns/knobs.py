@@ -9,10 +9,7 @@ import numpy as np
 
 from lightpaint.arrays import Doubles
 from lightpaint.basis.lights import BasisLight
-from lightpaint.colour import Preference
-from lightpaint.colour.color import luminance
-from lightpaint.colour.color_ranges import ColorHull, WhiteRange
-from lightpaint.colour.lamp import Lamp
+from lightpaint.colour import ColorHull, Lamp, Preference, WhiteRange, luminance
 from lightpaint.display_text import some_names
 from lightpaint.errors import ConstraintError
 from lightpaint.lighting.constraints.constraints import LightConstraint, Tie

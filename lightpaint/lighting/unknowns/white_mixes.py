@@ -23,8 +23,7 @@ from typing import Any
 import numpy as np
 
 from lightpaint.arrays import Doubles, Indices
-from lightpaint.colour.color_ranges import ColorHull, WhiteRange
-from lightpaint.colour.lamp import Lamp
+from lightpaint.colour import ColorHull, Lamp, WhiteRange
 from lightpaint.lighting.algebra.method import Method
 from lightpaint.lighting.normal_equations import NormalEquations
 from lightpaint.lighting.unknowns.knobs import Knob, brightest_whites

@@ -13,7 +13,7 @@ import numpy.typing as npt
 from lightpaint.arrays import Floats
 from lightpaint.basis.basis import Basis
 from lightpaint.basis.cache.denoised_planes import as_halves
-from lightpaint.colour.display.view_transform import ViewTransform
+from lightpaint.colour import ViewTransform
 from lightpaint.errors import PaintError
 from lightpaint.lighting.live.live_view import LiveView
 from lightpaint.paint.layers.composed_layers import Change, ComposedLayers

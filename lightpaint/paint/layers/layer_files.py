@@ -15,7 +15,7 @@ import numpy as np
 import numpy.typing as npt
 
 from lightpaint.arrays import Bools, Floats
-from lightpaint.colour.display.view_transform import ViewTransform
+from lightpaint.colour import ViewTransform
 from lightpaint.errors import ImageError, PaintError
 from lightpaint.images.formats.exr import read_headers, read_parts
 from lightpaint.images.formats.exr_rows import PartHead, write_streamed

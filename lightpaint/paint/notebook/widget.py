@@ -17,7 +17,7 @@ from types import TracebackType
 from typing import TYPE_CHECKING, Any, Generic, TypeVar, Unpack
 from weakref import WeakValueDictionary
 
-from lightpaint.colour.display.view_transform import TransformChoice, ViewTransform
+from lightpaint.colour import TransformChoice, ViewTransform
 from lightpaint.errors import PaintError
 from lightpaint.files import first_line
 from lightpaint.lighting.analysis.analysis import analyse, with_findings

@@ -13,7 +13,7 @@ import numpy.typing as npt
 from lightpaint.arrays import Bools, Doubles, Floats, Indices
 from lightpaint.basis.basis import Basis
 from lightpaint.basis.denoised_mixes import denoise_mix
-from lightpaint.colour.color import luminance
+from lightpaint.colour import luminance
 from lightpaint.images.object_map import Objects
 from lightpaint.images.pixel_blocks import block_mean, fitting_factor
 from lightpaint.paint.layers.canvas import Canvas

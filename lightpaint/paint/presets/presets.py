@@ -11,7 +11,7 @@ import numpy as np
 
 from lightpaint.arrays import RGB, Bools, Doubles, Floats, as_rgb
 from lightpaint.basis.basis import Basis
-from lightpaint.colour.color import kelvin_to_rgb, luminance
+from lightpaint.colour import kelvin_to_rgb, luminance
 from lightpaint.errors import PaintError
 from lightpaint.images.object_map import Objects
 from lightpaint.images.pixel_blocks import block_mean, fitting_factor

@@ -7,7 +7,7 @@ import numpy.typing as npt
 from PIL import Image, ImageFilter
 
 from lightpaint.arrays import Bools, Floats
-from lightpaint.colour.color import luminance
+from lightpaint.colour import luminance
 from lightpaint.images.denoiser import Features
 from lightpaint.images.object_map import Objects
 

@@ -9,7 +9,7 @@ from functools import partial
 import numpy as np
 
 from lightpaint.arrays import Bools, Doubles, Floats, Slices, as_rgb
-from lightpaint.colour.color import luminance
+from lightpaint.colour import luminance
 from lightpaint.errors import PaintError
 from lightpaint.paint.layers.canvas import Canvas
 from lightpaint.paint.layers.canvases import Canvases

@@ -11,7 +11,7 @@ import numpy as np
 from lightpaint.arrays import Bools, Doubles, Floats
 from lightpaint.basis.basis import Basis
 from lightpaint.basis.denoised_mixes import denoise_mix
-from lightpaint.colour.color import kelvin_to_rgb, luminance
+from lightpaint.colour import kelvin_to_rgb, luminance
 from lightpaint.errors import PaintError
 from lightpaint.paint.layers.canvas import Canvas
 from lightpaint.paint.layers.composition import compose_layer

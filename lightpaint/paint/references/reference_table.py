@@ -13,9 +13,7 @@ import numpy as np
 import numpy.typing as npt
 
 from lightpaint.arrays import Floats
-from lightpaint.colour.display.exposure import choose_exposure
-from lightpaint.colour.display.view_transform import ViewTransform
-from lightpaint.colour.icc import read_icc
+from lightpaint.colour import ViewTransform, choose_exposure, read_icc
 from lightpaint.errors import ImageError, PaintError
 from lightpaint.files import first_line, one_line
 from lightpaint.images.formats.bitmap import MAX_PIXELS, Bitmap, light_of_integers

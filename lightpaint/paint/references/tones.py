@@ -7,7 +7,7 @@ import numpy as np
 import numpy.typing as npt
 
 from lightpaint.arrays import Bools, Doubles, Floats
-from lightpaint.colour.color import luminance
+from lightpaint.colour import luminance
 from lightpaint.images.pixel_blocks import resampled
 from lightpaint.paint.presets.view_areas import soft_bands, soft_spot
 

@@ -10,7 +10,7 @@ import numpy.typing as npt
 
 from lightpaint.arrays import Doubles, Floats
 from lightpaint.basis.basis import Basis
-from lightpaint.colour.display.view_transform import ViewTransform
+from lightpaint.colour import ViewTransform
 from lightpaint.errors import NothingToUndoError, PaintError
 from lightpaint.paint import protocol
 from lightpaint.paint.layers.canvases import Canvases

@@ -14,8 +14,7 @@ import numpy as np
 from lightpaint.arrays import RGB, Doubles
 from lightpaint.basis.basis import Basis
 from lightpaint.basis.lights import Lights
-from lightpaint.colour.display.view_transform import ViewTransform
-from lightpaint.colour.lamp import Lamp
+from lightpaint.colour import Lamp, ViewTransform
 from lightpaint.errors import LightpaintError
 from lightpaint.lighting.constraints.absolute_scale import with_sure_scale
 from lightpaint.lighting.constraints.constraints import Constraints

@@ -12,7 +12,7 @@ import numpy.typing as npt
 from lightpaint.arrays import Bools, Floats
 from lightpaint.basis.basis import Basis
 from lightpaint.basis.cache.denoised_planes import scale_of
-from lightpaint.colour.display.view_transform import ViewTransform
+from lightpaint.colour import ViewTransform
 from lightpaint.errors import PaintError
 from lightpaint.images.pixel_blocks import block_mean, blocks_in, fitting_factor
 from lightpaint.report.basis_memo import make_once

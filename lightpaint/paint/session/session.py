@@ -19,7 +19,7 @@ import numpy.typing as npt
 from lightpaint.arrays import Doubles, Floats
 from lightpaint.basis.basis import Basis
 from lightpaint.basis.denoised_mixes import denoise_mix
-from lightpaint.colour.display.view_transform import ViewTransform
+from lightpaint.colour import ViewTransform
 from lightpaint.errors import LightpaintError, PaintError
 from lightpaint.lighting.constraints.constraints import Constraints
 from lightpaint.lighting.constraints.start_lighting import start_weights

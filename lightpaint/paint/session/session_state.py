@@ -10,7 +10,7 @@ import numpy.typing as npt
 from lightpaint.basis.basis import Basis
 from lightpaint.basis.cache.denoised_planes import DenoisedPlanes, RoughPlanes, as_halves
 from lightpaint.basis.light_images import LightImage, light_images
-from lightpaint.colour.display.view_transform import ViewTransform
+from lightpaint.colour import ViewTransform
 from lightpaint.errors import PaintError
 from lightpaint.images.pixel_blocks import resampled
 from lightpaint.paint.layers.canvas import Canvas

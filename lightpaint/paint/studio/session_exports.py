@@ -8,8 +8,7 @@ from typing import Any
 
 from lightpaint.arrays import Floats
 from lightpaint.basis.basis import Basis
-from lightpaint.colour.display.view_transform import ViewTransform
-from lightpaint.colour.srgb import to_8_bit
+from lightpaint.colour import ViewTransform, to_8_bit
 from lightpaint.errors import OutputError, PaintError
 from lightpaint.files import write_bytes
 from lightpaint.images.denoiser import denoised, denoiser_text

@@ -13,7 +13,7 @@ from lightpaint.arrays import Floats
 from lightpaint.basis.basis import Basis
 from lightpaint.basis.file.basis_file import read_basis
 from lightpaint.basis.lightgroups.light_groups import LightGroups, read_light_groups
-from lightpaint.colour.display.view_transform import TransformChoice
+from lightpaint.colour import TransformChoice
 from lightpaint.errors import BasisError
 from lightpaint.keywords import keywords
 from lightpaint.lighting.constraints.constraints_file import constraints_of

@@ -6,7 +6,7 @@ from dataclasses import asdict, dataclass, replace
 from pathlib import Path
 
 from lightpaint.basis.basis import Basis, Origin
-from lightpaint.colour.spectra.observer import EYE, Observer
+from lightpaint.colour import EYE, Observer
 from lightpaint.display_text import some_names
 from lightpaint.errors import ImageError, OutputError, SceneError
 from lightpaint.files import is_name, one_line, write_bytes, write_text

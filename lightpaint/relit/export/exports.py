@@ -16,8 +16,7 @@ import numpy as np
 
 from lightpaint.arrays import RGB, Doubles, Position
 from lightpaint.basis.lightgroups.light_groups import LightGroups
-from lightpaint.colour.color import luminance
-from lightpaint.colour.primaries import ACESCG, REC2020, from_rec709
+from lightpaint.colour import ACESCG, REC2020, from_rec709, luminance
 from lightpaint.display_text import some_names
 from lightpaint.errors import LightingError
 from lightpaint.files import write_text

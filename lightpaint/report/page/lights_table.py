@@ -10,9 +10,7 @@ from lightpaint.arrays import RGB, Doubles, Floats, Indices
 from lightpaint.basis.basis import Basis
 from lightpaint.basis.light_images import LightImage, light_images
 from lightpaint.basis.lights import BasisLight
-from lightpaint.colour.color import luminance, rgb_to_hex
-from lightpaint.colour.luminous_flux import Photometry
-from lightpaint.colour.srgb import encode_display, to_8_bit
+from lightpaint.colour import Photometry, encode_display, luminance, rgb_to_hex, to_8_bit
 from lightpaint.images.bands import in_turns
 from lightpaint.images.pixel_blocks import block_mean
 from lightpaint.lighting.analysis.noise.uncertainty import Uncertainty

@@ -14,11 +14,15 @@ from PIL import Image, ImageDraw, ImageFont
 
 from lightpaint.arrays import RGB, Doubles, Floats
 from lightpaint.basis.basis import Basis
-from lightpaint.colour.color import LUMINANCE, luminance
-from lightpaint.colour.display.exposure import choose_exposure
-from lightpaint.colour.display.view_transform import ViewTransform
-from lightpaint.colour.luminous_flux import Photometry, photometry
-from lightpaint.colour.srgb import to_8_bit
+from lightpaint.colour import (
+    LUMINANCE,
+    Photometry,
+    ViewTransform,
+    choose_exposure,
+    luminance,
+    photometry,
+    to_8_bit,
+)
 from lightpaint.images.denoiser import denoised
 from lightpaint.images.estimate import Estimate
 from lightpaint.images.formats.png import png_bytes

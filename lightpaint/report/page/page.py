@@ -15,8 +15,7 @@ from markupsafe import Markup
 
 from lightpaint.arrays import Floats
 from lightpaint.basis.basis import Basis
-from lightpaint.colour.display.view_transform import ViewTransform
-from lightpaint.colour.srgb import to_8_bit
+from lightpaint.colour import ViewTransform, to_8_bit
 from lightpaint.images.bands import in_turns
 from lightpaint.images.pixel_blocks import covered
 from lightpaint.lighting.solution import Solution

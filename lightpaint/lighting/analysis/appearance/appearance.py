@@ -11,7 +11,7 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 
 from lightpaint.arrays import Floats
-from lightpaint.colour.color import luminance
+from lightpaint.colour import luminance
 from lightpaint.display_text import short_repr
 from lightpaint.images.estimate import Estimate
 from lightpaint.keywords import keywords

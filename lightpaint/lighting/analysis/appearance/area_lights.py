@@ -15,7 +15,7 @@ import numpy.typing as npt
 from lightpaint.arrays import Bools, Doubles, Floats, Indices
 from lightpaint.basis.basis import Basis
 from lightpaint.basis.planes import thinned
-from lightpaint.colour.color import LUMINANCE, luminance
+from lightpaint.colour import LUMINANCE, luminance
 from lightpaint.images.object_map import Objects
 from lightpaint.lighting.analysis.appearance.error_place import NO_NAME, object_with_most
 
