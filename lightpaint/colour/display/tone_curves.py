@@ -1,4 +1,4 @@
-"""What view transforms are made of: the interface of encodings, and the built-in tone curves: sRGB,
+"""The parts of view transforms: the interface of encodings, and the built-in tone curves: sRGB,
 linear, filmic and AgX."""
 
 import math
