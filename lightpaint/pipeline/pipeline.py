@@ -8,7 +8,7 @@ from typing import Any
 from lightpaint.arrays import as_rgb, release_freed_memory
 from lightpaint.basis.basis import Basis
 from lightpaint.colour import daylight
-from lightpaint.images.estimate import Estimate, write_estimate
+from lightpaint.images import Estimate, write_estimate
 from lightpaint.keywords import keywords
 from lightpaint.lighting.analysis.analysis import Analysis, analyse, with_findings
 from lightpaint.lighting.analysis.surface_colors import SurfaceColor, surface_colors

@@ -12,8 +12,7 @@ from lightpaint.basis.cache.cached_render import Render
 from lightpaint.basis.render.basis_render import render_basis
 from lightpaint.display_text import some_names
 from lightpaint.errors import SceneError
-from lightpaint.images.estimate import Estimate
-from lightpaint.images.pixel_blocks import block_mean
+from lightpaint.images import Estimate, block_mean
 from lightpaint.lighting.constraints.constraints import Constraints
 from lightpaint.lighting.problem import Problem
 from lightpaint.lighting.solution import Solution

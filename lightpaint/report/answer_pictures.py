@@ -16,8 +16,7 @@ import numpy.typing as npt
 from lightpaint.arrays import Floats, Indices, largest
 from lightpaint.basis.basis import Basis, meter_exposure
 from lightpaint.colour import ViewTransform, luminance
-from lightpaint.images.bands import by_bands
-from lightpaint.images.estimate import box_mean
+from lightpaint.images import box_mean, by_bands
 from lightpaint.lighting.solution import Solution
 from lightpaint.target.target import Target
 

@@ -10,7 +10,7 @@ from PIL import Image, ImageDraw, ImageFont
 from lightpaint.arrays import Floats
 from lightpaint.basis.basis import Basis
 from lightpaint.colour import ViewTransform, to_8_bit
-from lightpaint.images.pixel_blocks import block_mean, enlarged, whole_factor
+from lightpaint.images import block_mean, enlarged, whole_factor
 from lightpaint.lighting.analysis.appearance.appearance import Appearance, compare_appearance
 from lightpaint.lighting.solution import Solution
 from lightpaint.report.answer_pictures import (

@@ -6,7 +6,7 @@ import numpy as np
 
 from lightpaint.arrays import Doubles, Indices, aligned
 from lightpaint.colour import WAVELENGTHS
-from lightpaint.images.object_map import Objects
+from lightpaint.images import Objects
 from lightpaint.scene.runtime.render_lock import tracing
 from lightpaint.scene.scene import Scene
 

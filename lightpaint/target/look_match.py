@@ -11,7 +11,7 @@ import numpy as np
 
 from lightpaint.arrays import Doubles, Floats, largest
 from lightpaint.colour import BUILT_IN, TransformChoice, ViewTransform, luminance
-from lightpaint.images.picture import Picture
+from lightpaint.images import Picture
 from lightpaint.sentences import Hint, Sentence
 from lightpaint.target.painted_pixels import LOSSY, ROUNDING, compressed_like, lossy_difference
 

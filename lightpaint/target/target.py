@@ -11,7 +11,7 @@ from lightpaint.arrays import Floats
 from lightpaint.colour import ViewTransform, luminance
 from lightpaint.display_text import Shown
 from lightpaint.errors import SizeError, TargetError
-from lightpaint.images.pixel_blocks import whole_factor
+from lightpaint.images import whole_factor
 from lightpaint.keywords import keywords
 from lightpaint.sentences import Hint, Remedy
 from lightpaint.target.painted_pixels import TargetPixels

@@ -43,12 +43,15 @@ from lightpaint.basis.planes import IndirectLight, Planes, as_planes
 from lightpaint.errors import BasisError, ImageError, LightpaintError
 from lightpaint.file_reading import file_length
 from lightpaint.files import one_line
-from lightpaint.images.formats.exr import Channels, ExrPart, read_headers, read_parts
-from lightpaint.images.formats.exr_rows import (
+from lightpaint.images.formats import (
+    Channels,
+    ExrPart,
     PartHead,
     PartLayout,
     RowFile,
     RowsUnsupportedError,
+    read_headers,
+    read_parts,
     room_for,
     write_streamed,
 )

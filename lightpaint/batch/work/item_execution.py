@@ -34,7 +34,7 @@ from lightpaint.batch.work.work_items import (
 from lightpaint.batch.work.worker_storage import WorkerCache
 from lightpaint.errors import LightpaintError
 from lightpaint.files import first_line, one_line
-from lightpaint.images.estimate import Estimate
+from lightpaint.images import Estimate
 from lightpaint.lighting.answer.lighting import Lighting
 from lightpaint.lighting.answer.lighting_file import read_lighting
 from lightpaint.lighting.fit import Fit

@@ -11,7 +11,7 @@ import numpy as np
 
 from lightpaint.arrays import Bools, Doubles, Floats, Slices
 from lightpaint.colour import ViewTransform, luminance
-from lightpaint.images.estimate import box_mean
+from lightpaint.images import box_mean
 
 #: The radius around an emitter's pixel in which paint counts: a share of the picture's height, and
 #: a minimum in pixels.

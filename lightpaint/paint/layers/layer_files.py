@@ -17,17 +17,20 @@ import numpy.typing as npt
 from lightpaint.arrays import Bools, Floats
 from lightpaint.colour import ViewTransform
 from lightpaint.errors import ImageError, PaintError
-from lightpaint.images.formats.exr import read_headers, read_parts
-from lightpaint.images.formats.exr_rows import PartHead, write_streamed
-from lightpaint.images.formats.file_kinds import head_of, kind_of
-from lightpaint.images.formats.openraster import (
+from lightpaint.images.formats import (
+    TRANSFORM_KEY,
+    PartHead,
     RasterGroup,
     RasterLayer,
+    head_of,
+    kind_of,
     layered_kind,
     opened_openraster,
+    read_headers,
+    read_parts,
     write_openraster,
+    write_streamed,
 )
-from lightpaint.images.formats.png import TRANSFORM_KEY
 from lightpaint.paint.layers.canvas import (
     MAX_IMPORTANCE,
     MAX_PAINTED_LIGHT,

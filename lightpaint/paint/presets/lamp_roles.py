@@ -14,8 +14,7 @@ from lightpaint.arrays import Bools, Doubles, Floats, Indices
 from lightpaint.basis.basis import Basis
 from lightpaint.basis.denoised_mixes import denoise_mix
 from lightpaint.colour import luminance
-from lightpaint.images.object_map import Objects
-from lightpaint.images.pixel_blocks import block_mean, fitting_factor
+from lightpaint.images import Objects, block_mean, fitting_factor
 from lightpaint.paint.layers.canvas import Canvas
 from lightpaint.paint.presets.view_areas import MIN_ALBEDO, Mask, ViewAreas
 from lightpaint.scene.lights.texels.texel import coarse_name, image_of, images_of, texel_place

@@ -13,8 +13,7 @@ from lightpaint.arrays import RGB, Bools, Doubles, Floats, as_rgb
 from lightpaint.basis.basis import Basis
 from lightpaint.colour import kelvin_to_rgb, luminance
 from lightpaint.errors import PaintError
-from lightpaint.images.object_map import Objects
-from lightpaint.images.pixel_blocks import block_mean, fitting_factor
+from lightpaint.images import Objects, block_mean, fitting_factor
 from lightpaint.paint.layers.canvas import Canvas
 from lightpaint.paint.layers.canvases import Canvases
 from lightpaint.paint.layers.composition import compose_layer

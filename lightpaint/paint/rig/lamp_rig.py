@@ -19,7 +19,7 @@ from lightpaint.basis.file.basis_file import is_large
 from lightpaint.basis.lights import BasisLight, Lights
 from lightpaint.basis.planes import IndirectLight, MemoryPlanes, Planes
 from lightpaint.errors import PaintError, SceneError
-from lightpaint.images.denoiser import Features
+from lightpaint.images import Features
 from lightpaint.paint.protocol import Camera, LightPlace, Place, PlanObject, Rig, SkyAxes
 from lightpaint.paint.rig.added_lights import POSE_KEYS, light_of_new, new_emitter, site_of_new
 from lightpaint.paint.rig.page_geometry import (

@@ -14,7 +14,7 @@ from lightpaint.basis.basis import Basis
 from lightpaint.basis.cache.denoised_planes import scale_of
 from lightpaint.colour import ViewTransform
 from lightpaint.errors import PaintError
-from lightpaint.images.pixel_blocks import block_mean, blocks_in, fitting_factor
+from lightpaint.images import block_mean, blocks_in, fitting_factor
 from lightpaint.report.basis_memo import make_once
 from lightpaint.report.page.figures import resized, thumbnail
 

@@ -12,7 +12,7 @@ from lightpaint.basis.cache.denoised_planes import DenoisedPlanes, RoughPlanes, 
 from lightpaint.basis.light_images import LightImage, light_images
 from lightpaint.colour import ViewTransform
 from lightpaint.errors import PaintError
-from lightpaint.images.pixel_blocks import resampled
+from lightpaint.images import resampled
 from lightpaint.paint.layers.canvas import Canvas
 from lightpaint.paint.layers.canvases import Canvases
 from lightpaint.paint.layers.layer_pixels import selection_mask

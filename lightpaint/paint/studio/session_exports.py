@@ -11,8 +11,8 @@ from lightpaint.basis.basis import Basis
 from lightpaint.colour import ViewTransform, to_8_bit
 from lightpaint.errors import OutputError, PaintError
 from lightpaint.files import write_bytes
-from lightpaint.images.denoiser import denoised, denoiser_text
-from lightpaint.images.formats.png import png_bytes
+from lightpaint.images import denoised, denoiser_text
+from lightpaint.images.formats import png_bytes
 from lightpaint.lighting.answer.combination import combine
 from lightpaint.lighting.answer.lighting import Lighting
 from lightpaint.paint.layers.canvas import ViewLayers

@@ -21,7 +21,7 @@ from lightpaint.basis.render.render_origin import basis_lights
 from lightpaint.display_text import short_repr
 from lightpaint.errors import ConstraintError, LightpaintError, TargetError
 from lightpaint.files import check_writable
-from lightpaint.images.pixel_blocks import whole_factor
+from lightpaint.images import whole_factor
 from lightpaint.keywords import keywords
 from lightpaint.lighting.constraints.absolute_scale import agreed_scale, with_sure_scale
 from lightpaint.lighting.constraints.constraints import Constraints

@@ -10,10 +10,8 @@ from lightpaint.colour import EYE, Observer
 from lightpaint.display_text import some_names
 from lightpaint.errors import ImageError, OutputError, SceneError
 from lightpaint.files import is_name, one_line, write_bytes, write_text
-from lightpaint.images.bands import in_turns
-from lightpaint.images.estimate import Estimate, read_estimate, write_estimate
-from lightpaint.images.formats.png import png_bytes
-from lightpaint.images.pixel_blocks import Size, whole_factor
+from lightpaint.images import Estimate, Size, in_turns, read_estimate, whole_factor, write_estimate
+from lightpaint.images.formats import png_bytes
 from lightpaint.keywords import keywords
 from lightpaint.lighting.analysis.analysis import Analysis
 from lightpaint.lighting.analysis.diagnosis import Diagnosis

@@ -33,8 +33,7 @@ import numpy.typing as npt
 
 from lightpaint.arrays import Doubles, Floats, Indices, aligned
 from lightpaint.errors import SceneError
-from lightpaint.images.denoiser import Features
-from lightpaint.images.surface_filter import SurfaceFilter
+from lightpaint.images import Features, SurfaceFilter
 from lightpaint.placement.paths.camera_paths import (
     Vertices,
     first_hits_of,

@@ -20,7 +20,7 @@ from lightpaint.colour import ACESCG, REC2020, from_rec709, luminance
 from lightpaint.display_text import some_names
 from lightpaint.errors import LightingError
 from lightpaint.files import write_text
-from lightpaint.images.formats.exr import ExrPart, rgb_channels, write_parts
+from lightpaint.images.formats import ExrPart, rgb_channels, write_parts
 from lightpaint.keywords import keywords
 from lightpaint.lighting.answer.lighting import Lighting, LightSetting
 from lightpaint.lighting.answer.lighting_keys import key_slopes

@@ -27,7 +27,7 @@ from lightpaint.basis.lightgroups.render_layers import RenderLayer
 from lightpaint.basis.lights import free_name
 from lightpaint.colour import to_rec709
 from lightpaint.files import one_line
-from lightpaint.images.formats.exr import ExrPart, rgb_channels
+from lightpaint.images.formats import ExrPart, rgb_channels
 from lightpaint.lighting.answer.lighting import Lighting
 from lightpaint.relit.export.program_axes import axis_conversions, conversion_of
 from lightpaint.scene.properties.site import Site

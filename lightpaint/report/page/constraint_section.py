@@ -9,8 +9,7 @@ from lightpaint.arrays import Doubles
 from lightpaint.basis.basis import Basis
 from lightpaint.colour import ViewTransform, cct_and_duv, hue_name, to_8_bit
 from lightpaint.display_text import some_names
-from lightpaint.images.denoiser import denoised
-from lightpaint.images.pixel_blocks import block_mean
+from lightpaint.images import block_mean, denoised
 from lightpaint.lighting.analysis.appearance.color_choices import Choices, ColorChoice
 from lightpaint.lighting.fit import Colors
 from lightpaint.lighting.solution import Solution

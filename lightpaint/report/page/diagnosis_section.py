@@ -8,7 +8,7 @@ from markupsafe import Markup
 from lightpaint.arrays import Floats
 from lightpaint.basis.basis import Basis
 from lightpaint.colour import ViewTransform, luminance, to_8_bit
-from lightpaint.images.bands import by_bands
+from lightpaint.images import by_bands
 from lightpaint.lighting.analysis.appearance.appearance import Appearance
 from lightpaint.lighting.analysis.diagnosis import Diagnosis
 from lightpaint.lighting.analysis.noise.uncertainty import Uncertainty

@@ -11,8 +11,7 @@ from lightpaint.basis.basis import Basis
 from lightpaint.basis.light_images import LightImage, light_images
 from lightpaint.basis.lights import BasisLight
 from lightpaint.colour import Photometry, encode_display, luminance, rgb_to_hex, to_8_bit
-from lightpaint.images.bands import in_turns
-from lightpaint.images.pixel_blocks import block_mean
+from lightpaint.images import block_mean, in_turns
 from lightpaint.lighting.analysis.noise.uncertainty import Uncertainty
 from lightpaint.lighting.answer.lighting import ALL_REACHED, Lighting, LightSetting
 from lightpaint.lighting.solution import Solution

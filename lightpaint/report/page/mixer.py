@@ -31,9 +31,7 @@ from lightpaint.colour import (
     photometry,
     to_8_bit,
 )
-from lightpaint.images.bands import in_turns
-from lightpaint.images.packed_picture import PackedPicture, pack_picture
-from lightpaint.images.pixel_blocks import block_mean
+from lightpaint.images import PackedPicture, block_mean, in_turns, pack_picture
 from lightpaint.lighting.answer.lighting import ALL_REACHED, Lighting
 from lightpaint.lighting.answer.lighting_file import lighting_fields
 from lightpaint.progress import with_progress

@@ -23,10 +23,8 @@ from lightpaint.colour import (
     photometry,
     to_8_bit,
 )
-from lightpaint.images.denoiser import denoised
-from lightpaint.images.estimate import Estimate
-from lightpaint.images.formats.png import png_bytes
-from lightpaint.images.pixel_blocks import covered, enlarged
+from lightpaint.images import Estimate, covered, denoised, enlarged
+from lightpaint.images.formats import png_bytes
 from lightpaint.lighting.analysis.appearance.appearance import Appearance
 from lightpaint.lighting.answer.lighting import Lighting
 from lightpaint.lighting.solution import Solution

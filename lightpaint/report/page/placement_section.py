@@ -11,7 +11,7 @@ from PIL import Image, ImageDraw, ImageFont
 from lightpaint.arrays import Floats, Position
 from lightpaint.colour import ViewTransform, to_8_bit
 from lightpaint.display_text import visible
-from lightpaint.images.denoiser import Features, denoised
+from lightpaint.images import Features, denoised
 from lightpaint.placement.suggestion import MoveSuggestion, Suggestion
 from lightpaint.report.page.figures import data_uri
 from lightpaint.report.page.html import html

@@ -13,7 +13,7 @@ import numpy as np
 
 from lightpaint.arrays import Bools, Doubles, Floats
 from lightpaint.colour import ViewTransform, lab
-from lightpaint.images.pixel_blocks import block_mean, fitting_factor
+from lightpaint.images import block_mean, fitting_factor
 from lightpaint.lighting.display import display_light
 from lightpaint.threads import one_thread
 
