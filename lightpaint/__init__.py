@@ -26,9 +26,9 @@ Each name is imported when it is first used (PEP 562): importing this loads no
 library. No Mitsuba variant is set before the first scene is loaded.
 """
 
-from importlib import import_module
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
+from lightpaint.lazy_names import lazy_names
 from lightpaint.scene.runtime.drjit_import import choose_llvm_at_import
 from lightpaint.version import __version__
 
@@ -93,12 +93,12 @@ if TYPE_CHECKING:
     from lightpaint.placement.freedom import Freedom as Freedom
     from lightpaint.placement.new_lights import MirroredPair as MirroredPair
     from lightpaint.placement.new_lights import NewLights as NewLights
-    from lightpaint.placement.place import place as place
+    from lightpaint.placement.place_search import place as place
+    from lightpaint.placement.place_search import suggest_lights as suggest_lights
     from lightpaint.placement.placement import AddedLight as AddedLight
     from lightpaint.placement.placement import Move as Move
     from lightpaint.placement.placement import Placement as Placement
     from lightpaint.placement.rigging import Rigging as Rigging
-    from lightpaint.placement.suggested_lights import suggest_lights as suggest_lights
     from lightpaint.placement.suggestion import Suggestion as Suggestion
     from lightpaint.relit.export.exports import write_exports as write_exports
     from lightpaint.relit.relight import relight as relight
@@ -113,100 +113,11 @@ if TYPE_CHECKING:
     from lightpaint.target.target import Target as Target
     from lightpaint.target.target_reader import read_target as read_target
 
-#: Public name → its module, below this package: what type checkers read above, for Python.
 choose_llvm_at_import()
 
-_HOMES = {
-    "AddedLight": "placement.placement",
-    "Analysis": "lighting.analysis.analysis",
-    "Basis": "basis.basis",
-    "Certificate": "lighting.answer.certificate",
-    "Constraints": "lighting.constraints.constraints",
-    "Demo": "demo",
-    "Diagnosis": "lighting.analysis.diagnosis",
-    "Estimate": "images.estimate",
-    "Fit": "lighting.fit",
-    "FrameSequence": "basis.lightgroups.frame_sequence",
-    "Freedom": "placement.freedom",
-    "Illuminance": "photometry.illuminance",
-    "Job": "pipeline.job.job",
-    "LightGroups": "basis.lightgroups.light_groups",
-    "Lighting": "lighting.answer.lighting",
-    "LightpaintError": "errors",
-    "Look": "pipeline.results.results",
-    "MeasuringPlane": "photometry.measuring_plane",
-    "MirroredPair": "placement.new_lights",
-    "Move": "placement.placement",
-    "NewEmitter": "scene.lights.new_emitter",
-    "NewLights": "placement.new_lights",
-    "Objects": "images.object_map",
-    "Painting": "pipeline.job.sources",
-    "Placement": "placement.placement",
-    "Pose": "scene.properties.pose",
-    "Problem": "lighting.problem",
-    "Rigging": "placement.rigging",
-    "Scene": "scene.scene",
-    "SceneFile": "pipeline.job.sources",
-    "Appearance": "lighting.analysis.appearance.appearance",
-    "Settings": "pipeline.job.settings",
-    "Solution": "lighting.solution",
-    "Suggestion": "placement.suggestion",
-    "Target": "target.target",
-    "TransformChoice": "colour.display.view_transform",
-    "Uncertainty": "lighting.analysis.noise.uncertainty",
-    "Verification": "relit.verification",
-    "ViewTransform": "colour.display.view_transform",
-    "analyse": "lighting.analysis.analysis",
-    "combine": "lighting.answer.combination",
-    "correct_noise": "lighting.analysis.noise.noise_correction",
-    "diagnose": "lighting.analysis.diagnosis",
-    "display_picture": "images.formats.png",
-    "error_bars": "lighting.analysis.noise.uncertainty",
-    "find_frames": "basis.lightgroups.frame_sequence",
-    "load_scene": "scene.scene_reader",
-    "measure_glare": "photometry.measure_glare",
-    "measure_illuminance": "photometry.measure",
-    "paint_with_light": "pipeline.one_call",
-    "place": "placement.place",
-    "read_basis": "basis.file.basis_file",
-    "read_constraints": "lighting.constraints.constraints_file",
-    "read_light_groups": "basis.lightgroups.light_groups",
-    "read_lighting": "lighting.answer.lighting_file",
-    "read_planes": "photometry.planes_file",
-    "read_target": "target.target_reader",
-    "refine": "lighting.analysis.noise.refinement",
-    "relight": "relit.relight",
-    "relight_frames": "pipeline.frame_pictures",
-    "render_basis": "basis.render.basis_render",
-    "render_template": "pipeline.templates",
-    "template_of_basis": "pipeline.templates",
-    "run": "pipeline.pipeline",
-    "solve": "lighting.solve",
-    "suggest_lights": "placement.suggested_lights",
-    "use_variant": "scene.runtime.variant",
-    "verdict": "report.verdict",
-    "verify": "relit.verification_render",
-    "compare_appearance": "lighting.analysis.appearance.appearance",
-    "write_basis": "basis.file.basis_file",
-    "write_demo": "demo",
-    "write_exports": "relit.export.exports",
-    "write_lighting": "lighting.answer.lighting_file",
-}
+__getattr__, __dir__, _NAMES = lazy_names(__name__)
 
-#: The same of what needs an extra, and is not part of `import *`.
-_EXTRAS = {"Painter": "paint.notebook.widget"}
+#: Names that need an extra, and are not part of `import *`.
+_EXTRAS = ("Painter",)
 
-__all__ = ["__version__", *_HOMES]
-
-
-def __getattr__(name: str) -> Any:
-    homes = _HOMES | _EXTRAS
-    if name not in homes:
-        raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
-    value = getattr(import_module(f"{__name__}.{homes[name]}"), name)
-    globals()[name] = value  # from now on found without asking here
-    return value
-
-
-def __dir__() -> list[str]:
-    return sorted({*globals(), *_HOMES, *_EXTRAS})
+__all__ = ["__version__", *(name for name in _NAMES if name not in _EXTRAS)]

@@ -14,8 +14,8 @@ from lightpaint.basis.basis import Origin
 from lightpaint.basis.lights import BasisLight
 from lightpaint.images.denoiser import Features
 from lightpaint.paint import protocol
+from lightpaint.paint.layers.layer_pixels import selection_mask
 from lightpaint.paint.layers.layer_stack import Gradient, Layer, LayerKind
-from lightpaint.paint.layers.selection import selection_mask
 from lightpaint.paint.session.session import Session
 from lightpaint.paint.store.history_steps import Identity
 from lightpaint.paint.store.store import MemoryStore, Store

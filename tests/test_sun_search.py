@@ -10,7 +10,7 @@ from nightly import nightly
 
 from lightpaint.basis.light_images import light_images
 from lightpaint.colour.color import luminance
-from lightpaint.colour.white_range import white_range
+from lightpaint.colour.color_ranges import white_range
 from lightpaint.errors import LightpaintError
 from lightpaint.images.formats.exr import write_rgb
 from lightpaint.lighting.answer.lighting_file import read_lighting

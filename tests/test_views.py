@@ -26,10 +26,10 @@ from lightpaint.lighting.joined_views import joint_basis
 from lightpaint.lighting.normal_equations import NormalEquations
 from lightpaint.lighting.solve import solve
 from lightpaint.paint.protocol import ConstrainLight, Export, Message, Paint
-from lightpaint.paint.session_file import session_identity
 from lightpaint.paint.store.history_steps import ViewIdentity
 from lightpaint.paint.store.store import MemoryStore
 from lightpaint.paint.studio.studio import Studio
+from lightpaint.paint.subject import session_identity
 from lightpaint.paint.subject_factory import make_subjects
 from lightpaint.pipeline.job.settings import Settings
 from lightpaint.pipeline.job.sources import SceneFile

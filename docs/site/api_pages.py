@@ -142,7 +142,7 @@ PARTS: dict[str, tuple[str, ...]] = {
     "lighting.wishes.planes_answer": ("PlanesAnswer",),
     "lighting.answer.lighting": ("LightSetting",),
     "lighting.answer.lighting_keys": ("LightingKey",),
-    "colour.photometry": ("Photometry",),
+    "colour.luminous_flux": ("Photometry",),
     "lighting.analysis.ambiguity": ("Ambiguity",),
     "lighting.analysis.appearance.area_lights": ("AreaLights",),
     "lighting.analysis.appearance.color_choices": ("ColorChoice",),

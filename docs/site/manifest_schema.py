@@ -18,7 +18,7 @@ from lightpaint.batch.manifest.keys import (
     SETTINGS,
     SUBJECT_KEYS,
 )
-from lightpaint.colour.emitter_preference import Preference
+from lightpaint.colour import Preference
 from lightpaint.lighting.constraints.constraints import LIGHT_KEYS
 from lightpaint.validation import Check
 

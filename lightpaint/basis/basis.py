@@ -16,15 +16,11 @@ from lightpaint.basis.planes import (
     power_and_totals,
     relative_variances,
 )
-from lightpaint.colour.color import luminance
-from lightpaint.colour.display.exposure import choose_exposure
+from lightpaint.colour import choose_exposure, luminance
 from lightpaint.dataframes import CHANNELS, pandas, xarray
 from lightpaint.display_text import Shown, some_names, some_of
 from lightpaint.errors import BasisError
-from lightpaint.images.denoiser import Features
-from lightpaint.images.estimate import Estimate
-from lightpaint.images.object_map import Objects
-from lightpaint.images.surface_filter import SurfaceFilter
+from lightpaint.images import Estimate, Features, Objects, SurfaceFilter
 from lightpaint.keywords import keywords
 from lightpaint.scene.lights.lights_file import SceneRequests
 from lightpaint.version import __version__

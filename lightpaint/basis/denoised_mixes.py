@@ -14,9 +14,7 @@ import numpy.typing as npt
 
 from lightpaint.arrays import Doubles, Floats
 from lightpaint.basis.basis import Basis
-from lightpaint.images.denoiser import Quality, denoised, oidn_is_installed
-from lightpaint.images.estimate import box_mean, shifted
-from lightpaint.images.pixel_blocks import block_mean
+from lightpaint.images import Quality, block_mean, box_mean, denoised, oidn_is_installed, shifted
 
 #: Radius in pixels over which noise and the change made by the denoiser are averaged.
 RADIUS = 3

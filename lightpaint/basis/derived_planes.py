@@ -14,7 +14,7 @@ from lightpaint.arrays import Doubles, Floats, Indices
 from lightpaint.basis.file import file_planes
 from lightpaint.basis.file.file_planes import RowPlanes
 from lightpaint.basis.planes import BLOCK_PIXELS, MemoryPlanes, Planes
-from lightpaint.images.pixel_blocks import block_sums
+from lightpaint.images import block_sums
 
 #: Number of rows of pixels averaged at a time: one chunk of a compressed file.
 READ_ROWS = 16

@@ -37,7 +37,7 @@ from lightpaint.batch.work.work_items import (
 )
 from lightpaint.batch.work.worker_storage import Spool, WorkerCache
 from lightpaint.errors import BasisError, SceneError
-from lightpaint.images.estimate import Estimate
+from lightpaint.images import Estimate
 from lightpaint.lighting.linear_problem import Sums
 from lightpaint.pipeline.job.job import Job
 from lightpaint.pipeline.job.sources import Painting, SceneFile

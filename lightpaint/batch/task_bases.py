@@ -21,13 +21,13 @@ from lightpaint.batch.work.worker_storage import WorkerCache
 from lightpaint.display_text import some_names
 from lightpaint.errors import SceneError
 from lightpaint.files import write_bytes, write_text
-from lightpaint.images.estimate import write_estimate
-from lightpaint.images.formats.png import png_bytes
+from lightpaint.images import write_estimate
+from lightpaint.images.formats import png_bytes
 from lightpaint.pipeline.job.settings import Settings
 from lightpaint.pipeline.job.sources import SceneFile
 from lightpaint.pipeline.job_bases import obtain
 from lightpaint.pipeline.placed_lights import moved_basis, say_changes
-from lightpaint.placement.placement import PlacementRecord, read_placement
+from lightpaint.placement import PlacementRecord, read_placement
 from lightpaint.progress import Listener
 from lightpaint.report.rig.hung_lights import HungLight
 from lightpaint.report.rig.rig_drawing import rig_drawing

@@ -17,17 +17,9 @@ bl_info = {
 
 
 def _modules():
-    from .interface import (
-        addon_settings,
-        controller,
-        image_operators,
-        level_operators,
-        panels,
-        shot_operators,
-    )
+    from .interface import addon_settings, controller, image_operators, panels, shot_operators
 
-    operators = shot_operators, level_operators, image_operators
-    return addon_settings, *operators, panels, controller
+    return addon_settings, shot_operators, image_operators, panels, controller
 
 
 def register():

@@ -77,7 +77,7 @@ def _extra(purpose: str, package: str, extra: str) -> Finding:
 def _denoiser() -> Finding:
     """Return the finding of the denoiser, which is optional."""
     try:
-        from lightpaint.images.denoiser import OLDEST_OIDN, oidn_is_installed
+        from lightpaint.images import OLDEST_OIDN, oidn_is_installed
     except ImportError:  # NumPy is missing, as another finding says
         return Finding("denoiser", "info", "not looked for")
     version = _package("pyoidn")

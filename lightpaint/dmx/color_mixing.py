@@ -11,8 +11,7 @@ from functools import lru_cache
 import numpy as np
 
 from lightpaint.arrays import Doubles
-from lightpaint.colour.color import cct_and_duv
-from lightpaint.colour.primaries import REC709, rgb_to_xyz
+from lightpaint.colour import REC709, cct_and_duv, rgb_to_xyz
 from lightpaint.dmx.console_rig import RigLight
 
 #: Least share of light that counts as more than none.

@@ -10,8 +10,7 @@ from functools import cached_property
 import numpy as np
 
 from lightpaint.arrays import RGB, Position
-from lightpaint.colour.lamp import SlotFilter
-from lightpaint.colour.spectra.spectrum import Spectrum
+from lightpaint.colour import SlotFilter, Spectrum
 from lightpaint.display_text import some_names
 from lightpaint.errors import RigError
 

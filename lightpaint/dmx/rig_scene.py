@@ -10,8 +10,7 @@ from pathlib import PurePosixPath
 import numpy as np
 
 from lightpaint.arrays import Doubles
-from lightpaint.colour.lamp import SlotFilter
-from lightpaint.colour.spectra.spectrum import WAVELENGTHS, Spectrum
+from lightpaint.colour import WAVELENGTHS, SlotFilter, Spectrum
 from lightpaint.dmx.console_rig import ConsoleRig, RigEmitter, RigFixture, RigLight
 from lightpaint.dmx.spot_cone import spot_cone
 from lightpaint.scene.checks.tokens import tag

@@ -2,7 +2,7 @@
 
 import math
 
-from lightpaint.colour.photometry import spot_flux
+from lightpaint.colour import spot_flux
 
 #: Widest cone that Mitsuba's spot has, in degrees from its axis.
 WIDEST = 89.0

@@ -13,7 +13,7 @@ from typing import Any, Literal
 import numpy as np
 
 from lightpaint.arrays import Floats
-from lightpaint.colour.primaries import REC709, rgb_to_xyz
+from lightpaint.colour import REC709, rgb_to_xyz
 from lightpaint.errors import SizeError
 from lightpaint.images.bands import LARGE_PICTURE
 from lightpaint.images.estimate import box_mean, shifted

@@ -9,7 +9,7 @@ import numpy as np
 import numpy.typing as npt
 
 from lightpaint.arrays import Floats
-from lightpaint.colour.display.view_transform import TransformChoice, ViewTransform
+from lightpaint.colour import TransformChoice, ViewTransform
 from lightpaint.errors import ImageError
 from lightpaint.files import one_line
 from lightpaint.images.formats.bitmap import (

@@ -3,9 +3,7 @@
 import numpy as np
 
 from lightpaint.arrays import Doubles
-from lightpaint.colour.display.exposure import choose_exposure
-from lightpaint.colour.display.view_transform import ViewTransform
-from lightpaint.colour.srgb import decode_display
+from lightpaint.colour import ViewTransform, choose_exposure, decode_display
 from lightpaint.lighting.problem import Problem
 
 

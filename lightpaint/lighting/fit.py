@@ -4,7 +4,7 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Annotated, Literal, TypeVar
 
-from lightpaint.colour.display.view_transform import ViewTransform
+from lightpaint.colour import ViewTransform
 from lightpaint.errors import LightpaintError, TargetError
 from lightpaint.field_options import Option
 from lightpaint.keywords import keywords
@@ -217,7 +217,7 @@ def resolve_fit(
 
 def _common_transform(targets: "Sequence[Target]") -> ViewTransform:
     """Return the one view that all targets were painted through."""
-    from lightpaint.colour.display.exposure import choose_exposure  # late, as it needs NumPy
+    from lightpaint.colour import choose_exposure
 
     transforms = {target.transform for target in targets if target.transform is not None}
     if len(transforms) > 1:

@@ -9,10 +9,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from lightpaint.arrays import Doubles, Floats
-from lightpaint.colour.color_difference import ciede2000, lab
-from lightpaint.colour.display.view_transform import ViewTransform
-from lightpaint.colour.lamp import Lamp
-from lightpaint.colour.spectra.color_rendering import fidelity
+from lightpaint.colour import Lamp, ViewTransform, ciede2000, fidelity, lab
 from lightpaint.lighting.display import display_light, display_transform
 from lightpaint.lighting.solution import Solution
 from lightpaint.lighting.unknowns.lamp_parts import WholeLamps

@@ -16,7 +16,7 @@ from lightpaint.basis.basis import Basis
 from lightpaint.basis.planes import joined_planes
 from lightpaint.display_text import some_names
 from lightpaint.errors import BasisError
-from lightpaint.images.estimate import Estimate
+from lightpaint.images import Estimate
 from lightpaint.target.target import Target
 
 #: Pixels in a row of the long picture. Pixels without importance fill the last row.

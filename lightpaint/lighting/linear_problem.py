@@ -15,7 +15,7 @@ from lightpaint.arrays import Bools, Doubles, Floats
 from lightpaint.basis.basis import Basis
 from lightpaint.basis.light_images import texel_lights
 from lightpaint.basis.lights import Lights
-from lightpaint.colour.display.view_transform import ViewTransform
+from lightpaint.colour import ViewTransform
 from lightpaint.display_text import short_repr
 from lightpaint.errors import TargetError
 from lightpaint.lighting.constraints.absolute_scale import with_scale

@@ -8,7 +8,7 @@ import numpy as np
 
 from lightpaint.arrays import Bools, Doubles, Floats
 from lightpaint.basis.basis import Basis
-from lightpaint.colour.color import luminance
+from lightpaint.colour import luminance
 from lightpaint.dataframes import CHANNELS, by_channel, xarray
 from lightpaint.display_text import Shown
 from lightpaint.keywords import keywords

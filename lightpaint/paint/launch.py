@@ -1,11 +1,14 @@
-"""The painter in a browser: opens and closes session file, studio, server and connection file."""
+"""The painter in a browser: opens and closes session file, studio, server and connection file.
+
+The session file is opened at once, and completed when the identity of its views is known.
+"""
 
 import gc
 import json
 import os
 import sys
 import time
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager, suppress
 from functools import partial
 from pathlib import Path
@@ -15,11 +18,13 @@ from lightpaint.errors import OutputError
 from lightpaint.files import check_writable, replacing
 from lightpaint.paint.server.address import BoundSocket, listen
 from lightpaint.paint.server.server import Server, check_installed
-from lightpaint.paint.session_file import SessionFile
 from lightpaint.paint.store.database import SESSION_FILE, set_aside
+from lightpaint.paint.store.history_steps import Identity
+from lightpaint.paint.store.store import Store
 from lightpaint.paint.studio.console_switch import Console
 from lightpaint.paint.studio.studio import Studio
-from lightpaint.paint.subject import Subject
+from lightpaint.paint.subject import LazyScene, Subject, check_view_names, session_identity
+from lightpaint.scene.scene import Scene
 from lightpaint.signals import interruptible_between_pieces
 
 #: Name of the file by which programs find a running painter, in the same folder.
@@ -98,6 +103,74 @@ def _write_if_possible(file: "ConnectionFile", say: Callable[[str], None]) -> No
         file.write()
     except OutputError as error:
         say(error.sentence)
+
+
+class SessionFile:
+    """The session file at `path`, opened at once, before its scenes are loaded: two painters that
+    start together would both believe it to be theirs.
+
+    say: receives remarks on the scenes, each one once.
+
+    Attributes:
+        store: The session.
+        server: Receives the store once its identity is known.
+    """
+
+    def __init__(self, subjects: Sequence[Subject], path: Path, say: Callable[[str], None]) -> None:
+        self.server: Server | None = None
+        self._subjects, self._path, self._report = subjects, path, say
+        self._loaded: dict[int, Scene] = {}
+        self._reported: set[str] = set()
+        identity = session_identity(subjects)
+        self._is_unused = identity is None and not path.exists()
+        self.store = Store.open(path, identity)
+        for k, subject in enumerate(subjects):
+            if subject.record is not None and isinstance(subject.scene, LazyScene):
+                self._report_new(subject.scene.remarks)
+            elif isinstance(subject.scene, LazyScene):
+                subject.scene.checks.append(partial(self._on_scene_loaded, k, subject.scene))
+
+    def open_store(self, _: Identity) -> Store:
+        """Return the store; called when there are bases."""
+        return self.store
+
+    def close(self) -> None:
+        """Close the session; a new one whose scenes could not be loaded leaves no file."""
+        self.store.close()
+        if self._is_unused:
+            self._path.unlink(missing_ok=True)
+
+    def _on_scene_loaded(self, k: int, lazy_scene: LazyScene, scene: Scene) -> None:
+        """Complete the identity with the scene of view k, which was not cached."""
+        from lightpaint.pipeline.job.remarks import (
+            remarks_of_film,
+            remarks_of_memory,
+            remarks_of_scene,
+        )
+
+        self._loaded[k] = scene
+        if (identity := session_identity(self._subjects, self._loaded)) is not None:
+            self._open_with(identity)
+        lasting = *remarks_of_scene(scene), *remarks_of_film(scene, lazy_scene.settings)
+        self._report_new((*lasting, *remarks_of_memory(scene)))
+        from lightpaint.scene.runtime.variant import use_variant
+
+        # Remarks about this machine may not hold next time.
+        lazy_scene.remarks = tuple(x for x in lasting if x != use_variant().note)
+
+    def _open_with(self, identity: Identity) -> None:
+        """Open the store, or check its identity, once all scenes are loaded."""
+        check_view_names([view.sensor for view in identity.views])
+        self.store.set_identity(identity)
+        self._is_unused = False
+        if self.server is not None:
+            self.server.follow_identity()
+
+    def _report_new(self, remarks: Iterable[str]) -> None:
+        for remark in remarks:
+            if remark not in self._reported:
+                self._reported.add(remark)
+                self._report(remark)
 
 
 class ConnectionFile:

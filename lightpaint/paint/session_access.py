@@ -9,7 +9,7 @@ from typing import Any, Generic, NamedTuple, TypeVar
 from lightpaint.errors import PaintError
 from lightpaint.lighting.answer.lighting import Lighting
 from lightpaint.paint.background_threads import StoppedError
-from lightpaint.paint.layers.view_layers import ViewLayers
+from lightpaint.paint.layers.canvas import ViewLayers
 from lightpaint.paint.protocol import Message, PictureUpdate, ProgressReport
 from lightpaint.paint.session.look_library import LookLibrary
 from lightpaint.paint.session.picture_table import Picture, PictureTable

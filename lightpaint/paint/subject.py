@@ -1,4 +1,4 @@
-"""The subject of a painting: a scene, a saved basis, or light groups, and its basis."""
+"""The subject of a painting: a scene, a saved basis, or light groups, with basis and identity."""
 
 import time
 from collections.abc import Callable, Iterator, Mapping, Sequence
@@ -13,14 +13,16 @@ from lightpaint.basis.basis import Basis, meter_exposure
 from lightpaint.basis.cache import cache, scene_facts
 from lightpaint.basis.cache.scene_facts import SceneFacts
 from lightpaint.basis.lightgroups.light_groups import LightGroups
-from lightpaint.colour.display.view_transform import TransformChoice, ViewTransform
+from lightpaint.colour import TransformChoice, ViewTransform
+from lightpaint.display_text import some_names
 from lightpaint.errors import PaintError
-from lightpaint.files import scene_name
+from lightpaint.files import is_name, one_line, scene_name
 from lightpaint.lighting.constraints.constraints import Constraints
+from lightpaint.paint.store.history_steps import Identity, ViewIdentity
 from lightpaint.paint.store.session_requests import SessionRequests
 from lightpaint.pipeline.job.settings import Settings
 from lightpaint.pipeline.job.sources import SceneFile, vars_of
-from lightpaint.placement.rigging import rigging_of
+from lightpaint.placement import rigging_of
 from lightpaint.progress import Progress, silent
 from lightpaint.scene.quality_presets import samples
 from lightpaint.scene.scene import Scene
@@ -327,3 +329,39 @@ def places_path(folder: Path) -> Path:
 def picture_path(folder: Path, sensor: str) -> Path:
     """Return the export path of the answer's picture in a view. sensor: "" for the only view."""
     return folder / (f"answer-{sensor}.png" if sensor else "answer.png")
+
+
+def session_identity(
+    subjects: Sequence[Subject], loaded: Mapping[int, Scene] | None = None
+) -> Identity | None:
+    """Return the identity of a session; None while a scene still has to be loaded for it.
+
+    loaded: scenes that have been loaded, by view. A scene has the same identity as its later basis.
+    """
+    bases = [subject.basis for subject in subjects if subject.basis is not None]
+    if bases:
+        return Identity.of(bases)
+    records = []
+    for k, subject in enumerate(subjects):
+        scene = subject.loaded_scene if not isinstance(subject.scene, LazyScene) else None
+        record = subject.record or scene or (loaded or {}).get(k)
+        if record is None:
+            return None
+        records.append(record)
+    first = records[0]
+    names = tuple(light.name for light in first.lights)
+    views = tuple(ViewIdentity(sensor_name(record), record.size) for record in records)
+    return Identity(Path(first.path).name, first.identity, names, views)
+
+
+def check_view_names(sensors: Sequence[str]) -> None:
+    """Raise PaintError unless several views have distinct names that are valid file names."""
+    if len(sensors) == 1:
+        return
+    if len(set(sensors)) < len(sensors):
+        raise PaintError(f"a view is there twice: {some_names(sensors)}; give each sensor once")
+    for name in sensors:
+        if not is_name(name):
+            raise PaintError(
+                f"the sensor id {one_line(repr(name))} cannot name a file: choose another id"
+            )

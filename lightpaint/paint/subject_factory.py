@@ -8,7 +8,7 @@ from typing import Any
 from lightpaint.basis.basis import Basis
 from lightpaint.basis.lightgroups.light_groups import LightGroups
 from lightpaint.basis.lights import Lights
-from lightpaint.colour.display.view_transform import TransformChoice
+from lightpaint.colour import TransformChoice
 from lightpaint.errors import PaintError, SceneError
 from lightpaint.file_reading import file_length
 from lightpaint.files import scene_name
@@ -19,9 +19,8 @@ from lightpaint.lighting.joined_views import check_same_lights
 from lightpaint.lighting.unknowns.reduction import reduce_to
 from lightpaint.lighting.wishes.wished_light import check_powers
 from lightpaint.paint.layers.layer_files import check_kind
-from lightpaint.paint.session_file import check_view_names, session_identity
 from lightpaint.paint.store.session_requests import SessionRequests
-from lightpaint.paint.subject import LazyScene, Subject
+from lightpaint.paint.subject import LazyScene, Subject, check_view_names, session_identity
 from lightpaint.pipeline.job.settings import Settings
 from lightpaint.pipeline.job.sources import (
     BasisFile,

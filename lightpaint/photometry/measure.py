@@ -12,7 +12,7 @@ from lightpaint.arrays import Doubles, Floats
 from lightpaint.basis.basis import Basis
 from lightpaint.basis.cache.cached_render import obtain_basis
 from lightpaint.basis.lights import Lights
-from lightpaint.colour.color import LUMINANCE
+from lightpaint.colour import LUMINANCE
 from lightpaint.display_text import brief, some_names
 from lightpaint.errors import SceneError
 from lightpaint.keywords import keywords

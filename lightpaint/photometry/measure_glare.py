@@ -15,7 +15,7 @@ import numpy as np
 
 from lightpaint.arrays import RGB, Bools, Doubles
 from lightpaint.basis.basis import Basis
-from lightpaint.colour.color import LUMINANCE
+from lightpaint.colour import LUMINANCE
 from lightpaint.keywords import keywords
 from lightpaint.luminaires.plugin_names import POINT_PLUGIN
 from lightpaint.photometry.glare import Glare, GlareObserver, GlareSources, position_index

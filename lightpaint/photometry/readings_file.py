@@ -12,7 +12,7 @@ import numpy as np
 
 from lightpaint.arrays import Doubles
 from lightpaint.files import one_line, write_bytes, write_text
-from lightpaint.images.formats.png import png_bytes
+from lightpaint.images.formats import png_bytes
 from lightpaint.photometry.false_colour import false_colours
 from lightpaint.photometry.glare import Glare, GlareReading
 from lightpaint.photometry.illuminance import Illuminance

@@ -14,7 +14,7 @@ from lightpaint.basis.lightgroups.frame_sequence import parse_frames
 from lightpaint.basis.lightgroups.light_groups import LightGroups, read_light_groups
 from lightpaint.errors import BasisError, ImageError, OutputError
 from lightpaint.files import check_files
-from lightpaint.images.formats.exr import read_headers, write_parts
+from lightpaint.images.formats import read_headers, write_parts
 from lightpaint.keywords import keywords
 from lightpaint.lighting.answer.lighting import Lighting
 from lightpaint.lighting.answer.lighting_file import read_lighting

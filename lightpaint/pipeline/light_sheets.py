@@ -8,8 +8,8 @@ from lightpaint.basis.cache.cached_render import obtain_basis
 from lightpaint.basis.render.integrators import why_not_one_pass
 from lightpaint.errors import LightpaintError, OutputError
 from lightpaint.files import check_files, check_writable, write_bytes
-from lightpaint.images.denoiser import denoiser_text
-from lightpaint.images.formats.png import png_bytes, png_has_text
+from lightpaint.images import denoiser_text
+from lightpaint.images.formats import png_bytes, png_has_text
 from lightpaint.lighting.answer.lighting_file import read_lighting
 from lightpaint.pipeline.results.answer_folder import LIGHTING
 from lightpaint.progress import Progress, silent

@@ -12,7 +12,7 @@ from lightpaint.basis.cache.cached_render import obtain_basis, top_up_basis
 from lightpaint.basis.light_images import texel_lights
 from lightpaint.basis.render.pixel_top_up import KeptTracer, kept_loaded
 from lightpaint.basis.render.render_origin import ONE_PASS
-from lightpaint.colour.color import LUMINANCE
+from lightpaint.colour import LUMINANCE
 from lightpaint.lighting.analysis.noise.sample_demand import (
     pixel_variances,
     sample_demand,

@@ -7,7 +7,7 @@ from typing import Any, overload
 from lightpaint.basis.basis import Basis
 from lightpaint.basis.cache.cached_render import check_same_view
 from lightpaint.basis.lightgroups.light_groups import LightGroups
-from lightpaint.colour.display.view_transform import TransformChoice
+from lightpaint.colour import TransformChoice
 from lightpaint.errors import SceneError, TargetError
 from lightpaint.keywords import keywords
 from lightpaint.lighting.constraints.constraints import Constraints
@@ -16,7 +16,7 @@ from lightpaint.pipeline.job.settings import Settings
 from lightpaint.pipeline.job.sources import BasisFile, Painting, SceneFile, check_needed
 from lightpaint.pipeline.pipeline import run
 from lightpaint.pipeline.results.results import Look
-from lightpaint.placement.rigging import Rigging
+from lightpaint.placement import Rigging
 from lightpaint.progress import Progress, silent
 from lightpaint.scene.scene import Scene
 from lightpaint.sentences import Hint, Sentence

@@ -7,8 +7,8 @@ from typing import Any
 
 from lightpaint.arrays import as_rgb, release_freed_memory
 from lightpaint.basis.basis import Basis
-from lightpaint.colour.spectra.spectrum_source import daylight
-from lightpaint.images.estimate import Estimate, write_estimate
+from lightpaint.colour import daylight
+from lightpaint.images import Estimate, write_estimate
 from lightpaint.keywords import keywords
 from lightpaint.lighting.analysis.analysis import Analysis, analyse, with_findings
 from lightpaint.lighting.analysis.surface_colors import SurfaceColor, surface_colors
@@ -41,9 +41,7 @@ from lightpaint.pipeline.wished_planes import (
     planes_of_job,
     require,
 )
-from lightpaint.placement.placement import Placement
-from lightpaint.placement.suggested_lights import suggest_lights
-from lightpaint.placement.suggestion import MoveSuggestion, Suggestion
+from lightpaint.placement import MoveSuggestion, Placement, Suggestion, suggest_lights
 from lightpaint.progress import (
     Listener,
     Progress,

@@ -12,8 +12,7 @@ from lightpaint.basis.cache.cached_render import Render
 from lightpaint.basis.render.basis_render import render_basis
 from lightpaint.display_text import some_names
 from lightpaint.errors import SceneError
-from lightpaint.images.estimate import Estimate
-from lightpaint.images.pixel_blocks import block_mean
+from lightpaint.images import Estimate, block_mean
 from lightpaint.lighting.constraints.constraints import Constraints
 from lightpaint.lighting.problem import Problem
 from lightpaint.lighting.solution import Solution
@@ -23,13 +22,17 @@ from lightpaint.pipeline.job.settings import Settings
 from lightpaint.pipeline.job.sources import content
 from lightpaint.pipeline.job_bases import obtain, problem_of, view_listener, without_noise
 from lightpaint.pipeline.results.placement_changes import all_changes, spoken_change
-from lightpaint.placement.freedom import Freedom
-from lightpaint.placement.lights_to_place import free_light
-from lightpaint.placement.look_goals import on_small_film
-from lightpaint.placement.place import place
-from lightpaint.placement.placement import Move, Placement, PlacementRecord
-from lightpaint.placement.rigged_lights import rigged_lights
-from lightpaint.placement.suggestion import MoveSuggestion
+from lightpaint.placement import (
+    Freedom,
+    Move,
+    MoveSuggestion,
+    Placement,
+    PlacementRecord,
+    free_light,
+    on_small_film,
+    place,
+    rigged_lights,
+)
 from lightpaint.progress import Listener
 from lightpaint.scene.scene import Scene
 

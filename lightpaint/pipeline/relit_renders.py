@@ -8,12 +8,16 @@ from typing import Any
 
 from lightpaint.arrays import Floats
 from lightpaint.basis.render.separate_renders import emitters_seen
-from lightpaint.colour.display.exposure import choose_exposure
-from lightpaint.colour.display.view_transform import ViewTransform
-from lightpaint.images.denoiser import Features, denoised, denoiser_text
-from lightpaint.images.estimate import HALF_DIFFERENCE, Estimate, write_estimate
-from lightpaint.images.formats.exr import ExrPart, rgb_channels, write_parts
-from lightpaint.images.formats.png import write_png, write_png_16
+from lightpaint.colour import ViewTransform, choose_exposure
+from lightpaint.images import (
+    HALF_DIFFERENCE,
+    Estimate,
+    Features,
+    denoised,
+    denoiser_text,
+    write_estimate,
+)
+from lightpaint.images.formats import ExrPart, rgb_channels, write_parts, write_png, write_png_16
 from lightpaint.lighting.answer.lighting import Lighting
 from lightpaint.pipeline.job.remarks import remarks_of_pictures
 from lightpaint.pipeline.results.answer_folder import (

@@ -13,7 +13,7 @@ import numpy as np
 from lightpaint.arrays import Doubles
 from lightpaint.basis.basis import Basis
 from lightpaint.basis.light_images import LightImage, light_images
-from lightpaint.colour.color import luminance
+from lightpaint.colour import luminance
 from lightpaint.lighting.solution import Solution
 from lightpaint.lighting.solve import solution_of
 from lightpaint.pipeline.job.job import Job

@@ -15,10 +15,8 @@ from lightpaint.basis.render.basis_render import render_basis
 from lightpaint.basis.render.integrators import why_not_one_pass
 from lightpaint.basis.render.render_origin import is_of
 from lightpaint.basis.render.separate_renders import emitters_seen
-from lightpaint.colour.display.exposure import choose_exposure
-from lightpaint.colour.display.view_transform import ViewTransform
-from lightpaint.images.denoiser import Features, denoised, denoiser_text
-from lightpaint.images.pixel_blocks import block_mean
+from lightpaint.colour import ViewTransform, choose_exposure
+from lightpaint.images import Features, block_mean, denoised, denoiser_text
 from lightpaint.keywords import keywords
 from lightpaint.pipeline.job.remarks import remarks_of_pictures
 from lightpaint.pipeline.job.settings import Settings

@@ -11,7 +11,7 @@ from lightpaint.arrays import Floats
 from lightpaint.basis.basis import Basis
 from lightpaint.basis.lights import BasisLight
 from lightpaint.errors import SceneError
-from lightpaint.images.pixel_blocks import block_mean, whole_factor
+from lightpaint.images import block_mean, whole_factor
 from lightpaint.lighting.constraints.constraints import Constraints, LightConstraint
 from lightpaint.lighting.normal_equations import NormalEquations
 from lightpaint.lighting.problem import Problem

@@ -12,7 +12,7 @@ from typing import Literal
 import numpy as np
 
 from lightpaint.arrays import RGB, Floats
-from lightpaint.colour.photometry import lambertian_flux, point_flux, spot_flux
+from lightpaint.colour import lambertian_flux, point_flux, spot_flux
 from lightpaint.display_text import rounded_text
 from lightpaint.errors import SceneError
 from lightpaint.file_reading import read_text

@@ -23,7 +23,7 @@ from lightpaint.arrays import Bools, Doubles, Floats, Indices
 from lightpaint.basis.basis import Basis
 from lightpaint.basis.lights import BasisLight
 from lightpaint.basis.planes import Planes
-from lightpaint.images.pixel_blocks import block_mean
+from lightpaint.images import block_mean
 from lightpaint.lighting.algebra.optimum import minimise
 from lightpaint.lighting.analysis.noise.noise import denoised_matrix
 from lightpaint.lighting.constraints.constraints import Constraints

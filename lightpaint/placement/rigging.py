@@ -34,7 +34,7 @@ PLACE_KEYS = ("within", "box", "along", "on")
 ON_KEYS = ("line", "shapes", "clear")
 
 #: Kinds of new lights.
-KINDS = ("point", "spot", "panel")
+LIGHT_KINDS = ("point", "spot", "panel")
 
 #: Keys of a light to add: for its place and pose, and for its constraints.
 NEW_KEYS = (
@@ -223,11 +223,11 @@ def _check_new(table: Mapping[str, Any], where: SourceKey) -> None:
         raise ConstraintError(
             where,
             f" has {'both kind and' if 'kind' in table else 'neither kind nor'} like: "
-            f"expected kind, {', '.join(KINDS)}, or like, the name of a light",
+            f"expected kind, {', '.join(LIGHT_KINDS)}, or like, the name of a light",
         )
     kind = table.get("kind", "")
-    if "kind" in table and kind not in KINDS:
-        raise _wrong(where / "kind", kind, f"one of {', '.join(KINDS)}")
+    if "kind" in table and kind not in LIGHT_KINDS:
+        raise _wrong(where / "kind", kind, f"one of {', '.join(LIGHT_KINDS)}")
     for key in ("like", "name"):
         if key in table and not _is_name(table[key]):
             raise _wrong(where / key, table[key], "the name of a light")

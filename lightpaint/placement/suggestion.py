@@ -4,7 +4,7 @@ import json
 from dataclasses import dataclass, field
 
 from lightpaint.arrays import RGB, Floats, Position
-from lightpaint.colour.photometry import Photometry, photometry, point_flux
+from lightpaint.colour import Photometry, photometry, point_flux
 from lightpaint.keywords import keywords
 
 #: The unit of a point light's intensity.

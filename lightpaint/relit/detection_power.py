@@ -20,9 +20,8 @@ import numpy as np
 
 from lightpaint.arrays import Doubles, Floats
 from lightpaint.basis.basis import Basis
-from lightpaint.colour.color import luminance
-from lightpaint.images.estimate import Estimate, box_mean
-from lightpaint.images.pixel_blocks import whole_factor
+from lightpaint.colour import luminance
+from lightpaint.images import Estimate, box_mean, whole_factor
 from lightpaint.lighting.answer.lighting import Lighting
 from lightpaint.relit.verification import (
     LIMIT,

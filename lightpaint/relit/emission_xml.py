@@ -7,7 +7,7 @@ from pathlib import Path
 import numpy as np
 
 from lightpaint.arrays import RGB, Doubles, Floats
-from lightpaint.colour.spectra.spectrum import WAVELENGTHS
+from lightpaint.colour import WAVELENGTHS
 from lightpaint.errors import SceneError
 from lightpaint.relit.xml_edit import Element, XmlFile
 from lightpaint.scene.checks.tokens import tag

@@ -15,7 +15,7 @@ import numpy as np
 from lightpaint.arrays import RGB, Doubles, Floats, Position
 from lightpaint.basis.light_images import joined_texels
 from lightpaint.basis.lightgroups.light_groups import LightGroups
-from lightpaint.colour.photometry import photometry
+from lightpaint.colour import photometry
 from lightpaint.errors import LightpaintError
 from lightpaint.lighting.answer.lighting import Lighting
 from lightpaint.luminaires.plugin_names import FULL

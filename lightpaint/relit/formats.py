@@ -10,11 +10,11 @@ import numpy as np
 
 from lightpaint.arrays import RGB, Floats, as_rgb
 from lightpaint.basis.light_images import joined_texels
-from lightpaint.colour.color import luminance
+from lightpaint.colour import luminance
 from lightpaint.display_text import some_names
 from lightpaint.errors import LightpaintError, OutputError
 from lightpaint.files import write_bytes, write_text
-from lightpaint.images.formats.exr import write_rgb
+from lightpaint.images.formats import write_rgb
 from lightpaint.lighting.answer.lighting import Lighting, LightSetting
 from lightpaint.progress import Listener
 from lightpaint.relit.export.exports import blender_script, scene_script

@@ -17,7 +17,7 @@ from lightpaint.arrays import RGB, Doubles
 from lightpaint.display_text import some_names
 from lightpaint.errors import LightingError, OutputError, SceneError
 from lightpaint.files import write_bytes
-from lightpaint.images.formats.exr import write_rgb
+from lightpaint.images.formats import write_rgb
 from lightpaint.keywords import keywords
 from lightpaint.lighting.answer.lighting import Lighting
 from lightpaint.relit.luminaire_xml import written_emission

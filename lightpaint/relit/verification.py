@@ -11,13 +11,11 @@ from statistics import NormalDist
 import numpy as np
 
 from lightpaint.arrays import Bools, Doubles, Floats
-from lightpaint.colour.color import luminance
-from lightpaint.colour.color_difference import delta_e
-from lightpaint.colour.display.exposure import choose_exposure
+from lightpaint.colour import choose_exposure, delta_e, luminance
 from lightpaint.display_text import Shown
 from lightpaint.errors import SizeError
-from lightpaint.images import pixel_blocks
-from lightpaint.images.estimate import Estimate, box_mean
+from lightpaint.images import Estimate, box_mean, whole_factor
+from lightpaint.images import block_sums as whole_block_sums
 from lightpaint.keywords import keywords
 
 #: Side of the blocks of pixels over which differences are summed before the tests.
@@ -166,7 +164,7 @@ def compare(predicted: Estimate, verified: Estimate) -> Verification:
     verified: of the size of `predicted`, or with a block of pixels for each of its pixels. Raises
     SizeError otherwise.
     """
-    factor = pixel_blocks.whole_factor(verified.size, predicted.size)
+    factor = whole_factor(verified.size, predicted.size)
     if factor is None:
         raise SizeError(f"sizes of {predicted.size} and {verified.size} cannot be compared")
     judged = _judge(predicted, verified.reduced(factor))
@@ -268,7 +266,7 @@ def block_sums(image: Floats) -> Doubles:
     """Return sums over blocks of BLOCK × BLOCK pixels in float64; remainders join the last
     blocks.
     """
-    sums = pixel_blocks.block_sums(image, BLOCK)
+    sums = whole_block_sums(image, BLOCK)
     height, width = image.shape[:2]
     if height % BLOCK and height > BLOCK:
         sums[-2] += sums[-1]

@@ -22,8 +22,7 @@ from pathlib import Path
 from lightpaint.basis.basis import Basis
 from lightpaint.basis.render.render_budget import check_samples
 from lightpaint.errors import SizeError
-from lightpaint.images.estimate import Estimate
-from lightpaint.images.pixel_blocks import Size, whole_factor
+from lightpaint.images import Estimate, Size, whole_factor
 from lightpaint.keywords import keywords
 from lightpaint.lighting.analysis.noise.refinement import refine
 from lightpaint.lighting.answer.lighting import Lighting

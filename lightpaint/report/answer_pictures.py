@@ -15,10 +15,8 @@ import numpy.typing as npt
 
 from lightpaint.arrays import Floats, Indices, largest
 from lightpaint.basis.basis import Basis, meter_exposure
-from lightpaint.colour.color import luminance
-from lightpaint.colour.display.view_transform import ViewTransform
-from lightpaint.images.bands import by_bands
-from lightpaint.images.estimate import box_mean
+from lightpaint.colour import ViewTransform, luminance
+from lightpaint.images import box_mean, by_bands
 from lightpaint.lighting.solution import Solution
 from lightpaint.target.target import Target
 

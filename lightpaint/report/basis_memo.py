@@ -15,7 +15,7 @@ from lightpaint.basis.cache.denoised_planes import (
     obtain_denoised_planes,
     read_denoised_planes,
 )
-from lightpaint.images.pixel_blocks import fitting_factor
+from lightpaint.images import fitting_factor
 from lightpaint.threads import start_in_background
 
 Result = TypeVar("Result")

@@ -11,9 +11,15 @@ from lightpaint.basis.denoised_mixes import (
     denoise_mix,
     denoise_mixes,
 )
-from lightpaint.colour.display.view_transform import ViewTransform
-from lightpaint.images.bands import LARGE_PICTURE, by_bands
-from lightpaint.images.denoiser import DENOISED_KEY, Features, denoised, denoiser_text
+from lightpaint.colour import ViewTransform
+from lightpaint.images import (
+    DENOISED_KEY,
+    LARGE_PICTURE,
+    Features,
+    by_bands,
+    denoised,
+    denoiser_text,
+)
 from lightpaint.report.basis_memo import cached_clean_planes
 
 #: Maximum number of lights whose thumbnails are denoised: for hundreds it would take long, and a

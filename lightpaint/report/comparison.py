@@ -9,9 +9,8 @@ from PIL import Image, ImageDraw, ImageFont
 
 from lightpaint.arrays import Floats
 from lightpaint.basis.basis import Basis
-from lightpaint.colour.display.view_transform import ViewTransform
-from lightpaint.colour.srgb import to_8_bit
-from lightpaint.images.pixel_blocks import block_mean, enlarged, whole_factor
+from lightpaint.colour import ViewTransform, to_8_bit
+from lightpaint.images import block_mean, enlarged, whole_factor
 from lightpaint.lighting.analysis.appearance.appearance import Appearance, compare_appearance
 from lightpaint.lighting.solution import Solution
 from lightpaint.report.answer_pictures import (

@@ -13,10 +13,9 @@ from PIL import Image, ImageDraw, ImageFont
 from lightpaint.arrays import Doubles, Floats, Position
 from lightpaint.basis.basis import Basis
 from lightpaint.basis.light_images import LightImage, light_images
-from lightpaint.colour.srgb import encode_display, to_8_bit
+from lightpaint.colour import encode_display, to_8_bit
 from lightpaint.display_text import visible
-from lightpaint.images.denoiser import denoised
-from lightpaint.images.pixel_blocks import block_mean
+from lightpaint.images import block_mean, denoised
 from lightpaint.lighting.answer.lighting import Lighting
 from lightpaint.report.comparison import shorten_to_width
 from lightpaint.report.measures import energy_shares

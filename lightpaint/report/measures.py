@@ -4,9 +4,8 @@ import numpy as np
 
 from lightpaint.arrays import Doubles, Floats
 from lightpaint.basis.basis import Basis
-from lightpaint.colour.color import LUMINANCE
-from lightpaint.images.bands import sum_by_bands
-from lightpaint.images.estimate import Estimate
+from lightpaint.colour import LUMINANCE
+from lightpaint.images import Estimate, sum_by_bands
 from lightpaint.lighting.analysis.noise.uncertainty import Uncertainty
 from lightpaint.lighting.answer.lighting import Lighting
 from lightpaint.lighting.solution import Solution

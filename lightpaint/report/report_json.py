@@ -11,9 +11,8 @@ from typing import Any
 import numpy as np
 
 from lightpaint.basis.basis import Basis
-from lightpaint.colour.color import luminance
-from lightpaint.colour.display.view_transform import ViewTransform
-from lightpaint.images.estimate import Estimate
+from lightpaint.colour import ViewTransform, luminance
+from lightpaint.images import Estimate
 from lightpaint.lighting.analysis.appearance.appearance import Appearance, compare_appearance
 from lightpaint.lighting.analysis.appearance.color_choices import ColorChoice
 from lightpaint.lighting.analysis.appearance.delivery import Delivery

@@ -3,9 +3,9 @@
 import numpy as np
 
 from lightpaint.basis.light_images import TEXELS, is_of_texels, joined_texels
-from lightpaint.colour.color import luminance
+from lightpaint.colour import luminance
 from lightpaint.display_text import some_names
-from lightpaint.images.estimate import Estimate
+from lightpaint.images import Estimate
 from lightpaint.keywords import keywords
 from lightpaint.lighting.analysis.appearance.appearance import (
     CLOSE,

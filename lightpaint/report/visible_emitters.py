@@ -7,10 +7,9 @@ import numpy as np
 from lightpaint.arrays import Bools, Doubles, Floats, Indices
 from lightpaint.basis.basis import Basis
 from lightpaint.basis.light_images import joined_texels, texel_lights
-from lightpaint.colour.color import luminance
+from lightpaint.colour import luminance
 from lightpaint.display_text import some_of
-from lightpaint.images.bands import sum_by_bands
-from lightpaint.images.estimate import Estimate
+from lightpaint.images import Estimate, sum_by_bands
 from lightpaint.lighting.loss.painting import ignored_paint
 from lightpaint.lighting.solution import Solution
 from lightpaint.scene.lights.texels.texel import image_of

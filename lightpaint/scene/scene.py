@@ -14,8 +14,7 @@ from pathlib import Path, PurePath
 from typing import Any, TypeVar
 
 from lightpaint.arrays import RGB, Floats, Position
-from lightpaint.colour.lamp import Lamp
-from lightpaint.colour.spectra.observer import EYE, Observer
+from lightpaint.colour import EYE, Lamp, Observer
 from lightpaint.display_text import Listed, Shown, some_of
 from lightpaint.keywords import keywords
 from lightpaint.luminaires.plugin_names import LUMINAIRE_PLUGINS

@@ -10,8 +10,7 @@ import numpy as np
 
 from lightpaint.arrays import RGB, Doubles, Floats
 from lightpaint.errors import SceneError
-from lightpaint.images.estimate import Estimate
-from lightpaint.images.pixel_blocks import block_mean
+from lightpaint.images import Estimate, block_mean
 from lightpaint.progress import Progress, silent
 from lightpaint.scene.properties.observed_spectra import as_seen
 from lightpaint.scene.runtime.kernel_threads import kernels

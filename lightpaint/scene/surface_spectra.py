@@ -5,8 +5,8 @@ from typing import Any
 import numpy as np
 
 from lightpaint.arrays import Doubles, Indices, aligned
-from lightpaint.colour.spectra.spectrum import WAVELENGTHS
-from lightpaint.images.object_map import Objects
+from lightpaint.colour import WAVELENGTHS
+from lightpaint.images import Objects
 from lightpaint.scene.runtime.render_lock import tracing
 from lightpaint.scene.scene import Scene
 

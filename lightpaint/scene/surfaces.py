@@ -8,10 +8,8 @@ import numpy as np
 import numpy.typing as npt
 
 from lightpaint.arrays import Floats
-from lightpaint.images.denoiser import Features
-from lightpaint.images.object_map import BACKGROUND as NOTHING_SEEN
-from lightpaint.images.object_map import Objects
-from lightpaint.images.pixel_blocks import block_mean, block_pixels
+from lightpaint.images import BACKGROUND as NOTHING_SEEN
+from lightpaint.images import Features, Objects, block_mean, block_pixels
 from lightpaint.progress import Progress, silent
 from lightpaint.scene.runtime.render_lock import tracing
 from lightpaint.scene.scene import Scene

@@ -10,10 +10,8 @@ from pathlib import Path
 import numpy as np
 
 from lightpaint.arrays import Doubles, Floats, largest
-from lightpaint.colour.color import luminance
-from lightpaint.colour.display.tone_curves import BUILT_IN
-from lightpaint.colour.display.view_transform import TransformChoice, ViewTransform
-from lightpaint.images.picture import Picture
+from lightpaint.colour import BUILT_IN, TransformChoice, ViewTransform, luminance
+from lightpaint.images import Picture
 from lightpaint.sentences import Hint, Sentence
 from lightpaint.target.painted_pixels import LOSSY, ROUNDING, compressed_like, lossy_difference
 

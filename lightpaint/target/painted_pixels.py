@@ -17,12 +17,10 @@ import numpy as np
 import numpy.typing as npt
 
 from lightpaint.arrays import Bools, Floats, largest
-from lightpaint.colour.srgb import to_8_bit
+from lightpaint.colour import to_8_bit
 from lightpaint.errors import SizeError
-from lightpaint.images.estimate import box_mean
-from lightpaint.images.formats.library_output import without_pillow_warnings
-from lightpaint.images.picture import Picture
-from lightpaint.images.pixel_blocks import block_mean, resampled
+from lightpaint.images import Picture, block_mean, box_mean, resampled
+from lightpaint.images.formats import without_pillow_warnings
 from lightpaint.sentences import Hint
 from lightpaint.target.template import Template
 

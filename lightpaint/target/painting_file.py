@@ -12,10 +12,10 @@ from typing import Literal
 
 import numpy as np
 
-from lightpaint.colour.display.view_transform import ViewTransform
+from lightpaint.colour import ViewTransform
 from lightpaint.errors import TargetError
-from lightpaint.images.formats.exr import ExrPart, rgb_channels, write_parts
-from lightpaint.images.picture import AT_LEAST
+from lightpaint.images import AT_LEAST
+from lightpaint.images.formats import ExrPart, rgb_channels, write_parts
 from lightpaint.storage.json_records import fields_of, read_record, strict_json
 from lightpaint.target.target import Target
 

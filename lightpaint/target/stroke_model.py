@@ -10,7 +10,7 @@ from collections.abc import Callable, Iterator
 import numpy as np
 
 from lightpaint.arrays import Bools, Doubles, Floats
-from lightpaint.colour.srgb import decode_display, encode_display
+from lightpaint.colour import decode_display, encode_display
 
 #: Weight that holds the colour of a stroke near what is painted, where the look alone does not tell
 #: how much of it covers; relative to all changes.

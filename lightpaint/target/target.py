@@ -8,11 +8,10 @@ import numpy as np
 import numpy.typing as npt
 
 from lightpaint.arrays import Floats
-from lightpaint.colour.color import luminance
-from lightpaint.colour.display.view_transform import ViewTransform
+from lightpaint.colour import ViewTransform, luminance
 from lightpaint.display_text import Shown
 from lightpaint.errors import SizeError, TargetError
-from lightpaint.images.pixel_blocks import whole_factor
+from lightpaint.images import whole_factor
 from lightpaint.keywords import keywords
 from lightpaint.sentences import Hint, Remedy
 from lightpaint.target.painted_pixels import TargetPixels

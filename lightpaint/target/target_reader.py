@@ -8,11 +8,9 @@ import numpy as np
 import numpy.typing as npt
 
 from lightpaint.arrays import Floats, largest
-from lightpaint.colour.color import luminance
-from lightpaint.colour.display.view_transform import TransformChoice, ViewTransform
+from lightpaint.colour import TransformChoice, ViewTransform, luminance
 from lightpaint.errors import SizeError, TargetError
-from lightpaint.images.estimate import box_mean
-from lightpaint.images.picture import Picture, read_mask, read_picture
+from lightpaint.images import Picture, box_mean, read_mask, read_picture
 from lightpaint.keywords import keywords
 from lightpaint.sentences import Hint, Sentence, Word
 from lightpaint.target.look_match import explain_mismatch, view_of_look

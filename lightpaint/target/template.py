@@ -12,13 +12,19 @@ from typing import Literal
 import numpy as np
 
 from lightpaint.arrays import Floats
-from lightpaint.colour.display.view_transform import ViewTransform
-from lightpaint.colour.srgb import to_8_bit
+from lightpaint.colour import ViewTransform, to_8_bit
 from lightpaint.errors import LightpaintError, TargetError
 from lightpaint.file_reading import read_text
 from lightpaint.files import one_line, write_bytes, write_text
-from lightpaint.images.formats.exr import ExrPart, read_parts, write_parts, write_rgb
-from lightpaint.images.formats.png import TRANSFORM_KEY, png_bytes, write_png_16
+from lightpaint.images.formats import (
+    TRANSFORM_KEY,
+    ExrPart,
+    png_bytes,
+    read_parts,
+    write_parts,
+    write_png_16,
+    write_rgb,
+)
 from lightpaint.sentences import Datum
 from lightpaint.storage.json_records import fields_of, read_record, strict_json
 from lightpaint.storage.staging import is_below, staged

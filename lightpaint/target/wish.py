@@ -7,7 +7,7 @@ import numpy as np
 
 from lightpaint.arrays import Floats
 from lightpaint.errors import SizeError
-from lightpaint.images.pixel_blocks import block_mean, resampled
+from lightpaint.images import block_mean, resampled
 
 
 @dataclass(frozen=True, eq=False)

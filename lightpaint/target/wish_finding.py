@@ -15,8 +15,8 @@ import numpy as np
 import numpy.typing as npt
 
 from lightpaint.arrays import Bools, Doubles, Floats
-from lightpaint.colour.color import LUMINANCE
-from lightpaint.images.pixel_blocks import block_sums, enlarged
+from lightpaint.colour import LUMINANCE
+from lightpaint.images import block_sums, enlarged
 from lightpaint.target.stroke_model import departure_from_one_stroke
 from lightpaint.target.target import Target
 from lightpaint.target.wish import Wish

@@ -13,9 +13,9 @@ sys.path.insert(0, os.path.dirname(__file__))
 import bpy
 import lightpaint_blender
 from lightpaint_blender.interface.controller import controller
+from lightpaint_blender.painter.painter_link import SocketClient
 from lightpaint_blender.painter.painter_messages import from_bytes, to_bytes
 from lightpaint_blender.painter.program import running_painter
-from lightpaint_blender.painter.socket_client import SocketClient
 
 #: Seconds that anything takes on a busy machine.
 PATIENCE_S = 200.0

@@ -13,17 +13,21 @@ from hypothesis import given
 from hypothesis import strategies as st
 from live_server import RunningServer
 
-from lightpaint.blender_addon.lamps.group_names import group_bytes, group_name, stem
-from lightpaint.blender_addon.lamps.lamp_drives import (
+from lightpaint.blender_addon.lamps.grouping import group_bytes, group_name, stem
+from lightpaint.blender_addon.lamps.lamp_levels import (
     DRIVES_KEY,
     discard_drives,
     forget_drives,
     keep_drives,
     show_drives,
 )
-from lightpaint.blender_addon.lamps.lamp_units import are_equal, scaled, scaled_colour
-from lightpaint.blender_addon.lamps.working_space import working_space
-from lightpaint.blender_addon.painter import program, socket_client
+from lightpaint.blender_addon.lamps.lamp_units import (
+    are_equal,
+    scaled,
+    scaled_colour,
+    working_space,
+)
+from lightpaint.blender_addon.painter import painter_link, program
 from lightpaint.blender_addon.painter.painter_messages import (
     PROTOCOL_VERSION,
     MessageError,
@@ -187,7 +191,7 @@ def test_the_painter_of_a_shot_gets_its_lights_file() -> None:
 @pytest.mark.parametrize("size", [0, 125, 126, 65535, 65536])
 def test_a_socket_sends_and_receives_messages_of_any_size(size: int) -> None:
     here, there = socket.socketpair()
-    client, data = socket_client.SocketClient(here, b""), bytes(range(256)) * (size // 256 + 1)
+    client, data = painter_link.SocketClient(here, b""), bytes(range(256)) * (size // 256 + 1)
     sender = threading.Thread(target=client.send, args=[data[:size]])
     sender.start()
     head = there.recv(2, socket.MSG_WAITALL)
@@ -212,12 +216,12 @@ def test_a_painter_takes_the_connection_and_refuses_others() -> None:
     serving = RunningServer()
     try:
         found = serving.server.connection
-        client = socket_client.SocketClient.open(found["address"], found["token"])
+        client = painter_link.SocketClient.open(found["address"], found["token"])
         client.send(to_bytes({"kind": "observe", "seq": 1, "version": PROTOCOL_VERSION}))
         assert from_bytes(client.receive())[0]["reply"] == 1
         client.close()
         with pytest.raises(ConnectionError, match="refused"):
-            socket_client.SocketClient.open(found["address"], "another")
+            painter_link.SocketClient.open(found["address"], "another")
     finally:
         serving.end()
 

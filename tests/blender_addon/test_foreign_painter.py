@@ -14,8 +14,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from lightpaint.blender_addon.lamps.lamp_units import checked_factor
-from lightpaint.blender_addon.painter import painter_link, socket_client
-from lightpaint.blender_addon.painter.painter_link import PainterLink
+from lightpaint.blender_addon.painter import painter_link
+from lightpaint.blender_addon.painter.painter_link import PainterLink, SocketClient
 from lightpaint.blender_addon.painter.painter_messages import (
     MessageError,
     PainterState,
@@ -23,7 +23,6 @@ from lightpaint.blender_addon.painter.painter_messages import (
     to_bytes,
 )
 from lightpaint.blender_addon.painter.program import running_painter
-from lightpaint.blender_addon.painter.socket_client import SocketClient
 from lightpaint.blender_addon.painter.solves import read_factors
 from lightpaint.blender_addon.shot.shot_files import ShotFolder
 
@@ -162,8 +161,8 @@ def test_frames_that_no_painter_sends_end_the_connection_with_words(frames: list
 
 
 def test_the_parts_of_a_message_are_bounded(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(socket_client, "MAX_FRAMES", 3)
-    monkeypatch.setattr(socket_client, "MAX_MESSAGE", 4)
+    monkeypatch.setattr(painter_link, "MAX_FRAMES", 3)
+    monkeypatch.setattr(painter_link, "MAX_MESSAGE", 4)
     assert receiving(b"\x02\x01a", b"\x00\x01b", b"\x80\x02cd") == b"abcd"
     with pytest.raises(ValueError, match="longer than a painter's"):
         receiving(b"\x02\x01a", b"\x00\x02bc", b"\x80\x02de")

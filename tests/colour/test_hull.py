@@ -4,8 +4,13 @@ import numpy as np
 import pytest
 
 from lightpaint.colour.color import kelvin_to_rgb, luminance
-from lightpaint.colour.color_hull import DIRECTIONS, ColorHull, chromaticity, reach_of
-from lightpaint.colour.white_range import white_range
+from lightpaint.colour.color_ranges import (
+    DIRECTIONS,
+    ColorHull,
+    chromaticity,
+    reach_of,
+    white_range,
+)
 
 WHITE = np.array([1.0, 0.95, 0.9])
 

@@ -7,8 +7,14 @@ import numpy as np
 import pytest
 from patience import PATIENCE_S
 
-from lightpaint.colour.color import cct_and_duv, kelvin_to_rgb
-from lightpaint.colour.planckian_locus import nearest_mired, uv_of, uv_of_black_body, xyz_of
+from lightpaint.colour.color import (
+    cct_and_duv,
+    kelvin_to_rgb,
+    nearest_mired,
+    uv_of,
+    uv_of_black_body,
+    xyz_of,
+)
 from lightpaint.colour.primaries import REC709, SPACES, colour_science, primaries_in, rgb_to_xyz
 
 KELVIN = np.geomspace(1000, 100_000, 60)

@@ -7,8 +7,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from lightpaint.colour.color import kelvin_to_rgb
-from lightpaint.colour.photometry import (
+from lightpaint.colour import kelvin_to_rgb
+from lightpaint.colour.luminous_flux import (
     lambertian_flux,
     photometry,
     point_flux,

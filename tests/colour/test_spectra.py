@@ -7,9 +7,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from lightpaint.colour.color import kelvin_to_rgb
+from lightpaint.colour.color import kelvin_to_rgb, xy_of, xy_of_spectrum
 from lightpaint.colour.lamp import Lamp, LampEmitter
-from lightpaint.colour.planckian_locus import xy_of, xy_of_spectrum
 from lightpaint.colour.primaries import colour_science
 from lightpaint.colour.spectra.color_rendering import color_rendering, fidelity
 from lightpaint.colour.spectra.spectrum import (

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from lightpaint.colour.color import cct_and_duv, kelvin_to_rgb, luminance
-from lightpaint.colour.white_range import white_range
+from lightpaint.colour.color_ranges import white_range
 
 #: Below 1901 K Rec.709 has no white.
 RANGES = [(1901, 100_000, 0.0), (2200, 9000, 0.0), (2700, 6500, 0.005), (2700, 2701, 0.0)]

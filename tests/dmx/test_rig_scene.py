@@ -22,7 +22,7 @@ from rig_files import (
 )
 
 from lightpaint.basis.render.render_origin import basis_lights
-from lightpaint.colour.photometry import spot_flux
+from lightpaint.colour.luminous_flux import spot_flux
 from lightpaint.colour.spectra.spectrum_source import read_spectrum
 from lightpaint.dmx import rig_room
 from lightpaint.dmx.mvr import PlacedModel, read_rig, read_show

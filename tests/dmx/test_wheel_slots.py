@@ -8,8 +8,8 @@ import pygdtf
 import pytest
 from rig_files import channel, fixture, gdtf, layered, write_mvr
 
+from lightpaint.colour.color import matching_functions
 from lightpaint.colour.lamp import Lamp, LampEmitter
-from lightpaint.colour.planckian_locus import matching_functions
 from lightpaint.colour.primaries import REC2020, rgb_to_xyz
 from lightpaint.dmx.console_rig import ConsoleRig, RigLight
 from lightpaint.dmx.gdtf.emitter_colour import xy_of_kelvin

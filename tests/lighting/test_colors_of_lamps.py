@@ -10,8 +10,8 @@ from nightly import nightly
 import lightpaint as lp
 from lightpaint.basis.render.basis_render import render_basis
 from lightpaint.colour.color import kelvin_to_rgb
+from lightpaint.colour.color_ranges import white_range
 from lightpaint.colour.display.exposure import choose_exposure
-from lightpaint.colour.white_range import white_range
 from lightpaint.lighting.analysis.noise.noise_correction import correct_noise
 
 ROOT = Path(__file__).parent.parent.parent

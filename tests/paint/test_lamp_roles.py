@@ -9,8 +9,7 @@ import lightpaint as lp
 from lightpaint.basis.lights import Lights
 from lightpaint.images.denoiser import Features
 from lightpaint.paint import protocol
-from lightpaint.paint.presets.lamp_roles import LampRoles
-from lightpaint.paint.presets.view_light import BLOCKS, find_roles
+from lightpaint.paint.presets.lamp_roles import BLOCKS, LampRoles, find_roles
 from lightpaint.paint.session.session import Session
 from lightpaint.paint.store.history_steps import Identity
 from lightpaint.paint.store.store import MemoryStore

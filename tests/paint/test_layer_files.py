@@ -28,6 +28,7 @@ from lightpaint.images.formats.exr import ExrPart, read_parts, write_parts
 from lightpaint.images.formats.openraster import RasterGroup, opened_openraster
 from lightpaint.paint import protocol
 from lightpaint.paint.layers import layer_files
+from lightpaint.paint.layers.canvas import ViewLayers
 from lightpaint.paint.layers.canvases import LayeredPaintings
 from lightpaint.paint.layers.composition import compose_layer
 from lightpaint.paint.layers.layer_files import (
@@ -39,7 +40,6 @@ from lightpaint.paint.layers.layer_files import (
 )
 from lightpaint.paint.layers.layer_pixels import LayerPixels
 from lightpaint.paint.layers.layer_stack import Layer, LayerStack
-from lightpaint.paint.layers.view_layers import ViewLayers
 from lightpaint.paint.protocol import Message
 from lightpaint.paint.session.session import Session
 from lightpaint.paint.store.history_steps import Pixels

@@ -17,7 +17,7 @@ from lightpaint.errors import LightpaintError
 from lightpaint.lighting.constraints.constraints import Constraints
 from lightpaint.paint import protocol
 from lightpaint.paint.protocol import Message
-from lightpaint.paint.session.live_readings import LiveReadings
+from lightpaint.paint.session.live_answer import LiveReadings
 from lightpaint.paint.session.session import Session
 from lightpaint.paint.session.session_planes import SessionPlanes
 from lightpaint.paint.store.history_steps import Identity

@@ -19,10 +19,10 @@ from lightpaint.errors import ConstraintError, PaintError
 from lightpaint.images.denoiser import Features
 from lightpaint.images.object_map import Objects
 from lightpaint.paint import subject_factory
-from lightpaint.paint.session_file import SessionFile, session_identity
+from lightpaint.paint.launch import SessionFile
 from lightpaint.paint.store.history_steps import Identity
 from lightpaint.paint.store.store import Store
-from lightpaint.paint.subject import LazyScene, Subject
+from lightpaint.paint.subject import LazyScene, Subject, session_identity
 from lightpaint.paint.subject_factory import make_subject
 from lightpaint.pipeline.job.settings import Settings
 from lightpaint.pipeline.job.sources import SceneFile

@@ -8,7 +8,7 @@ import pytest
 from lit_planes import BULB, box, floor, lit_scene
 
 import lightpaint as lp
-from lightpaint.paint.rig.plane_sight import plane_sight
+from lightpaint.paint.studio.plane_measurements import plane_sight
 from lightpaint.photometry.planes_file import read_planes
 
 #: The camera of `lit_scene` is at (0, 1, 2.5), and looks at (0, 0.8, 0).

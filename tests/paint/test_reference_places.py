@@ -13,12 +13,12 @@ from lightpaint.basis.lights import Lights
 from lightpaint.colour.color import luminance
 from lightpaint.errors import PaintError
 from lightpaint.paint.protocol import LookLike
-from lightpaint.paint.references.light_match import (
+from lightpaint.paint.references.likeness import find_part
+from lightpaint.paint.references.reference_light import (
     contrast_of_light,
+    distance_of,
     light_distance,
 )
-from lightpaint.paint.references.likeness import find_part
-from lightpaint.paint.references.reference_light import distance_of
 from lightpaint.paint.references.tones import LightTones, Tones
 from lightpaint.paint.session.session import Session
 from lightpaint.paint.store.history_steps import Identity

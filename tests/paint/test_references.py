@@ -18,7 +18,7 @@ from lightpaint.colour.color import kelvin_to_rgb, luminance
 from lightpaint.errors import ImageError, PaintError
 from lightpaint.paint import protocol
 from lightpaint.paint.protocol import LookLike, PlacePair
-from lightpaint.paint.references.light_match import (
+from lightpaint.paint.references.reference_light import (
     LampLight,
     contrast_of_light,
     match_light,

@@ -9,7 +9,7 @@ from layered_sessions import SIZES, RandomEditor, open_session
 
 from lightpaint.errors import PaintError
 from lightpaint.paint import protocol
-from lightpaint.paint.layers.selection import selection_mask
+from lightpaint.paint.layers.layer_pixels import selection_mask
 from lightpaint.paint.session.picture_table import PictureTable
 from lightpaint.paint.session.session_state import offer_layers
 from lightpaint.paint.store.history_steps import Region

@@ -35,8 +35,7 @@ from lightpaint.paint.protocol import (
 from lightpaint.paint.server import client, server
 from lightpaint.paint.server.address import Address, Reach
 from lightpaint.paint.server.guard import Guard
-from lightpaint.paint.server.page_files import page_files
-from lightpaint.paint.server.server import page_app
+from lightpaint.paint.server.server import page_app, page_files
 from lightpaint.paint.server.session_clients import Connections
 
 DEFAULT_PORT = 8421

@@ -23,7 +23,7 @@ from lightpaint.lighting.answer.combination import dimmed
 from lightpaint.lighting.constraints.constraints import Constraints
 from lightpaint.lighting.fit import DEFAULT_HOLD
 from lightpaint.paint import protocol
-from lightpaint.paint.session.live_drives import LiveDrives
+from lightpaint.paint.session.live_answer import LiveDrives
 from lightpaint.paint.session.look_library import LookLibrary
 from lightpaint.paint.session.picture_table import PictureTable
 from lightpaint.paint.session.session import Session

@@ -26,7 +26,7 @@ from lightpaint.lighting.analysis.noise.noise_correction import correct_noise
 from lightpaint.paint import protocol, subject
 from lightpaint.paint.background_threads import SOLVE_DELAY_S
 from lightpaint.paint.protocol import Message
-from lightpaint.paint.session import page_planes, picture_table
+from lightpaint.paint.session import picture_table
 from lightpaint.paint.session.session import Session
 from lightpaint.paint.session.snapshot import SessionSnapshot
 from lightpaint.paint.session_access import Publisher
@@ -864,8 +864,8 @@ def test_planes_of_many_lights_reach_a_page_reduced(
     basis: lp.Basis, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """And so do denoised ones, while the answer is that of all pixels."""
-    monkeypatch.setattr(page_planes, "MAX_PAGE_VALUES", 3 * SIZE[0] * SIZE[1] // 4)
-    monkeypatch.setattr(page_planes, "MAX_OPENING_VALUES", 0)
+    monkeypatch.setattr(picture_table, "MAX_PAGE_VALUES", 3 * SIZE[0] * SIZE[1] // 4)
+    monkeypatch.setattr(picture_table, "MAX_OPENING_VALUES", 0)
     client = StudioClient(tmp_path, basis)
     try:
         state = client.wait(lambda m: m.kind == "state")
@@ -893,8 +893,8 @@ def test_the_scales_of_planes_are_found_once(
 ) -> None:
     """Every state has them, of all lights."""
     found = []
-    monkeypatch.setattr(page_planes, "scale_of", lambda plane: found.append(1) or 2.0)
-    assert [page_planes.plane_scale(basis, k) for k in (0, 1, 2, 3, 0)] == [2, 2, 2, 1, 2]
+    monkeypatch.setattr(picture_table, "scale_of", lambda plane: found.append(1) or 2.0)
+    assert [picture_table.plane_scale(basis, k) for k in (0, 1, 2, 3, 0)] == [2, 2, 2, 1, 2]
     assert len(found) == len(basis.lights)
 
 
@@ -902,7 +902,7 @@ def test_a_page_of_very_many_planes_opens_before_kept_ones_are_looked_for(
     basis: lp.Basis, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setenv("LIGHTPAINT_CACHE", str(tmp_path / "cache"))
-    monkeypatch.setattr(page_planes, "MAX_OPENING_VALUES", 0)
+    monkeypatch.setattr(picture_table, "MAX_OPENING_VALUES", 0)
     clean = DenoisedPlanes(
         (2 * basis.images).astype(np.float16), np.ones(len(basis.lights)), basis.current_look
     )

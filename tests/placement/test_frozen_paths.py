@@ -16,9 +16,8 @@ import lightpaint as lp
 from lightpaint.arrays import Floats, Position
 from lightpaint.errors import SceneError
 from lightpaint.images.pixel_blocks import block_mean
-from lightpaint.placement.paths.frozen_paths import FrozenPaths
+from lightpaint.placement.paths.frozen_paths import FrozenPaths, PathSums
 from lightpaint.placement.paths.panel_lights import PanelSite
-from lightpaint.placement.paths.path_sums import PathSums
 from lightpaint.placement.paths.view_paths import SearchPaths
 from lightpaint.scene.lights.new_emitter import NewEmitter
 from lightpaint.scene.properties.pose import Site

@@ -10,7 +10,7 @@ from renderer import write_room
 import lightpaint as lp
 from lightpaint.errors import ConstraintError, LightpaintError
 from lightpaint.lighting.constraints.constraints_file import constraints_of
-from lightpaint.placement.rigged_lights import freedoms_of
+from lightpaint.placement.applied_rigging import freedoms_of
 from lightpaint.placement.rigging import rigging_of
 from lightpaint.scene.lights.lights_file import read_lights_file
 from lightpaint.scene.scene import Scene

@@ -19,14 +19,13 @@ from lightpaint.errors import SceneError
 from lightpaint.lighting.constraints.constraints import Constraints
 from lightpaint.lighting.solution import Solution
 from lightpaint.lighting.solve import solve
-from lightpaint.placement import suggested_lights
-from lightpaint.placement.place import place
-from lightpaint.placement.placement import Placement
-from lightpaint.placement.suggested_lights import (
+from lightpaint.placement.place_search import (
     check_suggestible,
     emitter_xml,
+    place,
     suggest_lights,
 )
+from lightpaint.placement.placement import Placement
 from lightpaint.placement.suggestion import Suggestion
 from lightpaint.report.page.placement_section import spoken_suggestions, suggestion_section
 from lightpaint.scene.scene import Scene
@@ -137,7 +136,7 @@ def test_gains_of_a_display_fit_are_shares_of_its_last_linear_problem(
         placements.append(place(*arguments, **options))
         return placements[-1]
 
-    monkeypatch.setattr(suggested_lights, "place", recorded)
+    monkeypatch.setattr("lightpaint.placement.place_search.place", recorded)
     [first] = suggest_lights(scene, basis, solution, count=1)
     [light] = placements[0].additions
     # The search's film is that of the basis here: nothing is missed that it does not see but noise.

@@ -9,7 +9,7 @@ import pytest
 from command import run, run_refused, succeed
 from renderer import LIGHTS, write_room
 
-from lightpaint.colour.photometry import point_flux
+from lightpaint.colour.luminous_flux import point_flux
 from lightpaint.errors import SceneError
 from lightpaint.images.formats.exr import write_rgb
 from lightpaint.lighting.answer.lighting_file import read_lighting

@@ -29,7 +29,7 @@ from lightpaint.basis.render.render_origin import (
 )
 from lightpaint.display_text import some_names
 from lightpaint.errors import BasisError, SceneError
-from lightpaint.images.pixel_blocks import whole_factor
+from lightpaint.images import whole_factor
 from lightpaint.progress import Progress, silent
 from lightpaint.scene.scene import Scene
 from lightpaint.sentences import Hint

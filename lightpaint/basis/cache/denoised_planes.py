@@ -24,8 +24,7 @@ from lightpaint.basis.denoised_mixes import denoise_current_look, denoise_plane,
 from lightpaint.basis.planes import mix
 from lightpaint.errors import LightpaintError
 from lightpaint.files import replacing
-from lightpaint.images.denoiser import denoiser_text, oidn_is_installed
-from lightpaint.images.pixel_blocks import block_mean, blocks_in, resampled
+from lightpaint.images import block_mean, blocks_in, denoiser_text, oidn_is_installed, resampled
 from lightpaint.progress import with_progress
 from lightpaint.threads import parallel_map
 

@@ -43,9 +43,18 @@ from lightpaint.basis.planes import IndirectLight, Planes, as_planes
 from lightpaint.errors import BasisError, ImageError, LightpaintError
 from lightpaint.file_reading import file_length
 from lightpaint.files import one_line
-from lightpaint.images.formats.exr import Channels, ExrPart, read_headers, read_parts
-from lightpaint.images.formats.exr_rows import PartLayout, RowFile, RowsUnsupportedError
-from lightpaint.images.formats.exr_streams import PartHead, room_for, write_streamed
+from lightpaint.images.formats import (
+    Channels,
+    ExrPart,
+    PartHead,
+    PartLayout,
+    RowFile,
+    RowsUnsupportedError,
+    read_headers,
+    read_parts,
+    room_for,
+    write_streamed,
+)
 from lightpaint.keywords import keywords
 from lightpaint.progress import with_progress
 from lightpaint.storage.json_records import fields_of, read_record, strict_json

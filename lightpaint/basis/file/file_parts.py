@@ -28,10 +28,8 @@ from lightpaint.basis.lights import BasisLight, free_name
 from lightpaint.basis.planes import Planes
 from lightpaint.errors import BasisError
 from lightpaint.files import one_line
-from lightpaint.images.denoiser import Features
-from lightpaint.images.estimate import HALF_DIFFERENCE
-from lightpaint.images.formats.exr import Channels, ExrPart, rgb_channels
-from lightpaint.images.object_map import Objects
+from lightpaint.images import HALF_DIFFERENCE, Features, Objects
+from lightpaint.images.formats import Channels, ExrPart, rgb_channels
 from lightpaint.storage.json_records import fields_of, read_record, strict_json
 
 VISIBLE_EMITTERS_PART = "emitters seen"

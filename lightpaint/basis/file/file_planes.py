@@ -20,7 +20,7 @@ import numpy.typing as npt
 
 from lightpaint.arrays import Doubles, Floats, Indices
 from lightpaint.basis.planes import MemoryPlanes, Planes, PlanesBase, as_slice, mix
-from lightpaint.images.formats.exr_rows import PartLayout, RowFile
+from lightpaint.images.formats import PartLayout, RowFile
 from lightpaint.threads import parallel_map
 
 #: Bytes of recently read strips of rows of some planes that are kept, and the number of these

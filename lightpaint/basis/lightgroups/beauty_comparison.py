@@ -7,7 +7,7 @@ import numpy as np
 
 from lightpaint.arrays import Floats
 from lightpaint.basis.lightgroups.render_layers import RenderLayer
-from lightpaint.colour.color import LUMINANCE
+from lightpaint.colour import LUMINANCE
 
 #: Share of the beauty that may be missing beyond rounding without being reported.
 NEGLIGIBLE_SHARE = 1e-5

@@ -19,9 +19,8 @@ from lightpaint.display_text import some_names
 from lightpaint.errors import BasisError
 from lightpaint.file_reading import read_bytes
 from lightpaint.files import one_line
-from lightpaint.images.formats.exr import ExrPart
-from lightpaint.images.formats.exr_layers import channel_named
-from lightpaint.images.object_map import BACKGROUND, Objects
+from lightpaint.images import BACKGROUND, Objects
+from lightpaint.images.formats import ExrPart, channel_named
 
 #: Attributes `cryptomatte/<key>/<field>`.
 ATTRIBUTE = re.compile(r"cryptomatte/(?P<key>[^/]+)/(?P<field>name|manifest|manif_file)")

@@ -14,7 +14,7 @@ from lightpaint.arrays import Floats
 from lightpaint.basis.lightgroups.beauty_comparison import rounding
 from lightpaint.basis.lightgroups.naming_conventions import SEPARATORS, is_known
 from lightpaint.basis.lightgroups.render_layers import RenderLayer
-from lightpaint.images.denoiser import Features
+from lightpaint.images import Features
 
 #: Names in lower case, without the view layer and with spaces for underscores; best first.
 ALBEDO_NAMES = (

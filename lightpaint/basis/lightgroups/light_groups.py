@@ -31,7 +31,7 @@ from lightpaint.basis.lightgroups.naming_conventions import convention_of
 from lightpaint.basis.lightgroups.render_layers import RenderFile, RenderLayer, read_render
 from lightpaint.basis.lights import BasisLight, Lights, free_name
 from lightpaint.basis.planes import IndirectLight, Planes, as_planes
-from lightpaint.colour.color import LUMINANCE
+from lightpaint.colour import LUMINANCE
 from lightpaint.display_text import short_repr, some_names
 from lightpaint.errors import BasisError
 from lightpaint.keywords import keywords

@@ -19,21 +19,25 @@ from lightpaint.arrays import Floats
 from lightpaint.basis.file.basis_file import FORMAT_KEY
 from lightpaint.basis.lightgroups.cryptomatte import declared_mattes, objects_of
 from lightpaint.basis.lightgroups.naming_conventions import is_known, short_names
-from lightpaint.colour.primaries import are_same, converted, to_rec709
+from lightpaint.colour import are_same, converted, to_rec709
 from lightpaint.display_text import some_names
 from lightpaint.errors import BasisError, ImageError
-from lightpaint.images.estimate import HALF_DIFFERENCE
-from lightpaint.images.formats.exr import OWN, ExrPart, read_channels, read_headers, read_parts
-from lightpaint.images.formats.exr_layers import (
+from lightpaint.images import HALF_DIFFERENCE, Objects
+from lightpaint.images.formats import (
     ALPHA_NAMES,
     KRITA_LAYERS,
+    OWN_PREFIX,
+    ExrPart,
     channel_named,
     colour_channels,
+    head_of,
+    kind_of,
     primaries_of,
+    read_channels,
+    read_headers,
+    read_parts,
     vector_channels,
 )
-from lightpaint.images.formats.file_kinds import head_of, kind_of
-from lightpaint.images.object_map import Objects
 
 #: Maximum number of files in a folder of light groups: more are probably frames of a film.
 MAX_FILES = 1000
@@ -316,7 +320,7 @@ def _reason_against(file: Path, others: Sequence[Path]) -> str:
         channels = read_channels(file)
     except ImageError:
         return ""  # Reading it reports the error.
-    if any(key.startswith(OWN) for header in headers for key in header):
+    if any(key.startswith(OWN_PREFIX) for header in headers for key in header):
         return "made by lightpaint"
     if any(name.startswith(f"{HALF_DIFFERENCE}.") for name in channels):
         return "made by lightpaint"

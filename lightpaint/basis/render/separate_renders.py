@@ -15,7 +15,7 @@ from lightpaint.arrays import RGB, Bools, Floats
 from lightpaint.basis.basis import Basis
 from lightpaint.basis.render.integrators import depth_limit
 from lightpaint.basis.render.render_budget import PASS_DIVISOR, Budget, Clock, Keeper, next_pair
-from lightpaint.images.pixel_blocks import block_mean
+from lightpaint.images import block_mean
 from lightpaint.progress import Interrupted, Progress
 from lightpaint.scene.runtime.render_lock import MITSUBA, tracing
 from lightpaint.scene.runtime.variant import use_variant

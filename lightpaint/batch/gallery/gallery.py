@@ -40,11 +40,11 @@ from lightpaint.batch.plan.plan import PlaceGroup, Plan, PlannedLook, PlanStep
 from lightpaint.batch.work.task import Kind, Task
 from lightpaint.display_text import visible
 from lightpaint.files import write_bytes, write_text
-from lightpaint.images.formats.png import png_bytes
+from lightpaint.images.formats import png_bytes
 from lightpaint.pipeline.job.job import Job
 from lightpaint.pipeline.job.sources import BasisFile, GroupsFile, SceneFile
 from lightpaint.pipeline.results.placement_changes import hung_of
-from lightpaint.placement.placement import PlacementRecord
+from lightpaint.placement import PlacementRecord
 from lightpaint.report.comparison import shorten_to_width
 from lightpaint.report.page.html import html
 from lightpaint.report.rig.hung_lights import LightChange

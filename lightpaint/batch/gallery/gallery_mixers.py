@@ -22,7 +22,7 @@ from lightpaint.batch.manifest.file_names import THUMBNAILS
 from lightpaint.batch.work.item_execution import job_fields
 from lightpaint.batch.work.task import Task
 from lightpaint.batch.work.worker_storage import WorkerCache
-from lightpaint.colour.display.view_transform import ViewTransform
+from lightpaint.colour import ViewTransform
 from lightpaint.errors import LightpaintError
 from lightpaint.file_reading import read_text
 from lightpaint.files import write_text

@@ -19,15 +19,11 @@ from lightpaint.batch.manifest.file_names import SUMMARY_FORMAT, THUMBNAILS
 from lightpaint.batch.plan.journal import JournalLine
 from lightpaint.batch.plan.plan import Plan, PlannedLook
 from lightpaint.batch.work.task import EXPORT, Kind
-from lightpaint.colour.display.exposure import choose_exposure
-from lightpaint.colour.display.view_transform import ViewTransform
-from lightpaint.colour.srgb import to_8_bit
+from lightpaint.colour import ViewTransform, choose_exposure, to_8_bit
 from lightpaint.errors import LightpaintError
 from lightpaint.file_reading import read_text
 from lightpaint.files import replacing
-from lightpaint.images.denoiser import denoised
-from lightpaint.images.estimate import read_estimate
-from lightpaint.images.pixel_blocks import block_mean, fitting_factor
+from lightpaint.images import block_mean, denoised, fitting_factor, read_estimate
 from lightpaint.lighting.answer.lighting_file import read_lighting
 from lightpaint.photometry.measuring_plane import plane_title
 from lightpaint.photometry.readings_file import PLANES

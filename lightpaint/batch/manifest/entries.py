@@ -34,7 +34,7 @@ from lightpaint.batch.manifest.keys import (
 from lightpaint.batch.manifest.manifest import Manifest, Table
 from lightpaint.batch.manifest.sequence import frame_position
 from lightpaint.batch.manifest.variations import SHIFTED_WORDS
-from lightpaint.colour.display.view_transform import TransformChoice
+from lightpaint.colour import TransformChoice
 from lightpaint.display_text import some_names
 from lightpaint.errors import BatchError, LightpaintError
 from lightpaint.files import is_name

@@ -9,8 +9,7 @@ import numpy as np
 from lightpaint.arrays import Doubles
 from lightpaint.batch.manifest.keys import Space
 from lightpaint.batch.manifest.variations import with_emission
-from lightpaint.colour.color import cct_and_duv, kelvin_to_rgb, luminance
-from lightpaint.colour.hue_names import WHITE_DUV
+from lightpaint.colour import WHITE_DUV, cct_and_duv, kelvin_to_rgb, luminance
 from lightpaint.display_text import some_names
 from lightpaint.errors import LightingError
 from lightpaint.lighting.answer.lighting import Lighting, LightSetting

@@ -7,8 +7,7 @@ from math import ceil
 import numpy as np
 
 from lightpaint.arrays import RGB
-from lightpaint.colour.color import kelvin_to_rgb, luminance
-from lightpaint.colour.photometry import photometry
+from lightpaint.colour import kelvin_to_rgb, luminance, photometry
 from lightpaint.errors import BatchError
 from lightpaint.lighting.answer.lighting import Lighting, LightSetting
 from lightpaint.lighting.constraints.constraints import Constraints

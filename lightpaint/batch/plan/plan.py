@@ -17,7 +17,7 @@ from lightpaint.batch.work.work_items import SAMPLE_S, render_seconds
 from lightpaint.batch.work.worker_storage import WorkerCache
 from lightpaint.display_text import some_names
 from lightpaint.errors import BatchError, LightpaintError
-from lightpaint.placement.placement import PlacementRecord, read_placement
+from lightpaint.placement import PlacementRecord, read_placement
 
 
 @dataclass(frozen=True)

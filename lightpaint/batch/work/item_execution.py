@@ -34,7 +34,7 @@ from lightpaint.batch.work.work_items import (
 from lightpaint.batch.work.worker_storage import WorkerCache
 from lightpaint.errors import LightpaintError
 from lightpaint.files import first_line, one_line
-from lightpaint.images.estimate import Estimate
+from lightpaint.images import Estimate
 from lightpaint.lighting.answer.lighting import Lighting
 from lightpaint.lighting.answer.lighting_file import read_lighting
 from lightpaint.lighting.fit import Fit
@@ -52,7 +52,7 @@ from lightpaint.pipeline.relit_renders import relight_look, relit_folder
 from lightpaint.pipeline.results.answer_folder import new_answer
 from lightpaint.pipeline.results.result_folder import ResultFolder
 from lightpaint.pipeline.results.results import view_names
-from lightpaint.placement.placement import record_of
+from lightpaint.placement import record_of
 from lightpaint.progress import Listener
 from lightpaint.relit.exported_answer import Source
 from lightpaint.relit.formats import names_of_forms, write_content, writers_of

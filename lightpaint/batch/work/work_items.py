@@ -10,7 +10,7 @@ from typing import Any, Literal, Protocol
 
 from lightpaint.basis.render.render_parts import Part
 from lightpaint.batch.manifest.keys import Final
-from lightpaint.colour.spectra.observer import Observer
+from lightpaint.colour import Observer
 from lightpaint.lighting.fit import Emitters
 from lightpaint.pipeline.job.sources import Painting, SceneFile, vars_of
 from lightpaint.scene.quality_presets import Quality

@@ -31,9 +31,9 @@ from lightpaint.batch.work.work_items import (
 )
 from lightpaint.errors import BasisError, OutputError
 from lightpaint.files import first_line
-from lightpaint.images.estimate import read_estimate
+from lightpaint.images import read_estimate
 from lightpaint.pipeline.job.sources import BasisFile, GroupsFile, SceneFile
-from lightpaint.placement.placement import read_placement
+from lightpaint.placement import read_placement
 from lightpaint.scene.quality_presets import on_film
 from lightpaint.scene.runtime.render_lock import tracing
 from lightpaint.scene.scene import Scene

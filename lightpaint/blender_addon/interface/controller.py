@@ -13,13 +13,11 @@ from typing import Any
 import bpy
 from bpy.app.handlers import persistent
 
-from ..lamps.lamp_drives import discard_drives
-from ..lamps.lamp_levels import PREVIEWS, discard_levels, grouped_places
+from ..lamps.lamp_levels import PREVIEWS, discard_drives, discard_levels, grouped_places
 from ..lamps.memory import recall, remember
-from ..painter.program import find_program
+from ..painter.program import find_program, plain_options, view_options
 from ..shot.cycles_render import RENDERING, ShotRender, put_back_output
 from ..shot.shot_home import home, move_image_paths, shot_folder
-from ..shot.view_options import plain_options, view_options
 from .live_session import LiveSession
 
 #: Seconds between two looks at what has happened.

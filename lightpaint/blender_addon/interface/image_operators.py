@@ -6,10 +6,10 @@ import os
 import bpy
 from bpy_extras.io_utils import ImportHelper
 
+from ..painter.program import plain_options, view_options
 from ..painter.solves import AREAS, BackgroundWork, make_template, solve_like, solve_picture
 from ..shot.image_files import edited_image, image_file
 from ..shot.shot_home import shot_folder
-from ..shot.view_options import plain_options, view_options
 from .controller import controller, ocio_path
 from .live_session import show_preview
 from .shot_operators import ShotOperator, begin_shot

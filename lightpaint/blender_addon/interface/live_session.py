@@ -9,20 +9,19 @@ import json
 
 import bpy
 
-from ..lamps.lamp_drives import show_drives
 from ..lamps.lamp_levels import (
     PREVIEWS,
     grouped_places,
     named_places,
     place_names,
+    show_drives,
     show_factors,
 )
+from ..lamps.lamp_units import working_space
 from ..lamps.memory import recall, remember
-from ..lamps.working_space import working_space
-from ..painter.painter_link import PainterLink
+from ..painter.painter_link import PainterLink, checked_address
 from ..painter.painter_messages import MessageError, PainterState
 from ..painter.program import ProgramRun, paint_arguments, running_painter
-from ..painter.socket_client import checked_address
 
 #: Words in errors of the painter that ask for another start: the session is of a picture of another
 #: size, or of other lights; or OpenColorIO, for Blender's own view, is not installed with it.

@@ -8,7 +8,7 @@ from ..lamps.lamp_levels import PREVIEWS
 from ..lamps.memory import recall
 from ..shot.shot_home import is_kept, shot_folder
 from .controller import controller
-from .level_operators import known_looks
+from .shot_operators import known_looks
 
 #: Reasons that are listed at most; the rest is counted.
 MAX_REASONS = 8

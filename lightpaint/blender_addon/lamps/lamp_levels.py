@@ -1,18 +1,35 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Multipliers of light groups, set in lamps: a preview until they are applied.
+"""Multipliers of light groups, set in lamps: a preview until they are applied; and their drives.
 
 The owner of each level remembers four: `original`, before lightpaint changed anything; `base`, as
 rendered; `kept`, to which a discarded preview returns; and `last`, which the add-on has set last.
 Somebody who changes a lamp by hand makes a new `kept`.
+
+Drives of the emitters that mix a light, 0 to 1, are for scripts, drivers and exporters. Each lamp,
+material or world of a light group whose lamp has emitters in the lights file carries them as a
+custom property, {"red": 0.4, "white": 1.0}, beside the levels that they give.
 """
 
-from .emission_places import LampEmission, NodeEmission, PlainColour, action_curves, remove_curves
 from .lamp_units import are_equal
-from .lit_items import KEYED, emitters
+from .lit_items import (
+    KEYED,
+    LampEmission,
+    NodeEmission,
+    PlainColour,
+    action_curves,
+    emitters,
+    remove_curves,
+)
 from .memory import recall, remember
 
 #: Key of a scene's memory: whether the lamps show a preview.
 PREVIEWS = "is_preview"
+
+#: Name of the custom property.
+DRIVES_KEY = "lightpaint_drives"
+
+#: Key of an owner's memory with the drives that a discarded preview returns to.
+KEPT = "drives"
 
 
 def grouped_places(scene, view_layer):
@@ -86,7 +103,7 @@ def show_factors(groups, factors, space=None):
     """Set levels to multiples of what was rendered. Return the number of places that changed.
 
     factors: multipliers of red, green and blue by name of group; groups without one stay. space:
-    the working space of the file, see working_space.py.
+    the working space of the file, see lamp_units.py.
     """
     changed = 0
     for name, places in groups.items():
@@ -206,3 +223,47 @@ def _store(place, slot):
     memory = recall(place.owner)
     memory.setdefault("slots", {})[place.slot] = slot
     remember(place.owner, memory)
+
+
+def show_drives(groups, drives):
+    """Write drives by name of group and emitter; groups without any lose what they had."""
+    for name, places in groups.items():
+        for place in places:
+            _set(place.owner, drives.get(name, {}))
+
+
+def keep_drives(groups):
+    """Make the drives that are shown be the ones that a discarded preview returns to."""
+    for places in groups.values():
+        for place in places:
+            memory = recall(place.owner)
+            if (shown := _shown(place.owner)) or KEPT in memory:
+                remember(place.owner, {**memory, KEPT: shown})
+
+
+def discard_drives(groups):
+    """Put back the drives of before the preview."""
+    for places in groups.values():
+        for place in places:
+            _set(place.owner, recall(place.owner).get(KEPT, {}))
+
+
+def forget_drives(owner):
+    """Remove the drives of a piece of data."""
+    _set(owner, {})
+
+
+def _shown(owner):
+    found = owner.get(DRIVES_KEY)
+    # Blender returns a group of properties.
+    plain = found.to_dict() if hasattr(found, "to_dict") else found
+    return dict(plain) if plain else {}
+
+
+def _set(owner, drives):
+    if _shown(owner) == drives:
+        return
+    if drives:
+        owner[DRIVES_KEY] = dict(drives)
+    elif DRIVES_KEY in owner:
+        del owner[DRIVES_KEY]

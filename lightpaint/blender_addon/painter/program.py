@@ -9,7 +9,7 @@ import subprocess
 import threading
 from pathlib import Path
 
-from .socket_client import checked_address, is_loopback
+from .painter_link import checked_address, is_loopback
 
 #: How to install it, for messages.
 INSTALL_TEXT = (
@@ -25,6 +25,9 @@ MAX_LINES = 200
 
 #: Variables by which Blender's own Python would disturb that of lightpaint.
 BLENDER_VARIABLES = ("PYTHONPATH", "PYTHONHOME", "PYTHONSTARTUP", "LD_PRELOAD")
+
+#: Blender's views that lightpaint has its own curve for, if OpenColorIO is not installed with it.
+OWN_CURVES = {"Standard": "srgb", "Filmic": "filmic", "AgX": "agx", "Raw": "linear"}
 
 
 def find_program(chosen=""):
@@ -144,3 +147,23 @@ def running_painter(session):
     except (OSError, ValueError, KeyError, TypeError, RecursionError):
         pass
     return None
+
+
+def view_options(scene, config):
+    """Return options that show pictures as Blender does, and the environment they need.
+
+    config: path of Blender's OpenColorIO configuration; "" if it is not known.
+    """
+    settings = scene.view_settings
+    exposure = [f"--exposure={settings.exposure:g}"]
+    if config and os.path.exists(config):
+        view = f"ocio:{scene.display_settings.display_device}/{settings.view_transform}"
+        return ["--view", view, *exposure], {"OCIO": config}
+    return plain_options(scene), {}
+
+
+def plain_options(scene):
+    """Return options with lightpaint's own curve that is next to Blender's."""
+    settings = scene.view_settings
+    curve = OWN_CURVES.get(settings.view_transform, "srgb")
+    return ["--view", curve, f"--exposure={settings.exposure:g}"]

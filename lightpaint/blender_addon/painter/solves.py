@@ -8,9 +8,9 @@ import time
 import traceback
 
 from ..lamps.lamp_units import checked_factor
+from .painter_link import SocketClient
 from .painter_messages import PROTOCOL_VERSION, PainterState, from_bytes, to_bytes
 from .program import ProgramRun
-from .socket_client import SocketClient
 
 #: Seconds after which a solve is given up.
 SOLVE_S = 1800.0

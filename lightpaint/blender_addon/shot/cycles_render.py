@@ -1,7 +1,15 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Renders a shot by Cycles into its folder, and leaves the scene's output settings as they were."""
+"""Renders a shot by Cycles into its folder, and leaves the scene's output settings as they were.
 
+A digest says what a render depends on, so that nothing is rendered twice. It reads every property
+of every datablock that the scene uses, and the points and faces of meshes. What it cannot see (a
+simulation's cache, a picture that is painted and not saved) may change a render without changing
+the digest: *Render again* is for that.
+"""
+
+import array
 import hashlib
+import os
 
 import bpy
 
@@ -13,7 +21,6 @@ from ..lamps.lamp_levels import (
     rendered_levels,
 )
 from ..lamps.memory import recall, remember
-from .scene_digest import scene_digest
 
 #: Settings while a shot is rendered: groups and whole picture alike, in one file, nothing behind.
 SETTINGS = (
@@ -32,6 +39,121 @@ SETTINGS = (
 
 #: Key of a scene's memory with the settings to put back.
 RENDERING = "rendering"
+
+#: Properties that say how Blender shows something, or what it is called this time.
+IGNORED = frozenset(
+    [
+        "rna_type",
+        "bl_rna",
+        "name_full",
+        "session_uid",
+        "tag",
+        "users",
+        "select",
+        "location_absolute",
+        "width",
+        "height",
+        "dimensions",
+        "preview",
+        "asset_data",
+        "library_weak_reference",
+        "original",
+        "use_fake_user",
+        "use_extra_user",
+        "active_index",
+        "active_material_index",
+        "animation_visualization",
+        "image_settings",
+        "filepath_raw",
+        "lightgroups",
+        "layer_collection",
+        "active_lightgroup",
+        "lightgroup",
+        "active_lightgroup_index",
+        "tool_settings",
+        "depsgraph",
+        "sequence_editor",
+        "bake",
+        "ffmpeg",
+        "view_center",
+        "bindcode",
+        "cursor",
+        "active_layer_collection",
+        "keying_sets",
+        "keying_sets_all",
+        "display",
+        "shading",
+        "grease_pencil",
+        "engine",
+        "filepath",
+        "color_tag",
+        "lightpaint_settings",
+        "parent_type",
+        "id_data",
+        "node",
+        "socket",
+        "modifier",
+        "motion_path",
+        "hide_viewport",
+        "view_layers",
+        "active",
+        "objects_active",
+        "selected_objects",
+        "location",
+        "rotation_euler",
+        "scale",
+        "frame_start",
+        "frame_end",
+        "frame_step",
+        "fps",
+        "users_collection",
+        "users_scene",
+        "active_input",
+        "active_output",
+        "cycles_visibility",
+        "transform_orientation_slots",
+        "mode",
+        "use_select",
+        "active_view_transform",
+        "active_clip",
+        "rigidbody_world",
+    ]
+)
+
+#: Collections that repeat what others have, or that say nothing about a render.
+SKIPPED_COLLECTIONS = frozenset(
+    [
+        "edges",
+        "attributes",
+        "loop_triangles",
+        "loop_triangle_polygons",
+        "vertex_colors",
+        "color_attributes",
+        "edge_creases",
+        "vertex_creases",
+        "corner_normals",
+        "vertex_normals",
+        "polygon_normals",
+        "sculpt_vertex_colors",
+        "skin_vertices",
+        "polygon_layers_int",
+        "vertex_layers_int",
+        "timeline_markers",
+        "all_objects",
+        "children_recursive",
+        "render_slots",
+        "packed_files",
+        "views",
+        "stereo_views",
+        "selected_objects",
+        "id_properties",
+        "view_layers",
+        "keying_sets",
+    ]
+)
+
+#: Pointers to these lead out of what is rendered.
+OUTSIDE = ("Screen", "WindowManager", "Workspace", "WorkSpace", "Text", "Brush", "Library")
 
 
 def shot_digest(scene, view_layer, groups):
@@ -129,3 +251,120 @@ def _resolve(scene, name):
     for part in holders:
         holder = getattr(holder, part, None)
     return holder, attribute
+
+
+def scene_digest(scene, view_layer):
+    """Return a digest of a scene as a view layer of it is rendered now."""
+    digest = hashlib.sha256(f"{bpy.app.version_string} {view_layer.name}".encode())
+    reader = _SceneReader(digest)
+    reader.read(view_layer)
+    reader.waiting.append(scene)
+    while reader.waiting:
+        owner = reader.waiting.pop()
+        reader.read(owner)
+        if isinstance(owner, bpy.types.Object):
+            digest.update(repr([list(row) for row in owner.matrix_world]).encode())
+        if isinstance(owner, bpy.types.Image):
+            digest.update(_file_state(owner.filepath, owner.library).encode("utf-8", "replace"))
+    return digest.hexdigest()
+
+
+class _SceneReader:
+    """Adds pieces of data to a digest, each once, and collects datablocks that they point to."""
+
+    def __init__(self, digest):
+        self.waiting, self._digest, self._seen = [], digest, set()
+
+    def read(self, struct):
+        """Add all properties of a piece of data."""
+        key = (type(struct).__name__, struct.as_pointer())
+        if key in self._seen:
+            return
+        self._seen.add(key)
+        self._add(type(struct).__name__, getattr(struct, "name", ""))
+        if isinstance(struct, bpy.types.Mesh):
+            self._read_mesh(struct)
+        for prop in struct.bl_rna.properties:
+            name = prop.identifier
+            is_plain = prop.type not in ("POINTER", "COLLECTION")
+            if name.startswith("uv_layer") and name != "uv_layers":
+                continue  # the active one and the like
+            is_shown = name.startswith("show_") and name != "show_render"
+            if name in IGNORED or is_shown or (is_plain and prop.is_readonly):
+                continue
+            try:
+                value = getattr(struct, name)
+            except (AttributeError, RuntimeError, TypeError, ValueError):
+                continue
+            self._read_value(struct, name, prop, value)
+
+    def _read_value(self, struct, name, prop, value):
+        if prop.type == "POINTER":
+            self._follow(name, value)
+        elif prop.type == "COLLECTION":
+            if name == "links" and isinstance(struct, bpy.types.NodeTree):
+                self._add(name, sorted(map(_ends, value)))
+            elif name not in SKIPPED_COLLECTIONS and not _is_read_at_once(struct, name):
+                self._add(name, len(value))
+                for item in value:
+                    self._follow(name, item)
+        elif getattr(prop, "is_array", False):
+            self._add(name, _plain(value))
+        else:
+            self._add(name, sorted(value) if isinstance(value, set) else value)
+
+    def _follow(self, name, value):
+        """Add what a property points to: datablocks by name and later, parts at once."""
+        if value is None or type(value).__name__ in OUTSIDE:
+            return
+        if isinstance(value, bpy.types.ID) and not getattr(value, "is_embedded_data", False):
+            self._add(name, value.name_full)
+            self.waiting.append(value)
+        else:
+            self.read(value)
+
+    def _read_mesh(self, mesh):
+        for name, (attribute, count, kind) in MESH_ARRAYS.items():
+            self._add_numbers(getattr(mesh, name), attribute, count, kind)
+        for layer in mesh.uv_layers:
+            self._add_numbers(layer.data, "uv", 2, "f")
+
+    def _add_numbers(self, collection, attribute, count, kind):
+        numbers = array.array(kind, [0]) * (len(collection) * count)
+        collection.foreach_get(attribute, numbers)
+        self._digest.update(numbers.tobytes())
+
+    def _add(self, name, value):
+        self._digest.update(f"{name}={value!r};".encode("utf-8", "replace"))
+
+
+#: Collections of a mesh that are read at once: an attribute, how many numbers it has, their type.
+MESH_ARRAYS = {
+    "vertices": ("co", 3, "f"),
+    "polygons": ("material_index", 1, "i"),
+    "loops": ("vertex_index", 1, "i"),
+}
+
+
+def _is_read_at_once(struct, name):
+    return isinstance(struct, bpy.types.Mesh) and (name in MESH_ARRAYS or name == "uv_layers")
+
+
+def _ends(link):
+    """Return what a link connects; the order of links depends on when they were made."""
+    sockets = (link.from_node, link.from_socket), (link.to_node, link.to_socket)
+    return [(node.name, socket.identifier) for node, socket in sockets]
+
+
+def _plain(value):
+    """Return an array of any dimension as lists."""
+    return [_plain(x) for x in value] if hasattr(value, "__len__") else value
+
+
+def _file_state(path, library):
+    """Return size and time of a picture's file."""
+    try:
+        state = os.stat(bpy.path.abspath(path, library=library))
+    except (OSError, ValueError):
+        return path
+    return f"{path} {state.st_size} {state.st_mtime_ns}"

@@ -4,8 +4,7 @@
 import bpy
 
 from ..lamps.grouping import assign_groups, clear_others, plan_groups
-from ..lamps.lamp_drives import forget_drives
-from ..lamps.lamp_levels import put_back_levels, remove_keys
+from ..lamps.lamp_levels import forget_drives, put_back_levels, remove_keys
 from ..lamps.memory import forget, owners_with_memory, recall, remember
 
 #: Passes that denoise the painter's pictures, and the mattes that it selects objects by.

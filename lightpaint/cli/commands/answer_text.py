@@ -13,7 +13,7 @@ from lightpaint.basis.lights import BasisLight
 from lightpaint.cli.output import terminal
 from lightpaint.cli.output.tables import spoken_agreement
 from lightpaint.cli.output.vocabulary import BY_OPTION, spoken
-from lightpaint.colour.color import LUMINANCE, luminance, rgb_to_hex
+from lightpaint.colour import LUMINANCE, luminance, rgb_to_hex
 from lightpaint.display_text import some_names, some_of
 from lightpaint.lighting.analysis.appearance.constraint_kinds import KEYS_BY_KIND
 from lightpaint.lighting.analysis.appearance.limiting_reasons import Reason

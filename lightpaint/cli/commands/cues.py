@@ -12,8 +12,7 @@ from lightpaint.cli.options.console_options import RigFile
 from lightpaint.dmx.console_rig import ConsoleRig
 from lightpaint.dmx.pan_tilt import aimed_rig, directions_of
 from lightpaint.errors import LightingError
-from lightpaint.paint.store.database import SESSION_FILE
-from lightpaint.paint.store.kept_looks import read_kept_looks
+from lightpaint.paint import SESSION_FILE, read_kept_looks
 from lightpaint.relit.export.cue_list import Cue, cue_list_csv
 from lightpaint.scene.properties.site import unit
 

@@ -12,14 +12,10 @@ from typing import TYPE_CHECKING, Any
 
 from lightpaint.cli.output import lines, terminal
 from lightpaint.cli.output.lines import CommandOutcome, output_mode
-from lightpaint.colour.display.view_transform import TransformChoice
+from lightpaint.colour import TransformChoice
 from lightpaint.errors import LightpaintError, OutputError
 from lightpaint.lighting.constraints.constraints import Constraints
-from lightpaint.paint.server.address import Reach
-from lightpaint.paint.store.session_requests import (
-    DEFAULT_NEAR,
-    SessionRequests,
-)
+from lightpaint.paint import DEFAULT_NEAR, Reach, SessionRequests
 from lightpaint.pipeline.job.settings import Settings
 from lightpaint.pipeline.job.sources import BasisFile, GroupsFile, SceneFile
 from lightpaint.sentences import Hint
@@ -27,10 +23,7 @@ from lightpaint.sentences import Hint
 if TYPE_CHECKING:
     from lightpaint.dmx.console_rig import ConsoleRig
     from lightpaint.dmx.network.console_target import ConsoleTarget
-    from lightpaint.paint.server.server import Server
-    from lightpaint.paint.store.session_requests import SessionRequests
-    from lightpaint.paint.studio.console_switch import Console
-    from lightpaint.paint.subject import Subject
+    from lightpaint.paint import Console, Server, SessionRequests, Subject
 
 #: The risk of an address that others can reach.
 RISK = (
@@ -66,8 +59,7 @@ def paint(
     console: the file of a rig, and the arguments of `_console`.
     """
     # The server and the session file import much that no other command needs.
-    from lightpaint.paint.server.server import check_installed
-    from lightpaint.paint.subject_factory import make_subjects
+    from lightpaint.paint import check_installed, make_subjects
 
     check_installed()
     if console is not None and settings.spectral:
@@ -118,7 +110,7 @@ def _console(
 ) -> "Console":
     """Return the console of a rig, and say what it will send to. Nothing is sent yet."""
     from lightpaint.dmx.network.console_link import PRIORITY, ConsoleLink, link_address
-    from lightpaint.paint.studio.console_switch import Console
+    from lightpaint.paint import Console
 
     if target is None:
         return Console(fixtures)
@@ -139,7 +131,7 @@ def _serve(
     console: "Console | None",
 ) -> CommandOutcome:
     """Serve the painter until its end."""
-    from lightpaint.paint.launch import paint_in_browser
+    from lightpaint.paint import paint_in_browser
 
     name, folder, addresses = subjects[0].name, subjects[0].folder, []
 
@@ -223,7 +215,7 @@ def command_for_paintings(
     for sensor, path in paintings.items():
         words.append(f"--target {quote(f'{sensor}={path}')}" if sensor else quote(path))
     if requests.placed:
-        from lightpaint.paint.subject import places_path
+        from lightpaint.paint import places_path
 
         folder = Path(next(iter(paintings.values()))).parent
         words.append(f"--places {quote(str(places_path(folder)))}")

@@ -14,7 +14,7 @@ from lightpaint.cli.options.job_options import folders_of, is_folder
 from lightpaint.cli.output import documents, tables, terminal
 from lightpaint.cli.output.lines import CommandOutcome
 from lightpaint.cli.output.vocabulary import from_any_folder
-from lightpaint.colour.display.view_transform import ViewTransform
+from lightpaint.colour import ViewTransform
 from lightpaint.demo import write_demo
 from lightpaint.errors import BackendError, OutputError
 from lightpaint.files import check_files, check_name, check_writable

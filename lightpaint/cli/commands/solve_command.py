@@ -16,7 +16,7 @@ from lightpaint.pipeline.frame_pictures import frames_to_write, relight_frames
 from lightpaint.pipeline.job.job import Job, PaintedView
 from lightpaint.pipeline.pipeline import run
 from lightpaint.pipeline.results.results import Look
-from lightpaint.placement.placement import PlacementRecord, record_of
+from lightpaint.placement import PlacementRecord, record_of
 from lightpaint.relit.export.exports import EXPORTS
 from lightpaint.report.page.placement_section import spoken_turn
 

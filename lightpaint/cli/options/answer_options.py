@@ -7,7 +7,7 @@ from typing import Any, get_args
 from lightpaint.batch.run_options import RunOptions
 from lightpaint.cli.options import arguments
 from lightpaint.cli.options.option_groups import add_fields, add_output, add_view_transform
-from lightpaint.colour.emitter_preference import Preference
+from lightpaint.colour import Preference
 from lightpaint.pipeline.job.settings import Settings
 
 #: Names of the variations.

@@ -177,9 +177,9 @@ def new_light(text: str) -> dict[str, Any]:
         raise argparse.ArgumentTypeError(
             f"{text!r} is not KIND, KIND:2 or KIND:2@WHERE, like spot:2@ceiling"
         )
-    from lightpaint.placement.rigging import KINDS
+    from lightpaint.placement import LIGHT_KINDS
 
-    table: dict[str, Any] = {"kind" if kind in KINDS else "like": kind.strip()}
+    table: dict[str, Any] = {"kind" if kind in LIGHT_KINDS else "like": kind.strip()}
     table |= {"count": parse_whole_number(count)} if colon else {}
     return table | ({"on": names_of(place)} if separator else {})
 

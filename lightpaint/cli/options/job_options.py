@@ -17,7 +17,7 @@ from lightpaint.cli.options.source_options import (
     sequence_of,
 )
 from lightpaint.cli.output.vocabulary import BY_OPTION, from_any_folder
-from lightpaint.colour.display.view_transform import TransformChoice
+from lightpaint.colour import TransformChoice
 from lightpaint.display_text import some_names
 from lightpaint.errors import LOOK_ERRORS, LightpaintError, OutputError, TargetError
 from lightpaint.files import check_files, is_name, is_utf_8, one_line
@@ -25,7 +25,7 @@ from lightpaint.lighting.constraints.constraints import LAMP_KEYS, LIGHT_KEYS, C
 from lightpaint.lighting.constraints.constraints_file import read_constraints
 from lightpaint.pipeline.job.settings import Settings
 from lightpaint.pipeline.job.sources import Painting, PlacementFile, SceneFile
-from lightpaint.placement.rigging import Rigging
+from lightpaint.placement import Rigging
 from lightpaint.scene.lights.lights_file import MOVES
 
 if TYPE_CHECKING:

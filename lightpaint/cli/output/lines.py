@@ -15,7 +15,7 @@ from typing import Any
 
 from lightpaint.display_text import visible
 from lightpaint.errors import OutputError
-from lightpaint.images.formats.library_output import unsilenced
+from lightpaint.images.formats import unsilenced
 
 #: Longest line on stderr, in characters: no sentence is longer.
 MAX_LINE_LENGTH = 4000

@@ -7,8 +7,8 @@ import numpy as np
 from lightpaint.arrays import as_rgb
 from lightpaint.basis.cache.cache import Entry
 from lightpaint.cli.output import terminal
-from lightpaint.colour.photometry import Photometry, photometry
-from lightpaint.placement.suggestion import Suggestion
+from lightpaint.colour import Photometry, photometry
+from lightpaint.placement import Suggestion
 from lightpaint.relit.verification import Verification
 from lightpaint.report.page.placement_section import spoken_position, spoken_suggestions
 from lightpaint.report.phrases import spoken_percent

@@ -1,13 +1,40 @@
-"""Built-in tone curves: sRGB, linear, filmic and AgX."""
+"""The parts of view transforms: the interface of encodings, and the built-in tone curves: sRGB,
+linear, filmic and AgX."""
 
 import math
 from collections.abc import Callable
 from dataclasses import dataclass
+from typing import Protocol
 
 import numpy as np
 
 from lightpaint.arrays import Floats
 from lightpaint.colour.srgb import decode_display, encode_display
+
+
+class Encoding(Protocol):
+    """An encoding of linear Rec.709 as display values, without exposure. Arrays are (..., 3)."""
+
+    @property
+    def white(self) -> float:
+        """Light of the grey that the display shows as white."""
+
+    def encode(self, image: Floats) -> Floats:
+        """Return linear light as display values in [0, 1]."""
+
+    def decode(self, image_display: Floats) -> Floats:
+        """Return display values in [0, 1] as linear light."""
+
+    def encode_planes(self, planes: Floats) -> Floats:
+        """Return `encode` of linear light with channels first, (3, p)."""
+
+    def with_slopes(self, planes: Floats) -> tuple[Floats, Floats]:
+        """Return display values (3, p) for linear light (3, p), and their derivatives.
+
+        Derivatives are (3, 3, p), of display value i by linear channel j, and 0 where clipped. If
+        channels do not mix, they are (3, p).
+        """
+
 
 #: The range of AgX's logarithm, in stops relative to middle grey.
 AGX_STOPS = (-10.0, 6.5)

@@ -23,7 +23,7 @@ from lightpaint.keywords import keywords
 # NumPy is imported late, with the curves: --help reads the settings, which have a transform.
 if TYPE_CHECKING:
     from lightpaint.arrays import Floats
-    from lightpaint.colour.display.encoding import Encoding
+    from lightpaint.colour.display.tone_curves import Encoding
 
 #: Maximum exposure in stops; a larger number is a typing error.
 MAX_STOPS = 64.0
@@ -188,3 +188,35 @@ def _encoding(name: str) -> "Encoding":
             "ocio:DISPLAY/VIEW"
         )
     return BUILT_IN[name]
+
+
+def lattice_of(transform: ViewTransform, side: int, low: float, high: float) -> "Floats":
+    """Return display values, (side, side, side, 3) float32, with axes r, g, b in log2 of light.
+
+    It is the transform for programs without its code, such as the painter's page. low, high: stops
+    at the ends of an axis; the first point stands for all light below it.
+    """
+    import numpy as np
+
+    axis = _axis(side, low, high)
+    light = np.stack(np.meshgrid(axis, axis, axis, indexing="ij"), axis=-1)
+    encoded = transform.encode(light.reshape(1, -1, 3))
+    return np.asarray(encoded.reshape(side, side, side, 3), np.float32)
+
+
+def curve_of(transform: ViewTransform, side: int, low: float, high: float) -> "Floats":
+    """Return the diagonal of `lattice_of`, (side,) float32, which suffices if channels do not
+    mix.
+    """
+    import numpy as np
+
+    grey = np.repeat(_axis(side, low, high)[:, None], 3, axis=1)
+    return np.asarray(transform.encode(grey)[:, 0], np.float32)
+
+
+def _axis(side: int, low: float, high: float) -> "Floats":
+    import numpy as np
+
+    axis = 2.0 ** np.linspace(low, high, side)
+    axis[0] = 0.0
+    return axis

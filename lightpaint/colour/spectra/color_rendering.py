@@ -1,4 +1,5 @@
-"""Colour rendering of a light by CIE 13.3 and ANSI/IES TM-30, from colour-science.
+"""Colour rendering of a light by CIE 13.3 and ANSI/IES TM-30, from colour-science, and colours of
+surfaces under it.
 
 Both compare with daylight or a black body of the same colour temperature, so they say something of
 whites alone.
@@ -14,8 +15,14 @@ import numpy as np
 
 from lightpaint.arrays import Doubles
 from lightpaint.colour.color import cct_and_duv
-from lightpaint.colour.primaries import colour_science
-from lightpaint.colour.spectra.spectrum import WAVELENGTHS, Spectrum, rgb_of_powers, scaled
+from lightpaint.colour.primaries import REC709, adaptation, colour_science, rgb_to_xyz
+from lightpaint.colour.spectra.spectrum import (
+    WAVELENGTHS,
+    Spectrum,
+    rgb_of_powers,
+    scaled,
+    xyz_of_powers,
+)
 
 #: Largest distance from Planck's locus of a light whose rendering is told.
 LARGEST_DUV = 0.02
@@ -104,3 +111,16 @@ def _computed(spectrum: Spectrum) -> ColorRendering:
 
 def _distribution(spectrum: Spectrum) -> Any:
     return colour_science().SpectralDistribution(np.array(spectrum), WAVELENGTHS)
+
+
+def adapted_color(powers: Doubles, reflectance: Doubles) -> Doubles:
+    """Return linear Rec.709 (3,) of a surface, as a display shows it; white is 1.
+
+    powers: (81,), of the light. reflectance: (81,). The light is adapted to D65 (Bradford), so
+    that a white surface is white.
+    """
+    white, color = xyz_of_powers(powers), xyz_of_powers(powers * reflectance)
+    to_rgb = np.linalg.inv(rgb_to_xyz(REC709))
+    d65 = rgb_to_xyz(REC709).sum(axis=1)
+    adapted = adaptation(white / white[1], d65) @ (color / white[1])
+    return np.asarray(to_rgb @ adapted)

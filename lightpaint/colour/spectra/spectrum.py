@@ -10,7 +10,7 @@ from functools import cache
 import numpy as np
 
 from lightpaint.arrays import Doubles, Floats
-from lightpaint.colour.planckian_locus import C2, matching_functions
+from lightpaint.colour.color import C2, matching_functions
 from lightpaint.colour.primaries import REC709, rgb_to_xyz
 from lightpaint.errors import ColorError
 

@@ -12,10 +12,18 @@ from xml.etree.ElementTree import Element
 import numpy as np
 
 from lightpaint.arrays import Doubles, as_rgb
-from lightpaint.colour.color_difference import ciede2000, lab_of_lights
-from lightpaint.colour.lamp import MAX_SLOTS, OPAQUE, SlotFilter
-from lightpaint.colour.planckian_locus import C2, matching_functions, xy_of
-from lightpaint.colour.primaries import REC2020, rgb_to_xyz
+from lightpaint.colour import (
+    C2,
+    MAX_SLOTS,
+    OPAQUE,
+    REC2020,
+    SlotFilter,
+    ciede2000,
+    lab_of_lights,
+    matching_functions,
+    rgb_to_xyz,
+    xy_of,
+)
 from lightpaint.dmx.console_rig import RigSlot
 from lightpaint.dmx.gdtf.emitter_colour import (
     Chromaticity,

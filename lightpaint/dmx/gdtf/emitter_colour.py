@@ -10,10 +10,18 @@ from xml.etree.ElementTree import Element
 import numpy as np
 
 from lightpaint.arrays import RGB, Doubles, as_rgb
-from lightpaint.colour.planckian_locus import uv_of_black_body, xy_of, xy_of_spectrum, xyz_of
-from lightpaint.colour.primaries import REC709, rgb_to_xyz
-from lightpaint.colour.spectra.spectrum import Spectrum, spectrum_of, xyz_of_powers
-from lightpaint.colour.spectra.spectrum_source import FEWEST_POINTS
+from lightpaint.colour import (
+    FEWEST_POINTS,
+    REC709,
+    Spectrum,
+    rgb_to_xyz,
+    spectrum_of,
+    uv_of_black_body,
+    xy_of,
+    xy_of_spectrum,
+    xyz_of,
+    xyz_of_powers,
+)
 from lightpaint.dmx.gdtf.mode_channels import Curve
 from lightpaint.dmx.rig_archive import library
 from lightpaint.errors import ColorError

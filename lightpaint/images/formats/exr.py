@@ -24,8 +24,8 @@ from lightpaint.images.formats.library_output import silenced
 from lightpaint.version import __version__
 
 #: Prefix of lightpaint's text attributes, and the attribute that all its files have.
-OWN = "lightpaint."
-VERSION_KEY = f"{OWN}version"
+OWN_PREFIX = "lightpaint."
+VERSION_KEY = f"{OWN_PREFIX}version"
 
 #: A file is rejected before decoding if its declared size in bytes exceeds both MAX_BYTES and
 #: MAX_COMPRESSION times its length. Only empty pictures compress better than that.

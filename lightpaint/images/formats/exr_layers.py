@@ -7,7 +7,7 @@ import numpy as np
 import numpy.typing as npt
 
 from lightpaint.arrays import Floats
-from lightpaint.colour.primaries import (
+from lightpaint.colour import (
     REC709,
     SPACES,
     converted,

@@ -25,7 +25,7 @@ import numpy as np
 from PIL import Image, ImageCms
 
 from lightpaint.arrays import Floats
-from lightpaint.colour.srgb import to_8_bit
+from lightpaint.colour import to_8_bit
 from lightpaint.errors import ImageError
 from lightpaint.files import replacing
 from lightpaint.images.formats.bitmap import MAX_PIXELS, Bitmap, read_bitmap

@@ -13,10 +13,16 @@ from PIL import Image
 from PIL.PngImagePlugin import PngInfo
 
 from lightpaint.arrays import Floats
-from lightpaint.colour.display.exposure import choose_exposure
-from lightpaint.colour.icc import Profile, gamma_profile, srgb_profile
-from lightpaint.colour.primaries import is_rec709, primaries_in
-from lightpaint.colour.srgb import encode_display, to_8_bit
+from lightpaint.colour import (
+    Profile,
+    choose_exposure,
+    encode_display,
+    gamma_profile,
+    is_rec709,
+    primaries_in,
+    srgb_profile,
+    to_8_bit,
+)
 from lightpaint.errors import ImageError, OutputError
 from lightpaint.files import replacing, write_bytes
 from lightpaint.keywords import keywords

@@ -11,7 +11,7 @@ import numpy as np
 
 from lightpaint.arrays import Doubles
 from lightpaint.basis.basis import Basis
-from lightpaint.colour.color import LUMINANCE
+from lightpaint.colour import LUMINANCE
 from lightpaint.lighting.answer.certificate import Bound, Kind, Per, Tint
 from lightpaint.lighting.normal_equations import NormalEquations
 from lightpaint.lighting.solution import Solution

@@ -7,7 +7,7 @@ from typing import Any
 
 from lightpaint.arrays import RGB
 from lightpaint.display_text import short_repr
-from lightpaint.images.bands import in_turns
+from lightpaint.images import in_turns
 from lightpaint.keywords import keywords
 from lightpaint.lighting.analysis.ambiguity import Ambiguity, ambiguities
 from lightpaint.lighting.analysis.appearance.appearance import (

@@ -19,9 +19,9 @@ import numpy as np
 import numpy.typing as npt
 
 from lightpaint.arrays import Doubles, Floats, as_rgb
-from lightpaint.colour.color import luminance
+from lightpaint.colour import luminance
 from lightpaint.display_text import short_repr
-from lightpaint.images.bands import bands_of
+from lightpaint.images import bands_of
 from lightpaint.keywords import keywords
 from lightpaint.lighting.analysis.active_bounds import bounds_of
 from lightpaint.lighting.analysis.noise.noise import pseudo_inverse

@@ -10,11 +10,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from lightpaint.arrays import RGB, Bools, Doubles, as_rgb
-from lightpaint.colour.color import luminance
-from lightpaint.colour.color_difference import ciede2000, lab
-from lightpaint.colour.spectra.color_rendering import white_of
-from lightpaint.colour.spectra.spectrum import xyz_of_powers
-from lightpaint.colour.spectra.surface_color import adapted_color
+from lightpaint.colour import adapted_color, ciede2000, lab, luminance, white_of, xyz_of_powers
 from lightpaint.lighting.answer.lighting import LightSetting
 from lightpaint.lighting.solution import Solution
 

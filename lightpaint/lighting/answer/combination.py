@@ -11,7 +11,7 @@ from lightpaint.arrays import Doubles, as_rgb
 from lightpaint.basis.basis import Basis
 from lightpaint.display_text import some_of
 from lightpaint.errors import LightingError, UnknownLightError
-from lightpaint.images.estimate import Estimate
+from lightpaint.images import Estimate
 from lightpaint.keywords import keywords
 from lightpaint.lighting.answer.lighting import Lighting, LightSetting
 

@@ -7,12 +7,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from lightpaint.arrays import Doubles
-from lightpaint.colour.lamp import Lamp
-from lightpaint.colour.spectra.color_rendering import (
-    ColorRendering,
-    color_rendering,
-    fidelity,
-)
+from lightpaint.colour import ColorRendering, Lamp, color_rendering, fidelity
 from lightpaint.lighting.answer.lighting import Lighting, LightSetting
 
 #: Most lamps whose best mix is searched for the table alone, which takes up to half a second each.

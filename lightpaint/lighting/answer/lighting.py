@@ -12,11 +12,16 @@ import numpy as np
 from lightpaint.arrays import RGB, Bools, Doubles, Position, as_rgb
 from lightpaint.basis.basis import Basis
 from lightpaint.basis.lights import BasisLight, Lights
-from lightpaint.colour.color import luminance
-from lightpaint.colour.lamp import Lamp, LampEmitter
-from lightpaint.colour.photometry import Photometry, photometry
-from lightpaint.colour.spectra.observer import EYE, Observer
-from lightpaint.colour.spectra.spectrum import rgb_of_powers
+from lightpaint.colour import (
+    EYE,
+    Lamp,
+    LampEmitter,
+    Observer,
+    Photometry,
+    luminance,
+    photometry,
+    rgb_of_powers,
+)
 from lightpaint.dataframes import CHANNELS, by_channel, number, pandas, xarray
 from lightpaint.display_text import Shown, some_names, some_of
 from lightpaint.errors import LightingError, UnknownLightError

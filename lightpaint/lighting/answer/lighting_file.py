@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from lightpaint.colour.lamp import Lamp
+from lightpaint.colour import Lamp
 from lightpaint.display_text import some_names
 from lightpaint.errors import LightingError
 from lightpaint.file_reading import read_text

@@ -10,9 +10,7 @@ from dataclasses import dataclass, field
 from typing import Any
 
 from lightpaint.arrays import RGB
-from lightpaint.colour.emitter_preference import Preference
-from lightpaint.colour.lamp import SlotFilter
-from lightpaint.colour.white_range import WhiteRange
+from lightpaint.colour import Preference, SlotFilter, WhiteRange
 from lightpaint.display_text import some_of
 from lightpaint.errors import ConstraintError
 from lightpaint.keywords import keywords

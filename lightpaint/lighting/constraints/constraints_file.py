@@ -4,7 +4,7 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
-from lightpaint.colour.spectra.spectrum_source import is_spectrum_file
+from lightpaint.colour import is_spectrum_file
 from lightpaint.errors import ConstraintError
 from lightpaint.files import one_line
 from lightpaint.keywords import keywords

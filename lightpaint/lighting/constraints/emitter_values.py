@@ -10,13 +10,20 @@ import numpy as np
 
 from lightpaint.arrays import RGB, Doubles, as_rgb
 from lightpaint.basis.lights import BasisLight
-from lightpaint.colour.color import luminance
-from lightpaint.colour.lamp import MAX_EMITTERS, MAX_SLOTS, LampEmitter, SlotFilter
-from lightpaint.colour.photometry import photometry
-from lightpaint.colour.planckian_locus import matching_functions
-from lightpaint.colour.primaries import REC709, rgb_to_xyz
-from lightpaint.colour.spectra.spectrum import Spectrum, spectrum_of
-from lightpaint.colour.spectra.spectrum_source import named_spectrum
+from lightpaint.colour import (
+    MAX_EMITTERS,
+    MAX_SLOTS,
+    REC709,
+    LampEmitter,
+    SlotFilter,
+    Spectrum,
+    luminance,
+    matching_functions,
+    named_spectrum,
+    photometry,
+    rgb_to_xyz,
+    spectrum_of,
+)
 from lightpaint.errors import ColorError, ConstraintError
 from lightpaint.files import one_line
 from lightpaint.lighting.constraints.values import check_keys

@@ -14,7 +14,7 @@ from lightpaint.basis.basis import Basis
 from lightpaint.basis.lights import BasisLight, Lights
 from lightpaint.display_text import some_names, with_similar_name
 from lightpaint.errors import ConstraintError
-from lightpaint.images.estimate import Estimate
+from lightpaint.images import Estimate
 
 
 def start_weights(start: Mapping[str, RGB], lights: Sequence[BasisLight]) -> Doubles:

@@ -7,9 +7,14 @@ from typing import Any, cast, get_args
 import numpy as np
 
 from lightpaint.arrays import RGB, as_rgb
-from lightpaint.colour.color import hex_to_rgb, kelvin_to_rgb, luminance
-from lightpaint.colour.emitter_preference import Preference
-from lightpaint.colour.white_range import WhiteRange, white_range
+from lightpaint.colour import (
+    Preference,
+    WhiteRange,
+    hex_to_rgb,
+    kelvin_to_rgb,
+    luminance,
+    white_range,
+)
 from lightpaint.display_text import known_keys, some_names
 from lightpaint.errors import ColorError, ConstraintError
 from lightpaint.files import one_line

@@ -21,7 +21,7 @@ from operator import add
 from lightpaint.arrays import RGB, Doubles
 from lightpaint.basis.basis import Basis
 from lightpaint.basis.light_images import texel_lights
-from lightpaint.colour.lamp import Lamp
+from lightpaint.colour import Lamp
 from lightpaint.lighting.constraints.color_restrictions import WhiteLimits, painted_whites
 from lightpaint.lighting.constraints.constraints import Constraints
 from lightpaint.lighting.constraints.start_lighting import start_weights

@@ -8,8 +8,8 @@ import numpy as np
 
 from lightpaint.arrays import Doubles, Floats, Slices
 from lightpaint.basis.basis import Basis
-from lightpaint.colour.display.view_transform import ViewTransform
-from lightpaint.images.pixel_blocks import block_mean, block_sums, enlarged
+from lightpaint.colour import ViewTransform
+from lightpaint.images import block_mean, block_sums, enlarged
 from lightpaint.lighting.live.tiles import MAX_CHEAP_LIGHTS, TiledEquations
 from lightpaint.lighting.loss.expected_lights import Wash, exact_share, wish_shares
 from lightpaint.lighting.loss.loss import STRIP_PIXELS

@@ -6,7 +6,7 @@ import numpy as np
 
 from lightpaint.arrays import RGB, Doubles, Floats, Slices
 from lightpaint.basis.basis import Basis
-from lightpaint.colour.display.view_transform import ViewTransform
+from lightpaint.colour import ViewTransform
 from lightpaint.lighting.constraints.start_lighting import held_at_start
 from lightpaint.lighting.live.live_sums import (
     MAX_FILM_PIXELS,

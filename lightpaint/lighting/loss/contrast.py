@@ -16,7 +16,7 @@ this does the same between painted ones.
 import numpy as np
 
 from lightpaint.arrays import Doubles
-from lightpaint.colour.display.view_transform import ViewTransform
+from lightpaint.colour import ViewTransform
 from lightpaint.lighting.loss.expected_lights import Wash
 from lightpaint.lighting.normal_equations import NormalEquations
 from lightpaint.threads import one_thread

@@ -15,8 +15,8 @@ import numpy as np
 from lightpaint.arrays import Doubles, Floats, Indices
 from lightpaint.basis.basis import Basis
 from lightpaint.basis.derived_planes import block_means
-from lightpaint.colour.color import luminance
-from lightpaint.images.pixel_blocks import block_sums
+from lightpaint.colour import luminance
+from lightpaint.images import block_sums
 from lightpaint.target.target import Target
 from lightpaint.target.wish import Wish
 from lightpaint.target.wish_finding import split_wishes

@@ -16,7 +16,7 @@ import numpy as np
 import numpy.typing as npt
 
 from lightpaint.arrays import Bools, Doubles, Floats, Indices
-from lightpaint.colour.display.view_transform import ViewTransform
+from lightpaint.colour import ViewTransform
 from lightpaint.threads import parallel_map
 
 #: Pixels in a strip, and in all strips that keep what they compute: of 1920 x 1080 pixels. With

@@ -10,9 +10,8 @@ room was before.
 import numpy as np
 
 from lightpaint.arrays import Bools, Doubles, Floats, Slices
-from lightpaint.colour.color import luminance
-from lightpaint.colour.display.view_transform import ViewTransform
-from lightpaint.images.estimate import box_mean
+from lightpaint.colour import ViewTransform, luminance
+from lightpaint.images import box_mean
 
 #: The radius around an emitter's pixel in which paint counts: a share of the picture's height, and
 #: a minimum in pixels.

@@ -7,7 +7,7 @@ import numpy as np
 
 from lightpaint.arrays import Bools, Floats
 from lightpaint.basis.basis import Basis
-from lightpaint.colour.display.view_transform import ViewTransform
+from lightpaint.colour import ViewTransform
 from lightpaint.errors import TargetError
 from lightpaint.lighting.fit import Emitters, Fit
 from lightpaint.lighting.joined_views import Views

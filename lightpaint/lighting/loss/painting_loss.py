@@ -9,9 +9,8 @@ import numpy as np
 import numpy.typing as npt
 
 from lightpaint.arrays import Bools, Doubles, Floats, Indices
-from lightpaint.colour.display.view_transform import ViewTransform
-from lightpaint.images.bands import BAND_PIXELS, by_bands
-from lightpaint.images.pixel_blocks import block_sums
+from lightpaint.colour import ViewTransform
+from lightpaint.images import BAND_PIXELS, block_sums, by_bands
 from lightpaint.lighting.loss.loss import (
     STRIP_PIXELS,
     Cut,

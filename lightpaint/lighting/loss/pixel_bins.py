@@ -18,9 +18,8 @@ from lightpaint.basis.basis import Basis
 from lightpaint.basis.derived_planes import block_means, in_one_row
 from lightpaint.basis.file.file_planes import spooled
 from lightpaint.basis.planes import BLOCK_PIXELS, Planes, as_planes
-from lightpaint.colour.display.view_transform import ViewTransform
-from lightpaint.images.estimate import Estimate
-from lightpaint.images.pixel_blocks import block_sums, enlarged
+from lightpaint.colour import ViewTransform
+from lightpaint.images import Estimate, block_sums, enlarged
 from lightpaint.lighting.joined_views import Views
 from lightpaint.lighting.loss.lit_pixels import LitPixels
 from lightpaint.lighting.loss.loss import Cut, Loss

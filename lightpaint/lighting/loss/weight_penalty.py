@@ -22,8 +22,7 @@ import numpy as np
 from lightpaint.arrays import Bools, Doubles
 from lightpaint.basis.light_images import light_images, texel_lights
 from lightpaint.basis.lights import Lights
-from lightpaint.colour.color import LUMINANCE, luminance
-from lightpaint.colour.display.view_transform import ViewTransform
+from lightpaint.colour import LUMINANCE, ViewTransform, luminance
 from lightpaint.lighting.constraints.constraints import Constraints
 from lightpaint.lighting.fit import Fit
 from lightpaint.lighting.loss.contrast import contrast_rows, contrast_term, display_amplitude

@@ -15,16 +15,16 @@ import numpy as np
 
 from lightpaint.arrays import Bools, Doubles, Floats, Indices
 from lightpaint.basis.basis import Basis
-from lightpaint.colour.color import luminance
-from lightpaint.colour.color_hull import (
+from lightpaint.colour import (
     DIRECTIONS,
     ROUND_OFF,
     ColorHull,
     chromaticity,
+    luminance,
     reach_of,
     sides_of,
+    white_range,
 )
-from lightpaint.colour.white_range import white_range
 from lightpaint.lighting.constraints.color_restrictions import LAMP_KELVINS
 
 #: Whites that paint may ask for, in kelvin: those that have a name.

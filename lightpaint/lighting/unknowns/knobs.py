@@ -9,11 +9,7 @@ import numpy as np
 
 from lightpaint.arrays import Doubles
 from lightpaint.basis.lights import BasisLight
-from lightpaint.colour.color import luminance
-from lightpaint.colour.color_hull import ColorHull
-from lightpaint.colour.emitter_preference import Preference
-from lightpaint.colour.lamp import Lamp
-from lightpaint.colour.white_range import WhiteRange
+from lightpaint.colour import ColorHull, Lamp, Preference, WhiteRange, luminance
 from lightpaint.display_text import some_names
 from lightpaint.errors import ConstraintError
 from lightpaint.lighting.constraints.constraints import LightConstraint, Tie

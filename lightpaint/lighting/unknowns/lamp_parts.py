@@ -12,8 +12,7 @@ import numpy as np
 
 from lightpaint.arrays import Doubles, as_rgb
 from lightpaint.basis.lights import BasisLight
-from lightpaint.colour.color import luminance
-from lightpaint.colour.lamp import Lamp
+from lightpaint.colour import Lamp, luminance
 from lightpaint.display_text import some_names
 from lightpaint.errors import ConstraintError
 from lightpaint.lighting.unknowns.knobs import Knob, Unknown

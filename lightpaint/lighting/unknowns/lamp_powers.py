@@ -5,7 +5,7 @@ from collections.abc import Mapping, Sequence
 import numpy as np
 
 from lightpaint.arrays import Doubles
-from lightpaint.colour.lamp import Lamp
+from lightpaint.colour import Lamp
 from lightpaint.lighting.unknowns.knobs import Knob
 
 

@@ -16,7 +16,7 @@ import numpy as np
 
 from lightpaint.arrays import RGB, Bools, Doubles, Indices, as_rgb
 from lightpaint.basis.lights import BasisLight
-from lightpaint.colour.lamp import Lamp
+from lightpaint.colour import Lamp
 from lightpaint.display_text import some_names
 from lightpaint.errors import ConstraintError
 from lightpaint.lighting.algebra.quadratic import Cap

@@ -23,9 +23,7 @@ from typing import Any
 import numpy as np
 
 from lightpaint.arrays import Doubles, Indices
-from lightpaint.colour.color_hull import ColorHull
-from lightpaint.colour.lamp import Lamp
-from lightpaint.colour.white_range import WhiteRange
+from lightpaint.colour import ColorHull, Lamp, WhiteRange
 from lightpaint.lighting.algebra.method import Method
 from lightpaint.lighting.normal_equations import NormalEquations
 from lightpaint.lighting.unknowns.knobs import Knob, brightest_whites

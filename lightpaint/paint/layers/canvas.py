@@ -1,6 +1,9 @@
-"""The painting of one view: its pixels, and the open stroke."""
+"""The painting of one view: its pixels, the open stroke, and its layers as pictures: the light that
+each comes to, and where it applies.
+"""
 
 from collections.abc import Collection, Iterator, Mapping, Sequence
+from dataclasses import dataclass, replace
 from functools import cache
 from typing import Any
 
@@ -10,20 +13,27 @@ import numpy.typing as npt
 from lightpaint.arrays import Floats
 from lightpaint.basis.basis import Basis
 from lightpaint.basis.cache.denoised_planes import as_halves
-from lightpaint.colour.display.view_transform import ViewTransform
+from lightpaint.colour import ViewTransform
 from lightpaint.errors import PaintError
 from lightpaint.lighting.live.live_view import LiveView
 from lightpaint.paint.layers.composed_layers import Change, ComposedLayers
-from lightpaint.paint.layers.composition import AlbedoSource
+from lightpaint.paint.layers.composition import (
+    MAX_LIGHT,
+    AlbedoSource,
+    adjusted,
+    compose_layer,
+    effect_of,
+    gradient_pixels,
+)
 from lightpaint.paint.layers.layer_pixels import (
+    SELECTION_ID,
     LayerPixels,
     enclosing,
     is_empty,
     relative,
     shared,
 )
-from lightpaint.paint.layers.layer_stack import Layer, LayerStack
-from lightpaint.paint.layers.selection import SELECTION_ID
+from lightpaint.paint.layers.layer_stack import MAX_STRENGTH, Layer, LayerStack
 from lightpaint.paint.store.history_steps import Patch, Pixels, Region, Step, slices
 from lightpaint.paint.store.store import StoredComposition
 from lightpaint.target.target import Target
@@ -32,7 +42,9 @@ from lightpaint.target.target import Target
 SQUARE_SIDE = 64
 
 #: Largest importance, and largest light, that a page may paint.
-MAX_IMPORTANCE, MAX_LIGHT = 1e4, 1e9
+MAX_IMPORTANCE, MAX_PAINTED_LIGHT = 1e4, 1e9
+
+_Array = npt.NDArray[np.float32]
 
 
 class OpenStroke:
@@ -325,11 +337,11 @@ class Canvas:
         if importance.size and not (importance.min() >= 0 and importance.max() <= most):
             what = "importance" if layer.kind == "pixels" else "coverage"
             raise PaintError(f"{what} beyond 0 to {most:g}")
-        if image.size and not (image.min() >= 0 and image.max() <= MAX_LIGHT):
+        if image.size and not (image.min() >= 0 and image.max() <= MAX_PAINTED_LIGHT):
             # A target set in a notebook may hold such light, and a stroke beside it resends it.
-            beyond = (image < 0) | (image > MAX_LIGHT)
+            beyond = (image < 0) | (image > MAX_PAINTED_LIGHT)
             if not np.array_equal(image[beyond], self.layer(layer.id).part(region).image[beyond]):
-                raise PaintError(f"light beyond 0 to {MAX_LIGHT:g}")
+                raise PaintError(f"light beyond 0 to {MAX_PAINTED_LIGHT:g}")
         return Pixels(image.astype(np.float32), importance.astype(np.float32))
 
 
@@ -350,3 +362,97 @@ def _with_marks(pixels: Pixels, before: Pixels) -> Pixels:
         return pixels
     left_alone = (pixels.image == before.image).all(axis=-1) & (pixels.importance > 0)
     return pixels._replace(at_least=before.at_least & left_alone[..., None])
+
+
+@dataclass(frozen=True, eq=False)
+class LayerPicture:
+    """A layer as a program shows it that only lays pictures over each other.
+
+    layer: the layer, also of a group, which has no pixels. region: the part of the view that it
+    covers. pixels: its own pixels there. light: (rows, columns, 3) linear, what it shows where it
+    covers fully, over the visible layers below. coverage: (rows, columns), 0 to 1. opacity: the
+    rest of its strength, up to 1, that `light` does not include.
+    """
+
+    layer: Layer
+    region: Region
+    pixels: Pixels
+    light: _Array
+    coverage: _Array
+    opacity: float
+
+
+@dataclass(frozen=True, eq=False)
+class ViewLayers:
+    """The layers of one view. pixels: of each, by id. current: the look below. albedo: of the
+    surfaces, for gradients.
+    """
+
+    layers: LayerStack
+    pixels: Mapping[int, LayerPixels]
+    current: Floats
+    albedo: Floats | None = None
+
+    @classmethod
+    def of(cls, canvas: Canvas, layers: LayerStack) -> "ViewLayers":
+        """Return a copy of the layers of a canvas, which shares the memory of their pixels."""
+        pixels = {
+            number: canvas.layer(number).copy()
+            for number in layers.ids
+            if not is_empty(canvas.layer(number).bounds)
+        }
+        has_gradient = any(layer.gradient is not None for layer in layers)
+        return cls(layers, pixels, canvas.current, canvas.albedo if has_gradient else None)
+
+    @property
+    def size(self) -> tuple[int, int]:
+        """(height, width) of the view."""
+        return self.current.shape[0], self.current.shape[1]
+
+    def pictures(self, rows: tuple[int, int] | None = None) -> Iterator[LayerPicture]:
+        """Yield each layer, the lowest first; the layers of a group come before it.
+
+        rows: the first row and the end of the part of the view in which to show them; None for all.
+        Each picture is made when it is asked for, and used before the next.
+        """
+        top, bottom = rows or (0, self.size[0])
+        part = top, bottom, 0, self.size[1]
+        groups = {layer.id: layer for layer in self.layers if layer.kind == "group"}
+        below = Pixels.unpainted(np.array(self.current[top:bottom], np.float32))
+        for layer in self.layers:
+            own = self.pixels.get(layer.id, LayerPixels(self.size))
+            region = shared(own.bounds, part)
+            region = (top, top, 0, 0) if is_empty(region) else region
+            pixels = own.part(region)
+            group = groups.get(layer.id if layer.group is None else layer.group)
+            strength, is_shown = layer.strength, layer.is_visible
+            if group is not None and group is not layer:
+                strength = min(MAX_STRENGTH, strength * group.strength)
+                is_shown &= group.is_visible
+            effective = replace(effect_of(layer), strength=strength)
+            inner = relative(region, part)
+            shown, area = pixels, below.part(inner)
+            if layer.gradient is not None:
+                shown = gradient_pixels(layer.gradient, pixels.importance, region, self.albedo)
+            light, coverage, opacity = _appearance(effective, shown, area.image)
+            yield LayerPicture(layer, region, pixels, light, coverage, opacity)
+            if is_shown and strength > 0 and not is_empty(region):
+                below.image[slices(inner)] = compose_layer(effective, shown, area).image
+
+
+def _appearance(layer: Layer, pixels: Pixels, below: _Array) -> tuple[_Array, _Array, float]:
+    """Return light, coverage and opacity that show a layer when laid over the light below."""
+    strength = layer.strength
+    if layer.kind in ("pixels", "paint"):
+        light, opacity = pixels.image, min(strength, 1.0)
+        if strength > 1:
+            light = below + np.float32(strength) * (pixels.image - below)
+    else:
+        light, opacity = below.copy(), 1.0
+        if layer.kind == "adjust":
+            tint = layer.tint
+            factors = (tint[0] ** strength, tint[1] ** strength, tint[2] ** strength)
+            light = adjusted(below, layer.gain**strength, factors)
+    counts = pixels.importance
+    coverage = (counts > 0).astype(np.float32) if layer.kind == "pixels" else counts
+    return np.clip(light, 0, np.float32(MAX_LIGHT)), np.minimum(coverage, 1), opacity

@@ -12,7 +12,13 @@ from lightpaint.basis.basis import Basis
 from lightpaint.errors import PaintError
 from lightpaint.lighting.live.live_view import LiveView
 from lightpaint.paint.layers.canvas import Canvas
-from lightpaint.paint.layers.layer_pixels import LayerPixels, enclosing, is_empty
+from lightpaint.paint.layers.layer_pixels import (
+    SELECTION_ID,
+    LayerPixels,
+    enclosing,
+    is_empty,
+    put_selection,
+)
 from lightpaint.paint.layers.layer_stack import (
     PAINTING,
     PAINTING_ID,
@@ -22,7 +28,6 @@ from lightpaint.paint.layers.layer_stack import (
     next_layer_id,
     stack_after,
 )
-from lightpaint.paint.layers.selection import SELECTION_ID, put_selection
 from lightpaint.paint.store.history_steps import Patch, Pixels, Region, Step, name_in_view
 from lightpaint.paint.store.store import StoredComposition
 

@@ -13,7 +13,7 @@ import numpy.typing as npt
 
 from lightpaint.arrays import Bools, Floats
 from lightpaint.errors import PaintError
-from lightpaint.images.pixel_blocks import block_sums
+from lightpaint.images import block_sums
 from lightpaint.paint.layers.composition import (
     AlbedoSource,
     GradientPixels,

@@ -15,7 +15,7 @@ import numpy as np
 import numpy.typing as npt
 
 from lightpaint.arrays import RGB, Bools, Floats
-from lightpaint.colour.color import LUMINANCE
+from lightpaint.colour import LUMINANCE
 from lightpaint.paint.layers.layer_pixels import (
     MIN_COVERAGE,
     LayerPixels,

@@ -15,24 +15,31 @@ import numpy as np
 import numpy.typing as npt
 
 from lightpaint.arrays import Bools, Floats
-from lightpaint.colour.display.view_transform import ViewTransform
+from lightpaint.colour import ViewTransform
 from lightpaint.errors import ImageError, PaintError
-from lightpaint.images.formats.exr import read_headers, read_parts
-from lightpaint.images.formats.exr_streams import PartHead, write_streamed
-from lightpaint.images.formats.file_kinds import head_of, kind_of
-from lightpaint.images.formats.openraster import (
+from lightpaint.images.formats import (
+    TRANSFORM_KEY,
+    PartHead,
     RasterGroup,
     RasterLayer,
+    head_of,
+    kind_of,
     layered_kind,
     opened_openraster,
+    read_headers,
+    read_parts,
     write_openraster,
+    write_streamed,
 )
-from lightpaint.images.formats.png import TRANSFORM_KEY
-from lightpaint.paint.layers.canvas import MAX_IMPORTANCE, MAX_LIGHT
+from lightpaint.paint.layers.canvas import (
+    MAX_IMPORTANCE,
+    MAX_PAINTED_LIGHT,
+    LayerPicture,
+    ViewLayers,
+)
 from lightpaint.paint.layers.canvases import LayeredPaintings
 from lightpaint.paint.layers.layer_pixels import is_empty, relative
 from lightpaint.paint.layers.layer_stack import MAX_NAME_LENGTH, Layer, LayerStack
-from lightpaint.paint.layers.view_layers import LayerPicture, ViewLayers
 from lightpaint.paint.store.history_steps import Pixels, Region, slices
 from lightpaint.storage.json_records import read_record, strict_json
 
@@ -299,7 +306,7 @@ def _exr_pixels(layer: Layer, name: str, channels: _Channels) -> Pixels:
     marks: Bools | None = None
     if f"{name}.{MARKS[0]}" in channels:
         marks = np.stack([channels[f"{name}.{c}"] > 0 for c in MARKS], axis=-1)
-    for values, bound in ((image, MAX_LIGHT), (coverage, most)):
+    for values, bound in ((image, MAX_PAINTED_LIGHT), (coverage, most)):
         if not (np.isfinite(values).all() and values.min() >= 0 and values.max() <= bound):
             raise ValueError(f"{name} has values beyond 0 to {bound:g}")
     return Pixels(image, coverage, marks)
@@ -358,7 +365,7 @@ def _raster_pixels(
     inner = _covered(display[..., 3])
     display = display[slices(inner)]
     light = np.asarray(transform.decode(display[..., :3]), np.float32)
-    pixels = Pixels(np.minimum(light, np.float32(MAX_LIGHT)), display[..., 3].copy())
+    pixels = Pixels(np.minimum(light, np.float32(MAX_PAINTED_LIGHT)), display[..., 3].copy())
     return (top + inner[0], top + inner[1], left + inner[2], left + inner[3]), pixels
 
 

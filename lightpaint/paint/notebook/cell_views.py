@@ -20,9 +20,8 @@ import numpy as np
 from markupsafe import Markup
 
 from lightpaint.basis.basis import Basis
-from lightpaint.colour.display.view_transform import ViewTransform
-from lightpaint.colour.srgb import to_8_bit
-from lightpaint.images.pixel_blocks import block_mean, fitting_factor
+from lightpaint.colour import ViewTransform, to_8_bit
+from lightpaint.images import block_mean, fitting_factor
 from lightpaint.lighting.answer.lighting import Lighting
 from lightpaint.paint.background_threads import error_text, error_tone, lower_priority
 from lightpaint.paint.message_frames import is_other_version, parse_request

@@ -5,25 +5,36 @@ Without a loop, as in a script, they send them themselves.
 """
 
 import atexit
-from collections.abc import Callable, Mapping, Sequence
+import traceback
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from contextlib import AbstractContextManager, contextmanager
+from dataclasses import dataclass, field
 from functools import partial
 from inspect import signature
 from pathlib import Path
 from threading import Event, RLock
-from typing import Any, Unpack
+from types import TracebackType
+from typing import TYPE_CHECKING, Any, Generic, TypeVar, Unpack
 from weakref import WeakValueDictionary
 
-from lightpaint.colour.display.view_transform import TransformChoice, ViewTransform
+from lightpaint.colour import TransformChoice, ViewTransform
 from lightpaint.errors import PaintError
+from lightpaint.files import first_line
 from lightpaint.lighting.analysis.analysis import analyse, with_findings
 from lightpaint.lighting.answer.combination import dimmed
 from lightpaint.lighting.answer.lighting import Lighting
 from lightpaint.lighting.answer.lighting_file import write_lighting
 from lightpaint.lighting.constraints.constraints import Constraints
 from lightpaint.lighting.solution import Solution
+from lightpaint.paint.background_threads import error_text
 from lightpaint.paint.notebook import widget_arguments
 from lightpaint.paint.notebook.cell_views import CellOutput, KernelThread, WidgetViews, static_view
-from lightpaint.paint.notebook.widget_arguments import notebook_advice
+from lightpaint.paint.notebook.widget_arguments import (
+    LOADERS,
+    LoadArguments,
+    notebook_advice,
+    same_paintings,
+)
 from lightpaint.paint.protocol import AnswerUpdate, Message, Notice, SessionState
 from lightpaint.paint.session.snapshot import SessionSnapshot
 from lightpaint.paint.store.history_steps import Identity
@@ -42,8 +53,6 @@ try:
     import ipywidgets
     import traitlets
     from traitlets import ObserveHandler
-
-    from lightpaint.paint.notebook.session_traits import Callback, LiveTrait, SessionTraits
 except ImportError as error:
     raise PaintError("lp.Painter needs anywidget: pip install 'lightpaint[notebook]'") from error
 
@@ -55,6 +64,12 @@ MIN_HEIGHT = 240
 
 #: Default layout: without a width, an HBox gives the painter none.
 DEFAULT_LAYOUT = {"width": "100%", "min_width": "320px"}
+
+Readable = TypeVar("Readable")
+Assignable = TypeVar("Assignable")
+
+#: Maximum number of rounds in which callbacks react to values set by callbacks.
+MAX_CALLBACK_ROUNDS = 20
 
 
 def _claim_file(path: Path, painter: "Painter") -> None:
@@ -103,6 +118,159 @@ def widget_script() -> str:
 def widget_style() -> str:
     """Return the style sheet of the painter."""
     return styles("paint/page/style.css")
+
+
+class LiveTrait(traitlets.Any, Generic[Readable, Assignable]):  # type: ignore[misc]
+    """A trait that the session sets with `set_trait`; assignments in cells become requests."""
+
+    if TYPE_CHECKING:
+
+        def __get__(self, obj: Any, cls: Any = None) -> Readable: ...
+
+    def __set__(self, obj: Any, value: Assignable) -> None:
+        obj._assign(self.name, value)
+
+
+@dataclass(frozen=True)
+class Callback:
+    """A function that observes changes; an error in it does not stop other callbacks.
+
+    warn: receives its error in one line.
+    """
+
+    handler: Callable[[Any], Any]
+    warn: Callable[[str], None] = field(compare=False)
+
+    def __call__(self, change: Any) -> None:
+        try:
+            self.handler(change)
+        except Exception as error:
+            # The traceback begins at the callback's own line.
+            traceback.print_exception(error.with_traceback(_from_caller(error)))
+            text = f"{type(error).__name__}: {first_line(error)}"
+            self.warn(f"a callback of painter.{change['name']} failed: {text}")
+
+
+def _from_caller(error: Exception) -> TracebackType | None:
+    frames = error.__traceback__
+    return frames and (frames.tb_next or frames)
+
+
+class SessionTraits:
+    """The traits of a painter by which cells read and change its session.
+
+    Args:
+        owner: The painter.
+        studio: Has the session.
+        lock: Held while observers are called, since two notifying threads would each take the
+            other's callbacks for theirs.
+        send: Sends a message to pages.
+        warn: Receives a line on a value that was not set.
+    """
+
+    def __init__(
+        self,
+        owner: "Painter",
+        studio: Studio,
+        lock: AbstractContextManager[Any],
+        *,
+        send: Callable[[Message], None],
+        warn: Callable[[str], None],
+    ) -> None:
+        self._owner, self._studio, self._lock = owner, studio, lock
+        self._send, self._warn = send, warn
+        self._pending: list[tuple[str, Any]] = []  # values by name, in the order of assignment
+        self._is_notifying = False
+
+    def assign(self, name: str, value: Any) -> None:
+        """Apply a value that a cell sets, or raise its LightpaintError there.
+
+        A value that a callback sets is applied after all observers have been called.
+        """
+        with self._lock:  # another thread may be notifying observers
+            arguments = LOADERS[name](self._studio.session, value)
+            if self._is_notifying:
+                self._pending.append((name, value))
+            else:
+                self._apply(arguments)
+
+    def assign_when_ready(self, name: str, value: Any) -> None:
+        """Set a trait now, or once the first basis is there. Raises LightpaintError if now."""
+        with self._lock:
+            if self._studio.store is None:
+                self._pending.append((name, value))
+            else:
+                setattr(self._owner, name, value)
+
+    def _apply(self, arguments: LoadArguments) -> None:
+        """Load paintings and requests into the session. Raises LightpaintError if refused."""
+        paintings, requests, _ = arguments
+        if not paintings and requests == self._studio.session.requests:
+            return  # it would be a step without a change
+        for message in self._studio.load(*arguments):
+            self._send(message)
+        self.update()
+
+    def update(self, values: dict[str, Any] | None = None) -> None:
+        """Set the traits to `values`, by default the session's, and notify observers of changes."""
+        with self._notifying():
+            for name, value in (values or self.current_values()).items():
+                if value is not getattr(self._owner, name):
+                    self._owner.set_trait(name, value)
+
+    def current_values(self) -> dict[str, Any]:
+        """Return the values of all traits; a value that has not changed is the same object.
+
+        An exact answer arrives twice, the second time with its analysis.
+        """
+        snapshot, answer = self._studio.snapshot_and_lighting()
+        lighting = dimmed(answer, snapshot.requests.master)
+        targets, earlier_targets = snapshot.targets, self._owner.targets
+        earlier_lighting = self._owner.lighting
+        lighting = lighting.for_target(
+            " + ".join(target.name for target in snapshot.painted_targets)
+        )
+        if same_paintings(targets, earlier_targets):
+            targets = earlier_targets
+        return {
+            "target": targets[0],
+            "targets": targets,
+            "lighting": earlier_lighting if lighting == earlier_lighting else lighting,
+            "constraints": snapshot.requests.constraints(),
+        }
+
+    @contextmanager
+    def _notifying(self) -> Iterator[None]:
+        """Hold back values that callbacks set until all observers have been called."""
+        with self._lock:
+            was_notifying, self._is_notifying = self._is_notifying, True
+            try:
+                yield
+                if not was_notifying:
+                    self._apply_pending()
+            finally:
+                self._is_notifying = was_notifying
+
+    def _apply_pending(self) -> None:
+        """Apply the values that wait, and then those that callbacks have set meanwhile."""
+        for _ in range(MAX_CALLBACK_ROUNDS):
+            values, self._pending = self._pending, []
+            for name, value in values:
+                self._apply_late(name, value)
+        if self._pending:
+            self._pending = []
+            self._warn(
+                "callbacks of the painter set something again each time that they are called: the "
+                "last values were not set"
+            )
+
+    def _apply_late(self, name: str, value: Any) -> None:
+        """Apply a value that was set earlier; show an error, since its cell has ended."""
+        try:
+            self._apply(LOADERS[name](self._studio.session, value))
+        except Exception as error:
+            traceback.print_exc()
+            self._warn(f"painter.{name} was not set: {error_text(error, at_length=False)}")
 
 
 class Painter(anywidget.AnyWidget):  # type: ignore[misc]

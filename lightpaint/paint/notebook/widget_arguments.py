@@ -11,7 +11,7 @@ import numpy as np
 
 from lightpaint.basis.basis import Basis
 from lightpaint.basis.lightgroups.light_groups import LightGroups
-from lightpaint.colour.display.view_transform import TransformChoice, ViewTransform
+from lightpaint.colour import TransformChoice, ViewTransform
 from lightpaint.errors import KeywordError, LightpaintError, PaintError
 from lightpaint.lighting.answer.lighting import Lighting
 from lightpaint.lighting.constraints.constraints import Constraints

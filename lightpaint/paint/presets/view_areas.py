@@ -7,9 +7,8 @@ import numpy.typing as npt
 from PIL import Image, ImageFilter
 
 from lightpaint.arrays import Bools, Floats
-from lightpaint.colour.color import luminance
-from lightpaint.images.denoiser import Features
-from lightpaint.images.object_map import Objects
+from lightpaint.colour import luminance
+from lightpaint.images import Features, Objects
 
 Mask = npt.NDArray[np.float32]
 

@@ -13,16 +13,18 @@ import numpy as np
 import numpy.typing as npt
 
 from lightpaint.arrays import Floats
-from lightpaint.colour.display.exposure import choose_exposure
-from lightpaint.colour.display.view_transform import ViewTransform
-from lightpaint.colour.icc import read_icc
+from lightpaint.colour import ViewTransform, choose_exposure, read_icc
 from lightpaint.errors import ImageError, PaintError
 from lightpaint.files import first_line, one_line
-from lightpaint.images.formats.bitmap import MAX_PIXELS, Bitmap, light_of_integers
-from lightpaint.images.formats.file_kinds import head_of
-from lightpaint.images.formats.library_output import silenced, without_pillow_warnings
-from lightpaint.images.picture import naming_file, read_picture
-from lightpaint.images.pixel_blocks import resampled
+from lightpaint.images import naming_file, read_picture, resampled
+from lightpaint.images.formats import (
+    MAX_PIXELS,
+    Bitmap,
+    head_of,
+    light_of_integers,
+    silenced,
+    without_pillow_warnings,
+)
 from lightpaint.paint.store.compression import pack, unpack
 from lightpaint.paint.store.database import DAMAGE_ERRORS, REFERENCE_TABLE
 from lightpaint.paint.store.store import Store

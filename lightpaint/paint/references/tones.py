@@ -7,8 +7,8 @@ import numpy as np
 import numpy.typing as npt
 
 from lightpaint.arrays import Bools, Doubles, Floats
-from lightpaint.colour.color import luminance
-from lightpaint.images.pixel_blocks import resampled
+from lightpaint.colour import luminance
+from lightpaint.images import resampled
 from lightpaint.paint.presets.view_areas import soft_bands, soft_spot
 
 #: Pixels of the longer side of the picture in which light is compared: smaller detail is no light.

@@ -11,7 +11,7 @@ from lightpaint.arrays import RGB, Doubles, Position
 from lightpaint.basis.lights import BasisLight
 from lightpaint.errors import PaintError, SceneError
 from lightpaint.paint.rig.page_geometry import FirstHit, FreeLength
-from lightpaint.placement.paths.panel_lights import PanelSite
+from lightpaint.placement import PanelSite
 from lightpaint.scene.lights.new_emitter import PLUGIN_OF, NewEmitter
 from lightpaint.scene.properties.emission import PLUGINS
 from lightpaint.scene.properties.pose import Pose, Site

@@ -27,12 +27,16 @@ from lightpaint.paint.session.snapshot import SessionSnapshot
 from lightpaint.paint.session_access import Publisher, SessionAccess
 from lightpaint.paint.store.session_requests import HOLD_KEYS
 from lightpaint.paint.store.store import Store, StoredRecords
-from lightpaint.placement.freedom import Freedom
-from lightpaint.placement.new_lights import NewLights
-from lightpaint.placement.place import place
-from lightpaint.placement.placement import Move, Placement
-from lightpaint.placement.rigged_lights import freedom_on
-from lightpaint.placement.search.new_light_search import SearchSize, usual_pace
+from lightpaint.placement import (
+    Freedom,
+    Move,
+    NewLights,
+    Placement,
+    SearchSize,
+    freedom_on,
+    place,
+    usual_pace,
+)
 from lightpaint.progress import cancellable
 from lightpaint.scene.properties.pose import Pose, Site
 from lightpaint.scene.runtime.render_lock import MITSUBA

@@ -21,14 +21,12 @@ from lightpaint.paint.rig.lamp_rig import LampRig
 from lightpaint.paint.rig.light_mover import LightMover
 from lightpaint.paint.session.look_library import LookLighting
 from lightpaint.paint.session.moved_lights import Placed, added_names
-from lightpaint.paint.session.page_planes import page_plane
-from lightpaint.paint.session.picture_table import Picture
+from lightpaint.paint.session.picture_table import Picture, page_plane
 from lightpaint.paint.session.snapshot import SessionSnapshot
 from lightpaint.paint.session_access import Publisher, SessionAccess
 from lightpaint.paint.store.history_steps import name_in_view
 from lightpaint.paint.subject import Subject, places_path
-from lightpaint.placement.paths.panel_lights import is_panel
-from lightpaint.placement.placement import AddedLight, Move, PlacementRecord
+from lightpaint.placement import AddedLight, Move, PlacementRecord, is_panel
 from lightpaint.scene.properties.pose import Site
 from lightpaint.scene.scene import Scene
 

@@ -16,10 +16,8 @@ import numpy as np
 import numpy.typing as npt
 
 from lightpaint.arrays import Floats, aligned
-from lightpaint.images.denoiser import DARKEST, Features
-from lightpaint.images.surface_filter import SurfaceFilter
-from lightpaint.placement.paths.frozen_paths import FrozenPaths
-from lightpaint.placement.paths.path_sums import PathSums
+from lightpaint.images import DARKEST, Features, SurfaceFilter
+from lightpaint.placement import FrozenPaths, PathSums
 from lightpaint.scene.properties.film import reduction_to
 from lightpaint.scene.properties.pose import Site
 from lightpaint.scene.runtime.render_lock import tracing

@@ -1,12 +1,15 @@
 """The painter's server: carries messages and pictures between one session and its pages.
 
-It knows nothing of light. The page is a table of files; pictures are raw bytes by name and
-generation; all else goes over one WebSocket. `guard.py` decides which requests are allowed.
+It knows nothing of light. The page is a table of files, read once at the start; pictures are raw
+bytes by name and generation; all else goes over one WebSocket. `guard.py` decides which requests
+are allowed.
 """
 
 from collections.abc import AsyncIterator, Callable
 from contextlib import asynccontextmanager
+from dataclasses import dataclass
 from importlib.util import find_spec
+from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from lightpaint.errors import PaintError
@@ -15,11 +18,10 @@ from lightpaint.paint.protocol import VERSION
 from lightpaint.paint.server.address import BoundSocket, listen
 from lightpaint.paint.server.client import Client
 from lightpaint.paint.server.guard import PROTOCOL, App, Guard
-from lightpaint.paint.server.page_files import PageFile, page_files
 from lightpaint.paint.server.session_clients import Connections, ServedSession, picture_message
 from lightpaint.paint.store.store import Store
 from lightpaint.version import __version__
-from lightpaint.viewer.bundle import BundleError
+from lightpaint.viewer.bundle import BundleError, bundled, styles
 
 if TYPE_CHECKING:
     import uvicorn
@@ -27,8 +29,36 @@ if TYPE_CHECKING:
     from starlette.responses import Response
     from starlette.websockets import WebSocket
 
+
 #: Bytes of a message without its pixels, and of each pixel (light and importance) in it.
 MESSAGE_OVERHEAD_BYTES, BYTES_PER_PIXEL = 2**20, 16
+
+#: Content types by suffix; other files are not part of the page.
+CONTENT_TYPES = {
+    ".html": "text/html;charset=utf-8",
+    ".js": "text/javascript;charset=utf-8",
+    ".css": "text/css;charset=utf-8",
+    ".json": "application/json",
+    ".svg": "image/svg+xml",
+    ".png": "image/png",
+    ".wasm": "application/wasm",
+    ".woff2": "font/woff2",
+    ".txt": "text/plain;charset=utf-8",
+}
+
+PAGE_FOLDER = Path(__file__).parents[1] / "page"
+
+#: The viewer's modules, served as `/viewer`. Modules of the page import them by their path in the
+#: package; browsers ignore the `..` beyond the root.
+VIEWER_FOLDER = Path(__file__).parents[2] / "viewer"
+
+#: The page's main module; a browser loads it with all its imports.
+ENTRY_MODULE = "/main.js"
+
+#: Its style sheet, which imports one for each part of the page.
+STYLE_SHEET = "/style.css"
+
+ICON = "/icon.svg"
 
 
 def check_installed() -> None:
@@ -38,6 +68,53 @@ def check_installed() -> None:
             raise PaintError(
                 f"painting in the browser needs {name}: pip install 'lightpaint[paint]'"
             )
+
+
+@dataclass(frozen=True)
+class PageFile:
+    """A file of the page, as it was at the start."""
+
+    kind: str
+    content: bytes
+
+
+def page_files(folder: Path = PAGE_FOLDER) -> dict[str, PageFile]:
+    """Return the files of the page by their paths; `/` is the page itself.
+
+    Hidden files, links that lead elsewhere, and other kinds of files are left out.
+    """
+    root = folder.resolve()
+    table = _files_below(root, "/")
+    if "/index.html" in table:
+        table["/"] = table["/index.html"]
+    if ICON in table:
+        # Some browsers request it from every page.
+        table["/favicon.ico"] = table[ICON]
+    if root == PAGE_FOLDER.resolve():
+        table |= _files_below(VIEWER_FOLDER.resolve(), "/viewer/")
+        # A browser takes ten milliseconds per file, independent of the server.
+        table[ENTRY_MODULE] = PageFile(
+            CONTENT_TYPES[".js"], bundled(f"paint/page{ENTRY_MODULE}").encode()
+        )
+        table[STYLE_SHEET] = PageFile(
+            CONTENT_TYPES[".css"], styles(f"paint/page{STYLE_SHEET}").encode()
+        )
+    return table
+
+
+def _files_below(root: Path, start: str) -> dict[str, PageFile]:
+    """Return the files of a folder by their paths, which begin with `start`."""
+    table = {}
+    for path in sorted(root.rglob("*")):
+        place = path.relative_to(root)
+        is_hidden = any(part.startswith((".", "_")) for part in place.parts)
+        if is_hidden or path.suffix not in CONTENT_TYPES or not path.resolve().is_relative_to(root):
+            continue
+        if path.is_file():
+            table[f"{start}{place.as_posix()}"] = PageFile(
+                CONTENT_TYPES[path.suffix], path.read_bytes()
+            )
+    return table
 
 
 def page_app(

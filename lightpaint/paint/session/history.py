@@ -10,12 +10,12 @@ import numpy.typing as npt
 
 from lightpaint.arrays import Doubles, Floats
 from lightpaint.basis.basis import Basis
-from lightpaint.colour.display.view_transform import ViewTransform
+from lightpaint.colour import ViewTransform
 from lightpaint.errors import NothingToUndoError, PaintError
 from lightpaint.paint import protocol
 from lightpaint.paint.layers.canvases import Canvases
+from lightpaint.paint.layers.layer_pixels import put_selection
 from lightpaint.paint.layers.layer_stack import LayerStack
-from lightpaint.paint.layers.selection import put_selection
 from lightpaint.paint.protocol import HistoryInfo, StepInfo, StepList
 from lightpaint.paint.session.live_answer import LiveAnswer
 from lightpaint.paint.session.picture_table import display_thumbnail

@@ -1,5 +1,10 @@
-"""The requests of a session, and the answer that follows them and the brush."""
+"""The requests of a session, and the answer that follows them and the brush.
 
+While a stroke is made, drives of lamps and readings of planes are renewed only as often as they
+cost little of its time.
+"""
+
+import time
 from collections.abc import Callable, Mapping, Sequence
 from contextlib import suppress
 from dataclasses import replace
@@ -9,8 +14,7 @@ import numpy as np
 from lightpaint.arrays import RGB, Doubles
 from lightpaint.basis.basis import Basis
 from lightpaint.basis.lights import Lights
-from lightpaint.colour.display.view_transform import ViewTransform
-from lightpaint.colour.lamp import Lamp
+from lightpaint.colour import Lamp, ViewTransform
 from lightpaint.errors import LightpaintError
 from lightpaint.lighting.constraints.absolute_scale import with_sure_scale
 from lightpaint.lighting.constraints.constraints import Constraints
@@ -23,6 +27,13 @@ from lightpaint.paint.protocol import PlanesReading
 from lightpaint.paint.session.session_planes import SessionPlanes, WishesInEffect
 from lightpaint.paint.store.session_requests import SessionRequests
 from lightpaint.pipeline.job.settings import Settings
+
+#: Share of the time that readings of planes take at most: the power of many lamps takes longer than
+#: an answer.
+READING_SHARE = 0.1
+
+#: Least seconds between two sets of drives, and the share of the time that they take at most.
+DRIVES_S, DRIVES_SHARE = 0.1, 0.05
 
 
 class LiveAnswer:
@@ -239,3 +250,50 @@ def weights_by_name(weights: Doubles, names: Sequence[str], lights: Lights) -> D
         if light.name in weight_by_name:
             new_weights[k] = weight_by_name[light.name]
     return new_weights
+
+
+class LiveReadings:
+    """Readings of the planes, renewed from time to time. clock_s: a clock in seconds."""
+
+    def __init__(self, clock_s: Callable[[], float] = time.monotonic) -> None:
+        self._clock_s = clock_s
+        self._next_s = float("-inf")
+
+    def take(self, answer: LiveAnswer) -> PlanesReading | None:
+        """Return what an answer gives on measuring planes; None without any, and if it is too early
+        for them.
+        """
+        begin_s = self._clock_s()
+        if begin_s < self._next_s:
+            return None
+        reading = answer.planes_reading()
+        end_s = self._clock_s()
+        self._next_s = end_s + (end_s - begin_s) / READING_SHARE
+        return reading
+
+
+class LiveDrives:
+    """Drives of all lamps of emitters, renewed from time to time. clock_s: a clock in seconds."""
+
+    def __init__(self, clock_s: Callable[[], float] = time.monotonic) -> None:
+        self._clock_s = clock_s
+        self._next_s = float("-inf")
+
+    def take(
+        self, lamps: Mapping[int, Lamp], weights: Doubles
+    ) -> tuple[tuple[float, ...] | None, ...] | None:
+        """Return the drives of each light, None for lights without emitters; None for all if it is
+        too early for them.
+
+        lamps: by index of the light. weights: (n, 3).
+        """
+        begin_s = self._clock_s()
+        if not lamps or begin_s < self._next_s:
+            return None
+        drives = tuple(
+            tuple(lamps[k].drives_for(weight).tolist()) if k in lamps else None
+            for k, weight in enumerate(weights)
+        )
+        end_s = self._clock_s()
+        self._next_s = end_s + max(DRIVES_S, (end_s - begin_s) / DRIVES_SHARE)
+        return drives

@@ -7,7 +7,7 @@ import numpy as np
 
 from lightpaint.arrays import Doubles
 from lightpaint.basis.lights import Lights
-from lightpaint.colour.color import luminance
+from lightpaint.colour import luminance
 from lightpaint.errors import PaintError
 from lightpaint.paint import protocol
 from lightpaint.paint.store.session_requests import TITLES, SessionRequests

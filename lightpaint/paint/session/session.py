@@ -19,22 +19,25 @@ import numpy.typing as npt
 from lightpaint.arrays import Doubles, Floats
 from lightpaint.basis.basis import Basis
 from lightpaint.basis.denoised_mixes import denoise_mix
-from lightpaint.colour.display.view_transform import ViewTransform
+from lightpaint.colour import ViewTransform
 from lightpaint.errors import LightpaintError, PaintError
 from lightpaint.lighting.constraints.constraints import Constraints
 from lightpaint.lighting.constraints.start_lighting import start_weights
 from lightpaint.lighting.solution import Solution
 from lightpaint.paint import protocol
 from lightpaint.paint.layers.canvases import LayeredPaintings
+from lightpaint.paint.layers.layer_pixels import selection_patch
 from lightpaint.paint.layers.layer_stack import PAINTING_ID, LayerStack
-from lightpaint.paint.layers.selection import selection_patch
 from lightpaint.paint.protocol import AnswerUpdate, Message
-from lightpaint.paint.references.likeness_layers import open_request
+from lightpaint.paint.references.likeness import open_request
 from lightpaint.paint.references.reference_table import ReferenceTable
 from lightpaint.paint.session.history import Changes, History, Travel, restore
-from lightpaint.paint.session.live_answer import LiveAnswer, weights_by_name
-from lightpaint.paint.session.live_drives import LiveDrives
-from lightpaint.paint.session.live_readings import LiveReadings
+from lightpaint.paint.session.live_answer import (
+    LiveAnswer,
+    LiveDrives,
+    LiveReadings,
+    weights_by_name,
+)
 from lightpaint.paint.session.moved_lights import MovedLights, NoPlaneSource, Placed, PlaneSource
 from lightpaint.paint.session.request_changes import (
     RequestChange,

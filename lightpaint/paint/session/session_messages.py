@@ -10,10 +10,16 @@ import numpy as np
 from lightpaint.arrays import RGB, Doubles, as_rgb
 from lightpaint.basis.basis import Basis
 from lightpaint.basis.lights import BasisLight
-from lightpaint.colour.color import LUMINANCE, luminance, rgb_to_hex
-from lightpaint.colour.lamp import Lamp, LampEmitter
-from lightpaint.colour.photometry import photometry
-from lightpaint.colour.spectra.color_rendering import ColorRendering, color_rendering
+from lightpaint.colour import (
+    LUMINANCE,
+    ColorRendering,
+    Lamp,
+    LampEmitter,
+    color_rendering,
+    luminance,
+    photometry,
+    rgb_to_hex,
+)
 from lightpaint.lighting.analysis.analysis import Analysis
 from lightpaint.lighting.analysis.appearance.appearance import INVISIBLE, Appearance
 from lightpaint.lighting.analysis.appearance.delivery import Delivery, merge_views

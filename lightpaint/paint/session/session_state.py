@@ -10,15 +10,14 @@ import numpy.typing as npt
 from lightpaint.basis.basis import Basis
 from lightpaint.basis.cache.denoised_planes import DenoisedPlanes, RoughPlanes, as_halves
 from lightpaint.basis.light_images import LightImage, light_images
-from lightpaint.colour.display.view_transform import ViewTransform
+from lightpaint.colour import ViewTransform
 from lightpaint.errors import PaintError
-from lightpaint.images.pixel_blocks import resampled
+from lightpaint.images import resampled
 from lightpaint.paint.layers.canvas import Canvas
 from lightpaint.paint.layers.canvases import Canvases
+from lightpaint.paint.layers.layer_pixels import selection_mask
 from lightpaint.paint.layers.layer_stack import Layer
-from lightpaint.paint.layers.selection import selection_mask
-from lightpaint.paint.presets.preset_masks import requested_look
-from lightpaint.paint.presets.presets import PRESETS, find_preset
+from lightpaint.paint.presets.presets import PRESETS, find_preset, requested_look
 from lightpaint.paint.protocol import (
     ImageInfo,
     PresetInfo,
@@ -31,14 +30,15 @@ from lightpaint.paint.protocol import (
 from lightpaint.paint.references.reference_table import Reference, ReferenceTable
 from lightpaint.paint.session import picture_table
 from lightpaint.paint.session.look_library import LookLibrary
-from lightpaint.paint.session.page_planes import (
+from lightpaint.paint.session.picture_table import (
+    Picture,
+    PictureTable,
     opens_plain,
     page_emitters,
     page_plane,
     plane_scale,
     plane_size,
 )
-from lightpaint.paint.session.picture_table import Picture, PictureTable
 from lightpaint.paint.session.session import Session
 from lightpaint.paint.session.session_messages import light_info
 from lightpaint.paint.store.history_steps import name_in_view

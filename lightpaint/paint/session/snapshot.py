@@ -10,7 +10,7 @@ import numpy.typing as npt
 from lightpaint.arrays import Doubles
 from lightpaint.basis.basis import Basis
 from lightpaint.basis.cache.denoised_planes import DenoisedPlanes
-from lightpaint.colour.display.view_transform import ViewTransform
+from lightpaint.colour import ViewTransform
 from lightpaint.lighting.analysis.analysis import analyse
 from lightpaint.lighting.analysis.appearance.display_difference import PaintComparison
 from lightpaint.lighting.analysis.appearance.error_place import NOTICED

@@ -244,7 +244,7 @@ class FinalRenders:
     def _preview_of_files(self, info: RenderInfo) -> Picture:
         """Return the small picture of a render of before. Raises LightpaintError without a file."""
         # Imported here, as what renders is.
-        from lightpaint.images.picture import read_picture
+        from lightpaint.images import read_picture
         from lightpaint.pipeline.relit_renders import DENOISED
 
         by_name = {Path(file).name: file for file in info.files}

@@ -21,13 +21,14 @@ from lightpaint.paint.layers.canvas import Canvas
 from lightpaint.paint.protocol import ProgressReport, Tone
 from lightpaint.paint.rig.light_mover import LightMover
 from lightpaint.paint.session.look_library import LookLibrary
-from lightpaint.paint.session.page_planes import (
+from lightpaint.paint.session.picture_table import (
+    Picture,
     opens_plain,
     page_emitters,
     page_factor,
     plane_size,
+    plane_thumbnail,
 )
-from lightpaint.paint.session.picture_table import Picture, plane_thumbnail
 from lightpaint.paint.session.session import Session
 from lightpaint.paint.session.session_state import (
     offer_layers,

@@ -8,16 +8,15 @@ from typing import Any
 
 from lightpaint.arrays import Floats
 from lightpaint.basis.basis import Basis
-from lightpaint.colour.display.view_transform import ViewTransform
-from lightpaint.colour.srgb import to_8_bit
+from lightpaint.colour import ViewTransform, to_8_bit
 from lightpaint.errors import OutputError, PaintError
 from lightpaint.files import write_bytes
-from lightpaint.images.denoiser import denoised, denoiser_text
-from lightpaint.images.formats.png import png_bytes
+from lightpaint.images import denoised, denoiser_text
+from lightpaint.images.formats import png_bytes
 from lightpaint.lighting.answer.combination import combine
 from lightpaint.lighting.answer.lighting import Lighting
+from lightpaint.paint.layers.canvas import ViewLayers
 from lightpaint.paint.layers.layer_files import write_layers_exr, write_layers_openraster
-from lightpaint.paint.layers.view_layers import ViewLayers
 from lightpaint.paint.session.snapshot import SessionSnapshot
 from lightpaint.paint.subject import Subject, layers_paths, painting_path, picture_path
 from lightpaint.pipeline.job.job import Job

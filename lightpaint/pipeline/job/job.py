@@ -21,7 +21,7 @@ from lightpaint.basis.render.render_origin import basis_lights
 from lightpaint.display_text import short_repr
 from lightpaint.errors import ConstraintError, LightpaintError, TargetError
 from lightpaint.files import check_writable
-from lightpaint.images.pixel_blocks import whole_factor
+from lightpaint.images import whole_factor
 from lightpaint.keywords import keywords
 from lightpaint.lighting.constraints.absolute_scale import agreed_scale, with_sure_scale
 from lightpaint.lighting.constraints.constraints import Constraints
@@ -68,9 +68,7 @@ from lightpaint.pipeline.results.results import (
     checked_names,
     view_names,
 )
-from lightpaint.placement.placement import PlacementRecord
-from lightpaint.placement.rigging import Rigging
-from lightpaint.placement.suggested_lights import check_suggestible
+from lightpaint.placement import PlacementRecord, Rigging, check_suggestible
 from lightpaint.relit.export.nuke import spoken_unreadable
 from lightpaint.relit.luminaire_xml import plugin_remark
 from lightpaint.scene.quality_presets import on_film

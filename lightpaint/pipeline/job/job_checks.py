@@ -17,8 +17,7 @@ from lightpaint.lighting.constraints.constraints import Constraints
 from lightpaint.lighting.joined_views import check_same_lights
 from lightpaint.pipeline.job.settings import Settings
 from lightpaint.pipeline.job.sources import Painting, content
-from lightpaint.placement.rigged_lights import check_names, rigged_lights
-from lightpaint.placement.rigging import Rigging, rigging_of
+from lightpaint.placement import Rigging, check_rigging, rigged_lights, rigging_of
 from lightpaint.scene.lights.texels.image_domains import DOMAINS, Sky
 from lightpaint.scene.lights.texels.texel import mirrored_pairs, node_name
 from lightpaint.scene.lights.texels.texel_layout import CHILDREN
@@ -148,7 +147,7 @@ def rigging_for(rigging: Rigging, scenes: Sequence[Scene], settings: Settings) -
             raise LightpaintError("lights can only move in their scene: give the scene")
         return Rigging()
     all_rigging = rigging_of(scenes[0].requests).and_then(rigging)
-    check_names(all_rigging, scenes[0])
+    check_rigging(all_rigging, scenes[0])
     if not settings.move_lights:
         return Rigging()
     if all_rigging:

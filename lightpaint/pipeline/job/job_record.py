@@ -18,7 +18,7 @@ from lightpaint.pipeline.job.sources import (
     PlacementFile,
     SceneFile,
 )
-from lightpaint.placement.rigging import Rigging
+from lightpaint.placement import Rigging
 from lightpaint.storage.json_records import read_record, strict_json
 
 FORMAT = "lightpaint-job 1"

@@ -3,8 +3,7 @@
 from lightpaint.basis.render.banded_film import memory_needed, renders_in_bands
 from lightpaint.basis.render.integrators import remark_on_separate_renders
 from lightpaint.display_text import some_names
-from lightpaint.images.denoiser import MISSING_REMARK, oidn_is_installed
-from lightpaint.images.pixel_blocks import Size, left_over, whole_factor
+from lightpaint.images import MISSING_REMARK, Size, left_over, oidn_is_installed, whole_factor
 from lightpaint.pipeline.job.settings import Settings
 from lightpaint.scene.quality_presets import PRESETS
 from lightpaint.scene.runtime.variant import use_variant

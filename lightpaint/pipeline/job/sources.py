@@ -13,13 +13,13 @@ from lightpaint.arrays import Floats
 from lightpaint.basis.basis import Basis
 from lightpaint.basis.file.basis_file import read_basis
 from lightpaint.basis.lightgroups.light_groups import LightGroups, read_light_groups
-from lightpaint.colour.display.view_transform import TransformChoice
+from lightpaint.colour import TransformChoice
 from lightpaint.errors import BasisError
 from lightpaint.keywords import keywords
 from lightpaint.lighting.constraints.constraints_file import constraints_of
 from lightpaint.pipeline.job.settings import Settings
 from lightpaint.pipeline.job.spectral_job import observer_of, spectral_scene
-from lightpaint.placement.placement import PlacementRecord, read_placement
+from lightpaint.placement import PlacementRecord, read_placement
 from lightpaint.scene.scene import Scene
 from lightpaint.scene.scene_reader import load_scene
 from lightpaint.sentences import Hint, Sentence

@@ -4,7 +4,7 @@ from pathlib import Path
 
 from lightpaint.basis.render.integrators import check_renders_spectra
 from lightpaint.basis.render.render_origin import basis_lights
-from lightpaint.colour.spectra.observer import EYE, Observer, read_observer
+from lightpaint.colour import EYE, Observer, read_observer
 from lightpaint.errors import LightpaintError, SceneError
 from lightpaint.lighting.constraints.constraints import Constraints
 from lightpaint.lighting.unknowns.lamp_parts import WholeLamps

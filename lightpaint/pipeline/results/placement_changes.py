@@ -4,7 +4,7 @@ from typing import Any
 
 from lightpaint.display_text import rounded_text
 from lightpaint.lighting.answer.lighting import Lighting
-from lightpaint.placement.placement import (
+from lightpaint.placement import (
     HARDLY_VISIBLE,
     TO_END,
     AddedLight,

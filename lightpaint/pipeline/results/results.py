@@ -6,14 +6,12 @@ from dataclasses import asdict, dataclass, replace
 from pathlib import Path
 
 from lightpaint.basis.basis import Basis, Origin
-from lightpaint.colour.spectra.observer import EYE, Observer
+from lightpaint.colour import EYE, Observer
 from lightpaint.display_text import some_names
 from lightpaint.errors import ImageError, OutputError, SceneError
 from lightpaint.files import is_name, one_line, write_bytes, write_text
-from lightpaint.images.bands import in_turns
-from lightpaint.images.estimate import Estimate, read_estimate, write_estimate
-from lightpaint.images.formats.png import png_bytes
-from lightpaint.images.pixel_blocks import Size, whole_factor
+from lightpaint.images import Estimate, Size, in_turns, read_estimate, whole_factor, write_estimate
+from lightpaint.images.formats import png_bytes
 from lightpaint.keywords import keywords
 from lightpaint.lighting.analysis.analysis import Analysis
 from lightpaint.lighting.analysis.diagnosis import Diagnosis
@@ -23,8 +21,7 @@ from lightpaint.lighting.answer.lighting import Lighting
 from lightpaint.lighting.solution import Solution
 from lightpaint.lighting.wishes.planes_answer import PlanesAnswer
 from lightpaint.pipeline.results.placement_changes import hung_of
-from lightpaint.placement.placement import Placement
-from lightpaint.placement.suggestion import MoveSuggestion, Suggestion
+from lightpaint.placement import MoveSuggestion, Placement, Suggestion
 from lightpaint.progress import Progress, silent
 from lightpaint.relit.export.exports import EXPORTS
 from lightpaint.relit.verification import Verification

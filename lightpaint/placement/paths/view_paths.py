@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 
 from lightpaint.arrays import Bools, Doubles, Floats, Indices
-from lightpaint.images.denoiser import Features
+from lightpaint.images import Features
 from lightpaint.placement.free_space import (
     CLEARANCE,
     FreeSpace,

@@ -16,12 +16,11 @@ import numpy as np
 
 from lightpaint.arrays import RGB, Doubles, Position
 from lightpaint.basis.lightgroups.light_groups import LightGroups
-from lightpaint.colour.color import luminance
-from lightpaint.colour.primaries import ACESCG, REC2020, from_rec709
+from lightpaint.colour import ACESCG, REC2020, from_rec709, luminance
 from lightpaint.display_text import some_names
 from lightpaint.errors import LightingError
 from lightpaint.files import write_text
-from lightpaint.images.formats.exr import ExrPart, rgb_channels, write_parts
+from lightpaint.images.formats import ExrPart, rgb_channels, write_parts
 from lightpaint.keywords import keywords
 from lightpaint.lighting.answer.lighting import Lighting, LightSetting
 from lightpaint.lighting.answer.lighting_keys import key_slopes

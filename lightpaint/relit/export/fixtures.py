@@ -20,7 +20,7 @@ from typing import Any, Literal
 import numpy as np
 
 from lightpaint.arrays import RGB, Position
-from lightpaint.colour.lamp import LampEmitter
+from lightpaint.colour import LampEmitter
 from lightpaint.lighting.answer.lighting import Lighting, LightSetting
 from lightpaint.relit.export.exports import plain_cell
 from lightpaint.version import __version__

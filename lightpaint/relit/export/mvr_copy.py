@@ -16,8 +16,7 @@ from xml.etree.ElementTree import Element, SubElement, tostring
 import numpy as np
 
 from lightpaint.arrays import Doubles
-from lightpaint.colour.color import luminance
-from lightpaint.colour.primaries import REC709, rgb_to_xyz
+from lightpaint.colour import REC709, luminance, rgb_to_xyz
 from lightpaint.dmx.mvr import DESCRIPTION, KIND, MM, NamedFixture, named_fixtures, show_nodes
 from lightpaint.dmx.rig_archive import RigArchive, reading
 from lightpaint.lighting.answer.lighting import Lighting

@@ -25,9 +25,9 @@ from lightpaint.arrays import RGB, Floats, Position
 from lightpaint.basis.lightgroups.light_groups import LightGroups
 from lightpaint.basis.lightgroups.render_layers import RenderLayer
 from lightpaint.basis.lights import free_name
-from lightpaint.colour.primaries import to_rec709
+from lightpaint.colour import to_rec709
 from lightpaint.files import one_line
-from lightpaint.images.formats.exr import ExrPart, rgb_channels
+from lightpaint.images.formats import ExrPart, rgb_channels
 from lightpaint.lighting.answer.lighting import Lighting
 from lightpaint.relit.export.program_axes import axis_conversions, conversion_of
 from lightpaint.scene.properties.site import Site

@@ -3,7 +3,7 @@
 import csv
 import io
 
-from lightpaint.colour.spectra.spectrum import WAVELENGTHS
+from lightpaint.colour import WAVELENGTHS
 from lightpaint.errors import LightpaintError
 from lightpaint.lighting.answer.lighting import Lighting
 from lightpaint.relit.export.exports import plain_cell

@@ -7,13 +7,9 @@ from markupsafe import Markup
 
 from lightpaint.arrays import Doubles
 from lightpaint.basis.basis import Basis
-from lightpaint.colour.color import cct_and_duv
-from lightpaint.colour.display.view_transform import ViewTransform
-from lightpaint.colour.hue_names import hue_name
-from lightpaint.colour.srgb import to_8_bit
+from lightpaint.colour import ViewTransform, cct_and_duv, hue_name, to_8_bit
 from lightpaint.display_text import some_names
-from lightpaint.images.denoiser import denoised
-from lightpaint.images.pixel_blocks import block_mean
+from lightpaint.images import block_mean, denoised
 from lightpaint.lighting.analysis.appearance.color_choices import Choices, ColorChoice
 from lightpaint.lighting.fit import Colors
 from lightpaint.lighting.solution import Solution

@@ -7,10 +7,8 @@ from markupsafe import Markup
 
 from lightpaint.arrays import Floats
 from lightpaint.basis.basis import Basis
-from lightpaint.colour.color import luminance
-from lightpaint.colour.display.view_transform import ViewTransform
-from lightpaint.colour.srgb import to_8_bit
-from lightpaint.images.bands import by_bands
+from lightpaint.colour import ViewTransform, luminance, to_8_bit
+from lightpaint.images import by_bands
 from lightpaint.lighting.analysis.appearance.appearance import Appearance
 from lightpaint.lighting.analysis.diagnosis import Diagnosis
 from lightpaint.lighting.analysis.noise.uncertainty import Uncertainty

@@ -10,10 +10,9 @@ from markupsafe import Markup
 from PIL import Image
 
 from lightpaint.arrays import Floats, largest
-from lightpaint.colour.display.view_transform import ViewTransform
-from lightpaint.colour.srgb import encode_display, to_8_bit
-from lightpaint.images.denoiser import denoised
-from lightpaint.images.formats.png import png_bytes
+from lightpaint.colour import ViewTransform, encode_display, to_8_bit
+from lightpaint.images import denoised
+from lightpaint.images.formats import png_bytes
 from lightpaint.lighting.solution import Solution
 from lightpaint.relit.verification import LIMIT, Verification
 from lightpaint.report.answer_pictures import (

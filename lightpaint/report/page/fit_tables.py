@@ -10,7 +10,7 @@ from markupsafe import Markup
 
 from lightpaint.basis.basis import Basis
 from lightpaint.display_text import some_of
-from lightpaint.images.estimate import Estimate
+from lightpaint.images import Estimate
 from lightpaint.lighting.analysis.appearance.appearance import Appearance
 from lightpaint.lighting.analysis.appearance.delivery import spoken_share
 from lightpaint.lighting.answer.certificate import Software, version

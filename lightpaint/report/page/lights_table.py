@@ -10,11 +10,8 @@ from lightpaint.arrays import RGB, Doubles, Floats, Indices
 from lightpaint.basis.basis import Basis
 from lightpaint.basis.light_images import LightImage, light_images
 from lightpaint.basis.lights import BasisLight
-from lightpaint.colour.color import luminance, rgb_to_hex
-from lightpaint.colour.photometry import Photometry
-from lightpaint.colour.srgb import encode_display, to_8_bit
-from lightpaint.images.bands import in_turns
-from lightpaint.images.pixel_blocks import block_mean
+from lightpaint.colour import Photometry, encode_display, luminance, rgb_to_hex, to_8_bit
+from lightpaint.images import block_mean, in_turns
 from lightpaint.lighting.analysis.noise.uncertainty import Uncertainty
 from lightpaint.lighting.answer.lighting import ALL_REACHED, Lighting, LightSetting
 from lightpaint.lighting.solution import Solution

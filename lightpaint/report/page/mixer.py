@@ -22,14 +22,16 @@ from lightpaint.basis.basis import Basis
 from lightpaint.basis.denoised_mixes import denoise_mixes, denoise_plane
 from lightpaint.basis.light_images import LightImage, light_images
 from lightpaint.basis.lights import BasisLight
-from lightpaint.colour.color import kelvin_to_rgb, luminance
-from lightpaint.colour.display.transform_table import curve_of, lattice_of
-from lightpaint.colour.display.view_transform import ViewTransform
-from lightpaint.colour.photometry import photometry
-from lightpaint.colour.srgb import to_8_bit
-from lightpaint.images.bands import in_turns
-from lightpaint.images.packed_picture import PackedPicture, pack_picture
-from lightpaint.images.pixel_blocks import block_mean
+from lightpaint.colour import (
+    ViewTransform,
+    curve_of,
+    kelvin_to_rgb,
+    lattice_of,
+    luminance,
+    photometry,
+    to_8_bit,
+)
+from lightpaint.images import PackedPicture, block_mean, in_turns, pack_picture
 from lightpaint.lighting.answer.lighting import ALL_REACHED, Lighting
 from lightpaint.lighting.answer.lighting_file import lighting_fields
 from lightpaint.progress import with_progress

@@ -14,15 +14,17 @@ from PIL import Image, ImageDraw, ImageFont
 
 from lightpaint.arrays import RGB, Doubles, Floats
 from lightpaint.basis.basis import Basis
-from lightpaint.colour.color import LUMINANCE, luminance
-from lightpaint.colour.display.exposure import choose_exposure
-from lightpaint.colour.display.view_transform import ViewTransform
-from lightpaint.colour.photometry import Photometry, photometry
-from lightpaint.colour.srgb import to_8_bit
-from lightpaint.images.denoiser import denoised
-from lightpaint.images.estimate import Estimate
-from lightpaint.images.formats.png import png_bytes
-from lightpaint.images.pixel_blocks import covered, enlarged
+from lightpaint.colour import (
+    LUMINANCE,
+    Photometry,
+    ViewTransform,
+    choose_exposure,
+    luminance,
+    photometry,
+    to_8_bit,
+)
+from lightpaint.images import Estimate, covered, denoised, enlarged
+from lightpaint.images.formats import png_bytes
 from lightpaint.lighting.analysis.appearance.appearance import Appearance
 from lightpaint.lighting.answer.lighting import Lighting
 from lightpaint.lighting.solution import Solution

@@ -15,10 +15,8 @@ from markupsafe import Markup
 
 from lightpaint.arrays import Floats
 from lightpaint.basis.basis import Basis
-from lightpaint.colour.display.view_transform import ViewTransform
-from lightpaint.colour.srgb import to_8_bit
-from lightpaint.images.bands import in_turns
-from lightpaint.images.pixel_blocks import covered
+from lightpaint.colour import ViewTransform, to_8_bit
+from lightpaint.images import covered, in_turns
 from lightpaint.lighting.solution import Solution
 from lightpaint.report.answer_pictures import (
     Residual,

@@ -9,10 +9,9 @@ from markupsafe import Markup
 from PIL import Image, ImageDraw, ImageFont
 
 from lightpaint.arrays import Floats, Position
-from lightpaint.colour.display.view_transform import ViewTransform
-from lightpaint.colour.srgb import to_8_bit
+from lightpaint.colour import ViewTransform, to_8_bit
 from lightpaint.display_text import visible
-from lightpaint.images.denoiser import Features, denoised
+from lightpaint.images import Features, denoised
 from lightpaint.placement.suggestion import MoveSuggestion, Suggestion
 from lightpaint.report.page.figures import data_uri
 from lightpaint.report.page.html import html

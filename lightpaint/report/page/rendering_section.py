@@ -7,7 +7,7 @@ import numpy as np
 from markupsafe import Markup
 
 from lightpaint.arrays import RGB
-from lightpaint.colour.srgb import encode_display, to_8_bit
+from lightpaint.colour import encode_display, to_8_bit
 from lightpaint.lighting.analysis.surface_colors import SurfaceColor
 from lightpaint.lighting.answer.light_rendering import LightRendering, renderings_of
 from lightpaint.lighting.answer.lighting import Lighting

@@ -10,7 +10,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from lightpaint.arrays import Doubles, Floats, Position
-from lightpaint.images.denoiser import Features
+from lightpaint.images import Features
 from lightpaint.scene.properties.site import Site
 
 #: Pixels that a projection is fitted to, and the least that it takes.

@@ -17,7 +17,7 @@ import numpy.typing as npt
 from lightpaint.errors import ImageError, SceneError
 from lightpaint.file_reading import file_length
 from lightpaint.files import one_line
-from lightpaint.images.formats.exr import read_parts
+from lightpaint.images.formats import read_parts
 from lightpaint.luminaires.plugin_names import LUMINAIRE_PLUGINS
 from lightpaint.luminaires.web_file import read_web
 

@@ -9,8 +9,7 @@ from typing import Any
 import numpy as np
 
 from lightpaint.arrays import RGB
-from lightpaint.colour.color import luminance
-from lightpaint.colour.photometry import lambertian_flux, point_flux, spot_flux
+from lightpaint.colour import lambertian_flux, luminance, point_flux, spot_flux
 from lightpaint.errors import SceneError
 from lightpaint.luminaires.plugin_names import AREA_PLUGIN, LUMINAIRE_PLUGINS
 from lightpaint.scene.lights.texels.texel import Texel

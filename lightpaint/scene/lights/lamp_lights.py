@@ -5,8 +5,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from lightpaint.colour.color import luminance
-from lightpaint.colour.lamp import Lamp
+from lightpaint.colour import Lamp, luminance
 from lightpaint.display_text import some_names
 from lightpaint.errors import SceneError
 from lightpaint.scene.lights.light import Light

@@ -5,7 +5,7 @@ from collections.abc import Collection, Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 
 from lightpaint.arrays import RGB
-from lightpaint.colour.spectra.spectrum import Spectrum
+from lightpaint.colour import Spectrum
 from lightpaint.display_text import some_names
 from lightpaint.errors import SceneError
 from lightpaint.scene.lights.emitters import Emitter

@@ -10,7 +10,7 @@ from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
 
-from lightpaint.colour.spectra.spectrum_source import is_spectrum_file
+from lightpaint.colour import is_spectrum_file
 from lightpaint.display_text import known_keys
 from lightpaint.errors import SceneError
 from lightpaint.file_reading import read_text

@@ -15,7 +15,7 @@ from typing import Any
 
 from lightpaint.display_text import some_names
 from lightpaint.errors import SceneError
-from lightpaint.images.pixel_blocks import blocks_in, left_over, whole_factor
+from lightpaint.images import blocks_in, left_over, whole_factor
 from lightpaint.scene.limits import MAX_PIXELS, MAX_SPP
 from lightpaint.scene.properties.observed_spectra import Bands
 

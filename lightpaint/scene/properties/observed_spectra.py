@@ -14,7 +14,7 @@ from typing import Any
 import numpy as np
 
 from lightpaint.arrays import Doubles, Floats
-from lightpaint.colour.spectra.observer import Observer
+from lightpaint.colour import Observer
 
 #: Wavelengths of the channels in nm.
 WAVES = np.arange(380, 781, dtype=np.float64)

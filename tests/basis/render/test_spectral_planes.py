@@ -8,10 +8,9 @@ from renderer import LIGHTS, write_room
 
 from lightpaint.basis.basis import Basis
 from lightpaint.basis.render.basis_render import render_basis
-from lightpaint.colour.color import luminance
+from lightpaint.colour.color import luminance, matching_functions
 from lightpaint.colour.color_difference import delta_e
 from lightpaint.colour.lamp import Lamp, LampEmitter
-from lightpaint.colour.planckian_locus import matching_functions
 from lightpaint.colour.primaries import REC709, rgb_to_xyz
 from lightpaint.colour.spectra.spectrum import (
     WAVELENGTHS,

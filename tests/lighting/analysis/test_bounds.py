@@ -12,7 +12,7 @@ from nightly import seeds
 from scipy.optimize import lsq_linear
 
 from lightpaint.colour.color import kelvin_to_rgb
-from lightpaint.colour.white_range import white_range
+from lightpaint.colour.color_ranges import white_range
 from lightpaint.errors import LightingError
 from lightpaint.lighting.analysis import active_bounds
 from lightpaint.lighting.analysis.diagnosis import diagnose

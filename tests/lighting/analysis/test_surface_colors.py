@@ -11,6 +11,7 @@ from renderer import LIGHTS, write_room
 from lightpaint.basis.render.basis_render import render_basis
 from lightpaint.colour.color import kelvin_to_rgb
 from lightpaint.colour.primaries import colour_science
+from lightpaint.colour.spectra.color_rendering import adapted_color
 from lightpaint.colour.spectra.spectrum import (
     WAVELENGTHS,
     rgb_of_powers,
@@ -18,7 +19,6 @@ from lightpaint.colour.spectra.spectrum import (
     xyz_of_powers,
 )
 from lightpaint.colour.spectra.spectrum_source import daylight
-from lightpaint.colour.spectra.surface_color import adapted_color
 from lightpaint.images.object_map import Objects
 from lightpaint.lighting.analysis.surface_colors import surface_colors
 from lightpaint.lighting.constraints.constraints import Constraints

@@ -12,7 +12,7 @@ from qp import least
 from scipy.optimize import lsq_linear, nnls
 
 from lightpaint.colour.color import cct_and_duv, hex_to_rgb, kelvin_to_rgb
-from lightpaint.colour.white_range import white_range
+from lightpaint.colour.color_ranges import white_range
 from lightpaint.errors import ConstraintError
 from lightpaint.lighting.answer.lighting_file import read_lighting, write_lighting
 from lightpaint.lighting.constraints.constraints import Constraints

@@ -7,8 +7,7 @@ import pytest
 
 import lightpaint as lp
 from lightpaint.colour.color import kelvin_to_rgb
-from lightpaint.colour.color_hull import DIRECTIONS, chromaticity
-from lightpaint.colour.white_range import white_range
+from lightpaint.colour.color_ranges import DIRECTIONS, chromaticity, white_range
 from lightpaint.lighting import problem
 from lightpaint.lighting.fit import resolve_for_targets
 from lightpaint.lighting.live.live import LiveSolver

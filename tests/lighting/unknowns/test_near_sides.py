@@ -6,8 +6,7 @@ import numpy as np
 import pytest
 
 import lightpaint as lp
-from lightpaint.colour.color_hull import ColorHull, reach_of
-from lightpaint.colour.white_range import white_range
+from lightpaint.colour.color_ranges import ColorHull, reach_of, white_range
 from lightpaint.lighting.linear_problem import reduce_lights
 from lightpaint.lighting.normal_equations import NormalEquations
 from lightpaint.lighting.unknowns import white_mixes

@@ -20,10 +20,10 @@ from patience import PATIENCE_S
 
 import lightpaint as lp
 from lightpaint.images.object_map import Objects
+from lightpaint.paint.layers.canvas import ViewLayers
 from lightpaint.paint.layers.layer_files import write_layers_openraster
 from lightpaint.paint.layers.layer_pixels import LayerPixels
 from lightpaint.paint.layers.layer_stack import Layer, LayerStack
-from lightpaint.paint.layers.view_layers import ViewLayers
 from lightpaint.paint.server.server import Server
 from lightpaint.paint.store.history_steps import Pixels
 from lightpaint.paint.store.store import Store

@@ -9,7 +9,7 @@ from axe import violations
 from painter_page import Painter
 
 import lightpaint as lp
-from lightpaint.paint.rig.plane_sight import plane_sight
+from lightpaint.paint.studio.plane_measurements import plane_sight
 from lightpaint.photometry.false_colour import COLOURS, colours_of, isolux_levels
 
 SENSORS = {

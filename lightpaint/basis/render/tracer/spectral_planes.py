@@ -19,8 +19,7 @@ import numpy as np
 from lightpaint.arrays import Doubles, Floats, aligned
 from lightpaint.basis.render.tracer.light_planes import LightPlanes
 from lightpaint.basis.render.tracer.wavelengths import BINS, FIRST_NM, packets_for, spacing_of
-from lightpaint.colour.spectra.observer import EYE, Observer
-from lightpaint.colour.spectra.spectrum import WAVELENGTHS, Spectrum
+from lightpaint.colour import EYE, WAVELENGTHS, Observer, Spectrum
 from lightpaint.scene.scene import Scene
 
 

@@ -18,7 +18,7 @@ import mitsuba as mi
 import numpy as np
 
 from lightpaint.basis.render.tracer.sobol import TIME
-from lightpaint.colour.spectra.spectrum import STEP, Spectrum
+from lightpaint.colour import STEP, Spectrum
 
 #: The first wavelength in nanometres, and the number of bins of 1 nm that follow.
 FIRST_NM, BINS = 380, 400

@@ -11,9 +11,9 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 
 from lightpaint.arrays import Floats
-from lightpaint.colour.color import luminance
+from lightpaint.colour import luminance
 from lightpaint.display_text import short_repr
-from lightpaint.images.estimate import Estimate
+from lightpaint.images import Estimate
 from lightpaint.keywords import keywords
 from lightpaint.lighting.analysis.appearance.area_lights import AreaLights, lights_of_area
 from lightpaint.lighting.analysis.appearance.compensation import compensating_lights

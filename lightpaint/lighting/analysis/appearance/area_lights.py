@@ -15,8 +15,8 @@ import numpy.typing as npt
 from lightpaint.arrays import Bools, Doubles, Floats, Indices
 from lightpaint.basis.basis import Basis
 from lightpaint.basis.planes import thinned
-from lightpaint.colour.color import LUMINANCE, luminance
-from lightpaint.images.object_map import Objects
+from lightpaint.colour import LUMINANCE, luminance
+from lightpaint.images import Objects
 from lightpaint.lighting.analysis.appearance.error_place import NO_NAME, object_with_most
 
 #: Ratio of a light's share in a part to its share in the rest from which it lights the part alone.

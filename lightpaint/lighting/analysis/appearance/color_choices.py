@@ -12,7 +12,7 @@ from typing import get_args
 import numpy as np
 
 from lightpaint.arrays import RGB, Doubles, as_rgb
-from lightpaint.colour.color import luminance
+from lightpaint.colour import luminance
 from lightpaint.display_text import short_repr
 from lightpaint.errors import ConstraintError
 from lightpaint.lighting.analysis.appearance.display_difference import PaintComparison

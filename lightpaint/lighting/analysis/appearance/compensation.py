@@ -3,7 +3,7 @@
 import numpy as np
 
 from lightpaint.arrays import Bools, Doubles
-from lightpaint.colour.color import luminance
+from lightpaint.colour import luminance
 from lightpaint.lighting.analysis.appearance.constraint_kinds import (
     SINGLE_LIGHT_KINDS,
     ConstraintsByLight,

@@ -19,8 +19,7 @@ from typing import NamedTuple
 import numpy as np
 
 from lightpaint.arrays import Doubles, Floats
-from lightpaint.colour.color import luminance
-from lightpaint.colour.color_difference import ciede2000, lab
+from lightpaint.colour import ciede2000, lab, luminance
 from lightpaint.display_text import visible
 from lightpaint.keywords import keywords
 from lightpaint.lighting.analysis.appearance.washes import AreaWashes, Washes

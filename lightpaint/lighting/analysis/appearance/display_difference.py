@@ -9,8 +9,7 @@ import numpy.typing as npt
 
 from lightpaint.arrays import Bools, Doubles, Floats
 from lightpaint.basis.planes import Planes
-from lightpaint.colour.color_difference import ciede2000, lab
-from lightpaint.colour.display.view_transform import ViewTransform
+from lightpaint.colour import ViewTransform, ciede2000, lab
 from lightpaint.lighting.display import display_light, display_transform
 from lightpaint.lighting.loss.painting import at_least_mask, target_light
 from lightpaint.lighting.problem import Problem

@@ -8,9 +8,8 @@ import numpy as np
 from lightpaint.arrays import Doubles, Indices, as_rgb
 from lightpaint.basis.light_images import light_images
 from lightpaint.basis.planes import thinned
-from lightpaint.colour.color import LUMINANCE, luminance
-from lightpaint.colour.color_difference import ciede2000
-from lightpaint.images.object_map import Objects
+from lightpaint.colour import LUMINANCE, ciede2000, luminance
+from lightpaint.images import Objects
 from lightpaint.lighting.analysis.appearance.display_difference import PaintComparison
 from lightpaint.lighting.analysis.diagnosis import (
     REGIONS,

@@ -12,7 +12,7 @@ from typing import Literal
 import numpy as np
 
 from lightpaint.arrays import Doubles, Floats
-from lightpaint.images.bands import is_large
+from lightpaint.images import is_large
 from lightpaint.lighting.analysis.appearance.constraint_kinds import (
     ALL_LIGHTS_KINDS,
     ConstraintKind,

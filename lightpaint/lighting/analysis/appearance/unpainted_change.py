@@ -6,7 +6,7 @@ import numpy as np
 
 from lightpaint.arrays import Bools, Doubles, Floats, Indices
 from lightpaint.basis.basis import Basis
-from lightpaint.colour.color_difference import ciede2000
+from lightpaint.colour import ciede2000
 from lightpaint.lighting.analysis.appearance.constraint_kinds import (
     ConstraintKind,
     ConstraintsByLight,

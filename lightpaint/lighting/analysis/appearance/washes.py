@@ -12,9 +12,8 @@ from typing import NamedTuple
 import numpy as np
 
 from lightpaint.arrays import Bools, Doubles, Floats
-from lightpaint.colour.color_difference import lab
-from lightpaint.colour.display.view_transform import ViewTransform
-from lightpaint.images.pixel_blocks import block_mean, fitting_factor
+from lightpaint.colour import ViewTransform, lab
+from lightpaint.images import block_mean, fitting_factor
 from lightpaint.lighting.display import display_light
 from lightpaint.threads import one_thread
 

@@ -8,7 +8,7 @@ from typing import Literal
 import numpy as np
 
 from lightpaint.arrays import Floats
-from lightpaint.images.object_map import Objects
+from lightpaint.images import Objects
 from lightpaint.lighting.analysis.appearance.error_place import object_with_most
 from lightpaint.target.wish import Wish
 

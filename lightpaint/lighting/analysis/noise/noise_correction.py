@@ -20,8 +20,7 @@ from lightpaint.arrays import Doubles, Floats
 from lightpaint.basis.basis import Basis
 from lightpaint.basis.planes import Planes, as_planes
 from lightpaint.errors import BasisError, LightpaintError
-from lightpaint.images.estimate import box_mean
-from lightpaint.images.surface_filter import SurfaceFilter
+from lightpaint.images import SurfaceFilter, box_mean
 from lightpaint.keywords import keywords
 from lightpaint.lighting.analysis.noise.noise import (
     Noise,

@@ -16,7 +16,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from lightpaint.arrays import Doubles, Floats
-from lightpaint.images.estimate import box_mean
+from lightpaint.images import box_mean
 from lightpaint.lighting.analysis.noise.residuals import Residuals
 from lightpaint.lighting.loss.loss import PixelLoss, planes_of
 from lightpaint.lighting.solution import Solution

@@ -14,7 +14,7 @@ import numpy as np
 from lightpaint.arrays import Doubles, Floats
 from lightpaint.basis.planes import BLOCK_PIXELS
 from lightpaint.errors import BasisError, SizeError
-from lightpaint.images.estimate import Estimate
+from lightpaint.images import Estimate
 from lightpaint.keywords import keywords
 from lightpaint.lighting.analysis.noise.noise import (
     gradient_bias,

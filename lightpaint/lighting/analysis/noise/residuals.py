@@ -18,8 +18,7 @@ import numpy as np
 import numpy.typing as npt
 
 from lightpaint.arrays import Bools, Doubles, Floats, Indices
-from lightpaint.images.estimate import box_mean
-from lightpaint.images.pixel_blocks import enlarged
+from lightpaint.images import box_mean, enlarged
 from lightpaint.lighting.solution import Solution
 
 _Kind = TypeVar("_Kind", bound=np.generic)

@@ -18,7 +18,7 @@ import numpy as np
 
 from lightpaint.arrays import RGB, Bools, Doubles, Floats, as_rgb, release_freed_memory
 from lightpaint.basis.planes import BLOCK_PIXELS, FEW_LIGHTS
-from lightpaint.colour.color import LUMINANCE
+from lightpaint.colour import LUMINANCE
 from lightpaint.display_text import short_repr
 from lightpaint.keywords import keywords
 from lightpaint.lighting.analysis.noise.dominant_pixels import NORMAL_95

@@ -51,7 +51,7 @@ def rigged_lights(rigging: Rigging, scene: Scene) -> RiggedLights:
     return RiggedLights(freedoms, tuple(new), tuple(pairs), Constraints(requests))
 
 
-def check_names(rigging: Rigging, scene: Scene) -> None:
+def check_rigging(rigging: Rigging, scene: Scene) -> None:
     """Raise ConstraintError for names that no light or shape of `scene` has.
 
     Those of pairs and surfaces count, too, whether or not a search would use them.
