@@ -81,6 +81,12 @@ def check_alike(planes: Planes, images: np.ndarray, tolerance: float = 0.0) -> N
     )
     expected = np.einsum("nhwc,nc->hwc", images, w)
     np.testing.assert_allclose(planes.mix(w), expected, rtol=1e-5 + tolerance)  # float32 sums
+    mask, exact = rng.random((height, width)) < 0.5, images.astype(np.float64)
+    power, totals = planes.power_and_totals(mask)
+    expected_power = np.square(exact)[:, mask].sum(axis=1)
+    np.testing.assert_allclose(power, expected_power, rtol=1e-5 + tolerance)
+    np.testing.assert_allclose(totals, exact.sum(axis=(1, 2)), rtol=1e-5 + tolerance)
+    np.testing.assert_allclose(planes.squares(), np.square(exact).sum(axis=(1, 2, 3)), rtol=1e-5)
     psi, weight = rng.random((height, width, 3)), rng.random((height, width))
     weight[2:4] = 0
     M, b, norm2 = planes.sums(weight, psi)

@@ -13,8 +13,9 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from lightpaint.arrays import Doubles, Floats, Indices, copy_as_singles
+from lightpaint.arrays import Bools, Doubles, Floats, Indices, copy_as_singles
 from lightpaint.basis.file.file_planes import RowPlanes
+from lightpaint.progress import with_progress
 from lightpaint.threads import parallel_map
 
 #: Number of lights from which planes may be kept by their lit pixels.
@@ -88,6 +89,20 @@ class _LitStrip:
     def nbytes(self) -> int:
         """Bytes of memory that it takes."""
         return self.lit.nbytes + self.numbers.nbytes
+
+    def power_and_totals(self, counted: Bools) -> Doubles:
+        """Return Σ x² over the counted pixels and Σ x over all, (2, n, 3), before the scales.
+
+        counted: (pixels,).
+        """
+        n = len(self.begins) - 1
+        owners, is_counted = self.of_planes(np.arange(n)), counted[self.lit]
+        values = (_singles(channel).astype(np.float64) for channel in self.numbers)
+        sums = [
+            [np.bincount(owners, x, n) for x in (is_counted * np.square(channel), channel)]
+            for channel in values
+        ]
+        return np.asarray(sums).transpose(1, 2, 0)
 
     def of_planes(self, values: npt.NDArray[Any]) -> npt.NDArray[Any]:
         """Return a value of each plane, (n,), for each of its lit pixels, (m,)."""
@@ -209,6 +224,21 @@ class LitPlanes(RowPlanes):
         """Return several sums Σ w_i Φ_i, (k, h, w, 3), in one walk. weights: (k, n, 3)."""
         mixed = np.stack([self.exact_mix(one).T for one in weights]).astype(np.float32)
         return mixed.reshape(len(weights), *self._size, 3)
+
+    def power_and_totals(self, mask: Bools) -> tuple[Doubles, Doubles]:
+        """Return ‖Φᵢ‖² over the counted pixels and Σ Φᵢ over all pixels, (n, 3) each."""
+        counted, (power, totals) = mask.ravel(), np.zeros((2, self._count, 3))
+        begin = 0
+        for strip in with_progress(self._lit, "strips"):
+            of_strip = strip.power_and_totals(counted[begin : begin + strip.size])
+            power += of_strip[0]
+            totals += of_strip[1]
+            begin += strip.size
+        for i, plane in self._clean.items():
+            power[i] = np.square(plane, dtype=np.float64) @ counted
+            totals[i] = plane.sum(axis=1, dtype=np.float64)
+        scales = self._scales.astype(np.float64)[:, None]
+        return power * np.square(scales), totals * scales
 
     def exact_mix(self, weights: Doubles) -> Doubles:
         """Return Σ w_i Φ_i channel by channel, (3, p), summed in float64."""
