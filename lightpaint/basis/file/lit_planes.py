@@ -118,13 +118,10 @@ class _LitStrip:
             block[c * self.size :][places] = _singles(channel)
         return block.reshape(n, 3, self.size)
 
-    def plane(self, i: int) -> npt.NDArray[np.float32]:
-        """Return plane i, (3, pixels), not yet multiplied by its scale."""
+    def lit_of(self, i: int) -> tuple[npt.NDArray[Any], npt.NDArray[Any]]:
+        """Return the lit pixels of plane i and their numbers, (3, m)."""
         part = slice(self.begins[i], self.begins[i + 1])
-        block = np.zeros((3, self.size), np.float32)
-        for channel, numbers in zip(block, self.numbers[:, part], strict=True):
-            channel[self.lit[part]] = _singles(numbers)
-        return block
+        return self.lit[part], self.numbers[:, part]
 
     def mix(self, weights: Doubles) -> Doubles:
         """Return Σ w_i of the planes, (3, pixels) float64. weights: (n, 3), with the scales."""
@@ -152,6 +149,7 @@ class LitPlanes(RowPlanes):
         self._scales = np.array([plane.scale for plane in planes], np.float32)
         (height, width), step = size, self.strip_rows
         edges = [width * row for row in [*range(0, height, step), height]]
+        self._begins = edges[:-1]  # of strips, in pixels
         is_half = [plane.numbers.dtype == np.float16 for plane in planes]
         self._is_noisy = 2 * sum(is_half) > len(planes)
         # A few clean ones are kept whole, in float32.
@@ -194,7 +192,12 @@ class LitPlanes(RowPlanes):
         if i in self._clean:
             plane = self._clean[i].copy()
         else:
-            plane = np.concatenate([strip.plane(i) for strip in self._lit], axis=1)
+            # One copy of all strips: there are many, of few lit pixels each.
+            of_strips = [strip.lit_of(i) for strip in self._lit]
+            lit = [x.astype(np.intp) + y for (x, _), y in zip(of_strips, self._begins, strict=True)]
+            numbers = np.concatenate([x for _, x in of_strips], axis=1)
+            plane = np.zeros((3, self._size[0] * self._size[1]), np.float32)
+            plane[:, np.concatenate(lit)] = _singles(numbers)
         if self._scales[i] != 1:
             plane *= self._scales[i]
         return np.ascontiguousarray(plane.T).reshape(*self._size, 3)
@@ -228,12 +231,11 @@ class LitPlanes(RowPlanes):
     def power_and_totals(self, mask: Bools) -> tuple[Doubles, Doubles]:
         """Return ‖Φᵢ‖² over the counted pixels and Σ Φᵢ over all pixels, (n, 3) each."""
         counted, (power, totals) = mask.ravel(), np.zeros((2, self._count, 3))
-        begin = 0
-        for strip in with_progress(self._lit, "strips"):
+        for k, begin in enumerate(with_progress(self._begins, "strips")):
+            strip = self._lit[k]
             of_strip = strip.power_and_totals(counted[begin : begin + strip.size])
             power += of_strip[0]
             totals += of_strip[1]
-            begin += strip.size
         for i, plane in self._clean.items():
             power[i] = np.square(plane, dtype=np.float64) @ counted
             totals[i] = plane.sum(axis=1, dtype=np.float64)
