@@ -174,7 +174,11 @@ def test_planes_of_a_file_are_those_in_memory(
 
 
 @pytest.mark.parametrize("room", [1, 2**27])
-@pytest.mark.parametrize("largest", [0, 2**31], ids=["by rows", "whole"])
+@pytest.mark.parametrize(
+    ("largest", "sparse"),
+    [(0, 2**31), (2**31, 2**31), (2**31, 0)],
+    ids=["by rows", "whole", "sparse"],
+)
 @pytest.mark.parametrize("clean", [(), (2,), range(N)], ids=["none", "one", "all"])
 def test_lit_pixels_of_many_lights_are_those_of_their_planes(
     tmp_path: Path,
@@ -182,6 +186,7 @@ def test_lit_pixels_of_many_lights_are_those_of_their_planes(
     monkeypatch: pytest.MonkeyPatch,
     clean: Sequence[int],
     largest: int,
+    sparse: int,
     room: int,
 ) -> None:
     # Bright lights have a scale; one is black, one reaches everything, and single channels are 0.
@@ -197,6 +202,7 @@ def test_lit_pixels_of_many_lights_are_those_of_their_planes(
     lp.write_basis(path, basis)
     monkeypatch.setattr(basis_file, "SINGLES_MAX_BYTES", 0)
     monkeypatch.setattr(basis_file, "IN_MEMORY_MAX_BYTES", largest)
+    monkeypatch.setattr(basis_file, "SPARSE_MIN_BYTES", sparse)
     monkeypatch.setattr(basis_file, "MIN_LIGHTS", N)
     monkeypatch.setattr(file_planes, "STRIP_CACHE_BYTES", room)
     reread = lp.read_basis(path)
@@ -205,9 +211,9 @@ def test_lit_pixels_of_many_lights_are_those_of_their_planes(
     assert reread.planes.is_noisy == (len(clean) < 2)
     check_alike(reread.planes, basis.images)
     check_alike(reread.noise, basis.half_differences)
-    if not largest:  # no room for them either
-        monkeypatch.setattr(lit_planes, "MAX_BYTES", 0)
-        assert isinstance(lp.read_basis(path).planes, FilePlanes)
+    # No room for them either: they stay in the file if they do not fit in memory.
+    monkeypatch.setattr(lit_planes, "MAX_BYTES", 0)
+    assert isinstance(lp.read_basis(path).planes, LitPlanes if largest else FilePlanes)
 
 
 def test_several_mixes_are_those_made_one_by_one(images: np.ndarray) -> None:

@@ -141,7 +141,7 @@ def _singles(numbers: npt.NDArray[Any]) -> npt.NDArray[np.float32]:
 
 class LitPlanes(RowPlanes):
     """Planes of which only the lit pixels are in memory. planes: one for each light, which are
-    released one by one. size: (height, width).
+    copied. size: (height, width).
     """
 
     def __init__(self, planes: Sequence[LitPlane], size: tuple[int, int]) -> None:
@@ -269,8 +269,13 @@ class LitCollector:
             self._planes = None
 
     def planes(self, names: Sequence[str]) -> list[LitPlanes] | None:
-        """Return each set of planes, in the order of `names`; None if there was no room."""
+        """Return each set of planes, in the order of `names`, and forget them; None if there was no
+        room.
+        """
         if self._planes is None:
             return None
-        in_order = [self._planes[name] for name in names]
-        return [LitPlanes(planes, self._size) for planes in zip(*in_order, strict=True)]
+        sets = list(zip(*(self._planes.pop(name) for name in names), strict=True))
+        joined = []
+        while sets:  # one is gone before the next is joined
+            joined.append(LitPlanes(sets.pop(0), self._size))
+        return joined
