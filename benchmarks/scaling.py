@@ -233,7 +233,8 @@ class Bench:
         if self.file is not None and self.file.is_file():
             for line in self.file.read_text("utf-8").splitlines():
                 row = json.loads(line)
-                self.known[row.pop("run")] = Result(**row)
+                run = row.pop("run")
+                self.known[run] = Result(**row)
 
     def result(self, stage: str, hall: Hall, *, is_old: bool = False) -> Result | None:
         """Return the result of a stage, which is run if it has to be; None if it is not to be."""
