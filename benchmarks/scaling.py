@@ -2,6 +2,7 @@
 
     python benchmarks/scaling.py [--lights 12,64,256,1000,4000]
         [--sizes 640x360,1920x1080,3840x2160] [--spp 8] [--against PATH_OF_OLD_VENV] [--folder F]
+        [--results FILE [--join]]
 
 Draws halls (hall.py) of so many lights on so many pixels, in blocks of pixels where a basis could
 not hold them all. Each stage of each hall runs in a process of its own, which prints its processor
@@ -14,6 +15,10 @@ after the other, and ratios, old to new, are printed beside. Then weights must a
 error bars, and certificates as far as they say that answers converged. The last column says where
 they are equal to the last bit. The exit code is 1 if they do not agree. A folder that is given
 keeps the halls and bases, where the next call finds them.
+
+A file of results keeps what was measured, and no stage in it is run again: so a table can be made
+in pieces, `--lights 12 --results table.jsonl`, then `--lights 64 --results table.jsonl`. With
+`--join`, nothing is run, and table and exponents are those of the file, as far as it goes.
 """
 
 import argparse
@@ -26,7 +31,7 @@ import tempfile
 import time
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
-from dataclasses import dataclass
+from dataclasses import asdict, dataclass, field
 from pathlib import Path
 from typing import Any
 
@@ -209,6 +214,50 @@ def run_stage(old_python: str | None, stage: str, hall: Hall, folder: Path, spp:
     return Result(report["seconds"], report["memory"], report["answer"])
 
 
+@dataclass
+class Bench:
+    """The runs of stages, and what is known of them.
+
+    folder: of halls and bases. old_python: of an old version, None without one. file: of results,
+    None without one. is_joined: whether nothing is run. known: results by the names of runs.
+    """
+
+    folder: Path
+    spp: int
+    old_python: str | None
+    file: Path | None
+    is_joined: bool
+    known: dict[str, Result] = field(default_factory=dict)
+
+    def __post_init__(self) -> None:
+        if self.file is not None and self.file.is_file():
+            for line in self.file.read_text("utf-8").splitlines():
+                row = json.loads(line)
+                run = row.pop("run")
+                self.known[run] = Result(**row)
+
+    def result(self, stage: str, hall: Hall, *, is_old: bool = False) -> Result | None:
+        """Return the result of a stage, which is run if it has to be; None if it is not to be."""
+        run = self._run_of(stage, hall, is_old=is_old)
+        if run not in self.known and not (self.is_joined or self._is_made(stage, hall)):
+            python = self.old_python if is_old else None
+            result = self.known[run] = run_stage(python, stage, hall, self.folder, self.spp)
+            if self.file is not None and not result.failure:
+                with self.file.open("a", encoding="utf-8") as lines:
+                    lines.write(json.dumps({"run": run, **asdict(result)}) + "\n")
+        return self.known.get(run)
+
+    def _run_of(self, stage: str, hall: Hall, *, is_old: bool) -> str:
+        version = "old" if is_old else "new"
+        return f"{version} {stage} {hall.name} {hall.block} {self.spp}"
+
+    def _is_made(self, stage: str, hall: Hall) -> bool:
+        """Return whether the folder has what a stage of this version makes."""
+        made = {"render": f"{hall.name}.basis.exr", "paint": f"{hall.name}.exr"}.get(stage)
+        has_run = self._run_of(stage, hall, is_old=True) in self.known
+        return made is not None and not has_run and (self.folder / made).is_file()
+
+
 def run_here(words: list[str], folder: Path) -> None:
     """Run a stage in this process, and print what it took."""
     import lightpaint as lp
@@ -271,26 +320,38 @@ def table_row(hall: Hall, stage: str, new: Result, old: Result | None) -> str:
     return row
 
 
-def compare(halls: list[Hall], folder: Path, spp: int, old_python: str | None) -> int:
+def measure_hall(hall: Hall, bench: Bench) -> tuple[dict[str, Result], dict[str, Result]]:
+    """Print the rows of a hall. Return the results of its stages, of this and of an old version."""
+    new, old = dict[str, Result](), dict[str, Result]()
+    for stage in STAGES:
+        is_measured = stage not in UNMEASURED
+        before = None
+        if bench.old_python is not None and is_measured:
+            before = bench.result(stage, hall, is_old=True)
+        result = bench.result(stage, hall)
+        if before is not None:
+            old[stage] = before
+        if result is None:
+            continue
+        new[stage] = result
+        if is_measured:
+            print(table_row(hall, stage, result, before), flush=True)
+        if result.failure:
+            break
+    return new, old
+
+
+def compare(halls: list[Hall], bench: Bench) -> int:
     """Print table, exponents and agreement. Return the exit code."""
-    print("| lights | pixels | stage | CPU s | GB |" + " old/new CPU | GB |" * bool(old_python))
-    print("|---|---|---|---|---|" + "---|---|" * bool(old_python))
+    has_old = bench.old_python is not None
+    print("| lights | pixels | stage | CPU s | GB |" + " old/new CPU | GB |" * has_old)
+    print("|---|---|---|---|---|" + "---|---|" * has_old)
     seconds: dict[str, list[tuple[Hall, float]]] = {name: [] for name in STAGES}
     texts, agree = [], True
     for hall in halls:
-        new, old = dict[str, Result](), dict[str, Result]()
-        for stage in STAGES:
-            made = {"render": f"{hall.name}.basis.exr", "paint": f"{hall.name}.exr"}.get(stage)
-            if made is not None and (folder / made).is_file():
-                continue
-            if old_python is not None and stage not in UNMEASURED:
-                old[stage] = run_stage(old_python, stage, hall, folder, spp)
-            new[stage] = run_stage(None, stage, hall, folder, spp)
-            if stage not in UNMEASURED:
-                print(table_row(hall, stage, new[stage], old.get(stage)), flush=True)
-                seconds[stage].append((hall, new[stage].seconds))
-            if new[stage].failure:
-                break
+        new, old = measure_hall(hall, bench)
+        for stage, result in new.items():
+            seconds[stage].append((hall, result.seconds))
         if {"solve", "analyse"} <= old.keys() & new.keys():
             text, is_equal = agreement(old, new)
             agree &= is_equal
@@ -321,6 +382,8 @@ def main() -> int:
     parser.add_argument("--spp", type=int, default=8)
     parser.add_argument("--against", type=Path, metavar="PATH_OF_OLD_VENV")
     parser.add_argument("--folder", type=Path)
+    parser.add_argument("--results", type=Path, metavar="FILE")
+    parser.add_argument("--join", action="store_true")
     parser.add_argument("--stage", nargs=6, help=argparse.SUPPRESS)
     options = parser.parse_args()
     if options.stage is not None:
@@ -331,7 +394,8 @@ def main() -> int:
     with tempfile.TemporaryDirectory() as temporary:
         folder = (options.folder or Path(temporary)).resolve()
         folder.mkdir(parents=True, exist_ok=True)
-        return compare(halls, folder, options.spp, old_python)
+        bench = Bench(folder, options.spp, old_python, options.results, options.join)
+        return compare(halls, bench)
 
 
 if __name__ == "__main__":

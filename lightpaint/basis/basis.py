@@ -13,7 +13,6 @@ from lightpaint.basis.planes import (
     IndirectLight,
     Planes,
     as_planes,
-    power_and_totals,
     relative_variances,
 )
 from lightpaint.colour import choose_exposure, luminance
@@ -354,7 +353,7 @@ class Basis(Shown):
     @cached_property
     def _power_and_totals(self) -> tuple[Doubles, Doubles]:
         """Power and totals, (n, 3) each, computed in one walk over the planes."""
-        return power_and_totals(self.planes, ~self.emitters_seen)
+        return self.planes.power_and_totals(~self.emitters_seen)
 
     def set_power_and_totals(self, power: Doubles, totals: Doubles) -> None:
         """Set `power` and `totals` to known values, so that no walk over the planes computes them.

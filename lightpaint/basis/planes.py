@@ -95,6 +95,11 @@ class Planes(Protocol):
     def squares(self) -> Doubles:
         """Return Σ Φ² over all pixels and channels, (n,)."""
 
+    def power_and_totals(self, mask: Bools) -> tuple[Doubles, Doubles]:
+        """Return ‖Φᵢ‖² over the counted pixels and Σ Φᵢ over all pixels, (n, 3) float64 each, in
+        one walk. mask: (h, w).
+        """
+
     def replaced(self, planes: Mapping[int, Floats]) -> "Planes":
         """Return planes in which some lights have other planes, (h, w, 3) each."""
 
@@ -157,11 +162,24 @@ class PlanesBase:
 
     def squares(self) -> Doubles:
         """Return Σ Φ² over all pixels and channels, (n,)."""
-        totals, pixels = np.zeros(self.count), self.size[0] * self.size[1]
-        for start in with_progress(range(0, pixels, BLOCK_PIXELS)):
-            block = self.pixels(slice(start, start + BLOCK_PIXELS)).astype(np.float64)
-            totals += np.einsum("npc,npc->n", block, block)
-        return totals
+        power, _ = self.power_and_totals(np.ones(self.size, np.bool_))
+        return np.asarray(power.sum(axis=1))
+
+    def power_and_totals(self, mask: Bools) -> tuple[Doubles, Doubles]:
+        """Return ‖Φᵢ‖² over the counted pixels and Σ Φᵢ over all pixels, (n, 3) each."""
+        power, totals = np.zeros((2, self.count, 3))
+        counted = mask.ravel()
+        # NumPy sums over such short axes slowly, but multiplies matrices fast; by blocks, which
+        # need no copy of the basis, a product is as exact as a sum.
+        step, kind = block_of(self)
+        for start in with_progress(range(0, len(counted), step)):
+            weights = counted[start : start + step].astype(kind)
+            block = self.pixels(slice(start, start + step))
+            for c in range(3):
+                lit = np.ascontiguousarray(block[..., c], kind)
+                totals[:, c] += lit @ np.ones_like(weights)
+                power[:, c] += np.square(lit) @ weights
+        return power, totals
 
     def sums(self, weight: Floats, image: Floats) -> tuple[Doubles, Doubles, Doubles]:
         """Return M (3, n, n), b (3, n) and ‖Ψ‖² (3,), in one walk over the pixels with weight."""
@@ -270,27 +288,6 @@ def joined_planes(
                 plane[...] = image.reshape(-1, 3)
         views.append(MemoryPlanes(joint[:, start:end].reshape(n, *part.size, 3)))
     return MemoryPlanes(joint.reshape(n, rows, width, 3)), tuple(views)
-
-
-def power_and_totals(planes: Planes, mask: Bools) -> tuple[Doubles, Doubles]:
-    """Return ‖Φᵢ‖² over the counted pixels and Σ Φᵢ over all pixels, (n, 3) float64 each, in one
-    walk.
-
-    mask: (h, w).
-    """
-    power, totals = np.zeros((2, planes.count, 3))
-    counted = mask.ravel()
-    # NumPy sums over such short axes slowly, but multiplies matrices fast; by blocks, which need no
-    # copy of the basis, a product is as exact as a sum.
-    step, kind = block_of(planes)
-    for start in with_progress(range(0, len(counted), step)):
-        weights = counted[start : start + step].astype(kind)
-        block = planes.pixels(slice(start, start + step))
-        for c in range(3):
-            lit = np.ascontiguousarray(block[..., c], kind)
-            totals[:, c] += lit @ np.ones_like(weights)
-            power[:, c] += np.square(lit) @ weights
-    return power, totals
 
 
 def thinned(planes: Planes, step: int, factors: Doubles) -> Iterator[Floats]:

@@ -1,6 +1,6 @@
 """The problem to solve: pictures, their goals, the lights and their constraints."""
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property, partial
 from typing import Any
@@ -344,15 +344,16 @@ def wash_of(views: Views) -> Wash:
 
 
 def expected_for(
-    views: Views, fit: Fit, own: Doubles, wash: Wash | None = None
+    views: Views, fit: Fit, own: Doubles, wash: Callable[[], Wash] | None = None
 ) -> ExpectedLights | None:
     """Return the lights that paintings let one expect; None if `fit` leaves colours free.
 
-    own: (n, 3), weights with the colours that lights have. wash: that of the views, if it is known.
+    own: (n, 3), weights with the colours that lights have. wash: returns that of the views, by
+    default a new one.
     """
     if fit.colors not in ("gentle", "white"):
         return None
-    return ExpectedLights.of(wash or wash_of(views), own)
+    return ExpectedLights.of(wash_of(views) if wash is None else wash(), own)
 
 
 def whites_for(expected: ExpectedLights | None, fit: Fit) -> WhiteLimits | None:
@@ -362,21 +363,23 @@ def whites_for(expected: ExpectedLights | None, fit: Fit) -> WhiteLimits | None:
     return painted_whites(expected.painted)
 
 
-def wash_fields(views: Views, fit: Fit, own: Doubles) -> dict[str, Any]:
+def wash_fields(
+    views: Views, fit: Fit, own: Doubles, wash: Callable[[], Wash] | None = None
+) -> dict[str, Any]:
     """Return what a sketch lets one expect, and its terms of the loss, as fields of a problem.
 
-    own: (n, 3), weights with the colours that lights have.
+    Arguments are those of `expected_for`.
     """
     none = vars(PaintTerms())
     reads_wishes = fit.reads_wishes(is_sketch=are_sketches(views))
     if not (reads_wishes or fit.colors == "white"):
         return none
-    wash = wash_of(views)
     if not reads_wishes:
         return {**none, "expected": expected_for(views, fit, own, wash)}
     importance = sum(float(x.importance.sum(dtype=np.float64)) for x in views.targets)
     unpainted = unpainted_weight_of(views, fit)
-    return vars(PaintTerms.of(wash, fit, own, importance=importance, unpainted=unpainted))
+    known = wash_of(views) if wash is None else wash()
+    return vars(PaintTerms.of(known, fit, own, importance=importance, unpainted=unpainted))
 
 
 def are_sketches(views: Views) -> bool:

@@ -22,10 +22,6 @@ from lightpaint.images import (
 )
 from lightpaint.report.basis_memo import cached_clean_planes
 
-#: Maximum number of lights whose thumbnails are denoised: for hundreds it would take long, and a
-#: thumbnail is small, and averages much of its noise.
-MAX_CLEAN_THUMBNAILS = 64
-
 
 @dataclass(frozen=True)
 class Encoder(ViewTransform):

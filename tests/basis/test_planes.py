@@ -81,6 +81,12 @@ def check_alike(planes: Planes, images: np.ndarray, tolerance: float = 0.0) -> N
     )
     expected = np.einsum("nhwc,nc->hwc", images, w)
     np.testing.assert_allclose(planes.mix(w), expected, rtol=1e-5 + tolerance)  # float32 sums
+    mask, exact = rng.random((height, width)) < 0.5, images.astype(np.float64)
+    power, totals = planes.power_and_totals(mask)
+    expected_power = np.square(exact)[:, mask].sum(axis=1)
+    np.testing.assert_allclose(power, expected_power, rtol=1e-5 + tolerance)
+    np.testing.assert_allclose(totals, exact.sum(axis=(1, 2)), rtol=1e-5 + tolerance)
+    np.testing.assert_allclose(planes.squares(), np.square(exact).sum(axis=(1, 2, 3)), rtol=1e-5)
     psi, weight = rng.random((height, width, 3)), rng.random((height, width))
     weight[2:4] = 0
     M, b, norm2 = planes.sums(weight, psi)
@@ -168,7 +174,11 @@ def test_planes_of_a_file_are_those_in_memory(
 
 
 @pytest.mark.parametrize("room", [1, 2**27])
-@pytest.mark.parametrize("largest", [0, 2**31], ids=["by rows", "whole"])
+@pytest.mark.parametrize(
+    ("largest", "sparse"),
+    [(0, 2**31), (2**31, 2**31), (2**31, 0)],
+    ids=["by rows", "whole", "sparse"],
+)
 @pytest.mark.parametrize("clean", [(), (2,), range(N)], ids=["none", "one", "all"])
 def test_lit_pixels_of_many_lights_are_those_of_their_planes(
     tmp_path: Path,
@@ -176,6 +186,7 @@ def test_lit_pixels_of_many_lights_are_those_of_their_planes(
     monkeypatch: pytest.MonkeyPatch,
     clean: Sequence[int],
     largest: int,
+    sparse: int,
     room: int,
 ) -> None:
     # Bright lights have a scale; one is black, one reaches everything, and single channels are 0.
@@ -191,6 +202,7 @@ def test_lit_pixels_of_many_lights_are_those_of_their_planes(
     lp.write_basis(path, basis)
     monkeypatch.setattr(basis_file, "SINGLES_MAX_BYTES", 0)
     monkeypatch.setattr(basis_file, "IN_MEMORY_MAX_BYTES", largest)
+    monkeypatch.setattr(basis_file, "SPARSE_MIN_BYTES", sparse)
     monkeypatch.setattr(basis_file, "MIN_LIGHTS", N)
     monkeypatch.setattr(file_planes, "STRIP_CACHE_BYTES", room)
     reread = lp.read_basis(path)
@@ -199,9 +211,9 @@ def test_lit_pixels_of_many_lights_are_those_of_their_planes(
     assert reread.planes.is_noisy == (len(clean) < 2)
     check_alike(reread.planes, basis.images)
     check_alike(reread.noise, basis.half_differences)
-    if not largest:  # no room for them either
-        monkeypatch.setattr(lit_planes, "MAX_BYTES", 0)
-        assert isinstance(lp.read_basis(path).planes, FilePlanes)
+    # No room for them either: they stay in the file if they do not fit in memory.
+    monkeypatch.setattr(lit_planes, "MAX_BYTES", 0)
+    assert isinstance(lp.read_basis(path).planes, LitPlanes if largest else FilePlanes)
 
 
 def test_several_mixes_are_those_made_one_by_one(images: np.ndarray) -> None:

@@ -72,6 +72,9 @@ SINGLES_MAX_BYTES = 2**27
 #: Size of all planes in float32, in bytes, above which they stay in their file.
 IN_MEMORY_MAX_BYTES = 2**31
 
+#: The same for many lights, of which then only lit pixels are read into memory if these have room.
+SPARSE_MIN_BYTES = 2**29
+
 #: Maximum size in bytes of a basis file that the library reads in less than two seconds.
 QUICK_MAX_BYTES = 2**29
 
@@ -175,7 +178,12 @@ def _encoded(basis: Basis) -> Basis:
 
 def is_large(lights: int, size: tuple[int, int]) -> bool:
     """Return whether planes of this number of lights stay in their file when it is read."""
-    return 4 * len(LIGHT_CHANNELS) * lights * size[0] * size[1] > IN_MEMORY_MAX_BYTES
+    return _float_bytes(lights, size) > IN_MEMORY_MAX_BYTES
+
+
+def _float_bytes(lights: int, size: tuple[int, int]) -> int:
+    """Return the bytes that images and noise of this number of lights take in float32."""
+    return 4 * len(LIGHT_CHANNELS) * lights * size[0] * size[1]
 
 
 def is_basis_file(path: Path) -> bool:
@@ -241,6 +249,7 @@ def read_basis(path: str | Path) -> Basis:
     file_length(path, "image file", ImageError, limit=MAX_BYTES)
     try:
         if (large_basis := _read_large(path)) is not None:
+            release_freed_memory()
             return replace(large_basis, source=str(path))
         parts = _read_by_lights(path) or read_parts(path)
         head = _head(p.attributes for p in parts)
@@ -290,16 +299,22 @@ def leave_indirect(basis: Basis, path: Path) -> Basis:
 def _read_large(path: Path) -> Basis | None:
     """Return a basis whose rows are read on demand, or of which lit pixels are in memory.
 
-    Returns None if all pixels fit in memory or the file does not support reading rows.
+    Returns None if all pixels fit in memory or the file does not support reading rows. Of many
+    lights, whose dark pixels would take most of it, all pixels may take less.
     """
     try:
         file = RowFile(path)
     except (RowsUnsupportedError, OSError):
         return None
     light_parts = [p for p in file.parts if LIGHT_KEY in p.texts]
-    if not light_parts or not is_large(len(light_parts), light_parts[0].size):
+    count, size = len(light_parts), light_parts[0].size if light_parts else (0, 0)
+    stays_in_file = is_large(count, size)
+    is_sparse = count >= MIN_LIGHTS and _float_bytes(count, size) > SPARSE_MIN_BYTES
+    if not (stays_in_file or is_sparse):
         return None
-    return _basis_of_rows(file, _head(p.texts for p in file.parts))
+    basis = _basis_of_rows(file, _head(p.texts for p in file.parts))
+    has_room = basis is not None and isinstance(basis.planes, LitPlanes)
+    return basis if stays_in_file or has_room else None
 
 
 def _read_by_lights(path: Path) -> list[ExrPart] | None:

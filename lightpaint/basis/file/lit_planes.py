@@ -13,8 +13,9 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from lightpaint.arrays import Doubles, Floats, Indices, copy_as_singles
+from lightpaint.arrays import Bools, Doubles, Floats, Indices, copy_as_singles
 from lightpaint.basis.file.file_planes import RowPlanes
+from lightpaint.progress import with_progress
 from lightpaint.threads import parallel_map
 
 #: Number of lights from which planes may be kept by their lit pixels.
@@ -89,6 +90,20 @@ class _LitStrip:
         """Bytes of memory that it takes."""
         return self.lit.nbytes + self.numbers.nbytes
 
+    def power_and_totals(self, counted: Bools) -> Doubles:
+        """Return Σ x² over the counted pixels and Σ x over all, (2, n, 3), before the scales.
+
+        counted: (pixels,).
+        """
+        n = len(self.begins) - 1
+        owners, is_counted = self.of_planes(np.arange(n)), counted[self.lit]
+        values = (_singles(channel).astype(np.float64) for channel in self.numbers)
+        sums = [
+            [np.bincount(owners, x, n) for x in (is_counted * np.square(channel), channel)]
+            for channel in values
+        ]
+        return np.asarray(sums).transpose(1, 2, 0)
+
     def of_planes(self, values: npt.NDArray[Any]) -> npt.NDArray[Any]:
         """Return a value of each plane, (n,), for each of its lit pixels, (m,)."""
         return np.repeat(values, np.diff(self.begins))
@@ -103,13 +118,10 @@ class _LitStrip:
             block[c * self.size :][places] = _singles(channel)
         return block.reshape(n, 3, self.size)
 
-    def plane(self, i: int) -> npt.NDArray[np.float32]:
-        """Return plane i, (3, pixels), not yet multiplied by its scale."""
+    def lit_of(self, i: int) -> tuple[npt.NDArray[Any], npt.NDArray[Any]]:
+        """Return the lit pixels of plane i and their numbers, (3, m)."""
         part = slice(self.begins[i], self.begins[i + 1])
-        block = np.zeros((3, self.size), np.float32)
-        for channel, numbers in zip(block, self.numbers[:, part], strict=True):
-            channel[self.lit[part]] = _singles(numbers)
-        return block
+        return self.lit[part], self.numbers[:, part]
 
     def mix(self, weights: Doubles) -> Doubles:
         """Return Σ w_i of the planes, (3, pixels) float64. weights: (n, 3), with the scales."""
@@ -129,7 +141,7 @@ def _singles(numbers: npt.NDArray[Any]) -> npt.NDArray[np.float32]:
 
 class LitPlanes(RowPlanes):
     """Planes of which only the lit pixels are in memory. planes: one for each light, which are
-    released one by one. size: (height, width).
+    copied. size: (height, width).
     """
 
     def __init__(self, planes: Sequence[LitPlane], size: tuple[int, int]) -> None:
@@ -137,6 +149,7 @@ class LitPlanes(RowPlanes):
         self._scales = np.array([plane.scale for plane in planes], np.float32)
         (height, width), step = size, self.strip_rows
         edges = [width * row for row in [*range(0, height, step), height]]
+        self._begins = edges[:-1]  # of strips, in pixels
         is_half = [plane.numbers.dtype == np.float16 for plane in planes]
         self._is_noisy = 2 * sum(is_half) > len(planes)
         # A few clean ones are kept whole, in float32.
@@ -179,7 +192,12 @@ class LitPlanes(RowPlanes):
         if i in self._clean:
             plane = self._clean[i].copy()
         else:
-            plane = np.concatenate([strip.plane(i) for strip in self._lit], axis=1)
+            # One copy of all strips: there are many, of few lit pixels each.
+            of_strips = [strip.lit_of(i) for strip in self._lit]
+            lit = [x.astype(np.intp) + y for (x, _), y in zip(of_strips, self._begins, strict=True)]
+            numbers = np.concatenate([x for _, x in of_strips], axis=1)
+            plane = np.zeros((3, self._size[0] * self._size[1]), np.float32)
+            plane[:, np.concatenate(lit)] = _singles(numbers)
         if self._scales[i] != 1:
             plane *= self._scales[i]
         return np.ascontiguousarray(plane.T).reshape(*self._size, 3)
@@ -210,6 +228,20 @@ class LitPlanes(RowPlanes):
         mixed = np.stack([self.exact_mix(one).T for one in weights]).astype(np.float32)
         return mixed.reshape(len(weights), *self._size, 3)
 
+    def power_and_totals(self, mask: Bools) -> tuple[Doubles, Doubles]:
+        """Return ‖Φᵢ‖² over the counted pixels and Σ Φᵢ over all pixels, (n, 3) each."""
+        counted, (power, totals) = mask.ravel(), np.zeros((2, self._count, 3))
+        for k, begin in enumerate(with_progress(self._begins, "strips")):
+            strip = self._lit[k]
+            of_strip = strip.power_and_totals(counted[begin : begin + strip.size])
+            power += of_strip[0]
+            totals += of_strip[1]
+        for i, plane in self._clean.items():
+            power[i] = np.square(plane, dtype=np.float64) @ counted
+            totals[i] = plane.sum(axis=1, dtype=np.float64)
+        scales = self._scales.astype(np.float64)[:, None]
+        return power * np.square(scales), totals * scales
+
     def exact_mix(self, weights: Doubles) -> Doubles:
         """Return Σ w_i Φ_i channel by channel, (3, p), summed in float64."""
         scaled = weights * self._scales[:, None]
@@ -237,8 +269,13 @@ class LitCollector:
             self._planes = None
 
     def planes(self, names: Sequence[str]) -> list[LitPlanes] | None:
-        """Return each set of planes, in the order of `names`; None if there was no room."""
+        """Return each set of planes, in the order of `names`, and forget them; None if there was no
+        room.
+        """
         if self._planes is None:
             return None
-        in_order = [self._planes[name] for name in names]
-        return [LitPlanes(planes, self._size) for planes in zip(*in_order, strict=True)]
+        sets = list(zip(*(self._planes.pop(name) for name in names), strict=True))
+        joined = []
+        while sets:  # one is gone before the next is joined
+            joined.append(LitPlanes(sets.pop(0), self._size))
+        return joined

@@ -22,7 +22,6 @@ from lightpaint.report.basis_memo import (
     make_once,
     page_reduction,
 )
-from lightpaint.report.clean_pictures import MAX_CLEAN_THUMBNAILS
 from lightpaint.report.diagnosis_sentences import (
     UNDETERMINED,
     UNTOLD_HERE,
@@ -118,9 +117,8 @@ def lights_table(
     rest folded.
 
     Shares are of the picture's energy, now or as solved, whichever is more. is_clean: whether to
-    denoise the pictures.
+    denoise the pictures, of many lights those that are not folded.
     """
-    is_clean = is_clean and len(basis.lights) <= MAX_CLEAN_THUMBNAILS
     rows = _rows(basis, solution, uncertainty, is_clean=is_clean)
     lead, shown = "", rows
     folded: list[tuple[str, list[LightEntry]]] = []
@@ -173,10 +171,7 @@ def _rows(
     errors = spoken_errors(uncertainty, len(shares))
     settings = {light.name: light for light in lighting.lights}
     rows: list[LightEntry] = []
-    if len(basis.lights) <= MAX_THUMBNAILS:
-        thumbnails = thumbnails_of(basis, is_clean=is_clean)
-    else:
-        thumbnails = _thumbnails(basis, most_visible_lights(basis, lighting), is_clean=is_clean)
+    thumbnails = _thumbnails_of_rows(basis, lighting, is_clean=is_clean)
     for k, light in enumerate(basis.lights):
         setting = settings[light.name]
         error = UNTOLD_HERE if errors[k] == UNDETERMINED else errors[k]
@@ -191,6 +186,20 @@ def _rows(
         )
         rows.append(row if light.is_fixed else _with_emission(row, light, setting, lighting))
     return rows
+
+
+def _thumbnails_of_rows(
+    basis: Basis, lighting: Lighting, *, is_clean: bool
+) -> Mapping[int, Thumbnail]:
+    """Return the pictures of the rows, by the number of the light: of many lights those of folded
+    rows are not denoised, and of hundreds these rows have none.
+    """
+    count = len(basis.lights)
+    if count <= ROWS_SHOWN + SPARE_ROWS:
+        return thumbnails_of(basis, is_clean=is_clean)
+    shown = most_visible_lights(basis, lighting)
+    folded = thumbnails_of(basis, is_clean=False) if count <= MAX_THUMBNAILS else {}
+    return {**folded, **_thumbnails(basis, shown, is_clean=is_clean)}
 
 
 def thumbnails_of(basis: Basis, *, is_clean: bool) -> Mapping[int, Thumbnail]:

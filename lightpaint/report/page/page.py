@@ -25,7 +25,7 @@ from lightpaint.report.answer_pictures import (
     target_picture,
 )
 from lightpaint.report.basis_memo import ROWS_SHOWN, SPARE_ROWS
-from lightpaint.report.clean_pictures import MAX_CLEAN_THUMBNAILS, CleanLooks
+from lightpaint.report.clean_pictures import CleanLooks
 from lightpaint.report.diagnosis_sentences import fit_sentence
 from lightpaint.report.page.constraint_section import colors_section, constraints_section
 from lightpaint.report.page.diagnosis_section import missed_section, sure_section
@@ -160,10 +160,11 @@ def _texts(answer: ReportedAnswer) -> dict[str, Any]:
 
 def prepare_page(basis: Basis) -> None:
     """Make the parts of a page that depend on the basis alone; `report_page` then finds them."""
-    if len(basis.lights) <= ROWS_SHOWN + SPARE_ROWS:
+    has_few_rows = len(basis.lights) <= ROWS_SHOWN + SPARE_ROWS
+    if has_few_rows:
         planes_for_page(basis, is_clean=True)
     if len(basis.lights) <= MAX_THUMBNAILS:
-        thumbnails_of(basis, is_clean=len(basis.lights) <= MAX_CLEAN_THUMBNAILS)
+        thumbnails_of(basis, is_clean=has_few_rows)
 
 
 def _wipe(

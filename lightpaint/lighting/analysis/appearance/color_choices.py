@@ -7,6 +7,7 @@ also the answer's, are solved over a sample of its pixels, so that errors of the
 from collections.abc import Callable, Mapping, Sequence
 from contextlib import suppress
 from dataclasses import dataclass, replace
+from functools import cache
 from typing import get_args
 
 import numpy as np
@@ -18,6 +19,7 @@ from lightpaint.errors import ConstraintError
 from lightpaint.lighting.analysis.appearance.display_difference import PaintComparison
 from lightpaint.lighting.fit import Colors
 from lightpaint.lighting.linear_problem import reduce_lights
+from lightpaint.lighting.loss.expected_lights import Wash
 from lightpaint.lighting.loss.lit_pixels import LitPixels
 from lightpaint.lighting.loss.reweighting import (
     RoundsResult,
@@ -33,6 +35,7 @@ from lightpaint.lighting.problem import (
     expected_for,
     gamuts_for,
     wash_fields,
+    wash_of,
     whites_for,
 )
 from lightpaint.lighting.solution import Solution
@@ -125,9 +128,10 @@ def best_by_colors(solution: Solution) -> dict[Colors, Doubles]:
     if not can_change_colors(solution) or problem.full.is_free.sum() > MAX_LIGHTS:
         return best
     solve_problem = _solver(solution)
+    wash = cache(lambda: wash_of(problem.views))  # several choices ask for it, or none
     for colors in get_args(Colors):
         with suppress(ConstraintError):  # another constraint may exclude white
-            best[colors] = solve_problem(_with_colors(problem, colors))
+            best[colors] = solve_problem(_with_colors(problem, colors, wash))
     return best
 
 
@@ -170,15 +174,17 @@ def _solver(solution: Solution) -> Callable[[Problem], Doubles]:
     return best
 
 
-def _with_colors(problem: Problem, colors: Colors) -> Problem:
+def _with_colors(
+    problem: Problem, colors: Colors, wash: Callable[[], Wash] | None = None
+) -> Problem:
     """Return the problem with that choice, for the lights that `sparse` has chosen.
 
-    Raises ConstraintError if a light cannot have it.
+    wash: as of `expected_for`. Raises ConstraintError if a light cannot have it.
     """
     fit, is_sketch = replace(problem.fit, colors=colors), are_sketches(problem.views)
     if problem.fit.reads_wishes(is_sketch=is_sketch) != fit.reads_wishes(is_sketch=is_sketch):
-        problem = replace(problem, **wash_fields(problem.views, fit, problem.reference))
-    expected = problem.expected or expected_for(problem.views, fit, problem.reference)
+        problem = replace(problem, **wash_fields(problem.views, fit, problem.reference, wash))
+    expected = problem.expected or expected_for(problem.views, fit, problem.reference, wash)
     gamuts = gamuts_for(problem.basis, problem.views, fit, problem.reference)
     full = reduce_lights(
         problem.constraints, problem.lights, fit, gamuts, whites_for(expected, fit)

@@ -47,15 +47,17 @@ class Peaks:
         """Return the state before the first block."""
         return cls(np.zeros(n), np.zeros(n))
 
-    def add(self, could: Doubles, push: Doubles) -> None:
-        """Add a block: u and z, (n, pixels) each."""
+    def add(self, could: Doubles, push: Doubles, *, first: int = 0) -> None:
+        """Add a block of some lights from `first` on: u and z, (lights, pixels) each."""
+        lights = slice(first, first + len(could))
         u2 = np.square(could)
-        self.total += u2.sum(axis=1)
-        self.pushed += np.einsum("ip,ip->i", push, push)
+        self.total[lights] += u2.sum(axis=1)
+        self.pushed[lights] += np.einsum("ip,ip->i", push, push)
         # Totals only grow: a pixel that is small by now stays small.
-        light, pixel = np.nonzero(u2 > PEAK_SHARE * self.total[:, None])
+        light, pixel = np.nonzero(u2 > PEAK_SHARE * self.total[lights, None])
         if light.size:
-            self.candidates.append((light, u2[light, pixel], np.square(push[light, pixel])))
+            numbers = u2[light, pixel], np.square(push[light, pixel])
+            self.candidates.append((light + first, *numbers))
 
     def merge(self, more: "Peaks") -> None:
         """Include the pixels that others collected."""

@@ -47,6 +47,9 @@ MIN_PAINTING_NOISE = 0.02
 #: Parts of the pixels that are summed in parallel.
 PARTS = 4
 
+#: Numbers of some lights for which the steps to their rows stay in the processor's cache.
+CACHED_NUMBERS = 2**16
+
 #: Eigenvalues of M, scaled to a unit diagonal, below which a direction changes no pixel.
 NULL_EIGENVALUE = 1e-12
 
@@ -341,16 +344,23 @@ class NoisyPixels:
         mean, half = (x[pixels, c].astype(kind) for x in (of_pixels.mean, of_pixels.half))
         # One by one, pixels show their own noise; in sums none is multiplied by itself.
         own = 1.0 if sums is None else self.own_share
-        rows = h * factor(mean, half, own) + factor(lit, h, own) * half
-        if sums is not None:
-            size = np.abs(missed[:, c].astype(kind)) + self.weights[:, c, None].astype(kind) * lit
-            sums.peaks[c].add(D * lit * size, rows)
-        if self.pulled.any():
-            # The noise correction leaves the pull as it is.
-            power = factor(lit, h, max(own, UNCORRECTED)) * h
-            rows += self.pulled[:, c, None].astype(kind) * np.where(self.unseen[pixels], power, 0)
+        missing, of_mean = np.abs(missed[:, c].astype(kind)), factor(mean, half, own)
+        weights, pulled = (x[:, c, None].astype(kind) for x in (self.weights, self.pulled))
+        rows = np.empty_like(h)
+        step = max(1, CACHED_NUMBERS // max(h.shape[1], 1))
+        for first in range(0, len(h), step):
+            some = slice(first, first + step)
+            noise, light, row = h[some], lit[some], rows[some]
+            row[...] = noise * of_mean + factor(light, noise, own) * half
+            if sums is not None:
+                size = missing + weights[some] * light
+                sums.peaks[c].add(D * light * size, row, first=first)
+            if self.pulled.any():
+                # The noise correction leaves the pull as it is.
+                power = factor(light, noise, max(own, UNCORRECTED)) * noise
+                row += pulled[some] * np.where(self.unseen[pixels], power, 0)
         if sums is None:
-            return np.asarray(rows)
+            return rows
         weighted = np.sqrt(D) * h
         sums.power[c] += weighted @ weighted.T
         if of_pixels.bend is not None and of_pixels.doubt is not None:
@@ -361,7 +371,7 @@ class NoisyPixels:
         elif self.residuals.current is not None:
             shared = D * self.share[pixels, c % self.share.shape[1]]
             sums.target_noise[c] += h @ (shared * self.residuals.current[pixels, c]).astype(kind)
-        return np.asarray(rows)
+        return rows
 
 
 def gradient_bias(solution: Solution, noise: Noise) -> tuple[Doubles, Doubles]:
