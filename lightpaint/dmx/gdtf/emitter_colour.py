@@ -15,8 +15,8 @@ from lightpaint.colour.primaries import REC709, rgb_to_xyz
 from lightpaint.colour.spectra.spectrum import Spectrum, spectrum_of, xyz_of_powers
 from lightpaint.colour.spectra.spectrum_source import FEWEST_POINTS
 from lightpaint.dmx.gdtf.mode_channels import Curve
-from lightpaint.dmx.rig_archive import library
 from lightpaint.errors import ColorError
+from lightpaint.storage.rig_archive import library
 
 #: Chromaticity of CIE 1931.
 Chromaticity = tuple[float, float]
