@@ -145,6 +145,11 @@ def test_processes_find_what_one_finds(how: str, folder: Path, monkeypatch):
 WRONG = {
     "no curves": ("camera.csv", "none.csv", "no such observer"),
     "no spectra": ("spectral = true, ", "", "a camera sees spectra alone: also pass spectral"),
+    "sums alone": (
+        'want = ["solve", "predict"]\n[look.constraints.light.panel]\noff = true',
+        'want = ["lights"]\n[look.constraints.light.panel]\nrf = 80',
+        "takes sums alone, and with spectra, mixes of one colour are chosen by their pictures",
+    ),
     "own emitters": (
         "off = true",
         'emitters = [{name = "red", spectrum = "D65", Y = 4}]',
