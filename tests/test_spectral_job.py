@@ -6,8 +6,9 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from command import run as run_command
 from command import run_refused, spawn, succeed
-from spectral_room import DRIVES, paint_spectral_room, write_spectral_room
+from spectral_room import DRIVES, LEVELS, paint_spectral_room, write_spectral_room
 from webs import batwing, cosine, ies_text, street, write_web
 
 from lightpaint import Constraints, Job, Painting, SceneFile, Settings, run
@@ -15,6 +16,8 @@ from lightpaint.colour.spectra.observer import EYE, read_observer
 from lightpaint.errors import LightpaintError, SceneError
 from lightpaint.images.formats.exr import write_rgb
 from lightpaint.lighting.answer.lighting_file import read_lighting
+from lightpaint.lighting.constraints.constraints_file import constraints_of
+from lightpaint.pipeline.job.spectral_job import spectral_scene
 from lightpaint.pipeline.results.results import verify_result
 from lightpaint.relit.export.spectra_table import spectra_csv
 from lightpaint.relit.relight import relight
@@ -133,6 +136,40 @@ def test_a_camera_sees_its_own_picture(room: Path) -> None:
     eye = replace(relit, observer=EYE)
     seen = render(eye, spp=256, seed=5, stream=Stream.SECOND_VERIFICATION).image.mean(axis=(0, 1))
     assert (np.abs(seen - picture.image.mean(axis=(0, 1))) > 4 * np.abs(difference)).any()
+
+
+def test_a_template_is_the_picture_that_is_solved_with(room: Path) -> None:
+    """As the camera sees it; the solve over it renders no basis."""
+    table = np.column_stack([CAMERA_WAVES, CAMERA])
+    np.savetxt(room.with_name("camera.csv"), table, delimiter=",", header="nm,R,G,B")
+    seen = ("--spectral", "--observer", "camera.csv", "--spp", 16)
+    cache = {"LIGHTPAINT_CACHE": str(room.with_name("cache"))}
+    succeed(room.parent, "template", "room.xml", *seen, **cache)
+    pictures = {x.stem for x in (room.parent / "template" / "lights").glob("*.png")}
+    assert pictures == {f"{lamp}_{x}" for lamp in DRIVES for x in LEVELS} | {"rest"}
+    solve = ("solve", "room.xml", "template/template.exr", "--no-template", "--no-verify")
+    completed = run_command(room.parent, *solve, *seen, "-o", "out", **cache)
+    assert completed.returncode == 0, completed.stderr
+    assert "basis of 16 samples per pixel kept from an earlier run" in completed.stderr
+    lighting = read_lighting(room.with_name("out") / "lighting.json")
+    scene = load_scene(room)
+    current = spectral_scene(scene, constraints_of(scene.requests)).lights
+    for light in current[: 2 * len(LEVELS)]:
+        lamp, _, emitter = light.name.partition("/")
+        drive = light.emission[0] / LEVELS[emitter]
+        # The picture is the sum in float32, of which sRGB's exposure is none.
+        assert lighting[lamp].drives[emitter] == pytest.approx(drive, abs=1e-3)
+
+
+@pytest.mark.parametrize(
+    ("options", "message"),
+    [
+        (("--observer", "camera.csv"), "a camera sees spectra alone: also pass --spectral"),
+        (("--spectral", "--observer", "none.csv"), "no such observer: none.csv"),
+    ],
+)
+def test_a_template_refuses_what_a_solve_does(options: tuple, message: str, room: Path) -> None:
+    assert message in run_refused(room.parent, "template", "room.xml", *options)
 
 
 def test_a_camera_needs_spectra() -> None:

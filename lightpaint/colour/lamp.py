@@ -305,7 +305,7 @@ class Lamp:
         low, high = DARK * most, most
         if not self._renders(low * color):
             drives = self.drives_for(low * color)
-            room = self._room(drives)
+            room = self.room(drives)
             return drives * room, low * room
         for _ in range(DIMMINGS):
             middle = (low + high) / 2
@@ -318,7 +318,7 @@ class Lamp:
         assert self.least_rf is not None
         return fidelity(self.drives_for(emission) @ self.powers_at_full) >= self.least_rf
 
-    def _room(self, drives: Doubles) -> float:
+    def room(self, drives: Doubles) -> float:
         """Return the largest factor of drives (e,) within their bounds."""
         lit = drives > 0
         room = float((self.most[lit] / drives[lit]).min(initial=np.inf))

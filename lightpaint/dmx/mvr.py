@@ -19,11 +19,11 @@ from lightpaint.dmx.console_rig import ConsoleRig, RigAxis, RigFixture, RigHead,
 from lightpaint.dmx.gdtf.fixture_type import FixtureType
 from lightpaint.dmx.gdtf.mode_heads import ModeHead
 from lightpaint.dmx.gdtf.mode_lights import FixtureMode, ModeLight
-from lightpaint.dmx.rig_archive import RigArchive, library, reading
 from lightpaint.errors import RigError
 from lightpaint.file_reading import read_bytes
 from lightpaint.scene.properties.site import unit
 from lightpaint.sentences import Hint
+from lightpaint.storage.rig_archive import RigArchive, library, reading
 
 #: The file in an MVR.
 DESCRIPTION = "GeneralSceneDescription.xml"

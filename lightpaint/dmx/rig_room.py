@@ -12,12 +12,12 @@ import numpy.typing as npt
 
 from lightpaint.arrays import Doubles
 from lightpaint.dmx.mvr import KIND, PlacedModel
-from lightpaint.dmx.rig_archive import MAX_XML, RigArchive
 from lightpaint.dmx.rig_scene import Room
 from lightpaint.errors import SceneError
 from lightpaint.file_reading import read_bytes
 from lightpaint.files import first_line
 from lightpaint.scene.checks.tokens import markup
+from lightpaint.storage.rig_archive import MAX_XML, RigArchive
 
 #: Folder of the meshes, beside the scene.
 MESHES = "meshes"

@@ -1,6 +1,6 @@
 """The solve: a basis and a painting become a lighting."""
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import Any
 
@@ -8,6 +8,7 @@ import numpy as np
 
 from lightpaint.arrays import Bools, Doubles, release_freed_memory
 from lightpaint.basis.basis import Basis
+from lightpaint.colour import Lamp
 from lightpaint.keywords import keywords
 from lightpaint.lighting.answer.lighting import Lighting
 from lightpaint.lighting.constraints.absolute_scale import with_sure_scale
@@ -37,18 +38,24 @@ from lightpaint.lighting.loss.weight_penalty import pull_to_current
 from lightpaint.lighting.normal_equations import NormalEquations
 from lightpaint.lighting.problem import Problem
 from lightpaint.lighting.solution import Solution
+from lightpaint.lighting.unknowns.dimmed_mixes import with_mixes_at
+from lightpaint.lighting.unknowns.lamp_parts import WholeLamps
 from lightpaint.lighting.unknowns.reduced_problem import (
     ReducedOptimum,
     ReducedSolver,
     nearest_weights,
     solve_reduced,
 )
+from lightpaint.lighting.unknowns.reduction import Reduction, lamps_by_name
 from lightpaint.lighting.unknowns.white_mixes import next_whites
 from lightpaint.target.target import Target
 
 #: Maximum number of steps of lights to other whites, for a loss that is not linear, and the share
 #: of the loss that a step has to gain.
 MAX_WHITE_STEPS, MIN_GAIN = 20, 1e-7
+
+#: Maximum number of steps of lamps of one colour to other mixes of their emitters.
+MAX_MIX_STEPS = 6
 
 #: Change of a light's picture at which the first descents of many lights end, before they choose
 #: their whites anew.
@@ -104,7 +111,52 @@ def solve(
     given = constraints_of(problem.lights.requests).and_then(constraints or Constraints())
     with_sure_scale(given, problem.lights)
     begin = problem.start if start is None else start.weights_for(problem.basis)
-    return choose_held_mixes(solution_of(replace(problem, start=begin)))
+    return choose_mixes(solution_of(replace(problem, start=begin)))
+
+
+def choose_mixes(solution: Solution) -> Solution:
+    """Return a solution whose lamps have the mixes that they prefer.
+
+    Of a basis with a picture for each emitter, lamps of one colour get those that they prefer at
+    their brightness, to which all lights are solved again; others as in `choose_held_mixes`.
+    """
+    whole = WholeLamps.of(solution.problem.lights)
+    if not whole.has_parts:
+        return solution
+    by_name = lamps_by_name(solution.problem.constraints, whole.lights)
+    lamps = {
+        parts: by_name[light.name]
+        for light, parts in zip(whole.lights, whole.parts, strict=True)
+        if light.name in by_name and light.lamp
+    }
+    return choose_held_mixes(_with_mixes_at_brightness(solution, lamps))
+
+
+def _with_mixes_at_brightness(
+    solution: Solution, lamps: Mapping[tuple[int, ...], Lamp]
+) -> Solution:
+    """Solve again until lamps of one colour have the mixes that they prefer at their brightness.
+
+    lamps: by the lights that are their emitters.
+    """
+    first = solution.problem.reduction
+    for _ in range(MAX_MIX_STEPS):
+        nearer = with_mixes_at(solution.weights, solution.problem.reduction, lamps)
+        if nearer is solution.problem.reduction:
+            break
+        solution = _solve_with(solution, nearer)
+    reduction = solution.problem.reduction
+    if reduction is first:
+        return solution
+    # The brightness may have moved since, and no emitter may be beyond full.
+    within = with_mixes_at(solution.weights, reduction, lamps, within=True)
+    return _solve_with(solution, within)
+
+
+def _solve_with(solution: Solution, reduction: Reduction) -> Solution:
+    """Solve again with another reduction of the same unknowns."""
+    problem = replace(solution.problem, reduction=reduction, full=reduction)
+    return solve_again(solution, problem)
 
 
 def solution_of(problem: Problem, *, start: Doubles | None = None) -> Solution:

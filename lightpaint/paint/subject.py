@@ -2,7 +2,7 @@
 
 import time
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import asdict, dataclass, field, replace
 from pathlib import Path
 from threading import Lock
 from typing import Any
@@ -13,7 +13,7 @@ from lightpaint.basis.basis import Basis, meter_exposure
 from lightpaint.basis.cache import cache, scene_facts
 from lightpaint.basis.cache.scene_facts import SceneFacts
 from lightpaint.basis.lightgroups.light_groups import LightGroups
-from lightpaint.colour import TransformChoice, ViewTransform
+from lightpaint.colour import TransformChoice, ViewTransform, read_observer
 from lightpaint.display_text import some_names
 from lightpaint.errors import PaintError
 from lightpaint.files import is_name, one_line, scene_name
@@ -67,6 +67,8 @@ class LazyScene:
         lights = {"lights": list(file["lights"])} if "lights" in file else {}
         kept = ("quality", "resolution", "spectral")
         film = {name: getattr(self.settings, name) for name in kept}
+        if self.settings.observer is not None:
+            film["observer"] = asdict(read_observer(Path(self.settings.observer)))
         parameters = {key: str(value) for key, value in self.file.parameters.items()}
         return {**file, **lights, **film, "groups": names, "parameters": parameters}
 

@@ -8,7 +8,7 @@ from typing import Any
 from lightpaint.basis.basis import Basis
 from lightpaint.basis.lightgroups.light_groups import LightGroups
 from lightpaint.basis.lights import Lights
-from lightpaint.colour import TransformChoice
+from lightpaint.colour import TransformChoice, read_observer
 from lightpaint.errors import PaintError, SceneError
 from lightpaint.file_reading import file_length
 from lightpaint.files import scene_name
@@ -140,6 +140,8 @@ def _scene_on_film(
         return whole
     # Errors that need no renderer are raised before the scene is loaded.
     file_length(Path(source.path), "scene file", SceneError)
+    if settings.observer is not None:
+        read_observer(Path(settings.observer))
     scene = LazyScene(source, settings, prepare)
     if scene.record is not None:
         _check_constraints(scene.record.lights, constraints, settings, check_lamps)

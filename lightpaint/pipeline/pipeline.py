@@ -15,10 +15,9 @@ from lightpaint.lighting.analysis.surface_colors import SurfaceColor, surface_co
 from lightpaint.lighting.animated_solve import solve_frames
 from lightpaint.lighting.answer.lighting import Lighting
 from lightpaint.lighting.answer.lighting_keys import LightingKey
-from lightpaint.lighting.held_mixes import choose_held_mixes
 from lightpaint.lighting.problem import Problem
 from lightpaint.lighting.solution import Solution
-from lightpaint.lighting.solve import solution_of
+from lightpaint.lighting.solve import choose_mixes, solution_of
 from lightpaint.lighting.wishes.planes_answer import PlanesAnswer
 from lightpaint.pipeline.job.job import Job, PaintedView
 from lightpaint.pipeline.job.settings import Settings
@@ -163,7 +162,7 @@ def answer_job(
             for basis in problem.views.bases:
                 make_ahead(basis, prepare_page)
         solution = solution_of(problem)
-    solution = choose_held_mixes(_reduce_noise(job, solution, listen))
+    solution = _finished(job, solution, listen)
     del problem  # some of its arrays are as large as the pictures
     release_freed_memory()
     level_errors = () if placement is None else placement.level_errors
@@ -177,8 +176,10 @@ def answer_job(
         return JobAnswer(solution, analyses, lighting, on_planes)
 
 
-def _reduce_noise(job: Job, solution: Solution, listen: Listener) -> Solution:
-    """Return the solution corrected for noise and refined by rendering, as the settings ask."""
+def _finished(job: Job, solution: Solution, listen: Listener) -> Solution:
+    """Return the solution corrected for noise and refined by rendering, as the settings ask, with
+    the mixes that lamps prefer then.
+    """
     settings, certificate = job.settings, solution.certificate
     listen.note(
         f"solved in {max(certificate.sweeps)} sweeps, to a KKT residual of "
@@ -191,6 +192,7 @@ def _reduce_noise(job: Job, solution: Solution, listen: Listener) -> Solution:
     solution = refine_by_rendering(
         scenes, solution, rounds=settings.refine, seed=settings.seed, progress=listen
     )
+    solution = choose_mixes(solution)
     lighting = with_places(solution.lighting, job.views[0].scene)
     return replace(solution, lighting=lighting)
 

@@ -98,7 +98,8 @@ class SceneFiles:
     def places(self) -> frozenset[Path]:
         """Paths of its files, and of files that would change the scene if they existed."""
         lights_path = self.lights_file or lights_file_beside(self.path)
-        return frozenset({*self.parsed.places(), lights_path})
+        spectra = self.requests.spectrum_files
+        return frozenset({*self.parsed.places(), lights_path, *spectra})
 
     @cached_property
     def shape_names(self) -> tuple[str, ...]:

@@ -1,14 +1,10 @@
 """A real scheduler and real worker processes: accidents cost nothing, to the last bit."""
 
-import contextlib
-import json
 import os
 import re
 import signal
-import subprocess
 import sys
 import threading
-import time
 from collections import Counter
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass, field
@@ -19,6 +15,7 @@ import numpy as np
 import pytest
 from batches import contents
 from command import run
+from dask_cluster import Workers, cluster_of, wait_until
 from renderer import write_room
 
 from lightpaint.basis.file import basis_file
@@ -60,86 +57,11 @@ want = ["lights"]
 settings = { spp = 16, literal = true }
 """
 
-#: Seconds after which something has gone wrong, however busy the machine is.
-LONG_S = 120.0
-
-
-@dataclass
-class Workers:
-    """A scheduler with workers. slow: folder by which they are held (slow_worker.py)."""
-
-    address: str
-    slow: Path
-
-    def pid(self, worker: str) -> int:
-        """The process behind an address."""
-        with distributed.Client(self.address, set_as_default=False) as client:
-            return int(client.run(os.getpid, workers=[worker])[worker])
-
-    def await_all(self, count: int = 2) -> None:
-        """Until all are there: a nanny begins another in the place of one that died."""
-        with distributed.Client(self.address, set_as_default=False) as client:
-            wait_until(lambda: len(client.nthreads()) == count)
-
-
-def wait_until(condition: Callable[[], Any]) -> None:
-    """Wait for it."""
-    deadline_s = time.monotonic() + LONG_S
-    while not condition():
-        assert time.monotonic() < deadline_s
-        time.sleep(0.02)
-
 
 @pytest.fixture(scope="module")
 def workers(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Workers]:
     with cluster_of(2, tmp_path_factory.mktemp("cluster")) as worker_pool:
         yield worker_pool
-
-
-@contextlib.contextmanager
-def cluster_of(count: int, folder: Path) -> Iterator[Workers]:
-    """A scheduler with so many workers."""
-    (slow := folder / "slow").mkdir()
-    file, tests = folder / "scheduler.json", Path(__file__).parent.parent
-    environment = {
-        **os.environ,
-        "LIGHTPAINT_TEST_SLOW": str(slow),
-        "PYTHONPATH": os.pathsep.join([str(tests), *filter(None, sys.path)]),
-        # Its own, so that nothing is found that the tests have kept.
-        "LIGHTPAINT_CACHE": str(folder / "none"),
-    }
-    dask = [sys.executable, "-m", "dask"]
-    options = ["--scheduler-file", str(file)]
-    quiet: dict[str, Any] = {"stdout": subprocess.DEVNULL, "env": environment, "cwd": folder}
-    with contextlib.ExitStack() as stack, (folder / "log").open("w") as log:
-        for command in (
-            [*dask, "scheduler", "--port", "0", "--host", "127.0.0.1", "--no-dashboard", *options],
-            [
-                *dask, "worker", "--nworkers", str(count), "--nthreads", "1", "--no-dashboard",
-                "--local-directory", str(folder), "--preload", "slow_worker", *options,
-            ],
-        ):  # fmt: skip
-            process = stack.enter_context(subprocess.Popen(command, stderr=log, **quiet))
-            stack.callback(_end, process)
-            wait_until(file.exists)
-        wait_until(lambda: _address(file))
-        worker_pool = Workers(_address(file), slow)
-        worker_pool.await_all(count)
-        yield worker_pool
-
-
-def _address(file: Path) -> str:
-    with contextlib.suppress(ValueError):  # half written
-        return str(json.loads(file.read_text())["address"])
-    return ""
-
-
-def _end(process: "subprocess.Popen[Any]") -> None:
-    process.terminate()
-    try:
-        process.wait(20)
-    except subprocess.TimeoutExpired:
-        process.kill()
 
 
 @pytest.fixture(scope="module")

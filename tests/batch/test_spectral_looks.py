@@ -1,6 +1,7 @@
 """Batches of looks with spectra: each is what `solve` finds, for the eye or for a camera."""
 
 import csv
+from contextlib import ExitStack
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -131,10 +132,18 @@ def test_the_summary_says_how_lamps_render_colours(folder: Path):
 
 
 @pytest.mark.nightly
-@pytest.mark.parametrize("how", ["processes"])
-def test_processes_find_what_one_finds(how: str, folder: Path, monkeypatch):
+@pytest.mark.parametrize("how", ["processes", "cluster"])
+def test_processes_find_what_one_finds(how: str, folder: Path, tmp_path: Path, monkeypatch):
+    """Those of a cluster get the files of the scene, and render parts of its basis."""
     monkeypatch.setenv("LIGHTPAINT_CACHE", str(folder / f"cache-{how}"))
-    outcome = run_batch(plan(folder / "looks.toml", folder / how), RunOptions(workers=2))
+    with ExitStack() as stack:
+        options = RunOptions(workers=2)
+        if how == "cluster":
+            from dask_cluster import cluster_of  # which skips without Dask
+
+            workers = stack.enter_context(cluster_of(2, tmp_path, can_be_held=False))
+            options = RunOptions(cluster=workers.address)
+        outcome = run_batch(plan(folder / "looks.toml", folder / how), options)
     assert not outcome.failed
     for name in ("eye", "camera", "dark", "fade-1", "eye-warmer"):
         for file in ("lighting.json", "relit.xml"):
@@ -145,6 +154,11 @@ def test_processes_find_what_one_finds(how: str, folder: Path, monkeypatch):
 WRONG = {
     "no curves": ("camera.csv", "none.csv", "no such observer"),
     "no spectra": ("spectral = true, ", "", "a camera sees spectra alone: also pass spectral"),
+    "sums alone": (
+        'want = ["solve", "predict"]\n[look.constraints.light.panel]\noff = true',
+        'want = ["lights"]\n[look.constraints.light.panel]\nrf = 80',
+        "takes sums alone, and with spectra, mixes of one colour are chosen by their pictures",
+    ),
     "own emitters": (
         "off = true",
         'emitters = [{name = "red", spectrum = "D65", Y = 4}]',

@@ -6,6 +6,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from rig_files import gdtf
 
 from lightpaint.colour.color import kelvin_to_rgb, xy_of, xy_of_spectrum
 from lightpaint.colour.lamp import Lamp, LampEmitter
@@ -97,6 +98,65 @@ def test_tm_27_is_read_as_colour_science_reads_it(tmp_path: Path):
     expected = colour_science().SpectralDistribution_IESTM2714(str(tmp_path / "led.spdx")).read()
     np.testing.assert_allclose(waves, expected.wavelengths)
     np.testing.assert_allclose(powers, expected.values)
+
+
+def _emitter(
+    name: str, peak: float, *, level: int = 100, waves: range = range(380, 781, 10)
+) -> str:
+    """An emitter of a GDTF, whose weaker measurement has another spectrum."""
+    measured = ""
+    for physical, center in ((level / 2, 400.0), (level, peak)):
+        # A spectrometer has noise, also below 0.
+        energies = {w: np.exp(-(((w - center) / 20) ** 2)) - 2e-3 for w in reversed(waves)}
+        points = "".join(
+            f'<MeasurementPoint WaveLength="{w}" Energy="{x}"/>' for w, x in energies.items()
+        )
+        measured += f'<Measurement Physical="{physical}">{points}</Measurement>'
+    return f'<Emitter Name="{name}">{measured}</Emitter>'
+
+
+EMITTERS = _emitter("Red", 630) + _emitter("Deep Blue", 450) + '<Emitter Name="Amber"/>'
+
+
+@pytest.mark.parametrize(("name", "peak"), [("Red", 630), ("deep blue", 450)])
+def test_an_emitter_of_a_gdtf_has_a_name(name: str, peak: float, tmp_path: Path):
+    """Its strongest measurement counts."""
+    (tmp_path / "spot.gdtf").write_bytes(gdtf(described=f"<Emitters>{EMITTERS}</Emitters>"))
+    waves, powers = named_spectrum(f"spot.gdtf:{name}", tmp_path)
+    np.testing.assert_array_equal(waves, np.arange(380, 781, 10))
+    expected = np.exp(-(((waves - peak) / 20) ** 2)) - 2e-3
+    np.testing.assert_allclose(powers, np.maximum(expected, 0), atol=1e-12)
+
+
+NAMELESS = 'names no emitter: it has Red, Deep Blue; write "spot.gdtf:Red"'
+NOT_A_NUMBER = EMITTERS.replace('WaveLength="400"', 'WaveLength="blue"')
+WRONG_EMITTERS = {
+    "unknown": ("spot.gdtf:Rot", EMITTERS, "no measured emitter 'Rot': it has Red, Deep Blue; "),
+    "not measured": ("spot.gdtf:Amber", EMITTERS, "no measured emitter 'Amber': it has Red, D"),
+    "no name": ("spot.gdtf", EMITTERS, NAMELESS),
+    "a colon alone": ("spot.gdtf:", EMITTERS, NAMELESS),
+    "none measured": ("spot.gdtf:Amber", '<Emitter Name="Amber"/>', "has no emitter with a meas"),
+    "some nanometres": (
+        "spot.gdtf:Red",
+        _emitter("Red", 630, waves=range(600, 661, 10)),
+        "covers 600 to 660 nm: expected 400 to 700",
+    ),
+    "no number": ("spot.gdtf:Red", NOT_A_NUMBER, "emitter 'Red' has a value that is not a number"),
+    "no file": ("none.gdtf:Red", EMITTERS, "no such GDTF: "),
+}
+
+
+@pytest.mark.parametrize("case", WRONG_EMITTERS)
+def test_mistakes_with_a_gdtf_are_one_line(case: str, tmp_path: Path):
+    name, emitters, message = WRONG_EMITTERS[case]
+    (tmp_path / "spot.gdtf").write_bytes(gdtf(described=f"<Emitters>{emitters}</Emitters>"))
+    with pytest.raises(ColorError) as error:
+        named_spectrum(name, tmp_path)
+    assert message in str(error.value)
+    assert "\n" not in str(error.value)
+    (tmp_path / "spot.gdtf").write_text("no archive")
+    with pytest.raises(ColorError, match="is not a GDTF" if "none" not in name else "no such"):
+        named_spectrum(name, tmp_path)
 
 
 def test_noise_below_zero_is_none(tmp_path: Path):

@@ -177,6 +177,53 @@ def test_a_fixed_colour_puts_rf_before_the_picture(make_basis):
         assert (best >= 80) == is_enough
 
 
+#: Least squares in float64, of planes in float32.
+ROUND_OFF = 1e-4
+
+
+@pytest.mark.parametrize("prefer", ["rf", "watts", "white"])
+@pytest.mark.parametrize("level", [0.2, 0.7])
+def test_a_fixed_colour_is_mixed_as_preferred_at_its_brightness(level, prefer, make_basis):
+    """And is as bright as brings the picture closest with that mix."""
+    basis = _basis(make_basis, "grey", "red")
+    found = _solved(basis, prefer=prefer, painted=level * POOR, color="3200K")
+    light = found.lighting.of_lamps()["a"]
+    assert light.lamp is not None
+    drives = np.array([*light.drives.values()])
+    expected = light.lamp.drives_for(np.array(light.emission))
+    # Mixes whose Rf is nearly equal are found some thousandths apart.
+    assert drives == pytest.approx(expected, abs=5e-3)
+    assert (drives <= light.lamp.most).all()
+    if prefer == "rf":
+        [x] = renderings_of(found.lighting).values()
+        assert x.color is not None
+        assert x.color.rf == pytest.approx(x.best_rf, abs=0.1)
+    # At full there is one mix, which dimmed lamps do not have to keep.
+    _, most = light.lamp.brightest_mix(np.array(light.emission))
+    at_full = light.lamp.drives_for(most * np.array(light.emission)) / most
+    assert np.abs(drives - at_full).max() > 0.01
+    picture = basis.mix(found.weights).ravel().astype(np.float64)
+    goal = found.problem.squares.image.ravel()
+    assert picture @ goal / (picture @ picture) == pytest.approx(1, rel=ROUND_OFF)
+
+
+def test_lamps_on_one_dimmer_are_mixed_as_preferred_at_their_brightness(make_basis):
+    basis = _basis(make_basis, "grey", "red", lamps="ab")
+    weights = np.repeat(np.tile(0.3 * POOR * LEVEL, 2)[:, None], 3, axis=1)
+    target = Target("t", basis.mix(weights), np.ones(SIZE, np.float32), everything=True)
+    constraints = Constraints.of(
+        {name: {"emitters": EMITTERS} for name in "ab"},
+        tie=[{"lights": ["a", "b"], "color": "3200K"}],
+        prefer_emitters="rf",
+    )
+    found = solve(basis, target, constraints=constraints, literal=True)
+    a, b = found.lighting.of_lamps().lights
+    assert a.mix == pytest.approx(b.mix, abs=1e-6)
+    for x in renderings_of(found.lighting).values():
+        assert x.color is not None
+        assert x.color.rf == pytest.approx(x.best_rf, abs=0.1)
+
+
 def test_the_file_has_what_was_chosen(make_basis, tmp_path):
     solution = _solved(_basis(make_basis, "grey", "red"), rf=80)
     lighting = analyse(solution)[0].solution.lighting

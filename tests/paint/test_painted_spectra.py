@@ -2,6 +2,7 @@
 
 import json
 from collections.abc import Iterator
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -19,6 +20,7 @@ from lightpaint.paint import protocol
 from lightpaint.paint.subject_factory import make_subject
 from lightpaint.pipeline.job.settings import Settings
 from lightpaint.pipeline.job.sources import SceneFile
+from lightpaint.scene.scene_reader import load_scene
 
 #: At the most: how far drives are off by the noise of two renders.
 NOISE = 0.05
@@ -45,6 +47,33 @@ def spectral(tmp_path_factory: pytest.TempPathFactory) -> Iterator[MovingStudio]
     )
     yield studio
     studio.close()
+
+
+def test_a_camera_sees_what_is_painted(tmp_path: Path) -> None:
+    """Another camera is another scene; its table is read before the scene is loaded."""
+    path = write_spectral_room(tmp_path)
+    waves = np.arange(380, 781, 10.0)
+    camera = tmp_path / "camera.csv"
+    identities = []
+    for red in (600, 620):
+        curves = [np.exp(-0.5 * ((waves - x) / 35) ** 2) for x in (red, 540, 460)]
+        np.savetxt(camera, np.column_stack([waves, *curves]), delimiter=",")
+        settings = Settings(spp=4, use_cache=False, spectral=True, observer=str(camera))
+        subject = make_subject(SceneFile(str(path)), tmp_path / "paint", settings=settings)
+        identities.append(subject.loaded_scene.identity)
+    assert identities[0] != identities[1]
+    *_, basis = subject.bases()
+    assert basis.origin.observer == "camera.csv"
+    assert [*basis.names[:6]] == NAMES
+    camera.write_text("400,1\n")
+    with pytest.raises(LightpaintError, match=r"camera.csv has '400,1' in line 1: expected nano"):
+        make_subject(SceneFile(str(path)), tmp_path / "paint", settings=settings)
+
+
+def test_files_of_spectra_are_those_of_a_scene(tmp_path: Path) -> None:
+    """What is kept of a scene for the next session ends with a change of them."""
+    path = write_spectral_room(tmp_path)
+    assert {tmp_path / f"{name}.csv" for name in LEVELS} <= load_scene(path).places
 
 
 def undone(studio: MovingStudio, message: Any) -> np.ndarray:

@@ -2,15 +2,21 @@
 
 import threading
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from concurrent.futures import ThreadPoolExecutor
+from contextlib import contextmanager
+from pathlib import Path
 
 import numpy as np
 import pytest
+from spectral_room import write_spectral_room
 
 import lightpaint as lp
 from lightpaint.arrays import Floats
+from lightpaint.lighting.constraints.constraints_file import constraints_of
+from lightpaint.pipeline.job.spectral_job import spectral_scene
 from lightpaint.scene.runtime.render_lock import MAX_WAIT_S, MITSUBA, Turns
+from lightpaint.scene.runtime.variant import spectral_variant, use_variant
 from lightpaint.scene.scene_reader import load_scene
 from lightpaint.scene.scene_render import Stream, render
 
@@ -193,3 +199,89 @@ def test_threads_render_what_one_alone_does(small_room: lp.Scene, monkeypatch: p
     np.testing.assert_allclose(basis.images, single_render.images, rtol=1e-4, atol=1e-5)
     for picture in [*pictures, frame()]:
         np.testing.assert_allclose(picture, pictures[0], rtol=1e-4, atol=1e-5)
+
+
+def test_who_borrows_a_turn_finds_things_as_expected():
+    """Each thread has its own context for the time at which its turn is lent."""
+    turns, state, seen = Turns(), ["rgb"], list[str]()
+
+    @contextmanager
+    def in_rgb() -> Iterator[None]:
+        state[0] = "rgb"
+        yield
+        assert turns.is_held
+        state[0] = "spectral"
+
+    def leisure() -> None:
+        with turns.low_priority(), turns.acquired(), turns.around_lending(in_rgb):
+            state[0] = "spectral"
+            is_waiting.set()
+            while len(seen) < 3:
+                assert state[0] == "spectral"
+                turns.let_others()
+            state[0] = "rgb"
+
+    def urgent() -> None:
+        assert is_waiting.wait(SOON_S)
+        for _ in range(3):
+            with turns.acquired():
+                seen.append(state[0])
+                with turns.aside():  # without a context of its own
+                    pass
+
+    is_waiting = threading.Event()
+    with ThreadPoolExecutor(2) as threads:
+        for one in [threads.submit(leisure), threads.submit(urgent)]:
+            one.result(SOON_S)
+    assert seen == ["rgb"] * 3
+    assert state == ["rgb"]
+
+
+@pytest.mark.nightly
+def test_others_render_in_rgb_between_the_passes_of_spectra(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+):
+    """Two threads, of which one has Mitsuba in its spectral variant."""
+    monkeypatch.setattr("lightpaint.scene.scene_render.SAMPLES_PER_PASS", 2**11)
+    plain = load_scene(write_spectral_room(tmp_path))
+    spectral = spectral_scene(plain, constraints_of(plain.requests))
+    order: list[str] = []
+    has_begun = threading.Event()
+
+    def note_pass(label: str, done: int, total: int, unit: str = "passes") -> None:
+        order.append("pass")
+        has_begun.set()
+
+    def frame() -> Floats:
+        estimate = render(load_scene(plain.path), spp=4, stream=Stream.VERIFICATION)
+        order.append(use_variant().variant)
+        return estimate.image
+
+    def frames() -> list[Floats]:
+        assert has_begun.wait(SOON_S)
+        return [frame() for _ in range(3)]
+
+    alone = lp.render_basis(spectral, spp=64)
+    with ThreadPoolExecutor(1) as threads:
+        future = threads.submit(frames)
+        with MITSUBA.low_priority():
+            basis = lp.render_basis(spectral, spp=64, progress=note_pass)
+        pictures = future.result(SOON_S)
+    variant = use_variant().variant
+    assert variant.endswith("_rgb")
+    assert order[-1] == "pass"  # the frames were in the middle
+    assert order.count("pass") + order.count(variant) == len(order)
+    # Sums are added in any order by several threads: float32.
+    np.testing.assert_allclose(basis.images, alone.images, rtol=1e-4, atol=1e-5)
+    for picture in [*pictures, frame()]:
+        np.testing.assert_allclose(picture, pictures[0], rtol=1e-4, atol=1e-5)
+
+
+def test_changes_of_the_variant_warn_of_nothing(monkeypatch: pytest.MonkeyPatch):
+    """Mitsuba loads its own Python integrators anew each time, which Dr.Jit counts."""
+    import drjit.ast
+
+    use_variant()
+    monkeypatch.setattr(drjit.ast, "_syntax_counter", 2000)
+    with spectral_variant():
+        pass

@@ -225,7 +225,7 @@ class _OnePassRender:
 
     def spend(self, budget: Budget, keeper: Keeper, progress: Progress) -> None:
         """Add samples step by step until `budget` is spent."""
-        with tracing() as let_others_through:
+        with self._scene.variant(), tracing() as let_others_through:
             pixels, done = self._film.band_pixels, self.done
             for k, spp in enumerate(steps(pixels, budget, done, progress, self._is_clean)):
                 if k > 0:  # after the last step the caller keeps what is finished
@@ -241,7 +241,7 @@ class _OnePassRender:
     def even_out(self) -> None:
         """Complete the step that an interrupt left unfinished in some pixels."""
         if ahead := self._film.ahead:
-            with tracing() as let_others_through:
+            with self._scene.variant(), tracing() as let_others_through:
                 self._film.add(self.done, ahead, let_others_through)
             self.done += ahead
 
@@ -310,7 +310,7 @@ def train_guide(scene: Scene, seed: int) -> Floats:
 
     tracer = Tracer(scene, view_seed(seed, scene.sensor))
     try:
-        with tracing() as let_others_through:
+        with scene.variant(), tracing() as let_others_through:
             return train_tracer(tracer, let_others_through)
     finally:
         tracer.close()

@@ -116,7 +116,7 @@ def top_up(
         render_errors(scene.path),
     ):
         try:
-            with tracing() as let_others_through:
+            with scene.variant(), tracing() as let_others_through:
                 tracer = kept_tracers.of(scene, basis)
                 if batches and not tracer.is_trained:
                     train_tracer(tracer, let_others_through)

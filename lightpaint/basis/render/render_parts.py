@@ -136,7 +136,7 @@ class PartRenderer:
         # A running kernel cannot be interrupted.
         step = largest_pass(size[0] * size[1], shorter=PASS_DIVISOR)
         halves = [self._tracer.planes(rows) for _ in range(2)]
-        with tracing() as let_others_through:
+        with self._scene.variant(), tracing() as let_others_through:
             for half, planes in enumerate(halves):
                 for done in range(0, part.spp, step):
                     pass_spp = min(step, part.spp - done)

@@ -390,12 +390,21 @@ def _check_by_sums(job: Job) -> None:
     reason = reason_against_sums(view.target, job.fit)
     if not reason and view.basis is None and view.scene is not None:
         reason = why_not_one_pass(view.scene) or ""
+    if view.scene is not None and view.scene.is_spectral and _chooses_mixes(job.all_constraints):
+        reason = "with spectra, mixes of one colour are chosen by their pictures"
     if job.all_constraints.near:
         reason = "near depends on the area of the paint"
     if job.all_rigging:
         reason = "lights may move in it, unless move_lights is false"
     if reason:
         raise BatchError(f"want = ['lights'] takes sums alone, and {reason}: want 'solve' instead")
+
+
+def _chooses_mixes(constraints: Constraints) -> bool:
+    """Return whether lamps may get other mixes of their colours after the solve."""
+    keys = {key for _, table, _ in constraints.lights for key in table}
+    has_colors = bool(constraints.ties) or not keys.isdisjoint(("rf", "color", "kelvin"))
+    return has_colors or constraints.prefer_emitters is not None
 
 
 def _files_of_lighting_look(entry: LookEntry, groups: LightGroups | None) -> tuple[Path, ...]:

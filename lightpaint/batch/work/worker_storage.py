@@ -153,14 +153,15 @@ class PassRenderer:
     def sum(self, passes: range) -> dict[int, Doubles]:
         """Return the undivided sums, (h, w, 3), of the given passes for each half, by the half."""
         sums: dict[int, Doubles] = {}
-        for k in passes:
-            half, spp = self._passes[k]
-            seed, stream = self._final.seed, Stream.VERIFICATION
-            with self._scene.variant(), tracing():
+        seed, stream = self._final.seed, Stream.VERIFICATION
+        with self._scene.variant(), tracing() as let_others_through:
+            for k in passes:
+                half, spp = self._passes[k]
                 pass_total = pass_sum(
                     self._loaded_scene, self._scene, k, spp, seed=seed, stream=stream
                 )
-            sums[half] = sums[half] + pass_total if half in sums else pass_total
+                sums[half] = sums[half] + pass_total if half in sums else pass_total
+                let_others_through()
         return sums
 
     def close(self) -> None:

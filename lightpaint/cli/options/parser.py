@@ -166,6 +166,7 @@ def _template(parser: argparse.ArgumentParser) -> None:
     add_split(parser)
     add_pattern(parser)
     add_budget(parser)
+    add_fields(parser, Settings, "spectral", "observer")
     add_cache(parser)
     add_view_transform(parser, "srgb", "metered like a camera; 0 with --view")
     add_output(
@@ -241,7 +242,7 @@ def _paint(parser: argparse.ArgumentParser) -> None:
     add_pattern(parser)
     add_constraints(parser)
     add_budget(parser)
-    add_fields(parser, Settings, "error", "cd_per_unit", "planes", "watts", "spectral")
+    add_fields(parser, Settings, "error", "cd_per_unit", "planes", "watts", "spectral", "observer")
     add_cache(parser)
     add_view(parser, is_repeatable=True)
     # The parser is kept for the command that answers exported paintings.

@@ -48,7 +48,8 @@ def source_of_template(options: Namespace) -> SceneFile | BasisFile | GroupsFile
     elif light_list and _is_file_to_be(light_list, Path(options.scene)):
         raise BasisError(f"{options.scene} and --lights {light_list} at once: give one to paint on")
     options.source, options.targets, options.masks, options.views = options.scene, [], [], []
-    return basis_of(options) or scene_of(options)
+    seen = {"spectral": options.spectral, "observer": options.observer}
+    return basis_of(options) or scene_of(options, **seen)
 
 
 def scene_of(options: Namespace, *, is_to_solve: bool = True, **fields: Any) -> SceneFile:

@@ -1,6 +1,7 @@
 """Spectra as people name them: a black body, an illuminant of the CIE, a file of a measurement.
 
-Files are tables of two columns, nanometres and power, or IES TM-27 (.spdx).
+Files are tables of two columns, nanometres and power, IES TM-27 (.spdx), or GDTF, of which one
+emitter is named.
 """
 
 import re
@@ -13,6 +14,7 @@ import numpy as np
 
 from lightpaint.arrays import Doubles
 from lightpaint.colour.primaries import colour_science
+from lightpaint.colour.spectra.gdtf_emitters import gdtf_and_emitter, read_gdtf_emitter
 from lightpaint.colour.spectra.spectrum import WAVELENGTHS, black_body, spectrum_of
 from lightpaint.errors import ColorError
 from lightpaint.file_reading import read_bytes, read_text
@@ -39,18 +41,24 @@ MAX_NESTING = 32
 _BLACK_BODY = re.compile(r"(\d+(?:\.\d+)?) ?k(?: ?black ?body)?", re.IGNORECASE)
 
 
-def is_spectrum_file(name: str) -> bool:
-    """Return whether a name is that of a file, rather than of a light."""
-    return Path(name).suffix.lower() in (*TABLES, *TM27)
+def file_of_spectrum(name: str) -> str | None:
+    """Return the file in which a spectrum of this name is; None for that of a light."""
+    if found := gdtf_and_emitter(name):
+        return found[0]
+    return name if Path(name).suffix.lower() in (*TABLES, *TM27) else None
 
 
 def named_spectrum(name: str, folder: Path) -> tuple[Doubles, Doubles]:
     """Return nanometres (k,), rising, and power (k,) of a spectrum by its name or file.
 
-    name: `3200K blackbody`, an illuminant like `D65`, or a file. folder: of relative paths. Raises
-    ColorError, which says what is wrong without the name.
+    name: `3200K blackbody`, an illuminant like `D65`, a file, or an emitter of a GDTF, like
+    `spot.gdtf:Red`. folder: of relative paths. Raises ColorError, which says what is wrong without
+    the name.
     """
-    if is_spectrum_file(name):
+    if found := gdtf_and_emitter(name):
+        path = folder / found[0]
+        return _curve(read_gdtf_emitter(path, found[1]), path)
+    if file_of_spectrum(name):
         return read_spectrum(folder / name)
     if match := _BLACK_BODY.fullmatch(name.strip()):
         kelvin = float(match[1])
@@ -59,12 +67,12 @@ def named_spectrum(name: str, folder: Path) -> tuple[Doubles, Doubles]:
         return WAVELENGTHS.astype(np.float64), np.array(black_body(kelvin))
     illuminants = colour_science().SDS_ILLUMINANTS
     if name in illuminants:
-        found = illuminants[name]
-        return np.array(found.wavelengths), np.array(found.values)
+        illuminant = illuminants[name]
+        return np.array(illuminant.wavelengths), np.array(illuminant.values)
     raise ColorError(
         f"{one_line(repr(name))}: expected pairs of nanometres and power, a file "
-        '("led.csv", "led.spdx"), a black body ("3200K blackbody") or an illuminant of the CIE '
-        '("D65", "A", "FL2")'
+        '("led.csv", "led.spdx"), an emitter of a GDTF ("spot.gdtf:Red"), a black body '
+        '("3200K blackbody") or an illuminant of the CIE ("D65", "A", "FL2")'
     )
 
 
@@ -84,6 +92,11 @@ def read_spectrum(path: Path) -> tuple[Doubles, Doubles]:
     else:
         text = read_text(path, "spectrum", ColorError, limit=MAX_BYTES)
         points = _points_of_table(text, path, "nanometres and power", 2)
+    return _curve(points, path)
+
+
+def _curve(points: Sequence[tuple[float, ...]], path: Path) -> tuple[Doubles, Doubles]:
+    """Return nanometres (k,) and power (k,) of measured points, checked."""
     waves, powers = _measured(points, path, "the power")
     return waves, powers[:, 0]
 
@@ -98,7 +111,9 @@ def read_sensitivities(path: Path) -> tuple[Doubles, Doubles]:
     return _measured(points, path, "the sensitivity")
 
 
-def _measured(points: list[tuple[float, ...]], path: Path, what: str) -> tuple[Doubles, Doubles]:
+def _measured(
+    points: Sequence[tuple[float, ...]], path: Path, what: str
+) -> tuple[Doubles, Doubles]:
     """Return nanometres (k,) and values (k, n) of measured points, checked, without their noise.
 
     what: the values in words.

@@ -23,8 +23,8 @@ from lightpaint.colour import (
     xyz_of_powers,
 )
 from lightpaint.dmx.gdtf.mode_channels import Curve
-from lightpaint.dmx.rig_archive import library
 from lightpaint.errors import ColorError
+from lightpaint.storage.rig_archive import library
 
 #: Chromaticity of CIE 1931.
 Chromaticity = tuple[float, float]

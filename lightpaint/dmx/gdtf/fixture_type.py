@@ -9,8 +9,8 @@ from lightpaint.display_text import some_names
 from lightpaint.dmx.gdtf.geometry_tree import Placed, geometry_tree
 from lightpaint.dmx.gdtf.mode_channels import ModeChannel, mode_channels
 from lightpaint.dmx.gdtf.mode_lights import FixtureMode, ModeReader
-from lightpaint.dmx.rig_archive import RigArchive, reading
 from lightpaint.errors import RigError
+from lightpaint.storage.rig_archive import RigArchive, reading
 
 #: The file in a GDTF.
 DESCRIPTION = "description.xml"

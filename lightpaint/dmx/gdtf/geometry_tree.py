@@ -9,8 +9,8 @@ from xml.etree.ElementTree import Element
 import numpy as np
 
 from lightpaint.arrays import Doubles
-from lightpaint.dmx.rig_archive import library
 from lightpaint.errors import RigError
+from lightpaint.storage.rig_archive import library
 
 #: Largest number of geometries of a mode, with those that references repeat.
 MAX_GEOMETRIES = 10_000

@@ -13,8 +13,8 @@ import numpy as np
 from lightpaint.arrays import Doubles
 from lightpaint.dmx.console_rig import DmxChannel
 from lightpaint.dmx.gdtf.geometry_tree import Placed
-from lightpaint.dmx.rig_archive import library
 from lightpaint.errors import RigError
+from lightpaint.storage.rig_archive import library
 
 #: Largest number of channels of a mode.
 MAX_CHANNELS = 10_000

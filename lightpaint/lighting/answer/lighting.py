@@ -587,7 +587,9 @@ def whole_lamp(parts: Sequence[LightSetting]) -> LightSetting:
         return first
     emitters = [in_own_color(x.lamp.emitters[0]) for x in parts if x.lamp is not None]
     assert first.lamp is not None
-    lamp = replace(first.lamp, emitters=tuple(emitters))
+    lamp = replace(first.lamp, emitters=tuple(emitters), power_share=None)
+    if (own_share := first.lamp.power_share) is not None:
+        lamp = replace(lamp, power_share=own_share * float(lamp.powers[0]))
     drives = np.array([x.emission[0] for x in parts]) / lamp.levels
     errors = [None if x.standard_error is None else x.standard_error[0] for x in parts]
     emission = as_rgb(lamp.mix(drives))

@@ -4,7 +4,7 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
-from lightpaint.colour import is_spectrum_file
+from lightpaint.colour import file_of_spectrum
 from lightpaint.errors import ConstraintError
 from lightpaint.files import one_line
 from lightpaint.keywords import keywords
@@ -97,7 +97,7 @@ def _with_places_of_spectra(table: Mapping[str, Any], folder: Path) -> dict[str,
 
 def _with_place(emitter: Any, folder: Path) -> Any:
     name = emitter.get("spectrum") if isinstance(emitter, Mapping) else None
-    if not (isinstance(name, str) and is_spectrum_file(name)):
+    if not (isinstance(name, str) and file_of_spectrum(name)):
         return emitter
     return {**emitter, "spectrum": str(folder / name)}
 

@@ -287,6 +287,6 @@ def _pairs(value: Any, where: SourceKey) -> tuple[Doubles, Doubles]:
             where,
             f" is not a spectrum: expected pairs of nanometres, rising from {low:g} to {high:g}, "
             "and power, [[620, 0.1], [632, 1], [644, 0.1]]; or the name of a file or a light, "
-            '"led.csv", "3200K blackbody"',
+            '"led.csv", "spot.gdtf:Red", "3200K blackbody"',
         )
     return np.array(waves), np.array([power for _, power in pairs])

@@ -107,10 +107,15 @@ class WholeLamps:
 
 
 def part_lamps(lamp: Lamp) -> list[Lamp]:
-    """Return a lamp for each emitter, whose emission has its luminance in each channel."""
+    """Return a lamp for each emitter, whose emission has its luminance in each channel.
+
+    Its share of power is what the lamp leaves it while the others are off.
+    """
+    share = lamp.power_share
+    shares = [None if share is None else share / x for x in lamp.powers.tolist()]
     return [
-        replace(lamp, emitters=(replace(x, emission=as_rgb(np.full(3, level))),), power_share=None)
-        for x, level in zip(lamp.emitters, lamp.levels, strict=True)
+        replace(lamp, emitters=(replace(x, emission=as_rgb(np.full(3, level))),), power_share=own)
+        for x, level, own in zip(lamp.emitters, lamp.levels, shares, strict=True)
     ]
 
 

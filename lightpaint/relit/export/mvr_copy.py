@@ -18,9 +18,9 @@ import numpy as np
 from lightpaint.arrays import Doubles
 from lightpaint.colour import REC709, luminance, rgb_to_xyz
 from lightpaint.dmx.mvr import DESCRIPTION, KIND, MM, NamedFixture, named_fixtures, show_nodes
-from lightpaint.dmx.rig_archive import RigArchive, reading
 from lightpaint.lighting.answer.lighting import Lighting
 from lightpaint.scene.properties.site import EmitterPlace, rotation_between
+from lightpaint.storage.rig_archive import RigArchive, reading
 
 #: Unit of the emission of spots, which the fixtures of a rig are.
 SPOT_UNIT = "W/sr"

@@ -10,7 +10,7 @@ from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
 
-from lightpaint.colour import is_spectrum_file
+from lightpaint.colour import file_of_spectrum
 from lightpaint.display_text import known_keys
 from lightpaint.errors import SceneError
 from lightpaint.file_reading import read_text
@@ -140,8 +140,8 @@ class SceneRequests:
         lists = [x.get("emitters") for x in tables if isinstance(x, dict)]
         emitters = [x for found in lists if isinstance(found, list) for x in found]
         spectra = [x.get("spectrum") for x in emitters if isinstance(x, dict)]
-        names = dict.fromkeys(x for x in spectra if isinstance(x, str) and is_spectrum_file(x))
-        return tuple(Path(self.source).parent / name for name in names)
+        files = dict.fromkeys(file_of_spectrum(x) for x in spectra if isinstance(x, str))
+        return tuple(Path(self.source).parent / file for file in files if file is not None)
 
     @property
     def symmetric(self) -> frozenset[str]:

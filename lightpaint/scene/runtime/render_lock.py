@@ -8,7 +8,7 @@ low-priority threads let others go first.
 
 from collections import deque
 from collections.abc import Callable, Iterator
-from contextlib import contextmanager
+from contextlib import AbstractContextManager, contextmanager, nullcontext
 from threading import Condition, get_ident, local
 from time import monotonic
 
@@ -61,6 +61,29 @@ class Turns:
         finally:
             self._thread_state.is_low_priority = was_low_priority
 
+    @property
+    def is_held(self) -> bool:
+        """True if this thread has the turn."""
+        return self._holder == get_ident()
+
+    @contextmanager
+    def around_lending(self, entered: Callable[[], AbstractContextManager[None]]) -> Iterator[None]:
+        """Enter a context while this thread's turn is lent within the block.
+
+        The thread has its turn when it enters, and again when it leaves, unless the wait for the
+        turn was interrupted.
+        """
+        before = self._around_lending
+        self._thread_state.around_lending = entered
+        try:
+            yield
+        finally:
+            self._thread_state.around_lending = before
+
+    @property
+    def _around_lending(self) -> Callable[[], AbstractContextManager[None]]:
+        return getattr(self._thread_state, "around_lending", nullcontext)
+
     @contextmanager
     def aside(self) -> Iterator[None]:
         """Lend this thread's turn, if it has one, to others within the block.
@@ -71,6 +94,11 @@ class Turns:
         if self._holder != get_ident():
             yield
             return
+        with self._around_lending(), self._lent():
+            yield
+
+    @contextmanager
+    def _lent(self) -> Iterator[None]:
         depth, urgent = self._depth, not self._is_low_priority
         self._leave(urgent)
         try:

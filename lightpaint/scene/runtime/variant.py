@@ -8,6 +8,7 @@ import warnings
 from collections.abc import Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass
+from functools import partial
 from types import FrameType
 from typing import Any
 
@@ -84,10 +85,10 @@ def use_variant(requested: str | None = None) -> Backend:
 def spectral_variant() -> Iterator[None]:
     """Make Mitsuba render spectra instead of RGB within the block.
 
-    No other thread uses it meanwhile. Scenes belong to the variant in which they were loaded.
-    Raises BackendError where there is no spectral variant that runs Python integrators.
+    No other thread uses it meanwhile, except in RGB while this one lends its turn. Scenes belong to
+    the variant in which they were loaded. Raises BackendError where there is no spectral variant
+    that runs Python integrators.
     """
-    global _current
     with MITSUBA.acquired():
         backend = use_variant()
         if backend.variant.endswith(SPECTRAL):  # a block within another
@@ -95,20 +96,43 @@ def spectral_variant() -> Iterator[None]:
             return
         import mitsuba as mi
 
-        spectral = backend.variant.removesuffix("_rgb") + SPECTRAL
-        if not backend.is_jit or spectral not in mi.variants():
+        spectral = Backend(backend.variant.removesuffix("_rgb") + SPECTRAL, backend.llvm)
+        if not backend.is_jit or spectral.variant not in mi.variants():
             raise BackendError(
                 f"spectra need a variant like {FAST_VARIANT}, and this process renders with "
                 f"{backend.variant}: {INSTALL_LLVM}"
             )
         try:
-            mi.set_variant(spectral)
-            _current = Backend(spectral, backend.llvm)
+            _switch(spectral)
             register_luminaires()
-            yield
+            with MITSUBA.around_lending(partial(_meanwhile, backend, spectral)):
+                yield
         finally:
-            mi.set_variant(backend.variant)
-            _current = backend
+            if MITSUBA.is_held:  # false if it was interrupted while its turn was lent
+                _switch(backend)
+
+
+@contextmanager
+def _meanwhile(others: Backend, own: Backend) -> Iterator[None]:
+    """Have Mitsuba render as others expect while they have the turn of this thread."""
+    _switch(others)
+    yield
+    _switch(own)
+
+
+def _switch(backend: Backend) -> None:
+    """Make Mitsuba render with a backend.
+
+    Mitsuba loads its Python integrators anew each time, which takes a tenth of a second, and after
+    a hundred times Dr.Jit warns of so many functions that it transforms.
+    """
+    global _current
+    import mitsuba as mi
+
+    with warnings.catch_warnings():
+        warnings.filterwarnings("ignore", "The AST-transforming decorator", RuntimeWarning)
+        mi.set_variant(backend.variant)
+    _current = backend
 
 
 def is_in_spectra() -> bool:

@@ -7,14 +7,18 @@ import numpy as np
 import pytest
 from scipy.optimize import lsq_linear
 
+from lightpaint.colour.color import kelvin_to_rgb
+from lightpaint.colour.spectra.color_rendering import fidelity
 from lightpaint.colour.spectra.spectrum import rgb_of_powers
 from lightpaint.errors import ConstraintError
 from lightpaint.lighting.analysis.analysis import analyse
 from lightpaint.lighting.answer.combination import combine
+from lightpaint.lighting.answer.light_rendering import renderings_of
 from lightpaint.lighting.answer.lighting_file import read_lighting, write_lighting
 from lightpaint.lighting.constraints.constraints import Constraints
 from lightpaint.lighting.solve import solve
-from lightpaint.lighting.unknowns.reduction import reduce_to
+from lightpaint.lighting.unknowns.lamp_parts import WholeLamps
+from lightpaint.lighting.unknowns.reduction import lamps_by_name, reduce_to
 from lightpaint.target.target import Target
 
 SIZE = (6, 5)
@@ -145,6 +149,33 @@ def test_power_share_bounds_the_emitters_of_a_lamp_together(make_basis):
     _, drives = _drives(_basis(make_basis), Constraints.of(lamps))
     assert drives["a"] @ watts == pytest.approx(0.3, abs=SAME)
     assert drives["b"] @ watts > 0.3
+
+
+def test_an_answer_keeps_the_power_share_of_its_lamp(make_basis, tmp_path):
+    """So the best Rf is that of mixes within it, where white takes much power."""
+    emitters = [*EMITTERS[:3], {**EMITTERS[3], "watts": 60}]
+    lamps = {**LAMPS, "a": {"emitters": emitters, "power_share": 0.3}}
+    basis = _basis(make_basis)
+    constraints = Constraints.of(lamps)
+    lamp = lamps_by_name(constraints, WholeLamps.of(basis.lights).lights)["a"]
+    white = np.asarray(kelvin_to_rgb(4000.0))
+    drives = lamp.drives_for(0.95 * lamp.brightest(white) * white)
+    solution = solve(
+        basis, _target(basis, np.tile(drives, 2)), constraints=constraints, literal=True
+    )
+    write_lighting(tmp_path / "a.json", solution.lighting)
+    a, b = read_lighting(tmp_path / "a.json").values()
+    assert a.lamp.power_share == pytest.approx(0.3)
+    assert b.lamp.power_share is None
+    for found in (a, solution.lighting.of_lamps()["a"]):
+        assert len(found.lamp.mixes(found.lamp.mix(np.array(found.mix)))) > 0
+        best = found.lamp.best_rendering(np.array(found.emission))
+        assert best @ found.lamp.powers <= 0.3 + SAME
+    rendering = renderings_of(solution.lighting)["a"]
+    free = replace(a.lamp, power_share=None)
+    assert rendering.best_rf + 1 < fidelity(
+        free.best_rendering(np.array(a.emission)) @ free.powers_at_full
+    )
 
 
 def test_limits_bound_the_luminance_of_a_lamp(make_basis):

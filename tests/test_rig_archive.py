@@ -6,10 +6,10 @@ from pathlib import Path
 import pytest
 from rig_files import EXAMPLE, zipped
 
-from lightpaint.dmx import rig_archive
 from lightpaint.dmx.mvr import read_rig
-from lightpaint.dmx.rig_archive import RigArchive, parse_xml
 from lightpaint.errors import RigError
+from lightpaint.storage import rig_archive
+from lightpaint.storage.rig_archive import RigArchive, parse_xml
 
 
 def opened(data: bytes) -> RigArchive:
