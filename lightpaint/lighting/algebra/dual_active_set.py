@@ -124,7 +124,7 @@ class _Held:
 
 
 @dataclass
-class _Point:
+class _DualPoint:
     """x, (k,), the multipliers of sums, (w,), and the gradient less what these balance, (k,)."""
 
     x: Doubles
@@ -256,7 +256,7 @@ class DualActiveSet:
 
     def _optimum_from(
         self, b: Doubles, start: Doubles, held: _Held
-    ) -> tuple[_Point, _Held, int] | None:
+    ) -> tuple[_DualPoint, _Held, int] | None:
         """Return the optimum with the pull, the limits that hold there, and the number of steps.
 
         start: (k,), to which the pull is. held: limits that may hold there.
@@ -285,7 +285,9 @@ class DualActiveSet:
             point, held = _with_joined(exact, held, self._sums.least.size)
         return None
 
-    def _begin(self, b: Doubles, start: Doubles, held: _Held) -> tuple[_Point, _Held, int] | None:
+    def _begin(
+        self, b: Doubles, start: Doubles, held: _Held
+    ) -> tuple[_DualPoint, _Held, int] | None:
         """Return an optimum under some limits, their multipliers of the right sign.
 
         Of the limits that may hold, those leave whose multipliers have the wrong sign. If these are
@@ -304,7 +306,7 @@ class DualActiveSet:
             return inside
         return (*_with_joined(*begun[:2], self._sums.least.size), begun[2])
 
-    def _with_right_signs(self, b: Doubles, held: _Held) -> tuple[_Point, _Held, int] | None:
+    def _with_right_signs(self, b: Doubles, held: _Held) -> tuple[_DualPoint, _Held, int] | None:
         """Drop limits until all multipliers have the right sign."""
         steps = 0
         while True:
@@ -321,8 +323,8 @@ class DualActiveSet:
             # Where one leaves, others often come to the right sign.
             held = self._without_worst(point, held)
 
-    def _guessed(self, b: Doubles, held: _Held) -> tuple[_Point, _Held, int] | None:
-        """Let all bounds hold that a point violates, and drop all limits whose multipliers have the
+    def _guessed(self, b: Doubles, held: _Held) -> tuple[_DualPoint, _Held, int] | None:
+        """Add all bounds that a point violates, and drop all limits whose multipliers have the
         wrong sign, until there are none; None if guesses come again.
         """
         seen = set[bytes]()
@@ -343,21 +345,21 @@ class DualActiveSet:
             held = guess
         return None
 
-    def _rightly_held(self, b: Doubles, point: _Point, held: _Held) -> _Held:
+    def _rightly_held(self, b: Doubles, point: _DualPoint, held: _Held) -> _Held:
         """Return the limits whose multipliers have the right sign at a point."""
         pull = ROUND_OFF * float(np.abs(b).max(initial=0))
         low = self._is_fixed | (held.low & (point.gradient >= -pull))
         high = held.high & (point.gradient <= pull)
         return _Held(low, high, held.sums & (point.pushes >= -pull))
 
-    def _keeps(self, point: _Point, held: _Held) -> bool:
+    def _keeps(self, point: _DualPoint, held: _Held) -> bool:
         """Return whether a point reaches the sums that are to hold: if they depend on each other,
         it does not.
         """
         off = np.abs(self._sums.missed(point.x)[held.sums])
         return bool((off <= DEPENDENT * self._sums.sizes(point.x)[held.sums]).all())
 
-    def _without_worst(self, point: _Point, held: _Held) -> _Held:
+    def _without_worst(self, point: _DualPoint, held: _Held) -> _Held:
         """Return the limits without those whose multipliers are most wrong."""
         wrongs = (
             np.where(held.low & ~self._is_fixed, -point.gradient, 0),
@@ -379,7 +381,7 @@ class DualActiveSet:
         sums[which[order[: sizes.size][sizes > DEPENDENT] - 1]] = True
         return replace(held, sums=sums)
 
-    def _solved(self, b: Doubles, held: _Held) -> _Point | None:
+    def _solved(self, b: Doubles, held: _Held) -> _DualPoint | None:
         """Return the optimum under the limits that hold, whatever it misses; None if there is
         none.
         """
@@ -394,9 +396,9 @@ class DualActiveSet:
                 return None
             x, pushes[which] = x + solved[0], pushes[which] + solved[1]
             gradient = self._M @ x - b - pushes @ sums.rows
-        return _Point(x, pushes, gradient) if np.isfinite(x).all() else None
+        return _DualPoint(x, pushes, gradient) if np.isfinite(x).all() else None
 
-    def _most_missed(self, point: _Point, held: _Held) -> _Missed | None:
+    def _most_missed(self, point: _DualPoint, held: _Held) -> _Missed | None:
         """Return the limit that a point misses most, of bounds and of the sums that count."""
         x, sums = point.x, self._sums
         missed = sums.missed(x)
@@ -416,8 +418,8 @@ class DualActiveSet:
         normal[place] = 1 if is_low else -1
         return _Missed("low" if is_low else "high", place, most, normal)
 
-    def _add(self, point: _Point, held: _Held, limit: _Missed) -> int | None:
-        """Let a limit hold, in place, while others leave whose multipliers come to 0; return the
+    def _add(self, point: _DualPoint, held: _Held, limit: _Missed) -> int | None:
+        """Add a limit, in place, while others leave whose multipliers come to 0; return the
         number of steps, None if nothing satisfies all of them.
         """
         missed, pushed, steps = limit.missed, 0.0, 0
@@ -453,7 +455,7 @@ class DualActiveSet:
             (point.pushes if leaving.kind == "sums" else point.gradient)[leaving.place] = 0
 
     def _first_to_leave(
-        self, point: _Point, held: _Held, rise: Doubles, pushes: Doubles
+        self, point: _DualPoint, held: _Held, rise: Doubles, pushes: Doubles
     ) -> tuple[float, _Place]:
         """Return the step after which the first multiplier comes to 0, and its limit.
 
@@ -474,7 +476,7 @@ class DualActiveSet:
                     found = float(steps[least]), _Place(kind, int(falling[least]))
         return found
 
-    def _let_hold(self, point: _Point, held: _Held, limit: _Missed, pushed: float) -> None:
+    def _let_hold(self, point: _DualPoint, held: _Held, limit: _Missed, pushed: float) -> None:
         """Add a limit that a point reaches now, with its multiplier, in place."""
         kind, place = limit.kind, limit.place
         getattr(held, kind)[place] = True
@@ -543,7 +545,7 @@ class DualActiveSet:
         return unscaled, multipliers[: self._count]
 
 
-def _with_joined(point: _Point, held: _Held, count: int) -> tuple[_Point, _Held]:
+def _with_joined(point: _DualPoint, held: _Held, count: int) -> tuple[_DualPoint, _Held]:
     """Return a point and the limits that hold it, with sums that have joined, now (w,) of them."""
     more = count - held.sums.size
     pushes, sums = (
