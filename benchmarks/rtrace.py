@@ -9,12 +9,12 @@ points of measurement on a plane 0.8 m over the floor. lightpaint measures the l
 at each point in one pass. Radiance has one `rtrace -I` for each luminaire, whose octree has that
 luminaire alone. Both follow five bounces.
 
-The error of a run is the root mean square over points of the difference to a measurement with many
-samples, relative to the mean that the luminaire gives; then over luminaires. Times are seconds of
-the processor: for lightpaint of loading, training and samples, with kernels compiled; for rtrace of
-its processes alone. The last column is the ratio of error squared times seconds: how many times
-longer rtrace takes for an equal error, if more rays make its error smaller as they do with -aa 0.
-Of the given sets of options that with the least product counts.
+The error of a run is the root mean square over points of the difference to the mean of measurements
+with many samples, relative to the mean that the luminaire gives; then over luminaires. Times are
+seconds of the processor: for lightpaint of loading, training and samples, with kernels compiled;
+for rtrace of its processes alone. The last column is the ratio of error squared times seconds: how
+many times longer rtrace takes for an equal error, if more rays make its error smaller as they do
+with -aa 0. Of the given sets of options that with the least product counts.
 """
 
 import argparse
@@ -40,8 +40,8 @@ from lightpaint.scene.scene import Scene
 BOUNCES = 5
 #: Metres from the ceiling to a luminaire, and from the floor to the points.
 HUNG, HEIGHT = 0.3, 0.8
-#: Samples per point of the measurement that all others are compared with.
-SURE_SPP = 2**16
+#: Samples per point of the measurements whose mean all others are compared with, and their number.
+SURE_SPP, SURE_RUNS = 2**16, 4
 
 #: Options of rtrace: roulette or none, many rays or few, and interpolation between ambient values.
 OPTIONS = (
@@ -100,7 +100,8 @@ def compare(folder: Path, count: int, options: argparse.Namespace) -> None:
     [plane] = read_planes(write_plane(folder, options.points), scene).planes
     octrees = [write_radiance(folder, k, place) for k, place in enumerate(places(count))]
     one_pass(scene, plane, 2, 0)  # compiles kernels
-    sure = one_pass(scene, plane, SURE_SPP, 999).lux
+    runs = [one_pass(scene, plane, SURE_SPP, 999 + k).lux for k in range(SURE_RUNS)]
+    sure = np.mean(runs, axis=0)
     ours, of_options = [], {text: list[Run]() for text in options.options}
     for repeat in range(options.repeats):
         ours.append(one_pass(scene, plane, options.spp, repeat + 1))

@@ -31,6 +31,7 @@ from lightpaint.lighting.loss.reweighting import (
     Descent,
     WeightTerms,
     descend,
+    interpolate,
     total_loss,
 )
 from lightpaint.lighting.loss.warm_start import find_near_optimum, is_sampled
@@ -43,6 +44,7 @@ from lightpaint.lighting.unknowns.lamp_parts import WholeLamps
 from lightpaint.lighting.unknowns.reduced_problem import (
     ReducedOptimum,
     ReducedSolver,
+    nearest_unknowns,
     nearest_weights,
     solve_reduced,
 )
@@ -368,7 +370,7 @@ def _least_loss(
     def loss_at(weights: Doubles) -> float:
         return total_loss(lit.pixels, WeightTerms(pull), weights, lit.predicted(weights))
 
-    current, reached_loss = nearest_to_current(problem), loss_at(descent.weights)
+    current, reached_loss = _from_current(problem, descent.weights), loss_at(descent.weights)
     if reached_loss > loss_at(current):
         # A worse valley: from the current lighting every step leads downhill.
         descent = descend_from(current)
@@ -394,6 +396,24 @@ def _solution_at(
     converged = optimum.converged and descent.reweighting.converged
     result = solution.with_certificate_fields(converged=converged)
     return replace(result, reweighting=descent.reweighting)
+
+
+def _from_current(problem: Problem, found: Doubles) -> Doubles:
+    """Return weights (n, 3) near the current ones that constraints allow: under requirements the
+    first that meet them on the way to an answer.
+    """
+    requirements = problem.reduction.requirements
+    if requirements is None:
+        return nearest_to_current(problem)
+    begin = nearest_weights(problem.reduction, problem.reference)
+    rows, least = problem.reduction.required
+    at_begin, at_end = (
+        rows @ nearest_unknowns(problem.reduction, w, np.ones(len(w), bool)) - least
+        for w in (begin, found)
+    )
+    missed = (at_begin < 0) & (at_end > at_begin)
+    parts = at_begin[missed] / (at_begin[missed] - at_end[missed])
+    return interpolate(begin, found, float(min(1.0, parts.max(initial=0))))
 
 
 def nearest_to_current(problem: Problem) -> Doubles:

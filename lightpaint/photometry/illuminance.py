@@ -26,6 +26,11 @@ DARK_SHARE = 0.3
 #: Weight of a plane's mean square error against a point's own, in degrees of freedom.
 POOLED_DEGREES = 4
 
+#: Standard errors of the ends of a 95 % interval.
+NORMAL_95 = 1.96
+#: Largest relative error that a wish allows for: beyond it, none could be met.
+LARGEST_ERROR = 0.25
+
 #: Points this many standard errors of a difference above the least one may be the darkest.
 CANDIDATE_ERRORS = 3.0
 
@@ -186,6 +191,17 @@ class Illuminance:
 def floored(values: Doubles) -> Doubles:
     """Return the illuminance of a plane, (p,), at least `DARK_SHARE` of its mean at each point."""
     return np.asarray(np.maximum(np.abs(values), DARK_SHARE * np.abs(values).mean()))
+
+
+def relative_intervals(values: Doubles, errors: Doubles) -> Doubles:
+    """Return half of the 95 % intervals of points, (p,), relative to their light, as far as wishes
+    allow for them.
+
+    values, errors: (p,), the light and its standard errors.
+    """
+    relative = np.full(len(values), LARGEST_ERROR)
+    np.divide(errors, values, out=relative, where=values > 0)
+    return np.asarray(NORMAL_95 * np.minimum(relative, LARGEST_ERROR))
 
 
 def _bias_bound(values: Doubles, errors: Doubles) -> float:

@@ -9,6 +9,7 @@ import numpy as np
 from lightpaint.arrays import Doubles, Position
 from lightpaint.errors import SceneError
 from lightpaint.photometry.glare import GlareObserver
+from lightpaint.photometry.room_rays import RoomRays
 from lightpaint.scene.scene import Scene
 
 #: Place of an observer who is where the camera is, and their name in files without any.
@@ -35,11 +36,12 @@ class ObserverRequest:
 
 
 def place_observers(
-    requests: Sequence[ObserverRequest], scene: Scene, loaded: Any
+    requests: Sequence[ObserverRequest], scene: Scene, loaded: Any, room: RoomRays
 ) -> tuple[GlareObserver, ...]:
     """Return the observers in a loaded scene; the camera, if it sees as an eye does, for none.
 
-    Raises SceneError for one who looks straight up or down, and for a camera that sees otherwise.
+    room: rays in that scene. Raises SceneError for one who looks straight up or down or is inside
+    of a solid, and for a camera that sees otherwise.
     """
     node = scene.parsed.state.nodes[scene.parsed.sensor_nodes[scene.sensor]]
     is_eye = node.props.plugin_name() in EYES
@@ -48,7 +50,14 @@ def place_observers(
     observers = []
     for request in requests:
         if request.at is not None and request.towards is not None:
-            observers.append(_looking(request, request.at, request.towards, scene.up))
+            observer = _looking(request, request.at, request.towards, scene.up)
+            place, ahead = np.array([observer.place]), np.array([observer.ahead])
+            if room.are_inside_solids(place, ahead).all():
+                raise SceneError(
+                    f"{request.where} is inside of a solid: the eyes at "
+                    f"{[round(x, 3) for x in observer.place]} see only the back sides of surfaces"
+                )
+            observers.append(observer)
         elif is_eye:
             observers.append(_camera(request.name, scene, loaded))
         else:

@@ -122,7 +122,7 @@ def read_planes(path: str | Path, scene: Scene) -> PlanesFile:
     def place(loaded: Any) -> PlanesFile:
         room = RoomRays(scene, loaded)
         planes = tuple(place_plane(request, room) for request in content.planes)
-        observers = place_observers(content.observers, scene, loaded)
+        observers = place_observers(content.observers, scene, loaded, room)
         return PlanesFile(path, planes, content.power, content.cases, observers, content.error)
 
     return scene.while_loaded(place)

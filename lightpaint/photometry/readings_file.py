@@ -3,7 +3,7 @@
 import csv
 import io
 import json
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import asdict
 from pathlib import Path
 from typing import Any
@@ -15,7 +15,7 @@ from lightpaint.files import one_line, write_bytes, write_text
 from lightpaint.images.formats import png_bytes
 from lightpaint.photometry.false_colour import false_colours
 from lightpaint.photometry.glare import Glare, GlareReading
-from lightpaint.photometry.illuminance import Illuminance
+from lightpaint.photometry.illuminance import Illuminance, PlaneReading, relative_intervals
 from lightpaint.photometry.measuring_plane import MeasuringPlane, Wishes
 from lightpaint.photometry.wish_presets import PRESETS
 from lightpaint.storage.json_records import strict_json
@@ -23,6 +23,9 @@ from lightpaint.storage.json_records import strict_json
 FORMAT = "lightpaint-illuminance 1"
 #: Files of a measurement; each plane has a picture beside them.
 POINTS, PLANES, PICTURE_SUFFIX = "planes.csv", "planes.json", ".png"
+
+#: Relative miss that is none: errors in a solve are those with all lamps at full.
+CLOSE = 2e-3
 
 
 def readings_files(planes: Iterable[str]) -> list[str]:
@@ -116,28 +119,56 @@ def wishes_document(wishes: Wishes) -> dict[str, Any]:
 
 
 def missed_wishes(measured: Illuminance, weights: Doubles) -> list[str]:
-    """Return a sentence for each wish that the readings miss, noise apart."""
-    readings, missed = measured.readings(weights), []
+    """Return a sentence for each wish that is not met at the sure end of its 95 % interval."""
+    readings, missed = measured.readings(weights), list[str]()
     for plane in measured.planes:
-        name, wishes, reading = plane.name, plane.wishes, readings[plane.name]
-        if wishes.mean is not None and reading.mean < wishes.mean:
-            missed.append(f"{name}: a mean of {reading.mean:.4g} lx, wished for {wishes.mean:g}")
-        if wishes.uniformity is not None and reading.uniformity < wishes.uniformity:
-            missed.append(
-                f"{name}: a uniformity of {reading.uniformity:.2f}, wished for "
-                f"{wishes.uniformity:g}"
-            )
-        if wishes.most is not None and reading.most > wishes.most:
-            missed.append(
-                f"{name}: up to {reading.most:.4g} lx, wished for at most {wishes.most:g}"
-            )
+        wishes, reading = plane.wishes, readings[plane.name]
+        least = reading.mean - reading.mean_interval
+        if wishes.mean is not None and least < wishes.mean * (1 - CLOSE):
+            sure = _sure(reading.mean, least, wishes.mean, " lx")
+            missed.append(f"{plane.name}: a mean of {sure}, wished for {wishes.mean:g}")
+        missed += _missed_by_points(measured, plane, reading, weights)
         for wish in wishes.ratios:
-            ratio = reading.mean / other if (other := readings[wish.to].mean) > 0 else np.inf
-            if ratio < wish.at_least:
-                missed.append(
-                    f"{name}: {ratio:.2f} of the mean of {wish.to}, wished for {wish.at_least:g}"
-                )
+            other = readings[wish.to].mean
+            ratio, sure_ratio = (x / other if other > 0 else np.inf for x in (reading.mean, least))
+            if sure_ratio < wish.at_least * (1 - CLOSE):
+                of_mean = f" of the mean of {wish.to}"
+                sure = _sure(ratio, sure_ratio, wish.at_least, of_mean, is_share=True)
+                missed.append(f"{plane.name}: {sure}, wished for {wish.at_least:g}")
     return missed
+
+
+def _missed_by_points(
+    measured: Illuminance, plane: MeasuringPlane, reading: PlaneReading, weights: Doubles
+) -> Iterator[str]:
+    """Yield a sentence for a uniformity and a limit that are missed."""
+    part, wishes = measured.points_of(plane.name), plane.wishes
+    values, errors = measured.of(weights)[part], measured.standard_errors(weights)[part]
+    relative = relative_intervals(values, errors)
+    least = float((values * (1 - relative)).min()) / reading.mean if reading.mean > 0 else 0.0
+    if wishes.uniformity is not None and least < wishes.uniformity * (1 - CLOSE):
+        sure = _sure(reading.uniformity, least, wishes.uniformity, is_share=True)
+        yield f"{plane.name}: a uniformity of {sure}, wished for {wishes.uniformity:g}"
+    most = float((values * (1 + relative)).max())
+    if wishes.most is not None and most > wishes.most * (1 + CLOSE):
+        sure = _sure(reading.most, most, wishes.most, " lx", is_most=True)
+        yield f"{plane.name}: up to {sure}, wished for at most {wishes.most:g}"
+
+
+def _sure(
+    value: float,
+    end: float,
+    asked: float,
+    unit: str = "",
+    *,
+    is_share: bool = False,
+    is_most: bool = False,
+) -> str:
+    """Return a value in words, with the sure end of its interval where that alone misses."""
+    spoken, spoken_end = (f"{x:.2f}" if is_share else f"{x:.4g}" for x in (value, end))
+    is_enough = value <= asked if is_most else value >= asked
+    bound = "at most" if is_most else "at least"
+    return f"{spoken}{unit}" + (f" (for sure {bound} {spoken_end})" if is_enough else "")
 
 
 def measured_origin(folder: Path) -> str | None:

@@ -244,7 +244,7 @@ def _spoken_rendering(found: LightRendering) -> str:
             f"{found.held_mix_change:.1f} ΔE"
         )
         if found.wanted_rf < 100:
-            text += ". It counts first once the lamp has a fixed colour"
+            text += ". Give the lamp a colour (color) to put Rf before the picture"
     return text + _spoken_cost(found)
 
 

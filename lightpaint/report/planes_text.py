@@ -5,9 +5,8 @@ from collections.abc import Iterator
 from typing import Any
 
 from lightpaint.lighting.wishes.planes_answer import PlanesAnswer, WishOutcome
-from lightpaint.lighting.wishes.wished_light import NORMAL_95
 from lightpaint.photometry.glare import GlareReading
-from lightpaint.photometry.illuminance import PlaneReading
+from lightpaint.photometry.illuminance import NORMAL_95, PlaneReading
 from lightpaint.photometry.measuring_plane import MeasuringPlane, plane_title
 from lightpaint.photometry.readings_file import glare_document
 from lightpaint.photometry.wish_presets import PRESETS

@@ -22,6 +22,7 @@ from lightpaint.batch.gallery.summary import (
     planes_of_answer,
     summary_csv,
 )
+from lightpaint.batch.plan.plan import estimate
 from lightpaint.batch.plan.planner import plan
 from lightpaint.batch.run import run_batch
 from lightpaint.batch.run_options import RunOptions
@@ -94,6 +95,19 @@ def test_looks_give_the_light_and_another_planes_file_makes_them_stale(folder: P
     row, _ = summary_rows(folder)
     assert 450 <= float(row["floor Em lx"]) < 470
     assert row["wishes missed"] == ""
+
+
+def test_the_estimate_has_the_lux_once_for_all_looks(folder: Path) -> None:
+    def bases_s(planes: str = PLANES) -> float:
+        (folder / "project" / "floor.planes.toml").write_text(planes, encoding="utf-8")
+        return estimate(plan(folder / "looks.toml", folder / "out")).bases_s
+
+    planned = plan(folder / "looks.toml", folder / "out")
+    assert [*planned.measurements] == ["dark", "dark-warmer"]
+    without = estimate(replace(planned, measurements={})).bases_s
+    alone = estimate(replace(planned, measurements={"dark": planned.measurements["dark"]})).bases_s
+    assert without < alone == bases_s()
+    assert bases_s('error = "1%"\n' + PLANES) - without > 3 * (alone - without)
 
 
 def test_a_summary_names_planes_that_miss_their_wishes(folder: Path) -> None:

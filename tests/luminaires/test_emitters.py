@@ -9,6 +9,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from blender import blender_command, found_in_blender
 from radiance import illuminance
 from webs import Distribution, batwing, cosine, ies_text, street, trough, write_web
 
@@ -129,6 +130,26 @@ def test_illuminance_is_that_of_radiance(
     found = _lux(_emitter(web, turn=float(turn)), points, normals)
     assert found.mean() == pytest.approx(expected.mean(), rel=RADIANCE)
     assert found == pytest.approx(expected, rel=RADIANCE, abs=1e-4 * expected.max())
+
+
+@pytest.mark.nightly
+def test_cycles_has_c0_at_minus_y_and_turns_the_other_way(tmp_path: Path) -> None:
+    """Seen from above C0 to C270 follow each other to the left here, and to the right in Cycles."""
+    blender = blender_command()
+
+    def light(c: Doubles, gamma: Doubles) -> Doubles:
+        return np.interp(c % 360, [0, 90, 180, 270, 360], [800, 400, 200, 100, 800]) + 0 * gamma
+
+    planes = np.arange(0, 361, 15).tolist()
+    web = write_web(tmp_path / "lamp.ies", ies_text(light, planes, np.arange(0, 180.1, 5)))
+    found = found_in_blender(blender, Path(__file__).parent / "blender_ies.py", tmp_path, {})
+    shares = {side: value / found["-y"] for side, value in found.items()}
+    # Between the planes the candela change by 2 % from pixel to pixel.
+    assert shares == pytest.approx({"-y": 1, "-x": 0.5, "+y": 0.25, "+x": 0.125}, rel=0.02)
+    sides = np.array([[0.0, -1, 0], [-1, 0, 0], [0, 1, 0], [1, 0, 0]])
+    points, normals = 2 * sides - [0, 0, 2], np.tile([0.0, 0, 1], (4, 1))
+    lux = _lux(_emitter(web, turn=-90.0), points, normals)
+    assert lux / lux[0] == pytest.approx([1, 0.125, 0.25, 0.5], rel=SINGLE)
 
 
 def test_a_panel_of_a_cosine_web_is_an_area_light(tmp_path: Path) -> None:

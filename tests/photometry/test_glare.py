@@ -12,7 +12,7 @@ from radiance import unified_glare_rating
 from test_plans import REFLECTANCES, SIZE, write_room
 from webs import batwing, cosine, ies_text
 
-from lightpaint.arrays import Doubles
+from lightpaint.arrays import Doubles, Position
 from lightpaint.basis.render.render_origin import basis_lights
 from lightpaint.errors import SceneError
 from lightpaint.lighting.constraints.constraints_file import constraints_of
@@ -276,41 +276,84 @@ def test_an_observer_who_sees_nothing_definite_is_refused(
     assert words in str(error.value)
 
 
-#: Panels of the room of test_plans: middle, side, and luminance.
-PANELS = (
-    ((2.0, 2.5, 2.99), 0.6, 3000.0),
-    ((4.5, 2.5, 2.99), 0.6, 3000.0),
-    ((4.5, 1.0, 2.99), 0.6, 3000.0),
-)
+def test_an_observer_inside_of_a_solid_is_named(tmp_path: Path) -> None:
+    wall = (
+        '<shape type="cube" id="wall"><transform name="to_world"><scale value="0.5"/>'
+        f'<translate x="3" y="1"/></transform>{BLACK}</shape>'
+    )
+    scene, file = load_scene(write_scene(tmp_path, squares() + wall)), tmp_path / "lit.planes.toml"
+    file.write_text(f"{PLANES}[observer.me]\nat = [3, 1, 0]\ntowards = [0, 1, 0]\n", "utf-8")
+    with pytest.raises(SceneError, match=r"observer\.me is inside of a solid: the eyes at \[3"):
+        read_planes(file, scene)
+    file.write_text(f"{PLANES}[observer.me]\nat = [4, 1, 0]\ntowards = [0, 1, 0]\n", "utf-8")
+    assert len(read_planes(file, scene).observers) == 1
+
+
+#: Rooms by size and reflectances, with panels (middle, side, luminance), the place of the eyes, and
+#: a luminance between those of walls and panels.
+ROOMS = [
+    (
+        SIZE,
+        REFLECTANCES,
+        (
+            ((2.0, 2.5, 2.99), 0.6, 3000.0),
+            ((4.5, 2.5, 2.99), 0.6, 3000.0),
+            ((4.5, 1.0, 2.99), 0.6, 3000.0),
+        ),
+        (0.5, 2.0, 1.2),
+        1500,
+    ),
+    pytest.param(
+        (9.0, 4.0, 3.4),
+        (0.4, 0.3, 0.6),
+        (
+            ((3.0, 1.0, 3.39), 0.4, 8000.0),
+            ((5.0, 3.0, 3.39), 0.4, 8000.0),
+            ((7.0, 1.0, 3.39), 0.5, 6000.0),
+            ((8.0, 3.0, 3.39), 0.5, 6000.0),
+        ),
+        (0.6, 2.4, 1.7),
+        3000,
+        marks=pytest.mark.nightly,
+    ),
+]
 #: Of the pixels of a picture and of Radiance's interpolation between its ambient samples, in UGR.
 PIXELS = 0.15
 
 
-def test_evalglare_finds_the_same_rating_in_a_room(tmp_path: Path) -> None:
-    path = write_room(tmp_path, batwing)
+@pytest.mark.parametrize(("size", "reflectances", "panels", "eyes", "threshold"), ROOMS)
+def test_evalglare_finds_the_same_rating_in_a_room(
+    tmp_path: Path,
+    size: Position,
+    reflectances: tuple[float, float, float],
+    panels: tuple[tuple[Position, float, float], ...],
+    eyes: Position,
+    threshold: float,
+) -> None:
+    path = write_room(tmp_path, batwing, size=size, reflectances=reflectances)
     text = path.read_text(encoding="utf-8")
     text = text[: text.index("<emitter")] + "".join(
         f'<shape type="rectangle" id="panel{k}"><transform name="to_world"><rotate x="1" '
         f'angle="180"/><scale x="{side / 2}" y="{side / 2}"/><translate x="{x}" y="{y}" z="{z}"/>'
         f'</transform>{BLACK}<emitter type="area"><rgb name="radiance" value="{luminance}"/>'
         "</emitter></shape>"
-        for k, ((x, y, z), side, luminance) in enumerate(PANELS)
+        for k, ((x, y, z), side, luminance) in enumerate(panels)
     )
     lit = tmp_path / "lit.xml"
     lit.write_text(text + "</scene>", encoding="utf-8")
     scene = load_scene(lit)
-    me = GlareObserver("me", (0.5, 2.0, 1.2), (1.0, 0.0, 0.0), (0.0, 0.0, 1.0))
+    me = GlareObserver("me", eyes, (1.0, 0.0, 0.0), (0.0, 0.0, 1.0))
     glare = measure_glare(scene, [me], use_cache=False)
     reading = glare.readings(glare.background.lights.current_weights)["me"]
     expected = unified_glare_rating(
         tmp_path / "radiance",
-        SIZE,
-        REFLECTANCES,
-        PANELS,
+        size,
+        reflectances,
+        panels,
         me.place,
         me.ahead,
         pixels=240,
-        threshold=1500,
+        threshold=threshold,
     )
     assert reading.rating is not None
     assert abs(reading.rating - expected) < PIXELS + 2 * reading.interval

@@ -118,6 +118,30 @@ def test_wishes_that_are_missed_have_a_sentence_each() -> None:
     ]
 
 
+def test_a_wish_is_missed_where_it_is_not_met_for_sure() -> None:
+    """As by a solve: 505 lx ± 2 % are no 500 lx, and 515 are."""
+    desk, _ = wished("desk", Wishes(mean=500, uniformity=0.9, most=530), 0)
+
+    def found(lux: float, error: float) -> Illuminance:
+        matrix, noise = np.zeros((2, 2, 3)), np.zeros((2, 2, 3))
+        matrix[:, 0, 1], noise[:, 0, 1] = lux, (error, -error)
+        return Illuminance((desk,), LIGHTS, matrix, noise, 1.0)
+
+    assert missed_wishes(found(515, 0.1), ONE) == []
+    narrow = found(500, 5)
+    reading = narrow.reading("desk", ONE)
+    least = reading.mean - reading.mean_interval
+    assert missed_wishes(narrow, ONE) == [
+        f"desk: a mean of 500 lx (for sure at least {least:.4g}), wished for 500"
+    ]
+    wide = missed_wishes(found(520, 40), ONE)
+    assert [text.partition(" (")[0] for text in wide] == [
+        "desk: a mean of 520 lx",
+        "desk: a uniformity of 1.00",
+        "desk: up to 520 lx",
+    ]
+
+
 @pytest.mark.parametrize("weights", [np.ones(3), np.ones((1, 3)), 1.0])
 def test_weights_of_another_shape_are_refused(weights: Any) -> None:
     with pytest.raises(SceneError, match=r"expected \(2, 3\), a row per light"):

@@ -160,6 +160,7 @@ class Cost:
 class Plan:
     """The plan of a manifest. costs: of each basis, by its key. chosen_names: of the looks to do.
 
+    measurements: the cost of the lux that a look needs, by its name; equal ones are measured once.
     cache: scenes that the checks have loaded, so that they are not loaded twice. remarks: on the
     batch as a whole. groups: looks that share places of lights.
     """
@@ -172,6 +173,7 @@ class Plan:
     cache: WorkerCache = field(default_factory=WorkerCache, repr=False, compare=False)
     remarks: tuple[str, ...] = ()
     groups: tuple[PlaceGroup, ...] = ()
+    measurements: Mapping[str, Cost] = field(default_factory=dict)
 
     @property
     def chosen_looks(self) -> tuple[PlannedLook, ...]:
@@ -248,7 +250,9 @@ SAVED_BASIS_COST = Cost("", 12, (360, 640), 0, 0)
 
 @dataclass(frozen=True)
 class CostEstimate:
-    """Seconds for bases and for looks, including final renders; memory: bytes at the peak."""
+    """Seconds for bases and lux, and for looks, including final renders; memory: bytes at the
+    peak.
+    """
 
     bases_s: float
     looks_s: float
@@ -256,7 +260,7 @@ class CostEstimate:
 
 
 def estimate(plan: Plan) -> CostEstimate:
-    """Estimate the rest of `plan`, if no basis is cached."""
+    """Estimate the rest of `plan`, if no basis and no measurement is cached."""
     remaining_looks = [look for look in plan.chosen_looks if not look.failure and not look.is_done]
     keys = dict.fromkeys(
         key
@@ -267,6 +271,10 @@ def estimate(plan: Plan) -> CostEstimate:
         if key in plan.costs
     )
     costs = [plan.costs[key] for key in keys]
+    measured = (
+        plan.measurements.get(x.entry.name) for x in remaining_looks if not x.steps[0].is_done
+    )
+    costs += dict.fromkeys(cost for cost in measured if cost is not None)
     return CostEstimate(
         sum(render_seconds(cost.samples, cost.lights) for cost in costs),
         sum(look_seconds(look, plan) for look in remaining_looks),

@@ -40,6 +40,7 @@ from lightpaint.lighting.constraints.constraints import Constraints
 from lightpaint.lighting.constraints.start_lighting import start_weights
 from lightpaint.lighting.linear_problem import reason_against_sums
 from lightpaint.lighting.unknowns.reduction import reduce_to
+from lightpaint.photometry.measure import DEFAULT_ERROR, FIRST_SPP, MOST_SPP
 from lightpaint.photometry.planes_file import PlanesFile, read_planes
 from lightpaint.pipeline.job.job import Job
 from lightpaint.pipeline.job.settings import Settings
@@ -50,6 +51,9 @@ from lightpaint.pipeline.wished_planes import check_planes, constraints_for_plan
 from lightpaint.relit.relight import scene_of
 from lightpaint.scene.quality_presets import on_film
 from lightpaint.scene.scene import Scene
+
+#: Samples per point that illuminance of `DEFAULT_ERROR` takes in a room.
+LUX_SPP = 4096
 
 
 def plan(
@@ -82,7 +86,8 @@ def plan(
     planner.cache.keep_only(())
     cache, remarks = planner.cache, planner.journal.remarks
     groups = tuple(planner.groups.values())
-    return Plan(manifest_.path, folder, looks, planner.costs, names, cache, remarks, groups)
+    sources = manifest_.path, folder, looks, planner.costs, names, cache, remarks, groups
+    return Plan(*sources, planner.measurements)
 
 
 @dataclass(frozen=True)
@@ -119,6 +124,7 @@ class _Planner:
         self._looks_with_moves: list[str] = []
         self.groups: dict[str, PlaceGroup] = {}
         self.costs: dict[str, Cost] = {}
+        self.measurements: dict[str, Cost] = {}
         self._planes: dict[tuple[str, str], PlanesFile] = {}
 
     def plan_looks(self, entries: Sequence[LookEntry]) -> tuple[PlannedLook, ...]:
@@ -238,7 +244,7 @@ class _Planner:
             )
             job = self._job(entry, scenes, basis, settings, constraints)
         if scenes:
-            self._check_planes(scenes[0].content, constraints, settings)
+            self._check_planes(entry.name, scenes[0].content, constraints, settings)
         if entry.is_by_sums:
             _check_by_sums(job)
         elif job.all_rigging and entry.basis is None:
@@ -255,8 +261,12 @@ class _Planner:
         entry = replace(entry, settings=settings, constraints=constraints)
         return entry, source_files, (*job.remarks, *_remarks_on_suns(job))
 
-    def _check_planes(self, scene: Scene, constraints: Constraints, settings: Settings) -> None:
-        """Check the planes that settings name, if any; each file is read once for a scene."""
+    def _check_planes(
+        self, name: str, scene: Scene, constraints: Constraints, settings: Settings
+    ) -> None:
+        """Check the planes that settings of a look name, if any, and note what their lux cost; each
+        file is read once for a scene.
+        """
 
         def read(path: str | Path, scene: Scene) -> PlanesFile:
             key = str(path), scene.identity
@@ -267,6 +277,7 @@ class _Planner:
         if settings.planes is not None:
             every = constraints_for_planes(scene, constraints, settings)
             check_planes(scene, settings.planes, every, read=read)
+            self.measurements[name] = _cost_of_lux(scene, read(settings.planes, scene), settings)
 
     def _job(
         self,
@@ -292,7 +303,7 @@ class _Planner:
         if entry.lighting:
             _check_given_lighting(entry, scene, basis)
         if scene is not None:
-            self._check_planes(scene, entry.constraints, entry.settings)
+            self._check_planes(entry.name, scene, entry.constraints, entry.settings)
         elif entry.settings.planes is not None:
             raise BatchError("settings.planes needs the scene: give scene = ...")
         folders = [str(self._folders[name] / "lighting.json") for name in entry.combined_looks]
@@ -327,6 +338,15 @@ class _Planner:
                 film.spp if spp is None else spp,
                 memory_needed(film),
             )
+
+
+def _cost_of_lux(scene: Scene, planes: PlanesFile, settings: Settings) -> Cost:
+    """Return the cost of the illuminance of each light at all points."""
+    points = sum(len(plane) for plane in planes.planes)
+    error = settings.error or planes.error
+    spp = min(max(LUX_SPP * (DEFAULT_ERROR / error) ** 2, FIRST_SPP), MOST_SPP)
+    text = f"{planes.path.name} in {scene.path.name}"
+    return Cost(text, len(scene.lights), (1, points), int(spp), 0)
 
 
 def _collect_errors(entry: LookEntry, cache: WorkerCache, mistakes: Mistakes) -> None:

@@ -184,9 +184,9 @@ def _show_plan(plan_: Plan) -> CommandOutcome:
         document = {"look": look.entry.name, "is_done": look.is_done, "want": look.entry.want}
         looks.append({**document, "why": look.failure} if look.failure else document)
     terminal.print_table(table)
-    cost = estimate(plan_)
+    cost, lux = estimate(plan_), " and lux" * bool(plan_.measurements)
     terminal.write(
-        f"bases {spoken_time(cost.bases_s)} unless they are in the cache, looks "
+        f"bases{lux} {spoken_time(cost.bases_s)} unless they are in the cache, looks "
         f"{spoken_time(cost.looks_s)}, by one process on two cores; "
         f"{cost.memory / 1e9:.1f} GB of memory"
     )

@@ -26,7 +26,7 @@ MAX_STEPS, CLOSE, STEP_SHARE = 40, 1e-14, 0.995
 OUT_OF_REACH = 1e30
 
 #: Unknowns from which a matrix is large.
-LARGE = 128
+LARGE = 64
 
 
 @dataclass(frozen=True)
@@ -43,11 +43,12 @@ class NearOptimum:
     multipliers: Doubles
 
 
-def interior_point(q: Quadratic, start: Doubles) -> NearOptimum | None:
+def interior_point(q: Quadratic, start: Doubles, *, close: float = CLOSE) -> NearOptimum | None:
     """Return a point near the optimum; None if steps fail, nothing satisfies all limits, or an
     unknown or a sum is fixed.
 
-    Unknowns that change nothing are drawn to `start`, (n,).
+    Unknowns that change nothing are drawn to `start`, (n,). close: the complementarity that ends
+    steps, relative to that of the start.
     """
     limits = _Limits(q)
     if not len(limits.h) or (q.lower >= q.upper).any() or (q.cap_lower >= q.cap_upper).any():
@@ -62,7 +63,7 @@ def interior_point(q: Quadratic, start: Doubles) -> NearOptimum | None:
     for _ in range(MAX_STEPS):
         check()
         gap = float(slack @ dual)
-        if not gap > CLOSE * first:
+        if not gap > close * first:
             break
         if dual.max(initial=0) > OUT_OF_REACH * q.size:
             return None

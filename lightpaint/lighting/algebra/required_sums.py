@@ -6,18 +6,19 @@ Unlike caps, the sums may share unknowns and have coefficients of either sign, a
 thousands, few of which hold. The method of multipliers (Hestenes 1969, Powell 1969; for
 inequalities Rockafellar, SIAM Journal on Control 12, 1974) solves problems without requirements: a
 penalty draws x to the sums that it misses, and their multipliers, updated each time, replace it.
-At its end the multipliers prove the optimum as those of bounds do. It serves where Newton's method
-on the multipliers (dual_newton.py), which is far quicker, does not end.
+At its end the multipliers prove the optimum as those of bounds do. It serves where an active set
+(dual_active_set.py), which is far quicker, does not end, and where nothing meets all sums.
 """
 
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
+from functools import cached_property
 from typing import Any
 
 import numpy as np
 
 from lightpaint.arrays import Bools, Doubles, Indices
-from lightpaint.lighting.algebra.dual_newton import DualNewton, NearAnswer
+from lightpaint.lighting.algebra.dual_active_set import DualActiveSet, NearAnswer
 from lightpaint.lighting.algebra.method import Method
 from lightpaint.lighting.algebra.optimum import TOLERANCE, Optimum, QuadraticFamily
 from lightpaint.lighting.algebra.quadratic import Cap
@@ -34,9 +35,6 @@ CLOSE, MAX_UPDATES, MAX_CHANGES = 1e-9, 60, 40
 #: Diagonal of M, relative to the largest, below which an unknown is scaled as if it had this one:
 #: a light that no painted pixel sees still lights what is required.
 LEAST_DIAGONAL = 1e-6
-
-#: Unknowns from which an interior point takes longer than some steps of Newton's method.
-MANY_UNKNOWNS = 256
 
 #: Bisections that end a step where the penalty is least.
 BISECTIONS = 40
@@ -87,16 +85,10 @@ class RequiredSums:
             "caps": tuple(caps),
             "method": method,
         }
-        power = M.diagonal()
-        largest = float(power.max(initial=0)) or 1.0
-        spread = np.einsum(
-            "mk,k->m", np.square(rows), 1 / np.maximum(power, LEAST_DIAGONAL * largest)
-        )
-        self._sizes = np.where(spread > 0, spread, 1.0)
         self._nothing_of_caps = np.zeros(len(self._limits["caps"]))
-        self._newton: DualNewton | None = None
+        self._active_set: DualActiveSet | None = None
         if method == "polished":
-            self._newton = DualNewton(
+            self._active_set = DualActiveSet(
                 M,
                 rows,
                 least,
@@ -117,23 +109,29 @@ class RequiredSums:
         multipliers: Doubles | None = None,
         cap_multipliers: Doubles | None = None,
         close: float = CLOSE,
+        max_updates: int = MAX_UPDATES,
         **options: Any,
     ) -> RequiredOptimum:
         """Minimise for b, (k,), from start, (k,), and the multipliers, (m,), of a similar problem.
 
-        cap_multipliers: (c,), of its caps. close: the largest miss of a sum to end at. options: of
+        cap_multipliers: (c,), of its caps. close: the largest miss of a sum to end at. max_updates:
+        of the method of multipliers; with 0, the result may be no more than the start. options: of
         `QuadraticFamily.minimise`.
         """
         duals = np.zeros(len(self._least)) if multipliers is None else multipliers
-        if self._newton is not None:
+        if self._active_set is not None:
             of_caps = self._nothing_of_caps if cap_multipliers is None else cap_multipliers
             near = NearAnswer(start, duals, of_caps)
-            found = self._newton_from(b, near, options)
-            if isinstance(found, RequiredOptimum):
-                return found
-            start, duals = found.x, found.multipliers
+            tolerance = options.get("tolerance", TOLERANCE)
+            found = self._active_set.minimise(b, near, tolerance=tolerance)
+            if found is not None:
+                return RequiredOptimum(*found, miss=0.0)
         x, last, check = start, np.inf, cancellation_check()
-        for _ in range(MAX_UPDATES):
+        if not max_updates:
+            nothing = np.zeros(start.size)
+            unsolved = Optimum(start, nothing, self._nothing_of_caps, np.inf, 0, 0, TOLERANCE)
+            return RequiredOptimum(unsolved, duals, np.inf)
+        for _ in range(max_updates):
             check()
             optimum = self._with_multipliers(b, x, duals, options)
             x, weights = optimum.x, self._weights
@@ -154,21 +152,14 @@ class RequiredSums:
         short = float(((self._least - self._rows @ x) / sizes).max(initial=0))
         return RequiredOptimum(optimum, duals, max(short, 0.0))
 
-    def _newton_from(
-        self, b: Doubles, near: NearAnswer, options: dict[str, Any]
-    ) -> RequiredOptimum | NearAnswer:
-        """Return the optimum by Newton's method on the multipliers; where that does not find it,
-        an answer near it.
-        """
-        assert self._newton is not None
-        tolerance = options.get("tolerance", TOLERANCE)
-        # From nowhere, interior points lead there sooner, if unknowns are few.
-        if near.multipliers.any() or len(b) > MANY_UNKNOWNS:
-            found = self._newton.minimise(b, near, tolerance=tolerance)
-            if found is not None:
-                return RequiredOptimum(*found, miss=0.0)
-        inside = self._newton.from_inside(b, near, tolerance=tolerance)
-        return inside if isinstance(inside, NearAnswer) else RequiredOptimum(*inside, miss=0.0)
+    @cached_property
+    def _sizes(self) -> Doubles:
+        """(m,), what a sum changes by where unknowns of length 1 push it."""
+        power = self._M.diagonal()
+        largest = float(power.max(initial=0)) or 1.0
+        least = np.maximum(power, LEAST_DIAGONAL * largest)
+        spread = np.einsum("mk,k->m", np.square(self._rows), 1 / least)
+        return np.where(spread > 0, spread, 1.0)
 
     @property
     def _weights(self) -> Doubles:

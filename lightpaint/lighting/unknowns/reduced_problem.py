@@ -21,7 +21,7 @@ from lightpaint.lighting.algebra.optimum import (
     minimise_each,
 )
 from lightpaint.lighting.algebra.quadratic import Cap, clip_to_sums
-from lightpaint.lighting.algebra.required_sums import CLOSE, RequiredSums
+from lightpaint.lighting.algebra.required_sums import CLOSE, MAX_UPDATES, RequiredSums
 from lightpaint.lighting.normal_equations import NormalEquations
 from lightpaint.lighting.unknowns.knobs import Knob
 from lightpaint.lighting.unknowns.reduction import Reduction
@@ -233,6 +233,7 @@ def solve_reduced(
     x: Doubles | None = None,
     required: Doubles | None = None,
     close: float = CLOSE,
+    max_updates: int = MAX_UPDATES,
     method: Method = "polished",
     tolerance: float = 1e-12,
     max_sweeps: int = 20_000,
@@ -242,11 +243,13 @@ def solve_reduced(
     start: (n, 3), weights to begin with; lights that reach nothing stay as near to them as the
     constraints allow. x: the unknowns to begin with, where they are known; else those nearest to
     `start`. required: the multipliers of requirements, (m,), in a similar problem. close: the
-    largest miss of a requirement, relative to its size. method, tolerance, max_sweeps: see
-    `minimise`.
+    largest miss of a requirement, relative to its size. max_updates: see `RequiredSums.minimise`.
+    method, tolerance, max_sweeps: see `minimise`.
     """
     options: dict[str, Any] = {"tolerance": tolerance, "max_sweeps": max_sweeps}
-    solver = ReducedSolver(reduction, required=required, close=close, method=method)
+    solver = ReducedSolver(
+        reduction, required=required, close=close, max_updates=max_updates, method=method
+    )
     return solver.solve(equations, start, x=x, **options)
 
 
@@ -263,10 +266,11 @@ class ReducedSolver:
         pull: NormalEquations | None = None,
         required: Doubles | None = None,
         close: float = CLOSE,
+        max_updates: int = MAX_UPDATES,
         method: Method = "polished",
     ) -> None:
         self._reduction, self._pull, self._method = reduction, pull, method
-        self._required, self._close = required, close
+        self._required, self._close, self._max_updates = required, close, max_updates
         self._required_caps: Doubles | None = None
         self._last: NormalEquations | None = None
         self._pulled: NormalEquations | None = None
@@ -407,6 +411,7 @@ class ReducedSolver:
             multipliers=self._required,
             cap_multipliers=self._required_caps,
             close=self._close,
+            max_updates=self._max_updates,
             **options,
         )
         optimum = found.optimum

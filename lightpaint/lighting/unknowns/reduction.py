@@ -263,10 +263,13 @@ class Reduction:
         assert requirements is not None
         unknown, light, rgb = self.columns
         rows = np.zeros((len(requirements), len(self.unknowns)))
-        entries = np.einsum("mec,ec->me", requirements.rows[:, light], rgb)
-        if len(unknown):
-            columns, first = np.unique(unknown, return_index=True)
-            rows[:, columns] = np.add.reduceat(entries, first, axis=1)
+        for c in range(3):
+            entries = np.flatnonzero(rgb[:, c])
+            if entries.size:
+                parts = requirements.rows[:, light[entries], c] * rgb[entries, c]
+                columns, first = np.unique(unknown[entries], return_index=True)
+                is_plain = columns.size == entries.size
+                rows[:, columns] += parts if is_plain else np.add.reduceat(parts, first, axis=1)
         least = requirements.least - np.einsum("mnc,nc->m", requirements.rows, self.fixed_weights)
         if requirements.watts.any():
             rows += np.outer(requirements.watts, watts_of_unknowns(self.knobs, self.lamps))

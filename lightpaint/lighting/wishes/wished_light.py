@@ -22,17 +22,16 @@ from lightpaint.display_text import with_similar_name
 from lightpaint.errors import ConstraintError
 from lightpaint.lighting.constraints.requirements import Requirements
 from lightpaint.lighting.unknowns.reduction import Reduction
-from lightpaint.photometry.illuminance import Illuminance
+from lightpaint.photometry.illuminance import (
+    LARGEST_ERROR,
+    NORMAL_95,
+    Illuminance,
+    relative_intervals,
+)
 from lightpaint.photometry.measuring_plane import LightCase, MeasuringPlane, PowerBudget
 
 #: What a wish is about.
 Kind = Literal["mean", "uniformity", "max", "ratio", "power"]
-
-#: Standard errors of the ends of a 95 % interval.
-NORMAL_95 = 1.96
-
-#: Largest relative error that a margin allows for: beyond it, no wish could be met.
-LARGEST_ERROR = 0.25
 
 
 @dataclass(frozen=True)
@@ -166,7 +165,7 @@ def _add_wishes(
         )
     mean = matrix.mean(axis=0, keepdims=True)
     values, errors = illuminance.of(weights)[part], illuminance.standard_errors(weights)[part]
-    point_error = NORMAL_95 * _relative(errors, values)[:, None, None]
+    point_error = relative_intervals(values, errors)[:, None, None]
     mean_error = reading.mean_interval / reading.mean if reading.mean > 0 else 0.0
     sure_mean = mean * (1 - min(mean_error, NORMAL_95 * LARGEST_ERROR))
     size = wishes.mean or max(reading.mean, 1e-9)
@@ -275,13 +274,6 @@ def check_powers(reduction: Reduction, names: Sequence[str], purpose: str) -> No
             f"{purpose} needs the power of each lamp, and that of {unknown[0]!r}{more} is unknown: "
             "add watts to its table in the lights file, or lock = true if it stays as it is"
         )
-
-
-def _relative(errors: Doubles, values: Doubles) -> Doubles:
-    """Return the relative errors of points, (p,), as far as a margin allows for them."""
-    relative = np.full(len(values), LARGEST_ERROR)
-    np.divide(errors, values, out=relative, where=values > 0)
-    return np.asarray(np.minimum(relative, LARGEST_ERROR))
 
 
 def _other_plane(illuminance: Illuminance, plane: MeasuringPlane, to: str) -> slice:

@@ -1,11 +1,11 @@
-"""Required sums and caps by Newton's method on their multipliers: against quadprog and Clarabel."""
+"""Required sums and caps by a dual active set: against quadprog and Clarabel."""
 
 import numpy as np
 import pytest
 from nightly import seeds
 from qp import least, least_by_interior_points
 
-from lightpaint.lighting.algebra.dual_newton import DualNewton, NearAnswer
+from lightpaint.lighting.algebra.dual_active_set import DualActiveSet, NearAnswer
 from lightpaint.lighting.algebra.quadratic import Cap
 from lightpaint.lighting.algebra.required_sums import RequiredSums
 
@@ -102,21 +102,67 @@ def test_mixes_that_are_equal_do_not_matter(seed):
     assert mixes @ value == pytest.approx(mixes @ expected, abs=1e-5)
 
 
-def test_from_its_own_multipliers_it_takes_two_steps_at_most():
-    rng = np.random.default_rng(3)
+@pytest.mark.parametrize("has_multipliers", [True, False])
+@pytest.mark.parametrize("seed", list(seeds(3, 20)))
+def test_from_its_own_answer_it_takes_a_few_steps(seed, has_multipliers):
+    """Also where multipliers are not known: the sums that x just meets are those that hold."""
+    rng = np.random.default_rng(200 + seed)
     M, b, rows, required, bright = _lamps(rng, 6, 60)
     caps = _luminance_caps(rng, bright)
     limits = {"lower": np.zeros(18), "upper": np.full(18, 2.5), "caps": caps}
-    newton = DualNewton(M, rows, required, least_diagonal=1e-6, **limits)
     begin = NearAnswer(np.zeros(18), np.zeros(61), np.zeros(6))
-    found = newton.from_inside(b, begin, tolerance=1e-12)
-    assert not isinstance(found, NearAnswer)
+
+    def active_set():
+        return DualActiveSet(M, rows, required, least_diagonal=1e-6, **limits)
+
+    found = active_set().minimise(b, begin, tolerance=1e-12)
+    assert found is not None
     optimum, multipliers = found
-    near = NearAnswer(optimum.x, multipliers, optimum.cap_multipliers)
-    again = newton.minimise(b, near, tolerance=1e-12)
+    near = NearAnswer(optimum.x, np.zeros(61), np.zeros(6))
+    if has_multipliers:
+        near = NearAnswer(optimum.x, multipliers, optimum.cap_multipliers)
+    again = active_set().minimise(b, near, tolerance=1e-12)
     assert again is not None
     assert again[0].steps <= 2
     assert again[0].x == pytest.approx(optimum.x, abs=SAME)
+
+
+def test_it_does_not_claim_what_nothing_reaches():
+    limits = {"lower": np.zeros(2), "upper": np.ones(2), "caps": (), "least_diagonal": 1e-6}
+    sums = DualActiveSet(np.eye(2), np.ones((1, 2)), np.array([5.0]), **limits)
+    near = NearAnswer(np.zeros(2), np.zeros(1), np.zeros(0))
+    assert sums.minimise(np.zeros(2), near, tolerance=1e-12) is None
+
+
+@pytest.mark.parametrize("seed", list(seeds(6, 40)))
+def test_wrong_limits_to_begin_with_do_not_matter(seed):
+    """Multipliers of sums that depend on each other, and unknowns at wrong bounds."""
+    rng = np.random.default_rng(300 + seed)
+    M, b, rows, required, _ = _lamps(rng, 5, 40)
+    rows, required = np.vstack([rows, rows[:9]]), np.append(required, required[:9])
+    limits = {"lower": np.zeros(15), "upper": np.full(15, 2.5)}
+    expected = RequiredSums(M, rows, required, **limits).minimise(b, np.zeros(15))
+    assert expected.converged
+    wrong = NearAnswer(
+        rng.choice([0.0, 1.0, 2.5], 15), rng.random(50) * (rng.random(50) < 0.5), np.zeros(0)
+    )
+    found = DualActiveSet(M, rows, required, caps=(), least_diagonal=1e-6, **limits).minimise(
+        b, wrong, tolerance=1e-12
+    )
+    assert found is not None
+    assert found[0].x == pytest.approx(expected.optimum.x, abs=SAME)
+    assert (found[1] >= 0).all()
+
+
+def test_a_corner_where_more_limits_meet_than_there_are_unknowns():
+    """Two sums and two bounds hold at one point of a plane: any two of them say where it is."""
+    rows, least = np.array([[1.0, 1.0], [1.0, 2.0]]), np.array([2.0, 3.0])
+    limits = {"lower": np.zeros(2), "upper": np.ones(2), "caps": (), "least_diagonal": 1e-6}
+    sums = DualActiveSet(np.eye(2), rows, least, **limits)
+    near = NearAnswer(np.ones(2), np.array([0.5, 0.5]), np.zeros(0))
+    found = sums.minimise(np.array([-3.0, 0.2]), near, tolerance=1e-12)
+    assert found is not None
+    assert found[0].x == pytest.approx([1, 1], abs=SAME)
 
 
 def test_channels_that_nothing_joins_are_solved_apart():
