@@ -32,8 +32,8 @@ def extend_saturated(target: Target, current_look: Floats) -> Floats:
     if not dark > 0:
         return target.image
     image, painted = target.image.copy(), target.importance > 0
-    for area in [wish.area for wish in target.wishes] or [painted]:
-        own = painted & (area > COVERED)
+    layers = [painted & (wish.area > COVERED) for wish in target.wishes] or [painted]
+    for own in layers:
         usual = _median_ratio(target.image, current_look, own & ~target.at_least.any(-1), dark)
         lifted = np.maximum(image, (current_look * usual).astype(np.float32))
         image = np.where(own[..., None] & target.at_least, lifted, image)
