@@ -17,6 +17,8 @@ import numpy.typing as npt
 from lightpaint.arrays import Bools, Doubles, Floats
 from lightpaint.colour import LUMINANCE
 from lightpaint.images import block_sums, enlarged
+from lightpaint.images.pixel_blocks import block_sums, enlarged
+from lightpaint.target.saturated_paint import extend_saturated
 from lightpaint.target.stroke_model import departure_from_one_stroke
 from lightpaint.target.target import Target
 from lightpaint.target.wish import Wish
@@ -63,7 +65,8 @@ def find_wishes(target: Target, current_look: Floats) -> tuple[Wish, ...]:
     layers = target.wishes or (
         Wish(target.name, np.minimum(target.importance, 1), has_strokes=True),
     )
-    return split_wishes(layers, target.image, target.importance, current_look)
+    image = extend_saturated(target, current_look)
+    return split_wishes(layers, image, target.importance, current_look)
 
 
 def split_wishes(

@@ -8,7 +8,7 @@ import pytest
 
 import lightpaint as lp
 from lightpaint.lighting.loss import contrast
-from lightpaint.lighting.loss.contrast import contrast_rows, contrast_term
+from lightpaint.lighting.loss.contrast import ContrastRows
 from lightpaint.lighting.loss.expected_lights import ExpectedLights, Wash, adjusted_share
 from lightpaint.target.wish import Wish
 
@@ -55,21 +55,33 @@ def test_the_term_vanishes_for_what_was_painted(make_basis: Any) -> None:
     basis = room(make_basis)
     meant = np.array([[0.1, 0.12, 0.2], [0.4, 0.3, 0.2]])
     target = painting(basis, basis.mix(meant))
-    rows = contrast_rows(Wash.of(basis, target), target.transform)
-    assert rows.shape == (1, 3, 2)  # the rest is not a subject
-    np.testing.assert_allclose(np.einsum("kcn,nc->kc", rows, meant), 0, atol=1e-6)
-    term = contrast_term(rows, 7.0)
-    assert term is not None
-    assert term.objective(2 * meant).max() < 1e-9  # contrast is of ratios
+    rows = ContrastRows.of(Wash.of(basis, target), target.transform)
+    assert rows.contrast.shape == (1, 3, 2)  # the rest is not a subject
+    np.testing.assert_allclose(np.einsum("kcn,nc->kc", rows.contrast, meant), 0, atol=1e-6)
+    np.testing.assert_allclose(np.einsum("kcn,nc->kc", rows.rest, meant), rows.rest_goal, rtol=1e-5)
+    brush, numbers = (replace(rows, exact=np.array([x])).term(7.0) for x in (0.0, 1.0))
+    assert brush is not None
+    assert numbers is not None
+    assert brush.objective(2 * meant).max() < 1e-9  # contrast is of ratios
+    assert numbers.objective(meant).max() < 1e-9
+    # Twice the light of an exact rest misses it by itself.
+    np.testing.assert_allclose(
+        numbers.objective(2 * meant), contrast.EXACT_REST * 7.0 * rows.rest_goal[0] ** 2, rtol=1e-5
+    )
     other = meant * [[1], [2]]
-    value = contrast.CONTRAST * 7.0 * np.einsum("kcn,nc->kc", rows, other)[0] ** 2
-    np.testing.assert_allclose(term.objective(other), value, rtol=1e-9)
+    value = 7.0 * np.einsum("kcn,nc->kc", rows.contrast, other)[0] ** 2
+    np.testing.assert_allclose(brush.objective(other), contrast.CONTRAST * value, rtol=1e-9)
+    half = replace(rows, exact=np.array([0.5])).term(7.0)
+    assert half is not None
+    np.testing.assert_allclose(
+        half.objective(other), (brush.objective(other) + numbers.objective(other)) / 2, rtol=1e-9
+    )
 
 
 def test_rows_are_the_formula(make_basis: Any) -> None:
     basis = room(make_basis)
     image = np.where(subject()[..., None], 0.4, 0.1) * np.ones(3)
-    rows = contrast_rows(Wash.of(basis, painting(basis, image)), None)
+    rows = ContrastRows.of(Wash.of(basis, painting(basis, image)), None).contrast
     # In linear light A is the painted light: 0.4 (1 / 0.4 − 1 / 0.1), 0.4 (1 / 0.4 − 0.3 / 0.1).
     np.testing.assert_allclose(rows[0], np.tile([-3.0, -0.2], (3, 1)), rtol=1e-5)
 
@@ -85,8 +97,75 @@ def test_a_small_subject_stands_out(make_basis: Any, monkeypatch: pytest.MonkeyP
         return float(got[subject()].mean() / got[~subject()].mean())
 
     with_contrast = ratio()
-    monkeypatch.setattr(contrast, "CONTRAST", 0.0)
+    for name in ("CONTRAST", "EXACT_CONTRAST", "EXACT_REST"):
+        monkeypatch.setattr(contrast, name, 0.0)
     assert with_contrast > ratio() + 0.05
+
+
+@pytest.mark.parametrize(("factor", "exact"), [(0.5, 1.0), (1.0, 0.0)])
+def test_a_rest_is_exact_where_a_number_changed_it(
+    make_basis: Any, factor: float, exact: float
+) -> None:
+    """Neither what was repainted as it is, nor what a brush changed."""
+    basis = room(make_basis)
+    image = basis.current_look * np.where(subject()[..., None], 2.0, factor)
+    rows = ContrastRows.of(Wash.of(basis, painting(basis, image)), None)
+    assert rows.exact == pytest.approx([exact], abs=1e-6)
+    image = np.where(subject()[..., None], image, image * uneven())
+    rows = ContrastRows.of(Wash.of(basis, painting(basis, image)), None)
+    assert rows.exact == pytest.approx([0], abs=0.05)
+
+
+def test_a_locked_subject_leaves_most_of_its_light_to_the_rest(
+    make_basis: Any, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Its contrast to an exact rest could otherwise be had by a dark rest alone."""
+    pools = np.array([np.where(subject(), 0.02, 1.0), np.where(subject(), 1.0, 0.02)])
+    basis = make_basis(
+        images=pools[..., None] * np.ones(3), names=["wash", "spot"], emission=[(0.2,) * 3] * 2
+    )
+    image = basis.current_look * np.where(subject()[..., None], 2.0, 0.8)
+    constraints = lp.Constraints.of({"spot": {"lock": True}})
+
+    def rest() -> float:
+        solution = lp.solve(basis, painting(basis, image), constraints=constraints)
+        got = basis.mix(solution.weights)[~subject()].mean()
+        return float(got / image[~subject()].mean())
+
+    kept = rest()
+    monkeypatch.setattr(contrast, "EXACT_REST", 0.0)
+    assert kept > rest() + 0.03
+
+
+def test_light_set_by_hand_wins_over_grey(make_basis: Any, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Bright warm sculptures in a cool dark room, and a spot that spills on a wall.
+
+    What pixels alone call the best is grey; a warm spot in a room bluer than painted is farther
+    from the painting in pixels, and nearer in contrast.
+    """
+    spill = np.tile(np.arange(W) < W // 8, (H, 1)) * 0.8
+    basis = room(make_basis, spill)
+    warm, cool = np.array([1.2, 1.0, 0.7]), np.array([0.85, 1.0, 1.2])
+    image = basis.current_look * np.where(subject()[..., None], 2 * warm, 0.35 * cool)
+    target = painting(basis, image)
+    by_hand = basis.current_weights * [0.2 * cool**1.5, 4 * warm**1.5]
+    answer = lp.solve(basis, target).weights
+    for name in ("CONTRAST", "EXACT_CONTRAST", "EXACT_REST"):
+        monkeypatch.setattr(contrast, name, 0.0)
+    grey = lp.solve(basis, target).weights
+    monkeypatch.undo()
+
+    def pixels(weights: np.ndarray) -> float:
+        codes = (lp.ViewTransform("srgb", 0.0).encode(x) for x in (basis.mix(weights), image))
+        return float(np.square(np.subtract(*codes)).sum())
+
+    wash = Wash.of(basis, target)
+    term = replace(ContrastRows.of(wash, target.transform), exact=np.zeros(1)).term(1.0)
+    assert term is not None
+    missed = [float(term.objective(x).sum()) for x in (grey, by_hand, answer)]
+    assert pixels(grey) < pixels(by_hand)
+    assert missed[1] < 0.5 * missed[0]
+    assert missed[2] < 0.5 * missed[0]
 
 
 def test_an_unpainted_rest_has_no_contrast(make_basis: Any) -> None:
@@ -97,8 +176,9 @@ def test_an_unpainted_rest_has_no_contrast(make_basis: Any) -> None:
         subject().astype(np.float32),
         everything=False,
     )
-    assert not len(contrast_rows(Wash.of(basis, target), None))
-    assert contrast_term(np.zeros((0, 3, 2)), 1.0) is None
+    rows = ContrastRows.of(Wash.of(basis, target), None)
+    assert not len(rows.contrast)
+    assert rows.term(1.0) is None
 
 
 def test_a_flat_painting_has_the_wishes_of_its_layers(make_basis: Any) -> None:
@@ -113,7 +193,8 @@ def test_a_flat_painting_has_the_wishes_of_its_layers(make_basis: Any) -> None:
         Wish(name, area.astype(np.float32)) for name, area in (("rest", ~place), ("subject", place))
     )
     rows = [
-        contrast_rows(Wash.of(basis, replace(flat, wishes=wishes)), None) for wishes in ((), layers)
+        ContrastRows.of(Wash.of(basis, replace(flat, wishes=wishes)), None).contrast
+        for wishes in ((), layers)
     ]
     assert len(rows[0]) == len(rows[1]) == 1
     # Found in a wash, the corners of a place are round.

@@ -106,7 +106,8 @@ def test_colors_are_pulled_as_the_formula_says(make_basis: Any, monkeypatch: pyt
     colours are painted where it shines.
     """
     monkeypatch.setattr(problem, "gamuts_for", lambda *_: None)
-    monkeypatch.setattr(contrast, "CONTRAST", 0.0)
+    for name in ("CONTRAST", "EXACT_CONTRAST", "EXACT_REST"):
+        monkeypatch.setattr(contrast, name, 0.0)
     basis = _basis(make_basis)
     target = _paint(basis, over_look=True)
     solution = lp.solve(basis, target, hold=0)

@@ -11,18 +11,31 @@ with the means P of the answer and O, R of the painting over the wish (o) and ov
 A the change of a display value with a relative change of light there. It is a quadratic in the
 weights. The paper weighs surfaces so that large unpainted ones do not overwhelm small painted ones;
 this does the same between painted ones.
+
+A brush is sloppy, and numbers are meant: the more of the rest was adjusted by a number, the
+stronger a contrast to it. A subject that cannot be lifted, as under a locked lamp, must not pull
+such a rest down instead, so the light of the rest shall come as painted, too:
+
+    F += s' Σ_k Σ_c A_kc² (P_r / R − 1)²
 """
+
+from dataclasses import dataclass
+from typing import Self
 
 import numpy as np
 
 from lightpaint.arrays import Doubles
 from lightpaint.colour import ViewTransform
-from lightpaint.lighting.loss.expected_lights import Wash
+from lightpaint.lighting.loss.expected_lights import UNIFORM_STOPS, Wash, adjusted_share
 from lightpaint.lighting.normal_equations import NormalEquations
 from lightpaint.threads import one_thread
 
-#: Strength of the contrast of all wishes together, relative to the importance of all paint.
-CONTRAST = 0.5
+#: Strength of the contrast of all wishes together, relative to the importance of all paint: to a
+#: rest that was painted with a brush, and to one that was adjusted by a number.
+CONTRAST, EXACT_CONTRAST = 0.5, 8.0
+
+#: The same of the light of a rest that was adjusted by a number.
+EXACT_REST = 4.0
 
 #: Smallest share of the rest of a picture that must be painted for a contrast to be asked for: an
 #: unpainted rest is held to the look, which was not meant as a contrast.
@@ -35,26 +48,65 @@ SUBJECT_SHARE = 0.5
 BLACK = 1e-3
 
 
-@one_thread()
-def contrast_rows(wash: Wash, transform: ViewTransform | None) -> Doubles:
-    """Return A (ō_i / O − r̄_i / R) for each wish and channel, (k, 3, n).
+@dataclass(frozen=True)
+class ContrastRows:
+    """The terms of the contrasts of k wishes, rows in the weights of n lights.
 
-    transform: the view transform of the loss; None for linear light.
+    contrast: (k, 3, n), A_o (ō_i / O − r̄_i / R), which shall be 0. rest: (k, 3, n), A_r r̄_i / R,
+    whose sum over the lights shall be A_r, (k, 3), `rest_goal`. exact: (k,), the share of the rest
+    that was adjusted by a number.
     """
-    n = wash.rows.shape[1]
-    goal = np.where(wash.importance > 0, wash.painted, wash.look)
-    total = float(wash.counts.sum())
-    parts = [x for area in wash.wishes for x in _subject_and_rest(wash, area, total)]
-    if not parts:
-        return np.zeros((0, 3, n))
-    shares = np.array(parts)  # (2 k, p)
-    black = BLACK * float(np.average(goal.mean(axis=0), weights=wash.counts))
-    inside, outside = (shares @ goal.T).reshape(-1, 2, 3).transpose(1, 0, 2)  # (k, 3) each
-    own, rest = wash.light_sums(shares).reshape(3, n, -1, 2).transpose(3, 2, 0, 1)  # (k, 3, n) each
-    is_lit = (inside > black) & (outside > black)
-    o, r = (np.where(is_lit, x, 1)[..., None] for x in (inside, outside))
-    amplitude = display_amplitude(inside.T, transform).T
-    return np.asarray((amplitude * is_lit)[..., None] * (own / o - rest / r))
+
+    contrast: Doubles
+    rest: Doubles
+    rest_goal: Doubles
+    exact: Doubles
+
+    @classmethod
+    @one_thread()
+    def of(cls, wash: Wash, transform: ViewTransform | None) -> Self:
+        """Make the rows of a painting. transform: of the loss; None for linear light."""
+        n = wash.rows.shape[1]
+        goal = np.where(wash.importance > 0, wash.painted, wash.look)
+        total = float(wash.counts.sum())
+        parts = [x for area in wash.wishes for x in _subject_and_rest(wash, area, total)]
+        if not parts:
+            none = np.zeros((0, 3, n))
+            return cls(none, none, np.zeros((0, 3)), np.zeros(0))
+        shares = np.array(parts)  # (2 k, p)
+        black = BLACK * float(np.average(goal.mean(axis=0), weights=wash.counts))
+        inside, outside = (shares @ goal.T).reshape(-1, 2, 3).transpose(1, 0, 2)  # (k, 3) each
+        # (k, 3, n) each
+        own, rest = wash.light_sums(shares).reshape(3, n, -1, 2).transpose(3, 2, 0, 1)
+        is_lit = (inside > black) & (outside > black)
+        own, rest = (
+            x / np.where(is_lit, mean, 1)[..., None] for x, mean in ((own, inside), (rest, outside))
+        )
+        amplitude, rest_amplitude = (
+            display_amplitude(mean.T, transform).T * is_lit for mean in (inside, outside)
+        )
+        stops = wash.asked()
+        # What was repainted as it is was not adjusted.
+        is_changed = np.abs(stops).max(axis=0) > UNIFORM_STOPS
+        exact = np.maximum(wash.exact, adjusted_share(wash, stops)) * is_changed
+        return cls(
+            amplitude[..., None] * (own - rest),
+            rest_amplitude[..., None] * rest,
+            rest_amplitude,
+            shares[1::2] @ exact,
+        )
+
+    def term(self, strength: float) -> NormalEquations | None:
+        """Return the term of the loss; None without any. strength: the importance of all paint."""
+        if not len(self.contrast) or strength <= 0:
+            return None
+        each = strength / len(self.contrast)
+        lift = each * (CONTRAST + self.exact * (EXACT_CONTRAST - CONTRAST))
+        keep = each * EXACT_REST * self.exact
+        M = np.einsum("k,kci,kcj->cij", lift, self.contrast, self.contrast)
+        M += np.einsum("k,kci,kcj->cij", keep, self.rest, self.rest)
+        b = np.einsum("k,kci,kc->ci", keep, self.rest, self.rest_goal)
+        return NormalEquations(M, b, keep @ self.rest_goal**2)
 
 
 def _subject_and_rest(wash: Wash, area: Doubles, total: float) -> list[Doubles]:
@@ -71,17 +123,6 @@ def _subject_and_rest(wash: Wash, area: Doubles, total: float) -> list[Doubles]:
     if painted_rest <= 0 or painted_rest < PAINTED_REST * rest.sum():
         return []
     return [own / own.sum(), rest / rest.sum()]
-
-
-def contrast_term(rows: Doubles, strength: float) -> NormalEquations | None:
-    """Return the term of rows (k, 3, n); None without any.
-
-    strength: the importance of all paint.
-    """
-    if not len(rows) or strength <= 0:
-        return None
-    M = CONTRAST * strength / len(rows) * np.einsum("kci,kcj->cij", rows, rows)
-    return NormalEquations(M, np.zeros(M.shape[:2]), np.zeros(3))
 
 
 def display_amplitude(light: Doubles, transform: ViewTransform | None) -> Doubles:

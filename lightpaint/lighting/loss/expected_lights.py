@@ -17,6 +17,8 @@ from lightpaint.basis.basis import Basis
 from lightpaint.basis.derived_planes import block_means
 from lightpaint.colour import luminance
 from lightpaint.images import block_sums
+from lightpaint.images.pixel_blocks import block_sums
+from lightpaint.target.saturated_paint import extend_saturated
 from lightpaint.target.target import Target
 from lightpaint.target.wish import Wish
 from lightpaint.target.wish_finding import split_wishes
@@ -86,11 +88,10 @@ class Wash:
             return np.asarray(sums / np.where(total > 0, total, 1)[..., None])
 
         look = mean(basis.current_look, counted, counts)
+        image = extend_saturated(target, basis.current_look)
         importance = painted_counts / np.where(counts > 0, counts, 1)
         # Where nothing is painted, nothing is asked for.
-        painted = np.where(
-            importance[..., None] > 0, mean(target.image, weight, painted_counts), look
-        )
+        painted = np.where(importance[..., None] > 0, mean(image, weight, painted_counts), look)
         pixels = block_sums(np.ones(basis.size), side)
         layers = [
             replace(wish, area=(block_sums(wish.area, side) / pixels).astype(np.float32))

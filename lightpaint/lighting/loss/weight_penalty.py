@@ -25,7 +25,7 @@ from lightpaint.basis.lights import Lights
 from lightpaint.colour import LUMINANCE, ViewTransform, luminance
 from lightpaint.lighting.constraints.constraints import Constraints
 from lightpaint.lighting.fit import Fit
-from lightpaint.lighting.loss.contrast import contrast_rows, contrast_term, display_amplitude
+from lightpaint.lighting.loss.contrast import ContrastRows, display_amplitude
 from lightpaint.lighting.loss.expected_lights import DARK, ExpectedLights, Wash
 from lightpaint.lighting.normal_equations import NormalEquations
 from lightpaint.threads import one_thread
@@ -33,7 +33,7 @@ from lightpaint.threads import one_thread
 #: Strength of the pull to the current colours, of lights of which the painting asks for no other
 #: colour, and of lights of which it clearly does: the share of a hue's effect on the picture that
 #: counts as an error, scaled by the share of painted pixels.
-COLOR_PULL, CLEAR_PULL = 1.5, 0.02
+COLOR_PULL, CLEAR_PULL = 1.5, 0.01
 
 #: Price of what each light by itself does to unpainted pixels, relative to that of what all lights
 #: together do: the hold.
@@ -84,7 +84,7 @@ class PaintTerms:
         keeps_colors = fit.colors in ("gentle", "white")
         return cls(
             ExpectedLights.of(wash, own) if keeps_colors else None,
-            contrast_term(contrast_rows(wash, fit.transform), importance),
+            ContrastRows.of(wash, fit.transform).term(importance),
             restrain_lights(wash, own, fit.transform, unpainted=unpainted),
         )
 
