@@ -8,7 +8,7 @@ to its colour may be, and how much light, how dim it will be.
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from math import ceil
+from math import ceil, sqrt
 from typing import Self
 
 import numpy as np
@@ -232,7 +232,7 @@ def light_rows(planes: Planes, counted: Doubles, side: int) -> Floats:
 
 
 def _block_side(size: tuple[int, int]) -> int:
-    return max(1, ceil((size[0] * size[1] / BLOCKS) ** 0.5))
+    return max(1, ceil(sqrt(size[0] * size[1] / BLOCKS)))
 
 
 def _counted_pixels(basis: Basis) -> Doubles:
