@@ -1,15 +1,17 @@
 """How often do 95 % intervals of lights hold in display space?
 
-    python benchmarks/display_coverage.py [--rooms gallery mirror glass] [--seeds 100] [--spp 64]
+    python benchmarks/display_coverage.py [--rooms gallery mirror glass] [--seeds 200] [--spp 64]
+    python benchmarks/display_coverage.py --answers default [--gallery 1/2]
 
 The gallery on a small film, a room with a wall that is a mirror and a room with a ball and a pane
 of glass, six lamps in each. The painting is the light of other lamps by all samples, half of it
 brighter and warmer, with a glow that no lamp makes, as a display shows it in 8 bits. It is fitted
-literally in display values. The samples of one render are cut into as many bases as there are
-seeds, and all of them together are the truth. Printed is, without the noise correction and with
-it, how often the intervals hold the truth, over lights, channels and seeds: of channels that these
-samples determine, which is where half the median interval is less than the weight; of the one of
-them that is held least; and the RMS error of these weights, relative to each.
+in display values: literally, or as `solve` does by default, which reads wishes in it and keeps
+lamps to their colours as far as it can. The samples of one render are cut into as many bases as
+there are seeds, and all of them together are the truth. Printed is, without the noise correction
+and with it, how often the intervals hold the truth, over lights, channels and seeds: of channels
+that these samples determine, which is where half the median interval is less than the weight; of
+the one of them that is held least; and the RMS error of these weights, relative to each.
 """
 
 import argparse
@@ -98,25 +100,29 @@ def main() -> None:
     """Print two lines for each room."""
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("--rooms", nargs="+", default=["gallery", *ROOMS])
-    parser.add_argument("--seeds", type=int, default=100, metavar="N")
+    parser.add_argument("--answers", choices=("literal", "default"), default="literal")
+    parser.add_argument("--gallery", default="1/8", metavar="1/N", help="resolution of the gallery")
+    parser.add_argument("--seeds", type=int, default=200, metavar="N")
     parser.add_argument("--spp", type=int, default=64)
     options = parser.parse_args()
     use_variant()
     print(f"{'':20s}{'held':>8s}{'least':>8s}{'RMS error':>11s}")
     with tempfile.TemporaryDirectory() as folder:
         for room in options.rooms:
-            measure(room, Path(folder), seeds=options.seeds, spp=options.spp)
+            scene = make_scene(room, Path(folder), options.gallery)
+            is_literal = options.answers == "literal"
+            measure(room, scene, seeds=options.seeds, spp=options.spp, is_literal=is_literal)
 
 
-def measure(room: str, folder: Path, *, seeds: int, spp: int) -> None:
+def measure(room: str, scene: Scene, *, seeds: int, spp: int, is_literal: bool) -> None:
     """Render, solve and print two lines."""
-    *bases, truth = rendered_bases(make_scene(room, folder), seeds, spp, 1)
+    *bases, truth = rendered_bases(scene, seeds, spp, 1)
     target = painted(truth)
-    best = answers(truth, target)[1].weights
+    best = answers(truth, target, is_literal)[1].weights
     for k, name in enumerate((room, f"{room}, corrected")):
         found, ends = [], []
         for basis in bases:
-            answer = answers(basis, target)[k]
+            answer = answers(basis, target, is_literal)[k]
             bars = lp.error_bars(answer)
             assert bars is not None
             found.append(answer.weights)
@@ -130,16 +136,16 @@ def measure(room: str, folder: Path, *, seeds: int, spp: int) -> None:
         print(f"{name:20s}{held[is_told].mean():8.3f}{held[is_told].min():8.2f}{error:11.3f}")
 
 
-def answers(basis: Basis, target: Target) -> tuple[lp.Solution, lp.Solution]:
+def answers(basis: Basis, target: Target, is_literal: bool) -> tuple[lp.Solution, lp.Solution]:
     """Solve without the noise correction, and with it."""
-    solution = lp.solve(basis, target, literal=True, space="display")
+    solution = lp.solve(basis, target, literal=is_literal, space="display")
     return solution, lp.correct_noise(solution)
 
 
-def make_scene(room: str, folder: Path) -> Scene:
-    """Return the scene of a room on a small film."""
+def make_scene(room: str, folder: Path, resolution: str) -> Scene:
+    """Return the scene of a room on a small film. resolution: of the gallery."""
     if room not in ROOMS:
-        return lp.load_scene(ROOT / "scenes" / room / "scene.xml").reduced("1/8")
+        return lp.load_scene(ROOT / "scenes" / room / "scene.xml").reduced(resolution)
     path = folder / f"{room}.xml"
     path.write_text(SCENE.format(room=ROOMS[room], box=BOXES[room]), encoding="utf-8")
     return lp.load_scene(path)

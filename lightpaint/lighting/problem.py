@@ -376,10 +376,18 @@ def wash_fields(
         return none
     if not reads_wishes:
         return {**none, "expected": expected_for(views, fit, own, wash)}
+    known = wash_of(views) if wash is None else wash()
+    return vars(terms_of_wash(known, views, fit, own))
+
+
+def terms_of_wash(wash: Wash, views: Views, fit: Fit, own: Doubles) -> PaintTerms:
+    """Return what a sketch with this wash lets one expect, and its terms of the loss.
+
+    own: (n, 3), weights with the colours that lights have.
+    """
     importance = sum(float(x.importance.sum(dtype=np.float64)) for x in views.targets)
     unpainted = unpainted_weight_of(views, fit)
-    known = wash_of(views) if wash is None else wash()
-    return vars(PaintTerms.of(known, fit, own, importance=importance, unpainted=unpainted))
+    return PaintTerms.of(wash, fit, own, importance=importance, unpainted=unpainted)
 
 
 def are_sketches(views: Views) -> bool:

@@ -99,37 +99,39 @@ class Target(Shown):
     def __post_init__(self) -> None:
         if self.image.shape != (*self.importance.shape, 3):
             raise SizeError(
-                f"{titled(self.name)}: image {self.image.shape} and importance "
-                f"{self.importance.shape} differ in size"
+                self.title,
+                f": image {self.image.shape} and importance {self.importance.shape} differ in size",
             )
         if self.at_least is not None and self.at_least.shape != self.image.shape:
             raise SizeError(
-                f"{titled(self.name)}: image {self.image.shape} and at_least {self.at_least.shape} "
-                "differ in size"
+                self.title,
+                f": image {self.image.shape} and at_least {self.at_least.shape} differ in size",
             )
         if any(wish.area.shape != self.importance.shape for wish in self.wishes):
             raise SizeError(
-                f"{titled(self.name)}: a wish of another size than its importance, "
-                f"{self.importance.shape}"
+                self.title, f": a wish of another size than its importance, {self.importance.shape}"
             )
         if lost_count := int((~np.isfinite(self.image).all(axis=-1)).sum()):
             raise TargetError(
-                f"{titled(self.name)} holds NaN or Inf in {lost_count} of "
-                f"{self.importance.size} pixels: make them 0, and their importance too"
+                self.title,
+                f" holds NaN or Inf in {lost_count} of "
+                f"{self.importance.size} pixels: make them 0, and their importance too",
             )
         if not np.isfinite(self.importance).all() or (self.importance < 0).any():
             raise TargetError(
-                f"{titled(self.name)}: importance must be finite and not negative; it is between "
-                f"{np.min(self.importance):g} and {np.max(self.importance):g}"
+                self.title,
+                ": importance must be finite and not negative; it is between "
+                f"{np.min(self.importance):g} and {np.max(self.importance):g}",
             )
         if not self.importance.any():
             if self.not_finite == self.importance.size:
-                raise TargetError(f"{titled(self.name)} holds NaN or Inf in every pixel")
+                raise TargetError(self.title, " holds NaN or Inf in every pixel")
             raise TargetError(
-                f"{titled(self.name)} has importance 0 everywhere, so nothing in it counts: "
-                "paint with some alpha, or give a mask that is not black"
+                self.title,
+                " has importance 0 everywhere, so nothing in it counts: "
+                "paint with some alpha, or give a mask that is not black",
             )
-        _check_range(self.name, self.image, self.importance > 0)
+        _check_range(self.title, self.image, self.importance > 0)
 
     @classmethod
     @keywords()
@@ -164,7 +166,7 @@ class Target(Shown):
         with np.errstate(over="ignore"):  # values beyond float32 become infinite, and are rejected
             pixels, counts = array.astype(np.float32), counts.astype(np.float32)
         if counts.shape == pixels.shape[:2]:  # otherwise the constructor reports the shapes
-            _check_is_light(name, pixels, counts > 0)
+            _check_is_light(titled(name), pixels, counts > 0)
         return cls(name, pixels, counts, everything=importance is None)
 
     def __repr__(self) -> str:
@@ -186,6 +188,11 @@ class Target(Shown):
     def size(self) -> tuple[int, int]:
         """(height, width) in pixels."""
         return self.image.shape[0], self.image.shape[1]
+
+    @property
+    def title(self) -> Path | str:
+        """The file that the target was read from, or its name: what messages call it."""
+        return self.files[0] if self.files else titled(self.name)
 
     @property
     def painted_share(self) -> float:
@@ -280,14 +287,16 @@ class Target(Shown):
             return self.reduced(factor)
         if self.size != size and not resize:
             raise SizeError(
-                f"{titled(self.name)} is {self.size[1]}x{self.size[0]} but the basis is "
+                self.title,
+                f" is {self.size[1]}x{self.size[0]} but the basis is "
                 f"{size[1]}x{size[0]}: export it at that size, or ",
                 PASS_RESIZE,
             )
         (height, width), (mine_h, mine_w) = size, self.size
         if abs(width * mine_h / (height * mine_w) - 1) > 0.02:
             raise SizeError(
-                f"{titled(self.name)} is {mine_w}x{mine_h}, but the basis is {width}x{height}, "
+                self.title,
+                f" is {mine_w}x{mine_h}, but the basis is {width}x{height}, "
                 "of another aspect ratio: crop it to that ratio, since ",
                 Hint("resize", True),
                 " does not stretch",
@@ -295,11 +304,11 @@ class Target(Shown):
         return self.resized(size)
 
 
-def _check_is_light(name: str, image: Floats, counts: npt.NDArray[np.bool_]) -> None:
-    """Raise TargetError for negative luminance."""
+def _check_is_light(title: str, image: Floats, counts: npt.NDArray[np.bool_]) -> None:
+    """Raise TargetError for negative luminance. title: of the target in messages."""
     if negative_text := describe_negative(image, counts):
         raise TargetError(
-            f"{titled(name)} has {negative_text}: expected light, which is never below 0; "
+            f"{title} has {negative_text}: expected light, which is never below 0; "
             "np.maximum(image, 0) cuts it off"
         )
 
@@ -320,13 +329,17 @@ def describe_negative(image: Floats, counts: npt.NDArray[np.bool_]) -> str:
     )
 
 
-def _check_range(name: str, image: Floats, counts: npt.NDArray[np.bool_]) -> None:
-    """Raise TargetError for light beyond all lamps, or next to nothing that is not black."""
+def _check_range(title: str | Path, image: Floats, counts: npt.NDArray[np.bool_]) -> None:
+    """Raise TargetError for light beyond all lamps, or next to nothing that is not black.
+
+    title: of the target in messages.
+    """
     peak = float(np.abs(image).max(initial=0, where=counts[..., None]))
     if peak > BRIGHTEST_PAINT or 0 < peak < DIMMEST:
         raise TargetError(
-            f"{titled(name)} has light up to {peak:.3g} where it counts: expected between "
-            f"{DIMMEST:g} and {BRIGHTEST_PAINT:g}, or black; was it exported in another unit?"
+            title,
+            f" has light up to {peak:.3g} where it counts: expected between "
+            f"{DIMMEST:g} and {BRIGHTEST_PAINT:g}, or black; was it exported in another unit?",
         )
 
 

@@ -13,7 +13,7 @@ import numpy as np
 
 from lightpaint.arrays import Floats
 from lightpaint.colour import ViewTransform, to_8_bit
-from lightpaint.errors import LightpaintError, TargetError
+from lightpaint.errors import LightpaintError, TargetError, ViewError
 from lightpaint.file_reading import read_text
 from lightpaint.files import one_line, write_bytes, write_text
 from lightpaint.images.formats import (
@@ -177,7 +177,7 @@ def earlier_files(folder: Path) -> list[Path]:
     if not (folder / RECORD_FILE).is_file():
         return []
     try:
-        names = _read_about(folder).files
+        names = _read_about(folder)[0].files
     except (ValueError, LightpaintError):
         names = ()
     if names:
@@ -228,8 +228,7 @@ def write_look(
 def read_template(folder: Path) -> Template:
     """Read a template written by `write_template`. Raises TargetError if it is not one."""
     try:
-        record = _read_about(folder)
-        transform = ViewTransform(record.view.name, record.view.stops)
+        record, transform = _read_about(folder)
         image = _read_picture(folder / LIGHT_FILE, record.size)
         albedo, clean = (
             _read_picture(folder / name, record.size) if (folder / name).exists() else None
@@ -242,7 +241,7 @@ def read_template(folder: Path) -> Template:
         if error.filename is not None:
             error.filename = os.path.relpath(error.filename, folder)
         raise _not_a_template(folder, str(error)) from None
-    except (ValueError, MemoryError) as error:
+    except MemoryError as error:
         raise _not_a_template(folder, str(error) or type(error).__name__) from None
     return Template(image, transform, record.scene, record.content, record.sensor, albedo, clean)
 
@@ -259,21 +258,24 @@ def _name_within(folder: Path, datum: Datum) -> str | None:
     return None
 
 
-def _read_about(folder: Path) -> _TemplateRecord:
-    """Read template.json. Raises TargetError if it is missing, ValueError if it is damaged."""
-    text = read_text(folder / RECORD_FILE, "file", TargetError, limit=MAX_ABOUT)
-    return read_record(_TemplateRecord, strict_json(text), others=True)
+def _read_about(folder: Path) -> tuple[_TemplateRecord, ViewTransform]:
+    """Read template.json and its view. Raises TargetError if it is missing or damaged."""
+    path = folder / RECORD_FILE
+    text = read_text(path, "file", TargetError, limit=MAX_ABOUT)
+    try:
+        record = read_record(_TemplateRecord, strict_json(text), others=True)
+        return record, ViewTransform(record.view.name, record.view.stops)
+    except (ValueError, ViewError) as error:
+        raise TargetError(path, f": {one_line(str(error))}") from None
 
 
 def _read_picture(path: Path, size: tuple[int, int]) -> Floats:
     image = read_parts(path)[0].rgb()
     height, width, _ = image.shape
     if size != (width, height):
-        raise ValueError(
-            f"{path.name} is {width}x{height}, but {RECORD_FILE} says {size[0]}x{size[1]}"
-        )
+        raise TargetError(path, f" is {width}x{height}, but {RECORD_FILE} says {size[0]}x{size[1]}")
     if not np.isfinite(image).all():
-        raise ValueError(f"{path.name} holds NaN or Inf")
+        raise TargetError(path, " holds NaN or Inf")
     return image
 
 

@@ -17,7 +17,6 @@ import numpy.typing as npt
 from lightpaint.arrays import Bools, Doubles, Floats
 from lightpaint.colour import LUMINANCE
 from lightpaint.images import block_sums, enlarged
-from lightpaint.images.pixel_blocks import block_sums, enlarged
 from lightpaint.target.saturated_paint import extend_saturated
 from lightpaint.target.stroke_model import departure_from_one_stroke
 from lightpaint.target.target import Target

@@ -8,16 +8,17 @@ to its colour may be, and how much light, how dim it will be.
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from math import ceil
+from math import ceil, sqrt
+from typing import Self
 
 import numpy as np
 
 from lightpaint.arrays import Doubles, Floats, Indices
 from lightpaint.basis.basis import Basis
 from lightpaint.basis.derived_planes import block_means
+from lightpaint.basis.planes import Planes
 from lightpaint.colour import luminance
 from lightpaint.images import block_sums
-from lightpaint.images.pixel_blocks import block_sums
 from lightpaint.target.saturated_paint import extend_saturated
 from lightpaint.target.target import Target
 from lightpaint.target.wish import Wish
@@ -77,37 +78,7 @@ class Wash:
     @classmethod
     def of(cls, basis: Basis, target: Target) -> "Wash":
         """Average a view. target: at the size of the basis."""
-        height, width = basis.size
-        side = max(1, ceil((height * width / BLOCKS) ** 0.5))
-        counted = (~basis.emitters_seen).astype(np.float64)
-        weight = np.minimum(target.importance, 1) * counted
-        counts, painted_counts = block_sums(counted, side), block_sums(weight, side)
-
-        def mean(image: Floats, weight: Doubles, total: Doubles) -> Doubles:
-            sums = block_sums(image * weight[..., None], side)
-            return np.asarray(sums / np.where(total > 0, total, 1)[..., None])
-
-        look = mean(basis.current_look, counted, counts)
-        image = extend_saturated(target, basis.current_look)
-        importance = painted_counts / np.where(counts > 0, counts, 1)
-        # Where nothing is painted, nothing is asked for.
-        painted = np.where(importance[..., None] > 0, mean(image, weight, painted_counts), look)
-        pixels = block_sums(np.ones(basis.size), side)
-        layers = [
-            replace(wish, area=(block_sums(wish.area, side) / pixels).astype(np.float32))
-            for wish in target.wishes
-        ]
-        rows = block_means(basis.planes, counted, side).pixels(slice(None)).transpose(2, 0, 1)
-        wishes = wish_shares(layers, painted, importance, look)
-        return cls(
-            np.ascontiguousarray(rows),
-            painted.reshape(-1, 3).T,
-            look.reshape(-1, 3).T,
-            importance.ravel(),
-            counts.ravel(),
-            wishes,
-            exact_share(layers, look.shape[:2]),
-        )
+        return PaintedBlocks.of(basis, target).wash
 
     @classmethod
     def joined(cls, views: Sequence["Wash"]) -> "Wash":
@@ -168,6 +139,112 @@ class Wash:
             return np.zeros(self.look.shape)
         asked, now = (np.maximum(x, 0).astype(np.float64) + dark for x in (self.painted, self.look))
         return np.where(weight > 0, np.log2(asked / now), 0)
+
+
+@dataclass(frozen=True)
+class PaintedBlocks:
+    """A view averaged over blocks of pixels, before its wishes are found.
+
+    rows: (3, n, p), Φ. painted, look: (h, w, 3), linear. importance, counts: (h, w), as in `Wash`.
+    layers: the wishes of a painting with layers, with an area of a value for each block.
+    """
+
+    rows: Floats
+    painted: Floats
+    look: Floats
+    importance: Doubles
+    counts: Doubles
+    layers: Sequence[Wish]
+
+    @classmethod
+    def of(cls, basis: Basis, target: Target) -> Self:
+        """Average a view. target: at the size of the basis."""
+        side = _block_side(basis.size)
+        counted = _counted_pixels(basis)
+        weight = np.minimum(target.importance, 1) * counted
+        counts, painted_counts = block_sums(counted, side), block_sums(weight, side)
+        look = _weighted_means(basis.current_look, counted, side)
+        importance = painted_counts / np.where(counts > 0, counts, 1)
+        # Where nothing is painted, nothing is asked for.
+        image = extend_saturated(target, basis.current_look)
+        painted = np.where(importance[..., None] > 0, _weighted_means(image, weight, side), look)
+        pixels = block_sums(np.ones(basis.size), side)
+        layers = [
+            replace(wish, area=(block_sums(wish.area, side) / pixels).astype(np.float32))
+            for wish in target.wishes
+        ]
+        return cls(
+            light_rows(basis.planes, counted, side), painted, look, importance, counts, layers
+        )
+
+    @property
+    def wash(self) -> Wash:
+        """The wash of the view, with its wishes."""
+        return Wash(
+            self.rows,
+            self.painted.reshape(-1, 3).T,
+            self.look.reshape(-1, 3).T,
+            self.importance.ravel(),
+            self.counts.ravel(),
+            wish_shares(self.layers, self.painted, self.importance, self.look),
+            exact_share(self.layers, self.importance.shape),
+        )
+
+
+@dataclass(frozen=True)
+class NoisyBlocks:
+    """The blocks of a view, and the half differences of their light and of the look.
+
+    noise: (3, n, p). look_noise: (h, w, 3).
+    """
+
+    blocks: PaintedBlocks
+    noise: Floats
+    look_noise: Floats
+
+    @classmethod
+    def of(cls, basis: Basis, target: Target) -> Self:
+        """Average a view whose noise is known. target: at the size of the basis."""
+        side, counted = _block_side(basis.size), _counted_pixels(basis)
+        return cls(
+            PaintedBlocks.of(basis, target),
+            light_rows(basis.noise, counted, side),
+            _weighted_means(basis.current_noise, counted, side),
+        )
+
+    def disturbed(self, rng: np.random.Generator, amount: float = 1.0) -> Wash:
+        """Return the wash with more noise: in each block, its half difference of either sign.
+
+        amount: of this noise, relative to that of the basis.
+        """
+        signs = rng.choice(np.array([-amount, amount], np.float32), self.blocks.importance.shape)
+        return replace(
+            self.blocks,
+            rows=self.blocks.rows + signs.ravel() * self.noise,
+            look=self.blocks.look + signs[..., None] * self.look_noise,
+        ).wash
+
+
+def light_rows(planes: Planes, counted: Doubles, side: int) -> Floats:
+    """Return planes averaged over blocks, (3, n, p). counted: (h, w), the weight of each pixel."""
+    means = block_means(planes, counted, side).pixels(slice(None))
+    return np.ascontiguousarray(means.transpose(2, 0, 1))
+
+
+def _block_side(size: tuple[int, int]) -> int:
+    return max(1, ceil(sqrt(size[0] * size[1] / BLOCKS)))
+
+
+def _counted_pixels(basis: Basis) -> Doubles:
+    """Return 1 for pixels without an emitter in view, (h, w)."""
+    return (~basis.emitters_seen).astype(np.float64)
+
+
+def _weighted_means(image: Floats, weight: Doubles, side: int) -> Doubles:
+    """Return means of an image (h, w, 3) over blocks, 0 for those without weight, (h, w)."""
+    total = block_sums(weight, side)
+    sums = block_sums(image * weight[..., None], side)
+    return np.asarray(sums / np.where(total > 0, total, 1)[..., None])
 
 
 def exact_share(layers: Sequence[Wish], size: tuple[int, int]) -> Doubles:

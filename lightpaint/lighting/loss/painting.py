@@ -15,7 +15,7 @@ from lightpaint.lighting.loss.loss import Loss, Squares
 from lightpaint.lighting.loss.paint_on_emitters import dark_threshold, find_glow_paint
 from lightpaint.lighting.loss.painting_loss import PaintingLoss
 from lightpaint.sentences import Hint, Word
-from lightpaint.target.target import Target, titled
+from lightpaint.target.target import Target
 
 
 def literal_squares(
@@ -61,7 +61,8 @@ def resolve_importance(target: Target, is_emitter: Bools, emitters: Emitters = "
     )
     if not importance.any():
         raise TargetError(
-            f"{titled(target.name)}: the camera sees an emitter in every painted pixel, so none "
+            target.title,
+            ": the camera sees an emitter in every painted pixel, so none "
             "counts; paint others too, or pass ",
             Hint("emitters", Word("count")),
         )

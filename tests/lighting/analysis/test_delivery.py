@@ -174,6 +174,44 @@ def test_brighter_light_is_as_good_where_the_painting_is_white(make_basis: Any):
     assert report.lit_delta_e == 0
 
 
+def test_the_rim_of_a_lamp_in_view_is_no_wish(make_basis: Any) -> None:
+    """A painting may show a lamp in part of a pixel in which the samples met none of it."""
+    seen = SUBJECT > 0
+    rim = np.pad(seen, 1)[1:-1, 2:] & ~seen  # the column to the left
+    now = _picture((WHOLE, _grey(30)), (SUBJECT, np.full(3, 5.0)))
+    asked = np.where(rim[..., None], 2.0, now)
+    basis = make_basis(images=now[None], names=["lamp"], emission=[[1.0] * 3], seen=seen)
+    target = replace(_painting(asked), importance=np.where(seen, 0, 1).astype(np.float32))
+    solution = solve(basis, target, space="display")
+    assert worst_delivery(measure_deliveries(solution, now.astype(np.float32)).deliveries) is None
+    # The same pixels are a wish where no lamp is beside them.
+    unseen = replace(basis, emitters_seen=np.zeros(SIZE, bool))
+    missed = measure_deliveries(solve(unseen, target), now.astype(np.float32)).deliveries
+    assert worst_delivery(missed) is not None
+
+
+def test_noise_of_a_few_dark_pixels_lacks_nothing(make_basis: Any) -> None:
+    """Half of a small change came, or all of it: the noise of its pixels does not tell."""
+    now, asked, got = (
+        _picture((WHOLE, _grey(30)), (SUBJECT, _grey(x))) for x in (20.0, 24.0, 22.0)
+    )
+    wish = Wish("Shade", SUBJECT)
+    rng = np.random.default_rng(0)
+    for noise, is_met in ((0.0, False), (1.0, True)):
+        halves = noise * now * SUBJECT[..., None] * rng.choice([-1, 1], (*SIZE, 1))
+        basis = make_basis(
+            images=now[None],
+            names=["lamp"],
+            emission=[[1.0] * 3],
+            half_differences=np.maximum(np.abs(halves), 1e-9)[None],
+        )
+        solution = solve(basis, _painting(asked, wish))
+        [delivery] = measure_deliveries(solution, got.astype(np.float32)).deliveries
+        assert delivery.brightness == pytest.approx(0.5, abs=1e-3)
+        assert delivery.is_met == is_met
+        assert (delivery.brightness_error > 0.125) == is_met
+
+
 @pytest.mark.parametrize("space", ["linear", "display"])
 def test_an_answer_that_is_held_by_a_lock_came_half_way(make_basis: Any, space: Any):
     """From the answer itself: two lamps, one of them locked, light a half of the picture each."""

@@ -31,6 +31,7 @@ from lightpaint.lighting.analysis.noise.noise import (
     pseudo_inverse,
 )
 from lightpaint.lighting.analysis.noise.weight_directions import WeightResponse, solve_for
+from lightpaint.lighting.analysis.noise.wish_noise import ReadingNoise
 from lightpaint.lighting.answer.lighting import LightSetting
 from lightpaint.lighting.normal_equations import NormalEquations
 from lightpaint.lighting.solution import Solution
@@ -131,7 +132,8 @@ class Uncertainty:
     Attributes:
         weights: (n, 3), as solved.
         scatter: (n, 3), standard deviation of the weights between seeds, that by errors of poses
-            included. For a light that is off or at a limit, the part on the side where it may go.
+            and by noise in the reading of a painting's wishes included. For a light that is off or
+            at a limit, the part on the side where it may go.
         bias: (n, 3), the rise of the weights without the noise power in M.
         painting_scatter: (n, 3), standard deviation by noise of the painting, where that is a
             render or a photograph; more samples of the basis do not lower it.
@@ -243,12 +245,15 @@ def error_bars(
         response = WeightResponse(solution, weak_equations, weak_equations, far)
         spread = spread.mixed_with(response.spread(noise.full_covariance), doubts)
         moved = far - weights - bias
-    by_poses = _scatter_by_poses(solution, level_errors)
+    by_poses, reading = _scatter_by_poses(solution, level_errors), ReadingNoise.of(solution)
     sides, wide = (
         [_root(*parts, exit_, moved, by_poses) for exit_ in spread.exits]
         for parts in (
-            (spread.inside, unsteady),
-            (spread.inside * noise.widening, by_painting, unsteady),
+            (spread.inside, unsteady, reading.scatter),
+            (
+                *(spread.inside * noise.widening, by_painting, unsteady),
+                reading.scatter * reading.widening,
+            ),
         )
     )
     is_determined = np.where(solution.reached, 1, np.nan)
