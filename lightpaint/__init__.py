@@ -115,7 +115,9 @@ if TYPE_CHECKING:
 
 choose_llvm_at_import()
 
-__getattr__, __dir__, _NAMES = lazy_names(__name__)
+_NAMES: list[str]
+if not TYPE_CHECKING:  # a type checker would take any name
+    __getattr__, __dir__, _NAMES = lazy_names(__name__)
 
 #: Names that need an extra, and are not part of `import *`.
 _EXTRAS = ("Painter",)

@@ -9,12 +9,14 @@ import sys
 import tarfile
 import tomllib
 import zipfile
-from importlib.metadata import PackageNotFoundError, requires
+from contextlib import suppress
+from importlib.metadata import PackageNotFoundError, metadata, requires
 from pathlib import Path
 
 import pytest
 from command import run, run_refused
 from packaging.requirements import Requirement
+from packaging.specifiers import SpecifierSet
 from packaging.utils import canonicalize_name
 from renderer import REPOSITORY
 
@@ -164,6 +166,17 @@ def test_every_package_is_pinned_within_its_bounds():
             names.add((name, *sorted(one.extras)))
             queue += _of(one)
     assert len(names) > 40
+
+
+def test_every_pin_runs_on_the_oldest_python():
+    # Debian 12 has Python 3.11.2: a library that wants 3.11.5 cannot be installed there.
+    [oldest] = SpecifierSet(PROJECT["requires-python"])
+    wanted = {}
+    for name in PINNED:
+        with suppress(PackageNotFoundError):  # an extra that is not installed here
+            wanted[name] = SpecifierSet(metadata(name).get("Requires-Python") or "")
+    assert len(wanted) > 40
+    assert [name for name, x in wanted.items() if not x.contains(f"{oldest.version}.2")] == []
 
 
 def _of(package: Requirement) -> list[str]:

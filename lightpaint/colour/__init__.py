@@ -28,6 +28,7 @@ if TYPE_CHECKING:
     from lightpaint.colour.color_difference import delta_e as delta_e
     from lightpaint.colour.color_difference import hue_name as hue_name
     from lightpaint.colour.color_difference import lab as lab
+    from lightpaint.colour.color_difference import lab_of_lights as lab_of_lights
     from lightpaint.colour.color_ranges import DIRECTIONS as DIRECTIONS
     from lightpaint.colour.color_ranges import ROUND_OFF as ROUND_OFF
     from lightpaint.colour.color_ranges import ColorHull as ColorHull
@@ -48,8 +49,10 @@ if TYPE_CHECKING:
     from lightpaint.colour.icc import srgb_profile as srgb_profile
     from lightpaint.colour.lamp import MAX_EMITTERS as MAX_EMITTERS
     from lightpaint.colour.lamp import MAX_SLOTS as MAX_SLOTS
+    from lightpaint.colour.lamp import OPAQUE as OPAQUE
     from lightpaint.colour.lamp import Lamp as Lamp
     from lightpaint.colour.lamp import LampEmitter as LampEmitter
+    from lightpaint.colour.lamp import SlotFilter as SlotFilter
     from lightpaint.colour.luminous_flux import Photometry as Photometry
     from lightpaint.colour.luminous_flux import lambertian_flux as lambertian_flux
     from lightpaint.colour.luminous_flux import photometry as photometry
@@ -88,4 +91,5 @@ if TYPE_CHECKING:
     from lightpaint.colour.srgb import encode_display as encode_display
     from lightpaint.colour.srgb import to_8_bit as to_8_bit
 
-__getattr__, __dir__, __all__ = lazy_names(__name__)
+if not TYPE_CHECKING:  # a type checker would take any name
+    __getattr__, __dir__, __all__ = lazy_names(__name__)

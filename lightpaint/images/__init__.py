@@ -49,4 +49,5 @@ if TYPE_CHECKING:
     from lightpaint.images.pixel_blocks import whole_factor as whole_factor
     from lightpaint.images.surface_filter import SurfaceFilter as SurfaceFilter
 
-__getattr__, __dir__, __all__ = lazy_names(__name__)
+if not TYPE_CHECKING:  # a type checker would take any name
+    __getattr__, __dir__, __all__ = lazy_names(__name__)

@@ -18,4 +18,5 @@ if TYPE_CHECKING:
     from lightpaint.paint.subject import places_path as places_path
     from lightpaint.paint.subject_factory import make_subjects as make_subjects
 
-__getattr__, __dir__, __all__ = lazy_names(__name__)
+if not TYPE_CHECKING:  # a type checker would take any name
+    __getattr__, __dir__, __all__ = lazy_names(__name__)

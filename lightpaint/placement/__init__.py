@@ -39,4 +39,5 @@ if TYPE_CHECKING:
     from lightpaint.placement.suggestion import MoveSuggestion as MoveSuggestion
     from lightpaint.placement.suggestion import Suggestion as Suggestion
 
-__getattr__, __dir__, __all__ = lazy_names(__name__)
+if not TYPE_CHECKING:  # a type checker would take any name
+    __getattr__, __dir__, __all__ = lazy_names(__name__)

@@ -47,4 +47,5 @@ if TYPE_CHECKING:
     from lightpaint.images.formats.png import write_png as write_png
     from lightpaint.images.formats.png import write_png_16 as write_png_16
 
-__getattr__, __dir__, __all__ = lazy_names(__name__)
+if not TYPE_CHECKING:  # a type checker would take any name
+    __getattr__, __dir__, __all__ = lazy_names(__name__)
