@@ -56,6 +56,8 @@ def test_every_public_name_is_there_and_seen_by_type_checkers():
     tree = ast.parse(Path(lp.__file__).read_text(encoding="utf-8"))
     names = {}
     for block in (node for node in tree.body if isinstance(node, ast.If)):
+        if not isinstance(block.test, ast.Name):
+            continue  # what type checkers leave out
         for line in block.body:
             assert isinstance(line, ast.ImportFrom)
             for name in line.names:

@@ -22,9 +22,10 @@ from lightpaint.lighting.normal_equations import NormalEquations
 MAX_ROUNDS = 100
 
 #: Rounds end at this change of a light's picture, relative to the brightest light's, or when the
-#: predicted decrease of a whole step is this share of the loss. Problems that become exact continue
-#: until they are.
-MIN_STEP, MIN_FALL = 1e-6, 1e-11
+#: predicted decrease of a whole step is one of these shares of the loss, and of the loss in the
+#: dark: where all paint is white, more light is always a little better. Problems that become exact
+#: continue until they are.
+MIN_STEP, MIN_FALL, MIN_FALL_OF_DARK = 1e-6, 1e-11, 1e-13
 
 #: Number of lights from which the sums of a round take so long that rounds keep the matrix of the
 #: last one where its step, as above, was at most this; and the step at which rounds that draw
@@ -185,7 +186,7 @@ def run_rounds(
     from_clipping = from_clipping and pixels.has_clipping
     is_curved = pixels.has_curvature and (from_clipping or not own_squares)
     w, x = start, lit.predicted(start)
-    value = total_loss(pixels, terms, w, x)
+    value, in_the_dark = total_loss(pixels, terms, w, x), _loss_in_the_dark(pixels, x)
     count, matrix, keeps_matrix = 0, None, lit.planes.count >= MANY_LIGHTS
     while True:
         kind = {"from_clipping": from_clipping, "is_curved": is_curved}
@@ -194,7 +195,9 @@ def run_rounds(
             known = SummedSquares(round_.image, round_.weight, round_.equations)
         count += 1
         is_first_part = keeps_matrix and from_clipping
-        done = round_.has_converged(pixels, x, value, max(until, CLIPPED_STEP * is_first_part))
+        least_fall = max(MIN_FALL * value, MIN_FALL_OF_DARK * in_the_dark)
+        least_step = max(until, CLIPPED_STEP * is_first_part)
+        done = round_.has_converged(pixels, x, least_fall, least_step)
         if matrix is not None and done and not is_first_part and until <= MIN_STEP:
             matrix, is_curved = None, False  # the last round is of the squares themselves
             continue
@@ -275,12 +278,14 @@ class _Round:
         fall = 2 * lit.slope(image, weight, x, ahead) + terms.fall(w, best)
         return cls(image, weight, equations, best, ahead, step, fall)
 
-    def has_converged(self, pixels: PixelLoss, x: Doubles, value: float, until: float) -> bool:
-        """Return whether its step from picture x, with loss `value`, ends the rounds."""
+    def has_converged(self, pixels: PixelLoss, x: Doubles, fall: float, until: float) -> bool:
+        """Return whether its step from picture x ends the rounds: one of at most `until`, or that
+        promises at most this fall.
+        """
         if pixels.has_pieces:
             # A problem that is exact along the whole step has the same optimum as the true one.
             return pixels.has_same_squares(x, self.ahead)
-        return self.step <= until or self.fall <= MIN_FALL * value
+        return self.step <= until or self.fall <= fall
 
 
 def relative_change(equations: NormalEquations, w: Doubles, best: Doubles) -> float:
@@ -296,6 +301,11 @@ def relative_change(equations: NormalEquations, w: Doubles, best: Doubles) -> fl
 def total_loss(pixels: PixelLoss, terms: WeightTerms, w: Doubles, x: Doubles) -> float:
     """Return the loss of a picture x, (3, p), with the terms in its weights, (n, 3)."""
     return float(pixels.objective(x).sum()) + terms.value(w)
+
+
+def _loss_in_the_dark(pixels: PixelLoss, x: Doubles) -> float:
+    """Return the loss of a black picture like x, (3, p)."""
+    return float(pixels.objective(np.zeros_like(x)).sum())
 
 
 def _line_search(
