@@ -5,7 +5,7 @@ import numpy as np
 from lightpaint.arrays import Doubles
 from lightpaint.errors import SceneError
 from lightpaint.files import one_line
-from lightpaint.luminaires.numbers_in_text import MAX_ANGLES, Numbers, check_rising, number
+from lightpaint.luminaires.lm63 import MAX_ANGLES, Numbers, check_rising, number
 from lightpaint.luminaires.web import Opening, PhotometricWeb, Symmetry, unfolded
 
 #: Symmetry by the number in the file (ISYM).

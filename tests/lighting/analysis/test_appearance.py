@@ -26,8 +26,7 @@ from lightpaint.lighting.constraints.constraints import Constraints
 from lightpaint.lighting.solve import solve
 from lightpaint.report.verdict import headline
 from lightpaint.scene.lights.texels.texel import texel_names
-from lightpaint.target.target import Target
-from lightpaint.target.wish import Wish
+from lightpaint.target.target import Target, Wish
 
 SIZE = (24, 48)
 
