@@ -17,7 +17,7 @@ from lightpaint.arrays import RGB, Bools, Doubles
 from lightpaint.basis.basis import Basis
 from lightpaint.colour import LUMINANCE
 from lightpaint.keywords import keywords
-from lightpaint.luminaires.plugin_names import POINT_PLUGIN
+from lightpaint.luminaires import POINT_PLUGIN
 from lightpaint.photometry.glare import Glare, GlareObserver, GlareSources, position_index
 from lightpaint.photometry.illuminance import Illuminance, PlaneReading
 from lightpaint.photometry.measure import DEFAULT_ERROR, measured_until, weights_on

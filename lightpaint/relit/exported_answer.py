@@ -18,7 +18,7 @@ from lightpaint.basis.lightgroups.light_groups import LightGroups
 from lightpaint.colour import photometry
 from lightpaint.errors import LightpaintError
 from lightpaint.lighting.answer.lighting import Lighting
-from lightpaint.luminaires.plugin_names import FULL
+from lightpaint.luminaires import FULL
 from lightpaint.progress import Listener
 from lightpaint.relit.emission_xml import safe_name
 from lightpaint.relit.export.nuke import NukeLight, RigKind

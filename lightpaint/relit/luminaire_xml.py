@@ -8,10 +8,9 @@ import numpy as np
 
 from lightpaint.arrays import RGB, Doubles
 from lightpaint.display_text import some_names
+from lightpaint.luminaires import AREA_PLUGIN, POINT_PLUGIN
 from lightpaint.luminaires.luminaire_request import NUMBER_KEYS
-from lightpaint.luminaires.plugin_names import AREA_PLUGIN, POINT_PLUGIN
-from lightpaint.luminaires.spot_sum import SpotPart, spots_of
-from lightpaint.luminaires.web_frame import EMITTER_FROM_WEB, world_from_web
+from lightpaint.luminaires.web import EMITTER_FROM_WEB, SpotPart, spots_of, world_from_web
 from lightpaint.relit.emission_xml import spectrum_text
 from lightpaint.scene.checks.tokens import tag
 from lightpaint.scene.lights.emitters import Emitter

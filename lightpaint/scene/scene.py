@@ -17,7 +17,7 @@ from lightpaint.arrays import RGB, Floats, Position
 from lightpaint.colour import EYE, Lamp, Observer
 from lightpaint.display_text import Listed, Shown, some_of
 from lightpaint.keywords import keywords
-from lightpaint.luminaires.plugin_names import LUMINAIRE_PLUGINS
+from lightpaint.luminaires import LUMINAIRE_PLUGINS
 from lightpaint.scene.lights.emitters import Emitter, find_emitters
 from lightpaint.scene.lights.hung_luminaires import HungLuminaire
 from lightpaint.scene.lights.image_split import with_split

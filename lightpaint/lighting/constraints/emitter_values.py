@@ -27,7 +27,7 @@ from lightpaint.colour import (
 from lightpaint.errors import ColorError, ConstraintError
 from lightpaint.files import one_line
 from lightpaint.lighting.constraints.values import check_keys
-from lightpaint.luminaires.plugin_names import FULL
+from lightpaint.luminaires import FULL
 from lightpaint.sentences import Hint, SourceKey
 from lightpaint.validation import BRIGHTEST, MAX_NAME, is_number
 
