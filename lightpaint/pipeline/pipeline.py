@@ -49,8 +49,7 @@ from lightpaint.progress import (
     spoken_duration,
     stage,
 )
-from lightpaint.relit.detection_power import LightShares, with_light_tests
-from lightpaint.relit.verification import Verification
+from lightpaint.relit.verification import LightShares, Verification, with_light_tests
 from lightpaint.relit.verification_render import (
     SPECTRAL_DOUBLINGS,
     VerificationBudget,

@@ -20,7 +20,7 @@ from lightpaint.files import write_bytes
 from lightpaint.images.formats import write_rgb
 from lightpaint.keywords import keywords
 from lightpaint.lighting.answer.lighting import Lighting
-from lightpaint.relit.luminaire_xml import written_emission
+from lightpaint.relit.emission_xml import written_emission
 from lightpaint.relit.relit_files import relit_files, settings_of
 from lightpaint.scene.checks.tokens import tag
 from lightpaint.scene.lights.image_split import with_split

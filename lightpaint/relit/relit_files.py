@@ -9,8 +9,14 @@ import numpy as np
 
 from lightpaint.arrays import RGB, Doubles, Floats
 from lightpaint.errors import OutputError, SceneError
-from lightpaint.relit.emission_xml import Changes, set_emission, set_image, set_spectrum
-from lightpaint.relit.luminaire_xml import luminaire_of, luminaire_xml
+from lightpaint.relit.emission_xml import (
+    Changes,
+    luminaire_of,
+    luminaire_xml,
+    set_emission,
+    set_image,
+    set_spectrum,
+)
 from lightpaint.relit.xml_edit import XmlFile
 from lightpaint.scene.checks.tokens import tag
 from lightpaint.scene.lights.emitters import Emitter

@@ -29,21 +29,19 @@ from lightpaint.lighting.answer.lighting import Lighting
 from lightpaint.lighting.joined_views import joint_estimate
 from lightpaint.lighting.solution import Solution
 from lightpaint.progress import Progress, silent
-from lightpaint.relit.detection_power import (
-    LightShares,
-    detection_power,
-    light_tests,
-    with_light_tests,
-)
 from lightpaint.relit.relight import relight
 from lightpaint.relit.verification import (
     LIMIT,
     LOW_POWER,
+    LightShares,
     Verification,
     compare,
+    detection_power,
     differences,
     largest_difference,
+    light_tests,
     limit_of_tests,
+    with_light_tests,
 )
 from lightpaint.scene.lights.hung_luminaires import luminaire_of_spot
 from lightpaint.scene.lights.texels.texel import image_of

@@ -23,8 +23,7 @@ from lightpaint.lighting.analysis.noise.uncertainty import Uncertainty
 from lightpaint.lighting.answer.lighting import Lighting
 from lightpaint.lighting.solution import Solution
 from lightpaint.placement.suggestion import MoveSuggestion, Suggestion
-from lightpaint.relit.detection_power import ERROR
-from lightpaint.relit.verification import Verification
+from lightpaint.relit.verification import ERROR, Verification
 from lightpaint.report.answer_pictures import (
     Residual,
     brighter_than_white,

@@ -18,8 +18,7 @@ from lightpaint.lighting.analysis.appearance.limiting_reasons import Reason
 from lightpaint.lighting.analysis.appearance.pixel_sample import LimitGroup
 from lightpaint.lighting.analysis.noise.uncertainty import error_bars
 from lightpaint.lighting.solution import Solution
-from lightpaint.relit.detection_power import ERROR
-from lightpaint.relit.verification import Verification
+from lightpaint.relit.verification import ERROR, Verification
 from lightpaint.report.delivery_sentences import (
     ALONE_ADVICE,
     REACH_ADVICE,

@@ -11,11 +11,11 @@ from lightpaint.cli.output.console_monitor import LINE_S, ConsoleMonitor
 from lightpaint.cli.output.lines import CommandOutcome, output_mode
 from lightpaint.display_text import some_names
 from lightpaint.dmx.console_rig import ConsoleRig
+from lightpaint.dmx.levels import RigDrives, check_drives, drives_of
 from lightpaint.dmx.network.console_link import PRIORITY, ConsoleLink
 from lightpaint.dmx.network.console_receiver import LOOPBACK, ConsoleReceiver
 from lightpaint.dmx.network.console_target import PROTOCOLS, network_universes
 from lightpaint.dmx.pan_tilt import aimed_rig, directions_of
-from lightpaint.dmx.rig_drives import RigDrives, check_drives, drives_of
 from lightpaint.errors import ConsoleError, LightingError, OutputError
 from lightpaint.files import check_files, check_writable, write_text
 from lightpaint.lighting.answer.lighting import Lighting

@@ -13,7 +13,7 @@ from lightpaint.dmx.console_rig import ConsoleRig
 from lightpaint.dmx.pan_tilt import aimed_rig, directions_of
 from lightpaint.errors import LightingError
 from lightpaint.paint import SESSION_FILE, read_kept_looks
-from lightpaint.relit.export.cue_list import Cue, cue_list_csv
+from lightpaint.relit.export.level_table import Cue, cue_list_csv
 from lightpaint.scene.properties.site import unit
 
 

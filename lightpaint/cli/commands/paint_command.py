@@ -77,7 +77,7 @@ def paint(
     fixtures = None
     if console is not None:
         from lightpaint.cli.commands.console_commands import read_rig_file
-        from lightpaint.dmx.rig_drives import check_lamps
+        from lightpaint.dmx.levels import check_lamps
 
         fixtures = read_rig_file(console["rig"])
     subjects = make_subjects(

@@ -8,12 +8,14 @@ from lightpaint.cli.output.lines import CommandOutcome
 from lightpaint.cli.output.vocabulary import spoken
 from lightpaint.dmx.console_rig import address_text
 from lightpaint.dmx.mvr import KindSummary, Show, read_show
-from lightpaint.dmx.rig_room import RoomFiles, room_of_scene, room_of_show
 from lightpaint.dmx.rig_scene import (
     Room,
+    RoomFiles,
     cd_per_unit,
     lights_of,
     lights_text,
+    room_of_scene,
+    room_of_show,
     scene_text,
     spectrum_tables,
 )

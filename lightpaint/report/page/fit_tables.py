@@ -16,8 +16,7 @@ from lightpaint.lighting.analysis.appearance.delivery import spoken_share
 from lightpaint.lighting.answer.certificate import Software, version
 from lightpaint.lighting.loss.painting import ignored_paint
 from lightpaint.lighting.solution import Solution
-from lightpaint.relit.detection_power import ERROR
-from lightpaint.relit.verification import Verification, limit_of_tests
+from lightpaint.relit.verification import ERROR, Verification, limit_of_tests
 from lightpaint.report.delivery_sentences import is_unnamed, wish_name
 from lightpaint.report.diagnosis_sentences import partly_reached
 from lightpaint.report.measures import (
