@@ -9,8 +9,7 @@ import numpy as np
 
 from lightpaint.arrays import Bools, Doubles, Indices
 from lightpaint.scene.lights.texels.image_domains import DOMAINS, GridSize, ImageDomain, domain_of
-from lightpaint.scene.lights.texels.texel import image_of, layouts_of, node_name
-from lightpaint.scene.lights.texels.texel_layout import TexelLayout
+from lightpaint.scene.lights.texels.texel import TexelLayout, image_of, layouts_of, node_name
 
 #: The middle of a phrase for several texels of an image.
 TEXELS = " texels of "

@@ -160,7 +160,7 @@ def _with_spectra(scene: Scene, *, settings: Settings, constraints: Constraints)
     """
     if not settings.spectral:
         return scene
-    from lightpaint.pipeline.job.spectral_job import (
+    from lightpaint.pipeline.job.sources import (
         check_spectral,
         observer_of,
         spectral_scene,

@@ -13,8 +13,7 @@ from lightpaint.lighting.wishes.planes_answer import PlanesAnswer, planes_answer
 from lightpaint.lighting.wishes.wished_light import check_powers
 from lightpaint.pipeline.job.settings import Settings
 from lightpaint.pipeline.results.answer_folder import answer_files
-from lightpaint.pipeline.results.planes_folder import files_of_planes
-from lightpaint.pipeline.results.result_folder import ResultFolder
+from lightpaint.pipeline.results.result_folder import ResultFolder, files_of_planes
 from lightpaint.pipeline.wished_planes import (
     MeasuredPlanes,
     constraints_for_planes,

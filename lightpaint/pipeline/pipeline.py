@@ -23,7 +23,7 @@ from lightpaint.pipeline.job.job import Job, PaintedView
 from lightpaint.pipeline.job.settings import Settings
 from lightpaint.pipeline.job_bases import obtain_bases_of, problem_of, view_listener, without_noise
 from lightpaint.pipeline.needed_samples import add_needed_samples
-from lightpaint.pipeline.placed_lights import place_lights, suggest_move
+from lightpaint.pipeline.placed_lights import find_suns, place_lights, suggest_move
 from lightpaint.pipeline.results.answer_folder import (
     LIGHTING,
     AnswerFolder,
@@ -31,9 +31,8 @@ from lightpaint.pipeline.results.answer_folder import (
     reload_relit,
     with_places,
 )
-from lightpaint.pipeline.results.planes_folder import write_planes
+from lightpaint.pipeline.results.result_folder import write_planes
 from lightpaint.pipeline.results.results import Look, write_predicted, write_report
-from lightpaint.pipeline.sun_search import find_suns
 from lightpaint.pipeline.wished_planes import (
     MeasuredPlanes,
     answer_on_planes,
@@ -61,7 +60,7 @@ from lightpaint.relit.verification_render import (
 from lightpaint.report.basis_memo import make_ahead
 from lightpaint.report.page.page import prepare_page
 from lightpaint.scene.scene import Scene
-from lightpaint.scene.surface_spectra import render_reflectances
+from lightpaint.scene.surfaces import render_reflectances
 from lightpaint.sentences import Hint, Sentence, Word
 
 #: Advice on stages that every answer needs.

@@ -14,6 +14,7 @@ from lightpaint.images import block_mean, enlarged, whole_factor
 from lightpaint.lighting.analysis.appearance.appearance import Appearance, compare_appearance
 from lightpaint.lighting.solution import Solution
 from lightpaint.report.answer_pictures import (
+    CleanLooks,
     Residual,
     diverging,
     report_transform,
@@ -22,7 +23,6 @@ from lightpaint.report.answer_pictures import (
     spoken_view,
     target_picture,
 )
-from lightpaint.report.clean_pictures import CleanLooks
 from lightpaint.report.phrases import spoken_progress
 from lightpaint.target.target import Target
 

@@ -19,7 +19,7 @@ from lightpaint.lighting.analysis.appearance.pixel_sample import LimitGroup
 from lightpaint.lighting.analysis.noise.uncertainty import error_bars
 from lightpaint.lighting.solution import Solution
 from lightpaint.relit.verification import ERROR, Verification
-from lightpaint.report.delivery_sentences import (
+from lightpaint.report.diagnosis_sentences import (
     ALONE_ADVICE,
     REACH_ADVICE,
     SAMPLES_ADVICE,

@@ -16,8 +16,7 @@ from lightpaint.lighting.loss import weight_penalty
 from lightpaint.lighting.loss.weight_penalty import image_prior
 from lightpaint.lighting.solve import solve
 from lightpaint.scene.lights.texels.image_domains import solid_angles
-from lightpaint.scene.lights.texels.texel import mirrored_pairs, texel_names
-from lightpaint.scene.lights.texels.texel_layout import TexelLayout
+from lightpaint.scene.lights.texels.texel import TexelLayout, mirrored_pairs, texel_names
 from lightpaint.target.target import Target
 
 FREE = Fit(colors="free")

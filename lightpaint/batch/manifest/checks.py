@@ -8,9 +8,15 @@ from pathlib import Path
 from typing import Any
 
 from lightpaint.batch.manifest.file_names import files_matching
-from lightpaint.batch.manifest.keys import SOURCE_KEYS, SUBJECT_KEYS, Handover, Mistakes, near_key
+from lightpaint.batch.manifest.keys import (
+    SOLVED_WORDS,
+    SOURCE_KEYS,
+    SUBJECT_KEYS,
+    Handover,
+    Mistakes,
+    near_key,
+)
 from lightpaint.batch.manifest.manifest import Manifest, Table, subject_keys
-from lightpaint.batch.manifest.variations import SOLVED_WORDS
 from lightpaint.display_text import some_names
 from lightpaint.errors import LightpaintError
 from lightpaint.files import is_name

@@ -14,9 +14,8 @@ from lightpaint.basis.render.integrators import why_not_one_pass
 from lightpaint.basis.render.render_origin import basis_lights
 from lightpaint.batch.manifest.entries import LookEntry, entries_of
 from lightpaint.batch.manifest.file_names import check_gallery
-from lightpaint.batch.manifest.keys import Mistakes, as_key
+from lightpaint.batch.manifest.keys import Mistakes, as_key, vary
 from lightpaint.batch.manifest.manifest import Manifest, read_manifest
-from lightpaint.batch.manifest.variations import vary
 from lightpaint.batch.plan.journal import Fingerprints, Journal
 from lightpaint.batch.plan.plan import (
     Cost,

@@ -12,9 +12,8 @@ from lightpaint.basis.lightgroups.light_groups import LightGroups
 from lightpaint.basis.lights import Lights
 from lightpaint.basis.render.basis_render import train_guide
 from lightpaint.basis.render.one_pass_basis import basis_of_sums
-from lightpaint.batch.manifest.keys import Space, as_key
+from lightpaint.batch.manifest.keys import Space, as_key, shift
 from lightpaint.batch.manifest.sequence import interpolate
-from lightpaint.batch.manifest.variations import shift
 from lightpaint.batch.work.derived_looks import (
     derived_folder,
     dimmer_lights,

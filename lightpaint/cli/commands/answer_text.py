@@ -38,7 +38,6 @@ from lightpaint.report.diagnosis_sentences import (
     unreached_channels,
     untold_lights,
 )
-from lightpaint.report.glare_text import GLARE_HEADINGS, glare_rows
 from lightpaint.report.measures import energy_shares
 from lightpaint.report.page.constraint_section import closer_choice
 from lightpaint.report.phrases import (
@@ -48,7 +47,14 @@ from lightpaint.report.phrases import (
     spoken_preference,
     spoken_wheels,
 )
-from lightpaint.report.planes_text import HEADINGS, glare_by_title, plane_rows, planes_sentences
+from lightpaint.report.planes_text import (
+    GLARE_HEADINGS,
+    HEADINGS,
+    glare_by_title,
+    glare_rows,
+    plane_rows,
+    planes_sentences,
+)
 from lightpaint.sentences import Sentence, SourceKey
 
 Table = Literal["short", "full"]

@@ -48,19 +48,17 @@ from lightpaint.paint.session.history import History
 from lightpaint.paint.session.live_answer import LiveAnswer
 from lightpaint.paint.store.history_steps import Region
 from lightpaint.paint.store.session_requests import HOLD_KEYS
-from lightpaint.report.delivery_sentences import (
-    ALONE_ADVICE,
-    is_one_painting,
-    named_worst_wish,
-    spoken_deliveries,
-    spoken_newest,
-)
 from lightpaint.report.diagnosis_sentences import (
+    ALONE_ADVICE,
     NO_ERROR,
     bound_sentences,
     compensation_sentences,
     hold_clause,
+    is_one_painting,
+    named_worst_wish,
+    spoken_deliveries,
     spoken_errors,
+    spoken_newest,
     spoken_shares,
 )
 from lightpaint.report.phrases import (

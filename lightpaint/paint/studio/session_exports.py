@@ -25,7 +25,7 @@ from lightpaint.pipeline.results.answer_folder import LIGHTING, RELIT, write_ans
 from lightpaint.progress import Progress
 from lightpaint.relit.relight import relight
 from lightpaint.relit.verification_render import verify_in_stages
-from lightpaint.report.clean_pictures import CleanLooks
+from lightpaint.report.answer_pictures import CleanLooks
 from lightpaint.report.verdict import spoken_distance
 from lightpaint.scene.scene_reader import load_scene
 from lightpaint.target.painting_file import write_painting

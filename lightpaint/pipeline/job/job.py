@@ -56,12 +56,13 @@ from lightpaint.pipeline.job.sources import (
     PlacementFile,
     SceneFile,
     check_nothing_unused,
+    check_spectral,
     content,
+    observer_of,
+    spectral_scene,
 )
-from lightpaint.pipeline.job.spectral_job import check_spectral, observer_of, spectral_scene
 from lightpaint.pipeline.results.answer_folder import answer_files
-from lightpaint.pipeline.results.planes_folder import files_of_planes
-from lightpaint.pipeline.results.result_folder import ResultFolder
+from lightpaint.pipeline.results.result_folder import ResultFolder, files_of_planes
 from lightpaint.pipeline.results.results import (
     SOLVE_RESULTS,
     VIEW_RESULTS,

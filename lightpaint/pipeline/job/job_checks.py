@@ -19,8 +19,7 @@ from lightpaint.pipeline.job.settings import Settings
 from lightpaint.pipeline.job.sources import Painting, content
 from lightpaint.placement import Rigging, check_rigging, rigged_lights, rigging_of
 from lightpaint.scene.lights.texels.image_domains import DOMAINS, Sky
-from lightpaint.scene.lights.texels.texel import mirrored_pairs, node_name
-from lightpaint.scene.lights.texels.texel_layout import CHILDREN
+from lightpaint.scene.lights.texels.texel import CHILDREN, mirrored_pairs, node_name
 from lightpaint.scene.scene import Scene
 from lightpaint.sentences import Hint, Sentence
 from lightpaint.target.target import Target

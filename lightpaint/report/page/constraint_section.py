@@ -13,8 +13,8 @@ from lightpaint.images import block_mean, denoised
 from lightpaint.lighting.analysis.appearance.color_choices import Choices, ColorChoice
 from lightpaint.lighting.fit import Colors
 from lightpaint.lighting.solution import Solution
+from lightpaint.report.answer_pictures import CleanLooks
 from lightpaint.report.basis_memo import ROWS_SHOWN, SPARE_ROWS
-from lightpaint.report.clean_pictures import CleanLooks
 from lightpaint.report.measures import relative_residual
 from lightpaint.report.page.figures import PagePicture, figure
 from lightpaint.report.page.html import html

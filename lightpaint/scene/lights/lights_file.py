@@ -22,8 +22,7 @@ from lightpaint.luminaires.luminaire_request import (
     luminaires_in,
 )
 from lightpaint.scene.lights.texels.image_domains import GridSize
-from lightpaint.scene.lights.texels.texel import image_of, parse_size
-from lightpaint.scene.lights.texels.texel_layout import TexelLayout
+from lightpaint.scene.lights.texels.texel import TexelLayout, image_of, parse_size
 from lightpaint.storage.json_records import strict_toml
 from lightpaint.validation import BRIGHTEST, MAX_LISTED, MAX_NAME, is_number
 

@@ -19,7 +19,7 @@ from lightpaint.arrays import Floats
 from lightpaint.scene.lights.emitters import Emitter
 from lightpaint.scene.lights.image_split import even_image
 from lightpaint.scene.lights.texels.image_domains import FlatDomain, ImageDomain, Sky
-from lightpaint.scene.lights.texels.texel_layout import RATIO, TexelLayout
+from lightpaint.scene.lights.texels.texel import RATIO, TexelLayout
 from lightpaint.scene.scene import Scene
 
 #: Number of a texel where there is none.
