@@ -37,7 +37,7 @@ from lightpaint.lighting.unknowns.gamuts import Gamuts
 from lightpaint.lighting.unknowns.reduction import Reduction, reduce_to
 from lightpaint.lighting.unknowns.slot_search import improve_slots
 from lightpaint.sentences import Hint, Word
-from lightpaint.target.target import Target, titled
+from lightpaint.target import Target, titled
 
 
 class LinearProblem:

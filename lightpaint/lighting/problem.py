@@ -41,7 +41,7 @@ from lightpaint.lighting.normal_equations import NormalEquations
 from lightpaint.lighting.unknowns.gamuts import Gamuts, PaintedLight
 from lightpaint.lighting.unknowns.reduction import Reduction
 from lightpaint.lighting.unknowns.white_mixes import tangent_reduction
-from lightpaint.target.target import Target
+from lightpaint.target import Target
 
 #: Largest relative error of one rounding to float16 and to float32.
 HALF_ROUND_OFF, SINGLE_ROUND_OFF = 2.0**-11, 2.0**-24

@@ -20,7 +20,7 @@ from lightpaint.placement import Rigging
 from lightpaint.progress import Progress, silent
 from lightpaint.scene.scene import Scene
 from lightpaint.sentences import Hint, Sentence
-from lightpaint.target.target import Target
+from lightpaint.target import Target
 
 AnyScene = str | Path | Scene
 AnyTarget = str | Path | Target

@@ -34,7 +34,7 @@ from lightpaint.scene.quality_presets import on_film
 from lightpaint.scene.scene import Scene
 from lightpaint.scene.scene_render import Stream, render
 from lightpaint.scene.surfaces import render_features
-from lightpaint.target.template import texts_of
+from lightpaint.target import texts_of
 
 #: EXR layer of a final render without its noise.
 DENOISED = "denoised"

@@ -26,7 +26,7 @@ from lightpaint.scene.quality_presets import Preset
 from lightpaint.scene.scene import Scene
 from lightpaint.scene.scene_render import Stream, render
 from lightpaint.scene.surfaces import render_features, render_surfaces
-from lightpaint.target.template import LIGHTS, SHOWN_FILE, Template, write_look, write_template
+from lightpaint.target import LIGHTS, SHOWN_FILE, Template, write_look, write_template
 
 #: Rendering of the small picture of each light, to recognise it by.
 THUMBNAIL = Preset(32, 2**14)

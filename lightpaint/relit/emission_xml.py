@@ -15,9 +15,15 @@ from lightpaint.arrays import RGB, Doubles, Floats
 from lightpaint.colour import WAVELENGTHS
 from lightpaint.display_text import some_names
 from lightpaint.errors import SceneError
-from lightpaint.luminaires import AREA_PLUGIN, POINT_PLUGIN
-from lightpaint.luminaires.luminaire_request import NUMBER_KEYS
-from lightpaint.luminaires.web import EMITTER_FROM_WEB, SpotPart, spots_of, world_from_web
+from lightpaint.luminaires import (
+    AREA_PLUGIN,
+    EMITTER_FROM_WEB,
+    NUMBER_KEYS,
+    POINT_PLUGIN,
+    SpotPart,
+    spots_of,
+    world_from_web,
+)
 from lightpaint.relit.xml_edit import Element, XmlFile
 from lightpaint.scene.checks.tokens import tag
 from lightpaint.scene.lights.emitters import Emitter

@@ -28,7 +28,7 @@ from lightpaint.images import (
 )
 from lightpaint.lighting.solution import Solution
 from lightpaint.report.basis_memo import cached_clean_planes
-from lightpaint.target.target import Target
+from lightpaint.target import Target
 
 #: Conversion of a band of display values into its final form.
 Finish = Callable[[Floats], npt.NDArray[Any]]

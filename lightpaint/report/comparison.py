@@ -24,7 +24,7 @@ from lightpaint.report.answer_pictures import (
     target_picture,
 )
 from lightpaint.report.phrases import spoken_progress
-from lightpaint.target.target import Target
+from lightpaint.target import Target
 
 #: Narrower images are enlarged, pixel by pixel, until their captions can be read, unless they would
 #: become higher than that; what they lack in width is grey then.

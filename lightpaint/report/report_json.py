@@ -48,7 +48,7 @@ from lightpaint.report.page.rendering_section import rendering_numbers
 from lightpaint.report.planes_text import planes_numbers
 from lightpaint.report.reported_answer import ReportedAnswer
 from lightpaint.report.rig.hung_lights import placement_numbers
-from lightpaint.target.target import Target
+from lightpaint.target import Target
 from lightpaint.version import __version__
 
 FORMAT = "lightpaint-report 1"

@@ -15,7 +15,7 @@ from lightpaint.lighting.wishes.planes_answer import PlanesAnswer
 from lightpaint.placement.suggestion import MoveSuggestion, Suggestion
 from lightpaint.relit.verification import Verification
 from lightpaint.report.rig.hung_lights import HungLights
-from lightpaint.target.target import Target
+from lightpaint.target import Target
 
 
 @dataclass(frozen=True, kw_only=True)

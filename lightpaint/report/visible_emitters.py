@@ -14,7 +14,7 @@ from lightpaint.lighting.loss.painting import ignored_paint
 from lightpaint.lighting.solution import Solution
 from lightpaint.scene.lights.texels.texel import image_of
 from lightpaint.sentences import Hint, Sentence, Word
-from lightpaint.target.target import Target
+from lightpaint.target import Target
 
 #: Ratio to the painted brightness from which an emitter that does not count is worth a warning.
 MIN_RATIO = 4.0

@@ -25,7 +25,7 @@ from lightpaint.relit.formats import FORMS
 from lightpaint.scene.limits import MAX_SPP
 from lightpaint.scene.properties.film import check_resolution
 from lightpaint.sentences import Datum, Hint, Sentence
-from lightpaint.target.target_reader import Paint
+from lightpaint.target import Paint
 from lightpaint.validation import BRIGHTEST, MAX_LISTED, SWITCH, Check, a, checks_of, one_of, whole
 
 #: Variations that are solved.

@@ -38,7 +38,7 @@ from lightpaint.scene.quality_presets import on_film
 from lightpaint.scene.runtime.render_lock import tracing
 from lightpaint.scene.scene import Scene
 from lightpaint.scene.scene_render import Stream, pass_sum, passes_of
-from lightpaint.target.target import Target
+from lightpaint.target import Target
 from lightpaint.version import __version__
 
 #: Seconds after which leftover parts of a basis are deleted.

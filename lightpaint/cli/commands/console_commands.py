@@ -10,12 +10,23 @@ from lightpaint.cli.options.console_options import RigFile, Sending
 from lightpaint.cli.output import lines, terminal
 from lightpaint.cli.output.lines import CommandOutcome, output_mode
 from lightpaint.display_text import some_names, some_of
-from lightpaint.dmx.console_rig import ConsoleRig, RigFixture, address_text
-from lightpaint.dmx.levels import RigDrives, check_drives, decode_levels, drives_of
-from lightpaint.dmx.network.console_link import PRIORITY, ConsoleLink
-from lightpaint.dmx.network.console_receiver import LOOPBACK, ConsoleReceiver
-from lightpaint.dmx.network.console_target import PROTOCOLS, network_universes
-from lightpaint.dmx.pan_tilt import aimed_rig, directions_of
+from lightpaint.dmx import (
+    LOOPBACK,
+    PRIORITY,
+    PROTOCOLS,
+    ConsoleLink,
+    ConsoleReceiver,
+    ConsoleRig,
+    RigDrives,
+    RigFixture,
+    address_text,
+    aimed_rig,
+    check_drives,
+    decode_levels,
+    directions_of,
+    drives_of,
+    network_universes,
+)
 from lightpaint.errors import ConsoleError, LightingError, OutputError
 from lightpaint.files import check_files, check_writable, write_text
 from lightpaint.lighting.answer.lighting import Lighting
@@ -42,7 +53,7 @@ LINE_S = 0.2
 
 def read_rig_file(rig: RigFile) -> ConsoleRig:
     """Return a rig. Raises RigError for anything else than an MVR with fixtures."""
-    from lightpaint.dmx.mvr import read_rig
+    from lightpaint.dmx import read_rig
 
     # The colours of lights are those of the scene and its lights file.
     return read_rig(rig.path, gdtf_folder=rig.gdtf, pixels=rig.pixels, usual_colors=True)

@@ -19,8 +19,7 @@ from lightpaint.cli.commands import console_commands
 from lightpaint.cli.options.console_options import RigFile
 from lightpaint.cli.output import documents, terminal
 from lightpaint.cli.output.lines import CommandOutcome
-from lightpaint.dmx.console_rig import ConsoleRig
-from lightpaint.dmx.pan_tilt import aimed_rig, directions_of
+from lightpaint.dmx import ConsoleRig, aimed_rig, directions_of
 from lightpaint.errors import LightingError, LightpaintError, OutputError
 from lightpaint.files import check_files, check_writable, write_bytes
 from lightpaint.lighting.answer.lighting import Lighting

@@ -48,14 +48,7 @@ from lightpaint.scene.runtime.variant import use_variant
 from lightpaint.scene.scene import Scene
 from lightpaint.sentences import Sentence
 from lightpaint.storage.staging import finish
-from lightpaint.target.template import (
-    CLEAN,
-    LIGHT_FILE,
-    LIGHTS,
-    MATTES,
-    SHOWN_FILE,
-    files_in_the_way,
-)
+from lightpaint.target import CLEAN, LIGHT_FILE, LIGHTS, MATTES, SHOWN_FILE, files_in_the_way
 
 
 def lights(

@@ -19,8 +19,7 @@ from lightpaint.basis.derived_planes import block_means
 from lightpaint.basis.planes import Planes
 from lightpaint.colour import luminance
 from lightpaint.images import block_sums
-from lightpaint.target.target import Target, Wish
-from lightpaint.target.wish_finding import extend_saturated, split_wishes
+from lightpaint.target import Target, Wish, extend_saturated, split_wishes
 from lightpaint.threads import one_thread
 
 #: Approximate number of blocks of pixels over which the light of a painting is compared.

@@ -15,7 +15,7 @@ from lightpaint.lighting.loss.loss import Loss, Squares
 from lightpaint.lighting.loss.paint_on_emitters import dark_threshold, find_glow_paint
 from lightpaint.lighting.loss.painting_loss import PaintingLoss
 from lightpaint.sentences import Hint, Word
-from lightpaint.target.target import Target
+from lightpaint.target import Target
 
 
 def literal_squares(

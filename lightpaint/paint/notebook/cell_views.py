@@ -32,7 +32,7 @@ from lightpaint.report.answer_pictures import target_picture
 from lightpaint.report.page.figures import data_uri
 from lightpaint.report.page.html import html
 from lightpaint.report.page.mixer import mixer_assets, mixer_html
-from lightpaint.target.target import Target
+from lightpaint.target import Target
 from lightpaint.viewer.bundle import styles
 
 #: Maximum number of pixels in all planes of the mixer: with their scripts these stay below 400 kB.

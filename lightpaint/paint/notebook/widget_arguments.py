@@ -26,7 +26,7 @@ from lightpaint.pipeline.job.settings import Settings
 from lightpaint.scene.scene import Scene
 from lightpaint.scene.scene_reader import load_scene
 from lightpaint.sentences import Datum, Remedy
-from lightpaint.target.target import PASS_RESIZE, Target
+from lightpaint.target import PASS_RESIZE, Target
 
 #: Types that can be painted.
 Paintable = Basis | Scene | LightGroups | str | Path

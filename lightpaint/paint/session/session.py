@@ -59,7 +59,7 @@ from lightpaint.paint.store.history_steps import Pixels
 from lightpaint.paint.store.session_requests import SessionRequests
 from lightpaint.paint.store.store import Store, StoredComposition
 from lightpaint.pipeline.job.settings import Settings
-from lightpaint.target.target import Target
+from lightpaint.target import Target
 
 
 class Session:

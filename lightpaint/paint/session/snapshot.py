@@ -31,7 +31,7 @@ from lightpaint.paint.session.picture_table import Picture, display_thumbnail
 from lightpaint.paint.session.session_messages import preview_text, why_not_closer
 from lightpaint.paint.store.session_requests import SessionRequests
 from lightpaint.pipeline.job.settings import Settings
-from lightpaint.target.target import Target
+from lightpaint.target import Target
 
 
 @dataclass(frozen=True)

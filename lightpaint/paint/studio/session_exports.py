@@ -28,8 +28,7 @@ from lightpaint.relit.verification_render import verify_in_stages
 from lightpaint.report.answer_pictures import CleanLooks
 from lightpaint.report.verdict import spoken_distance
 from lightpaint.scene.scene_reader import load_scene
-from lightpaint.target.painting_file import write_painting
-from lightpaint.target.template import texts_of
+from lightpaint.target import texts_of, write_painting
 
 #: Folder of the report, in that of the session.
 ANSWER_FOLDER = "answer"

@@ -75,7 +75,7 @@ from lightpaint.relit.export.nuke import spoken_unreadable
 from lightpaint.scene.quality_presets import on_film
 from lightpaint.scene.scene import Scene
 from lightpaint.sentences import Hint, Sentence
-from lightpaint.target.target import Target
+from lightpaint.target import Target
 from lightpaint.threads import parallel_map
 
 #: A basis, or light groups of another renderer, in memory or in a file.

@@ -22,7 +22,7 @@ from lightpaint.scene.lights.texels.image_domains import DOMAINS, Sky
 from lightpaint.scene.lights.texels.texel import CHILDREN, mirrored_pairs, node_name
 from lightpaint.scene.scene import Scene
 from lightpaint.sentences import Hint, Sentence
-from lightpaint.target.target import Target
+from lightpaint.target import Target
 
 #: Emitters that shine from all directions.
 SKY_PLUGINS = [plugin for plugin, domain in DOMAINS.items() if isinstance(domain, Sky)]

@@ -9,7 +9,7 @@ from lightpaint.scene.quality_presets import PRESETS
 from lightpaint.scene.runtime.variant import use_variant
 from lightpaint.scene.scene import Scene
 from lightpaint.sentences import Hint, Sentence, Word
-from lightpaint.target.target import Target
+from lightpaint.target import Target
 
 #: Bytes of memory above which a basis gets a remark.
 MUCH_MEMORY = 2e9

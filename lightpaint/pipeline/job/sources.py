@@ -28,8 +28,7 @@ from lightpaint.scene.lights.light import part_name
 from lightpaint.scene.scene import Scene
 from lightpaint.scene.scene_reader import load_scene
 from lightpaint.sentences import Hint, Sentence
-from lightpaint.target.target import Target
-from lightpaint.target.target_reader import Paint, read_over_look, read_target
+from lightpaint.target import Paint, Target, read_over_look, read_target
 
 #: Settings of sampling, of rendering, and those that light groups do not support.
 SAMPLING_SETTINGS = ("spp", "exact_spp", "time_s", "error", "quality", "resolution")

@@ -50,7 +50,7 @@ from lightpaint.scene.scene_render import Stream
 from lightpaint.scene.surfaces import render_features
 from lightpaint.storage.json_records import read_record, strict_json
 from lightpaint.storage.staging import finish
-from lightpaint.target.target import Target
+from lightpaint.target import Target
 
 #: Header attribute of predicted.exr: the sensor, film and samples of the basis.
 VIEW_KEY = "lightpaint.view"

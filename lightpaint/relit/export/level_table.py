@@ -9,9 +9,16 @@ from dataclasses import astuple, dataclass, fields
 from typing import Any, Literal
 
 from lightpaint.arrays import Position
-from lightpaint.dmx.console_rig import ConsoleRig, DmxChannel, RigFixture, RigLight
-from lightpaint.dmx.levels import RigDrives, check_drives, encode_levels
-from lightpaint.dmx.pan_tilt import aimed_rig
+from lightpaint.dmx import (
+    ConsoleRig,
+    DmxChannel,
+    RigDrives,
+    RigFixture,
+    RigLight,
+    aimed_rig,
+    check_drives,
+    encode_levels,
+)
 from lightpaint.relit.export.exports import plain_cell
 from lightpaint.version import __version__
 

@@ -37,7 +37,7 @@ from lightpaint.report.page.html import html
 from lightpaint.report.page.lights_table import change, hex_color
 from lightpaint.report.verdict import agreement, verdict
 from lightpaint.scene.scene import Scene
-from lightpaint.target.target import Target
+from lightpaint.target import Target
 
 #: Maximum number of lights in a table; the most pictures of a contact sheet, and in a row.
 MAX_LIGHTS, MAX_PICTURES, MAX_COLUMNS = 10, 12, 4

@@ -71,7 +71,7 @@ from lightpaint.report.planes_text import (
 from lightpaint.report.reported_answer import ReportedAnswer
 from lightpaint.report.verdict import spoken_samples, verdict
 from lightpaint.report.visible_emitters import emitter_remarks
-from lightpaint.target.target import Target
+from lightpaint.target import Target
 from lightpaint.version import __version__
 
 

@@ -15,12 +15,7 @@ from lightpaint.display_text import known_keys
 from lightpaint.errors import SceneError
 from lightpaint.file_reading import read_text
 from lightpaint.files import one_line
-from lightpaint.luminaires.luminaire_request import (
-    LUMINAIRE_KEYS,
-    PHOTOMETRY,
-    LuminaireRequest,
-    luminaires_in,
-)
+from lightpaint.luminaires import LUMINAIRE_KEYS, PHOTOMETRY, LuminaireRequest, luminaires_in
 from lightpaint.scene.lights.texels.image_domains import GridSize
 from lightpaint.scene.lights.texels.texel import TexelLayout, image_of, parse_size
 from lightpaint.storage.json_records import strict_toml

@@ -25,8 +25,7 @@ from lightpaint.lighting.loss.painting import importance_sums, unpainted_weight
 from lightpaint.lighting.problem import Problem
 from lightpaint.lighting.solution import Solution
 from lightpaint.lighting.solve import solution_of
-from lightpaint.target.target import Target
-from lightpaint.target.wish_finding import find_wishes
+from lightpaint.target import Target, find_wishes
 
 #: Lights beyond which their colours are not tried as a reason.
 MAX_COLORED_LIGHTS = 300
