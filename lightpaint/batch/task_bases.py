@@ -29,8 +29,7 @@ from lightpaint.pipeline.job_bases import obtain
 from lightpaint.pipeline.placed_lights import moved_basis, say_changes
 from lightpaint.placement import PlacementRecord, read_placement
 from lightpaint.progress import Listener
-from lightpaint.report.rig.hung_lights import HungLight
-from lightpaint.report.rig.rig_drawing import rig_drawing
+from lightpaint.report import HungLight, rig_drawing
 from lightpaint.scene.quality_presets import on_film
 from lightpaint.scene.scene import Scene
 

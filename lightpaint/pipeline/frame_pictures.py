@@ -22,7 +22,7 @@ from lightpaint.pipeline.job.job import Job
 from lightpaint.pipeline.job.sources import GroupsFile
 from lightpaint.pipeline.results.answer_folder import LIGHTING
 from lightpaint.progress import Progress, listener, silent
-from lightpaint.relit.export.exports import relit_part
+from lightpaint.relit import relit_part
 from lightpaint.sentences import Hint
 
 #: Header attribute of a frame: the answer and the render that it shows.

@@ -13,8 +13,7 @@ from lightpaint.images.formats import png_bytes, png_has_text
 from lightpaint.lighting.answer.lighting_file import read_lighting
 from lightpaint.pipeline.results.answer_folder import LIGHTING
 from lightpaint.progress import Progress, silent
-from lightpaint.report.light_sheet import light_sheet
-from lightpaint.report.rig.hung_lights import HungLight
+from lightpaint.report import HungLight, light_sheet
 from lightpaint.scene.lights.texels.texel import image_of
 from lightpaint.scene.properties.site import EmitterPlace
 from lightpaint.scene.quality_presets import Preset

@@ -25,8 +25,7 @@ from lightpaint.pipeline.job.job import Job
 from lightpaint.pipeline.job.settings import PILOT_SPP
 from lightpaint.pipeline.job_bases import problem_of, view_listener, without_noise
 from lightpaint.progress import Listener
-from lightpaint.report.measures import LEAST_SHARE, picture_errors
-from lightpaint.report.phrases import spoken_percent
+from lightpaint.report import LEAST_SHARE, picture_errors, spoken_percent
 from lightpaint.scene.limits import MAX_SPP
 
 #: Rounds of samples, each of which at most doubles their number.

@@ -48,17 +48,18 @@ from lightpaint.progress import (
     spoken_duration,
     stage,
 )
-from lightpaint.relit.verification import LightShares, Verification, with_light_tests
-from lightpaint.relit.verification_render import (
+from lightpaint.relit import (
     SPECTRAL_DOUBLINGS,
+    LightShares,
+    Verification,
     VerificationBudget,
     refine_by_rendering,
     verification_budget,
     verify,
     verify_in_stages,
+    with_light_tests,
 )
-from lightpaint.report.basis_memo import make_ahead
-from lightpaint.report.page.page import prepare_page
+from lightpaint.report import make_ahead, prepare_page
 from lightpaint.scene.scene import Scene
 from lightpaint.scene.surfaces import render_reflectances
 from lightpaint.sentences import Hint, Sentence, Word

@@ -28,7 +28,7 @@ from lightpaint.pipeline.results.answer_folder import (
 )
 from lightpaint.pipeline.results.result_folder import ResultFolder
 from lightpaint.progress import Progress, listener, silent
-from lightpaint.relit.relight import relight
+from lightpaint.relit import relight
 from lightpaint.scene.properties.film import with_width
 from lightpaint.scene.quality_presets import on_film
 from lightpaint.scene.scene import Scene

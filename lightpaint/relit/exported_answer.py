@@ -23,8 +23,8 @@ from lightpaint.progress import Listener
 from lightpaint.relit.emission_xml import safe_name
 from lightpaint.relit.export.nuke import NukeLight, RigKind
 from lightpaint.relit.export.program_axes import SkyMap, lat_long, map_axes, map_size_for
-from lightpaint.relit.relight import scene_of
 from lightpaint.relit.relit_files import enlarged, images_of_texels, settings_of
+from lightpaint.relit.relit_scene import scene_of
 from lightpaint.scene.lights.emitters import Emitter
 from lightpaint.scene.lights.texels.image_domains import Sky, Slide, Wall
 from lightpaint.scene.properties.emission import Scaling

@@ -40,7 +40,7 @@ from lightpaint.relit.exported_answer import (
     slide_images_of,
     wall_images_of,
 )
-from lightpaint.relit.relight import scene_of, scene_patch
+from lightpaint.relit.relit_scene import scene_of, scene_patch
 from lightpaint.sentences import Hint, Sentence
 
 #: Width of a 95 % interval, relative to the brightest channel, above which a light is hardly known.

@@ -29,7 +29,7 @@ from lightpaint.lighting.answer.lighting import Lighting
 from lightpaint.lighting.joined_views import joint_estimate
 from lightpaint.lighting.solution import Solution
 from lightpaint.progress import Progress, silent
-from lightpaint.relit.relight import relight
+from lightpaint.relit.relit_scene import relight
 from lightpaint.relit.verification import (
     LIMIT,
     LOW_POWER,

@@ -20,7 +20,7 @@ from lightpaint.lighting.answer.lighting_file import write_lighting
 from lightpaint.lighting.constraints.constraints_file import constraints_of
 from lightpaint.luminaires.web import SPOT_TOLERANCE, PhotometricWeb, spots_of
 from lightpaint.relit.emission_xml import plugin_remark
-from lightpaint.relit.relight import relight
+from lightpaint.relit.relit_scene import relight
 from lightpaint.relit.verification_render import shares_of_emitters, verify
 from lightpaint.scene.scene import Scene
 from lightpaint.scene.scene_reader import load_scene

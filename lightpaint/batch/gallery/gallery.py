@@ -50,17 +50,17 @@ from lightpaint.pipeline.job.job import Job
 from lightpaint.pipeline.job.sources import BasisFile, GroupsFile, SceneFile, content
 from lightpaint.pipeline.results.results import hung_of
 from lightpaint.placement import PlacementRecord
-from lightpaint.report.comparison import shorten_to_width
-from lightpaint.report.page.html import html
-from lightpaint.report.page.mixer import (
+from lightpaint.report import (
+    LightChange,
+    html,
     kelvin_colors,
     light_data,
     lighting_data,
     packed_gels,
     planes_for_page,
+    shorten_to_width,
     transform_data,
 )
-from lightpaint.report.rig.hung_lights import LightChange
 from lightpaint.storage.json_records import strict_json
 from lightpaint.version import __version__
 from lightpaint.viewer.bundle import bundled, styles

@@ -29,7 +29,7 @@ from lightpaint.photometry.measuring_plane import plane_title
 from lightpaint.photometry.readings_file import PLANES
 from lightpaint.pipeline.results.result_folder import PLANES_FOLDER as PLANES_FOLDER
 from lightpaint.pipeline.results.result_folder import RECORD
-from lightpaint.relit.export.exports import plain_cell
+from lightpaint.relit import plain_cell
 from lightpaint.storage.json_records import strict_json
 from lightpaint.version import __version__
 

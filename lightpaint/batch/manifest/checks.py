@@ -24,8 +24,7 @@ from lightpaint.lighting.constraints.constraints import Constraints
 from lightpaint.lighting.constraints.constraints_file import read_constraints
 from lightpaint.pipeline.job.settings import Settings
 from lightpaint.pipeline.job.sources import GroupsFile
-from lightpaint.relit.export.usd import check_usd
-from lightpaint.relit.formats import FORMS
+from lightpaint.relit import FORMS, check_usd
 
 #: Default steps of a look that is solved, and of a given lighting or a frame.
 SOLVE_STEPS, GIVEN_LIGHTING_STEPS = ("solve", "predict", "verify", "report"), ("predict",)

@@ -21,7 +21,7 @@ from lightpaint.lighting.answer.lighting import Lighting, LightSetting
 from lightpaint.lighting.constraints.constraints import Constraints
 from lightpaint.lighting.fit import DEFAULT_HOLD
 from lightpaint.pipeline.job.settings import Settings
-from lightpaint.relit.formats import FORMS
+from lightpaint.relit import FORMS
 from lightpaint.scene.limits import MAX_SPP
 from lightpaint.scene.properties.film import check_resolution
 from lightpaint.sentences import Datum, Hint, Sentence

@@ -47,7 +47,7 @@ from lightpaint.pipeline.job.sources import check_nothing_unused, content
 from lightpaint.pipeline.results.result_folder import is_as_written
 from lightpaint.pipeline.results.results import view_names
 from lightpaint.pipeline.wished_planes import check_planes, constraints_for_planes
-from lightpaint.relit.relight import scene_of
+from lightpaint.relit import scene_of
 from lightpaint.scene.quality_presets import on_film
 from lightpaint.scene.scene import Scene
 

@@ -23,7 +23,7 @@ from lightpaint.pipeline.wished_planes import (
     with_glare,
 )
 from lightpaint.progress import Listener
-from lightpaint.relit.relight import scene_of
+from lightpaint.relit import scene_of
 from lightpaint.scene.scene import Scene
 
 

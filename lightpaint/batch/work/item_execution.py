@@ -53,8 +53,7 @@ from lightpaint.pipeline.results.result_folder import ResultFolder
 from lightpaint.pipeline.results.results import view_names
 from lightpaint.placement import record_of
 from lightpaint.progress import Listener
-from lightpaint.relit.exported_answer import Source
-from lightpaint.relit.formats import names_of_forms, write_content, writers_of
+from lightpaint.relit import Source, names_of_forms, write_content, writers_of
 from lightpaint.scene.scene import Scene
 
 #: Error numbers of a full disk.

@@ -23,37 +23,33 @@ from lightpaint.lighting.wishes.planes_answer import PlanesAnswer
 from lightpaint.photometry.glare import GlareReading
 from lightpaint.pipeline.job.settings import Settings
 from lightpaint.pipeline.results.results import Look
-from lightpaint.report.answer_pictures import spoken_view
-from lightpaint.report.diagnosis_sentences import (
+from lightpaint.report import (
     ANY_COLOR,
+    GLARE_HEADINGS,
+    HEADINGS,
     bound_sentences,
+    closer_choice,
     compensation_sentences,
+    energy_shares,
     error_sentences,
     fit_sentence,
+    glare_by_title,
+    glare_rows,
     partly_reached,
+    plane_rows,
+    planes_sentences,
+    rendering_sentences,
     spoken_about,
     spoken_cause,
     spoken_errors,
-    uncertainty_sentence,
-    unreached_channels,
-    untold_lights,
-)
-from lightpaint.report.measures import energy_shares
-from lightpaint.report.page.constraint_section import closer_choice
-from lightpaint.report.phrases import (
-    rendering_sentences,
     spoken_lamp,
     spoken_percent,
     spoken_preference,
+    spoken_view,
     spoken_wheels,
-)
-from lightpaint.report.planes_text import (
-    GLARE_HEADINGS,
-    HEADINGS,
-    glare_by_title,
-    glare_rows,
-    plane_rows,
-    planes_sentences,
+    uncertainty_sentence,
+    unreached_channels,
+    untold_lights,
 )
 from lightpaint.sentences import Sentence, SourceKey
 

@@ -32,8 +32,8 @@ from lightpaint.photometry.wish_presets import PRESETS
 from lightpaint.pipeline.job.settings import Settings
 from lightpaint.pipeline.job.sources import SceneFile
 from lightpaint.progress import stage
-from lightpaint.relit.relight import scene_of
-from lightpaint.report.planes_text import glare_sentences
+from lightpaint.relit import scene_of
+from lightpaint.report import glare_sentences
 from lightpaint.scene.scene import Scene
 from lightpaint.sentences import Hint
 from lightpaint.storage.staging import finish, staged

@@ -26,9 +26,15 @@ from lightpaint.lighting.answer.lighting import Lighting
 from lightpaint.lighting.answer.lighting_file import read_lighting
 from lightpaint.paint import SESSION_FILE, read_kept_looks
 from lightpaint.pipeline.job.sources import GroupsFile, SceneFile, content
-from lightpaint.relit.export.level_table import Cue, cue_list_csv
-from lightpaint.relit.exported_answer import Source
-from lightpaint.relit.formats import FORMS, names_of_forms, write_content, writers_of
+from lightpaint.relit import (
+    FORMS,
+    Cue,
+    Source,
+    cue_list_csv,
+    names_of_forms,
+    write_content,
+    writers_of,
+)
 from lightpaint.scene.properties.site import unit
 from lightpaint.sentences import Hint
 from lightpaint.storage.staging import finish

@@ -42,7 +42,7 @@ from lightpaint.pipeline.templates import (
     template_of_basis,
 )
 from lightpaint.progress import stage
-from lightpaint.relit.relight import solved_identity
+from lightpaint.relit import solved_identity
 from lightpaint.scene.quality_presets import on_film, samples
 from lightpaint.scene.runtime.variant import use_variant
 from lightpaint.scene.scene import Scene

@@ -17,8 +17,8 @@ from lightpaint.pipeline.job.job import Job, PaintedView
 from lightpaint.pipeline.pipeline import run
 from lightpaint.pipeline.results.results import Look
 from lightpaint.placement import PlacementRecord, record_of
-from lightpaint.relit.export.exports import EXPORTS
-from lightpaint.report.page.placement_section import spoken_turn
+from lightpaint.relit import EXPORTS
+from lightpaint.report import spoken_turn
 
 if TYPE_CHECKING:
     from lightpaint.cli.solve_variations import LookSet

@@ -13,8 +13,8 @@ from lightpaint.cli.tolerances import Tolerances
 from lightpaint.pipeline.job.job import Job, PaintedView
 from lightpaint.pipeline.results.result_folder import RECORD
 from lightpaint.pipeline.results.results import Look
-from lightpaint.relit.verification import Verification
-from lightpaint.report.report_json import finite, verification_numbers
+from lightpaint.relit import Verification
+from lightpaint.report import finite, verification_numbers
 from lightpaint.scene.lights.light import WHOLE_EMISSION, Light
 from lightpaint.scene.properties.emission import MULTIPLE
 from lightpaint.scene.scene import Scene

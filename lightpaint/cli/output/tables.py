@@ -9,10 +9,8 @@ from lightpaint.basis.cache.cache import Entry
 from lightpaint.cli.output import terminal
 from lightpaint.colour import Photometry, photometry
 from lightpaint.placement import Suggestion
-from lightpaint.relit.verification import Verification
-from lightpaint.report.page.placement_section import spoken_position, spoken_suggestions
-from lightpaint.report.phrases import spoken_percent
-from lightpaint.report.verdict import agreement
+from lightpaint.relit import Verification
+from lightpaint.report import agreement, spoken_percent, spoken_position, spoken_suggestions
 from lightpaint.scene.lights.emitters import Emitter
 from lightpaint.scene.lights.light import Light
 from lightpaint.scene.lights.texels.image_domains import domain_of

@@ -28,10 +28,7 @@ from lightpaint.paint.message_frames import is_other_version, parse_request
 from lightpaint.paint.protocol import Closing, Failure, Hello, Message, TakeOver
 from lightpaint.paint.session_access import SessionOwner
 from lightpaint.paint.studio.studio import Studio
-from lightpaint.report.answer_pictures import target_picture
-from lightpaint.report.page.figures import data_uri
-from lightpaint.report.page.html import html
-from lightpaint.report.page.mixer import mixer_assets, mixer_html
+from lightpaint.report import data_uri, html, mixer_assets, mixer_html, target_picture
 from lightpaint.target import Target
 from lightpaint.viewer.bundle import styles
 

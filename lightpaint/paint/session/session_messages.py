@@ -48,33 +48,29 @@ from lightpaint.paint.session.history import History
 from lightpaint.paint.session.live_answer import LiveAnswer
 from lightpaint.paint.store.history_steps import Region
 from lightpaint.paint.store.session_requests import HOLD_KEYS
-from lightpaint.report.diagnosis_sentences import (
+from lightpaint.report import (
     ALONE_ADVICE,
+    NO_CLOSER_TEXT,
     NO_ERROR,
     bound_sentences,
     compensation_sentences,
+    headline,
     hold_clause,
     is_one_painting,
     named_worst_wish,
-    spoken_deliveries,
-    spoken_errors,
-    spoken_newest,
-    spoken_shares,
-)
-from lightpaint.report.phrases import (
-    NO_CLOSER_TEXT,
     spoken_amount,
     spoken_changed,
+    spoken_deliveries,
+    spoken_errors,
+    spoken_lack,
+    spoken_missing,
+    spoken_newest,
     spoken_part,
     spoken_percent,
     spoken_place,
     spoken_progress,
-)
-from lightpaint.report.verdict import (
-    headline,
-    spoken_lack,
-    spoken_missing,
     spoken_reason,
+    spoken_shares,
     spoken_whole,
 )
 

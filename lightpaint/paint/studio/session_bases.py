@@ -46,7 +46,7 @@ from lightpaint.paint.store.store import Store
 from lightpaint.paint.studio.file_imports import begin_with_layers
 from lightpaint.paint.subject import Subject, obtain_bases, painting_transform
 from lightpaint.progress import Progress, silent
-from lightpaint.report.basis_memo import page_reduction
+from lightpaint.report import page_reduction
 from lightpaint.scene.limits import MAX_SPP
 from lightpaint.scene.runtime.render_lock import MITSUBA
 

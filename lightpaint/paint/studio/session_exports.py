@@ -23,10 +23,8 @@ from lightpaint.pipeline.job.job import Job
 from lightpaint.pipeline.pipeline import run
 from lightpaint.pipeline.results.answer_folder import LIGHTING, RELIT, write_answer
 from lightpaint.progress import Progress
-from lightpaint.relit.relight import relight
-from lightpaint.relit.verification_render import verify_in_stages
-from lightpaint.report.answer_pictures import CleanLooks
-from lightpaint.report.verdict import spoken_distance
+from lightpaint.relit import relight, verify_in_stages
+from lightpaint.report import CleanLooks, spoken_distance
 from lightpaint.scene.scene_reader import load_scene
 from lightpaint.target import texts_of, write_painting
 

@@ -70,8 +70,7 @@ from lightpaint.pipeline.results.results import (
     view_names,
 )
 from lightpaint.placement import PlacementRecord, Rigging, check_suggestible
-from lightpaint.relit.emission_xml import plugin_remark
-from lightpaint.relit.export.nuke import spoken_unreadable
+from lightpaint.relit import plugin_remark, spoken_unreadable
 from lightpaint.scene.quality_presets import on_film
 from lightpaint.scene.scene import Scene
 from lightpaint.sentences import Hint, Sentence

@@ -13,8 +13,7 @@ from lightpaint.basis.lightgroups.light_groups import LightGroups
 from lightpaint.lighting.answer.lighting import Lighting
 from lightpaint.lighting.answer.lighting_file import write_lighting
 from lightpaint.pipeline.results.result_folder import ResultFolder
-from lightpaint.relit.export.exports import EXPORTS, write_exports
-from lightpaint.relit.relight import check_relightable, relight, settle
+from lightpaint.relit import EXPORTS, check_relightable, relight, settle, write_exports
 from lightpaint.scene.scene import Scene
 from lightpaint.scene.scene_reader import load_scene
 

@@ -32,18 +32,23 @@ from lightpaint.placement import (
     Suggestion,
 )
 from lightpaint.progress import Progress, silent
-from lightpaint.relit.export.exports import EXPORTS
-from lightpaint.relit.verification import Verification
-from lightpaint.relit.verification_render import verify
-from lightpaint.report.answer_pictures import CleanLooks, report_transform, residual_of
-from lightpaint.report.comparison import comparison_image
+from lightpaint.relit import EXPORTS, Verification, verify
+from lightpaint.report import (
+    CleanLooks,
+    HungLights,
+    LightChange,
+    ReportedAnswer,
+    comparison_image,
+    emitter_remarks,
+    hung_lights,
+    report_numbers,
+    report_page,
+    report_transform,
+    residual_of,
+    spoken_fraction,
+    verdict,
+)
 from lightpaint.report.page.notebook_html import look_html
-from lightpaint.report.page.page import report_page
-from lightpaint.report.report_json import report_numbers
-from lightpaint.report.reported_answer import ReportedAnswer
-from lightpaint.report.rig.hung_lights import HungLights, LightChange, hung_lights, spoken_fraction
-from lightpaint.report.verdict import verdict
-from lightpaint.report.visible_emitters import emitter_remarks
 from lightpaint.scene.scene import Scene
 from lightpaint.scene.scene_reader import load_scene
 from lightpaint.scene.scene_render import Stream

@@ -35,7 +35,7 @@ from lightpaint.report.diagnosis_sentences import UNTOLD_HERE
 from lightpaint.report.page.figures import THUMBNAIL_WIDTH, data_uri, thumbnail
 from lightpaint.report.page.html import html
 from lightpaint.report.page.lights_table import change, hex_color
-from lightpaint.report.verdict import agreement, verdict
+from lightpaint.report.verdict_sentences import agreement, verdict
 from lightpaint.scene.scene import Scene
 from lightpaint.target import Target
 

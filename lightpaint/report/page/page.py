@@ -69,7 +69,7 @@ from lightpaint.report.planes_text import (
     planes_sentences,
 )
 from lightpaint.report.reported_answer import ReportedAnswer
-from lightpaint.report.verdict import spoken_samples, verdict
+from lightpaint.report.verdict_sentences import spoken_samples, verdict
 from lightpaint.report.visible_emitters import emitter_remarks
 from lightpaint.target import Target
 from lightpaint.version import __version__

@@ -14,7 +14,7 @@ from renderer import (
 
 from lightpaint.basis.render.basis_render import render_basis
 from lightpaint.lighting.answer.combination import combine
-from lightpaint.relit.relight import relight
+from lightpaint.relit.relit_scene import relight
 from lightpaint.relit.verification_render import verify
 from lightpaint.scene.lights.texels.texel import TexelLayout
 from lightpaint.scene.scene import Scene
