@@ -11,16 +11,21 @@ from typing import Any
 import numpy as np
 
 from lightpaint.arrays import Floats
-from lightpaint.basis.basis import Basis
-from lightpaint.basis.render.banded_film import check_memory, renders_in_bands
-from lightpaint.basis.render.basis_render import (
+from lightpaint.basis import Basis
+from lightpaint.basis.render import (
+    ONE_PASS,
+    Part,
+    PartSums,
+    basis_lights,
+    check_memory,
     check_size,
+    method_of,
+    plan_parts,
     render_basis,
+    renders_in_bands,
     training_samples,
     with_first_hits,
 )
-from lightpaint.basis.render.render_origin import ONE_PASS, basis_lights, method_of
-from lightpaint.basis.render.render_parts import Part, PartSums, plan_parts
 from lightpaint.batch.engine import Engine
 from lightpaint.batch.work.item_execution import attempt, job_fields, publish_solved_lights
 from lightpaint.batch.work.task import Task

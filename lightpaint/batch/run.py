@@ -10,7 +10,7 @@ from functools import partial
 from pathlib import Path
 from typing import Any
 
-from lightpaint.basis.basis import Basis
+from lightpaint.basis import Basis
 from lightpaint.batch.cluster.cluster import Cluster
 from lightpaint.batch.distributed_work import distributed_renderer, solve_by_sums
 from lightpaint.batch.engine import Engine, InProcess, Processes

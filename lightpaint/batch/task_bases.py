@@ -8,9 +8,8 @@ from contextlib import ExitStack
 from dataclasses import replace
 from pathlib import Path
 
-from lightpaint.basis.basis import Basis
+from lightpaint.basis import Basis, write_basis
 from lightpaint.basis.cache import cache
-from lightpaint.basis.file.basis_file import write_basis
 from lightpaint.batch.distributed_work import PartwiseRender
 from lightpaint.batch.engine import Engine
 from lightpaint.batch.plan.plan import PlaceGroup

@@ -12,8 +12,7 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from lightpaint.basis.basis import Basis
-from lightpaint.basis.planes import joined_planes
+from lightpaint.basis import Basis, joined_planes
 from lightpaint.display_text import some_names
 from lightpaint.errors import BasisError
 from lightpaint.images import Estimate

@@ -12,9 +12,7 @@ from typing import TYPE_CHECKING, Self
 import numpy as np
 
 from lightpaint.arrays import Bools, Doubles, Floats
-from lightpaint.basis.basis import Basis
-from lightpaint.basis.light_images import texel_lights
-from lightpaint.basis.lights import Lights
+from lightpaint.basis import Basis, Lights, texel_lights
 from lightpaint.colour import ViewTransform
 from lightpaint.display_text import short_repr
 from lightpaint.errors import TargetError

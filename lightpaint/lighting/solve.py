@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 
 from lightpaint.arrays import Bools, Doubles, release_freed_memory
-from lightpaint.basis.basis import Basis
+from lightpaint.basis import Basis
 from lightpaint.colour import Lamp
 from lightpaint.keywords import keywords
 from lightpaint.lighting.answer.lighting import Lighting

@@ -5,9 +5,7 @@ from functools import partial
 from pathlib import Path
 from typing import Any
 
-from lightpaint.basis.basis import Basis
-from lightpaint.basis.lightgroups.light_groups import LightGroups
-from lightpaint.basis.lights import Lights
+from lightpaint.basis import Basis, LightGroups, Lights
 from lightpaint.colour import TransformChoice, read_observer
 from lightpaint.errors import PaintError, SceneError
 from lightpaint.file_reading import file_length
@@ -124,7 +122,7 @@ def _scene_on_film(
     """Return a scene on the film of its basis, or one that is loaded when it is needed."""
 
     def check(scene: Scene) -> None:
-        from lightpaint.basis.render.render_origin import basis_lights
+        from lightpaint.basis.render import basis_lights
 
         _check_constraints(basis_lights(scene), constraints, settings, check_lamps)
         if settings.planes is not None:

@@ -9,9 +9,8 @@ from collections.abc import Callable, Sequence
 import numpy as np
 
 from lightpaint.arrays import Doubles, Floats
-from lightpaint.basis.basis import Basis
-from lightpaint.basis.cache.cached_render import obtain_basis
-from lightpaint.basis.lights import Lights
+from lightpaint.basis import Basis, Lights
+from lightpaint.basis.cache import obtain_basis
 from lightpaint.colour import LUMINANCE
 from lightpaint.display_text import brief, some_names
 from lightpaint.errors import SceneError

@@ -14,7 +14,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from lightpaint.arrays import RGB, Bools, Doubles
-from lightpaint.basis.basis import Basis
+from lightpaint.basis import Basis
 from lightpaint.colour import LUMINANCE
 from lightpaint.keywords import keywords
 from lightpaint.luminaires import POINT_PLUGIN

@@ -10,8 +10,7 @@ from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
 
-from lightpaint.basis.lightgroups.frame_sequence import parse_frames
-from lightpaint.basis.lightgroups.light_groups import LightGroups, read_light_groups
+from lightpaint.basis import LightGroups, parse_frames, read_light_groups
 from lightpaint.errors import BasisError, ImageError, OutputError
 from lightpaint.files import check_files
 from lightpaint.images.formats import read_headers, write_parts

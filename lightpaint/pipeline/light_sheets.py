@@ -3,9 +3,8 @@
 from dataclasses import replace
 from pathlib import Path
 
-from lightpaint.basis.cache import cache
-from lightpaint.basis.cache.cached_render import obtain_basis
-from lightpaint.basis.render.integrators import why_not_one_pass
+from lightpaint.basis.cache import cache, obtain_basis
+from lightpaint.basis.render import why_not_one_pass
 from lightpaint.errors import LightpaintError, OutputError
 from lightpaint.files import check_files, check_writable, write_bytes
 from lightpaint.images import denoiser_text

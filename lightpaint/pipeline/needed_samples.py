@@ -7,11 +7,9 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from lightpaint.arrays import Doubles, Indices
-from lightpaint.basis.basis import Basis
-from lightpaint.basis.cache.cached_render import obtain_basis, top_up_basis
-from lightpaint.basis.light_images import texel_lights
-from lightpaint.basis.render.pixel_top_up import KeptTracer, kept_loaded
-from lightpaint.basis.render.render_origin import ONE_PASS
+from lightpaint.basis import Basis, texel_lights
+from lightpaint.basis.cache import obtain_basis, top_up_basis
+from lightpaint.basis.render import ONE_PASS, KeptTracer, kept_loaded
 from lightpaint.colour import LUMINANCE
 from lightpaint.lighting.analysis.noise.sample_demand import (
     pixel_variances,

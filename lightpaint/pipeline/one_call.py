@@ -4,9 +4,8 @@ from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
 from typing import Any, overload
 
-from lightpaint.basis.basis import Basis
-from lightpaint.basis.cache.cached_render import check_same_view
-from lightpaint.basis.lightgroups.light_groups import LightGroups
+from lightpaint.basis import Basis, LightGroups
+from lightpaint.basis.cache import check_same_view
 from lightpaint.colour import TransformChoice
 from lightpaint.errors import SceneError, TargetError
 from lightpaint.keywords import keywords

@@ -6,7 +6,7 @@ from pathlib import Path
 from typing import Any
 
 from lightpaint.arrays import as_rgb, release_freed_memory
-from lightpaint.basis.basis import Basis
+from lightpaint.basis import Basis
 from lightpaint.colour import daylight
 from lightpaint.images import Estimate, write_estimate
 from lightpaint.keywords import keywords

@@ -13,10 +13,9 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from lightpaint.arrays import Doubles, Floats
-from lightpaint.basis.basis import Basis
-from lightpaint.basis.cache.cached_render import Render
-from lightpaint.basis.light_images import LightImage, light_images
-from lightpaint.basis.render.basis_render import render_basis
+from lightpaint.basis import Basis, LightImage, light_images
+from lightpaint.basis.cache import Render
+from lightpaint.basis.render import render_basis
 from lightpaint.colour import luminance
 from lightpaint.display_text import some_names
 from lightpaint.errors import SceneError

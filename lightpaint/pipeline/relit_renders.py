@@ -7,7 +7,7 @@ from pathlib import Path
 from typing import Any
 
 from lightpaint.arrays import Floats
-from lightpaint.basis.render.separate_renders import emitters_seen
+from lightpaint.basis.render import emitters_seen
 from lightpaint.colour import ViewTransform, choose_exposure
 from lightpaint.images import (
     HALF_DIFFERENCE,

@@ -7,14 +7,16 @@ from pathlib import Path
 import numpy as np
 
 from lightpaint.arrays import Floats
-from lightpaint.basis.basis import Basis, meter_exposure
+from lightpaint.basis import (
+    Basis,
+    denoise_current_look,
+    denoise_mix,
+    denoise_plane,
+    light_images,
+    meter_exposure,
+)
 from lightpaint.basis.cache import cache
-from lightpaint.basis.denoised_mixes import denoise_current_look, denoise_mix, denoise_plane
-from lightpaint.basis.light_images import light_images
-from lightpaint.basis.render.basis_render import render_basis
-from lightpaint.basis.render.integrators import why_not_one_pass
-from lightpaint.basis.render.render_origin import is_of
-from lightpaint.basis.render.separate_renders import emitters_seen
+from lightpaint.basis.render import emitters_seen, is_of, render_basis, why_not_one_pass
 from lightpaint.colour import ViewTransform, choose_exposure
 from lightpaint.images import Features, block_mean, denoised, denoiser_text
 from lightpaint.keywords import keywords

@@ -7,8 +7,8 @@ from pathlib import Path
 import numpy as np
 
 from lightpaint.arrays import Doubles
-from lightpaint.basis.lights import Lights
-from lightpaint.basis.render.render_origin import basis_lights
+from lightpaint.basis import Lights
+from lightpaint.basis.render import basis_lights
 from lightpaint.display_text import some_names
 from lightpaint.lighting.analysis.appearance.display_difference import PaintComparison
 from lightpaint.lighting.constraints.absolute_scale import with_sure_scale

@@ -9,7 +9,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from lightpaint.arrays import Floats, Position
-from lightpaint.basis.lights import BasisLight
+from lightpaint.basis import BasisLight
 from lightpaint.display_text import some_names, with_similar_name
 from lightpaint.errors import NoPlaceError, SceneError
 from lightpaint.placement.free_space import as_position

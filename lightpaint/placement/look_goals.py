@@ -8,8 +8,7 @@ from typing import Any
 import numpy as np
 
 from lightpaint.arrays import Floats
-from lightpaint.basis.basis import Basis
-from lightpaint.basis.lights import BasisLight
+from lightpaint.basis import Basis, BasisLight
 from lightpaint.errors import SceneError
 from lightpaint.images import block_mean, whole_factor
 from lightpaint.lighting.constraints.constraints import Constraints, LightConstraint

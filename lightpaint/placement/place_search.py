@@ -10,8 +10,8 @@ from typing import Any
 import numpy as np
 
 from lightpaint.arrays import RGB, Position, as_rgb
-from lightpaint.basis.basis import Basis
-from lightpaint.basis.render.integrators import why_not_one_pass
+from lightpaint.basis import Basis
+from lightpaint.basis.render import why_not_one_pass
 from lightpaint.errors import NoPlaceError, SceneError
 from lightpaint.keywords import keywords
 from lightpaint.lighting.constraints.constraints import Constraints

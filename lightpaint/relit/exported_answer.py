@@ -13,8 +13,7 @@ from typing import Any
 import numpy as np
 
 from lightpaint.arrays import RGB, Doubles, Floats, Position
-from lightpaint.basis.light_images import joined_texels
-from lightpaint.basis.lightgroups.light_groups import LightGroups
+from lightpaint.basis import LightGroups, joined_texels
 from lightpaint.colour import photometry
 from lightpaint.errors import LightpaintError
 from lightpaint.lighting.answer.lighting import Lighting

@@ -11,7 +11,7 @@ from pathlib import Path
 import numpy as np
 
 from lightpaint.arrays import RGB, Floats, as_rgb
-from lightpaint.basis.light_images import joined_texels
+from lightpaint.basis import joined_texels
 from lightpaint.colour import WAVELENGTHS, luminance
 from lightpaint.display_text import some_names
 from lightpaint.errors import LightpaintError, OutputError

@@ -21,7 +21,7 @@ from statistics import NormalDist
 import numpy as np
 
 from lightpaint.arrays import Bools, Doubles, Floats
-from lightpaint.basis.basis import Basis
+from lightpaint.basis import Basis
 from lightpaint.colour import choose_exposure, delta_e, luminance
 from lightpaint.display_text import Shown
 from lightpaint.errors import SizeError

@@ -19,8 +19,8 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 
-from lightpaint.basis.basis import Basis
-from lightpaint.basis.render.render_budget import check_samples
+from lightpaint.basis import Basis
+from lightpaint.basis.render import check_samples
 from lightpaint.errors import SizeError
 from lightpaint.images import Estimate, Size, whole_factor
 from lightpaint.keywords import keywords

@@ -14,8 +14,7 @@ import numpy as np
 import numpy.typing as npt
 
 from lightpaint.arrays import Doubles, Floats, Indices, largest
-from lightpaint.basis.basis import Basis, meter_exposure
-from lightpaint.basis.denoised_mixes import denoise_current_look, denoise_mix, denoise_mixes
+from lightpaint.basis import Basis, denoise_current_look, denoise_mix, denoise_mixes, meter_exposure
 from lightpaint.colour import ViewTransform, luminance
 from lightpaint.images import (
     DENOISED_KEY,

@@ -5,8 +5,7 @@ would make it more certain, and which options of the fit influence it.
 from collections.abc import Sequence
 from typing import Any
 
-from lightpaint.basis.basis import Basis
-from lightpaint.basis.light_images import joined_texels
+from lightpaint.basis import Basis, joined_texels
 from lightpaint.display_text import some_names, some_of
 from lightpaint.lighting.analysis.appearance.appearance import Appearance
 from lightpaint.lighting.analysis.appearance.delivery import (

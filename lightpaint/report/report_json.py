@@ -10,7 +10,7 @@ from typing import Any
 
 import numpy as np
 
-from lightpaint.basis.basis import Basis
+from lightpaint.basis import Basis
 from lightpaint.colour import ViewTransform, luminance
 from lightpaint.images import Estimate
 from lightpaint.lighting.analysis.appearance.appearance import Appearance, compare_appearance

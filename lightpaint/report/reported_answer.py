@@ -3,7 +3,7 @@
 from collections.abc import Sequence
 from dataclasses import dataclass
 
-from lightpaint.basis.basis import Basis
+from lightpaint.basis import Basis
 from lightpaint.images import Estimate
 from lightpaint.lighting.analysis.appearance.appearance import Appearance
 from lightpaint.lighting.analysis.appearance.color_choices import Choices

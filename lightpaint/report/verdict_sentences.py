@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from lightpaint.basis.light_images import TEXELS, is_of_texels, joined_texels
+from lightpaint.basis import TEXELS, is_of_texels, joined_texels
 from lightpaint.colour import luminance
 from lightpaint.display_text import some_names
 from lightpaint.images import Estimate

@@ -5,8 +5,7 @@ answer.
 import numpy as np
 
 from lightpaint.arrays import Bools, Doubles, Floats, Indices
-from lightpaint.basis.basis import Basis
-from lightpaint.basis.light_images import joined_texels, texel_lights
+from lightpaint.basis import Basis, joined_texels, texel_lights
 from lightpaint.colour import luminance
 from lightpaint.display_text import some_of
 from lightpaint.images import Estimate, sum_by_bands

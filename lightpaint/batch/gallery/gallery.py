@@ -21,9 +21,7 @@ import numpy as np
 from markupsafe import Markup
 from PIL import Image, ImageDraw, ImageFont
 
-from lightpaint.basis.basis import Basis
-from lightpaint.basis.light_images import light_images
-from lightpaint.basis.lightgroups.light_groups import LightGroups
+from lightpaint.basis import Basis, LightGroups, light_images
 from lightpaint.batch.gallery.summary import (
     SummaryRow,
     drop_pictures,

@@ -14,7 +14,7 @@ import numpy as np
 from PIL import Image
 
 from lightpaint.arrays import RGB
-from lightpaint.basis.light_images import light_images
+from lightpaint.basis import light_images
 from lightpaint.batch.manifest.file_names import SUMMARY_FORMAT, THUMBNAILS
 from lightpaint.batch.plan.journal import JournalLine
 from lightpaint.batch.plan.plan import Plan, PlannedLook

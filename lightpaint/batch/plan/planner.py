@@ -6,12 +6,8 @@ from functools import partial
 from pathlib import Path
 from typing import Any
 
-from lightpaint.basis.basis import Basis
-from lightpaint.basis.lightgroups.light_groups import LightGroups
-from lightpaint.basis.lights import BasisLight
-from lightpaint.basis.render.banded_film import memory_needed
-from lightpaint.basis.render.integrators import why_not_one_pass
-from lightpaint.basis.render.render_origin import basis_lights
+from lightpaint.basis import Basis, BasisLight, LightGroups
+from lightpaint.basis.render import basis_lights, memory_needed, why_not_one_pass
 from lightpaint.batch.manifest.entries import LookEntry, entries_of
 from lightpaint.batch.manifest.file_names import check_gallery
 from lightpaint.batch.manifest.keys import Mistakes, as_key, vary

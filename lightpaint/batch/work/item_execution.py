@@ -7,11 +7,8 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any, Literal
 
-from lightpaint.basis.basis import Basis
-from lightpaint.basis.lightgroups.light_groups import LightGroups
-from lightpaint.basis.lights import Lights
-from lightpaint.basis.render.basis_render import train_guide
-from lightpaint.basis.render.one_pass_basis import basis_of_sums
+from lightpaint.basis import Basis, LightGroups, Lights
+from lightpaint.basis.render import basis_of_sums, train_guide
 from lightpaint.batch.manifest.keys import Space, as_key, shift
 from lightpaint.batch.manifest.sequence import interpolate
 from lightpaint.batch.work.derived_looks import (

@@ -16,10 +16,9 @@ from typing import Any
 import numpy as np
 
 from lightpaint.arrays import Doubles, Floats
-from lightpaint.basis.basis import Basis
-from lightpaint.basis.cache.cache import PARTS, folder, is_trusted_owner
-from lightpaint.basis.file.basis_file import read_basis
-from lightpaint.basis.render.render_parts import Part, PartRenderer
+from lightpaint.basis import Basis, read_basis
+from lightpaint.basis.cache import PARTS, folder, is_trusted_owner
+from lightpaint.basis.render import Part, PartRenderer
 from lightpaint.batch.manifest.keys import Final
 from lightpaint.batch.work.task import key_of_basis
 from lightpaint.batch.work.work_items import (

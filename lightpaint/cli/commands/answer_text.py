@@ -8,8 +8,7 @@ from typing import Literal
 
 import numpy as np
 
-from lightpaint.basis.light_images import LightImage, joined_texels, light_images
-from lightpaint.basis.lights import BasisLight
+from lightpaint.basis import BasisLight, LightImage, joined_texels, light_images
 from lightpaint.cli.output import terminal
 from lightpaint.cli.output.tables import spoken_agreement
 from lightpaint.cli.output.vocabulary import BY_OPTION, spoken

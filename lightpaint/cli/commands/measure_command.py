@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 
 from lightpaint.arrays import RGB, Doubles
-from lightpaint.basis.render.render_origin import basis_lights
+from lightpaint.basis.render import basis_lights
 from lightpaint.cli.commands.answer_text import show_glare
 from lightpaint.cli.output import terminal
 from lightpaint.cli.output.lines import CommandOutcome

@@ -13,8 +13,7 @@ from typing import Any
 import numpy as np
 
 from lightpaint.arrays import Floats, Position
-from lightpaint.basis.lightgroups.frame_sequence import find_frames, is_pattern
-from lightpaint.basis.lightgroups.light_groups import LightGroups, first_frame
+from lightpaint.basis import LightGroups, find_frames, first_frame, is_pattern
 from lightpaint.cli.commands import console_commands
 from lightpaint.cli.options.console_options import RigFile
 from lightpaint.cli.output import documents, terminal

@@ -6,9 +6,8 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
-from lightpaint.basis.basis import Basis
-from lightpaint.basis.cache.cache import write_from_cache
-from lightpaint.basis.file.basis_file import write_basis
+from lightpaint.basis import Basis, write_basis
+from lightpaint.basis.cache import write_from_cache
 from lightpaint.cli.commands.solve_command import solve
 from lightpaint.cli.options.job_options import folders_of, is_folder
 from lightpaint.cli.output import documents, tables, terminal

@@ -5,7 +5,7 @@ from pathlib import Path
 from shlex import quote
 from typing import TYPE_CHECKING, Any
 
-from lightpaint.basis.basis import Basis
+from lightpaint.basis import Basis
 from lightpaint.cli.commands.answer_text import Table, show_look, spoken_settings
 from lightpaint.cli.output import documents, tables, terminal
 from lightpaint.cli.output.lines import CommandOutcome

@@ -5,7 +5,7 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
-from lightpaint.basis.basis import Basis
+from lightpaint.basis import Basis
 from lightpaint.basis.cache import cache
 from lightpaint.cli.doctor import Finding
 from lightpaint.cli.output.tables import photometry_of

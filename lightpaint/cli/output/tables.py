@@ -5,7 +5,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from lightpaint.arrays import as_rgb
-from lightpaint.basis.cache.cache import Entry
+from lightpaint.basis.cache import Entry
 from lightpaint.cli.output import terminal
 from lightpaint.colour import Photometry, photometry
 from lightpaint.placement import Suggestion

@@ -9,7 +9,7 @@ from typing import Any, Literal
 import numpy as np
 
 from lightpaint.arrays import RGB, Doubles, as_rgb
-from lightpaint.basis.lights import BasisLight
+from lightpaint.basis import BasisLight
 from lightpaint.colour import (
     MAX_EMITTERS,
     MAX_SLOTS,

@@ -7,7 +7,7 @@ from math import ceil
 import numpy as np
 
 from lightpaint.arrays import Doubles, Floats, Slices
-from lightpaint.basis.basis import Basis
+from lightpaint.basis import Basis
 from lightpaint.colour import ViewTransform
 from lightpaint.images import block_mean, block_sums, enlarged
 from lightpaint.lighting.live.tiles import MAX_CHEAP_LIGHTS, TiledEquations

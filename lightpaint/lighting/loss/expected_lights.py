@@ -14,9 +14,7 @@ from typing import Self
 import numpy as np
 
 from lightpaint.arrays import Doubles, Floats, Indices
-from lightpaint.basis.basis import Basis
-from lightpaint.basis.derived_planes import block_means
-from lightpaint.basis.planes import Planes
+from lightpaint.basis import Basis, Planes, block_means
 from lightpaint.colour import luminance
 from lightpaint.images import block_sums
 from lightpaint.target import Target, Wish, extend_saturated, split_wishes

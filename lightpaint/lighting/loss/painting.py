@@ -6,7 +6,7 @@ from dataclasses import replace
 import numpy as np
 
 from lightpaint.arrays import Bools, Floats
-from lightpaint.basis.basis import Basis
+from lightpaint.basis import Basis
 from lightpaint.colour import ViewTransform
 from lightpaint.errors import TargetError
 from lightpaint.lighting.fit import Emitters, Fit

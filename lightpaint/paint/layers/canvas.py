@@ -11,8 +11,7 @@ import numpy as np
 import numpy.typing as npt
 
 from lightpaint.arrays import Floats
-from lightpaint.basis.basis import Basis
-from lightpaint.basis.cache.denoised_planes import as_halves
+from lightpaint.basis import Basis, as_halves
 from lightpaint.colour import ViewTransform
 from lightpaint.errors import PaintError
 from lightpaint.lighting.live.live_view import LiveView

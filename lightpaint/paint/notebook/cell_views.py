@@ -19,7 +19,7 @@ from uuid import uuid4
 import numpy as np
 from markupsafe import Markup
 
-from lightpaint.basis.basis import Basis
+from lightpaint.basis import Basis
 from lightpaint.colour import ViewTransform, to_8_bit
 from lightpaint.images import block_mean, fitting_factor
 from lightpaint.lighting.answer.lighting import Lighting

@@ -9,8 +9,7 @@ from typing import Any
 
 import numpy as np
 
-from lightpaint.basis.basis import Basis
-from lightpaint.basis.lightgroups.light_groups import LightGroups
+from lightpaint.basis import Basis, LightGroups
 from lightpaint.colour import TransformChoice, ViewTransform
 from lightpaint.errors import KeywordError, LightpaintError, PaintError
 from lightpaint.lighting.answer.lighting import Lighting

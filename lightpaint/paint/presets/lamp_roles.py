@@ -11,8 +11,7 @@ import numpy as np
 import numpy.typing as npt
 
 from lightpaint.arrays import Bools, Doubles, Floats, Indices
-from lightpaint.basis.basis import Basis
-from lightpaint.basis.denoised_mixes import denoise_mix
+from lightpaint.basis import Basis, denoise_mix
 from lightpaint.colour import luminance
 from lightpaint.images import Objects, block_mean, fitting_factor
 from lightpaint.paint.layers.canvas import Canvas

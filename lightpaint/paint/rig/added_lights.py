@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 
 from lightpaint.arrays import RGB, Doubles, Position
-from lightpaint.basis.lights import BasisLight
+from lightpaint.basis import BasisLight
 from lightpaint.errors import PaintError, SceneError
 from lightpaint.paint.rig.page_geometry import FirstHit, FreeLength
 from lightpaint.placement import PanelSite

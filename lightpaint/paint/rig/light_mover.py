@@ -12,8 +12,7 @@ from typing import Any
 import numpy as np
 
 from lightpaint.arrays import Doubles
-from lightpaint.basis.basis import Basis
-from lightpaint.basis.cache.denoised_planes import DenoisedPlanes, as_halves, denoise_to_halves
+from lightpaint.basis import Basis, DenoisedPlanes, as_halves, denoise_to_halves
 from lightpaint.colour import LUMINANCE
 from lightpaint.errors import LightpaintError, PaintError, SceneError
 from lightpaint.paint.background_threads import BackgroundThreads, LatestWork, StoppedError

@@ -8,9 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from lightpaint.basis.basis import Basis
-from lightpaint.basis.cache.denoised_planes import as_halves
-from lightpaint.basis.denoised_mixes import denoise_mix
+from lightpaint.basis import Basis, as_halves, denoise_mix
 from lightpaint.display_text import some_names
 from lightpaint.errors import LightpaintError
 from lightpaint.files import write_text

@@ -10,8 +10,7 @@ import numpy as np
 import numpy.typing as npt
 
 from lightpaint.arrays import Bools, Floats
-from lightpaint.basis.basis import Basis
-from lightpaint.basis.cache.denoised_planes import scale_of
+from lightpaint.basis import Basis, scale_of
 from lightpaint.colour import ViewTransform
 from lightpaint.errors import PaintError
 from lightpaint.images import block_mean, blocks_in, fitting_factor

@@ -17,8 +17,7 @@ from typing import Any
 import numpy.typing as npt
 
 from lightpaint.arrays import Doubles, Floats
-from lightpaint.basis.basis import Basis
-from lightpaint.basis.denoised_mixes import denoise_mix
+from lightpaint.basis import Basis, denoise_mix
 from lightpaint.colour import ViewTransform
 from lightpaint.errors import LightpaintError, PaintError
 from lightpaint.lighting.constraints.constraints import Constraints

@@ -8,8 +8,7 @@ from typing import Any
 import numpy as np
 
 from lightpaint.arrays import RGB, Doubles, as_rgb
-from lightpaint.basis.basis import Basis
-from lightpaint.basis.lights import BasisLight
+from lightpaint.basis import Basis, BasisLight
 from lightpaint.colour import (
     LUMINANCE,
     ColorRendering,

@@ -8,8 +8,7 @@ import numpy as np
 import numpy.typing as npt
 
 from lightpaint.arrays import Doubles
-from lightpaint.basis.basis import Basis
-from lightpaint.basis.cache.denoised_planes import DenoisedPlanes
+from lightpaint.basis import Basis, DenoisedPlanes
 from lightpaint.colour import ViewTransform
 from lightpaint.lighting.analysis.analysis import analyse
 from lightpaint.lighting.analysis.appearance.display_difference import PaintComparison

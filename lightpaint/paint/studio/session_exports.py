@@ -7,7 +7,7 @@ from pathlib import Path
 from typing import Any
 
 from lightpaint.arrays import Floats
-from lightpaint.basis.basis import Basis
+from lightpaint.basis import Basis
 from lightpaint.colour import ViewTransform, to_8_bit
 from lightpaint.errors import OutputError, PaintError
 from lightpaint.files import write_bytes

@@ -12,12 +12,9 @@ from pathlib import Path
 from typing import Any
 
 from lightpaint.arrays import Bools
-from lightpaint.basis.basis import Basis
-from lightpaint.basis.cache.cached_render import check_same_view
-from lightpaint.basis.lightgroups.frame_sequence import FrameSequence, spoken_frames
-from lightpaint.basis.lightgroups.light_groups import LightGroups
-from lightpaint.basis.lights import Lights
-from lightpaint.basis.render.render_origin import basis_lights
+from lightpaint.basis import Basis, FrameSequence, LightGroups, Lights, spoken_frames
+from lightpaint.basis.cache import check_same_view
+from lightpaint.basis.render import basis_lights
 from lightpaint.display_text import short_repr
 from lightpaint.errors import ConstraintError, LightpaintError, TargetError
 from lightpaint.files import check_writable

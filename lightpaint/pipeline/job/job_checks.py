@@ -4,8 +4,7 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
-from lightpaint.basis.basis import Basis
-from lightpaint.basis.lightgroups.light_groups import LightGroups, with_equal_lights
+from lightpaint.basis import Basis, LightGroups, with_equal_lights
 from lightpaint.errors import (
     BasisError,
     ConstraintError,

@@ -1,7 +1,6 @@
 """Remarks for the user before a job runs, in plain text."""
 
-from lightpaint.basis.render.banded_film import memory_needed, renders_in_bands
-from lightpaint.basis.render.integrators import remark_on_separate_renders
+from lightpaint.basis.render import memory_needed, remark_on_separate_renders, renders_in_bands
 from lightpaint.display_text import some_names
 from lightpaint.images import MISSING_REMARK, Size, left_over, oidn_is_installed, whole_factor
 from lightpaint.pipeline.job.settings import Settings

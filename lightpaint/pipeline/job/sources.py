@@ -10,11 +10,8 @@ from pathlib import Path
 from typing import Any, Self
 
 from lightpaint.arrays import Floats
-from lightpaint.basis.basis import Basis
-from lightpaint.basis.file.basis_file import read_basis
-from lightpaint.basis.lightgroups.light_groups import LightGroups, read_light_groups
-from lightpaint.basis.render.integrators import check_renders_spectra
-from lightpaint.basis.render.render_origin import basis_lights
+from lightpaint.basis import Basis, LightGroups, read_basis, read_light_groups
+from lightpaint.basis.render import basis_lights, check_renders_spectra
 from lightpaint.colour import EYE, Observer, TransformChoice, read_observer
 from lightpaint.errors import BasisError, LightpaintError, SceneError
 from lightpaint.keywords import keywords

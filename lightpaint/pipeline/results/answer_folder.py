@@ -9,7 +9,7 @@ from contextlib import contextmanager
 from dataclasses import dataclass, replace
 from pathlib import Path
 
-from lightpaint.basis.lightgroups.light_groups import LightGroups
+from lightpaint.basis import LightGroups
 from lightpaint.lighting.answer.lighting import Lighting
 from lightpaint.lighting.answer.lighting_file import write_lighting
 from lightpaint.pipeline.results.result_folder import ResultFolder

@@ -6,7 +6,7 @@ from dataclasses import asdict, dataclass, replace
 from pathlib import Path
 from typing import Any
 
-from lightpaint.basis.basis import Basis, Origin
+from lightpaint.basis import Basis, Origin
 from lightpaint.colour import EYE, Observer
 from lightpaint.display_text import rounded_text, some_names
 from lightpaint.errors import ImageError, OutputError, SceneError

@@ -6,7 +6,7 @@ import numpy as np
 from markupsafe import Markup
 
 from lightpaint.arrays import Doubles
-from lightpaint.basis.basis import Basis
+from lightpaint.basis import Basis
 from lightpaint.colour import ViewTransform, cct_and_duv, hue_name, to_8_bit
 from lightpaint.display_text import some_names
 from lightpaint.images import block_mean, denoised

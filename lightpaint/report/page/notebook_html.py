@@ -13,7 +13,7 @@ from markupsafe import Markup
 from PIL import Image, ImageDraw, ImageFont
 
 from lightpaint.arrays import RGB, Doubles, Floats
-from lightpaint.basis.basis import Basis
+from lightpaint.basis import Basis
 from lightpaint.colour import (
     LUMINANCE,
     Photometry,

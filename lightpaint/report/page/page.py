@@ -18,7 +18,7 @@ import numpy as np
 from markupsafe import Markup
 
 from lightpaint.arrays import Floats
-from lightpaint.basis.basis import Basis
+from lightpaint.basis import Basis
 from lightpaint.colour import ViewTransform, to_8_bit
 from lightpaint.display_text import some_of
 from lightpaint.images import Estimate, covered, in_turns

@@ -9,8 +9,7 @@ import numpy as np
 import numpy.typing as npt
 
 from lightpaint.arrays import Doubles, Floats
-from lightpaint.basis.basis import Basis
-from lightpaint.basis.derived_planes import block_means
+from lightpaint.basis import Basis, block_means
 from lightpaint.images import Estimate, block_mean, block_sums, whole_factor
 from lightpaint.lighting.analysis.appearance.constraint_kinds import (
     ALL_LIGHTS_KINDS,
