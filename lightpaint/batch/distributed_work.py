@@ -47,9 +47,8 @@ from lightpaint.lighting.linear_problem import Sums
 from lightpaint.pipeline.job.job import Job
 from lightpaint.pipeline.job.sources import Painting, SceneFile
 from lightpaint.progress import Listener, Progress
+from lightpaint.scene import Scene, estimate_of, passes_of, ranges_of
 from lightpaint.scene.quality_presets import samples
-from lightpaint.scene.scene import Scene
-from lightpaint.scene.scene_render import estimate_of, passes_of, ranges_of
 
 
 class PartwiseRender:

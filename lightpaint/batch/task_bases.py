@@ -29,8 +29,8 @@ from lightpaint.pipeline.placed_lights import moved_basis, say_changes
 from lightpaint.placement import PlacementRecord, read_placement
 from lightpaint.progress import Listener
 from lightpaint.report import HungLight, rig_drawing
+from lightpaint.scene import Scene
 from lightpaint.scene.quality_presets import on_film
-from lightpaint.scene.scene import Scene
 
 #: Rough seconds of a search on one thread, to detect hung workers.
 SEARCH_S = 300.0

@@ -22,8 +22,8 @@ from lightpaint.pipeline.job.settings import Settings
 from lightpaint.pipeline.job.sources import SceneFile, vars_of
 from lightpaint.placement import rigging_of
 from lightpaint.progress import Progress, silent
+from lightpaint.scene import Scene
 from lightpaint.scene.quality_presets import samples
-from lightpaint.scene.scene import Scene
 
 #: Samples per pixel after which a basis that is still being rendered is shown, and shown again.
 PREVIEW_SPP = (2, 8, 32, 128)

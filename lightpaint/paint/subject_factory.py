@@ -27,9 +27,9 @@ from lightpaint.pipeline.job.sources import (
     check_nothing_unused,
     content,
 )
+from lightpaint.scene import Scene
 from lightpaint.scene.lights.lights_file import lights_file_for
 from lightpaint.scene.quality_presets import on_film
-from lightpaint.scene.scene import Scene
 from lightpaint.sentences import Hint
 
 #: Maximum number of bytes of half floats that a page can hold, for all planes of a view.

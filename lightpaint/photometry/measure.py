@@ -18,8 +18,7 @@ from lightpaint.keywords import keywords
 from lightpaint.photometry.illuminance import Illuminance, floored
 from lightpaint.photometry.measuring_plane import MeasuringPlane
 from lightpaint.progress import Progress, listener, silent
-from lightpaint.scene.properties.measuring_points import MeasuringPoints
-from lightpaint.scene.scene import Scene
+from lightpaint.scene import MeasuringPoints, Scene
 from lightpaint.validation import Check, between, number
 
 #: Relative error of a measurement without another; see `measure_illuminance`.

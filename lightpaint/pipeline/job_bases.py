@@ -13,7 +13,7 @@ from lightpaint.lighting.solution import Solution
 from lightpaint.pipeline.job.job import Job, PaintedView
 from lightpaint.pipeline.job.settings import Settings
 from lightpaint.progress import Announcement, Listener, Pace, Progress, labelled, listener
-from lightpaint.scene.scene import Scene
+from lightpaint.scene import Scene
 from lightpaint.sentences import Hint, Sentence, Word
 
 

@@ -21,7 +21,7 @@ from lightpaint.pipeline.wished_planes import (
     with_glare,
 )
 from lightpaint.progress import Progress, listener, silent
-from lightpaint.scene.scene import Scene
+from lightpaint.scene import Scene
 
 #: The file of a plan's numbers.
 PLAN = "plan.json"

@@ -13,11 +13,11 @@ from lightpaint.lighting.answer.lighting_file import read_lighting
 from lightpaint.pipeline.results.answer_folder import LIGHTING
 from lightpaint.progress import Progress, silent
 from lightpaint.report import HungLight, light_sheet
-from lightpaint.scene.lights.texels.texel import image_of
+from lightpaint.scene import Scene
+from lightpaint.scene.lights.texels import image_of
 from lightpaint.scene.properties.site import EmitterPlace
 from lightpaint.scene.quality_presets import Preset
 from lightpaint.scene.runtime.variant import use_variant
-from lightpaint.scene.scene import Scene
 from lightpaint.sentences import Hint
 
 #: Rendering of a light sheet, and its own seed: answers that continue a cached basis must not

@@ -17,7 +17,7 @@ from lightpaint.pipeline.pipeline import run
 from lightpaint.pipeline.results.results import Look
 from lightpaint.placement import Rigging
 from lightpaint.progress import Progress, silent
-from lightpaint.scene.scene import Scene
+from lightpaint.scene import Scene
 from lightpaint.sentences import Hint, Sentence
 from lightpaint.target import Target
 

@@ -60,8 +60,7 @@ from lightpaint.relit import (
     with_light_tests,
 )
 from lightpaint.report import make_ahead, prepare_page
-from lightpaint.scene.scene import Scene
-from lightpaint.scene.surfaces import render_reflectances
+from lightpaint.scene import Scene, render_reflectances
 from lightpaint.sentences import Hint, Sentence, Word
 
 #: Advice on stages that every answer needs.

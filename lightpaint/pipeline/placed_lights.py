@@ -42,9 +42,8 @@ from lightpaint.placement import (
     rigged_lights,
 )
 from lightpaint.progress import Listener
-from lightpaint.scene.lights.texels.texel import CHILDREN, MAX_LEVEL, RATIO, Node
-from lightpaint.scene.scene import Scene
-from lightpaint.scene.scene_reader import with_layout
+from lightpaint.scene import Scene, with_layout
+from lightpaint.scene.lights.texels import CHILDREN, MAX_LEVEL, RATIO, Node
 from lightpaint.sentences import Hint, Sentence
 
 #: Largest turn that is tried, in degrees, and the margin that the suggested option adds to it.

@@ -29,11 +29,8 @@ from lightpaint.pipeline.results.answer_folder import (
 from lightpaint.pipeline.results.result_folder import ResultFolder
 from lightpaint.progress import Progress, listener, silent
 from lightpaint.relit import relight
-from lightpaint.scene.properties.film import with_width
+from lightpaint.scene import Scene, Stream, render, render_features, with_width
 from lightpaint.scene.quality_presets import on_film
-from lightpaint.scene.scene import Scene
-from lightpaint.scene.scene_render import Stream, render
-from lightpaint.scene.surfaces import render_features
 from lightpaint.target import texts_of
 
 #: EXR layer of a final render without its noise.

@@ -24,10 +24,8 @@ from lightpaint.pipeline.job.remarks import remarks_of_pictures
 from lightpaint.pipeline.job.settings import Settings
 from lightpaint.pipeline.job_bases import obtain
 from lightpaint.progress import Listener, Progress, listener, silent
+from lightpaint.scene import Scene, Stream, render, render_features, render_surfaces
 from lightpaint.scene.quality_presets import Preset
-from lightpaint.scene.scene import Scene
-from lightpaint.scene.scene_render import Stream, render
-from lightpaint.scene.surfaces import render_features, render_surfaces
 from lightpaint.target import LIGHTS, SHOWN_FILE, Template, write_look, write_template
 
 #: Rendering of the small picture of each light, to recognise it by.

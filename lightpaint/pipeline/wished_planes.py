@@ -37,7 +37,7 @@ from lightpaint.pipeline.job.job import Job
 from lightpaint.pipeline.job.job_checks import checked_scale
 from lightpaint.pipeline.job.settings import Settings
 from lightpaint.progress import Listener
-from lightpaint.scene.scene import Scene
+from lightpaint.scene import Scene
 
 #: Least cosine between the normal of a plane and the vertical at which it faces upwards.
 FACING_UP = 0.7

@@ -44,11 +44,9 @@ from lightpaint.placement.search.new_light_search import STARTS, NewLightSearch
 from lightpaint.placement.search.pose_search import TURNS, PoseRules, PoseSearch
 from lightpaint.placement.suggestion import Suggestion
 from lightpaint.progress import Progress, silent
+from lightpaint.scene import NewEmitter, Pose, Scene, free_names
 from lightpaint.scene.checks.tokens import tag
-from lightpaint.scene.lights.light import free_names
-from lightpaint.scene.lights.new_emitter import NewEmitter
-from lightpaint.scene.properties.pose import Pose, Site
-from lightpaint.scene.scene import Scene
+from lightpaint.scene.properties.site import Site
 
 #: Steps of all lights together along many paths.
 STEPS = 10

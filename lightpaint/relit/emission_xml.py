@@ -25,18 +25,20 @@ from lightpaint.luminaires import (
     world_from_web,
 )
 from lightpaint.relit.xml_edit import Element, XmlFile
-from lightpaint.scene.checks.tokens import tag
-from lightpaint.scene.lights.emitters import Emitter
-from lightpaint.scene.lights.hung_luminaires import (
+from lightpaint.scene import (
+    AS_AUTHORED,
     SPOT_MARK,
+    Emitter,
     HungLuminaire,
+    Scaling,
+    Scene,
+    child_named,
     luminaire_lines,
     matrix_text,
     panel_lines,
     rgb_text,
 )
-from lightpaint.scene.properties.emission import AS_AUTHORED, Scaling, child_named
-from lightpaint.scene.scene import Scene
+from lightpaint.scene.checks.tokens import tag
 
 #: Luminance that Mitsuba shows for a power per nanometre that has the luminance 1 for the observer.
 LUMINANCE_OF_POWER = 0.009367658735689113

@@ -24,10 +24,8 @@ from lightpaint.relit.export.nuke import NukeLight, RigKind
 from lightpaint.relit.export.program_axes import SkyMap, lat_long, map_axes, map_size_for
 from lightpaint.relit.relit_files import enlarged, images_of_texels, settings_of
 from lightpaint.relit.relit_scene import scene_of
-from lightpaint.scene.lights.emitters import Emitter
-from lightpaint.scene.lights.texels.image_domains import Sky, Slide, Wall
-from lightpaint.scene.properties.emission import Scaling
-from lightpaint.scene.scene import Scene
+from lightpaint.scene import Emitter, Scaling, Scene
+from lightpaint.scene.lights.texels import Sky, Slide, Wall
 from lightpaint.sentences import Hint, Sentence
 
 #: Kind of light for each plugin; area lights are panels if they are flat.

@@ -18,11 +18,9 @@ from lightpaint.relit.emission_xml import (
     set_spectrum,
 )
 from lightpaint.relit.xml_edit import XmlFile
+from lightpaint.scene import Emitter, Scene, texel_image
 from lightpaint.scene.checks.tokens import tag
-from lightpaint.scene.lights.emitters import Emitter
-from lightpaint.scene.lights.image_split import texel_image
-from lightpaint.scene.lights.texels.image_domains import GridSize
-from lightpaint.scene.scene import Scene
+from lightpaint.scene.lights.texels import GridSize
 
 
 def settings_of(scene: Scene, emission: Mapping[str, RGB]) -> Iterator[tuple[Emitter, RGB]]:

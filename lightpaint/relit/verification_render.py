@@ -43,17 +43,17 @@ from lightpaint.relit.verification import (
     limit_of_tests,
     with_light_tests,
 )
-from lightpaint.scene.lights.hung_luminaires import luminaire_of_spot
-from lightpaint.scene.lights.texels.texel import image_of
-from lightpaint.scene.scene import Scene
-from lightpaint.scene.scene_render import (
+from lightpaint.scene import (
+    Scene,
     Stream,
+    luminaire_of_spot,
     pass_seed,
     render,
     render_in_stages,
     sampled_by,
     view_seed,
 )
+from lightpaint.scene.lights.texels import image_of
 
 #: Numbers of parts, out of ALL_PARTS, of the samples after which the render is examined.
 LOOKS, ALL_PARTS = (2, 3, 4, 6, 8, 12, 16, 24, 32, 48, 64), 64

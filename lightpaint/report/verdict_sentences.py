@@ -40,7 +40,7 @@ from lightpaint.report.phrases import (
     spoken_progress,
     spoken_where,
 )
-from lightpaint.scene.lights.texels.texel import image_of
+from lightpaint.scene.lights.texels import image_of
 
 #: Maximum number of barely visible lights that a sentence names.
 MAX_UNSEEN_NAMES = 2

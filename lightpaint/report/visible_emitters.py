@@ -11,7 +11,7 @@ from lightpaint.display_text import some_of
 from lightpaint.images import Estimate, sum_by_bands
 from lightpaint.lighting.loss.painting import ignored_paint
 from lightpaint.lighting.solution import Solution
-from lightpaint.scene.lights.texels.texel import image_of
+from lightpaint.scene.lights.texels import image_of
 from lightpaint.sentences import Hint, Sentence, Word
 from lightpaint.target import Target
 

@@ -22,8 +22,8 @@ from lightpaint.lighting.constraints.constraints import Constraints
 from lightpaint.lighting.fit import DEFAULT_HOLD
 from lightpaint.pipeline.job.settings import Settings
 from lightpaint.relit import FORMS
+from lightpaint.scene import check_resolution
 from lightpaint.scene.limits import MAX_SPP
-from lightpaint.scene.properties.film import check_resolution
 from lightpaint.sentences import Datum, Hint, Sentence
 from lightpaint.target import Paint
 from lightpaint.validation import BRIGHTEST, MAX_LISTED, SWITCH, Check, a, checks_of, one_of, whole

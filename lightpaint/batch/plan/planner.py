@@ -44,8 +44,8 @@ from lightpaint.pipeline.results.result_folder import is_as_written
 from lightpaint.pipeline.results.results import view_names
 from lightpaint.pipeline.wished_planes import check_planes, constraints_for_planes
 from lightpaint.relit import scene_of
+from lightpaint.scene import Scene
 from lightpaint.scene.quality_presets import on_film
-from lightpaint.scene.scene import Scene
 
 #: Samples per point that illuminance of `DEFAULT_ERROR` takes in a room.
 LUX_SPP = 4096

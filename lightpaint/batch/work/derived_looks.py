@@ -23,7 +23,7 @@ from lightpaint.pipeline.wished_planes import (
 )
 from lightpaint.progress import Listener
 from lightpaint.relit import scene_of
-from lightpaint.scene.scene import Scene
+from lightpaint.scene import Scene
 
 
 def derived_folder(

@@ -51,7 +51,7 @@ from lightpaint.pipeline.results.results import view_names
 from lightpaint.placement import record_of
 from lightpaint.progress import Listener
 from lightpaint.relit import Source, names_of_forms, write_content, writers_of
-from lightpaint.scene.scene import Scene
+from lightpaint.scene import Scene
 
 #: Error numbers of a full disk.
 DISK_FULL_ERRNOS = {errno.ENOSPC, errno.EDQUOT, errno.EFBIG}

@@ -33,10 +33,9 @@ from lightpaint.files import first_line
 from lightpaint.images import read_estimate
 from lightpaint.pipeline.job.sources import BasisFile, GroupsFile, SceneFile
 from lightpaint.placement import read_placement
+from lightpaint.scene import Scene, Stream, pass_sum, passes_of
 from lightpaint.scene.quality_presets import on_film
 from lightpaint.scene.runtime.render_lock import tracing
-from lightpaint.scene.scene import Scene
-from lightpaint.scene.scene_render import Stream, pass_sum, passes_of
 from lightpaint.target import Target
 from lightpaint.version import __version__
 

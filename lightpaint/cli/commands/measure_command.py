@@ -34,7 +34,7 @@ from lightpaint.pipeline.job.sources import SceneFile
 from lightpaint.progress import stage
 from lightpaint.relit import scene_of
 from lightpaint.report import glare_sentences
-from lightpaint.scene.scene import Scene
+from lightpaint.scene import Scene
 from lightpaint.sentences import Hint
 from lightpaint.storage.staging import finish, staged
 

@@ -42,9 +42,9 @@ from lightpaint.pipeline.templates import (
 )
 from lightpaint.progress import stage
 from lightpaint.relit import solved_identity
+from lightpaint.scene import Scene
 from lightpaint.scene.quality_presets import on_film, samples
 from lightpaint.scene.runtime.variant import use_variant
-from lightpaint.scene.scene import Scene
 from lightpaint.sentences import Sentence
 from lightpaint.storage.staging import finish
 from lightpaint.target import CLEAN, LIGHT_FILE, LIGHTS, MATTES, SHOWN_FILE, files_in_the_way

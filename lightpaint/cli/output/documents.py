@@ -15,9 +15,7 @@ from lightpaint.pipeline.results.result_folder import RECORD
 from lightpaint.pipeline.results.results import Look
 from lightpaint.relit import Verification
 from lightpaint.report import finite, verification_numbers
-from lightpaint.scene.lights.light import WHOLE_EMISSION, Light
-from lightpaint.scene.properties.emission import MULTIPLE
-from lightpaint.scene.scene import Scene
+from lightpaint.scene import MULTIPLE, WHOLE_EMISSION, Light, Scene
 
 
 def lights_document(scene: Scene, cd_per_unit: float | None) -> dict[str, Any]:

@@ -11,12 +11,8 @@ from lightpaint.colour import Photometry, photometry
 from lightpaint.placement import Suggestion
 from lightpaint.relit import Verification
 from lightpaint.report import agreement, spoken_percent, spoken_position, spoken_suggestions
-from lightpaint.scene.lights.emitters import Emitter
-from lightpaint.scene.lights.light import Light
-from lightpaint.scene.lights.texels.image_domains import domain_of
-from lightpaint.scene.lights.texels.texel import image_of, layouts_of, node_name
-from lightpaint.scene.properties.emission import MULTIPLE
-from lightpaint.scene.scene import Scene
+from lightpaint.scene import MULTIPLE, Emitter, Light, Scene
+from lightpaint.scene.lights.texels import domain_of, image_of, layouts_of, node_name
 
 
 def show_lights(scene: Scene, cd_per_unit: float | None) -> None:

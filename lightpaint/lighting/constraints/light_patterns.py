@@ -16,7 +16,7 @@ from lightpaint.lighting.constraints.constraints import (
     is_pattern,
     merge_tables,
 )
-from lightpaint.scene.lights.texels.texel import coarse_name, image_of
+from lightpaint.scene.lights.texels import coarse_name, image_of
 from lightpaint.sentences import Hint, Lead, SourceKey
 
 

@@ -22,8 +22,7 @@ from lightpaint.paint.store.session_requests import SessionRequests
 from lightpaint.paint.subject import Subject
 from lightpaint.paint.subject_factory import make_subjects
 from lightpaint.pipeline.job.settings import Settings
-from lightpaint.scene.scene import Scene
-from lightpaint.scene.scene_reader import load_scene
+from lightpaint.scene import Scene, load_scene
 from lightpaint.sentences import Datum, Remedy
 from lightpaint.target import PASS_RESIZE, Target
 

@@ -16,7 +16,7 @@ from lightpaint.colour import luminance
 from lightpaint.images import Objects, block_mean, fitting_factor
 from lightpaint.paint.layers.canvas import Canvas
 from lightpaint.paint.presets.view_areas import MIN_ALBEDO, Mask, ViewAreas
-from lightpaint.scene.lights.texels.texel import coarse_name, image_of, images_of, texel_place
+from lightpaint.scene.lights.texels import coarse_name, image_of, images_of, texel_place
 
 #: Kinds of emitters that always are hard light, always soft light, and light of the sky or the sun.
 HARD_KINDS = frozenset({"spot", "point", "directional", "projector", "directionalarea", "ies"})

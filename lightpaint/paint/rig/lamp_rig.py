@@ -49,10 +49,9 @@ from lightpaint.placement import (
     surfaces_of,
     why_not_searched,
 )
-from lightpaint.scene.properties.pose import Pose, Site, motion_of
+from lightpaint.scene import Pose, Scene, motion_of, render_features
+from lightpaint.scene.properties.site import Site
 from lightpaint.scene.runtime.render_lock import MITSUBA
-from lightpaint.scene.scene import Scene
-from lightpaint.scene.surfaces import render_features
 from lightpaint.sentences import Hint
 
 #: Number of rendered planes, each of all views, that are cached for undo.

@@ -50,8 +50,8 @@ from lightpaint.paint.session.picture_table import (
 from lightpaint.paint.session.session import Session
 from lightpaint.paint.session_access import Publisher, SessionAccess
 from lightpaint.paint.store.history_steps import name_in_view
-from lightpaint.scene.lights.new_emitter import NewEmitter
-from lightpaint.scene.properties.pose import Pose, Site
+from lightpaint.scene import NewEmitter, Pose
+from lightpaint.scene.properties.site import Site
 
 #: Luminance of a spot that is aimed well, relative to that of a lamp without a cone at its place.
 AIMED_SHARE = 0.3

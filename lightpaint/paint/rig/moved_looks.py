@@ -25,8 +25,8 @@ from lightpaint.paint.session_access import Publisher, SessionAccess
 from lightpaint.paint.store.history_steps import name_in_view
 from lightpaint.paint.subject import Subject, places_path
 from lightpaint.placement import AddedLight, Move, PlacementRecord, is_panel
-from lightpaint.scene.properties.pose import Site
-from lightpaint.scene.scene import Scene
+from lightpaint.scene import Scene
+from lightpaint.scene.properties.site import Site
 
 
 def of_moved_scenes(

@@ -25,7 +25,7 @@ from lightpaint.pipeline.results.answer_folder import LIGHTING, RELIT, write_ans
 from lightpaint.progress import Progress
 from lightpaint.relit import relight, verify_in_stages
 from lightpaint.report import CleanLooks, spoken_distance
-from lightpaint.scene.scene_reader import load_scene
+from lightpaint.scene import load_scene
 from lightpaint.target import texts_of, write_painting
 
 #: Folder of the report, in that of the session.

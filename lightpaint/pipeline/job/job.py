@@ -68,8 +68,8 @@ from lightpaint.pipeline.results.results import (
 )
 from lightpaint.placement import PlacementRecord, Rigging, check_suggestible
 from lightpaint.relit import plugin_remark, spoken_unreadable
+from lightpaint.scene import Scene
 from lightpaint.scene.quality_presets import on_film
-from lightpaint.scene.scene import Scene
 from lightpaint.sentences import Hint, Sentence
 from lightpaint.target import Target
 from lightpaint.threads import parallel_map

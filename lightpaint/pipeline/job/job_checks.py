@@ -17,9 +17,8 @@ from lightpaint.lighting.joined_views import check_same_lights
 from lightpaint.pipeline.job.settings import Settings
 from lightpaint.pipeline.job.sources import Painting, content
 from lightpaint.placement import Rigging, check_rigging, rigged_lights, rigging_of
-from lightpaint.scene.lights.texels.image_domains import DOMAINS, Sky
-from lightpaint.scene.lights.texels.texel import CHILDREN, mirrored_pairs, node_name
-from lightpaint.scene.scene import Scene
+from lightpaint.scene import Scene
+from lightpaint.scene.lights.texels import CHILDREN, DOMAINS, Sky, mirrored_pairs, node_name
 from lightpaint.sentences import Hint, Sentence
 from lightpaint.target import Target
 

@@ -4,9 +4,9 @@ from lightpaint.basis.render import memory_needed, remark_on_separate_renders, r
 from lightpaint.display_text import some_names
 from lightpaint.images import MISSING_REMARK, Size, left_over, oidn_is_installed, whole_factor
 from lightpaint.pipeline.job.settings import Settings
+from lightpaint.scene import Scene
 from lightpaint.scene.quality_presets import PRESETS
 from lightpaint.scene.runtime.variant import use_variant
-from lightpaint.scene.scene import Scene
 from lightpaint.sentences import Hint, Sentence, Word
 from lightpaint.target import Target
 

@@ -21,9 +21,7 @@ from lightpaint.lighting.unknowns.lamp_parts import WholeLamps
 from lightpaint.lighting.unknowns.reduction import lamps_by_name
 from lightpaint.pipeline.job.settings import Settings
 from lightpaint.placement import PlacementRecord, read_placement
-from lightpaint.scene.lights.light import part_name
-from lightpaint.scene.scene import Scene
-from lightpaint.scene.scene_reader import load_scene
+from lightpaint.scene import Scene, load_scene, part_name
 from lightpaint.sentences import Hint, Sentence
 from lightpaint.target import Paint, Target, read_over_look, read_target
 

@@ -14,8 +14,7 @@ from lightpaint.lighting.answer.lighting import Lighting
 from lightpaint.lighting.answer.lighting_file import write_lighting
 from lightpaint.pipeline.results.result_folder import ResultFolder
 from lightpaint.relit import EXPORTS, check_relightable, relight, settle, write_exports
-from lightpaint.scene.scene import Scene
-from lightpaint.scene.scene_reader import load_scene
+from lightpaint.scene import Scene, load_scene
 
 #: Files of every answer; a scene may add files that it includes, light groups those for other
 #: programs.

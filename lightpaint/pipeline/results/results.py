@@ -49,10 +49,7 @@ from lightpaint.report import (
     verdict,
 )
 from lightpaint.report.page.notebook_html import look_html
-from lightpaint.scene.scene import Scene
-from lightpaint.scene.scene_reader import load_scene
-from lightpaint.scene.scene_render import Stream
-from lightpaint.scene.surfaces import render_features
+from lightpaint.scene import Scene, Stream, load_scene, render_features
 from lightpaint.storage.json_records import read_record, strict_json
 from lightpaint.storage.staging import finish
 from lightpaint.target import Target

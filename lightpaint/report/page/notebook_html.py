@@ -36,7 +36,7 @@ from lightpaint.report.page.figures import THUMBNAIL_WIDTH, data_uri, thumbnail
 from lightpaint.report.page.html import html
 from lightpaint.report.page.lights_table import change, hex_color
 from lightpaint.report.verdict_sentences import agreement, verdict
-from lightpaint.scene.scene import Scene
+from lightpaint.scene import Scene
 from lightpaint.target import Target
 
 #: Maximum number of lights in a table; the most pictures of a contact sheet, and in a row.

@@ -21,7 +21,7 @@ from lightpaint.arrays import Doubles, Floats, aligned
 from lightpaint.basis.render.tracer.texel_table import TexelTable
 from lightpaint.basis.render.tracer.wavelengths import BINS, FIRST_NM, packets_for, spacing_of
 from lightpaint.colour import EYE, WAVELENGTHS, Observer, Spectrum
-from lightpaint.scene.scene import Scene
+from lightpaint.scene import Scene
 
 
 class LightPlanes:

@@ -41,10 +41,8 @@ from lightpaint.basis.render.tracer.path_tracer import Rules, View, trace_paths,
 from lightpaint.basis.render.tracer.sobol import SobolPairs
 from lightpaint.basis.render.tracer.texel_table import TexelTable
 from lightpaint.basis.render.tracer.wavelengths import RgbPaths, SpectralPaths
-from lightpaint.scene.properties.measuring_points import MeasuringPoints
+from lightpaint.scene import MeasuringPoints, Scene, Stream, pass_seed
 from lightpaint.scene.runtime.kernel_threads import kernels
-from lightpaint.scene.scene import Scene
-from lightpaint.scene.scene_render import Stream, pass_seed
 
 #: Number of emitter samples at the first vertex, and at later ones: keys are exclusive upper bounds
 #: of the number of emitters.
