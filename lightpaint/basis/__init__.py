@@ -68,4 +68,5 @@ if TYPE_CHECKING:
     from lightpaint.basis.texel_images import light_images as light_images
     from lightpaint.basis.texel_images import texel_lights as texel_lights
 
-__getattr__, __dir__, __all__ = lazy_names(__name__)
+if not TYPE_CHECKING:  # a type checker would take any name
+    __getattr__, __dir__, __all__ = lazy_names(__name__)

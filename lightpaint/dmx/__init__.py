@@ -48,4 +48,5 @@ if TYPE_CHECKING:
     from lightpaint.dmx.rig_scene import scene_text as scene_text
     from lightpaint.dmx.rig_scene import spectrum_tables as spectrum_tables
 
-__getattr__, __dir__, __all__ = lazy_names(__name__)
+if not TYPE_CHECKING:  # a type checker would take any name
+    __getattr__, __dir__, __all__ = lazy_names(__name__)

@@ -27,4 +27,5 @@ if TYPE_CHECKING:
     from lightpaint.luminaires.web_file import read_web as read_web
     from lightpaint.luminaires.web_file import unread_remark as unread_remark
 
-__getattr__, __dir__, __all__ = lazy_names(__name__)
+if not TYPE_CHECKING:  # a type checker would take any name
+    __getattr__, __dir__, __all__ = lazy_names(__name__)

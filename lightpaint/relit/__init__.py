@@ -42,4 +42,5 @@ if TYPE_CHECKING:
     from lightpaint.relit.verification_render import verify as verify
     from lightpaint.relit.verification_render import verify_in_stages as verify_in_stages
 
-__getattr__, __dir__, __all__ = lazy_names(__name__)
+if not TYPE_CHECKING:  # a type checker would take any name
+    __getattr__, __dir__, __all__ = lazy_names(__name__)

@@ -99,4 +99,5 @@ if TYPE_CHECKING:
     from lightpaint.report.verdict_sentences import verdict as verdict
     from lightpaint.report.visible_emitters import emitter_remarks as emitter_remarks
 
-__getattr__, __dir__, __all__ = lazy_names(__name__)
+if not TYPE_CHECKING:  # a type checker would take any name
+    __getattr__, __dir__, __all__ = lazy_names(__name__)

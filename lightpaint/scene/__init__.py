@@ -64,4 +64,5 @@ if TYPE_CHECKING:
     from lightpaint.scene.surfaces import render_reflectances as render_reflectances
     from lightpaint.scene.surfaces import render_surfaces as render_surfaces
 
-__getattr__, __dir__, __all__ = lazy_names(__name__)
+if not TYPE_CHECKING:  # a type checker would take any name
+    __getattr__, __dir__, __all__ = lazy_names(__name__)

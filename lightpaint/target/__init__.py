@@ -28,4 +28,5 @@ if TYPE_CHECKING:
     from lightpaint.target.wish_finding import find_wishes as find_wishes
     from lightpaint.target.wish_finding import split_wishes as split_wishes
 
-__getattr__, __dir__, __all__ = lazy_names(__name__)
+if not TYPE_CHECKING:  # a type checker would take any name
+    __getattr__, __dir__, __all__ = lazy_names(__name__)

@@ -17,4 +17,5 @@ if TYPE_CHECKING:
     from lightpaint.basis.cache.cached_render import top_up_basis as top_up_basis
     from lightpaint.basis.cache.scene_facts import SceneFacts as SceneFacts
 
-__getattr__, __dir__, __all__ = lazy_names(__name__)
+if not TYPE_CHECKING:  # a type checker would take any name
+    __getattr__, __dir__, __all__ = lazy_names(__name__)

@@ -33,4 +33,5 @@ if TYPE_CHECKING:
     from lightpaint.basis.render.render_parts import plan_parts as plan_parts
     from lightpaint.basis.render.separate_renders import emitters_seen as emitters_seen
 
-__getattr__, __dir__, __all__ = lazy_names(__name__)
+if not TYPE_CHECKING:  # a type checker would take any name
+    __getattr__, __dir__, __all__ = lazy_names(__name__)

@@ -26,4 +26,5 @@ if TYPE_CHECKING:
     from lightpaint.scene.lights.texels.texel import node_name as node_name
     from lightpaint.scene.lights.texels.texel import texel_place as texel_place
 
-__getattr__, __dir__, __all__ = lazy_names(__name__)
+if not TYPE_CHECKING:  # a type checker would take any name
+    __getattr__, __dir__, __all__ = lazy_names(__name__)
