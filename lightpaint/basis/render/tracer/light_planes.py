@@ -1,14 +1,14 @@
 """Planes on the device to which paths add their light, one for each light.
 
-Import this module after setting a Dr.Jit variant, since its array types do not exist before.
-
-The scene is loaded with all lamps at white, whose spectrum is D65. The colour that a path adds to
-the plane of an emitter is a sum over its wavelengths: its light there relative to D65, times the
-emitter's power, times the response of the observer, in linear Rec.709. So one path serves all
-emitters of a lamp.
+For a render with spectra, the scene is loaded with all lamps at white, whose spectrum is D65. The
+colour that a path adds to the plane of an emitter is a sum over its wavelengths: its light there
+relative to D65, times the emitter's power, times the response of the observer, in linear Rec.709.
+So one path serves all emitters of a lamp.
 
 Import this module after setting a Dr.Jit variant, since its array types do not exist before.
 """
+
+# mypy: disable-error-code="no-untyped-def, no-untyped-call"
 
 from collections.abc import Mapping
 from typing import Any

@@ -10,14 +10,14 @@ That is its plain mode, `trace_plainly`, which tests compare with Mitsuba. For a
 things better, at the same cost: it uses a low-discrepancy sequence instead of random numbers (see
 sobol.py), and a trained guide chooses the emitters (basis_render.py).
 
-Import this module after setting a Dr.Jit variant, since its array types do not exist before.
-
-A diffuse white surface reflects the radiance E / π, so π times the radiance that leaves it is the
-irradiance. At such a surface the path tracer samples lights as at any other, also lights without a
-size, which Mitsuba's `irradiancemeter` does not see.
+Measuring points are surfaces, diffuse and white. These reflect the radiance E / π, so π times the
+radiance that leaves one is the irradiance. There the path tracer samples lights as elsewhere, also
+lights without a size, which Mitsuba's `irradiancemeter` does not see.
 
 Import this module after setting a Dr.Jit variant, since its array types do not exist before.
 """
+
+# mypy: disable-error-code="no-untyped-def, no-untyped-call"
 
 from collections.abc import Callable, Sequence
 from functools import partial
