@@ -49,7 +49,7 @@ from lightpaint.paint.store.history_steps import Identity
 from lightpaint.paint.store.store import MemoryStore
 from lightpaint.pipeline.job.settings import Settings
 from lightpaint.scene.lights.texels.texel import image_of
-from lightpaint.target.wish import Wish
+from lightpaint.target.target import Wish
 
 SCENES = Path(__file__).parent.parent / "scenes"
 SIZES = {"gallery": "160x90", "stage": "160x90", "table": "160x90", "cornell": "64x64"}

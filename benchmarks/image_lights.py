@@ -32,7 +32,7 @@ from image_light_rivals import adam
 import lightpaint as lp
 from lightpaint.arrays import Doubles, Floats
 from lightpaint.basis.basis import Basis
-from lightpaint.basis.light_images import LightImage, light_images
+from lightpaint.basis.texel_images import LightImage, light_images
 from lightpaint.colour.color import luminance
 from lightpaint.colour.color_difference import delta_e
 from lightpaint.images.formats.exr import write_rgb

@@ -101,10 +101,10 @@ if TYPE_CHECKING:
     from lightpaint.placement.rigging import Rigging as Rigging
     from lightpaint.placement.suggestion import Suggestion as Suggestion
     from lightpaint.relit.export.exports import write_exports as write_exports
-    from lightpaint.relit.relight import relight as relight
+    from lightpaint.relit.relit_scene import relight as relight
     from lightpaint.relit.verification import Verification as Verification
     from lightpaint.relit.verification_render import verify as verify
-    from lightpaint.report.verdict import verdict as verdict
+    from lightpaint.report.verdict_sentences import verdict as verdict
     from lightpaint.scene.lights.new_emitter import NewEmitter as NewEmitter
     from lightpaint.scene.properties.pose import Pose as Pose
     from lightpaint.scene.runtime.variant import use_variant as use_variant

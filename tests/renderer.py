@@ -11,7 +11,7 @@ from lightpaint.basis.basis import Basis
 from lightpaint.basis.render.basis_render import render_basis
 from lightpaint.images.formats.exr import write_rgb
 from lightpaint.lighting.answer.lighting import Lighting
-from lightpaint.relit.relight import relight
+from lightpaint.relit.relit_scene import relight
 from lightpaint.scene.scene import Scene
 
 REPOSITORY = Path(__file__).parent.parent

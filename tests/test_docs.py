@@ -21,8 +21,7 @@ from lightpaint.batch.manifest.keys import MAX_FRAMES
 from lightpaint.cli.commands.render_commands import template_lines
 from lightpaint.cli.options.parser import command_parser
 from lightpaint.dmx.network.console_link import PRIORITY
-from lightpaint.dmx.network.console_receiver import LOOPBACK
-from lightpaint.dmx.network.dmx_packets import USUAL_PRIORITY
+from lightpaint.dmx.network.console_receiver import LOOPBACK, USUAL_PRIORITY
 from lightpaint.lighting.constraints.color_restrictions import LAMP_KELVINS
 from lightpaint.lighting.fit import DEFAULT_HOLD
 from lightpaint.paint.server.address import DEFAULT_PORT

@@ -15,7 +15,7 @@ from lightpaint.basis.file import basis_file, file_planes
 from lightpaint.images import bands, denoiser
 from lightpaint.images.formats.png import png_bytes
 from lightpaint.lighting.loss import loss
-from lightpaint.report import clean_pictures
+from lightpaint.report import answer_pictures
 
 #: Bytes of memory for each pixel that a solve and its report may take, beside the planes: 3.5 GB at
 #: 3840 x 2160, where libraries and strips of 100 lights take another half.
@@ -35,7 +35,7 @@ def stay_in_the_file(patch: pytest.MonkeyPatch, large: int) -> None:
     patch.setattr(bands, "BAND_PIXELS", large // 8)
     patch.setattr(loss, "MAX_KEPT_PIXELS", large)
     patch.setattr(loss, "STRIP_PIXELS", min(loss.STRIP_PIXELS, large // 4))
-    for module in (bands, denoiser, clean_pictures):
+    for module in (bands, denoiser, answer_pictures):
         patch.setattr(module, "LARGE_PICTURE", large)
 
 

@@ -17,10 +17,10 @@ from lightpaint.errors import LightpaintError, SceneError
 from lightpaint.images.formats.exr import write_rgb
 from lightpaint.lighting.answer.lighting_file import read_lighting
 from lightpaint.lighting.constraints.constraints_file import constraints_of
-from lightpaint.pipeline.job.spectral_job import spectral_scene
+from lightpaint.pipeline.job.sources import spectral_scene
 from lightpaint.pipeline.results.results import verify_result
-from lightpaint.relit.export.spectra_table import spectra_csv
-from lightpaint.relit.relight import relight
+from lightpaint.relit.formats import spectra_csv
+from lightpaint.relit.relit_scene import relight
 from lightpaint.scene.scene_reader import load_scene
 from lightpaint.scene.scene_render import Stream, render
 

@@ -136,7 +136,7 @@ PARTS: dict[str, tuple[str, ...]] = {
     "lighting.loss.expected_lights": ("ExpectedLights",),
     "lighting.normal_equations": ("NormalEquations",),
     "lighting.loss.reweighting": ("Reweighting",),
-    "target.wish": ("Wish",),
+    "target.target": ("Wish",),
     "lighting.problem": ("Refinement",),
     "lighting.answer.certificate": ("Bound",),
     "lighting.wishes.planes_answer": ("PlanesAnswer",),

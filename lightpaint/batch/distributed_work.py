@@ -11,16 +11,21 @@ from typing import Any
 import numpy as np
 
 from lightpaint.arrays import Floats
-from lightpaint.basis.basis import Basis
-from lightpaint.basis.render.banded_film import check_memory, renders_in_bands
-from lightpaint.basis.render.basis_render import (
+from lightpaint.basis import Basis
+from lightpaint.basis.render import (
+    ONE_PASS,
+    Part,
+    PartSums,
+    basis_lights,
+    check_memory,
     check_size,
+    method_of,
+    plan_parts,
     render_basis,
+    renders_in_bands,
     training_samples,
     with_first_hits,
 )
-from lightpaint.basis.render.render_origin import ONE_PASS, basis_lights, method_of
-from lightpaint.basis.render.render_parts import Part, PartSums, plan_parts
 from lightpaint.batch.engine import Engine
 from lightpaint.batch.work.item_execution import attempt, job_fields, publish_solved_lights
 from lightpaint.batch.work.task import Task
@@ -42,9 +47,8 @@ from lightpaint.lighting.linear_problem import Sums
 from lightpaint.pipeline.job.job import Job
 from lightpaint.pipeline.job.sources import Painting, SceneFile
 from lightpaint.progress import Listener, Progress
+from lightpaint.scene import Scene, estimate_of, passes_of, ranges_of
 from lightpaint.scene.quality_presets import samples
-from lightpaint.scene.scene import Scene
-from lightpaint.scene.scene_render import estimate_of, passes_of, ranges_of
 
 
 class PartwiseRender:

@@ -10,12 +10,11 @@ from functools import partial
 from pathlib import Path
 from typing import Any
 
-from lightpaint.basis.basis import Basis
+from lightpaint.basis import Basis
 from lightpaint.batch.cluster.cluster import Cluster
 from lightpaint.batch.distributed_work import distributed_renderer, solve_by_sums
 from lightpaint.batch.engine import Engine, InProcess, Processes
-from lightpaint.batch.gallery.gallery import write_gallery
-from lightpaint.batch.gallery.gallery_mixers import write_task_planes
+from lightpaint.batch.gallery.gallery import write_gallery, write_task_planes
 from lightpaint.batch.gallery.summary import SummaryRow
 from lightpaint.batch.manifest.file_names import THUMBNAILS
 from lightpaint.batch.manifest.keys import as_key

@@ -8,9 +8,8 @@ from contextlib import ExitStack
 from dataclasses import replace
 from pathlib import Path
 
-from lightpaint.basis.basis import Basis
+from lightpaint.basis import Basis, write_basis
 from lightpaint.basis.cache import cache
-from lightpaint.basis.file.basis_file import write_basis
 from lightpaint.batch.distributed_work import PartwiseRender
 from lightpaint.batch.engine import Engine
 from lightpaint.batch.plan.plan import PlaceGroup
@@ -29,10 +28,9 @@ from lightpaint.pipeline.job_bases import obtain
 from lightpaint.pipeline.placed_lights import moved_basis, say_changes
 from lightpaint.placement import PlacementRecord, read_placement
 from lightpaint.progress import Listener
-from lightpaint.report.rig.hung_lights import HungLight
-from lightpaint.report.rig.rig_drawing import rig_drawing
+from lightpaint.report import HungLight, rig_drawing
+from lightpaint.scene import Scene
 from lightpaint.scene.quality_presets import on_film
-from lightpaint.scene.scene import Scene
 
 #: Rough seconds of a search on one thread, to detect hung workers.
 SEARCH_S = 300.0

@@ -5,7 +5,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
-from lightpaint.basis.basis import Basis
+from lightpaint.basis import Basis
 from lightpaint.batch.gallery.gallery import counts_text, entry_of, write_solve_gallery
 from lightpaint.batch.manifest.entries import LookEntry
 from lightpaint.batch.manifest.file_names import FILES, check_gallery, is_reserved

@@ -17,7 +17,7 @@ from lightpaint.arrays import Doubles, Position
 from lightpaint.display_text import some_names
 from lightpaint.dmx.console_rig import ConsoleRig, RigAxis, RigFixture, RigHead, RigLight
 from lightpaint.dmx.gdtf.fixture_type import FixtureType
-from lightpaint.dmx.gdtf.mode_heads import ModeHead
+from lightpaint.dmx.gdtf.mode_channels import ModeHead
 from lightpaint.dmx.gdtf.mode_lights import FixtureMode, ModeLight
 from lightpaint.errors import RigError
 from lightpaint.file_reading import read_bytes

@@ -13,7 +13,7 @@ from lightpaint.sentences import Hint
 from lightpaint.validation import a, check_fields, number
 
 if TYPE_CHECKING:
-    from lightpaint.target.target import Target
+    from lightpaint.target import Target
 
 #: The space of the comparison with the painting: light, or display values.
 Space = Literal["linear", "display"]

@@ -12,12 +12,11 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from lightpaint.basis.basis import Basis
-from lightpaint.basis.planes import joined_planes
+from lightpaint.basis import Basis, joined_planes
 from lightpaint.display_text import some_names
 from lightpaint.errors import BasisError
 from lightpaint.images import Estimate
-from lightpaint.target.target import Target
+from lightpaint.target import Target
 
 #: Pixels in a row of the long picture. Pixels without importance fill the last row.
 ROW_PIXELS = 2**10

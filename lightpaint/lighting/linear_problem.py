@@ -12,9 +12,7 @@ from typing import TYPE_CHECKING, Self
 import numpy as np
 
 from lightpaint.arrays import Bools, Doubles, Floats
-from lightpaint.basis.basis import Basis
-from lightpaint.basis.light_images import texel_lights
-from lightpaint.basis.lights import Lights
+from lightpaint.basis import Basis, Lights, texel_lights
 from lightpaint.colour import ViewTransform
 from lightpaint.display_text import short_repr
 from lightpaint.errors import TargetError
@@ -37,7 +35,7 @@ from lightpaint.lighting.unknowns.gamuts import Gamuts
 from lightpaint.lighting.unknowns.reduction import Reduction, reduce_to
 from lightpaint.lighting.unknowns.slot_search import improve_slots
 from lightpaint.sentences import Hint, Word
-from lightpaint.target.target import Target, titled
+from lightpaint.target import Target, titled
 
 
 class LinearProblem:

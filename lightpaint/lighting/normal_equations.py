@@ -10,8 +10,7 @@ import numpy as np
 import numpy.typing as npt
 
 from lightpaint.arrays import Doubles, Floats
-from lightpaint.basis.basis import Basis
-from lightpaint.basis.planes import MemoryPlanes
+from lightpaint.basis import Basis, MemoryPlanes
 from lightpaint.errors import SizeError
 from lightpaint.lighting.algebra.quadratic import UNREACHED_POWER
 

@@ -9,9 +9,7 @@ import numpy as np
 import numpy.typing as npt
 
 from lightpaint.arrays import Bools, Doubles, Floats
-from lightpaint.basis.basis import Basis
-from lightpaint.basis.light_images import texel_lights
-from lightpaint.basis.lights import Lights
+from lightpaint.basis import Basis, Lights, texel_lights
 from lightpaint.colour import ViewTransform
 from lightpaint.display_text import short_repr
 from lightpaint.errors import BasisError, ConstraintError, TargetError
@@ -41,7 +39,7 @@ from lightpaint.lighting.normal_equations import NormalEquations
 from lightpaint.lighting.unknowns.gamuts import Gamuts, PaintedLight
 from lightpaint.lighting.unknowns.reduction import Reduction
 from lightpaint.lighting.unknowns.white_mixes import tangent_reduction
-from lightpaint.target.target import Target
+from lightpaint.target import Target
 
 #: Largest relative error of one rounding to float16 and to float32.
 HALF_ROUND_OFF, SINGLE_ROUND_OFF = 2.0**-11, 2.0**-24

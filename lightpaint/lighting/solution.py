@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 
 from lightpaint.arrays import Bools, Doubles, Floats
-from lightpaint.basis.basis import Basis
+from lightpaint.basis import Basis
 from lightpaint.colour import luminance
 from lightpaint.dataframes import CHANNELS, by_channel, xarray
 from lightpaint.display_text import Shown

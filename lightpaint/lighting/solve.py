@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 
 from lightpaint.arrays import Bools, Doubles, release_freed_memory
-from lightpaint.basis.basis import Basis
+from lightpaint.basis import Basis
 from lightpaint.colour import Lamp
 from lightpaint.keywords import keywords
 from lightpaint.lighting.answer.lighting import Lighting
@@ -50,7 +50,7 @@ from lightpaint.lighting.unknowns.reduced_problem import (
 )
 from lightpaint.lighting.unknowns.reduction import Reduction, lamps_by_name
 from lightpaint.lighting.unknowns.white_mixes import next_whites
-from lightpaint.target.target import Target
+from lightpaint.target import Target
 
 #: Maximum number of steps of lights to other whites, for a loss that is not linear, and the share
 #: of the loss that a step has to gain.

@@ -20,10 +20,9 @@ import mitsuba as mi
 import numpy as np
 
 from lightpaint.arrays import Doubles
-from lightpaint.luminaires.plugin_names import AREA_PLUGIN, POINT_PLUGIN
-from lightpaint.luminaires.web import PhotometricWeb
+from lightpaint.luminaires import AREA_PLUGIN, POINT_PLUGIN
+from lightpaint.luminaires.web import PhotometricWeb, world_from_web
 from lightpaint.luminaires.web_file import read_web
-from lightpaint.luminaires.web_frame import world_from_web
 
 #: Solid angle of all directions.
 SPHERE = 4 * math.pi

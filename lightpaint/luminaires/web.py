@@ -3,6 +3,9 @@
 Angles are those of CIE's type C. Gamma is the angle from the nadir: 0 is straight down, 180
 straight up. A C-plane is a half-plane that ends at the vertical axis. In the frame of a web the
 nadir is −z, C0 is +x and C90 is +y, as in the output of Radiance's ies2rad.
+
+A spot is bright up to its beam width and falls linearly with the angle to its cutoff. So an axial
+web, which is linear between its angles γₖ, is Σₖ (Iₖ − Iₖ₊₁) spot(γₖ, γₖ₊₁).
 """
 
 import math
@@ -13,7 +16,8 @@ from typing import Literal
 
 import numpy as np
 
-from lightpaint.arrays import Doubles, Indices, read_only
+from lightpaint.arrays import Doubles, Indices, Position, read_only
+from lightpaint.errors import SceneError
 
 #: How a file repeats the planes that it lists: about the axis, in quadrants, on both sides of the
 #: plane C0–C180 or C90–C270, or not at all.
@@ -25,6 +29,16 @@ SAME_ANGLE = 1e-4
 GRID_UNIT = 1e-3
 #: Intervals of an even grid at most: of gammas, and of C-planes.
 MAX_STEPS, MAX_PLANES = 1800, 720
+
+#: From the frame of a web (nadir −z, C0 +x, C90 +y) into that of an emitter that shines along z:
+#: seen along z with y upwards, +x is to the left, so that C0 is to the right and C90 up.
+EMITTER_FROM_WEB = np.diag([-1.0, 1.0, -1.0])
+
+#: Error of a sum at most, relative to the web's largest intensity.
+SPOT_TOLERANCE = 1e-3
+
+#: The largest cutoff of a spot in degrees.
+WIDEST = 90.0
 
 
 @dataclass(frozen=True)
@@ -222,3 +236,95 @@ def _even(angles: Doubles, most: int) -> Doubles:
     units = np.rint((angles - angles[0]) / GRID_UNIT).astype(int).tolist()
     steps = units[-1] // max(1, math.gcd(*units))
     return np.linspace(angles[0], angles[-1], min(steps, most) + 1) if span > 0 else angles
+
+
+def world_from_web(to_world: Doubles, *, turn: float = 0.0, tilt: float = 0.0) -> Doubles:
+    """Return the matrix (3, 3) from the frame of a web into the world.
+
+    to_world: (3, 3), of the emitter, which may be scaled. turn, tilt: as in `turned`.
+    Raises SceneError for a frame without three axes.
+    """
+    left, up, ahead = np.asarray(to_world, np.float64).T
+    axes = [_unit(ahead)]
+    axes.append(_unit(left - axes[0] * (left @ axes[0])))
+    axes.append(_unit(up - sum(axis * (up @ axis) for axis in axes)))
+    frame = np.array([axes[1], axes[2], axes[0]]).T
+    return np.asarray(frame @ EMITTER_FROM_WEB @ turning(turn=turn, tilt=tilt))
+
+
+def hanging_frame(up: Position) -> Doubles:
+    """Return the matrix (3, 3) into the world of an emitter that shines straight down.
+
+    With z up its C0 is +x and its C90 +y; with y up C0 is +x and C90 −z.
+    """
+    axis = _unit(np.array(up))
+    k = int(np.argmax(np.abs(axis)))
+    c0 = np.array([0.0, 1.0, 0.0]) if k == 0 else np.array([1.0, 0.0, 0.0])
+    c0 = _unit(c0 - axis * (c0 @ axis))
+    return np.array([-c0, np.cross(axis, c0), -axis]).T
+
+
+def _unit(vector: Doubles) -> Doubles:
+    length = float(np.linalg.norm(vector))
+    if not length > 1e-12:
+        raise SceneError("the luminaire has a transform without three axes")
+    return np.asarray(vector / length)
+
+
+@dataclass(frozen=True)
+class SpotPart:
+    """A spot of a sum: its candela on the axis, and beam width and cutoff in degrees."""
+
+    candela: float
+    beam: float
+    cutoff: float
+
+
+def spots_of(web: PhotometricWeb) -> tuple[SpotPart, ...]:
+    """Return the spots that add up to a web; none if it is not axial, or not dark above 90 degrees.
+
+    The error is at most SPOT_TOLERANCE of the largest intensity.
+    """
+    if not web.is_axial:
+        return ()
+    gammas, candela = web.gammas, web.profile()
+    slack = SPOT_TOLERANCE * web.peak
+    if np.any(candela[gammas > WIDEST] > slack):
+        return ()
+    below = gammas <= WIDEST
+    above = candela[gammas > WIDEST]
+    gammas, candela = gammas[below], candela[below]
+    if len(above) and candela[-1] > slack and gammas[-1] < WIDEST:
+        # It falls to the dark beyond 90 degrees, from before.
+        return ()
+    kept = _corners(gammas, candela, slack)
+    gammas, candela = gammas[kept], candela[kept]
+    parts = [
+        SpotPart(float(first - last), float(beam), float(cutoff))
+        for first, last, beam, cutoff in zip(
+            candela[:-1], candela[1:], gammas[:-1], gammas[1:], strict=True
+        )
+    ]
+    if gammas[0] > 0:
+        parts.insert(0, SpotPart(float(-candela[0]), float(gammas[0]), float(gammas[0])))
+    parts.append(SpotPart(float(candela[-1]), float(gammas[-1]), float(gammas[-1])))
+    return tuple(x for x in parts if x.candela != 0)
+
+
+def _corners(x: Doubles, y: Doubles, slack: float) -> Indices:
+    """Return the points of a polyline that suffice for an error of y of at most `slack`.
+
+    Those of Douglas and Peucker (1973), whose first and last points are kept.
+    """
+    kept, open_ranges = {0, len(x) - 1}, [(0, len(x) - 1)]
+    while open_ranges:
+        first, last = open_ranges.pop()
+        if last - first < 2:
+            continue
+        inner = slice(first + 1, last)
+        error = np.abs(y[inner] - np.interp(x[inner], x[[first, last]], y[[first, last]]))
+        if error.max() > slack:
+            middle = first + 1 + int(error.argmax())
+            kept.add(middle)
+            open_ranges += [(first, middle), (middle, last)]
+    return np.array(sorted(kept))

@@ -24,7 +24,7 @@ from lightpaint.paint.store.store import Store
 from lightpaint.paint.studio.console_switch import Console
 from lightpaint.paint.studio.studio import Studio
 from lightpaint.paint.subject import LazyScene, Subject, check_view_names, session_identity
-from lightpaint.scene.scene import Scene
+from lightpaint.scene import Scene
 from lightpaint.signals import interruptible_between_pieces
 
 #: Name of the file by which programs find a running painter, in the same folder.

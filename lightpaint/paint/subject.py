@@ -9,10 +9,8 @@ from typing import Any
 
 import numpy as np
 
-from lightpaint.basis.basis import Basis, meter_exposure
-from lightpaint.basis.cache import cache, scene_facts
-from lightpaint.basis.cache.scene_facts import SceneFacts
-from lightpaint.basis.lightgroups.light_groups import LightGroups
+from lightpaint.basis import Basis, LightGroups, meter_exposure
+from lightpaint.basis.cache import SceneFacts, cache, scene_facts
 from lightpaint.colour import TransformChoice, ViewTransform, read_observer
 from lightpaint.display_text import some_names
 from lightpaint.errors import PaintError
@@ -24,8 +22,8 @@ from lightpaint.pipeline.job.settings import Settings
 from lightpaint.pipeline.job.sources import SceneFile, vars_of
 from lightpaint.placement import rigging_of
 from lightpaint.progress import Progress, silent
+from lightpaint.scene import Scene
 from lightpaint.scene.quality_presets import samples
-from lightpaint.scene.scene import Scene
 
 #: Samples per pixel after which a basis that is still being rendered is shown, and shown again.
 PREVIEW_SPP = (2, 8, 32, 128)
@@ -231,7 +229,7 @@ class Subject:
         return replace(cached, lights=record.lights)
 
     def _obtain_at(self, spp: int, progress: Progress) -> Basis:
-        from lightpaint.basis.cache.cached_render import obtain_basis
+        from lightpaint.basis.cache import obtain_basis
 
         scene = self.loaded_scene
         basis = obtain_basis(

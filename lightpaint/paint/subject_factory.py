@@ -5,9 +5,7 @@ from functools import partial
 from pathlib import Path
 from typing import Any
 
-from lightpaint.basis.basis import Basis
-from lightpaint.basis.lightgroups.light_groups import LightGroups
-from lightpaint.basis.lights import Lights
+from lightpaint.basis import Basis, LightGroups, Lights
 from lightpaint.colour import TransformChoice, read_observer
 from lightpaint.errors import PaintError, SceneError
 from lightpaint.file_reading import file_length
@@ -29,9 +27,9 @@ from lightpaint.pipeline.job.sources import (
     check_nothing_unused,
     content,
 )
+from lightpaint.scene import Scene
 from lightpaint.scene.lights.lights_file import lights_file_for
 from lightpaint.scene.quality_presets import on_film
-from lightpaint.scene.scene import Scene
 from lightpaint.sentences import Hint
 
 #: Maximum number of bytes of half floats that a page can hold, for all planes of a view.
@@ -124,7 +122,7 @@ def _scene_on_film(
     """Return a scene on the film of its basis, or one that is loaded when it is needed."""
 
     def check(scene: Scene) -> None:
-        from lightpaint.basis.render.render_origin import basis_lights
+        from lightpaint.basis.render import basis_lights
 
         _check_constraints(basis_lights(scene), constraints, settings, check_lamps)
         if settings.planes is not None:
@@ -160,7 +158,7 @@ def _with_spectra(scene: Scene, *, settings: Settings, constraints: Constraints)
     """
     if not settings.spectral:
         return scene
-    from lightpaint.pipeline.job.spectral_job import (
+    from lightpaint.pipeline.job.sources import (
         check_spectral,
         observer_of,
         spectral_scene,

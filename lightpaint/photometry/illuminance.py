@@ -15,7 +15,7 @@ from functools import cached_property
 import numpy as np
 
 from lightpaint.arrays import Doubles
-from lightpaint.basis.lights import Lights
+from lightpaint.basis import Lights
 from lightpaint.display_text import some_names
 from lightpaint.errors import SceneError
 from lightpaint.keywords import keywords

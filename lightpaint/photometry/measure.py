@@ -9,9 +9,8 @@ from collections.abc import Callable, Sequence
 import numpy as np
 
 from lightpaint.arrays import Doubles, Floats
-from lightpaint.basis.basis import Basis
-from lightpaint.basis.cache.cached_render import obtain_basis
-from lightpaint.basis.lights import Lights
+from lightpaint.basis import Basis, Lights
+from lightpaint.basis.cache import obtain_basis
 from lightpaint.colour import LUMINANCE
 from lightpaint.display_text import brief, some_names
 from lightpaint.errors import SceneError
@@ -19,8 +18,7 @@ from lightpaint.keywords import keywords
 from lightpaint.photometry.illuminance import Illuminance, floored
 from lightpaint.photometry.measuring_plane import MeasuringPlane
 from lightpaint.progress import Progress, listener, silent
-from lightpaint.scene.properties.measuring_points import MeasuringPoints
-from lightpaint.scene.scene import Scene
+from lightpaint.scene import MeasuringPoints, Scene
 from lightpaint.validation import Check, between, number
 
 #: Relative error of a measurement without another; see `measure_illuminance`.

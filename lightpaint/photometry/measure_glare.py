@@ -14,19 +14,16 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from lightpaint.arrays import RGB, Bools, Doubles
-from lightpaint.basis.basis import Basis
+from lightpaint.basis import Basis
 from lightpaint.colour import LUMINANCE
 from lightpaint.keywords import keywords
-from lightpaint.luminaires.plugin_names import POINT_PLUGIN
+from lightpaint.luminaires import POINT_PLUGIN
 from lightpaint.photometry.glare import Glare, GlareObserver, GlareSources, position_index
 from lightpaint.photometry.illuminance import Illuminance, PlaneReading
 from lightpaint.photometry.measure import DEFAULT_ERROR, measured_until, weights_on
 from lightpaint.photometry.measuring_plane import MeasuringPlane
 from lightpaint.progress import Progress, silent
-from lightpaint.scene.lights.emitters import Emitter
-from lightpaint.scene.properties.emission import ENVIRONMENTS
-from lightpaint.scene.properties.measuring_points import MeasuringPoints
-from lightpaint.scene.scene import Scene
+from lightpaint.scene import ENVIRONMENTS, Emitter, MeasuringPoints, Scene
 
 #: Places on a source along each side of the grid to which rays go.
 GRID = 16

@@ -10,7 +10,7 @@ from lightpaint.arrays import Doubles, Position
 from lightpaint.errors import SceneError
 from lightpaint.photometry.glare import GlareObserver
 from lightpaint.photometry.room_rays import RoomRays
-from lightpaint.scene.scene import Scene
+from lightpaint.scene import Scene
 
 #: Place of an observer who is where the camera is, and their name in files without any.
 CAMERA = "camera"

@@ -30,9 +30,8 @@ from lightpaint.photometry.observer_placement import CAMERA, ObserverRequest, pl
 from lightpaint.photometry.plane_placement import CYLINDRICAL, PlaneRequest, place_plane
 from lightpaint.photometry.room_rays import RoomRays
 from lightpaint.photometry.wish_presets import PRESETS
-from lightpaint.scene.properties.pose import FARTHEST
+from lightpaint.scene import FARTHEST, Scene
 from lightpaint.scene.runtime.variant import use_variant
-from lightpaint.scene.scene import Scene
 from lightpaint.sentences import SourceKey
 from lightpaint.storage.json_records import strict_toml
 from lightpaint.validation import MAX_NAME, is_number, parse_share

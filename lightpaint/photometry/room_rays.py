@@ -9,8 +9,7 @@ from typing import Any
 import numpy as np
 
 from lightpaint.arrays import Bools, Doubles, Indices
-from lightpaint.scene.scene import Scene
-from lightpaint.scene.surfaces import names_by_shape
+from lightpaint.scene import Scene, names_by_shape
 
 #: Directions in which a point looks around, and share of back sides among all from which on it is
 #: inside of a solid.

@@ -10,8 +10,7 @@ from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
 
-from lightpaint.basis.lightgroups.frame_sequence import parse_frames
-from lightpaint.basis.lightgroups.light_groups import LightGroups, read_light_groups
+from lightpaint.basis import LightGroups, parse_frames, read_light_groups
 from lightpaint.errors import BasisError, ImageError, OutputError
 from lightpaint.files import check_files
 from lightpaint.images.formats import read_headers, write_parts
@@ -22,7 +21,7 @@ from lightpaint.pipeline.job.job import Job
 from lightpaint.pipeline.job.sources import GroupsFile
 from lightpaint.pipeline.results.answer_folder import LIGHTING
 from lightpaint.progress import Progress, listener, silent
-from lightpaint.relit.export.exports import relit_part
+from lightpaint.relit import relit_part
 from lightpaint.sentences import Hint
 
 #: Header attribute of a frame: the answer and the render that it shows.

@@ -4,19 +4,16 @@ import time
 from collections.abc import Sequence
 from dataclasses import replace
 
-from lightpaint.basis.basis import Basis
-from lightpaint.basis.cache import cache
-from lightpaint.basis.cache.cache import folder
-from lightpaint.basis.cache.cached_render import Render, obtain_basis
-from lightpaint.basis.render.basis_render import render_basis
-from lightpaint.basis.render.render_origin import samples_for
+from lightpaint.basis import Basis
+from lightpaint.basis.cache import Render, cache, folder, obtain_basis
+from lightpaint.basis.render import render_basis, samples_for
 from lightpaint.lighting.analysis.noise.noise_correction import correct_noise
 from lightpaint.lighting.problem import Problem
 from lightpaint.lighting.solution import Solution
 from lightpaint.pipeline.job.job import Job, PaintedView
 from lightpaint.pipeline.job.settings import Settings
 from lightpaint.progress import Announcement, Listener, Pace, Progress, labelled, listener
-from lightpaint.scene.scene import Scene
+from lightpaint.scene import Scene
 from lightpaint.sentences import Hint, Sentence, Word
 
 

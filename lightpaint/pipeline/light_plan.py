@@ -3,7 +3,7 @@
 from dataclasses import dataclass
 from pathlib import Path
 
-from lightpaint.basis.render.render_origin import basis_lights
+from lightpaint.basis.render import basis_lights
 from lightpaint.keywords import keywords
 from lightpaint.lighting.answer.lighting import Lighting
 from lightpaint.lighting.constraints.constraints import Constraints
@@ -13,8 +13,7 @@ from lightpaint.lighting.wishes.planes_answer import PlanesAnswer, planes_answer
 from lightpaint.lighting.wishes.wished_light import check_powers
 from lightpaint.pipeline.job.settings import Settings
 from lightpaint.pipeline.results.answer_folder import answer_files
-from lightpaint.pipeline.results.planes_folder import files_of_planes
-from lightpaint.pipeline.results.result_folder import ResultFolder
+from lightpaint.pipeline.results.result_folder import ResultFolder, files_of_planes
 from lightpaint.pipeline.wished_planes import (
     MeasuredPlanes,
     constraints_for_planes,
@@ -22,7 +21,7 @@ from lightpaint.pipeline.wished_planes import (
     with_glare,
 )
 from lightpaint.progress import Progress, listener, silent
-from lightpaint.scene.scene import Scene
+from lightpaint.scene import Scene
 
 #: The file of a plan's numbers.
 PLAN = "plan.json"

@@ -3,9 +3,8 @@
 from dataclasses import replace
 from pathlib import Path
 
-from lightpaint.basis.cache import cache
-from lightpaint.basis.cache.cached_render import obtain_basis
-from lightpaint.basis.render.integrators import why_not_one_pass
+from lightpaint.basis.cache import cache, obtain_basis
+from lightpaint.basis.render import why_not_one_pass
 from lightpaint.errors import LightpaintError, OutputError
 from lightpaint.files import check_files, check_writable, write_bytes
 from lightpaint.images import denoiser_text
@@ -13,13 +12,12 @@ from lightpaint.images.formats import png_bytes, png_has_text
 from lightpaint.lighting.answer.lighting_file import read_lighting
 from lightpaint.pipeline.results.answer_folder import LIGHTING
 from lightpaint.progress import Progress, silent
-from lightpaint.report.light_sheet import light_sheet
-from lightpaint.report.rig.hung_lights import HungLight
-from lightpaint.scene.lights.texels.texel import image_of
+from lightpaint.report import HungLight, light_sheet
+from lightpaint.scene import Scene
+from lightpaint.scene.lights.texels import image_of
 from lightpaint.scene.properties.site import EmitterPlace
 from lightpaint.scene.quality_presets import Preset
 from lightpaint.scene.runtime.variant import use_variant
-from lightpaint.scene.scene import Scene
 from lightpaint.sentences import Hint
 
 #: Rendering of a light sheet, and its own seed: answers that continue a cached basis must not

@@ -7,11 +7,9 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from lightpaint.arrays import Doubles, Indices
-from lightpaint.basis.basis import Basis
-from lightpaint.basis.cache.cached_render import obtain_basis, top_up_basis
-from lightpaint.basis.light_images import texel_lights
-from lightpaint.basis.render.pixel_top_up import KeptTracer, kept_loaded
-from lightpaint.basis.render.render_origin import ONE_PASS
+from lightpaint.basis import Basis, texel_lights
+from lightpaint.basis.cache import obtain_basis, top_up_basis
+from lightpaint.basis.render import ONE_PASS, KeptTracer, kept_loaded
 from lightpaint.colour import LUMINANCE
 from lightpaint.lighting.analysis.noise.sample_demand import (
     pixel_variances,
@@ -25,8 +23,7 @@ from lightpaint.pipeline.job.job import Job
 from lightpaint.pipeline.job.settings import PILOT_SPP
 from lightpaint.pipeline.job_bases import problem_of, view_listener, without_noise
 from lightpaint.progress import Listener
-from lightpaint.report.measures import LEAST_SHARE, picture_errors
-from lightpaint.report.phrases import spoken_percent
+from lightpaint.report import LEAST_SHARE, picture_errors, spoken_percent
 from lightpaint.scene.limits import MAX_SPP
 
 #: Rounds of samples, each of which at most doubles their number.

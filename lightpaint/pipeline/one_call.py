@@ -4,9 +4,8 @@ from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
 from typing import Any, overload
 
-from lightpaint.basis.basis import Basis
-from lightpaint.basis.cache.cached_render import check_same_view
-from lightpaint.basis.lightgroups.light_groups import LightGroups
+from lightpaint.basis import Basis, LightGroups
+from lightpaint.basis.cache import check_same_view
 from lightpaint.colour import TransformChoice
 from lightpaint.errors import SceneError, TargetError
 from lightpaint.keywords import keywords
@@ -18,9 +17,9 @@ from lightpaint.pipeline.pipeline import run
 from lightpaint.pipeline.results.results import Look
 from lightpaint.placement import Rigging
 from lightpaint.progress import Progress, silent
-from lightpaint.scene.scene import Scene
+from lightpaint.scene import Scene
 from lightpaint.sentences import Hint, Sentence
-from lightpaint.target.target import Target
+from lightpaint.target import Target
 
 AnyScene = str | Path | Scene
 AnyTarget = str | Path | Target

@@ -6,7 +6,7 @@ from pathlib import Path
 from typing import Any
 
 from lightpaint.arrays import as_rgb, release_freed_memory
-from lightpaint.basis.basis import Basis
+from lightpaint.basis import Basis
 from lightpaint.colour import daylight
 from lightpaint.images import Estimate, write_estimate
 from lightpaint.keywords import keywords
@@ -23,7 +23,7 @@ from lightpaint.pipeline.job.job import Job, PaintedView
 from lightpaint.pipeline.job.settings import Settings
 from lightpaint.pipeline.job_bases import obtain_bases_of, problem_of, view_listener, without_noise
 from lightpaint.pipeline.needed_samples import add_needed_samples
-from lightpaint.pipeline.placed_lights import place_lights, suggest_move
+from lightpaint.pipeline.placed_lights import find_suns, place_lights, suggest_move
 from lightpaint.pipeline.results.answer_folder import (
     LIGHTING,
     AnswerFolder,
@@ -31,9 +31,8 @@ from lightpaint.pipeline.results.answer_folder import (
     reload_relit,
     with_places,
 )
-from lightpaint.pipeline.results.planes_folder import write_planes
+from lightpaint.pipeline.results.result_folder import write_planes
 from lightpaint.pipeline.results.results import Look, write_predicted, write_report
-from lightpaint.pipeline.sun_search import find_suns
 from lightpaint.pipeline.wished_planes import (
     MeasuredPlanes,
     answer_on_planes,
@@ -49,20 +48,19 @@ from lightpaint.progress import (
     spoken_duration,
     stage,
 )
-from lightpaint.relit.detection_power import LightShares, with_light_tests
-from lightpaint.relit.verification import Verification
-from lightpaint.relit.verification_render import (
+from lightpaint.relit import (
     SPECTRAL_DOUBLINGS,
+    LightShares,
+    Verification,
     VerificationBudget,
     refine_by_rendering,
     verification_budget,
     verify,
     verify_in_stages,
+    with_light_tests,
 )
-from lightpaint.report.basis_memo import make_ahead
-from lightpaint.report.page.page import prepare_page
-from lightpaint.scene.scene import Scene
-from lightpaint.scene.surface_spectra import render_reflectances
+from lightpaint.report import make_ahead, prepare_page
+from lightpaint.scene import Scene, render_reflectances
 from lightpaint.sentences import Hint, Sentence, Word
 
 #: Advice on stages that every answer needs.

@@ -7,7 +7,7 @@ from pathlib import Path
 from typing import Any
 
 from lightpaint.arrays import Floats
-from lightpaint.basis.render.separate_renders import emitters_seen
+from lightpaint.basis.render import emitters_seen
 from lightpaint.colour import ViewTransform, choose_exposure
 from lightpaint.images import (
     HALF_DIFFERENCE,
@@ -28,13 +28,10 @@ from lightpaint.pipeline.results.answer_folder import (
 )
 from lightpaint.pipeline.results.result_folder import ResultFolder
 from lightpaint.progress import Progress, listener, silent
-from lightpaint.relit.relight import relight
-from lightpaint.scene.properties.film import with_width
+from lightpaint.relit import relight
+from lightpaint.scene import Scene, Stream, render, render_features, with_width
 from lightpaint.scene.quality_presets import on_film
-from lightpaint.scene.scene import Scene
-from lightpaint.scene.scene_render import Stream, render
-from lightpaint.scene.surfaces import render_features
-from lightpaint.target.template import texts_of
+from lightpaint.target import texts_of
 
 #: EXR layer of a final render without its noise.
 DENOISED = "denoised"

@@ -7,14 +7,16 @@ from pathlib import Path
 import numpy as np
 
 from lightpaint.arrays import Floats
-from lightpaint.basis.basis import Basis, meter_exposure
+from lightpaint.basis import (
+    Basis,
+    denoise_current_look,
+    denoise_mix,
+    denoise_plane,
+    light_images,
+    meter_exposure,
+)
 from lightpaint.basis.cache import cache
-from lightpaint.basis.denoised_mixes import denoise_current_look, denoise_mix, denoise_plane
-from lightpaint.basis.light_images import light_images
-from lightpaint.basis.render.basis_render import render_basis
-from lightpaint.basis.render.integrators import why_not_one_pass
-from lightpaint.basis.render.render_origin import is_of
-from lightpaint.basis.render.separate_renders import emitters_seen
+from lightpaint.basis.render import emitters_seen, is_of, render_basis, why_not_one_pass
 from lightpaint.colour import ViewTransform, choose_exposure
 from lightpaint.images import Features, block_mean, denoised, denoiser_text
 from lightpaint.keywords import keywords
@@ -22,11 +24,9 @@ from lightpaint.pipeline.job.remarks import remarks_of_pictures
 from lightpaint.pipeline.job.settings import Settings
 from lightpaint.pipeline.job_bases import obtain
 from lightpaint.progress import Listener, Progress, listener, silent
+from lightpaint.scene import Scene, Stream, render, render_features, render_surfaces
 from lightpaint.scene.quality_presets import Preset
-from lightpaint.scene.scene import Scene
-from lightpaint.scene.scene_render import Stream, render
-from lightpaint.scene.surfaces import render_features, render_surfaces
-from lightpaint.target.template import LIGHTS, SHOWN_FILE, Template, write_look, write_template
+from lightpaint.target import LIGHTS, SHOWN_FILE, Template, write_look, write_template
 
 #: Rendering of the small picture of each light, to recognise it by.
 THUMBNAIL = Preset(32, 2**14)

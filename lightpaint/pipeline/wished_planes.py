@@ -7,8 +7,8 @@ from pathlib import Path
 import numpy as np
 
 from lightpaint.arrays import Doubles
-from lightpaint.basis.lights import Lights
-from lightpaint.basis.render.render_origin import basis_lights
+from lightpaint.basis import Lights
+from lightpaint.basis.render import basis_lights
 from lightpaint.display_text import some_names
 from lightpaint.lighting.analysis.appearance.display_difference import PaintComparison
 from lightpaint.lighting.constraints.absolute_scale import with_sure_scale
@@ -37,7 +37,7 @@ from lightpaint.pipeline.job.job import Job
 from lightpaint.pipeline.job.job_checks import checked_scale
 from lightpaint.pipeline.job.settings import Settings
 from lightpaint.progress import Listener
-from lightpaint.scene.scene import Scene
+from lightpaint.scene import Scene
 
 #: Least cosine between the normal of a plane and the vertical at which it faces upwards.
 FACING_UP = 0.7

@@ -16,8 +16,7 @@ from lightpaint.placement.freedom import Freedom
 from lightpaint.placement.lights_to_place import followers_of, free_light, new_lights_of
 from lightpaint.placement.new_lights import MirroredPair, NewLights
 from lightpaint.placement.rigging import Rigging, constraint_of, names_of
-from lightpaint.scene.lights.light import Light
-from lightpaint.scene.scene import Scene
+from lightpaint.scene import Light, Scene
 from lightpaint.sentences import Lead, SourceKey
 
 

@@ -13,8 +13,7 @@ from typing import Any
 import numpy as np
 
 from lightpaint.arrays import Bools, Floats, Position
-from lightpaint.scene.scene import Scene
-from lightpaint.scene.scene_render import Stream, pass_seed
+from lightpaint.scene import Scene, Stream, pass_seed
 
 #: Points of the picture from which the search starts, and rays from each.
 POINTS, RAYS = 600, 24

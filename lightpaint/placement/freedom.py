@@ -27,7 +27,7 @@ from lightpaint.placement.permitted_places import (
     Places,
     Rails,
 )
-from lightpaint.scene.properties.pose import FARTHEST
+from lightpaint.scene import FARTHEST
 from lightpaint.scene.properties.site import Site, across, rotation_between
 from lightpaint.validation import parse_number
 

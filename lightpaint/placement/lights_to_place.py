@@ -9,7 +9,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from lightpaint.arrays import Floats, Position
-from lightpaint.basis.lights import BasisLight
+from lightpaint.basis import BasisLight
 from lightpaint.display_text import some_names, with_similar_name
 from lightpaint.errors import NoPlaceError, SceneError
 from lightpaint.placement.free_space import as_position
@@ -19,12 +19,8 @@ from lightpaint.placement.paths.panel_lights import PanelSite, is_panel, panel_s
 from lightpaint.placement.paths.view_paths import SearchPaths
 from lightpaint.placement.permitted_places import BoxOfPlaces, Places, places_on
 from lightpaint.placement.placement_fit import Fitted
-from lightpaint.scene.lights.emitters import Emitter
-from lightpaint.scene.lights.light import Light, free_names
-from lightpaint.scene.lights.new_emitter import PLUGIN_OF, NewKind
-from lightpaint.scene.properties.emission import MULTIPLE, PLUGINS
-from lightpaint.scene.properties.pose import Site
-from lightpaint.scene.scene import Scene
+from lightpaint.scene import MULTIPLE, PLUGIN_OF, PLUGINS, Emitter, Light, Scene, free_names
+from lightpaint.scene.properties.site import NewKind, Site
 
 #: Plugins whose light can be computed along frozen paths.
 SEARCHED = ("point", "spot", "directional")

@@ -8,8 +8,7 @@ from typing import Any
 import numpy as np
 
 from lightpaint.arrays import Floats
-from lightpaint.basis.basis import Basis
-from lightpaint.basis.lights import BasisLight
+from lightpaint.basis import Basis, BasisLight
 from lightpaint.errors import SceneError
 from lightpaint.images import block_mean, whole_factor
 from lightpaint.lighting.constraints.constraints import Constraints, LightConstraint
@@ -17,8 +16,7 @@ from lightpaint.lighting.normal_equations import NormalEquations
 from lightpaint.lighting.problem import Problem
 from lightpaint.lighting.solution import Solution
 from lightpaint.lighting.unknowns.reduction import Reduction, reduce_to
-from lightpaint.scene.properties.film import reduction_to
-from lightpaint.scene.scene import Scene
+from lightpaint.scene import Scene, reduction_to
 
 #: Number of pixels of the small films, on which all places are compared, and of the larger films
 #: for the last steps; of all views together, if possible.

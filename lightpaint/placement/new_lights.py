@@ -13,8 +13,8 @@ from lightpaint.errors import SceneError
 from lightpaint.keywords import keywords
 from lightpaint.placement.free_space import as_position
 from lightpaint.placement.freedom import Freedom
-from lightpaint.scene.lights.new_emitter import NewKind
-from lightpaint.scene.properties.pose import FARTHEST, Site
+from lightpaint.scene import FARTHEST
+from lightpaint.scene.properties.site import NewKind, Site
 from lightpaint.validation import MAX_NAME, parse_number
 
 #: Maximum number of lights that one search adds.

@@ -15,7 +15,7 @@ from lightpaint.arrays import Doubles, Floats, Indices
 from lightpaint.display_text import some_names
 from lightpaint.errors import NoPlaceError, SceneError
 from lightpaint.placement.free_space import CLEARANCE, FreeSpace
-from lightpaint.scene.scene import Scene
+from lightpaint.scene import Scene
 
 #: Number of random places, per requested place, from which distant ones are chosen.
 OVERSAMPLING = 20

@@ -10,8 +10,8 @@ from typing import Any
 import numpy as np
 
 from lightpaint.arrays import RGB, Position, as_rgb
-from lightpaint.basis.basis import Basis
-from lightpaint.basis.render.integrators import why_not_one_pass
+from lightpaint.basis import Basis
+from lightpaint.basis.render import why_not_one_pass
 from lightpaint.errors import NoPlaceError, SceneError
 from lightpaint.keywords import keywords
 from lightpaint.lighting.constraints.constraints import Constraints
@@ -44,11 +44,9 @@ from lightpaint.placement.search.new_light_search import STARTS, NewLightSearch
 from lightpaint.placement.search.pose_search import TURNS, PoseRules, PoseSearch
 from lightpaint.placement.suggestion import Suggestion
 from lightpaint.progress import Progress, silent
+from lightpaint.scene import NewEmitter, Pose, Scene, free_names
 from lightpaint.scene.checks.tokens import tag
-from lightpaint.scene.lights.light import free_names
-from lightpaint.scene.lights.new_emitter import NewEmitter
-from lightpaint.scene.properties.pose import Pose, Site
-from lightpaint.scene.scene import Scene
+from lightpaint.scene.properties.site import Site
 
 #: Steps of all lights together along many paths.
 STEPS = 10

@@ -18,9 +18,8 @@ from lightpaint.errors import SceneError
 from lightpaint.file_reading import read_text
 from lightpaint.keywords import keywords
 from lightpaint.placement.free_space import as_position
-from lightpaint.scene.lights.new_emitter import NewEmitter
-from lightpaint.scene.properties.pose import Pose, Site
-from lightpaint.scene.scene import Scene
+from lightpaint.scene import NewEmitter, Pose, Scene
+from lightpaint.scene.properties.site import Site
 from lightpaint.sentences import Hint
 from lightpaint.storage.json_records import read_record, strict_json
 

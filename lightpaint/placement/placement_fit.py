@@ -20,9 +20,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from lightpaint.arrays import Bools, Doubles, Floats, Indices
-from lightpaint.basis.basis import Basis
-from lightpaint.basis.lights import BasisLight
-from lightpaint.basis.planes import Planes
+from lightpaint.basis import Basis, BasisLight, Planes
 from lightpaint.images import block_mean
 from lightpaint.lighting.algebra.optimum import minimise
 from lightpaint.lighting.analysis.noise.noise import denoised_matrix

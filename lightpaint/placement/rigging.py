@@ -17,8 +17,8 @@ from lightpaint.keywords import keywords
 from lightpaint.lighting.constraints.constraints import LightConstraint, is_pattern
 from lightpaint.lighting.constraints.values import check_keys
 from lightpaint.placement.freedom import EDGE
+from lightpaint.scene import FARTHEST
 from lightpaint.scene.lights.lights_file import MOVES, SceneRequests
-from lightpaint.scene.properties.pose import FARTHEST
 from lightpaint.sentences import SourceKey
 from lightpaint.validation import MAX_LISTED, MAX_NAME, is_number, parse_number
 

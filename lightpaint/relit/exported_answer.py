@@ -13,22 +13,19 @@ from typing import Any
 import numpy as np
 
 from lightpaint.arrays import RGB, Doubles, Floats, Position
-from lightpaint.basis.light_images import joined_texels
-from lightpaint.basis.lightgroups.light_groups import LightGroups
+from lightpaint.basis import LightGroups, joined_texels
 from lightpaint.colour import photometry
 from lightpaint.errors import LightpaintError
 from lightpaint.lighting.answer.lighting import Lighting
-from lightpaint.luminaires.plugin_names import FULL
+from lightpaint.luminaires import FULL
 from lightpaint.progress import Listener
 from lightpaint.relit.emission_xml import safe_name
 from lightpaint.relit.export.nuke import NukeLight, RigKind
 from lightpaint.relit.export.program_axes import SkyMap, lat_long, map_axes, map_size_for
-from lightpaint.relit.relight import scene_of
 from lightpaint.relit.relit_files import enlarged, images_of_texels, settings_of
-from lightpaint.scene.lights.emitters import Emitter
-from lightpaint.scene.lights.texels.image_domains import Sky, Slide, Wall
-from lightpaint.scene.properties.emission import Scaling
-from lightpaint.scene.scene import Scene
+from lightpaint.relit.relit_scene import scene_of
+from lightpaint.scene import Emitter, Scaling, Scene
+from lightpaint.scene.lights.texels import Sky, Slide, Wall
 from lightpaint.sentences import Hint, Sentence
 
 #: Kind of light for each plugin; area lights are panels if they are flat.

@@ -1,5 +1,7 @@
 """All formats in which an answer can be exported, a class each, and the files of some of them."""
 
+import csv
+import io
 from abc import abstractmethod
 from collections.abc import Callable, Collection, Iterable, Mapping, Sequence
 from dataclasses import replace
@@ -9,20 +11,19 @@ from pathlib import Path
 import numpy as np
 
 from lightpaint.arrays import RGB, Floats, as_rgb
-from lightpaint.basis.light_images import joined_texels
-from lightpaint.colour import luminance
+from lightpaint.basis import joined_texels
+from lightpaint.colour import WAVELENGTHS, luminance
 from lightpaint.display_text import some_names
 from lightpaint.errors import LightpaintError, OutputError
 from lightpaint.files import write_bytes, write_text
 from lightpaint.images.formats import write_rgb
 from lightpaint.lighting.answer.lighting import Lighting, LightSetting
 from lightpaint.progress import Listener
-from lightpaint.relit.export.exports import blender_script, scene_script
+from lightpaint.relit.export.exports import blender_script, plain_cell, scene_script
 from lightpaint.relit.export.fixtures import fixtures_csv, fixtures_json
 from lightpaint.relit.export.mvr_copy import show_copy
 from lightpaint.relit.export.nuke import needs_copy, nuke_lights, nuke_script, spoken_unreadable
 from lightpaint.relit.export.program_axes import SkyMap
-from lightpaint.relit.export.spectra_table import spectra_csv
 from lightpaint.relit.export.usd import check_usd, usd_overrides
 from lightpaint.relit.export.usd_groups import usd_multipliers
 from lightpaint.relit.exported_answer import (
@@ -39,7 +40,7 @@ from lightpaint.relit.exported_answer import (
     slide_images_of,
     wall_images_of,
 )
-from lightpaint.relit.relight import scene_of, scene_patch
+from lightpaint.relit.relit_scene import scene_of, scene_patch
 from lightpaint.sentences import Hint, Sentence
 
 #: Width of a 95 % interval, relative to the brightest channel, above which a light is hardly known.
@@ -249,6 +250,28 @@ class JsonFormat(TableFormat):
 
     name, file, file_of_groups = "json", "fixtures.json", "fixtures.json"
     text_of = staticmethod(fixtures_json)
+
+
+def spectra_csv(lighting: Lighting) -> str:
+    """Return a table with a row for each wavelength, and a column for each lamp: power per
+    nanometre, for the luminance of its emission in the scene's unit.
+
+    Raises LightpaintError for a lighting without spectra.
+    """
+    spectra = {
+        light.name: light.powers for light in lighting.of_lamps().lights if light.powers is not None
+    }
+    if not spectra:
+        raise LightpaintError(
+            "the lighting has no spectra: give the emitters of its lamps a spectrum in the lights "
+            "file, and solve again"
+        )
+    text = io.StringIO()
+    table = csv.writer(text, lineterminator="\n")
+    table.writerow(["nm", *map(plain_cell, spectra)])
+    for k, wave in enumerate(WAVELENGTHS.tolist()):
+        table.writerow([wave, *(f"{powers[k]:.6g}" for powers in spectra.values())])
+    return text.getvalue()
 
 
 class SpectraFormat(TableFormat):

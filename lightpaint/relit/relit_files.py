@@ -9,14 +9,18 @@ import numpy as np
 
 from lightpaint.arrays import RGB, Doubles, Floats
 from lightpaint.errors import OutputError, SceneError
-from lightpaint.relit.emission_xml import Changes, set_emission, set_image, set_spectrum
-from lightpaint.relit.luminaire_xml import luminaire_of, luminaire_xml
+from lightpaint.relit.emission_xml import (
+    Changes,
+    luminaire_of,
+    luminaire_xml,
+    set_emission,
+    set_image,
+    set_spectrum,
+)
 from lightpaint.relit.xml_edit import XmlFile
+from lightpaint.scene import Emitter, Scene, texel_image
 from lightpaint.scene.checks.tokens import tag
-from lightpaint.scene.lights.emitters import Emitter
-from lightpaint.scene.lights.image_split import texel_image
-from lightpaint.scene.lights.texels.image_domains import GridSize
-from lightpaint.scene.scene import Scene
+from lightpaint.scene.lights.texels import GridSize
 
 
 def settings_of(scene: Scene, emission: Mapping[str, RGB]) -> Iterator[tuple[Emitter, RGB]]:

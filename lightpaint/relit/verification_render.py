@@ -19,8 +19,8 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 
-from lightpaint.basis.basis import Basis
-from lightpaint.basis.render.render_budget import check_samples
+from lightpaint.basis import Basis
+from lightpaint.basis.render import check_samples
 from lightpaint.errors import SizeError
 from lightpaint.images import Estimate, Size, whole_factor
 from lightpaint.keywords import keywords
@@ -29,33 +29,31 @@ from lightpaint.lighting.answer.lighting import Lighting
 from lightpaint.lighting.joined_views import joint_estimate
 from lightpaint.lighting.solution import Solution
 from lightpaint.progress import Progress, silent
-from lightpaint.relit.detection_power import (
-    LightShares,
-    detection_power,
-    light_tests,
-    with_light_tests,
-)
-from lightpaint.relit.relight import relight
+from lightpaint.relit.relit_scene import relight
 from lightpaint.relit.verification import (
     LIMIT,
     LOW_POWER,
+    LightShares,
     Verification,
     compare,
+    detection_power,
     differences,
     largest_difference,
+    light_tests,
     limit_of_tests,
+    with_light_tests,
 )
-from lightpaint.scene.lights.hung_luminaires import luminaire_of_spot
-from lightpaint.scene.lights.texels.texel import image_of
-from lightpaint.scene.scene import Scene
-from lightpaint.scene.scene_render import (
+from lightpaint.scene import (
+    Scene,
     Stream,
+    luminaire_of_spot,
     pass_seed,
     render,
     render_in_stages,
     sampled_by,
     view_seed,
 )
+from lightpaint.scene.lights.texels import image_of
 
 #: Numbers of parts, out of ALL_PARTS, of the samples after which the render is examined.
 LOOKS, ALL_PARTS = (2, 3, 4, 6, 8, 12, 16, 24, 32, 48, 64), 64

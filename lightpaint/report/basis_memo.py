@@ -9,12 +9,7 @@ from concurrent.futures import Future
 from threading import Lock
 from typing import Any, TypeVar
 
-from lightpaint.basis.basis import Basis
-from lightpaint.basis.cache.denoised_planes import (
-    DenoisedPlanes,
-    obtain_denoised_planes,
-    read_denoised_planes,
-)
+from lightpaint.basis import Basis, DenoisedPlanes, obtain_denoised_planes, read_denoised_planes
 from lightpaint.images import fitting_factor
 from lightpaint.threads import start_in_background
 

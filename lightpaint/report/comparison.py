@@ -8,12 +8,13 @@ import numpy.typing as npt
 from PIL import Image, ImageDraw, ImageFont
 
 from lightpaint.arrays import Floats
-from lightpaint.basis.basis import Basis
+from lightpaint.basis import Basis
 from lightpaint.colour import ViewTransform, to_8_bit
 from lightpaint.images import block_mean, enlarged, whole_factor
 from lightpaint.lighting.analysis.appearance.appearance import Appearance, compare_appearance
 from lightpaint.lighting.solution import Solution
 from lightpaint.report.answer_pictures import (
+    CleanLooks,
     Residual,
     diverging,
     report_transform,
@@ -22,9 +23,8 @@ from lightpaint.report.answer_pictures import (
     spoken_view,
     target_picture,
 )
-from lightpaint.report.clean_pictures import CleanLooks
 from lightpaint.report.phrases import spoken_progress
-from lightpaint.target.target import Target
+from lightpaint.target import Target
 
 #: Narrower images are enlarged, pixel by pixel, until their captions can be read, unless they would
 #: become higher than that; what they lack in width is grey then.

@@ -3,7 +3,7 @@
 import numpy as np
 
 from lightpaint.arrays import Doubles, Floats
-from lightpaint.basis.basis import Basis
+from lightpaint.basis import Basis
 from lightpaint.colour import LUMINANCE
 from lightpaint.images import Estimate, sum_by_bands
 from lightpaint.lighting.analysis.noise.uncertainty import Uncertainty

@@ -5,7 +5,7 @@ from collections.abc import Iterable, Mapping, Sequence
 
 import numpy as np
 
-from lightpaint.basis.light_images import TEXELS, is_of_texels, joined_texels
+from lightpaint.basis import TEXELS, is_of_texels, joined_texels
 from lightpaint.colour import luminance
 from lightpaint.display_text import some_names, some_of
 from lightpaint.lighting.analysis.appearance.unpainted_change import UnpaintedChange

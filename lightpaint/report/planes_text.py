@@ -1,16 +1,18 @@
 """Measuring planes of an answer in words, and in rows of tables."""
 
 import math
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from typing import Any
 
 from lightpaint.lighting.wishes.planes_answer import PlanesAnswer, WishOutcome
-from lightpaint.photometry.glare import GlareReading
+from lightpaint.photometry.glare import LARGEST_ANGLE, LEAST_ANGLE, LEAST_RATING, GlareReading
 from lightpaint.photometry.illuminance import NORMAL_95, PlaneReading
 from lightpaint.photometry.measuring_plane import MeasuringPlane, plane_title
 from lightpaint.photometry.readings_file import glare_document
 from lightpaint.photometry.wish_presets import PRESETS
-from lightpaint.report.glare_text import glare_sentences
+
+#: Headings of a table of observers.
+GLARE_HEADINGS = ("observer", "UGR", "background cd/m²", "most from")
 
 #: Headings of a table of planes.
 HEADINGS = ("plane", "Em lx", "U0", "least lx", "most lx", "wished for", "W/m² per 100 lx")
@@ -23,6 +25,34 @@ LEAST_PRICE = 0.05
 
 #: Cost of wishes in CIEDE2000 below which they cost the picture nothing that shows.
 LEAST_COST = 0.05
+
+
+def glare_rows(readings: Mapping[str, GlareReading]) -> Iterator[tuple[str, ...]]:
+    """Yield a row for each observer, in the order of `GLARE_HEADINGS`. readings: by title."""
+    for title, reading in readings.items():
+        yield title, rating_text(reading), f"{reading.background:.3g}", reading.strongest
+
+
+def rating_text(reading: GlareReading) -> str:
+    """Return the UGR with half of its 95 % interval."""
+    if reading.rating is None:
+        return "unknown"
+    if reading.rating < LEAST_RATING:
+        return f"< {LEAST_RATING:g}"
+    return f"{reading.rating:.1f} ± {max(reading.interval, 0.1):.1f}"
+
+
+def glare_sentences(readings: Mapping[str, GlareReading]) -> Iterator[str]:
+    """Yield what readers of the table have to know. readings: by title."""
+    for title, reading in readings.items():
+        if reading.rating is None:
+            yield f"The UGR of {title} cannot be told: {reading.reason}."
+        elif reading.rating >= LEAST_RATING and reading.is_of_unusual_size:
+            yield (
+                f"The UGR of {title} is that of {reading.strongest}, which fills "
+                f"{reading.solid_angle:.2g} sr: it is made for {LEAST_ANGLE:g} to "
+                f"{LARGEST_ANGLE:g} sr."
+            )
 
 
 def plane_rows(answer: PlanesAnswer) -> Iterator[tuple[str, ...]]:

@@ -10,7 +10,7 @@ from typing import Any
 
 import numpy as np
 
-from lightpaint.basis.basis import Basis
+from lightpaint.basis import Basis
 from lightpaint.colour import ViewTransform, luminance
 from lightpaint.images import Estimate
 from lightpaint.lighting.analysis.appearance.appearance import Appearance, compare_appearance
@@ -23,8 +23,7 @@ from lightpaint.lighting.analysis.noise.uncertainty import Uncertainty
 from lightpaint.lighting.answer.lighting import Lighting
 from lightpaint.lighting.solution import Solution
 from lightpaint.placement.suggestion import MoveSuggestion, Suggestion
-from lightpaint.relit.detection_power import ERROR
-from lightpaint.relit.verification import Verification
+from lightpaint.relit.verification import ERROR, Verification
 from lightpaint.report.answer_pictures import (
     Residual,
     brighter_than_white,
@@ -49,7 +48,7 @@ from lightpaint.report.page.rendering_section import rendering_numbers
 from lightpaint.report.planes_text import planes_numbers
 from lightpaint.report.reported_answer import ReportedAnswer
 from lightpaint.report.rig.hung_lights import placement_numbers
-from lightpaint.target.target import Target
+from lightpaint.target import Target
 from lightpaint.version import __version__
 
 FORMAT = "lightpaint-report 1"

@@ -3,7 +3,7 @@
 from collections.abc import Sequence
 from dataclasses import dataclass
 
-from lightpaint.basis.basis import Basis
+from lightpaint.basis import Basis
 from lightpaint.images import Estimate
 from lightpaint.lighting.analysis.appearance.appearance import Appearance
 from lightpaint.lighting.analysis.appearance.color_choices import Choices
@@ -15,7 +15,7 @@ from lightpaint.lighting.wishes.planes_answer import PlanesAnswer
 from lightpaint.placement.suggestion import MoveSuggestion, Suggestion
 from lightpaint.relit.verification import Verification
 from lightpaint.report.rig.hung_lights import HungLights
-from lightpaint.target.target import Target
+from lightpaint.target import Target
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -5,16 +5,15 @@ answer.
 import numpy as np
 
 from lightpaint.arrays import Bools, Doubles, Floats, Indices
-from lightpaint.basis.basis import Basis
-from lightpaint.basis.light_images import joined_texels, texel_lights
+from lightpaint.basis import Basis, joined_texels, texel_lights
 from lightpaint.colour import luminance
 from lightpaint.display_text import some_of
 from lightpaint.images import Estimate, sum_by_bands
 from lightpaint.lighting.loss.painting import ignored_paint
 from lightpaint.lighting.solution import Solution
-from lightpaint.scene.lights.texels.texel import image_of
+from lightpaint.scene.lights.texels import image_of
 from lightpaint.sentences import Hint, Sentence, Word
-from lightpaint.target.target import Target
+from lightpaint.target import Target
 
 #: Ratio to the painted brightness from which an emitter that does not count is worth a warning.
 MIN_RATIO = 4.0

@@ -17,11 +17,10 @@ from lightpaint.arrays import RGB, Floats, Position
 from lightpaint.colour import EYE, Lamp, Observer
 from lightpaint.display_text import Listed, Shown, some_of
 from lightpaint.keywords import keywords
-from lightpaint.luminaires.plugin_names import LUMINAIRE_PLUGINS
+from lightpaint.luminaires import LUMINAIRE_PLUGINS
 from lightpaint.scene.lights.emitters import Emitter, find_emitters
 from lightpaint.scene.lights.hung_luminaires import HungLuminaire
 from lightpaint.scene.lights.image_split import with_split
-from lightpaint.scene.lights.lamp_lights import lights_of_lamps
 from lightpaint.scene.lights.light import (
     Light,
     black_emitters,
@@ -29,6 +28,7 @@ from lightpaint.scene.lights.light import (
     emitter_named,
     light_named,
     lights_of,
+    lights_of_lamps,
     regrouped,
     settings_for,
 )
@@ -40,7 +40,7 @@ from lightpaint.scene.lights.new_emitter import (
     places_of,
 )
 from lightpaint.scene.lights.texels.image_domains import GridSize
-from lightpaint.scene.lights.texels.texel_layout import TexelLayout
+from lightpaint.scene.lights.texels.texel import TexelLayout
 from lightpaint.scene.plane_identity import SceneHasher
 from lightpaint.scene.properties.emission import ENVIRONMENTS, read_emitted_image
 from lightpaint.scene.properties.film import Film, camera_named, reduced, reduction

@@ -17,8 +17,12 @@ from lightpaint.scene.lights.light import Light, lights_of
 from lightpaint.scene.lights.light_choice import choose_lights
 from lightpaint.scene.lights.lights_file import LightsFile, lights_file_for
 from lightpaint.scene.lights.texels.image_domains import GridSize
-from lightpaint.scene.lights.texels.texel import mirrored_pairs, parse_map_size, parse_size
-from lightpaint.scene.lights.texels.texel_layout import TexelLayout
+from lightpaint.scene.lights.texels.texel import (
+    TexelLayout,
+    mirrored_pairs,
+    parse_map_size,
+    parse_size,
+)
 from lightpaint.scene.properties.film import check_film, sensor_index
 from lightpaint.scene.properties.integrator import IntegratorChoice
 from lightpaint.scene.runtime.mitsuba_errors import explain_old_scene, mitsuba_errors

@@ -4,9 +4,18 @@ A person who repaints a whole picture darker and three figures in it brighter ha
 things. They lie in one picture; what tells them apart is what is asked: the ratio of the painting
 to the current look, in stops of each channel. But a stroke on part of the picture asks for one
 thing as long as one colour, or one gain, laid over the look explains it.
+
+One soft stroke of blue over a vase and the wall behind it asks for one thing. Its ratio to the look
+is not uniform: it falls off to the rim, and over the dark vase it is larger than over the wall.
+What is uniform is the stroke.
+
+Eight bits end at the white of a display, so a wash that makes a room warmer ends there at a lamp
+that is white already. Read as it stands, that place asks for less than the paint around it: a wish
+that nobody had. Such paint means at least its light, so it asks for the change that the rest of its
+layer does where that is more.
 """
 
-from collections.abc import Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property, partial
 from math import ceil
@@ -15,12 +24,9 @@ import numpy as np
 import numpy.typing as npt
 
 from lightpaint.arrays import Bools, Doubles, Floats
-from lightpaint.colour import LUMINANCE
+from lightpaint.colour import LUMINANCE, decode_display, encode_display
 from lightpaint.images import block_sums, enlarged
-from lightpaint.target.saturated_paint import extend_saturated
-from lightpaint.target.stroke_model import departure_from_one_stroke
-from lightpaint.target.target import Target
-from lightpaint.target.wish import Wish
+from lightpaint.target.target import Target, Wish
 
 #: Stops by which a place must ask for something else than what is around it, to be a wish.
 DISTINCT_STOPS = 0.5
@@ -53,6 +59,28 @@ MAX_PIXELS = 2**14
 
 #: Importance, or coverage, that counts as painted.
 PAINTED = 0.02
+
+#: Weight that holds the colour of a stroke near what is painted, where the look alone does not tell
+#: how much of it covers; relative to all changes.
+HOLD = 1e-3
+
+
+#: Share of a stroke that it need not explain.
+NEGLIGIBLE = 0.01
+
+Encoding = Callable[[Floats], Floats]
+Wash = Callable[[Floats], Doubles]
+
+#: Values in which brushes mix, from linear light and back: editors of 8-bit pictures mix display
+#: values, those of EXR files mix light.
+SPACES: tuple[tuple[Encoding, Encoding], ...] = (
+    (encode_display, decode_display),
+    (np.asarray, np.asarray),
+)
+
+#: Coverage from which a pixel belongs to a layer, and the approximate number of pixels of one that
+#: are compared.
+COVERED, SAMPLES = 0.5, 2**14
 
 
 def find_wishes(target: Target, current_look: Floats) -> tuple[Wish, ...]:
@@ -220,3 +248,175 @@ def _connected(mask: Bools, radius: int, least: float) -> list[Bools]:
     parts = np.where(mask, parts, 0)
     sizes = np.bincount(parts.ravel(), minlength=count + 1)
     return [parts == k for k in range(1, count + 1) if sizes[k] >= least]
+
+
+def departure_from_one_stroke(
+    stroke: Bools, painted: Floats, look: Floats, dark: float, radius: float, tolerance: float
+) -> Floats:
+    """Return how far a painting departs from the best single stroke, in stops of each channel.
+
+    stroke: (h, w), where it is. painted, look: (3, h, w) linear. dark: light that is added to both
+    before they are compared. radius: of the wash over which the stroke may come and fade, in
+    pixels. tolerance: departure up to which a stroke explains a pixel; the best explains most.
+    Returns (3, h, w), 0 outside.
+    """
+    rows, columns = (
+        slice(int(x[0]), int(x[-1]) + 1)
+        for x in (np.flatnonzero(stroke.any(axis=1)), np.flatnonzero(stroke.any(axis=0)))
+    )
+    inside = stroke[rows, columns]
+    wash = _wash(inside, radius)
+    now, asked = (np.maximum(x[:, rows, columns], 0) for x in (look, painted))
+    brushes: list[_Brush] = [_Blend(*space, inside, asked, now, dark, wash) for space in SPACES]
+    brushes.append(_Gain(inside, asked, now, dark, wash))
+
+    def unexplained(departure: Doubles) -> tuple[float, float]:
+        stops = np.abs(departure[:, inside]).max(axis=0)
+        return float((stops > tolerance).mean()), float(stops.mean())
+
+    best = min((brush.departure(inside.astype(np.float64)) for brush in brushes), key=unexplained)
+    if unexplained(best)[0] > NEGLIGIBLE:  # perhaps two strokes that touch
+        halves = (x for brush in brushes for x in brush.halves())
+        best = min((best, *halves), key=unexplained)
+    result = np.zeros(painted.shape, np.float32)
+    result[:, rows, columns] = inside * best
+    return result
+
+
+def _wash(inside: Bools, radius: float) -> Wash:
+    """Return a function that averages (…, h, w) over a radius, within a mask alone."""
+    from scipy.ndimage import gaussian_filter
+
+    counts = inside.astype(np.float64)
+    coverage = np.maximum(gaussian_filter(counts, radius), 1e-6)
+
+    def washed(values: Floats) -> Doubles:
+        around = (0,) * (values.ndim - 2) + (radius, radius)
+        return np.asarray(gaussian_filter(values * counts, around) / coverage)
+
+    return washed
+
+
+class _Brush:
+    """A kind of stroke, to be fitted to the change of values that it makes, (3, h, w)."""
+
+    def __init__(self, inside: Bools, change: Doubles) -> None:
+        self.inside = inside
+        self.change = change
+        self.changes = change[:, inside]
+
+    def departure(self, weights: Doubles) -> Doubles:
+        """Return the departure, (3, h, w), in stops, from the stroke that fits best by weights,
+        (h, w).
+        """
+        raise NotImplementedError
+
+    def halves(self) -> Iterator[Doubles]:
+        """Yield the departures from strokes that fit one half of the changes, told apart by their
+        directions.
+        """
+        lengths = np.sqrt(np.square(self.changes).sum(axis=0))
+        directions = self.changes / (lengths + 1e-12)
+        away = directions - (directions @ lengths / (lengths.sum() + 1e-12))[:, None]
+        axis = np.linalg.eigh((away * lengths) @ away.T)[1][:, -1]
+        side = axis @ away > 0
+        for half in (side, ~side):
+            weights = np.zeros(self.inside.shape)
+            weights[self.inside] = half
+            yield self.departure(weights)
+
+
+class _Blend(_Brush):
+    """A colour c over the look n: a c + (1 − a) n, with a from 0 to 1.
+
+    encode, decode: to the values that are mixed, from linear light and back.
+    """
+
+    def __init__(
+        self,
+        encode: Encoding,
+        decode: Encoding,
+        inside: Bools,
+        painted: Floats,
+        look: Floats,
+        dark: float,
+        wash: Wash,
+    ) -> None:
+        self.decode, self.dark, self.wash = decode, dark, wash
+        self.asked, self.now = wash(encode(painted)), wash(encode(look))
+        super().__init__(inside, self.asked - self.now)
+
+    def departure(self, weights: Doubles) -> Doubles:
+        """See `_Brush.departure`."""
+        to_color = self._color(weights)[:, None, None] - self.now
+        toward = self.wash((to_color * self.change).sum(axis=0))
+        cover = toward / (self.wash(np.square(to_color).sum(axis=0)) + 1e-12)
+        model = self.now + np.clip(cover, 0, 1) * to_color
+        asked, reached = (np.maximum(self.decode(x), 0) + self.dark for x in (self.asked, model))
+        return np.asarray(np.log2(asked / reached))
+
+    def _color(self, weights: Doubles) -> Doubles:
+        """Return the colour: each changed pixel is on the line from its n to c, so c is the point
+        nearest to all lines.
+        """
+        points, changes = self.asked[:, self.inside], self.changes
+        weighted = weights[self.inside]
+        amounts = weighted * np.square(changes).sum(axis=0)
+        total = amounts.sum()
+        hold = HOLD * total + 1e-12
+        across = total * np.eye(3) - (changes * weighted) @ changes.T
+        along = (changes * weighted) @ (changes * points).sum(axis=0)
+        mean = points @ amounts / (total + 1e-12)
+        return np.linalg.solve(across + hold * np.eye(3), points @ amounts - along + hold * mean)
+
+
+class _Gain(_Brush):
+    """A direction of gain, in stops, by amounts of at least 0."""
+
+    def __init__(
+        self, inside: Bools, painted: Floats, look: Floats, dark: float, wash: Wash
+    ) -> None:
+        self.wash = wash
+        super().__init__(inside, wash(np.log2((painted + dark) / (look + dark))))
+
+    def departure(self, weights: Doubles) -> Doubles:
+        """See `_Brush.departure`."""
+        lengths = np.sqrt(np.square(self.changes).sum(axis=0))
+        direction = self.changes @ (weights[self.inside] * lengths)
+        direction /= np.linalg.norm(direction) + 1e-12
+        amount = np.maximum(self.wash(np.tensordot(direction, self.change, 1)), 0)
+        return np.asarray(self.change - amount * direction[:, None, None])
+
+
+def extend_saturated(target: Target, current_look: Floats) -> Floats:
+    """Return the painting, (h, w, 3) linear, with what its saturated values ask for at least.
+
+    current_look: (h, w, 3) linear, the current look at the size of the target. A value at the top
+    of its range becomes the look times the median ratio of painting to look of the other pixels of
+    its layer, where that is brighter; without layers, of all paint.
+    """
+    if target.at_least is None or not target.at_least.any() or not target.over_look:
+        return target.image
+    dark = DARK * float(np.mean(current_look))
+    if not dark > 0:
+        return target.image
+    image, painted = target.image.copy(), target.importance > 0
+    layers = [painted & (wish.area > COVERED) for wish in target.wishes] or [painted]
+    for own in layers:
+        usual = _median_ratio(target.image, current_look, own & ~target.at_least.any(-1), dark)
+        lifted = np.maximum(image, (current_look * usual).astype(np.float32))
+        image = np.where(own[..., None] & target.at_least, lifted, image)
+    return image
+
+
+def _median_ratio(image: Floats, look: Floats, pixels: Bools, dark: float) -> Floats:
+    """Return the median ratio of a painting to the look in `pixels`, (3,); 0 where there are none.
+
+    dark: light that is added to both.
+    """
+    chosen = np.flatnonzero(pixels)
+    if not chosen.size:
+        return np.zeros(3, np.float32)
+    chosen = chosen[:: 1 + chosen.size // SAMPLES]
+    painted, now = (np.maximum(x.reshape(-1, 3)[chosen], 0) + dark for x in (image, look))
+    return np.asarray(np.median(painted / now, axis=0), np.float32)

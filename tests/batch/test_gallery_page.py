@@ -17,8 +17,7 @@ from PIL import Image
 
 from lightpaint.basis.lights import BasisLight
 from lightpaint.batch.gallery import summary
-from lightpaint.batch.gallery.gallery import gallery_page
-from lightpaint.batch.gallery.gallery_mixers import planes_name, read_planes, write_planes
+from lightpaint.batch.gallery.gallery import gallery_page, planes_name, read_planes, write_planes
 from lightpaint.batch.gallery.summary import NARROW, WIDE, LightRow, SummaryRow, lights_of_answer
 from lightpaint.colour.display.view_transform import ViewTransform
 from lightpaint.colour.srgb import to_8_bit

@@ -8,14 +8,14 @@ from batches import small_basis
 from hypothesis import assume, given
 from hypothesis import strategies as st
 
-from lightpaint.batch.manifest.sequence import OFF_STOPS, frame_position, interpolate
-from lightpaint.batch.manifest.variations import (
+from lightpaint.batch.manifest.keys import (
     SHIFTED_WORDS,
     SOLVED_WORDS,
     VARIATIONS,
     shift,
     vary,
 )
+from lightpaint.batch.manifest.sequence import OFF_STOPS, frame_position, interpolate
 from lightpaint.colour.color import cct_and_duv, kelvin_to_rgb, luminance
 from lightpaint.errors import LightingError
 from lightpaint.lighting.answer.lighting import Lighting

@@ -11,8 +11,8 @@ import pytest
 from spectral_room import DRIVES, PEAKS, paint_spectral_room, write_spectral_room
 
 from lightpaint.batch.gallery.summary import SummaryRow, lights_of_answer, summary_csv
+from lightpaint.batch.manifest.keys import shift
 from lightpaint.batch.manifest.sequence import interpolate
-from lightpaint.batch.manifest.variations import shift
 from lightpaint.batch.plan.planner import plan
 from lightpaint.batch.run import run_batch
 from lightpaint.batch.run_options import RunOptions

@@ -17,13 +17,11 @@ from hypothesis import given
 from hypothesis import strategies as st
 from patience import PATIENCE_S
 
-from lightpaint.dmx.levels import decode_levels, encode_levels
+from lightpaint.dmx.levels import DriveFade, check_drives, decode_levels, encode_levels
 from lightpaint.dmx.network import console_link
-from lightpaint.dmx.network.console_link import ConsoleLink
+from lightpaint.dmx.network.console_link import KEEP_ALIVE_S, ConsoleLink, SendSchedule
 from lightpaint.dmx.network.console_receiver import ConsoleReceiver
 from lightpaint.dmx.network.console_target import ARTNET, SACN, network_universes, parse_target
-from lightpaint.dmx.network.send_schedule import KEEP_ALIVE_S, SendSchedule
-from lightpaint.dmx.rig_drives import DriveFade, check_drives
 from lightpaint.errors import ConsoleError, RigError
 
 RIG = two_lamps()

@@ -24,15 +24,16 @@ from rig_files import (
 from lightpaint.basis.render.render_origin import basis_lights
 from lightpaint.colour.luminous_flux import spot_flux
 from lightpaint.colour.spectra.spectrum_source import read_spectrum
-from lightpaint.dmx import rig_room
+from lightpaint.dmx import rig_scene
 from lightpaint.dmx.mvr import PlacedModel, read_rig, read_show
-from lightpaint.dmx.rig_room import room_of_scene, room_of_show
 from lightpaint.dmx.rig_scene import (
     STARTING_SHARE,
     Room,
     cd_per_unit,
     lights_of,
     lights_text,
+    room_of_scene,
+    room_of_show,
     scene_text,
 )
 from lightpaint.lighting.constraints.constraints_file import constraints_of
@@ -169,7 +170,7 @@ def test_models_of_other_formats_are_named(tmp_path: Path) -> None:
 def test_without_trimesh_models_are_left_out(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(rig_room, "_trimesh", lambda: None)
+    monkeypatch.setattr(rig_scene, "_trimesh", lambda: None)
     show = write_mvr(tmp_path / "a.mvr", layered(fixture()))
     [remark] = room_of_show(show, [PlacedModel("a.glb", np.eye(4))]).remarks
     assert "pip install trimesh" in remark

@@ -15,15 +15,13 @@ from lightpaint.dmx.console_rig import ConsoleRig, RigLight
 from lightpaint.dmx.gdtf.emitter_colour import xy_of_kelvin
 from lightpaint.dmx.gdtf.fixture_type import FixtureType
 from lightpaint.dmx.gdtf.mode_lights import FixtureMode
-from lightpaint.dmx.levels import decode_levels, encode_levels
+from lightpaint.dmx.levels import DriveFade, check_drives, decode_levels, drives_of, encode_levels
 from lightpaint.dmx.mvr import read_rig
-from lightpaint.dmx.rig_drives import DriveFade, check_drives, drives_of
 from lightpaint.dmx.rig_scene import cd_per_unit, lights_text, scene_text
 from lightpaint.dmx.spot_cone import solid_angle
 from lightpaint.lighting.answer.lighting import Lighting, LightSetting
 from lightpaint.lighting.constraints.constraints import LightConstraint
-from lightpaint.relit.export.cue_list import Cue, cue_list_csv
-from lightpaint.relit.export.level_table import level_rows
+from lightpaint.relit.export.level_table import Cue, cue_list_csv, level_rows
 
 #: Name, colour under D65, and the levels of each slot.
 SLOTS = (

@@ -10,7 +10,7 @@ import lightpaint as lp
 from lightpaint.lighting.loss import contrast
 from lightpaint.lighting.loss.contrast import ContrastRows
 from lightpaint.lighting.loss.expected_lights import ExpectedLights, Wash, adjusted_share
-from lightpaint.target.wish import Wish
+from lightpaint.target.target import Wish
 
 H, W = 24, 40
 

@@ -8,16 +8,15 @@ from conftest import BasisFactory
 
 from lightpaint.arrays import Doubles
 from lightpaint.basis.basis import Basis
-from lightpaint.basis.light_images import joined_texels, light_images, texel_lights
 from lightpaint.basis.lights import BasisLight, Lights
 from lightpaint.basis.planes import as_planes
+from lightpaint.basis.texel_images import joined_texels, light_images, texel_lights
 from lightpaint.lighting.fit import Fit
 from lightpaint.lighting.loss import weight_penalty
 from lightpaint.lighting.loss.weight_penalty import image_prior
 from lightpaint.lighting.solve import solve
 from lightpaint.scene.lights.texels.image_domains import solid_angles
-from lightpaint.scene.lights.texels.texel import mirrored_pairs, texel_names
-from lightpaint.scene.lights.texels.texel_layout import TexelLayout
+from lightpaint.scene.lights.texels.texel import TexelLayout, mirrored_pairs, texel_names
 from lightpaint.target.target import Target
 
 FREE = Fit(colors="free")

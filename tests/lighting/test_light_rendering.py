@@ -16,7 +16,7 @@ from lightpaint.lighting.answer.lighting_file import read_lighting, write_lighti
 from lightpaint.lighting.constraints.constraints import Constraints
 from lightpaint.lighting.constraints.constraints_file import read_constraints
 from lightpaint.lighting.solve import solve
-from lightpaint.relit.export.spectra_table import spectra_csv
+from lightpaint.relit.formats import spectra_csv
 from lightpaint.report.page.rendering_section import rendering_numbers, rendering_section
 from lightpaint.report.phrases import rendering_sentences
 from lightpaint.target.target import Target

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 import lightpaint as lp
-from lightpaint.batch.manifest.variations import shift, with_emission
+from lightpaint.batch.manifest.keys import shift, with_emission
 from lightpaint.errors import LightingError, UnknownLightError
 from lightpaint.lighting.answer.combination import dimmed
 

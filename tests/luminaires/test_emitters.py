@@ -16,9 +16,8 @@ from webs import Distribution, batwing, cosine, ies_text, street, trough, write_
 from lightpaint.arrays import Doubles
 from lightpaint.errors import BackendError
 from lightpaint.luminaires.registration import check_can_have_luminaires
-from lightpaint.luminaires.web import turned
+from lightpaint.luminaires.web import hanging_frame, turned, world_from_web
 from lightpaint.luminaires.web_file import read_web
-from lightpaint.luminaires.web_frame import hanging_frame, world_from_web
 from lightpaint.scene.runtime.variant import spectral_variant, use_variant
 
 #: The renderer's numbers are float32; angles near the axis lose half of their digits.

@@ -18,7 +18,7 @@ from lightpaint.dmx.console_rig import (
     RigHead,
     RigLight,
 )
-from lightpaint.dmx.rig_drives import check_lamps
+from lightpaint.dmx.levels import check_lamps
 from lightpaint.errors import PaintError, RigError
 from lightpaint.paint import protocol
 from lightpaint.paint.session.look_library import LookLibrary

@@ -26,7 +26,7 @@ from lightpaint.paint.session.session_messages import (
     why_not_closer,
 )
 from lightpaint.report.diagnosis_sentences import spoken_about, spoken_cause
-from lightpaint.report.verdict import headline
+from lightpaint.report.verdict_sentences import headline
 
 OFF, HOLD = Reason("off", ("annex_window",), 0.57), Reason("hold", (), 0.5)
 COLORS, SIDE = Reason("colors", (), 0.5), Reason("views", ("side",), 0.4)

@@ -12,7 +12,7 @@ from renderer import LIGHTS, write_room
 
 import lightpaint as lp
 from lightpaint.errors import SceneError
-from lightpaint.pipeline.results.placement_changes import spoken_move
+from lightpaint.pipeline.results.results import spoken_move
 from lightpaint.placement.freedom import FreeLight
 from lightpaint.scene.properties.pose import Site
 from lightpaint.scene.scene import Scene

@@ -14,7 +14,7 @@ from lightpaint.images.formats.exr import write_rgb
 from lightpaint.lighting.answer.combination import combine
 from lightpaint.lighting.answer.lighting import Lighting
 from lightpaint.lighting.solve import solve
-from lightpaint.relit.relight import relight
+from lightpaint.relit.relit_scene import relight
 from lightpaint.relit.verification_render import verify
 from lightpaint.scene.lights.light import settings_for
 from lightpaint.scene.properties.emission import MULTIPLE, Scaling

@@ -7,11 +7,14 @@ import numpy as np
 import pytest
 
 from lightpaint.images.estimate import Estimate
-from lightpaint.relit.detection_power import ERROR, LightShares, detection_power, light_tests
 from lightpaint.relit.verification import (
+    ERROR,
     LIMIT,
+    LightShares,
+    detection_power,
     differences,
     largest_difference,
+    light_tests,
     limit_of_tests,
 )
 

@@ -18,10 +18,9 @@ from lightpaint.lighting.answer.combination import combine
 from lightpaint.lighting.answer.lighting import Lighting
 from lightpaint.lighting.answer.lighting_file import write_lighting
 from lightpaint.lighting.constraints.constraints_file import constraints_of
-from lightpaint.luminaires.spot_sum import TOLERANCE, spots_of
-from lightpaint.luminaires.web import PhotometricWeb
-from lightpaint.relit.luminaire_xml import plugin_remark
-from lightpaint.relit.relight import relight
+from lightpaint.luminaires.web import SPOT_TOLERANCE, PhotometricWeb, spots_of
+from lightpaint.relit.emission_xml import plugin_remark
+from lightpaint.relit.relit_scene import relight
 from lightpaint.relit.verification_render import shares_of_emitters, verify
 from lightpaint.scene.scene import Scene
 from lightpaint.scene.scene_reader import load_scene
@@ -88,8 +87,8 @@ def test_an_axial_web_is_written_as_spots_of_plain_mitsuba(tmp_path: Path) -> No
     hung = next(x for x in scene.luminaires if x.name == "bulb")
     brightest = 0.5 * hung.scale * hung.request.web.peak
     distances = ((points - [-0.5, 1, 0.5]) ** 2).sum(axis=1, keepdims=True)
-    # The spots err by TOLERANCE of the web's largest candela, at most.
-    assert (np.abs(found - expected) <= TOLERANCE * brightest / distances + 1e-3).all()
+    # The spots err by SPOT_TOLERANCE of the web's largest candela, at most.
+    assert (np.abs(found - expected) <= SPOT_TOLERANCE * brightest / distances + 1e-3).all()
     assert expected.max() > 10
 
 
@@ -238,7 +237,7 @@ def test_spots_add_up_to_the_web(light: Distribution, gammas: Doubles) -> None:
     ]
     inside = (angle >= gammas[0]) & (angle <= gammas[-1])
     expected = np.where(inside, np.interp(angle, gammas, web.profile()), 0)
-    assert np.abs(sum(ramps) - expected).max() <= TOLERANCE * web.peak * (1 + 1e-9)
+    assert np.abs(sum(ramps) - expected).max() <= SPOT_TOLERANCE * web.peak * (1 + 1e-9)
 
 
 def test_webs_that_are_no_sum_of_spots() -> None:

@@ -20,7 +20,7 @@ from lightpaint.progress import silent
 from lightpaint.relit.export.fixtures import fixtures_csv, pan_and_tilt
 from lightpaint.relit.exported_answer import Source
 from lightpaint.relit.formats import names_of_forms, writers_of
-from lightpaint.relit.relight import scene_patch
+from lightpaint.relit.relit_scene import scene_patch
 from lightpaint.scene.lights.new_emitter import NewEmitter
 from lightpaint.scene.scene import Scene
 from lightpaint.scene.scene_reader import load_scene

@@ -4,8 +4,13 @@ import numpy as np
 import pytest
 
 from lightpaint.images.estimate import Estimate
-from lightpaint.relit.detection_power import ERROR, LightShares, with_light_tests
-from lightpaint.relit.verification import Verification, compare
+from lightpaint.relit.verification import (
+    ERROR,
+    LightShares,
+    Verification,
+    compare,
+    with_light_tests,
+)
 
 SIZE, SEEDS = (48, 64), range(100)
 

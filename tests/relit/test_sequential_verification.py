@@ -13,9 +13,8 @@ from lightpaint.basis.render.basis_render import render_basis
 from lightpaint.images.estimate import Estimate
 from lightpaint.lighting.answer.combination import combine
 from lightpaint.lighting.answer.lighting import Lighting
-from lightpaint.relit.detection_power import LightShares
-from lightpaint.relit.relight import relight
-from lightpaint.relit.verification import LIMIT, limit_of_tests
+from lightpaint.relit.relit_scene import relight
+from lightpaint.relit.verification import LIMIT, LightShares, limit_of_tests
 from lightpaint.relit.verification_render import (
     ALL_PARTS,
     FIRST_LOOK,

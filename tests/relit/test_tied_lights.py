@@ -16,7 +16,7 @@ from lightpaint.lighting.answer.lighting import Lighting
 from lightpaint.lighting.answer.lighting_file import read_lighting, write_lighting
 from lightpaint.lighting.solve import solve
 from lightpaint.pipeline.one_call import paint_with_light
-from lightpaint.relit.relight import check_relightable, relight
+from lightpaint.relit.relit_scene import check_relightable, relight
 from lightpaint.relit.verification_render import verify
 from lightpaint.scene.scene import Scene
 from lightpaint.scene.scene_reader import load_scene

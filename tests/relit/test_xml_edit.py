@@ -14,7 +14,7 @@ from renderer import LIGHTS, write_room
 from lightpaint.arrays import RGB
 from lightpaint.errors import SceneError
 from lightpaint.lighting.answer.lighting import Lighting, LightSetting
-from lightpaint.relit.relight import relight
+from lightpaint.relit.relit_scene import relight
 from lightpaint.relit.xml_edit import Element, XmlFile, _parse
 from lightpaint.scene.checks.tokens import tag
 from lightpaint.scene.scene import Scene

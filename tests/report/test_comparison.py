@@ -43,7 +43,7 @@ from lightpaint.report.answer_pictures import (
 from lightpaint.report.comparison import SURROUND, Tile, comparison_image, compose
 from lightpaint.report.report_json import report_numbers
 from lightpaint.report.reported_answer import ReportedAnswer
-from lightpaint.report.verdict import headline
+from lightpaint.report.verdict_sentences import headline
 from lightpaint.target.target import Target
 from lightpaint.target.target_reader import read_target
 

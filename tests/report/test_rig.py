@@ -10,7 +10,7 @@ from conftest import BasisFactory
 from PIL import ImageDraw
 
 from lightpaint.images.denoiser import Features
-from lightpaint.report.light_sheet import light_sheet
+from lightpaint.report.contact_sheet import light_sheet
 from lightpaint.report.page.placement_section import aim_picture, placement_section
 from lightpaint.report.rig.hung_lights import (
     HungLight,

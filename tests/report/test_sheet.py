@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from lightpaint.basis.basis import Basis
-from lightpaint.report.light_sheet import EDGE, GROUND, MAX_LIGHTS, _grid, light_sheet
+from lightpaint.report.contact_sheet import EDGE, GROUND, MAX_LIGHTS, _grid, light_sheet
 
 
 def told(sheet: np.ndarray, basis: Basis) -> list[float]:
@@ -25,7 +25,7 @@ def told(sheet: np.ndarray, basis: Basis) -> list[float]:
 @pytest.fixture(autouse=True)
 def _as_rendered(monkeypatch: pytest.MonkeyPatch) -> None:
     """What is tested is where things are: the denoiser takes most of the time."""
-    monkeypatch.setattr("lightpaint.report.light_sheet.denoised", lambda image, _features: image)
+    monkeypatch.setattr("lightpaint.report.contact_sheet.denoised", lambda image, _features: image)
 
 
 @pytest.mark.parametrize("n", [1, 3, 12, 64, 80])

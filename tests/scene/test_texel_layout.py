@@ -7,13 +7,15 @@ from hypothesis import strategies as st
 
 from lightpaint.scene.lights.texels.image_domains import Sky
 from lightpaint.scene.lights.texels.texel import (
+    CHILDREN,
+    MAX_LEVEL,
+    TexelLayout,
     coarse_name,
     image_of,
     images_of,
     layouts_of,
     node_name,
 )
-from lightpaint.scene.lights.texels.texel_layout import CHILDREN, MAX_LEVEL, TexelLayout
 
 
 @st.composite

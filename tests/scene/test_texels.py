@@ -8,13 +8,13 @@ from hypothesis import strategies as st
 from lightpaint.errors import SceneError
 from lightpaint.scene.lights.texels.image_domains import Sky, solid_angles, texel_direction
 from lightpaint.scene.lights.texels.texel import (
+    TexelLayout,
     image_of,
     images_of,
     parse_map_size,
     parse_size,
     texel_names,
 )
-from lightpaint.scene.lights.texels.texel_layout import TexelLayout
 from lightpaint.scene.runtime.variant import use_variant
 
 SIZES = st.tuples(st.integers(2, 24), st.integers(3, 24))

@@ -14,7 +14,7 @@ from spectral_room import write_spectral_room
 import lightpaint as lp
 from lightpaint.arrays import Floats
 from lightpaint.lighting.constraints.constraints_file import constraints_of
-from lightpaint.pipeline.job.spectral_job import spectral_scene
+from lightpaint.pipeline.job.sources import spectral_scene
 from lightpaint.scene.runtime.render_lock import MAX_WAIT_S, MITSUBA, Turns
 from lightpaint.scene.runtime.variant import spectral_variant, use_variant
 from lightpaint.scene.scene_reader import load_scene

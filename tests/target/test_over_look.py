@@ -9,8 +9,7 @@ from PIL import Image
 from lightpaint.colour.display.view_transform import TransformChoice, ViewTransform
 from lightpaint.images.formats.exr import write_rgb
 from lightpaint.images.picture import read_picture
-from lightpaint.target.look_match import view_of_look
-from lightpaint.target.target_reader import read_over_look
+from lightpaint.target.target_reader import read_over_look, view_of_look
 
 OPEN = TransformChoice()
 

@@ -6,9 +6,8 @@ import numpy as np
 import pytest
 
 import lightpaint as lp
-from lightpaint.target.saturated_paint import extend_saturated
-from lightpaint.target.wish import Wish
-from lightpaint.target.wish_finding import find_wishes
+from lightpaint.target.target import Wish
+from lightpaint.target.wish_finding import extend_saturated, find_wishes
 
 H, W = 40, 64
 

@@ -31,7 +31,7 @@ from lightpaint.display_text import some_names
 from lightpaint.errors import BasisError, SceneError
 from lightpaint.images import whole_factor
 from lightpaint.progress import Progress, silent
-from lightpaint.scene.scene import Scene
+from lightpaint.scene import Scene
 from lightpaint.sentences import Hint
 
 #: Smallest time budget of a render in seconds, which still renders one step.

@@ -21,8 +21,7 @@ from lightpaint.basis.planes import IndirectLight, Planes
 from lightpaint.basis.render.render_budget import half_of
 from lightpaint.basis.render.render_origin import ONE_PASS, basis_lights, method_of, origin_of
 from lightpaint.basis.render.separate_renders import emitters_seen
-from lightpaint.scene.properties.emission import ENVIRONMENTS
-from lightpaint.scene.scene import Scene
+from lightpaint.scene import ENVIRONMENTS, Scene
 from lightpaint.version import __version__
 
 #: Number of samples of halves A and B, and number of passes of both.

@@ -26,9 +26,9 @@ from lightpaint.basis.cache import cache as bases
 from lightpaint.basis.lights import BasisLight, Lights
 from lightpaint.errors import LightpaintError
 from lightpaint.files import write_text
+from lightpaint.scene import Scene
 from lightpaint.scene.checks.tokens import attributes, markup
 from lightpaint.scene.lights.lights_file import SceneRequests
-from lightpaint.scene.scene import Scene
 from lightpaint.sentences import Sentence
 from lightpaint.storage.json_records import read_record, strict_json
 from lightpaint.version import __version__

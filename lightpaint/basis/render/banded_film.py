@@ -20,8 +20,7 @@ from lightpaint.basis.render.integrators import has_indirect_planes, plane_count
 from lightpaint.basis.render.one_pass_basis import mean_and_half_difference
 from lightpaint.basis.render.render_origin import ONE_PASS, method_of
 from lightpaint.errors import SceneError
-from lightpaint.scene.scene import Scene
-from lightpaint.scene.scene_render import SAMPLES_PER_PASS
+from lightpaint.scene import SAMPLES_PER_PASS, Scene
 from lightpaint.sentences import Hint
 
 if TYPE_CHECKING:

@@ -33,11 +33,9 @@ from lightpaint.basis.render.separate_renders import LightSums, emitters_seen, r
 from lightpaint.errors import BasisError, SceneError
 from lightpaint.keywords import keywords
 from lightpaint.progress import Interrupted, Progress, silent
+from lightpaint.scene import Scene, render_first_hits, view_seed
 from lightpaint.scene.runtime.mitsuba_errors import render_errors
 from lightpaint.scene.runtime.render_lock import MITSUBA, tracing
-from lightpaint.scene.scene import Scene
-from lightpaint.scene.scene_render import view_seed
-from lightpaint.scene.surfaces import render_first_hits
 from lightpaint.sentences import Hint
 
 if TYPE_CHECKING:

@@ -5,10 +5,8 @@ their basis is then the same up to noise.
 """
 
 from lightpaint.errors import SceneError
-from lightpaint.scene.properties.emission import ENVIRONMENTS
-from lightpaint.scene.properties.integrator import Integrator
+from lightpaint.scene import ENVIRONMENTS, Integrator, Scene
 from lightpaint.scene.runtime.variant import FAST_VARIANT, use_variant
-from lightpaint.scene.scene import Scene
 from lightpaint.sentences import Hint
 
 #: Integrators that end after one bounce.

@@ -15,7 +15,7 @@ from lightpaint.basis.render.render_origin import (
     basis_lights,
     origin_of,
 )
-from lightpaint.scene.scene import Scene
+from lightpaint.scene import Scene
 
 #: Samples per pixel of halves A and B: numbers, or (h, w, 1) float32 if pixels differ.
 HalfCounts = Sequence[int] | Sequence[Floats]

@@ -25,10 +25,9 @@ from lightpaint.basis.render.render_origin import ONE_PASS, is_of
 from lightpaint.basis.render.render_parts import PART_MAX_BYTES
 from lightpaint.errors import BasisError
 from lightpaint.progress import Interrupted, Progress, silent
+from lightpaint.scene import Scene, largest_pass, view_seed
 from lightpaint.scene.runtime.mitsuba_errors import render_errors
 from lightpaint.scene.runtime.render_lock import MITSUBA, tracing
-from lightpaint.scene.scene import Scene
-from lightpaint.scene.scene_render import largest_pass, view_seed
 
 if TYPE_CHECKING:
     from lightpaint.basis.render.tracer.one_pass import Tracer

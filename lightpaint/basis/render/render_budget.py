@@ -9,8 +9,8 @@ from lightpaint.basis.basis import Basis
 from lightpaint.display_text import brief
 from lightpaint.errors import SceneError
 from lightpaint.progress import Progress
+from lightpaint.scene import largest_pass, plan_passes
 from lightpaint.scene.limits import MAX_SPP
-from lightpaint.scene.scene_render import largest_pass, plan_passes
 from lightpaint.validation import whole
 
 #: Seconds of work that a crash may lose, both in wall time and in processor time, so that a busy

@@ -11,7 +11,7 @@ from lightpaint.basis.render.separate_renders import (
 )
 from lightpaint.display_text import some_names
 from lightpaint.errors import SceneError
-from lightpaint.scene.scene import Scene
+from lightpaint.scene import Scene
 from lightpaint.sentences import Hint
 
 ONE_PASS = "one pass, several questions"

@@ -30,9 +30,8 @@ from lightpaint.basis.render.separate_renders import (
     light_pass,
     plan_of_light,
 )
+from lightpaint.scene import SAMPLES_PER_PASS, Scene, largest_pass, view_seed
 from lightpaint.scene.runtime.render_lock import MITSUBA, tracing
-from lightpaint.scene.scene import Scene
-from lightpaint.scene.scene_render import SAMPLES_PER_PASS, largest_pass, view_seed
 
 #: Number of camera samples in a part: some seconds on one processor, the work lost by a failure.
 PART_SAMPLES = SAMPLES_PER_PASS // 2

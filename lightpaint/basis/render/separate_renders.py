@@ -17,10 +17,9 @@ from lightpaint.basis.render.integrators import depth_limit
 from lightpaint.basis.render.render_budget import PASS_DIVISOR, Budget, Clock, Keeper, next_pair
 from lightpaint.images import block_mean
 from lightpaint.progress import Interrupted, Progress
+from lightpaint.scene import Scene, Stream, as_float32, pass_seed, plan_passes, render_pass
 from lightpaint.scene.runtime.render_lock import MITSUBA, tracing
 from lightpaint.scene.runtime.variant import use_variant
-from lightpaint.scene.scene import Scene
-from lightpaint.scene.scene_render import Stream, as_float32, pass_seed, plan_passes, render_pass
 
 WHITE: RGB = (1.0, 1.0, 1.0)
 BLACK: RGB = (0.0, 0.0, 0.0)

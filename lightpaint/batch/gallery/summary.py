@@ -14,7 +14,7 @@ import numpy as np
 from PIL import Image
 
 from lightpaint.arrays import RGB
-from lightpaint.basis.light_images import light_images
+from lightpaint.basis import light_images
 from lightpaint.batch.manifest.file_names import SUMMARY_FORMAT, THUMBNAILS
 from lightpaint.batch.plan.journal import JournalLine
 from lightpaint.batch.plan.plan import Plan, PlannedLook
@@ -27,9 +27,9 @@ from lightpaint.images import block_mean, denoised, fitting_factor, read_estimat
 from lightpaint.lighting.answer.lighting_file import read_lighting
 from lightpaint.photometry.measuring_plane import plane_title
 from lightpaint.photometry.readings_file import PLANES
-from lightpaint.pipeline.results.planes_folder import FOLDER as PLANES_FOLDER
+from lightpaint.pipeline.results.result_folder import PLANES_FOLDER as PLANES_FOLDER
 from lightpaint.pipeline.results.result_folder import RECORD
-from lightpaint.relit.export.exports import plain_cell
+from lightpaint.relit import plain_cell
 from lightpaint.storage.json_records import strict_json
 from lightpaint.version import __version__
 

@@ -8,9 +8,15 @@ from pathlib import Path
 from typing import Any
 
 from lightpaint.batch.manifest.file_names import files_matching
-from lightpaint.batch.manifest.keys import SOURCE_KEYS, SUBJECT_KEYS, Handover, Mistakes, near_key
+from lightpaint.batch.manifest.keys import (
+    SOLVED_WORDS,
+    SOURCE_KEYS,
+    SUBJECT_KEYS,
+    Handover,
+    Mistakes,
+    near_key,
+)
 from lightpaint.batch.manifest.manifest import Manifest, Table, subject_keys
-from lightpaint.batch.manifest.variations import SOLVED_WORDS
 from lightpaint.display_text import some_names
 from lightpaint.errors import LightpaintError
 from lightpaint.files import is_name
@@ -18,8 +24,7 @@ from lightpaint.lighting.constraints.constraints import Constraints
 from lightpaint.lighting.constraints.constraints_file import read_constraints
 from lightpaint.pipeline.job.settings import Settings
 from lightpaint.pipeline.job.sources import GroupsFile
-from lightpaint.relit.export.usd import check_usd
-from lightpaint.relit.formats import FORMS
+from lightpaint.relit import FORMS, check_usd
 
 #: Default steps of a look that is solved, and of a given lighting or a frame.
 SOLVE_STEPS, GIVEN_LIGHTING_STEPS = ("solve", "predict", "verify", "report"), ("predict",)

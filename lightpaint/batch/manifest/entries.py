@@ -25,6 +25,7 @@ from lightpaint.batch.manifest.keys import (
     LIGHTING_STEPS,
     MAX_FRAMES,
     PAINTING_KEYS,
+    SHIFTED_WORDS,
     SOURCE_KEYS,
     Final,
     Handover,
@@ -33,7 +34,6 @@ from lightpaint.batch.manifest.keys import (
 )
 from lightpaint.batch.manifest.manifest import Manifest, Table
 from lightpaint.batch.manifest.sequence import frame_position
-from lightpaint.batch.manifest.variations import SHIFTED_WORDS
 from lightpaint.colour import TransformChoice
 from lightpaint.display_text import some_names
 from lightpaint.errors import BatchError, LightpaintError

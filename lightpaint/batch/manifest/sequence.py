@@ -7,8 +7,7 @@ from math import floor
 import numpy as np
 
 from lightpaint.arrays import Doubles
-from lightpaint.batch.manifest.keys import Space
-from lightpaint.batch.manifest.variations import with_emission
+from lightpaint.batch.manifest.keys import Space, with_emission
 from lightpaint.colour import WHITE_DUV, cct_and_duv, kelvin_to_rgb, luminance
 from lightpaint.display_text import some_names
 from lightpaint.errors import LightingError

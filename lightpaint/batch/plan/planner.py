@@ -6,17 +6,12 @@ from functools import partial
 from pathlib import Path
 from typing import Any
 
-from lightpaint.basis.basis import Basis
-from lightpaint.basis.lightgroups.light_groups import LightGroups
-from lightpaint.basis.lights import BasisLight
-from lightpaint.basis.render.banded_film import memory_needed
-from lightpaint.basis.render.integrators import why_not_one_pass
-from lightpaint.basis.render.render_origin import basis_lights
+from lightpaint.basis import Basis, BasisLight, LightGroups
+from lightpaint.basis.render import basis_lights, memory_needed, why_not_one_pass
 from lightpaint.batch.manifest.entries import LookEntry, entries_of
 from lightpaint.batch.manifest.file_names import check_gallery
-from lightpaint.batch.manifest.keys import Mistakes, as_key
+from lightpaint.batch.manifest.keys import Mistakes, as_key, vary
 from lightpaint.batch.manifest.manifest import Manifest, read_manifest
-from lightpaint.batch.manifest.variations import vary
 from lightpaint.batch.plan.journal import Fingerprints, Journal
 from lightpaint.batch.plan.plan import (
     Cost,
@@ -48,9 +43,9 @@ from lightpaint.pipeline.job.sources import check_nothing_unused, content
 from lightpaint.pipeline.results.result_folder import is_as_written
 from lightpaint.pipeline.results.results import view_names
 from lightpaint.pipeline.wished_planes import check_planes, constraints_for_planes
-from lightpaint.relit.relight import scene_of
+from lightpaint.relit import scene_of
+from lightpaint.scene import Scene
 from lightpaint.scene.quality_presets import on_film
-from lightpaint.scene.scene import Scene
 
 #: Samples per point that illuminance of `DEFAULT_ERROR` takes in a room.
 LUX_SPP = 4096

@@ -5,17 +5,15 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
-from lightpaint.basis.basis import Basis
-from lightpaint.basis.lightgroups.light_groups import LightGroups
-from lightpaint.batch.manifest.variations import SHIFTED_WORDS, SOLVED_WORDS, shift, vary
+from lightpaint.basis import Basis, LightGroups
+from lightpaint.batch.manifest.keys import SHIFTED_WORDS, SOLVED_WORDS, shift, vary
 from lightpaint.lighting.answer.combination import combine
 from lightpaint.lighting.answer.lighting import Lighting
 from lightpaint.lighting.constraints.constraints import Constraints
 from lightpaint.pipeline.job.job import Job
 from lightpaint.pipeline.job.settings import Settings
 from lightpaint.pipeline.results.answer_folder import LIGHTING, answer_files, new_answer
-from lightpaint.pipeline.results.planes_folder import files_of_planes, write_planes
-from lightpaint.pipeline.results.result_folder import ResultFolder
+from lightpaint.pipeline.results.result_folder import ResultFolder, files_of_planes, write_planes
 from lightpaint.pipeline.results.results import write_predicted
 from lightpaint.pipeline.wished_planes import (
     MeasuredPlanes,
@@ -24,8 +22,8 @@ from lightpaint.pipeline.wished_planes import (
     with_glare,
 )
 from lightpaint.progress import Listener
-from lightpaint.relit.relight import scene_of
-from lightpaint.scene.scene import Scene
+from lightpaint.relit import scene_of
+from lightpaint.scene import Scene
 
 
 def derived_folder(

@@ -7,14 +7,10 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any, Literal
 
-from lightpaint.basis.basis import Basis
-from lightpaint.basis.lightgroups.light_groups import LightGroups
-from lightpaint.basis.lights import Lights
-from lightpaint.basis.render.basis_render import train_guide
-from lightpaint.basis.render.one_pass_basis import basis_of_sums
-from lightpaint.batch.manifest.keys import Space, as_key
+from lightpaint.basis import Basis, LightGroups, Lights
+from lightpaint.basis.render import basis_of_sums, train_guide
+from lightpaint.batch.manifest.keys import Space, as_key, shift
 from lightpaint.batch.manifest.sequence import interpolate
-from lightpaint.batch.manifest.variations import shift
 from lightpaint.batch.work.derived_looks import (
     derived_folder,
     dimmer_lights,
@@ -54,9 +50,8 @@ from lightpaint.pipeline.results.result_folder import ResultFolder
 from lightpaint.pipeline.results.results import view_names
 from lightpaint.placement import record_of
 from lightpaint.progress import Listener
-from lightpaint.relit.exported_answer import Source
-from lightpaint.relit.formats import names_of_forms, write_content, writers_of
-from lightpaint.scene.scene import Scene
+from lightpaint.relit import Source, names_of_forms, write_content, writers_of
+from lightpaint.scene import Scene
 
 #: Error numbers of a full disk.
 DISK_FULL_ERRNOS = {errno.ENOSPC, errno.EDQUOT, errno.EFBIG}

@@ -7,8 +7,7 @@ from pathlib import Path
 from typing import Any, Literal
 
 from lightpaint.batch.manifest.entries import LookEntry
-from lightpaint.batch.manifest.keys import Final, Handover, Space
-from lightpaint.batch.manifest.variations import SHIFTED_WORDS
+from lightpaint.batch.manifest.keys import SHIFTED_WORDS, Final, Handover, Space
 from lightpaint.batch.work.work_items import PathMap
 from lightpaint.errors import BatchError
 from lightpaint.pipeline.job.job_record import encode_job

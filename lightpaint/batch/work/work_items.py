@@ -8,7 +8,7 @@ from collections.abc import Callable
 from dataclasses import dataclass, field, replace
 from typing import Any, Literal, Protocol
 
-from lightpaint.basis.render.render_parts import Part
+from lightpaint.basis.render import Part
 from lightpaint.batch.manifest.keys import Final
 from lightpaint.colour import Observer
 from lightpaint.lighting.fit import Emitters

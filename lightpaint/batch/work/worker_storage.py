@@ -16,10 +16,9 @@ from typing import Any
 import numpy as np
 
 from lightpaint.arrays import Doubles, Floats
-from lightpaint.basis.basis import Basis
-from lightpaint.basis.cache.cache import PARTS, folder, is_trusted_owner
-from lightpaint.basis.file.basis_file import read_basis
-from lightpaint.basis.render.render_parts import Part, PartRenderer
+from lightpaint.basis import Basis, read_basis
+from lightpaint.basis.cache import PARTS, folder, is_trusted_owner
+from lightpaint.basis.render import Part, PartRenderer
 from lightpaint.batch.manifest.keys import Final
 from lightpaint.batch.work.task import key_of_basis
 from lightpaint.batch.work.work_items import (
@@ -34,11 +33,10 @@ from lightpaint.files import first_line
 from lightpaint.images import read_estimate
 from lightpaint.pipeline.job.sources import BasisFile, GroupsFile, SceneFile
 from lightpaint.placement import read_placement
+from lightpaint.scene import Scene, Stream, pass_sum, passes_of
 from lightpaint.scene.quality_presets import on_film
 from lightpaint.scene.runtime.render_lock import tracing
-from lightpaint.scene.scene import Scene
-from lightpaint.scene.scene_render import Stream, pass_sum, passes_of
-from lightpaint.target.target import Target
+from lightpaint.target import Target
 from lightpaint.version import __version__
 
 #: Seconds after which leftover parts of a basis are deleted.

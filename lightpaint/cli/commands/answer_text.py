@@ -8,8 +8,7 @@ from typing import Literal
 
 import numpy as np
 
-from lightpaint.basis.light_images import LightImage, joined_texels, light_images
-from lightpaint.basis.lights import BasisLight
+from lightpaint.basis import BasisLight, LightImage, joined_texels, light_images
 from lightpaint.cli.output import terminal
 from lightpaint.cli.output.tables import spoken_agreement
 from lightpaint.cli.output.vocabulary import BY_OPTION, spoken
@@ -23,32 +22,34 @@ from lightpaint.lighting.wishes.planes_answer import PlanesAnswer
 from lightpaint.photometry.glare import GlareReading
 from lightpaint.pipeline.job.settings import Settings
 from lightpaint.pipeline.results.results import Look
-from lightpaint.report.answer_pictures import spoken_view
-from lightpaint.report.diagnosis_sentences import (
+from lightpaint.report import (
     ANY_COLOR,
+    GLARE_HEADINGS,
+    HEADINGS,
     bound_sentences,
+    closer_choice,
     compensation_sentences,
+    energy_shares,
     error_sentences,
     fit_sentence,
+    glare_by_title,
+    glare_rows,
     partly_reached,
+    plane_rows,
+    planes_sentences,
+    rendering_sentences,
     spoken_about,
     spoken_cause,
     spoken_errors,
+    spoken_lamp,
+    spoken_percent,
+    spoken_preference,
+    spoken_view,
+    spoken_wheels,
     uncertainty_sentence,
     unreached_channels,
     untold_lights,
 )
-from lightpaint.report.glare_text import GLARE_HEADINGS, glare_rows
-from lightpaint.report.measures import energy_shares
-from lightpaint.report.page.constraint_section import closer_choice
-from lightpaint.report.phrases import (
-    rendering_sentences,
-    spoken_lamp,
-    spoken_percent,
-    spoken_preference,
-    spoken_wheels,
-)
-from lightpaint.report.planes_text import HEADINGS, glare_by_title, plane_rows, planes_sentences
 from lightpaint.sentences import Sentence, SourceKey
 
 Table = Literal["short", "full"]

@@ -4,7 +4,7 @@ from collections.abc import Sequence
 from pathlib import Path
 
 from lightpaint.basis.cache import cache as bases
-from lightpaint.basis.cache.cache import delete_orphans, folder
+from lightpaint.basis.cache import delete_orphans, folder
 from lightpaint.cli.doctor import examine
 from lightpaint.cli.output import documents, tables, terminal
 from lightpaint.cli.output.lines import CommandOutcome

@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 
 from lightpaint.arrays import RGB, Doubles
-from lightpaint.basis.render.render_origin import basis_lights
+from lightpaint.basis.render import basis_lights
 from lightpaint.cli.commands.answer_text import show_glare
 from lightpaint.cli.output import terminal
 from lightpaint.cli.output.lines import CommandOutcome
@@ -32,9 +32,9 @@ from lightpaint.photometry.wish_presets import PRESETS
 from lightpaint.pipeline.job.settings import Settings
 from lightpaint.pipeline.job.sources import SceneFile
 from lightpaint.progress import stage
-from lightpaint.relit.relight import scene_of
-from lightpaint.report.glare_text import glare_sentences
-from lightpaint.scene.scene import Scene
+from lightpaint.relit import scene_of
+from lightpaint.report import glare_sentences
+from lightpaint.scene import Scene
 from lightpaint.sentences import Hint
 from lightpaint.storage.staging import finish, staged
 

@@ -21,8 +21,7 @@ from lightpaint.pipeline.job.sources import BasisFile, GroupsFile, SceneFile
 from lightpaint.sentences import Hint
 
 if TYPE_CHECKING:
-    from lightpaint.dmx.console_rig import ConsoleRig
-    from lightpaint.dmx.network.console_target import ConsoleTarget
+    from lightpaint.dmx import ConsoleRig, ConsoleTarget
     from lightpaint.paint import Console, Server, SessionRequests, Subject
 
 #: The risk of an address that others can reach.
@@ -77,7 +76,7 @@ def paint(
     fixtures = None
     if console is not None:
         from lightpaint.cli.commands.console_commands import read_rig_file
-        from lightpaint.dmx.rig_drives import check_lamps
+        from lightpaint.dmx import check_lamps
 
         fixtures = read_rig_file(console["rig"])
     subjects = make_subjects(
@@ -109,7 +108,7 @@ def _console(
     positions: bool,
 ) -> "Console":
     """Return the console of a rig, and say what it will send to. Nothing is sent yet."""
-    from lightpaint.dmx.network.console_link import PRIORITY, ConsoleLink, link_address
+    from lightpaint.dmx import PRIORITY, ConsoleLink, link_address
     from lightpaint.paint import Console
 
     if target is None:

@@ -17,9 +17,8 @@ from lightpaint.pipeline.job.settings import Settings
 from lightpaint.pipeline.job.sources import SceneFile
 from lightpaint.pipeline.light_plan import PLAN, LightPlan, plan_folder, plan_lighting
 from lightpaint.pipeline.results.answer_folder import new_answer
-from lightpaint.pipeline.results.planes_folder import write_planes
-from lightpaint.report.phrases import spoken_drives
-from lightpaint.report.planes_text import planes_numbers
+from lightpaint.pipeline.results.result_folder import write_planes
+from lightpaint.report import planes_numbers, spoken_drives
 from lightpaint.version import __version__
 
 

@@ -4,25 +4,37 @@ import io
 import shutil
 import sysconfig
 import zipfile
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from importlib.resources import files
 from importlib.resources.abc import Traversable
 from pathlib import Path
+from typing import Any
 
-from lightpaint.arrays import Floats
-from lightpaint.basis.lightgroups.frame_sequence import find_frames, is_pattern
-from lightpaint.basis.lightgroups.light_groups import LightGroups, first_frame
-from lightpaint.cli.commands.cues import cue_list, is_session
+import numpy as np
+
+from lightpaint.arrays import Floats, Position
+from lightpaint.basis import LightGroups, find_frames, first_frame, is_pattern
+from lightpaint.cli.commands import console_commands
 from lightpaint.cli.options.console_options import RigFile
 from lightpaint.cli.output import documents, terminal
 from lightpaint.cli.output.lines import CommandOutcome
-from lightpaint.errors import LightpaintError, OutputError
+from lightpaint.dmx import ConsoleRig, aimed_rig, directions_of
+from lightpaint.errors import LightingError, LightpaintError, OutputError
 from lightpaint.files import check_files, check_writable, write_bytes
 from lightpaint.lighting.answer.lighting import Lighting
 from lightpaint.lighting.answer.lighting_file import read_lighting
+from lightpaint.paint import SESSION_FILE, read_kept_looks
 from lightpaint.pipeline.job.sources import GroupsFile, SceneFile, content
-from lightpaint.relit.exported_answer import Source
-from lightpaint.relit.formats import FORMS, names_of_forms, write_content, writers_of
+from lightpaint.relit import (
+    FORMS,
+    Cue,
+    Source,
+    cue_list_csv,
+    names_of_forms,
+    write_content,
+    writers_of,
+)
+from lightpaint.scene.properties.site import unit
 from lightpaint.sentences import Hint
 from lightpaint.storage.staging import finish
 
@@ -184,3 +196,72 @@ def _sources(folder: Traversable, name: str) -> list[tuple[str, bytes]]:
         elif item.name.endswith((".py", ".toml")) or item.name == "LICENSE":
             found.append((f"{name}/{item.name}", item.read_bytes()))
     return found
+
+
+def is_session(path: Path) -> bool:
+    """Return whether a path is the session of a painter, or the folder that it is in."""
+    return path.suffix == Path(SESSION_FILE).suffix or (path / SESSION_FILE).is_file()
+
+
+def cue_list(
+    sources: Sequence[Path], rig: RigFile, *, fade_s: float, positions: bool
+) -> tuple[str, list[str]]:
+    """Return the table of a cue for each lighting and each look of a session, in their order, and
+    what fixtures cannot do.
+
+    positions: whether pan and tilt follow. Raises LightingError for what has no drives, PaintError
+    for what is not a session, RigError for what does not fit the rig.
+    """
+    fixtures = console_commands.read_rig_file(rig)
+    cues = []
+    for path in sources:
+        cues += (
+            _cues_of_session(path, fixtures, fade_s=fade_s)
+            if is_session(path)
+            else [_cue_of_lighting(path, fade_s=fade_s)]
+        )
+    if not positions:
+        cues = [Cue(x.label, x.fade_s, x.drives) for x in cues]
+    remarks = [r for x in cues if x.directions for r in aimed_rig(fixtures, x.directions)[1]]
+    return cue_list_csv(fixtures, cues), [*dict.fromkeys(remarks)]
+
+
+def _cue_of_lighting(path: Path, *, fade_s: float) -> Cue:
+    lighting, drives = console_commands.read_answer(path)
+    return Cue(_label_of(path), fade_s, drives, directions_of(lighting))
+
+
+def _cues_of_session(path: Path, rig: ConsoleRig, *, fade_s: float) -> list[Cue]:
+    """Return a cue for each look of a session."""
+    file = path / SESSION_FILE if path.is_dir() else path
+    looks = read_kept_looks(file)
+    if not looks:
+        raise LightingError(f"{file} has no looks: keep some in the painter, one for each cue")
+    cues = []
+    for look in looks:
+        if look.drives is None:
+            raise LightingError(
+                f"{file} has no drives of the look {look.name!r}: open it in the painter once, "
+                "with lights that have emitters"
+            )
+        placed = look.requests.placed
+        cues.append(Cue(look.name, fade_s, look.drives, _directions(placed, rig)))
+    return cues
+
+
+def _directions(placed: Mapping[str, Mapping[str, Any]], rig: ConsoleRig) -> dict[str, Position]:
+    """Return where lights that were moved point; others point as in the show."""
+    lights = {light.name: light for fixture in rig.fixtures for light in fixture.lights}
+    found = {}
+    for name, pose in placed.items():
+        if name in lights and pose.get("target") is not None:
+            way = np.subtract(pose["target"], pose.get("position") or lights[name].position)
+            if np.linalg.norm(way) > 0:
+                found[name] = unit(way)
+    return found
+
+
+def _label_of(lighting: Path) -> str:
+    """Return the name of a look: its file's, or its folder's where all files are called alike."""
+    path = lighting.absolute()
+    return path.parent.name if path.stem == "lighting" else path.stem

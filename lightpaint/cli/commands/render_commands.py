@@ -6,9 +6,8 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
-from lightpaint.basis.basis import Basis
-from lightpaint.basis.cache.cache import write_from_cache
-from lightpaint.basis.file.basis_file import write_basis
+from lightpaint.basis import Basis, write_basis
+from lightpaint.basis.cache import write_from_cache
 from lightpaint.cli.commands.solve_command import solve
 from lightpaint.cli.options.job_options import folders_of, is_folder
 from lightpaint.cli.output import documents, tables, terminal
@@ -42,20 +41,13 @@ from lightpaint.pipeline.templates import (
     template_of_basis,
 )
 from lightpaint.progress import stage
-from lightpaint.relit.relight import solved_identity
+from lightpaint.relit import solved_identity
+from lightpaint.scene import Scene
 from lightpaint.scene.quality_presets import on_film, samples
 from lightpaint.scene.runtime.variant import use_variant
-from lightpaint.scene.scene import Scene
 from lightpaint.sentences import Sentence
 from lightpaint.storage.staging import finish
-from lightpaint.target.template import (
-    CLEAN,
-    LIGHT_FILE,
-    LIGHTS,
-    MATTES,
-    SHOWN_FILE,
-    files_in_the_way,
-)
+from lightpaint.target import CLEAN, LIGHT_FILE, LIGHTS, MATTES, SHOWN_FILE, files_in_the_way
 
 
 def lights(

@@ -6,14 +6,18 @@ from typing import Any
 from lightpaint.cli.output import documents, terminal
 from lightpaint.cli.output.lines import CommandOutcome
 from lightpaint.cli.output.vocabulary import spoken
-from lightpaint.dmx.console_rig import address_text
-from lightpaint.dmx.mvr import KindSummary, Show, read_show
-from lightpaint.dmx.rig_room import RoomFiles, room_of_scene, room_of_show
-from lightpaint.dmx.rig_scene import (
+from lightpaint.dmx import (
+    KindSummary,
     Room,
+    RoomFiles,
+    Show,
+    address_text,
     cd_per_unit,
     lights_of,
     lights_text,
+    read_show,
+    room_of_scene,
+    room_of_show,
     scene_text,
     spectrum_tables,
 )

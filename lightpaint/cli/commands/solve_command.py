@@ -5,7 +5,7 @@ from pathlib import Path
 from shlex import quote
 from typing import TYPE_CHECKING, Any
 
-from lightpaint.basis.basis import Basis
+from lightpaint.basis import Basis
 from lightpaint.cli.commands.answer_text import Table, show_look, spoken_settings
 from lightpaint.cli.output import documents, tables, terminal
 from lightpaint.cli.output.lines import CommandOutcome
@@ -17,8 +17,8 @@ from lightpaint.pipeline.job.job import Job, PaintedView
 from lightpaint.pipeline.pipeline import run
 from lightpaint.pipeline.results.results import Look
 from lightpaint.placement import PlacementRecord, record_of
-from lightpaint.relit.export.exports import EXPORTS
-from lightpaint.report.page.placement_section import spoken_turn
+from lightpaint.relit import EXPORTS
+from lightpaint.report import spoken_turn
 
 if TYPE_CHECKING:
     from lightpaint.cli.solve_variations import LookSet

@@ -187,7 +187,7 @@ def _solve_arguments(options: Namespace, settings: Settings) -> dict[str, Any]:
         return {"jobs": jobs_of(options, settings), **arguments}
 
     # Imported late: a single look needs no gallery.
-    from lightpaint.batch.manifest.variations import parse_variations
+    from lightpaint.batch.manifest.keys import parse_variations
     from lightpaint.cli.solve_variations import look_set
 
     failures: dict[str, str] = {}

@@ -7,7 +7,7 @@ from typing import Literal
 
 from lightpaint.cli.options import arguments
 from lightpaint.cli.options.option_groups import add_rig_reading
-from lightpaint.dmx.network.console_target import PROTOCOLS, SACN, ConsoleTarget, parse_target
+from lightpaint.dmx import PROTOCOLS, SACN, ConsoleTarget, parse_target
 from lightpaint.errors import ConsoleError
 from lightpaint.validation import parse_number, parse_whole_number
 

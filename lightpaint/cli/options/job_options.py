@@ -6,7 +6,7 @@ from dataclasses import fields
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from lightpaint.basis.lightgroups.frame_sequence import FrameSequence
+from lightpaint.basis import FrameSequence
 from lightpaint.cli.options.source_options import (
     basis_of,
     groups_of_frames,

@@ -10,15 +10,17 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
-from lightpaint.basis.file.basis_file import is_basis_file
-from lightpaint.basis.lightgroups.frame_sequence import (
+from lightpaint.basis import (
     SIGN,
     FrameSequence,
     find_frames,
+    is_basis_file,
+    is_exr,
+    is_light_groups,
+    is_own_basis,
     is_pattern,
     spoken_frames,
 )
-from lightpaint.basis.lightgroups.render_layers import is_exr, is_light_groups, is_own_basis
 from lightpaint.display_text import visible
 from lightpaint.errors import BasisError, TargetError
 from lightpaint.pipeline.job.sources import BasisFile, GroupsFile, SceneFile, check_needed

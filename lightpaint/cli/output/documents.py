@@ -5,7 +5,7 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
-from lightpaint.basis.basis import Basis
+from lightpaint.basis import Basis
 from lightpaint.basis.cache import cache
 from lightpaint.cli.doctor import Finding
 from lightpaint.cli.output.tables import photometry_of
@@ -13,11 +13,9 @@ from lightpaint.cli.tolerances import Tolerances
 from lightpaint.pipeline.job.job import Job, PaintedView
 from lightpaint.pipeline.results.result_folder import RECORD
 from lightpaint.pipeline.results.results import Look
-from lightpaint.relit.verification import Verification
-from lightpaint.report.report_json import finite, verification_numbers
-from lightpaint.scene.lights.light import WHOLE_EMISSION, Light
-from lightpaint.scene.properties.emission import MULTIPLE
-from lightpaint.scene.scene import Scene
+from lightpaint.relit import Verification
+from lightpaint.report import finite, verification_numbers
+from lightpaint.scene import MULTIPLE, WHOLE_EMISSION, Light, Scene
 
 
 def lights_document(scene: Scene, cd_per_unit: float | None) -> dict[str, Any]:

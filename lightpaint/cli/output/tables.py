@@ -5,20 +5,14 @@ from collections.abc import Sequence
 import numpy as np
 
 from lightpaint.arrays import as_rgb
-from lightpaint.basis.cache.cache import Entry
+from lightpaint.basis.cache import Entry
 from lightpaint.cli.output import terminal
 from lightpaint.colour import Photometry, photometry
 from lightpaint.placement import Suggestion
-from lightpaint.relit.verification import Verification
-from lightpaint.report.page.placement_section import spoken_position, spoken_suggestions
-from lightpaint.report.phrases import spoken_percent
-from lightpaint.report.verdict import agreement
-from lightpaint.scene.lights.emitters import Emitter
-from lightpaint.scene.lights.light import Light
-from lightpaint.scene.lights.texels.image_domains import domain_of
-from lightpaint.scene.lights.texels.texel import image_of, layouts_of, node_name
-from lightpaint.scene.properties.emission import MULTIPLE
-from lightpaint.scene.scene import Scene
+from lightpaint.relit import Verification
+from lightpaint.report import agreement, spoken_percent, spoken_position, spoken_suggestions
+from lightpaint.scene import MULTIPLE, Emitter, Light, Scene
+from lightpaint.scene.lights.texels import domain_of, image_of, layouts_of, node_name
 
 
 def show_lights(scene: Scene, cd_per_unit: float | None) -> None:

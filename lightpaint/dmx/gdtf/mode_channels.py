@@ -2,10 +2,14 @@
 
 pygdtf leaves channels of geometries below a reference out, and does not follow the `s` of values
 such as `128/1s`; so offsets and values are read here.
+
+A geometry with a channel `Pan` turns about its own z axis, one with `Tilt` about its x axis, both
+right-handed, with all that hangs on it. At 0° everything is where the geometries say.
 """
 
-from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+import re
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass, field
 from xml.etree.ElementTree import Element
 
 import numpy as np
@@ -14,6 +18,7 @@ from lightpaint.arrays import Doubles
 from lightpaint.dmx.console_rig import DmxChannel
 from lightpaint.dmx.gdtf.geometry_tree import Placed
 from lightpaint.errors import RigError
+from lightpaint.sentences import Hint, Sentence
 from lightpaint.storage.rig_archive import library
 
 #: Largest number of channels of a mode.
@@ -27,6 +32,19 @@ CURVE_POINTS = 33
 
 #: Pairs of a share of a channel's highest level and a share of what it does.
 Curve = tuple[tuple[float, float], ...]
+
+#: Functions of shutters, which let light through as far as they say, and those that flash.
+_SHUTTER, _STROBE = re.compile(r"Shutter\d+"), re.compile(r"Shutter\d+Strobe\w*|StrobeMode\w*")
+
+#: What to know of a shutter that stays as its file has it.
+_CLOSED = Sentence(
+    "its shutter rests closed, so that no light would leave it: give a file whose default opens it "
+    "with ",
+    Hint("gdtf_folder"),
+)
+
+#: Axis of a geometry by the attribute of the channel that turns it.
+TURNS = {"Pan": 2, "Tilt": 0}
 
 
 @dataclass(frozen=True)
@@ -217,3 +235,106 @@ def _cubics(points: Sequence[object], inputs: Doubles) -> Doubles:
         raise ValueError("a DMXProfile that is not finite")
     away = inputs - starts[which]
     return np.asarray((factors * away[:, None] ** np.arange(4)).sum(axis=1))
+
+
+def shutter_levels(channels: Sequence[ModeChannel]) -> tuple[dict[int, int], list[str]]:
+    """Return levels for channels that would flash at rest, by their places, and what to know of
+    these and of shutters that rest closed.
+    """
+    levels, remarks = dict[int, int](), []
+    for k, channel in enumerate(channels):
+        level = channel.dmx.default
+        resting = channel.function_at(level)
+        if resting is None:
+            continue
+        opening = max(channel.functions, key=_openness)
+        if _STROBE.fullmatch(resting.attribute):
+            levels[k] = opening.open_level if _openness(opening) >= 0 else 0
+            remarks.append(f"{resting.attribute}, where it rests, flashes: it is sent open")
+        elif _openness(resting) >= 0 and resting.value_at(level) <= 0 < _openness(opening):
+            remarks.append(_CLOSED)
+    return levels, remarks
+
+
+def _openness(function: ChannelFunction) -> float:
+    """Return how far a function opens a shutter; -1 if it is none of a shutter."""
+    return max(function.ends) if _SHUTTER.fullmatch(function.attribute) else -1.0
+
+
+@dataclass(frozen=True)
+class ModeAxis:
+    """An axis of a head, in the axes of its fixture while all angles are 0.
+
+    name: pan or tilt. channel: place of the channel that turns it. axis: of length 1.
+    levels, degrees: the ends of the channel's range, and the angles there.
+    """
+
+    name: str
+    channel: int
+    axis: Doubles
+    levels: tuple[int, int]
+    degrees: tuple[float, float]
+
+
+@dataclass
+class ModeHead:
+    """A part that turns. Updated in place while beams are found on it.
+
+    axes: one or two, the outer one first. beams: directions of its beams at 0°, in the axes of the
+    fixture. lights: places of their lights in the mode.
+    """
+
+    axes: tuple[ModeAxis, ...]
+    beams: list[Doubles] = field(default_factory=list)
+    lights: list[int] = field(default_factory=list)
+
+    @property
+    def direction(self) -> Doubles:
+        """The direction of its beams together at 0°."""
+        mean = np.mean(self.beams, axis=0)
+        return mean if np.linalg.norm(mean) > 1e-3 else self.beams[0]
+
+
+def mode_heads(
+    tree: Sequence[Placed], channels: Sequence[ModeChannel], lights: Sequence[Sequence[Placed]]
+) -> tuple[ModeHead, ...]:
+    """Return the heads of a mode. lights: the beams of each."""
+    heads: dict[tuple[int, ...], ModeHead] = {}
+    for number, beams in enumerate(lights):
+        for beam in beams:
+            axes = tuple(_axes(tree, channels, beam))
+            if not axes:
+                continue
+            head = heads.setdefault(tuple(x.channel for x in axes), ModeHead(axes))
+            head.beams.append(-beam.matrix[:3, 2])
+            if number not in head.lights:
+                head.lights.append(number)
+    return tuple(heads.values())
+
+
+def _axes(
+    tree: Sequence[Placed], channels: Sequence[ModeChannel], beam: Placed
+) -> Iterator[ModeAxis]:
+    """Yield the axes that a beam hangs on, the outer one first; of each kind the innermost."""
+    found: dict[str, tuple[int, int, ChannelFunction]] = {}
+    for k, channel in enumerate(channels):
+        if channel.node not in beam.ancestry:
+            continue
+        for attribute in TURNS:
+            function = channel.function(attribute)
+            if function is not None and has_angles(function):
+                depth = beam.ancestry.index(channel.node)
+                if attribute not in found or depth > found[attribute][0]:
+                    found[attribute] = depth, k, function
+    # Of two axes in one geometry, pan carries tilt.
+    for attribute, (_, k, function) in sorted(found.items(), key=lambda x: (x[1][0], x[0])):
+        column = tree[channels[k].node].matrix[:3, TURNS[attribute]]
+        axis = column / np.linalg.norm(column)
+        levels = function.first, function.last
+        yield ModeAxis(attribute.lower(), k, axis, levels, function.ends)
+
+
+def has_angles(function: ChannelFunction) -> bool:
+    """Return whether a function says which angles its levels are: 0 to 1 stands for nothing."""
+    start, end = function.physical
+    return start != end and (start, end) != (0.0, 1.0)

@@ -31,9 +31,15 @@ from lightpaint.dmx.gdtf.emitter_colour import (
     xy_of_kelvin,
 )
 from lightpaint.dmx.gdtf.geometry_tree import Placed
-from lightpaint.dmx.gdtf.mode_channels import ChannelFunction, Curve, ModeChannel, curve_of
-from lightpaint.dmx.gdtf.mode_heads import ModeHead, mode_heads
-from lightpaint.dmx.gdtf.shutters import shutter_levels
+from lightpaint.dmx.gdtf.mode_channels import (
+    ChannelFunction,
+    Curve,
+    ModeChannel,
+    ModeHead,
+    curve_of,
+    mode_heads,
+    shutter_levels,
+)
 from lightpaint.dmx.spot_cone import solid_angle
 from lightpaint.sentences import Hint, Sentence
 

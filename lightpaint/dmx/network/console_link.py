@@ -1,4 +1,8 @@
-"""A link to a console: what is shown last leaves at a steady rate, from a thread of its own."""
+"""A link to a console: what is shown last leaves at a steady rate, from a thread of its own.
+
+E1.31 (6.6.1) wants levels that no longer change sent three times, and then every 0.8 to 1 s;
+Art-Net 4 wants the latter, too.
+"""
 
 import math
 import socket
@@ -11,7 +15,7 @@ from types import TracebackType
 from typing import Protocol, Self
 
 from lightpaint.dmx.console_rig import ConsoleRig
-from lightpaint.dmx.levels import encode_levels
+from lightpaint.dmx.levels import DriveFade, RigDrives, check_drives, encode_levels
 from lightpaint.dmx.network.console_target import (
     SACN,
     ConsoleTarget,
@@ -19,9 +23,13 @@ from lightpaint.dmx.network.console_target import (
     network_universes,
     parse_target,
 )
-from lightpaint.dmx.network.send_schedule import REPEATS, SendSchedule
-from lightpaint.dmx.rig_drives import DriveFade, RigDrives, check_drives
 from lightpaint.errors import ConsoleError
+
+#: Packets with the same levels before a universe falls silent.
+REPEATS = 3
+
+#: Seconds between packets of a universe whose levels do not change.
+KEEP_ALIVE_S = 0.8
 
 #: The source of sACN, as consoles show it.
 SOURCE_NAME = "lightpaint"
@@ -34,6 +42,40 @@ MAX_PRIORITY = 200
 
 #: Frames in a second; DMX itself carries up to 44.
 FPS, MAX_FPS = 30, 60
+
+
+class SendSchedule:
+    """The universes that are due, by the levels and times of what was sent."""
+
+    def __init__(self) -> None:
+        self._levels: dict[int, bytes] = {}
+        self._repeats: dict[int, int] = {}
+        self._sent_s: dict[int, float] = {}
+
+    def take_due(self, levels: Mapping[int, bytes], now_s: float) -> dict[int, bytes]:
+        """Return the levels of the universes that are due, which count as sent."""
+        due = {}
+        for universe, values in levels.items():
+            if self._levels.get(universe) != values:
+                self._levels[universe], self._repeats[universe] = values, REPEATS
+            is_silent = now_s - self._sent_s.get(universe, -math.inf) >= KEEP_ALIVE_S
+            if self._repeats[universe] or is_silent:
+                due[universe] = values
+                self._repeats[universe] = max(self._repeats[universe] - 1, 0)
+                self._sent_s[universe] = now_s
+        return due
+
+    @property
+    def is_settled(self) -> bool:
+        """True if all levels have been sent as often as they should, and only stay alive."""
+        return not any(self._repeats.values())
+
+    @property
+    def next_s(self) -> float:
+        """The time of the next packet: at once until it is settled; never before the first."""
+        if not self.is_settled:
+            return -math.inf
+        return min(self._sent_s.values(), default=math.inf) + KEEP_ALIVE_S
 
 
 class LevelOutput(Protocol):

@@ -10,7 +10,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from lightpaint.arrays import Doubles
-from lightpaint.basis.basis import Basis
+from lightpaint.basis import Basis
 from lightpaint.colour import LUMINANCE
 from lightpaint.lighting.answer.certificate import Bound, Kind, Per, Tint
 from lightpaint.lighting.normal_equations import NormalEquations

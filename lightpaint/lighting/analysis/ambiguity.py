@@ -6,7 +6,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from lightpaint.arrays import Bools, Doubles
-from lightpaint.basis.light_images import texel_lights
+from lightpaint.basis import texel_lights
 from lightpaint.lighting.algebra.eigenvectors import eigenvectors
 from lightpaint.lighting.algebra.quadratic import UNREACHED_POWER
 from lightpaint.lighting.solution import Solution

@@ -8,7 +8,7 @@ import numpy as np
 import numpy.typing as npt
 
 from lightpaint.arrays import Doubles, as_rgb
-from lightpaint.basis.basis import Basis
+from lightpaint.basis import Basis
 from lightpaint.display_text import some_of
 from lightpaint.errors import LightingError, UnknownLightError
 from lightpaint.images import Estimate

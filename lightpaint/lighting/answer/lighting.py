@@ -10,8 +10,7 @@ from typing import Any
 import numpy as np
 
 from lightpaint.arrays import RGB, Bools, Doubles, Position, as_rgb
-from lightpaint.basis.basis import Basis
-from lightpaint.basis.lights import BasisLight, Lights
+from lightpaint.basis import Basis, BasisLight, Lights
 from lightpaint.colour import (
     EYE,
     Lamp,

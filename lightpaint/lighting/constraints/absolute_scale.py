@@ -3,11 +3,11 @@
 from collections.abc import Sequence
 from dataclasses import replace
 
-from lightpaint.basis.lights import BasisLight
+from lightpaint.basis import BasisLight
 from lightpaint.errors import ConstraintError
 from lightpaint.lighting.constraints.constraints import Constraints, LightConstraint
 from lightpaint.lighting.constraints.light_patterns import constraints_by_light
-from lightpaint.luminaires.plugin_names import LUMINAIRE_PLUGINS
+from lightpaint.luminaires import LUMINAIRE_PLUGINS
 from lightpaint.sentences import Hint
 
 

@@ -3,7 +3,7 @@
 from collections.abc import Sequence
 
 from lightpaint.arrays import Doubles
-from lightpaint.basis.lights import BasisLight
+from lightpaint.basis import BasisLight
 from lightpaint.colour import cct_and_duv
 from lightpaint.lighting.constraints.constraints import Constraints
 from lightpaint.lighting.constraints.light_patterns import lights_of_open_color

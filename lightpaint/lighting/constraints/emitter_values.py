@@ -9,7 +9,7 @@ from typing import Any, Literal
 import numpy as np
 
 from lightpaint.arrays import RGB, Doubles, as_rgb
-from lightpaint.basis.lights import BasisLight
+from lightpaint.basis import BasisLight
 from lightpaint.colour import (
     MAX_EMITTERS,
     MAX_SLOTS,
@@ -27,7 +27,7 @@ from lightpaint.colour import (
 from lightpaint.errors import ColorError, ConstraintError
 from lightpaint.files import one_line
 from lightpaint.lighting.constraints.values import check_keys
-from lightpaint.luminaires.plugin_names import FULL
+from lightpaint.luminaires import FULL
 from lightpaint.sentences import Hint, SourceKey
 from lightpaint.validation import BRIGHTEST, MAX_NAME, is_number
 

@@ -5,7 +5,7 @@ from dataclasses import replace
 from fnmatch import fnmatchcase
 from typing import Any
 
-from lightpaint.basis.lights import BasisLight
+from lightpaint.basis import BasisLight
 from lightpaint.display_text import some_names, with_similar_name
 from lightpaint.errors import ConstraintError
 from lightpaint.lighting.constraints.constraints import (
@@ -16,7 +16,7 @@ from lightpaint.lighting.constraints.constraints import (
     is_pattern,
     merge_tables,
 )
-from lightpaint.scene.lights.texels.texel import coarse_name, image_of
+from lightpaint.scene.lights.texels import coarse_name, image_of
 from lightpaint.sentences import Hint, Lead, SourceKey
 
 

@@ -10,8 +10,7 @@ from dataclasses import replace
 import numpy as np
 
 from lightpaint.arrays import RGB, Doubles
-from lightpaint.basis.basis import Basis
-from lightpaint.basis.lights import BasisLight, Lights
+from lightpaint.basis import Basis, BasisLight, Lights
 from lightpaint.display_text import some_names, with_similar_name
 from lightpaint.errors import ConstraintError
 from lightpaint.images import Estimate

@@ -19,8 +19,7 @@ from functools import partial, reduce
 from operator import add
 
 from lightpaint.arrays import RGB, Doubles
-from lightpaint.basis.basis import Basis
-from lightpaint.basis.light_images import texel_lights
+from lightpaint.basis import Basis, texel_lights
 from lightpaint.colour import Lamp
 from lightpaint.lighting.constraints.color_restrictions import WhiteLimits, painted_whites
 from lightpaint.lighting.constraints.constraints import Constraints

@@ -7,7 +7,7 @@ from math import ceil
 import numpy as np
 
 from lightpaint.arrays import Doubles, Floats, Slices
-from lightpaint.basis.basis import Basis
+from lightpaint.basis import Basis
 from lightpaint.colour import ViewTransform
 from lightpaint.images import block_mean, block_sums, enlarged
 from lightpaint.lighting.live.tiles import MAX_CHEAP_LIGHTS, TiledEquations
@@ -16,7 +16,7 @@ from lightpaint.lighting.loss.loss import STRIP_PIXELS
 from lightpaint.lighting.loss.painting_loss import PaintedPixels, join_pixels
 from lightpaint.lighting.loss.reweighting import interpolate
 from lightpaint.lighting.normal_equations import NormalEquations
-from lightpaint.target.wish import Wish
+from lightpaint.target import Wish
 from lightpaint.threads import one_thread, parallel_map
 
 #: Maximum number of pixels of an averaged picture in display space: those of one strip.

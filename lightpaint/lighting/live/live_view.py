@@ -5,7 +5,7 @@ from collections.abc import Collection, Mapping
 import numpy as np
 
 from lightpaint.arrays import RGB, Doubles, Floats, Slices
-from lightpaint.basis.basis import Basis
+from lightpaint.basis import Basis
 from lightpaint.colour import ViewTransform
 from lightpaint.lighting.constraints.start_lighting import held_at_start
 from lightpaint.lighting.live.live_sums import (

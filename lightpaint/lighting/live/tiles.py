@@ -14,7 +14,7 @@ from math import prod
 import numpy as np
 
 from lightpaint.arrays import Doubles, Floats
-from lightpaint.basis.planes import Planes, as_planes
+from lightpaint.basis import Planes, as_planes
 from lightpaint.errors import SizeError
 from lightpaint.lighting.normal_equations import NormalEquations
 from lightpaint.threads import one_thread, parallel_map

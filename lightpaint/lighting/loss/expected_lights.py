@@ -14,15 +14,10 @@ from typing import Self
 import numpy as np
 
 from lightpaint.arrays import Doubles, Floats, Indices
-from lightpaint.basis.basis import Basis
-from lightpaint.basis.derived_planes import block_means
-from lightpaint.basis.planes import Planes
+from lightpaint.basis import Basis, Planes, block_means
 from lightpaint.colour import luminance
 from lightpaint.images import block_sums
-from lightpaint.target.saturated_paint import extend_saturated
-from lightpaint.target.target import Target
-from lightpaint.target.wish import Wish
-from lightpaint.target.wish_finding import split_wishes
+from lightpaint.target import Target, Wish, extend_saturated, split_wishes
 from lightpaint.threads import one_thread
 
 #: Approximate number of blocks of pixels over which the light of a painting is compared.

@@ -6,8 +6,7 @@ from functools import cached_property
 import numpy as np
 
 from lightpaint.arrays import Doubles, Floats, Indices
-from lightpaint.basis.basis import Basis
-from lightpaint.basis.planes import Planes, mix_channels
+from lightpaint.basis import Basis, Planes, mix_channels
 from lightpaint.lighting.loss.loss import (
     Loss,
     PixelLoss,

@@ -6,7 +6,7 @@ from dataclasses import replace
 import numpy as np
 
 from lightpaint.arrays import Bools, Floats
-from lightpaint.basis.basis import Basis
+from lightpaint.basis import Basis
 from lightpaint.colour import ViewTransform
 from lightpaint.errors import TargetError
 from lightpaint.lighting.fit import Emitters, Fit
@@ -15,7 +15,7 @@ from lightpaint.lighting.loss.loss import Loss, Squares
 from lightpaint.lighting.loss.paint_on_emitters import dark_threshold, find_glow_paint
 from lightpaint.lighting.loss.painting_loss import PaintingLoss
 from lightpaint.sentences import Hint, Word
-from lightpaint.target.target import Target
+from lightpaint.target import Target
 
 
 def literal_squares(

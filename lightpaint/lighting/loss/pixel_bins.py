@@ -14,10 +14,15 @@ from functools import cached_property, partial
 import numpy as np
 
 from lightpaint.arrays import Bools, Doubles, Floats
-from lightpaint.basis.basis import Basis
-from lightpaint.basis.derived_planes import block_means, in_one_row
-from lightpaint.basis.file.file_planes import spooled
-from lightpaint.basis.planes import BLOCK_PIXELS, Planes, as_planes
+from lightpaint.basis import (
+    BLOCK_PIXELS,
+    Basis,
+    Planes,
+    as_planes,
+    block_means,
+    in_one_row,
+    spooled,
+)
 from lightpaint.colour import ViewTransform
 from lightpaint.images import Estimate, block_sums, enlarged
 from lightpaint.lighting.joined_views import Views

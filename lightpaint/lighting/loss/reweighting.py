@@ -13,7 +13,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from lightpaint.arrays import Doubles
-from lightpaint.basis.basis import Basis
+from lightpaint.basis import Basis
 from lightpaint.lighting.loss.lit_pixels import LitPixels, SummedSquares
 from lightpaint.lighting.loss.loss import Loss, PixelLoss, Squares, image_in_place
 from lightpaint.lighting.normal_equations import NormalEquations

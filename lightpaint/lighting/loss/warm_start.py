@@ -10,8 +10,7 @@ from typing import Any
 import numpy as np
 
 from lightpaint.arrays import Doubles
-from lightpaint.basis.basis import Basis
-from lightpaint.basis.planes import MemoryPlanes
+from lightpaint.basis import Basis, MemoryPlanes
 from lightpaint.lighting.loss.lit_pixels import LitPixels
 from lightpaint.lighting.loss.loss import Loss, PixelLoss
 from lightpaint.lighting.loss.reweighting import (

@@ -20,8 +20,7 @@ from typing import Self
 import numpy as np
 
 from lightpaint.arrays import Bools, Doubles
-from lightpaint.basis.light_images import light_images, texel_lights
-from lightpaint.basis.lights import Lights
+from lightpaint.basis import Lights, light_images, texel_lights
 from lightpaint.colour import LUMINANCE, ViewTransform, luminance
 from lightpaint.lighting.constraints.constraints import Constraints
 from lightpaint.lighting.fit import Fit

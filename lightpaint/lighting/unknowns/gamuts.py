@@ -14,7 +14,7 @@ from functools import cached_property
 import numpy as np
 
 from lightpaint.arrays import Bools, Doubles, Floats, Indices
-from lightpaint.basis.basis import Basis
+from lightpaint.basis import Basis
 from lightpaint.colour import (
     DIRECTIONS,
     ROUND_OFF,

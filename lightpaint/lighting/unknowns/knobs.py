@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 
 from lightpaint.arrays import Doubles
-from lightpaint.basis.lights import BasisLight
+from lightpaint.basis import BasisLight
 from lightpaint.colour import ColorHull, Lamp, Preference, WhiteRange, luminance
 from lightpaint.display_text import some_names
 from lightpaint.errors import ConstraintError

@@ -11,7 +11,7 @@ from itertools import groupby
 import numpy as np
 
 from lightpaint.arrays import Doubles, as_rgb
-from lightpaint.basis.lights import BasisLight
+from lightpaint.basis import BasisLight
 from lightpaint.colour import Lamp, luminance
 from lightpaint.display_text import some_names
 from lightpaint.errors import ConstraintError

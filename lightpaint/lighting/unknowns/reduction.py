@@ -15,7 +15,7 @@ from itertools import pairwise
 import numpy as np
 
 from lightpaint.arrays import RGB, Bools, Doubles, Indices, as_rgb
-from lightpaint.basis.lights import BasisLight
+from lightpaint.basis import BasisLight
 from lightpaint.colour import Lamp
 from lightpaint.display_text import some_names
 from lightpaint.errors import ConstraintError

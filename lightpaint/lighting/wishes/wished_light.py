@@ -17,7 +17,7 @@ from typing import Literal
 import numpy as np
 
 from lightpaint.arrays import Doubles, Indices
-from lightpaint.basis.lights import Lights
+from lightpaint.basis import Lights
 from lightpaint.display_text import with_similar_name
 from lightpaint.errors import ConstraintError
 from lightpaint.lighting.constraints.requirements import Requirements

@@ -11,8 +11,7 @@ import numpy as np
 import numpy.typing as npt
 
 from lightpaint.arrays import Floats
-from lightpaint.basis.basis import Basis
-from lightpaint.basis.cache.denoised_planes import as_halves
+from lightpaint.basis import Basis, as_halves
 from lightpaint.colour import ViewTransform
 from lightpaint.errors import PaintError
 from lightpaint.lighting.live.live_view import LiveView
@@ -36,7 +35,7 @@ from lightpaint.paint.layers.layer_pixels import (
 from lightpaint.paint.layers.layer_stack import MAX_STRENGTH, Layer, LayerStack
 from lightpaint.paint.store.history_steps import Patch, Pixels, Region, Step, slices
 from lightpaint.paint.store.store import StoredComposition
-from lightpaint.target.target import Target
+from lightpaint.target import Target
 
 #: Side, in pixels, of the squares that are saved when a stroke first touches them.
 SQUARE_SIDE = 64

@@ -8,7 +8,7 @@ import numpy as np
 import numpy.typing as npt
 
 from lightpaint.arrays import Floats
-from lightpaint.basis.basis import Basis
+from lightpaint.basis import Basis
 from lightpaint.errors import PaintError
 from lightpaint.lighting.live.live_view import LiveView
 from lightpaint.paint.layers.canvas import Canvas

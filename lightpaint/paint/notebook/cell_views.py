@@ -19,7 +19,7 @@ from uuid import uuid4
 import numpy as np
 from markupsafe import Markup
 
-from lightpaint.basis.basis import Basis
+from lightpaint.basis import Basis
 from lightpaint.colour import ViewTransform, to_8_bit
 from lightpaint.images import block_mean, fitting_factor
 from lightpaint.lighting.answer.lighting import Lighting
@@ -28,11 +28,8 @@ from lightpaint.paint.message_frames import is_other_version, parse_request
 from lightpaint.paint.protocol import Closing, Failure, Hello, Message, TakeOver
 from lightpaint.paint.session_access import SessionOwner
 from lightpaint.paint.studio.studio import Studio
-from lightpaint.report.answer_pictures import target_picture
-from lightpaint.report.page.figures import data_uri
-from lightpaint.report.page.html import html
-from lightpaint.report.page.mixer import mixer_assets, mixer_html
-from lightpaint.target.target import Target
+from lightpaint.report import data_uri, html, mixer_assets, mixer_html, target_picture
+from lightpaint.target import Target
 from lightpaint.viewer.bundle import styles
 
 #: Maximum number of pixels in all planes of the mixer: with their scripts these stay below 400 kB.

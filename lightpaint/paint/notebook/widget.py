@@ -41,8 +41,7 @@ from lightpaint.paint.store.history_steps import Identity
 from lightpaint.paint.store.store import MemoryStore, Store
 from lightpaint.paint.studio.studio import Studio
 from lightpaint.pipeline.job.settings import SettingsByName
-from lightpaint.target.painting_file import write_painting
-from lightpaint.target.target import Target
+from lightpaint.target import Target, write_painting
 from lightpaint.viewer.bundle import bundled, styles
 
 #: Painters of this process that keep their session in a file, by its path.

@@ -9,8 +9,7 @@ from typing import Any
 
 import numpy as np
 
-from lightpaint.basis.basis import Basis
-from lightpaint.basis.lightgroups.light_groups import LightGroups
+from lightpaint.basis import Basis, LightGroups
 from lightpaint.colour import TransformChoice, ViewTransform
 from lightpaint.errors import KeywordError, LightpaintError, PaintError
 from lightpaint.lighting.answer.lighting import Lighting
@@ -23,10 +22,9 @@ from lightpaint.paint.store.session_requests import SessionRequests
 from lightpaint.paint.subject import Subject
 from lightpaint.paint.subject_factory import make_subjects
 from lightpaint.pipeline.job.settings import Settings
-from lightpaint.scene.scene import Scene
-from lightpaint.scene.scene_reader import load_scene
+from lightpaint.scene import Scene, load_scene
 from lightpaint.sentences import Datum, Remedy
-from lightpaint.target.target import PASS_RESIZE, Target
+from lightpaint.target import PASS_RESIZE, Target
 
 #: Types that can be painted.
 Paintable = Basis | Scene | LightGroups | str | Path

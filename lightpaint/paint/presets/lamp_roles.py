@@ -11,13 +11,12 @@ import numpy as np
 import numpy.typing as npt
 
 from lightpaint.arrays import Bools, Doubles, Floats, Indices
-from lightpaint.basis.basis import Basis
-from lightpaint.basis.denoised_mixes import denoise_mix
+from lightpaint.basis import Basis, denoise_mix
 from lightpaint.colour import luminance
 from lightpaint.images import Objects, block_mean, fitting_factor
 from lightpaint.paint.layers.canvas import Canvas
 from lightpaint.paint.presets.view_areas import MIN_ALBEDO, Mask, ViewAreas
-from lightpaint.scene.lights.texels.texel import coarse_name, image_of, images_of, texel_place
+from lightpaint.scene.lights.texels import coarse_name, image_of, images_of, texel_place
 
 #: Kinds of emitters that always are hard light, always soft light, and light of the sky or the sun.
 HARD_KINDS = frozenset({"spot", "point", "directional", "projector", "directionalarea", "ies"})

@@ -10,7 +10,7 @@ from typing import Literal
 import numpy as np
 
 from lightpaint.arrays import RGB, Bools, Doubles, Floats, as_rgb
-from lightpaint.basis.basis import Basis
+from lightpaint.basis import Basis
 from lightpaint.colour import kelvin_to_rgb, luminance
 from lightpaint.errors import PaintError
 from lightpaint.images import Objects, block_mean, fitting_factor

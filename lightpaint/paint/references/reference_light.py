@@ -9,8 +9,7 @@ from functools import cache
 import numpy as np
 
 from lightpaint.arrays import Bools, Doubles, Floats
-from lightpaint.basis.basis import Basis
-from lightpaint.basis.denoised_mixes import denoise_mix
+from lightpaint.basis import Basis, denoise_mix
 from lightpaint.colour import kelvin_to_rgb, luminance
 from lightpaint.errors import PaintError
 from lightpaint.paint.layers.canvas import Canvas

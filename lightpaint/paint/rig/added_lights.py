@@ -8,13 +8,12 @@ from typing import Any
 import numpy as np
 
 from lightpaint.arrays import RGB, Doubles, Position
-from lightpaint.basis.lights import BasisLight
+from lightpaint.basis import BasisLight
 from lightpaint.errors import PaintError, SceneError
 from lightpaint.paint.rig.page_geometry import FirstHit, FreeLength
 from lightpaint.placement import PanelSite
-from lightpaint.scene.lights.new_emitter import PLUGIN_OF, NewEmitter
-from lightpaint.scene.properties.emission import PLUGINS
-from lightpaint.scene.properties.pose import Pose, Site
+from lightpaint.scene import PLUGIN_OF, PLUGINS, NewEmitter, Pose
+from lightpaint.scene.properties.site import Site
 
 #: Keys of a pose, and further keys of added lights.
 POSE_KEYS, LIGHT_KEYS = ("position", "target", "cutoff", "beam"), ("kind", "size", "emission")

@@ -13,11 +13,17 @@ from typing import Any
 import numpy as np
 
 from lightpaint.arrays import Doubles, Floats, Position
-from lightpaint.basis.basis import Basis
-from lightpaint.basis.derived_planes import PlaneReference, compose_planes
-from lightpaint.basis.file.basis_file import is_large
-from lightpaint.basis.lights import BasisLight, Lights
-from lightpaint.basis.planes import IndirectLight, MemoryPlanes, Planes
+from lightpaint.basis import (
+    Basis,
+    BasisLight,
+    IndirectLight,
+    Lights,
+    MemoryPlanes,
+    PlaneReference,
+    Planes,
+    compose_planes,
+    is_large,
+)
 from lightpaint.errors import PaintError, SceneError
 from lightpaint.images import Features
 from lightpaint.paint.protocol import Camera, LightPlace, Place, PlanObject, Rig, SkyAxes
@@ -43,10 +49,9 @@ from lightpaint.placement import (
     surfaces_of,
     why_not_searched,
 )
-from lightpaint.scene.properties.pose import Pose, Site, motion_of
+from lightpaint.scene import Pose, Scene, motion_of, render_features
+from lightpaint.scene.properties.site import Site
 from lightpaint.scene.runtime.render_lock import MITSUBA
-from lightpaint.scene.scene import Scene
-from lightpaint.scene.surfaces import render_features
 from lightpaint.sentences import Hint
 
 #: Number of rendered planes, each of all views, that are cached for undo.
@@ -340,7 +345,7 @@ class LampRig:
 
         check: called between passes; raises to stop.
         """
-        from lightpaint.basis.cache.cached_render import obtain_basis
+        from lightpaint.basis.cache import obtain_basis
 
         def progress(label: str, done: int, total: int, unit: str = "passes") -> None:
             del label, done, total, unit

@@ -12,8 +12,7 @@ from typing import Any
 import numpy as np
 
 from lightpaint.arrays import Doubles
-from lightpaint.basis.basis import Basis
-from lightpaint.basis.cache.denoised_planes import DenoisedPlanes, as_halves, denoise_to_halves
+from lightpaint.basis import Basis, DenoisedPlanes, as_halves, denoise_to_halves
 from lightpaint.colour import LUMINANCE
 from lightpaint.errors import LightpaintError, PaintError, SceneError
 from lightpaint.paint.background_threads import BackgroundThreads, LatestWork, StoppedError
@@ -51,8 +50,8 @@ from lightpaint.paint.session.picture_table import (
 from lightpaint.paint.session.session import Session
 from lightpaint.paint.session_access import Publisher, SessionAccess
 from lightpaint.paint.store.history_steps import name_in_view
-from lightpaint.scene.lights.new_emitter import NewEmitter
-from lightpaint.scene.properties.pose import Pose, Site
+from lightpaint.scene import NewEmitter, Pose
+from lightpaint.scene.properties.site import Site
 
 #: Luminance of a spot that is aimed well, relative to that of a lamp without a cone at its place.
 AIMED_SHARE = 0.3

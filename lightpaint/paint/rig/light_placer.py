@@ -38,7 +38,8 @@ from lightpaint.placement import (
     usual_pace,
 )
 from lightpaint.progress import cancellable
-from lightpaint.scene.properties.pose import Pose, Site
+from lightpaint.scene import Pose
+from lightpaint.scene.properties.site import Site
 from lightpaint.scene.runtime.render_lock import MITSUBA
 from lightpaint.sentences import Hint, Sentence
 

@@ -8,9 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from lightpaint.basis.basis import Basis
-from lightpaint.basis.cache.denoised_planes import as_halves
-from lightpaint.basis.denoised_mixes import denoise_mix
+from lightpaint.basis import Basis, as_halves, denoise_mix
 from lightpaint.display_text import some_names
 from lightpaint.errors import LightpaintError
 from lightpaint.files import write_text
@@ -27,8 +25,8 @@ from lightpaint.paint.session_access import Publisher, SessionAccess
 from lightpaint.paint.store.history_steps import name_in_view
 from lightpaint.paint.subject import Subject, places_path
 from lightpaint.placement import AddedLight, Move, PlacementRecord, is_panel
-from lightpaint.scene.properties.pose import Site
-from lightpaint.scene.scene import Scene
+from lightpaint.scene import Scene
+from lightpaint.scene.properties.site import Site
 
 
 def of_moved_scenes(

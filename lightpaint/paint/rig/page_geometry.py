@@ -10,10 +10,9 @@ import numpy.typing as npt
 
 from lightpaint.arrays import Doubles
 from lightpaint.paint.protocol import Camera, Place, PlanObject, SkyAxes
-from lightpaint.scene.lights.texels.image_domains import Sky
+from lightpaint.scene import Scene, names_by_shape
+from lightpaint.scene.lights.texels import Sky
 from lightpaint.scene.runtime.render_lock import tracing
-from lightpaint.scene.scene import Scene
-from lightpaint.scene.surfaces import names_by_shape
 
 #: Largest deviation from the rays of a pinhole, as through a fisheye lens, relative to a ray's
 #: length.

@@ -18,10 +18,9 @@ import numpy.typing as npt
 from lightpaint.arrays import Floats, aligned
 from lightpaint.images import DARKEST, Features, SurfaceFilter
 from lightpaint.placement import FrozenPaths, PathSums
-from lightpaint.scene.properties.film import reduction_to
-from lightpaint.scene.properties.pose import Site
+from lightpaint.scene import Scene, reduction_to
+from lightpaint.scene.properties.site import Site
 from lightpaint.scene.runtime.render_lock import tracing
-from lightpaint.scene.scene import Scene
 
 #: Approximate number of first hits in the picture, and the largest number per pixel.
 FIRST_HITS, MOST_PER_PIXEL = 2**19, 16

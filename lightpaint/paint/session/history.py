@@ -9,7 +9,7 @@ import numpy as np
 import numpy.typing as npt
 
 from lightpaint.arrays import Doubles, Floats
-from lightpaint.basis.basis import Basis
+from lightpaint.basis import Basis
 from lightpaint.colour import ViewTransform
 from lightpaint.errors import NothingToUndoError, PaintError
 from lightpaint.paint import protocol

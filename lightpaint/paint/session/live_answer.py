@@ -12,8 +12,7 @@ from dataclasses import replace
 import numpy as np
 
 from lightpaint.arrays import RGB, Doubles
-from lightpaint.basis.basis import Basis
-from lightpaint.basis.lights import Lights
+from lightpaint.basis import Basis, Lights
 from lightpaint.colour import Lamp, ViewTransform
 from lightpaint.errors import LightpaintError
 from lightpaint.lighting.constraints.absolute_scale import with_sure_scale

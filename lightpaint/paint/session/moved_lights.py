@@ -5,8 +5,7 @@ from typing import Any, Protocol
 
 import numpy as np
 
-from lightpaint.basis.basis import Basis
-from lightpaint.basis.lights import Lights
+from lightpaint.basis import Basis, Lights
 from lightpaint.errors import PaintError
 from lightpaint.paint.layers.canvases import Canvases
 from lightpaint.paint.session.live_answer import LiveAnswer

@@ -10,13 +10,11 @@ import numpy as np
 import numpy.typing as npt
 
 from lightpaint.arrays import Bools, Floats
-from lightpaint.basis.basis import Basis
-from lightpaint.basis.cache.denoised_planes import scale_of
+from lightpaint.basis import Basis, scale_of
 from lightpaint.colour import ViewTransform
 from lightpaint.errors import PaintError
 from lightpaint.images import block_mean, blocks_in, fitting_factor
-from lightpaint.report.basis_memo import make_once
-from lightpaint.report.page.figures import resized, thumbnail
+from lightpaint.report import make_once, resized, thumbnail
 
 #: Approximate pixels of a thumbnail's longer side.
 THUMBNAIL_SIDE = 192

@@ -6,7 +6,7 @@ from typing import Any
 import numpy as np
 
 from lightpaint.arrays import Doubles
-from lightpaint.basis.lights import Lights
+from lightpaint.basis import Lights
 from lightpaint.colour import luminance
 from lightpaint.errors import PaintError
 from lightpaint.paint import protocol

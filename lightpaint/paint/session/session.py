@@ -17,8 +17,7 @@ from typing import Any
 import numpy.typing as npt
 
 from lightpaint.arrays import Doubles, Floats
-from lightpaint.basis.basis import Basis
-from lightpaint.basis.denoised_mixes import denoise_mix
+from lightpaint.basis import Basis, denoise_mix
 from lightpaint.colour import ViewTransform
 from lightpaint.errors import LightpaintError, PaintError
 from lightpaint.lighting.constraints.constraints import Constraints
@@ -59,7 +58,7 @@ from lightpaint.paint.store.history_steps import Pixels
 from lightpaint.paint.store.session_requests import SessionRequests
 from lightpaint.paint.store.store import Store, StoredComposition
 from lightpaint.pipeline.job.settings import Settings
-from lightpaint.target.target import Target
+from lightpaint.target import Target
 
 
 class Session:

@@ -8,8 +8,7 @@ from typing import Any
 import numpy as np
 
 from lightpaint.arrays import RGB, Doubles, as_rgb
-from lightpaint.basis.basis import Basis
-from lightpaint.basis.lights import BasisLight
+from lightpaint.basis import Basis, BasisLight
 from lightpaint.colour import (
     LUMINANCE,
     ColorRendering,
@@ -48,35 +47,29 @@ from lightpaint.paint.session.history import History
 from lightpaint.paint.session.live_answer import LiveAnswer
 from lightpaint.paint.store.history_steps import Region
 from lightpaint.paint.store.session_requests import HOLD_KEYS
-from lightpaint.report.delivery_sentences import (
+from lightpaint.report import (
     ALONE_ADVICE,
-    is_one_painting,
-    named_worst_wish,
-    spoken_deliveries,
-    spoken_newest,
-)
-from lightpaint.report.diagnosis_sentences import (
+    NO_CLOSER_TEXT,
     NO_ERROR,
     bound_sentences,
     compensation_sentences,
+    headline,
     hold_clause,
-    spoken_errors,
-    spoken_shares,
-)
-from lightpaint.report.phrases import (
-    NO_CLOSER_TEXT,
+    is_one_painting,
+    named_worst_wish,
     spoken_amount,
     spoken_changed,
+    spoken_deliveries,
+    spoken_errors,
+    spoken_lack,
+    spoken_missing,
+    spoken_newest,
     spoken_part,
     spoken_percent,
     spoken_place,
     spoken_progress,
-)
-from lightpaint.report.verdict import (
-    headline,
-    spoken_lack,
-    spoken_missing,
     spoken_reason,
+    spoken_shares,
     spoken_whole,
 )
 

@@ -7,7 +7,7 @@ from functools import cached_property
 import numpy as np
 
 from lightpaint.arrays import Bools, Doubles
-from lightpaint.basis.lights import Lights
+from lightpaint.basis import Lights
 from lightpaint.lighting.constraints.requirements import Requirements
 from lightpaint.lighting.unknowns.reduction import Reduction
 from lightpaint.lighting.wishes.planes_answer import WishOutcome, planes_answer

@@ -7,9 +7,7 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from lightpaint.basis.basis import Basis
-from lightpaint.basis.cache.denoised_planes import DenoisedPlanes, RoughPlanes, as_halves
-from lightpaint.basis.light_images import LightImage, light_images
+from lightpaint.basis import Basis, DenoisedPlanes, LightImage, RoughPlanes, as_halves, light_images
 from lightpaint.colour import ViewTransform
 from lightpaint.errors import PaintError
 from lightpaint.images import resampled

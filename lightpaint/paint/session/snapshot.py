@@ -8,8 +8,7 @@ import numpy as np
 import numpy.typing as npt
 
 from lightpaint.arrays import Doubles
-from lightpaint.basis.basis import Basis
-from lightpaint.basis.cache.denoised_planes import DenoisedPlanes
+from lightpaint.basis import Basis, DenoisedPlanes
 from lightpaint.colour import ViewTransform
 from lightpaint.lighting.analysis.analysis import analyse
 from lightpaint.lighting.analysis.appearance.display_difference import PaintComparison
@@ -31,7 +30,7 @@ from lightpaint.paint.session.picture_table import Picture, display_thumbnail
 from lightpaint.paint.session.session_messages import preview_text, why_not_closer
 from lightpaint.paint.store.session_requests import SessionRequests
 from lightpaint.pipeline.job.settings import Settings
-from lightpaint.target.target import Target
+from lightpaint.target import Target
 
 
 @dataclass(frozen=True)

@@ -16,7 +16,7 @@ from contextlib import contextmanager, suppress
 from dataclasses import asdict
 from pathlib import Path
 
-from lightpaint.basis.light_images import joined_texels
+from lightpaint.basis import joined_texels
 from lightpaint.display_text import some_names
 from lightpaint.errors import LightpaintError, OutputError, PaintError
 from lightpaint.files import first_line, flush

@@ -14,7 +14,7 @@ import numpy as np
 import numpy.typing as npt
 
 from lightpaint.arrays import Bools, Floats
-from lightpaint.basis.basis import Basis
+from lightpaint.basis import Basis
 
 #: Rows and columns of the picture, `(top, bottom, left, right)`, the ends not included.
 Region = tuple[int, int, int, int]

@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from lightpaint.arrays import Bools, Doubles
-from lightpaint.basis.lights import BasisLight
+from lightpaint.basis import BasisLight
 from lightpaint.errors import PaintError
 from lightpaint.lighting.constraints.constraints import Constraints
 from lightpaint.lighting.constraints.light_patterns import tables_by_light, tied_lights

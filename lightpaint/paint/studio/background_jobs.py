@@ -8,8 +8,7 @@ from pathlib import Path
 from threading import Lock
 from typing import Any, Literal
 
-from lightpaint.basis.basis import Basis
-from lightpaint.basis.cache.denoised_planes import DenoisedPlanes, as_halves
+from lightpaint.basis import Basis, DenoisedPlanes, as_halves
 from lightpaint.errors import PaintError
 from lightpaint.lighting.analysis.analysis import analyse, with_findings
 from lightpaint.lighting.answer.combination import dimmed

@@ -5,10 +5,7 @@ from contextlib import suppress
 from dataclasses import dataclass
 
 from lightpaint.arrays import Position
-from lightpaint.dmx.console_rig import ConsoleRig, address_text
-from lightpaint.dmx.network.console_link import ConsoleLink
-from lightpaint.dmx.pan_tilt import aimed_rig
-from lightpaint.dmx.rig_drives import RigDrives
+from lightpaint.dmx import ConsoleLink, ConsoleRig, RigDrives, address_text, aimed_rig
 from lightpaint.errors import PaintError
 from lightpaint.paint.protocol import BlackOut, ConsoleInfo, ConsoleState, Message, SwitchConsole
 from lightpaint.paint.session.session import Session

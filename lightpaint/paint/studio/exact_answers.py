@@ -10,8 +10,7 @@ from collections.abc import Callable, Sequence
 from contextlib import suppress
 from typing import Any, get_args
 
-from lightpaint.basis.basis import Basis
-from lightpaint.basis.cache.denoised_planes import DenoisedPlanes
+from lightpaint.basis import Basis, DenoisedPlanes
 from lightpaint.errors import ConstraintError
 from lightpaint.lighting.analysis.analysis import analyse
 from lightpaint.lighting.analysis.appearance.color_choices import can_change_colors

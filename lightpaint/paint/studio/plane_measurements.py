@@ -19,8 +19,8 @@ from lightpaint.paint.session_access import Publisher, SessionAccess
 from lightpaint.paint.store.session_requests import SessionRequests
 from lightpaint.paint.subject import Subject
 from lightpaint.progress import Progress, listener
+from lightpaint.scene import Scene
 from lightpaint.scene.runtime.render_lock import MITSUBA
-from lightpaint.scene.scene import Scene
 
 #: The name of the task in reports of progress.
 TASK = "planes"

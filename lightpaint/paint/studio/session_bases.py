@@ -6,14 +6,14 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from lightpaint.arrays import Floats
-from lightpaint.basis.basis import Basis
-from lightpaint.basis.cache.denoised_planes import (
+from lightpaint.basis import (
+    Basis,
     DenoisedPlanes,
     cache_denoised_planes,
+    denoise_current_look,
     denoise_to_halves,
     read_denoised_planes,
 )
-from lightpaint.basis.denoised_mixes import denoise_current_look
 from lightpaint.files import one_line
 from lightpaint.lighting.solution import Solution
 from lightpaint.paint.background_threads import LatestWork, StoppedError
@@ -46,7 +46,7 @@ from lightpaint.paint.store.store import Store
 from lightpaint.paint.studio.file_imports import begin_with_layers
 from lightpaint.paint.subject import Subject, obtain_bases, painting_transform
 from lightpaint.progress import Progress, silent
-from lightpaint.report.basis_memo import page_reduction
+from lightpaint.report import page_reduction
 from lightpaint.scene.limits import MAX_SPP
 from lightpaint.scene.runtime.render_lock import MITSUBA
 
@@ -363,9 +363,8 @@ def add_round(
     that was asked for is reached, in percent.
     """
     # Imported here: saved bases need no renderer.
-    from lightpaint.basis.cache.cached_render import top_up_basis
-    from lightpaint.basis.render.pixel_top_up import kept_loaded
-    from lightpaint.basis.render.render_origin import ONE_PASS
+    from lightpaint.basis.cache import top_up_basis
+    from lightpaint.basis.render import ONE_PASS, kept_loaded
     from lightpaint.pipeline.needed_samples import Certainty, needed_counts
 
     settings, bases = snapshot.settings, list(snapshot.bases)

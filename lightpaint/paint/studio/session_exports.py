@@ -7,7 +7,7 @@ from pathlib import Path
 from typing import Any
 
 from lightpaint.arrays import Floats
-from lightpaint.basis.basis import Basis
+from lightpaint.basis import Basis
 from lightpaint.colour import ViewTransform, to_8_bit
 from lightpaint.errors import OutputError, PaintError
 from lightpaint.files import write_bytes
@@ -23,13 +23,10 @@ from lightpaint.pipeline.job.job import Job
 from lightpaint.pipeline.pipeline import run
 from lightpaint.pipeline.results.answer_folder import LIGHTING, RELIT, write_answer
 from lightpaint.progress import Progress
-from lightpaint.relit.relight import relight
-from lightpaint.relit.verification_render import verify_in_stages
-from lightpaint.report.clean_pictures import CleanLooks
-from lightpaint.report.verdict import spoken_distance
-from lightpaint.scene.scene_reader import load_scene
-from lightpaint.target.painting_file import write_painting
-from lightpaint.target.template import texts_of
+from lightpaint.relit import relight, verify_in_stages
+from lightpaint.report import CleanLooks, spoken_distance
+from lightpaint.scene import load_scene
+from lightpaint.target import texts_of, write_painting
 
 #: Folder of the report, in that of the session.
 ANSWER_FOLDER = "answer"

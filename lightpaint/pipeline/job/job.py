@@ -12,12 +12,9 @@ from pathlib import Path
 from typing import Any
 
 from lightpaint.arrays import Bools
-from lightpaint.basis.basis import Basis
-from lightpaint.basis.cache.cached_render import check_same_view
-from lightpaint.basis.lightgroups.frame_sequence import FrameSequence, spoken_frames
-from lightpaint.basis.lightgroups.light_groups import LightGroups
-from lightpaint.basis.lights import Lights
-from lightpaint.basis.render.render_origin import basis_lights
+from lightpaint.basis import Basis, FrameSequence, LightGroups, Lights, spoken_frames
+from lightpaint.basis.cache import check_same_view
+from lightpaint.basis.render import basis_lights
 from lightpaint.display_text import short_repr
 from lightpaint.errors import ConstraintError, LightpaintError, TargetError
 from lightpaint.files import check_writable
@@ -56,12 +53,13 @@ from lightpaint.pipeline.job.sources import (
     PlacementFile,
     SceneFile,
     check_nothing_unused,
+    check_spectral,
     content,
+    observer_of,
+    spectral_scene,
 )
-from lightpaint.pipeline.job.spectral_job import check_spectral, observer_of, spectral_scene
 from lightpaint.pipeline.results.answer_folder import answer_files
-from lightpaint.pipeline.results.planes_folder import files_of_planes
-from lightpaint.pipeline.results.result_folder import ResultFolder
+from lightpaint.pipeline.results.result_folder import ResultFolder, files_of_planes
 from lightpaint.pipeline.results.results import (
     SOLVE_RESULTS,
     VIEW_RESULTS,
@@ -69,12 +67,11 @@ from lightpaint.pipeline.results.results import (
     view_names,
 )
 from lightpaint.placement import PlacementRecord, Rigging, check_suggestible
-from lightpaint.relit.export.nuke import spoken_unreadable
-from lightpaint.relit.luminaire_xml import plugin_remark
+from lightpaint.relit import plugin_remark, spoken_unreadable
+from lightpaint.scene import Scene
 from lightpaint.scene.quality_presets import on_film
-from lightpaint.scene.scene import Scene
 from lightpaint.sentences import Hint, Sentence
-from lightpaint.target.target import Target
+from lightpaint.target import Target
 from lightpaint.threads import parallel_map
 
 #: A basis, or light groups of another renderer, in memory or in a file.

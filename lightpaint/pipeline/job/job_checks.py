@@ -4,8 +4,7 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
-from lightpaint.basis.basis import Basis
-from lightpaint.basis.lightgroups.light_groups import LightGroups, with_equal_lights
+from lightpaint.basis import Basis, LightGroups, with_equal_lights
 from lightpaint.errors import (
     BasisError,
     ConstraintError,
@@ -18,12 +17,10 @@ from lightpaint.lighting.joined_views import check_same_lights
 from lightpaint.pipeline.job.settings import Settings
 from lightpaint.pipeline.job.sources import Painting, content
 from lightpaint.placement import Rigging, check_rigging, rigged_lights, rigging_of
-from lightpaint.scene.lights.texels.image_domains import DOMAINS, Sky
-from lightpaint.scene.lights.texels.texel import mirrored_pairs, node_name
-from lightpaint.scene.lights.texels.texel_layout import CHILDREN
-from lightpaint.scene.scene import Scene
+from lightpaint.scene import Scene
+from lightpaint.scene.lights.texels import CHILDREN, DOMAINS, Sky, mirrored_pairs, node_name
 from lightpaint.sentences import Hint, Sentence
-from lightpaint.target.target import Target
+from lightpaint.target import Target
 
 #: Emitters that shine from all directions.
 SKY_PLUGINS = [plugin for plugin, domain in DOMAINS.items() if isinstance(domain, Sky)]

@@ -6,7 +6,7 @@ from dataclasses import asdict, dataclass, field, replace
 from pathlib import Path
 from typing import Any
 
-from lightpaint.basis.lightgroups.frame_sequence import FrameSequence, find_frames
+from lightpaint.basis import FrameSequence, find_frames
 from lightpaint.errors import LightpaintError
 from lightpaint.lighting.constraints.constraints import Constraints
 from lightpaint.pipeline.job.settings import Settings

@@ -1,15 +1,14 @@
 """Remarks for the user before a job runs, in plain text."""
 
-from lightpaint.basis.render.banded_film import memory_needed, renders_in_bands
-from lightpaint.basis.render.integrators import remark_on_separate_renders
+from lightpaint.basis.render import memory_needed, remark_on_separate_renders, renders_in_bands
 from lightpaint.display_text import some_names
 from lightpaint.images import MISSING_REMARK, Size, left_over, oidn_is_installed, whole_factor
 from lightpaint.pipeline.job.settings import Settings
+from lightpaint.scene import Scene
 from lightpaint.scene.quality_presets import PRESETS
 from lightpaint.scene.runtime.variant import use_variant
-from lightpaint.scene.scene import Scene
 from lightpaint.sentences import Hint, Sentence, Word
-from lightpaint.target.target import Target
+from lightpaint.target import Target
 
 #: Bytes of memory above which a basis gets a remark.
 MUCH_MEMORY = 2e9

@@ -368,7 +368,7 @@ class Settings(Fit):
                 Hint("spectral", True),
             )
         if self.resolution is not None:
-            from lightpaint.scene.properties.film import check_resolution  # late: it needs NumPy
+            from lightpaint.scene import check_resolution
 
             check_resolution(self.resolution)
 

@@ -10,21 +10,20 @@ from pathlib import Path
 from typing import Any, Self
 
 from lightpaint.arrays import Floats
-from lightpaint.basis.basis import Basis
-from lightpaint.basis.file.basis_file import read_basis
-from lightpaint.basis.lightgroups.light_groups import LightGroups, read_light_groups
-from lightpaint.colour import TransformChoice
-from lightpaint.errors import BasisError
+from lightpaint.basis import Basis, LightGroups, read_basis, read_light_groups
+from lightpaint.basis.render import basis_lights, check_renders_spectra
+from lightpaint.colour import EYE, Observer, TransformChoice, read_observer
+from lightpaint.errors import BasisError, LightpaintError, SceneError
 from lightpaint.keywords import keywords
+from lightpaint.lighting.constraints.constraints import Constraints
 from lightpaint.lighting.constraints.constraints_file import constraints_of
+from lightpaint.lighting.unknowns.lamp_parts import WholeLamps
+from lightpaint.lighting.unknowns.reduction import lamps_by_name
 from lightpaint.pipeline.job.settings import Settings
-from lightpaint.pipeline.job.spectral_job import observer_of, spectral_scene
 from lightpaint.placement import PlacementRecord, read_placement
-from lightpaint.scene.scene import Scene
-from lightpaint.scene.scene_reader import load_scene
+from lightpaint.scene import Scene, load_scene, part_name
 from lightpaint.sentences import Hint, Sentence
-from lightpaint.target.target import Target
-from lightpaint.target.target_reader import Paint, read_over_look, read_target
+from lightpaint.target import Paint, Target, read_over_look, read_target
 
 #: Settings of sampling, of rendering, and those that light groups do not support.
 SAMPLING_SETTINGS = ("spp", "exact_spp", "time_s", "error", "quality", "resolution")
@@ -244,3 +243,62 @@ def check_nothing_unused(settings: Settings, basis: Any) -> None:
     default = Settings()
     unused_settings = [name for name in names if getattr(settings, name) != getattr(default, name)]
     check_needed(unused_settings, basis)
+
+
+def observer_of(path: str | None) -> Observer:
+    """Return the camera of a table, or the eye without one. Raises ColorError."""
+    return EYE if path is None else read_observer(Path(path))
+
+
+def spectral_scene(scene: Scene, constraints: Constraints, observer: Observer = EYE) -> Scene:
+    """Return a scene with a light for each emitter of its lamps, as the observer sees it.
+
+    One that has them already, which looks of a batch share, has to have those of `constraints`.
+    Raises SceneError if a light that is adjusted has no emitters with spectra, or the scene cannot
+    be rendered with them.
+    """
+    if scene.is_spectral:
+        _check_same_emitters(scene, constraints)
+        return scene
+    check_renders_spectra(scene)
+    return scene.with_lamps(lamps_by_name(constraints, basis_lights(scene)), observer)
+
+
+def _check_same_emitters(scene: Scene, constraints: Constraints) -> None:
+    """Raise SceneError if constraints give lamps other spectra than those of a spectral scene."""
+    lights = WholeLamps.of(basis_lights(scene)).lights
+    lamps = lamps_by_name(constraints, lights)
+    expected = {
+        part_name(name, x.name): x.spectrum for name, lamp in lamps.items() for x in lamp.emitters
+    }
+    rendered = {x.name: x.spectrum for x in scene.lights if not x.is_fixed}
+    if changed := sorted(k for k in rendered if rendered[k] != expected.get(k)):
+        raise SceneError(
+            f"the emitters of a lamp, like {changed[0]!r}, are those of the lights file, which "
+            "looks with spectra share: give them there, and not for one look"
+        )
+
+
+def check_spectral(settings: Settings, constraints: Constraints, *others: object) -> None:
+    """Raise LightpaintError for what does not go with spectra. others: what moves or adds lights;
+    false if there is nothing.
+    """
+    if not settings.spectral:
+        return
+    unusable = [name for name in ("suggest", "refine", "animate") if getattr(settings, name)]
+    if settings.sun:
+        unusable.append("sun")
+    if unusable:
+        raise LightpaintError(
+            Hint("spectral", True), " does not go with ", Hint(unusable[0]), ": leave one out"
+        )
+    if constraints.start:
+        raise LightpaintError(
+            Hint("spectral", True), " starts from the scene as it is: leave ", Hint("start"), " out"
+        )
+    if any(others):
+        raise LightpaintError(
+            Hint("spectral", True),
+            " keeps all lights in place: solve with ",
+            Hint("move_lights", False),
+        )

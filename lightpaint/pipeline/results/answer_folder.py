@@ -9,14 +9,12 @@ from contextlib import contextmanager
 from dataclasses import dataclass, replace
 from pathlib import Path
 
-from lightpaint.basis.lightgroups.light_groups import LightGroups
+from lightpaint.basis import LightGroups
 from lightpaint.lighting.answer.lighting import Lighting
 from lightpaint.lighting.answer.lighting_file import write_lighting
 from lightpaint.pipeline.results.result_folder import ResultFolder
-from lightpaint.relit.export.exports import EXPORTS, write_exports
-from lightpaint.relit.relight import check_relightable, relight, settle
-from lightpaint.scene.scene import Scene
-from lightpaint.scene.scene_reader import load_scene
+from lightpaint.relit import EXPORTS, check_relightable, relight, settle, write_exports
+from lightpaint.scene import Scene, load_scene
 
 #: Files of every answer; a scene may add files that it includes, light groups those for other
 #: programs.

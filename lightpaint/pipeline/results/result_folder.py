@@ -9,9 +9,14 @@ from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Literal
 
+from lightpaint.arrays import Doubles
 from lightpaint.errors import LightpaintError, OutputError
 from lightpaint.file_reading import read_text
 from lightpaint.files import check_files, check_writable, one_line, write_text
+from lightpaint.photometry.glare import Glare
+from lightpaint.photometry.illuminance import Illuminance
+from lightpaint.photometry.planes_file import plane_names
+from lightpaint.photometry.readings_file import readings_files, write_readings
 from lightpaint.pipeline.results.results import RESULTS
 from lightpaint.sentences import Hint, Sentence
 from lightpaint.storage.json_records import read_record, strict_json
@@ -30,6 +35,9 @@ IN_MEMORY = " (in memory)"
 REMEDY = Sentence(
     "name another folder (", Hint("folder"), "), or replace it (", Hint("force", True), ")"
 )
+
+#: The folder within that of the answer.
+PLANES_FOLDER = "planes"
 
 
 @dataclass(frozen=True)
@@ -214,3 +222,27 @@ def _checksum(file: Path) -> str:
         while data := stream.read(2**24):
             crc = zlib.crc32(data, crc)
     return f"{crc:08x}"
+
+
+def files_of_planes(folder: Path, planes: str | Path) -> list[Path]:
+    """Return the files of measured planes in a result folder. planes: the path of their file."""
+    names, cases = plane_names(planes)
+    files = readings_files(names)
+    return [folder / PLANES_FOLDER / case / name for case in cases or ("",) for name in files]
+
+
+def write_planes(
+    folder: Path,
+    illuminance: Illuminance,
+    weights: Mapping[str, Doubles],
+    origin: str,
+    *,
+    glare: Glare | None = None,
+) -> None:
+    """Write what weights (n, 3) by case give on planes, in a folder for each. origin: of the light,
+    in words. glare: of all lights, if it was measured.
+    """
+    for case, lit in weights.items():
+        place, words = folder / PLANES_FOLDER / case, f"{origin}, {case}" if case else origin
+        place.mkdir(parents=True, exist_ok=True)
+        write_readings(place, illuminance, lit, words, glare=glare)

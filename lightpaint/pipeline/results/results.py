@@ -4,10 +4,11 @@ import json
 from collections.abc import Mapping, Sequence
 from dataclasses import asdict, dataclass, replace
 from pathlib import Path
+from typing import Any
 
-from lightpaint.basis.basis import Basis, Origin
+from lightpaint.basis import Basis, Origin
 from lightpaint.colour import EYE, Observer
-from lightpaint.display_text import some_names
+from lightpaint.display_text import rounded_text, some_names
 from lightpaint.errors import ImageError, OutputError, SceneError
 from lightpaint.files import is_name, one_line, write_bytes, write_text
 from lightpaint.images import Estimate, Size, in_turns, read_estimate, whole_factor, write_estimate
@@ -20,28 +21,38 @@ from lightpaint.lighting.analysis.surface_colors import SurfaceColor
 from lightpaint.lighting.answer.lighting import Lighting
 from lightpaint.lighting.solution import Solution
 from lightpaint.lighting.wishes.planes_answer import PlanesAnswer
-from lightpaint.pipeline.results.placement_changes import hung_of
-from lightpaint.placement import MoveSuggestion, Placement, Suggestion
+from lightpaint.placement import (
+    HARDLY_VISIBLE,
+    TO_END,
+    AddedLight,
+    Move,
+    MoveSuggestion,
+    Placement,
+    PlacementRecord,
+    Suggestion,
+)
 from lightpaint.progress import Progress, silent
-from lightpaint.relit.export.exports import EXPORTS
-from lightpaint.relit.verification import Verification
-from lightpaint.relit.verification_render import verify
-from lightpaint.report.answer_pictures import report_transform, residual_of
-from lightpaint.report.clean_pictures import CleanLooks
-from lightpaint.report.comparison import comparison_image
+from lightpaint.relit import EXPORTS, Verification, verify
+from lightpaint.report import (
+    CleanLooks,
+    HungLights,
+    LightChange,
+    ReportedAnswer,
+    comparison_image,
+    emitter_remarks,
+    hung_lights,
+    report_numbers,
+    report_page,
+    report_transform,
+    residual_of,
+    spoken_fraction,
+    verdict,
+)
 from lightpaint.report.page.notebook_html import look_html
-from lightpaint.report.page.page import report_page
-from lightpaint.report.report_json import report_numbers
-from lightpaint.report.reported_answer import ReportedAnswer
-from lightpaint.report.verdict import verdict
-from lightpaint.report.visible_emitters import emitter_remarks
-from lightpaint.scene.scene import Scene
-from lightpaint.scene.scene_reader import load_scene
-from lightpaint.scene.scene_render import Stream
-from lightpaint.scene.surfaces import render_features
+from lightpaint.scene import Scene, Stream, load_scene, render_features
 from lightpaint.storage.json_records import read_record, strict_json
 from lightpaint.storage.staging import finish
-from lightpaint.target.target import Target
+from lightpaint.target import Target
 
 #: Header attribute of predicted.exr: the sensor, film and samples of the basis.
 VIEW_KEY = "lightpaint.view"
@@ -66,6 +77,9 @@ RESULTS = (
     "relit.*.exr",
     *EXPORTS,
 )
+
+#: Least errors of a turn, in degrees, and of a way, as a share of it, that are worth a number.
+LEAST_TURN_ERROR, LEAST_SHARE = 0.05, 0.001
 
 
 @keywords()
@@ -349,3 +363,65 @@ def _read_view(path: Path, text: str) -> _RecordedView:
         raise ImageError(
             f"{path} is damaged in its attribute {VIEW_KEY}: {one_line(str(error))}; solve again"
         ) from None
+
+
+def hung_of(placement: Placement | PlacementRecord, lighting: Lighting | None) -> HungLights:
+    """Return the changes of a placement and the lights of an answer; none without a placement."""
+    changes = [_change_of(change) for change in all_changes(placement)]
+    changes.sort(key=lambda change: -change.numbers["gain_share"])
+    missed_shares = placement.missed_before, placement.missed_after
+    lights = () if lighting is None else hung_lights(lighting)
+    up_axis = (0.0, 1.0, 0.0) if lighting is None else lighting.up
+    return HungLights(lights, tuple(changes), up_axis, *missed_shares, placement.looks)
+
+
+def all_changes(placement: Placement | PlacementRecord) -> list[Move | AddedLight]:
+    """Return the moves, then the new lights."""
+    return [*placement.moves, *placement.additions]
+
+
+def _change_of(change: Move | AddedLight) -> LightChange:
+    numbers: dict[str, Any] = {
+        "gain_share": change.gain_share,
+        "place_error": change.place_error,
+        "turn_error": change.turn_error,
+        "is_hardly_visible": change.is_hardly_visible,
+    }
+    if isinstance(change, Move):
+        numbers |= {"distance": change.distance, "turn": change.turn}
+        numbers |= {"cutoff": change.new.cutoff, "beam": change.new.beam}
+    return LightChange(change.name, spoken_change(change), numbers)
+
+
+def spoken_change(change: Move | AddedLight) -> str:
+    """Return a light's change and gain: `spot_knot turned by 12°, slid by 0.6: a fifth …`."""
+    gain = f"{spoken_fraction(change.gain_share)} of what was missed"
+    if isinstance(change, Move):
+        phrase, gain = spoken_move(change), change.shared_gain or gain
+    else:
+        x, y, z = (f"{v:.2f}" for v in change.site.position or (0.0, 0.0, 0.0))
+        phrase = f"is a new {change.emitter.kind} at ({x}, {y}, {z})".replace("-", "−")
+        if change.place_error:
+            phrase += f" ± {rounded_text(change.place_error, 1)}"
+    text = f"{change.name} {phrase}: {gain}"
+    return f"{text}; {HARDLY_VISIBLE}" if change.is_hardly_visible else text
+
+
+def spoken_move(move: Move) -> str:
+    """Return a light's change with its errors: `turned by 12° ± 1°, slid by 0.6 ± 0.05`."""
+    phrases = []
+    if move.turn >= 0.5:
+        turn_error = move.turn_error or 0.0
+        error = f" ± {rounded_text(turn_error, 1)}°" if turn_error >= LEAST_TURN_ERROR else ""
+        phrases.append(f"turned by {move.turn:.0f}°{error}{TO_END * move.is_turned_to_end}")
+    if move.distance > 0:
+        place_error = move.place_error or 0.0
+        is_told = place_error >= LEAST_SHARE * move.distance
+        error = f" ± {rounded_text(place_error, 1)}" if is_told else ""
+        way = rounded_text(move.distance, 2)
+        phrases.append(f"slid by {way}{error}{TO_END * move.is_slid_to_end}")
+    if move.new.cutoff is not None and move.new.cutoff != move.old.cutoff:
+        phrases.append(f"its cone ends at {move.new.cutoff:.0f}° (was {move.old.cutoff:.0f}°)")
+    if move.has_other_edge:
+        phrases.append(f"its beam at {move.new.beam:.0f}° (was {move.old.beam:.0f}°)")
+    return ", ".join(phrases)

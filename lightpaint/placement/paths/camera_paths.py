@@ -20,7 +20,7 @@ import numpy.typing as npt
 
 from lightpaint.arrays import Bools, Doubles, Floats, Indices, aligned
 from lightpaint.placement.paths.panel_lights import PanelSite
-from lightpaint.scene.scene import Scene
+from lightpaint.scene import Scene
 
 #: Longest paths, in vertices, of integrators without a limit of their own; their light is frozen
 #: without Russian roulette, and the light beyond is a thousandth even in a bright room.

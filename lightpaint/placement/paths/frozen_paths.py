@@ -49,10 +49,9 @@ from lightpaint.placement.paths.vertex_light import (
     VertexLight,
     added_light,
 )
+from lightpaint.scene import Scene, Stream, pass_seed
 from lightpaint.scene.properties.site import Site
 from lightpaint.scene.runtime.render_lock import tracing
-from lightpaint.scene.scene import Scene
-from lightpaint.scene.scene_render import Stream, pass_seed
 
 #: Shadow rays of one launch; more would only take more memory.
 LANES = 2**20

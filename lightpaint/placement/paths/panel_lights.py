@@ -15,12 +15,9 @@ import numpy as np
 
 from lightpaint.arrays import Doubles, Floats, Indices, Position, aligned
 from lightpaint.placement.free_space import as_position
-from lightpaint.scene.lights.light import Light
-from lightpaint.scene.properties.emission import MULTIPLE
+from lightpaint.scene import MULTIPLE, Light, Scene, without_emitters
 from lightpaint.scene.properties.site import Site
 from lightpaint.scene.runtime.render_lock import tracing
-from lightpaint.scene.scene import Scene
-from lightpaint.scene.scene_tree import without_emitters
 
 #: Cosine of the angle to the opposite direction from which a rotation is half a turn.
 OPPOSITE = -1 + 1e-6

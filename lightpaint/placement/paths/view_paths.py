@@ -20,11 +20,9 @@ from lightpaint.placement.free_space import (
 )
 from lightpaint.placement.paths.frozen_paths import FrozenPaths
 from lightpaint.placement.paths.panel_lights import PanelSite, SightLines
-from lightpaint.scene.properties.pose import Site
+from lightpaint.scene import Scene, Stream, loaded_features, pass_seed
+from lightpaint.scene.properties.site import Site
 from lightpaint.scene.runtime.render_lock import tracing
-from lightpaint.scene.scene import Scene
-from lightpaint.scene.scene_render import Stream, pass_seed
-from lightpaint.scene.surfaces import loaded_features
 
 #: First hits per pixel, and continued paths, to rank and compare candidates on small films.
 COARSE_SAMPLES = ((1, 0), (16, 16))

@@ -16,7 +16,7 @@ from lightpaint.placement.lights_to_place import Arrangement, all_sites, by_colu
 from lightpaint.placement.paths.view_paths import SearchPaths, ViewPaths
 from lightpaint.placement.placement_fit import Fitted, PlacementFit
 from lightpaint.placement.search.pose_steps import PoseSteps
-from lightpaint.scene.properties.pose import Site
+from lightpaint.scene.properties.site import Site
 
 #: Least gain of a move or a new light, as a share of the error, and in standard errors.
 WORTH, SURE = 0.01, 3.0

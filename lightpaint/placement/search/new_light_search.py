@@ -21,7 +21,7 @@ from lightpaint.placement.lights_to_place import Arrangement, Movable
 from lightpaint.placement.look_goals import PIXELS
 from lightpaint.placement.search.judgement import NOTHING, PlacementJudge
 from lightpaint.placement.search.pose_search import SHORT_STEPS, TURNS, PoseSearch
-from lightpaint.scene.properties.pose import Site
+from lightpaint.scene.properties.site import Site
 
 #: Number of searches at most, each with other trial places, and the share of the error before them
 #: up to which no further one is made.

@@ -24,7 +24,7 @@ from lightpaint.placement.paths.vertex_light import away_from
 from lightpaint.placement.paths.view_paths import SearchPaths, ViewPaths
 from lightpaint.placement.placement_fit import Fitted, PlacementFit, Ranking, with_columns
 from lightpaint.placement.search.pose_steps import PoseSteps
-from lightpaint.scene.properties.pose import Site
+from lightpaint.scene.properties.site import Site
 from lightpaint.threads import one_thread
 
 #: Number of trial places of a light: if all lights are on lines, otherwise, and for new lights and

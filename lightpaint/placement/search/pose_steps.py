@@ -13,7 +13,7 @@ from lightpaint.placement.lights_to_place import Arrangement, Movable, all_sites
 from lightpaint.placement.paths.panel_lights import PanelSite
 from lightpaint.placement.paths.view_paths import ViewPaths
 from lightpaint.placement.placement_fit import Fitted, PlacementFit, Slopes, with_columns
-from lightpaint.scene.properties.pose import Site
+from lightpaint.scene.properties.site import Site
 
 #: Largest step of a number, relative to its finite difference.
 MAX_STEP = 6.0

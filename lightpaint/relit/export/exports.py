@@ -15,7 +15,7 @@ from typing import Any
 import numpy as np
 
 from lightpaint.arrays import RGB, Doubles, Position
-from lightpaint.basis.lightgroups.light_groups import LightGroups
+from lightpaint.basis import LightGroups
 from lightpaint.colour import ACESCG, REC2020, from_rec709, luminance
 from lightpaint.display_text import some_names
 from lightpaint.errors import LightingError

@@ -22,9 +22,7 @@ from typing import Literal
 import numpy as np
 
 from lightpaint.arrays import RGB, Floats, Position
-from lightpaint.basis.lightgroups.light_groups import LightGroups
-from lightpaint.basis.lightgroups.render_layers import RenderLayer
-from lightpaint.basis.lights import free_name
+from lightpaint.basis import LightGroups, RenderLayer, free_name
 from lightpaint.colour import to_rec709
 from lightpaint.files import one_line
 from lightpaint.images.formats import ExrPart, rgb_channels

@@ -13,7 +13,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from lightpaint.arrays import Doubles, Floats, Position
-from lightpaint.scene.lights.texels.image_domains import GridSize, Sky
+from lightpaint.scene.lights.texels import GridSize, Sky
 from lightpaint.scene.properties.site import EmitterPlace, across, rotation_between
 
 #: Distance up to which positions count as equal, relative to the largest coordinate of a light.

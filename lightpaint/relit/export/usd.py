@@ -17,7 +17,7 @@ from typing import Any
 import numpy as np
 
 from lightpaint.arrays import RGB, Doubles, Position
-from lightpaint.basis.lights import free_name
+from lightpaint.basis import free_name
 from lightpaint.errors import OutputError
 from lightpaint.files import one_line
 from lightpaint.relit.export.program_axes import (

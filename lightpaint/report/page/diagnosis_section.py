@@ -6,7 +6,7 @@ import numpy as np
 from markupsafe import Markup
 
 from lightpaint.arrays import Floats
-from lightpaint.basis.basis import Basis
+from lightpaint.basis import Basis
 from lightpaint.colour import ViewTransform, luminance, to_8_bit
 from lightpaint.images import by_bands
 from lightpaint.lighting.analysis.appearance.appearance import Appearance

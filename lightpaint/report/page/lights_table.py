@@ -7,9 +7,7 @@ import numpy as np
 from markupsafe import Markup
 
 from lightpaint.arrays import RGB, Doubles, Floats, Indices
-from lightpaint.basis.basis import Basis
-from lightpaint.basis.light_images import LightImage, light_images
-from lightpaint.basis.lights import BasisLight
+from lightpaint.basis import Basis, BasisLight, LightImage, light_images
 from lightpaint.colour import Photometry, encode_display, luminance, rgb_to_hex, to_8_bit
 from lightpaint.images import block_mean, in_turns
 from lightpaint.lighting.analysis.noise.uncertainty import Uncertainty

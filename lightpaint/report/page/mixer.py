@@ -18,10 +18,14 @@ import numpy as np
 from markupsafe import Markup
 
 from lightpaint.arrays import Doubles, Floats, Indices
-from lightpaint.basis.basis import Basis
-from lightpaint.basis.denoised_mixes import denoise_mixes, denoise_plane
-from lightpaint.basis.light_images import LightImage, light_images
-from lightpaint.basis.lights import BasisLight
+from lightpaint.basis import (
+    Basis,
+    BasisLight,
+    LightImage,
+    denoise_mixes,
+    denoise_plane,
+    light_images,
+)
 from lightpaint.colour import (
     ViewTransform,
     curve_of,

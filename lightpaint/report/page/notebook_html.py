@@ -13,7 +13,7 @@ from markupsafe import Markup
 from PIL import Image, ImageDraw, ImageFont
 
 from lightpaint.arrays import RGB, Doubles, Floats
-from lightpaint.basis.basis import Basis
+from lightpaint.basis import Basis
 from lightpaint.colour import (
     LUMINANCE,
     Photometry,
@@ -35,9 +35,9 @@ from lightpaint.report.diagnosis_sentences import UNTOLD_HERE
 from lightpaint.report.page.figures import THUMBNAIL_WIDTH, data_uri, thumbnail
 from lightpaint.report.page.html import html
 from lightpaint.report.page.lights_table import change, hex_color
-from lightpaint.report.verdict import agreement, verdict
-from lightpaint.scene.scene import Scene
-from lightpaint.target.target import Target
+from lightpaint.report.verdict_sentences import agreement, verdict
+from lightpaint.scene import Scene
+from lightpaint.target import Target
 
 #: Maximum number of lights in a table; the most pictures of a contact sheet, and in a row.
 MAX_LIGHTS, MAX_PICTURES, MAX_COLUMNS = 10, 12, 4

@@ -2,8 +2,11 @@
 
 templates/page.html is the frame of the page; the other modules here make its sections. Pictures are
 data: URIs; the page loads nothing from anywhere, which its own content policy forbids.
+
+Names of lights, targets and scenes come from other people's files; templates escape them.
 """
 
+import platform
 import shlex
 from collections.abc import Callable
 from dataclasses import replace
@@ -11,41 +14,65 @@ from functools import partial
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 from markupsafe import Markup
 
 from lightpaint.arrays import Floats
-from lightpaint.basis.basis import Basis
+from lightpaint.basis import Basis
 from lightpaint.colour import ViewTransform, to_8_bit
-from lightpaint.images import covered, in_turns
+from lightpaint.display_text import some_of
+from lightpaint.images import Estimate, covered, in_turns
+from lightpaint.lighting.analysis.appearance.appearance import Appearance
+from lightpaint.lighting.analysis.appearance.delivery import spoken_share
+from lightpaint.lighting.answer.certificate import Software, version
+from lightpaint.lighting.loss.painting import ignored_paint
 from lightpaint.lighting.solution import Solution
+from lightpaint.lighting.wishes.planes_answer import PlanesAnswer
+from lightpaint.photometry.false_colour import false_colours
+from lightpaint.photometry.measuring_plane import plane_title
+from lightpaint.relit.verification import ERROR, Verification, limit_of_tests
 from lightpaint.report.answer_pictures import (
+    CleanLooks,
     Residual,
     brighter_than_white,
     report_transform,
     target_picture,
 )
 from lightpaint.report.basis_memo import ROWS_SHOWN, SPARE_ROWS
-from lightpaint.report.clean_pictures import CleanLooks
-from lightpaint.report.diagnosis_sentences import fit_sentence
+from lightpaint.report.diagnosis_sentences import (
+    fit_sentence,
+    is_unnamed,
+    partly_reached,
+    wish_name,
+)
+from lightpaint.report.measures import (
+    count_at_least_pixels,
+    error_in_codes,
+    linear_residual,
+    noise_residual,
+    relative_residual,
+)
 from lightpaint.report.page.constraint_section import colors_section, constraints_section
 from lightpaint.report.page.diagnosis_section import missed_section, sure_section
-from lightpaint.report.page.figures import PagePicture, maps, wipe
-from lightpaint.report.page.fit_tables import (
-    fit_table,
-    render_table,
-    verification_table,
-    versions,
-    wishes_section,
-)
-from lightpaint.report.page.html import html
+from lightpaint.report.page.figures import PagePicture, data_uri, maps, wipe
+from lightpaint.report.page.html import facts, html, name_list
 from lightpaint.report.page.lights_table import MAX_THUMBNAILS, lights_table, thumbnails_of
 from lightpaint.report.page.mixer import mixer_assets, mixer_html, planes_for_page
 from lightpaint.report.page.placement_section import placement_section, suggestion_section
-from lightpaint.report.page.planes_section import planes_section
 from lightpaint.report.page.rendering_section import rendering_section
+from lightpaint.report.planes_text import (
+    GLARE_HEADINGS,
+    HEADINGS,
+    glare_by_title,
+    glare_rows,
+    plane_rows,
+    planes_sentences,
+)
 from lightpaint.report.reported_answer import ReportedAnswer
-from lightpaint.report.verdict import spoken_samples, verdict
+from lightpaint.report.verdict_sentences import spoken_samples, verdict
 from lightpaint.report.visible_emitters import emitter_remarks
+from lightpaint.target import Target
+from lightpaint.version import __version__
 
 
 def report_page(
@@ -229,3 +256,226 @@ def _exposure(transform: ViewTransform, predicted: Floats, origin: str) -> str:
     if origin:
         text += f" Denoised by {origin}; all numbers and maps are of the raw renders."
     return text
+
+
+def planes_section(answer: PlanesAnswer | None) -> Markup:
+    """Return the table of planes, what is said of it, and false colours; nothing without planes."""
+    if answer is None:
+        return Markup("")
+    return html(
+        "planes",
+        has_planes=bool(answer.readings),
+        tables=[
+            (headings, rows)
+            for headings, rows in (
+                (HEADINGS, [*plane_rows(answer)]),
+                (GLARE_HEADINGS, [*glare_rows(glare_by_title(answer))]),
+            )
+            if rows
+        ],
+        sentences=planes_sentences(answer),
+        pictures=_pictures(answer),
+    )
+
+
+def _pictures(answer: PlanesAnswer) -> list[dict[str, Any]]:
+    """Return false colours of the illuminance on each plane."""
+    illuminance, pictures = answer.wished.illuminance, []
+    for case, weights in answer.weights_by_case.items():
+        values = illuminance.of(weights)
+        for plane in illuminance.planes:
+            title = plane_title(plane.name, case)
+            pixels = false_colours(plane, values[illuminance.points_of(plane.name)], title)
+            height, width = pixels.shape[:2]
+            source = data_uri(pixels)
+            pictures.append({"name": title, "width": width, "height": height, "source": source})
+    return pictures
+
+
+def wishes_section(appearance: Appearance | None) -> Markup:
+    """Return the section on how much of each wish came; "" if none asks for anything visible.
+
+    The verdict says it of an only one without a name.
+    """
+    deliveries = () if appearance is None else appearance.deliveries
+    entries = [entry for entry in deliveries if entry.least is not None]
+    if not entries or (len(entries) == 1 and is_unnamed(entries[0])):
+        return Markup("")
+    return html("wishes", entries=entries, wish_name=wish_name, spoken_share=spoken_share)
+
+
+def fit_table(solution: Solution) -> Markup:
+    """Return rows of the objective with its standard error, optimality and sweeps, per channel and
+    in all.
+    """
+    q = solution.certificate
+    norm2 = np.where(solution.norm2 > 0, solution.norm2, 1)
+    errors = None if q.objective_error is None else np.array(q.objective_error)
+    errors_text = [""] * 3 if errors is None else [f" ± {e:.1g}" for e in errors / norm2]
+    columns = zip(
+        ("red", "green", "blue"),
+        q.relative_objective,
+        errors_text,
+        q.kkt_residual,
+        q.sweeps,
+        strict=True,
+    )
+    channels = [
+        {
+            "name": name,
+            "objective": f"{objective:.3g}{error}",
+            "rms": f"{np.sqrt(objective):.3g}",
+            "kkt": f"{kkt:.1e}",
+            "sweeps": sweeps,
+        }
+        for name, objective, error, kkt, sweeps in columns
+    ]
+    residual = relative_residual(solution)
+    # One path carries all channels, so that their errors go together.
+    error = "" if errors is None else f" ± {errors.sum() / norm2.sum():.1g}"
+    total = {
+        "objective": f"{residual**2:.3g}{error}",
+        "rms": f"{residual:.3g}",
+        "kkt": f"{max(q.kkt_residual):.1e}",
+        "sweeps": max(q.sweeps),
+    }
+    return html("fit", channels=channels, total=total)
+
+
+def verification_table(verification: Verification | None) -> Markup:
+    """Return the differences of prediction and render, each beside its limit."""
+    if verification is None:
+        return facts([("Result", "not verified")])
+    v = verification
+    means_text = ", ".join(f"{value:+.2f}" for value in v.z_mean).replace("-", "−")
+    return facts(
+        [
+            ("Result", "agrees within noise" if v.agrees else "DISAGREES beyond noise"),
+            ("RMSE of the pixels", f"{v.rmse:.3g}; noise alone gives {v.noise_rmse:.3g}"),
+            ("z of the whole image", f"{means_text} (R, G, B); limit ±{v.limit:.3g}"),
+            ("z of the pattern", f"{v.z_pattern:+.2f}; limit {v.limit:.3g}".replace("-", "−")),
+            ("z of 8×8 blocks, RMS", f"{v.z_rms:.3f}; about 1 is noise"),
+            ("ΔE2000", f"mean {v.delta_e_mean:.2f}; 95 % of pixels below {v.delta_e_95:.2f}"),
+            *_light_tests(v),
+        ]
+    )
+
+
+def _light_tests(v: Verification) -> list[tuple[str, str]]:
+    """Return rows on the tests of each light: its largest z, and the chance of detecting an error
+    in each, the smallest first.
+    """
+    if not v.power:
+        return []
+    in_order = sorted(v.power.items(), key=lambda entry: entry[1])
+    powers = [f"{100 * power:.0f} % in {name}" for name, power in in_order]
+    rows = [(f"Chance of seeing an error of {100 * ERROR:.0f} %", some_of(powers, room=400))]
+    if v.z_lights:
+        name, z = max(v.z_lights.items(), key=lambda entry: abs(entry[1]))
+        limit = limit_of_tests(len(v.z_lights), once=v.limit)
+        farthest_text = f"{z:+.2f} in {name}, the largest of {len(v.z_lights)}; limit ±{limit:.3g}"
+        rows.insert(0, ("z of each light", farthest_text.replace("-", "−")))
+    return rows
+
+
+def render_table(
+    basis: Basis,
+    target: Target,
+    solution: Solution,
+    predicted: Estimate,
+    verification: Verification | None,
+) -> Markup:
+    """Return facts on the origin of the basis, and on pixels and lights that took no part."""
+    origin, q = basis.origin, solution.certificate
+    height, width = basis.size
+    convergence_text = f"no: stopped after {max(q.sweeps)} sweeps"
+    emitter_pixels = int(basis.emitters_seen.sum())
+    ignored_pixels = int(
+        ignored_paint(target, basis.emitters_seen, solution.problem.fit.emitters).sum()
+    )
+    adjusted = int((~basis.is_fixed).sum())
+    entries: list[tuple[str, str]] = [
+        ("Solve converged", "yes" if q.converged else convergence_text),
+        ("Lights", f"{adjusted}, of them {_lights_off(solution) or 'none'} off"),
+        ("Image", f"{width} × {height} pixels{_full_size(basis, verification)}"),
+        ("Basis", f"{origin.method}, {_samples(basis)}"),
+        ("Integrator", f"{origin.integrator}, not the scene's own" if origin.integrator else ""),
+        ("Observer", origin.observer),
+        ("Emitters seen directly", f"in {emitter_pixels} pixels{_seen_note(ignored_pixels)}"),
+    ]
+    missed, noise = relative_residual(solution), noise_residual(solution, predicted)
+    entries.append(("Missed (RMS)", f"{missed:.3g} of what was asked; noise adds {noise:.3g}"))
+    entries += _display_facts(solution, predicted)
+    for light in basis.lights:
+        if light.is_fixed:
+            entries.append(("Kept as they are", name_list(light.members)))
+    if q.unreached:
+        entries.append(("Reach nothing painted, so unchanged", name_list(q.unreached)))
+    for channels in partly_reached(solution.lighting):
+        entries.append(("Reach nothing painted in a channel", channels))
+    if target.not_finite:
+        entries.append(("NaN or Inf in the target", f"{target.not_finite} pixels, not counted"))
+    return facts([(label, value) for label, value in entries if value])
+
+
+def _display_facts(solution: Solution, predicted: Estimate) -> list[tuple[str, str]]:
+    """Return facts on the comparison with the painting, if it was not in plain linear light."""
+    if solution.problem.is_linear or solution.reweighting is None:
+        return []
+    q = solution.certificate
+    entries: list[tuple[str, str]] = []
+    if q.display:
+        entries += [
+            ("Fitted in display space", f"as {q.display} shows it"),
+            (
+                "Missed on the display",
+                f"{error_in_codes(solution):.1f} of 255 codes, {relative_residual(solution):.3g} "
+                f"of "
+                "the painting (RMS)",
+            ),
+            (
+                "Missed in linear light",
+                f"{linear_residual(solution, predicted):.3g} of the painting (RMS)",
+            ),
+        ]
+    if (at_least := count_at_least_pixels(solution, predicted.image)) is not None:
+        pixels, brighter = at_least
+        text = f"{pixels} pixels, {brighter} of which are brighter now"
+        entries.append(("Painted as at least so bright", text))
+    return [*entries, ("Linear problems solved", f"{q.rounds}, each certified")]
+
+
+def _samples(basis: Basis) -> str:
+    if not basis.knows_noise:
+        return "which says nothing of its samples and noise"
+    return f"{basis.origin.samples_text}, seed {basis.origin.seed}"
+
+
+def _full_size(basis: Basis, verification: Verification | None) -> str:
+    if verification is None or verification.verified.size == basis.size:
+        return ""
+    height, width = verification.verified.size
+    return f", verified at {width} × {height}"
+
+
+def versions(basis: Basis) -> str:
+    """Return the versions of lightpaint and the libraries under it, as installed here."""
+    parts = [f"lightpaint {__version__}"]
+    if basis.origin.lightpaint != __version__:
+        parts[0] += f" (basis by {basis.origin.lightpaint})"
+    parts += [
+        f"{name} {installed}"
+        for name in ("mitsuba", "drjit", "numpy")
+        if (installed := version(name))
+    ]
+    software = Software.installed()
+    parts.append(f"{software.blas} {software.kernel}".strip())
+    return " · ".join([*parts, f"Python {platform.python_version()}"])
+
+
+def _lights_off(solution: Solution) -> int:
+    return sum(not any(light.emission) for light in solution.lighting.lights)
+
+
+def _seen_note(ignored_pixels: int) -> str:
+    return f", of which {ignored_pixels} were painted and do not count" if ignored_pixels else ""

@@ -18,8 +18,7 @@ from lightpaint.errors import ImageError, SceneError
 from lightpaint.file_reading import file_length
 from lightpaint.files import one_line
 from lightpaint.images.formats import read_parts
-from lightpaint.luminaires.plugin_names import LUMINAIRE_PLUGINS
-from lightpaint.luminaires.web_file import read_web
+from lightpaint.luminaires import LUMINAIRE_PLUGINS, read_web
 
 #: Maximum size in bytes of a file that is read.
 MAX_ASSET = 2**32

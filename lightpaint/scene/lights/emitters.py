@@ -11,7 +11,7 @@ import numpy as np
 from lightpaint.arrays import RGB
 from lightpaint.colour import lambertian_flux, luminance, point_flux, spot_flux
 from lightpaint.errors import SceneError
-from lightpaint.luminaires.plugin_names import AREA_PLUGIN, LUMINAIRE_PLUGINS
+from lightpaint.luminaires import AREA_PLUGIN, LUMINAIRE_PLUGINS
 from lightpaint.scene.lights.texels.texel import Texel
 from lightpaint.scene.plane_identity import EmitterDigest, SceneHasher
 from lightpaint.scene.properties.emission import (

@@ -17,13 +17,20 @@ import numpy as np
 from lightpaint.arrays import Doubles, Position
 from lightpaint.display_text import some_names
 from lightpaint.errors import SceneError
-from lightpaint.luminaires.luminaire_request import LuminaireRequest
-from lightpaint.luminaires.plugin_names import AREA_PLUGIN, LUMINAIRE_PLUGINS, POINT_PLUGIN
+from lightpaint.luminaires import (
+    AREA_PLUGIN,
+    EMITTER_FROM_WEB,
+    LUMINAIRE_PLUGINS,
+    POINT_PLUGIN,
+    LuminaireRequest,
+    PhotometricWeb,
+    flux_remark,
+    hanging_frame,
+    spots_of,
+    unread_remark,
+    world_from_web,
+)
 from lightpaint.luminaires.registration import check_can_have_luminaires
-from lightpaint.luminaires.spot_sum import spots_of
-from lightpaint.luminaires.web import PhotometricWeb
-from lightpaint.luminaires.web_file import flux_remark, unread_remark
-from lightpaint.luminaires.web_frame import EMITTER_FROM_WEB, hanging_frame, world_from_web
 from lightpaint.scene.checks.tokens import tag
 from lightpaint.scene.properties.emission import child_named
 from lightpaint.scene.properties.pose import FLAT_SHAPES

@@ -19,8 +19,7 @@ from lightpaint.scene.lights.texels.image_domains import (
     Sky,
     domain_of,
 )
-from lightpaint.scene.lights.texels.texel import Texel, node_name
-from lightpaint.scene.lights.texels.texel_layout import RATIO, TexelLayout
+from lightpaint.scene.lights.texels.texel import RATIO, Texel, TexelLayout, node_name
 from lightpaint.scene.plane_identity import EmitterDigest
 from lightpaint.scene.properties.emission import (
     EmissionKind,

@@ -15,15 +15,9 @@ from lightpaint.display_text import known_keys
 from lightpaint.errors import SceneError
 from lightpaint.file_reading import read_text
 from lightpaint.files import one_line
-from lightpaint.luminaires.luminaire_request import (
-    LUMINAIRE_KEYS,
-    PHOTOMETRY,
-    LuminaireRequest,
-    luminaires_in,
-)
+from lightpaint.luminaires import LUMINAIRE_KEYS, PHOTOMETRY, LuminaireRequest, luminaires_in
 from lightpaint.scene.lights.texels.image_domains import GridSize
-from lightpaint.scene.lights.texels.texel import image_of, parse_size
-from lightpaint.scene.lights.texels.texel_layout import TexelLayout
+from lightpaint.scene.lights.texels.texel import TexelLayout, image_of, parse_size
 from lightpaint.storage.json_records import strict_toml
 from lightpaint.validation import BRIGHTEST, MAX_LISTED, MAX_NAME, is_number
 

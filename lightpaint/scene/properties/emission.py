@@ -9,7 +9,7 @@ import numpy as np
 
 from lightpaint.arrays import RGB, Floats
 from lightpaint.errors import SceneError
-from lightpaint.luminaires.plugin_names import FULL, LUMINAIRE_PLUGINS, POINT_PLUGIN
+from lightpaint.luminaires import FULL, LUMINAIRE_PLUGINS, POINT_PLUGIN
 
 #: The emission of an unchanged light if the unit is a multiple of that in the scene.
 AS_AUTHORED: RGB = (1.0, 1.0, 1.0)

@@ -15,7 +15,7 @@ from lightpaint.arrays import Doubles, Position
 from lightpaint.display_text import brief
 from lightpaint.errors import SceneError
 from lightpaint.keywords import keywords
-from lightpaint.luminaires.plugin_names import POINT_PLUGIN
+from lightpaint.luminaires import POINT_PLUGIN
 from lightpaint.scene.checks.tokens import tag
 from lightpaint.scene.properties.emission import ENVIRONMENTS
 from lightpaint.scene.properties.site import Site as Site

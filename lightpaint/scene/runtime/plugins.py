@@ -17,7 +17,7 @@ from typing import Any
 
 from lightpaint.errors import BackendError
 from lightpaint.files import one_line
-from lightpaint.luminaires.plugin_names import LUMINAIRE_PLUGINS
+from lightpaint.luminaires import LUMINAIRE_PLUGINS
 from lightpaint.luminaires.registration import check_can_have_luminaires
 from lightpaint.scene.checks.tokens import place_of_node
 

@@ -14,9 +14,9 @@ from renderer import (
 
 from lightpaint.basis.render.basis_render import render_basis
 from lightpaint.lighting.answer.combination import combine
-from lightpaint.relit.relight import relight
+from lightpaint.relit.relit_scene import relight
 from lightpaint.relit.verification_render import verify
-from lightpaint.scene.lights.texels.texel_layout import TexelLayout
+from lightpaint.scene.lights.texels.texel import TexelLayout
 from lightpaint.scene.scene import Scene
 from lightpaint.scene.scene_reader import load_scene, with_layout
 

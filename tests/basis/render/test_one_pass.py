@@ -27,7 +27,7 @@ from lightpaint.errors import SceneError
 from lightpaint.lighting.answer.lighting import Lighting
 from lightpaint.pipeline.job.remarks import remarks_of_scene
 from lightpaint.progress import silent
-from lightpaint.relit.relight import relight
+from lightpaint.relit.relit_scene import relight
 from lightpaint.scene.runtime.variant import use_variant
 from lightpaint.scene.scene import Scene
 from lightpaint.scene.scene_reader import load_scene

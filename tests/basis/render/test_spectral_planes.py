@@ -23,7 +23,7 @@ from lightpaint.errors import SceneError
 from lightpaint.lighting.answer.combination import combine
 from lightpaint.lighting.answer.lighting import Lighting
 from lightpaint.pipeline.job.remarks import remarks_of_scene
-from lightpaint.relit.relight import relight
+from lightpaint.relit.relit_scene import relight
 from lightpaint.relit.verification_render import verify
 from lightpaint.scene.properties.measuring_points import MeasuringPoints
 from lightpaint.scene.scene_reader import load_scene

@@ -24,8 +24,8 @@ from lightpaint.lighting.answer.lighting import Lighting
 from lightpaint.lighting.constraints.constraints_file import constraints_of
 from lightpaint.lighting.unknowns.lamp_parts import part_lamps
 from lightpaint.lighting.unknowns.reduction import lamps_by_name
-from lightpaint.relit.detection_power import LightShares, with_light_tests
-from lightpaint.relit.relight import relight
+from lightpaint.relit.relit_scene import relight
+from lightpaint.relit.verification import LightShares, with_light_tests
 from lightpaint.relit.verification_render import verify
 from lightpaint.scene.properties import observed_spectra
 from lightpaint.scene.runtime.variant import spectral_variant, use_variant

@@ -20,7 +20,7 @@ from lightpaint.errors import SceneError
 from lightpaint.lighting.answer.combination import combine
 from lightpaint.lighting.answer.lighting import Lighting
 from lightpaint.lighting.problem import Problem
-from lightpaint.relit.relight import relight
+from lightpaint.relit.relit_scene import relight
 from lightpaint.relit.verification_render import verify
 from lightpaint.scene.scene import Scene
 from lightpaint.scene.scene_reader import load_scene

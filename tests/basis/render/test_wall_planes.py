@@ -18,7 +18,7 @@ from renderer import (
 from lightpaint.basis.render.basis_render import render_basis
 from lightpaint.errors import SceneError
 from lightpaint.lighting.answer.combination import combine
-from lightpaint.relit.relight import relight
+from lightpaint.relit.relit_scene import relight
 from lightpaint.relit.verification_render import verify
 from lightpaint.scene.properties.emission import read_emitted_image
 from lightpaint.scene.scene import Scene

@@ -24,10 +24,9 @@ from lightpaint.lighting.analysis.noise.uncertainty import error_bars
 from lightpaint.lighting.answer.combination import combine
 from lightpaint.lighting.constraints.constraints import Constraints
 from lightpaint.lighting.solve import solve
-from lightpaint.report.verdict import headline
+from lightpaint.report.verdict_sentences import headline
 from lightpaint.scene.lights.texels.texel import texel_names
-from lightpaint.target.target import Target
-from lightpaint.target.wish import Wish
+from lightpaint.target.target import Target, Wish
 
 SIZE = (24, 48)
 

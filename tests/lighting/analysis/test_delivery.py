@@ -23,8 +23,7 @@ from lightpaint.lighting.analysis.appearance.delivery import (
 from lightpaint.lighting.analysis.appearance.wish_parts import wish_parts
 from lightpaint.lighting.constraints.constraints import Constraints
 from lightpaint.lighting.solve import solve
-from lightpaint.target.target import Target
-from lightpaint.target.wish import Wish
+from lightpaint.target.target import Target, Wish
 
 SIZE = (24, 48)
 WHOLE = np.ones(SIZE, np.float32)

@@ -12,8 +12,7 @@ from lightpaint.colour.display.view_transform import ViewTransform
 from lightpaint.lighting.analysis.diagnosis import diagnose
 from lightpaint.lighting.answer.combination import combine
 from lightpaint.lighting.solve import solve
-from lightpaint.target.target import Target
-from lightpaint.target.wish import Wish
+from lightpaint.target.target import Target, Wish
 
 SIZE = (12, 18)
 

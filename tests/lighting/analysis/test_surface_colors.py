@@ -25,7 +25,7 @@ from lightpaint.lighting.constraints.constraints import Constraints
 from lightpaint.lighting.solve import solve
 from lightpaint.report.page.rendering_section import rendering_section
 from lightpaint.scene.scene_reader import load_scene
-from lightpaint.scene.surface_spectra import render_reflectances
+from lightpaint.scene.surfaces import render_reflectances
 from lightpaint.target.target import Target
 
 SIZE = (4, 12)

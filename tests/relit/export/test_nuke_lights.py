@@ -20,7 +20,7 @@ from lightpaint.pipeline.results.answer_folder import with_places
 from lightpaint.relit.export.nuke import STRAIGHT, rotate_of
 from lightpaint.relit.exported_answer import Source
 from lightpaint.relit.formats import names_of_forms
-from lightpaint.relit.relight import scene_of
+from lightpaint.relit.relit_scene import scene_of
 from lightpaint.scene.lights.new_emitter import NewEmitter
 from lightpaint.scene.scene import Scene
 from lightpaint.scene.scene_reader import load_scene

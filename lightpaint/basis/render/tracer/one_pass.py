@@ -10,10 +10,14 @@ That is its plain mode, `trace_plainly`, which tests compare with Mitsuba. For a
 things better, at the same cost: it uses a low-discrepancy sequence instead of random numbers (see
 sobol.py), and a trained guide chooses the emitters (basis_render.py).
 
+Measuring points are surfaces, diffuse and white. These reflect the radiance E / π, so π times the
+radiance that leaves one is the irradiance. There the path tracer samples lights as elsewhere, also
+lights without a size, which Mitsuba's `irradiancemeter` does not see.
+
 Import this module after setting a Dr.Jit variant, since its array types do not exist before.
 """
 
-# mypy: disable-error-code="no-untyped-call"
+# mypy: disable-error-code="no-untyped-def, no-untyped-call"
 
 from collections.abc import Callable, Sequence
 from functools import partial
@@ -24,22 +28,21 @@ import mitsuba as mi
 import numpy as np
 
 from lightpaint.arrays import Floats, Indices, aligned
-from lightpaint.basis.render.integrators import (
-    depth_limit,
-    has_indirect_planes,
-    needs_a_bounce,
-)
+from lightpaint.basis.render.integrators import depth_limit, has_indirect_planes, needs_a_bounce
 from lightpaint.basis.render.tracer.emitter_guide import EmitterGuide
-from lightpaint.basis.render.tracer.light_planes import LightPlanes, lights_by_instance
+from lightpaint.basis.render.tracer.light_planes import (
+    ColorTables,
+    LightPlanes,
+    SpectralPlanes,
+    lights_by_instance,
+    packets_of,
+)
 from lightpaint.basis.render.tracer.path_tracer import Rules, View, trace_paths, trace_samples
-from lightpaint.basis.render.tracer.point_surfaces import PointSurfaces
 from lightpaint.basis.render.tracer.sobol import SobolPairs
-from lightpaint.basis.render.tracer.spectral_planes import ColorTables, SpectralPlanes, packets_of
 from lightpaint.basis.render.tracer.texel_table import TexelTable
 from lightpaint.basis.render.tracer.wavelengths import RgbPaths, SpectralPaths
+from lightpaint.scene import MeasuringPoints, Scene, Stream, pass_seed
 from lightpaint.scene.runtime.kernel_threads import kernels
-from lightpaint.scene.scene import Scene
-from lightpaint.scene.scene_render import Stream, pass_seed
 
 #: Number of emitter samples at the first vertex, and at later ones: keys are exclusive upper bounds
 #: of the number of emitters.
@@ -52,6 +55,33 @@ TILE = 4
 
 #: Indices of number streams; lower ones are the halves of the uniform samples.
 TRAINING_STREAM, FIRST_TOP_UP_STREAM = 2, 3
+
+
+class PointSurfaces:
+    """Measuring points on the device. bsdf: the material of their surfaces."""
+
+    def __init__(self, points: MeasuringPoints) -> None:
+        self._positions, self._normals = (
+            mi.Float(aligned(x.ravel(), np.float32)) for x in (points.positions, points.normals)
+        )
+        self._is_cylindrical = mi.UInt32(aligned(points.is_cylindrical, np.uint32))
+        white = {"type": "rgb", "value": [1.0, 1.0, 1.0]}
+        self.bsdf = mi.load_dict({"type": "diffuse", "reflectance": white})
+
+    def at(self, index, number):
+        """Return the surface interaction at each point, seen along its normal.
+
+        number: in [0, 1), chooses the direction in which cylindrical irradiance is measured.
+        """
+        si = dr.zeros(mi.SurfaceInteraction3f)
+        si.p = dr.gather(mi.Point3f, self._positions, index)
+        normal = dr.gather(mi.Normal3f, self._normals, index)
+        sin, cos = dr.sincos(dr.two_pi * number)
+        around = mi.Normal3f(mi.Frame3f(normal).to_world(mi.Vector3f(cos, sin, 0)))
+        si.n = dr.select(dr.gather(mi.UInt32, self._is_cylindrical, index) != 0, around, normal)
+        si.sh_frame = mi.Frame3f(si.n)
+        si.wi = mi.Vector3f(0, 0, 1)
+        return si
 
 
 class Tracer:

@@ -16,11 +16,8 @@ import mitsuba as mi
 import numpy as np
 
 from lightpaint.arrays import Floats
-from lightpaint.scene.lights.emitters import Emitter
-from lightpaint.scene.lights.image_split import even_image
-from lightpaint.scene.lights.texels.image_domains import FlatDomain, ImageDomain, Sky
-from lightpaint.scene.lights.texels.texel_layout import RATIO, TexelLayout
-from lightpaint.scene.scene import Scene
+from lightpaint.scene import Emitter, Scene, even_image
+from lightpaint.scene.lights.texels import RATIO, FlatDomain, ImageDomain, Sky, TexelLayout
 
 #: Number of a texel where there is none.
 NO_TEXELS = np.uint32(2**32 - 1)

@@ -13,8 +13,7 @@ import numpy as np
 import numpy.typing as npt
 
 from lightpaint.arrays import Bools, Doubles, Floats, Indices
-from lightpaint.basis.basis import Basis
-from lightpaint.basis.planes import thinned
+from lightpaint.basis import Basis, thinned
 from lightpaint.colour import LUMINANCE, luminance
 from lightpaint.images import Objects
 from lightpaint.lighting.analysis.appearance.error_place import NO_NAME, object_with_most

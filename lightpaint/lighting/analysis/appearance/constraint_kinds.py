@@ -4,8 +4,7 @@ from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import Any, Literal
 
-from lightpaint.basis.light_images import light_images
-from lightpaint.basis.lights import BasisLight
+from lightpaint.basis import BasisLight, light_images
 from lightpaint.lighting.constraints.constraints import COLOR_KEYS, Constraints
 from lightpaint.lighting.constraints.light_patterns import tables_by_light, tied_lights
 from lightpaint.sentences import SourceKey

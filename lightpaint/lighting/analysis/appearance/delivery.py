@@ -30,8 +30,7 @@ from lightpaint.lighting.analysis.appearance.washes import AreaWashes, Washes
 from lightpaint.lighting.analysis.appearance.wish_parts import WishKind, WishPart, wish_parts
 from lightpaint.lighting.display import display_transform
 from lightpaint.lighting.solution import Solution
-from lightpaint.target.target import Target
-from lightpaint.target.wish_finding import find_wishes
+from lightpaint.target import Target, find_wishes
 
 #: ΔE of a visible change: if a wish changes brightness by less, it asks for none.
 MIN_ASKED = 2.0

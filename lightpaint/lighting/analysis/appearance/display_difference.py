@@ -8,7 +8,7 @@ import numpy as np
 import numpy.typing as npt
 
 from lightpaint.arrays import Bools, Doubles, Floats
-from lightpaint.basis.planes import Planes
+from lightpaint.basis import Planes
 from lightpaint.colour import ViewTransform, ciede2000, lab
 from lightpaint.lighting.display import display_light, display_transform
 from lightpaint.lighting.loss.painting import at_least_mask, target_light

@@ -6,8 +6,7 @@ from collections import Counter
 import numpy as np
 
 from lightpaint.arrays import Doubles, Indices, as_rgb
-from lightpaint.basis.light_images import light_images
-from lightpaint.basis.planes import thinned
+from lightpaint.basis import light_images, thinned
 from lightpaint.colour import LUMINANCE, ciede2000, luminance
 from lightpaint.images import Objects
 from lightpaint.lighting.analysis.appearance.display_difference import PaintComparison

@@ -9,8 +9,7 @@ import numpy as np
 import numpy.typing as npt
 
 from lightpaint.arrays import Doubles, Floats
-from lightpaint.basis.basis import Basis
-from lightpaint.basis.derived_planes import block_means
+from lightpaint.basis import Basis, block_means
 from lightpaint.images import Estimate, block_mean, block_sums, whole_factor
 from lightpaint.lighting.analysis.appearance.constraint_kinds import (
     ALL_LIGHTS_KINDS,
@@ -25,8 +24,7 @@ from lightpaint.lighting.loss.painting import importance_sums, unpainted_weight
 from lightpaint.lighting.problem import Problem
 from lightpaint.lighting.solution import Solution
 from lightpaint.lighting.solve import solution_of
-from lightpaint.target.target import Target
-from lightpaint.target.wish_finding import find_wishes
+from lightpaint.target import Target, find_wishes
 
 #: Lights beyond which their colours are not tried as a reason.
 MAX_COLORED_LIGHTS = 300

@@ -5,7 +5,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from lightpaint.arrays import Bools, Doubles, Floats, Indices
-from lightpaint.basis.basis import Basis
+from lightpaint.basis import Basis
 from lightpaint.colour import ciede2000
 from lightpaint.lighting.analysis.appearance.constraint_kinds import (
     ConstraintKind,

@@ -10,7 +10,7 @@ import numpy as np
 from lightpaint.arrays import Floats
 from lightpaint.images import Objects
 from lightpaint.lighting.analysis.appearance.error_place import object_with_most
-from lightpaint.target.wish import Wish
+from lightpaint.target import Wish
 
 #: A group of layers, a layer, or a part of a layer or of a painting without layers.
 WishKind = Literal["wish", "layer", "group"]

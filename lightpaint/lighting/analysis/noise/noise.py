@@ -18,7 +18,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from lightpaint.arrays import Bools, Doubles, Floats, Indices
-from lightpaint.basis.planes import BLOCK_PIXELS, FEW_LIGHTS, Planes, as_slice, block_of
+from lightpaint.basis import BLOCK_PIXELS, FEW_LIGHTS, Planes, as_slice, block_of
 from lightpaint.lighting.algebra.eigenvectors import SMALL_MATRIX, eigenvectors, excess_above
 from lightpaint.lighting.algebra.lapack import large_libraries
 from lightpaint.lighting.analysis.noise.dominant_pixels import Peaks, t_ratios

@@ -17,8 +17,7 @@ from weakref import WeakKeyDictionary
 import numpy as np
 
 from lightpaint.arrays import Doubles, Floats
-from lightpaint.basis.basis import Basis
-from lightpaint.basis.planes import Planes, as_planes
+from lightpaint.basis import Basis, Planes, as_planes
 from lightpaint.errors import BasisError, LightpaintError
 from lightpaint.images import SurfaceFilter, box_mean
 from lightpaint.keywords import keywords

@@ -12,7 +12,7 @@ from dataclasses import replace
 import numpy as np
 
 from lightpaint.arrays import Doubles, Floats
-from lightpaint.basis.planes import BLOCK_PIXELS
+from lightpaint.basis import BLOCK_PIXELS
 from lightpaint.errors import BasisError, SizeError
 from lightpaint.images import Estimate
 from lightpaint.keywords import keywords

@@ -13,7 +13,7 @@ from itertools import product
 import numpy as np
 
 from lightpaint.arrays import Bools, Doubles, Indices
-from lightpaint.basis.planes import BLOCK_PIXELS
+from lightpaint.basis import BLOCK_PIXELS
 from lightpaint.lighting.analysis.noise.noise import NoisyPixels
 from lightpaint.lighting.analysis.noise.weight_directions import gradient_response
 from lightpaint.lighting.solution import Solution

@@ -17,7 +17,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from lightpaint.arrays import RGB, Bools, Doubles, Floats, as_rgb, release_freed_memory
-from lightpaint.basis.planes import BLOCK_PIXELS, FEW_LIGHTS
+from lightpaint.basis import BLOCK_PIXELS, FEW_LIGHTS
 from lightpaint.colour import LUMINANCE
 from lightpaint.display_text import short_repr
 from lightpaint.keywords import keywords

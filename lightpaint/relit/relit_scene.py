@@ -20,16 +20,11 @@ from lightpaint.files import write_bytes
 from lightpaint.images.formats import write_rgb
 from lightpaint.keywords import keywords
 from lightpaint.lighting.answer.lighting import Lighting
-from lightpaint.relit.luminaire_xml import written_emission
+from lightpaint.relit.emission_xml import written_emission
 from lightpaint.relit.relit_files import relit_files, settings_of
+from lightpaint.scene import Scaling, Scene, load_scene, new_emitter_at, pose_of, with_split
 from lightpaint.scene.checks.tokens import tag
-from lightpaint.scene.lights.image_split import with_split
-from lightpaint.scene.lights.new_emitter import new_emitter_at
-from lightpaint.scene.lights.texels.texel import image_of, layouts_of
-from lightpaint.scene.properties.emission import Scaling
-from lightpaint.scene.properties.pose import pose_of
-from lightpaint.scene.scene import Scene
-from lightpaint.scene.scene_reader import load_scene
+from lightpaint.scene.lights.texels import image_of, layouts_of
 
 #: A parameter in Mitsuba's list of unused ones.
 UNUSED_PARAMETER = re.compile(r"- \$(\w+)=")

@@ -11,8 +11,7 @@ import numpy.typing as npt
 from PIL import Image, ImageDraw, ImageFont
 
 from lightpaint.arrays import Doubles, Floats, Position
-from lightpaint.basis.basis import Basis
-from lightpaint.basis.light_images import LightImage, light_images
+from lightpaint.basis import Basis, LightImage, light_images
 from lightpaint.colour import encode_display, to_8_bit
 from lightpaint.display_text import visible
 from lightpaint.images import block_mean, denoised

@@ -8,9 +8,16 @@ from typing import Protocol
 import numpy as np
 
 from lightpaint.arrays import Bools, Doubles, Indices
-from lightpaint.scene.lights.texels.image_domains import DOMAINS, GridSize, ImageDomain, domain_of
-from lightpaint.scene.lights.texels.texel import image_of, layouts_of, node_name
-from lightpaint.scene.lights.texels.texel_layout import TexelLayout
+from lightpaint.scene.lights.texels import (
+    DOMAINS,
+    GridSize,
+    ImageDomain,
+    TexelLayout,
+    domain_of,
+    image_of,
+    layouts_of,
+    node_name,
+)
 
 #: The middle of a phrase for several texels of an image.
 TEXELS = " texels of "

@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from lightpaint.basis.light_images import TEXELS, is_of_texels, joined_texels
+from lightpaint.basis import TEXELS, is_of_texels, joined_texels
 from lightpaint.colour import luminance
 from lightpaint.display_text import some_names
 from lightpaint.images import Estimate
@@ -18,9 +18,8 @@ from lightpaint.lighting.analysis.appearance.limiting_reasons import Reason
 from lightpaint.lighting.analysis.appearance.pixel_sample import LimitGroup
 from lightpaint.lighting.analysis.noise.uncertainty import error_bars
 from lightpaint.lighting.solution import Solution
-from lightpaint.relit.detection_power import ERROR
-from lightpaint.relit.verification import Verification
-from lightpaint.report.delivery_sentences import (
+from lightpaint.relit.verification import ERROR, Verification
+from lightpaint.report.diagnosis_sentences import (
     ALONE_ADVICE,
     REACH_ADVICE,
     SAMPLES_ADVICE,
@@ -41,7 +40,7 @@ from lightpaint.report.phrases import (
     spoken_progress,
     spoken_where,
 )
-from lightpaint.scene.lights.texels.texel import image_of
+from lightpaint.scene.lights.texels import image_of
 
 #: Maximum number of barely visible lights that a sentence names.
 MAX_UNSEEN_NAMES = 2
