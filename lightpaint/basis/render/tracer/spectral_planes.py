@@ -67,9 +67,12 @@ class SpectralPlanes(LightPlanes):
         *,
         tables: ColorTables,
         is_split: bool = False,
+        is_in_blocks: bool = True,
         start: Floats | None = None,
     ) -> None:
-        super().__init__(light_of, lights, size, is_split=is_split, start=start)
+        super().__init__(
+            light_of, lights, size, is_split=is_split, is_in_blocks=is_in_blocks, start=start
+        )
         self._tables = tables
 
     @dr.syntax
