@@ -16,8 +16,10 @@ from lightpaint.pipeline.results.answer_folder import answer_files
 from lightpaint.pipeline.results.result_folder import ResultFolder, files_of_planes
 from lightpaint.pipeline.wished_planes import (
     MeasuredPlanes,
-    constraints_for_planes,
+    check_reached,
+    constraints_and_unscaled,
     measure_planes,
+    no_glare_remark,
     with_glare,
 )
 from lightpaint.progress import Progress, listener, silent
@@ -62,12 +64,16 @@ def plan_lighting(
         SceneError: For an invalid planes file.
     """
     settings, listen = settings or Settings(), listener(progress)
-    every = constraints_for_planes(scene, constraints or Constraints(), settings)
+    every, unscaled = constraints_and_unscaled(scene, constraints or Constraints(), settings)
     lights = basis_lights(scene)
     reduction = reduce_to(every, lights)
     check_powers(reduction, [light.name for light in lights], "the least power")
     measured = measure_planes(scene, planes, settings, every.cd_per_unit, listen)
-    measured = with_glare(measured, scene, settings, listen)
+    check_reached(measured.illuminance, unscaled)
+    if unscaled:
+        listen.say(no_glare_remark(unscaled))
+    else:
+        measured = with_glare(measured, scene, settings, listen)
     return plan_of(measured, reduction, scene_identity=scene.identity)
 
 

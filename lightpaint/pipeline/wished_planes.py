@@ -1,17 +1,22 @@
 """Planes on which a job wishes for illuminance: measured before the solve, and read after it."""
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
 
 from lightpaint.arrays import Doubles
-from lightpaint.basis import Lights
+from lightpaint.basis import BasisLight, Lights
 from lightpaint.basis.render import basis_lights
 from lightpaint.display_text import some_names
 from lightpaint.lighting.analysis.appearance.display_difference import PaintComparison
-from lightpaint.lighting.constraints.absolute_scale import with_sure_scale
+from lightpaint.lighting.constraints.absolute_scale import (
+    unscaled_error,
+    unscaled_lights,
+    with_scale,
+    with_sure_scale,
+)
 from lightpaint.lighting.constraints.constraints import Constraints
 from lightpaint.lighting.constraints.constraints_file import constraints_of
 from lightpaint.lighting.problem import Problem
@@ -126,6 +131,31 @@ def with_glare(
     return replace(planes, glare=glare)
 
 
+def check_reached(
+    measured: Illuminance, unscaled: Sequence[BasisLight], weights: Doubles | None = None
+) -> None:
+    """Raise ConstraintError if a light without a scale reaches a plane.
+
+    unscaled: lights whose brightness is a guess. weights: of the lights, (n, 3); by default any.
+    """
+    for light in unscaled:
+        k = measured.lights.names.index(light.name)
+        light_at = (
+            measured.matrix[:, k] @ np.ones(3)
+            if weights is None
+            else (measured.matrix[:, k] @ weights[k])
+        )
+        for plane in measured.planes:
+            if light_at[measured.points_of(plane.name)].any():
+                raise unscaled_error(light, plane.name)
+
+
+def no_glare_remark(unscaled: Sequence[BasisLight]) -> str:
+    """Return why glare is not rated beside lights without a scale, which observers may see."""
+    names = some_names(light.name for light in unscaled)
+    return f"glare is not rated: {names} may be seen, and nothing says how bright that is in cd/m²"
+
+
 def limited_power(watts: float, lights: Lights) -> MeasuredPlanes:
     """Return no planes, and a limit of the power of all lamps."""
     nothing = np.zeros((0, len(lights), 3))
@@ -137,9 +167,22 @@ def constraints_for_planes(
     scene: Scene, constraints: Constraints, settings: Settings
 ) -> Constraints:
     """Return all constraints on the lights of a scene, with what a radiance of 1 stands for."""
+    return with_sure_scale(_every(scene, constraints, settings), basis_lights(scene))
+
+
+def constraints_and_unscaled(
+    scene: Scene, constraints: Constraints, settings: Settings
+) -> tuple[Constraints, tuple[BasisLight, ...]]:
+    """Return constraints as `constraints_for_planes`, and the lights whose brightness is a guess,
+    which `check_reached` allows where they reach no plane.
+    """
+    every, lights = _every(scene, constraints, settings), basis_lights(scene)
+    return with_scale(every, lights), unscaled_lights(every, lights)
+
+
+def _every(scene: Scene, constraints: Constraints, settings: Settings) -> Constraints:
     every = constraints_of(scene.requests).and_then(constraints)
-    every = every.and_then(Constraints(cd_per_unit=settings.cd_per_unit))
-    return with_sure_scale(every, basis_lights(scene))
+    return every.and_then(Constraints(cd_per_unit=settings.cd_per_unit))
 
 
 def check_planes(

@@ -12,6 +12,7 @@ from lightpaint.arrays import Floats, Position
 from lightpaint.basis import BasisLight
 from lightpaint.display_text import some_names, with_similar_name
 from lightpaint.errors import NoPlaceError, SceneError
+from lightpaint.luminaires import LUMINAIRE_PLUGINS
 from lightpaint.placement.free_space import as_position
 from lightpaint.placement.freedom import Freedom, FreeLight, places_of
 from lightpaint.placement.new_lights import NEW_CONE, Mirror, MirroredPair, NewLights
@@ -194,6 +195,11 @@ def why_not_searched(light: Light) -> str:
         return ""
     if light.plugin == "area" and light.unit != MULTIPLE:
         return "is an area light, and only rectangles and disks can move"
+    if light.plugin in LUMINAIRE_PLUGINS:
+        return (
+            "is a luminaire, which stays where it hangs (search with its photometry left out of "
+            "the lights file, or a spot in its stead, and hang it at the place that is found)"
+        )
     if light.plugin not in SEARCHED and light.plugin != "area":
         return f"is of the kind {light.plugin}, and only {', '.join(SEARCHED)} and panels can move"
     if light.unit == MULTIPLE:

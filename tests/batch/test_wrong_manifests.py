@@ -32,6 +32,10 @@ WRONG: dict[str, tuple[str, tuple[str, ...]]] = {
     ),
     "an unknown key": (FIRST + "masc = 'a'\n", ("look 'one'", "'masc'", "mean 'mask'")),
     "a painting that is a number": (HEAD + "[[look]]\npainting = 3\n", ("painting is 3",)),
+    "a camera without spectra": (
+        FIRST + 'settings = { observer = "alexa" }\n',
+        ("look 'one', settings: ", "also pass settings.spectral = true"),
+    ),
     "an empty name": (HEAD + LOOK_PARAMETER + 'name = ""\n', ("look 'p0.exr'", "name is ''")),
     "nothing to show": (HEAD + '[[look]]\nname = "a"\n', ("look 'a'", "nothing to show")),
     "painting and lighting": (

@@ -10,6 +10,7 @@ import pytest
 from command import run, run_refused, succeed
 from lit_planes import BULB, DISC, floor, write_scene
 from PIL import Image
+from webs import cosine, ies_text, write_web
 
 from lightpaint.lighting.answer.lighting import Lighting, LightSetting
 from lightpaint.lighting.answer.lighting_file import write_lighting
@@ -37,6 +38,26 @@ def folder(tmp_path: Path) -> Path:
 def mean_of(folder: Path, plane: str = "spots") -> float:
     document = json.loads((folder / "measured" / "planes.json").read_text("utf-8"))
     return float(document["planes"][plane]["mean"])
+
+
+BELOW = """<emitter type="point" id="below"><point name="position" x="0" y="-2" z="0"/>
+    <rgb name="intensity" value="100"/></emitter>"""
+
+
+def test_lights_without_a_scale_may_reach_no_plane(folder: Path) -> None:
+    write_web(folder / "lamp.ies", ies_text(cosine))
+    toml = '[light.bulb]\nphotometry = "lamp.ies"\n'
+    (folder / "lit.lights.toml").write_text(toml, encoding="utf-8")
+    write_scene(folder, BULB + floor(8) + BELOW, max_depth=2)
+    succeed(folder, "measure", "lit.xml")
+    write_scene(folder, BULB + floor(8) + BELOW + DISC, max_depth=2)
+    refused = run(folder, "measure", "lit.xml", "-o", "refused")
+    assert refused.returncode == 2
+    assert not (folder / "refused").exists()
+    error = refused.stderr.splitlines()[-1]  # after the remarks of the measurement
+    assert "'disc', which reaches desk, is in W/(m² sr), beside luminaires" in error
+    assert "--unit 1" in error
+    succeed(folder, "measure", "lit.xml", "--force", "--unit", "1")
 
 
 def test_a_table_and_files(folder: Path) -> None:

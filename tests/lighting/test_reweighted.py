@@ -209,6 +209,18 @@ def test_saturated_paint_does_not_dim_the_lights(make_basis: Any):
     np.testing.assert_allclose(weights, truth, atol=3 * half / np.sqrt(3 * 400) / 0.2)
 
 
+@pytest.mark.parametrize("seed", [4, 5])
+def test_white_paint_everywhere_ends(make_basis: Any, seed: int):
+    """No light is too much for it, so each step to more promises a little, however long."""
+    images = np.random.default_rng(seed).random((10, 12, 16, 3)) ** 8
+    basis = make_basis(images=images, emission=np.ones((10, 3)))
+    target = Target("t", np.full((12, 16, 3), 30.0, np.float32), np.ones((12, 16), np.float32))
+    solution = solve(basis, target, space="display", transform=SRGB, colors="gentle")
+    assert solution.certificate.converged
+    shown = SRGB.encode(combine(basis, solution.lighting).image)
+    assert np.round(255 * shown).min() == 255
+
+
 def test_only_a_lower_end_is_black(make_basis: Any):
     """All paint at the top: anything above will do, and the answer meets it."""
     basis = make_basis(3, SIZE)

@@ -21,6 +21,7 @@ from radiance import illuminance_of_panel
 
 from lightpaint.basis.render import render_budget
 from lightpaint.basis.render.basis_render import render_basis
+from lightpaint.basis.render.render_budget import BLOCK_SPP
 from lightpaint.colour.color import LUMINANCE
 from lightpaint.errors import SceneError
 from lightpaint.photometry.illuminance import Illuminance
@@ -30,6 +31,9 @@ from lightpaint.scene.properties.pose import Pose
 from lightpaint.scene.scene import Scene
 
 POINTS = [(0, 0, 0), (0.8, 0, 0), (-0.5, 0, 1.1), (0.2, 0.7, -0.4)]
+
+#: Points all over a cube.
+SPREAD = np.stack(np.meshgrid(*[(-1.5, -0.5, 0.5, 1.5)] * 3), axis=-1).reshape(-1, 3)
 
 #: Standard errors of a mean of many samples, and float32 sums of them.
 SURE, ROUNDING = 4.0, 1e-4
@@ -53,6 +57,34 @@ def test_a_point_light_has_the_cosine_law(tmp_path: Path) -> None:
     distance = np.linalg.norm(away, axis=1)
     expected = 2.0 * 100 * away[:, 1] / distance**3
     np.testing.assert_allclose(lux(found, "bulb"), expected, rtol=ROUNDING)
+
+
+def test_many_samples_are_summed_without_loss(tmp_path: Path) -> None:
+    """Each of 2^17 samples of a half adds the same light, in eight parts, that a float32 sum of all
+    of them rounds to up to 3 % more or less.
+    """
+    found = measured(lit_scene(tmp_path, BULB, max_depth=2), plane_of(POINTS), spp=2**18)
+    away = (0, 2, 0) - np.array(POINTS, float)
+    expected = 100 * away[:, 1] / np.linalg.norm(away, axis=1) ** 3
+    # The largest rounding of a part in a sum of as many as a block has.
+    assert np.abs(lux(found, "bulb") / expected - 1).max() < 8 * BLOCK_SPP * 2**-25
+    assert np.abs(found.noise).max() < 8 * BLOCK_SPP * 2**-25 * expected.max()
+
+
+@pytest.mark.nightly
+def test_four_times_the_samples_have_a_quarter_of_the_variance(tmp_path: Path) -> None:
+    """Up to the most samples, measurements of a furnace differ like 1/√n, from the same mean."""
+    scene, plane = lit_scene(tmp_path, FURNACE, max_depth=-1), plane_of(SPREAD)
+    variances, means, errors = [], [], []
+    for spp in (2**12, 2**15, 2**18):
+        a, b = (lux(measured(scene, plane, spp=spp, seed=seed), "furnace") for seed in (1, 2))
+        variance = np.mean((a - b) ** 2) / 2
+        variances.append(spp * variance)
+        means.append(np.mean([a, b]))
+        errors.append(np.sqrt(variance / (2 * a.size)))
+    # The variance of a variance of 64 values is 2/64 of its square.
+    assert max(variances) < min(variances) * (1 + SURE * np.sqrt(2 / 64)) ** 2
+    assert (np.abs(np.subtract(means, means[-1])) <= SURE * np.hypot(errors, errors[-1])).all()
 
 
 def test_the_sun_is_measured_at_its_angle_and_not_from_behind(tmp_path: Path) -> None:

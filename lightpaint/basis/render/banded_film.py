@@ -2,8 +2,9 @@
 and the memory that a render needs.
 
 The samples of a pixel are added in the same order whichever rows are traced together, so a film
-traced in bands has the same bits as one traced whole. In bands, the sums lie in a temporary file,
-memory holds one band at a time, and planes are computed from the sums on request.
+traced in bands has the same bits as one traced whole, up to `BLOCK_SPP` samples. In bands, the sums
+lie in a temporary file, memory holds one band at a time, and planes are computed from the sums on
+request.
 """
 
 import tempfile
@@ -18,12 +19,14 @@ from lightpaint.basis.basis import Basis
 from lightpaint.basis.file.file_planes import RowPlanes, TemporaryArray
 from lightpaint.basis.render.integrators import has_indirect_planes, plane_count
 from lightpaint.basis.render.one_pass_basis import mean_and_half_difference
+from lightpaint.basis.render.render_budget import BLOCK_SPP
 from lightpaint.basis.render.render_origin import ONE_PASS, method_of
 from lightpaint.errors import SceneError
 from lightpaint.scene import SAMPLES_PER_PASS, Scene
 from lightpaint.sentences import Hint
 
 if TYPE_CHECKING:
+    from lightpaint.basis.render.tracer.light_planes import LightPlanes
     from lightpaint.basis.render.tracer.one_pass import Tracer
 
 
@@ -38,6 +41,14 @@ def _is_banded(scene: Scene) -> bool:
     """Return whether a one-pass render of `scene` keeps its sums in a file."""
     height, width = scene.size
     return 2 * 12 * plane_count(scene) * height * width > WHOLE_MAX_BYTES
+
+
+def sums_in_blocks(scene: Scene) -> bool:
+    """Return whether a one-pass render of `scene` sums samples in blocks (see `LightPlanes`).
+
+    A film in bands has one sum for all samples, of which it would take days to trace too many.
+    """
+    return not _is_banded(scene)
 
 
 class FilmSums(ABC):
@@ -97,7 +108,14 @@ class WholeFilm(FilmSums):
     ) -> None:
         super().__init__(tracer, begun, tracer.scene.size[0])
         start_sums = (None, None) if start is None else start
-        self._halves = [tracer.planes(self._bands[0], sums) for sums in start_sums]
+        self._halves = [self._planes(self._bands[0], sums) for sums in start_sums]
+        if begun >= BLOCK_SPP:
+            for planes in self._halves:
+                planes.end_block()
+
+    def _planes(self, rows: range, start: Floats | None = None) -> "LightPlanes":
+        is_in_blocks = sums_in_blocks(self._tracer.scene)
+        return self._tracer.planes(rows, start, is_in_blocks=is_in_blocks)
 
     def _trace(self, half: int, rows: range, first: int, spp: int) -> None:
         self._tracer.add(self._halves[half], half, rows, first, spp)
@@ -111,7 +129,7 @@ class WholeFilm(FilmSums):
         for half, planes in enumerate(self._halves):
             sums.append(planes.sums(shares_memory=is_last))
             if is_last:  # halves the peak memory
-                self._halves[half] = self._tracer.planes(range(0))
+                self._halves[half] = self._planes(range(0))
         return sums
 
 
@@ -133,7 +151,8 @@ class BandedFilm(FilmSums):
                 self.sums.write(half, rows, earlier_sums[:, rows.start : rows.stop])
 
     def _trace(self, half: int, rows: range, first: int, spp: int) -> None:
-        planes = self._tracer.planes(rows, self.sums.read(half, rows))
+        start = self.sums.read(half, rows)
+        planes = self._tracer.planes(rows, start, is_in_blocks=False)
         self._tracer.add(planes, half, rows, first, spp)
         self._seen[rows.start : rows.stop] |= planes.seen() > 0
         self.sums.write(half, rows, planes.sums(shares_memory=True))

@@ -78,7 +78,8 @@ def render_basis(
         seed: Any number >= 0; different seeds give independent bases.
         start: An earlier basis of the same scene, sensor and seed. Its samples count, so only those
             missing to `spp` are rendered, or as many more as `time_s` allows. If it has `sums`, the
-            result has the bits of a single render, else it differs by round-off.
+            result has the bits of a single render, up to 2,048 samples per pixel, else it differs
+            by round-off.
         keep: Called with the basis so far, including its `sums`, from time to time and when Ctrl-C
             ends the work early. Returns whether it was stored.
         is_final: False for a basis to which more samples will be added: it keeps its `sums`.

@@ -21,6 +21,11 @@ KEEP_EVERY_S = 30.0
 #: whole passes, and Ctrl-C has to wait for the end of one.
 PASS_DIVISOR = 4
 
+#: Samples of a pixel and half whose light is summed before it is added to that of earlier ones. A
+#: float32 sum of n samples rounds to n 2⁻²⁴ of their mean, and a path adds its light in many small
+#: parts: of 2¹⁷ samples, several percent of some lights would be lost.
+BLOCK_SPP = 2**10
+
 #: A render that may stop early takes at least this share of its samples and this many per pixel,
 #: since the noise of fewer is poorly known, and then looks after each further eighth.
 LEAST_SHARE, LEAST_SPP, STEP_SHARE = 1 / 4, 8, 1 / 8

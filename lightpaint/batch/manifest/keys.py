@@ -329,7 +329,7 @@ class Mistakes:
     def add(self, label: str, text: str) -> None:
         """Add an error. label: the look and the key; "" for the manifest as a whole."""
         prefix = f"{self.source}: {label}{': ' if label else ''}"
-        line = one_line(Sentence(prefix, text), limit=1000)
+        line = one_line(Sentence(prefix, text).spelled(as_key), limit=1000)
         if line not in self.lines:
             self.lines.append(line)
 

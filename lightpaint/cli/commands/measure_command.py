@@ -7,6 +7,7 @@ from typing import Any
 import numpy as np
 
 from lightpaint.arrays import RGB, Doubles
+from lightpaint.basis import BasisLight
 from lightpaint.basis.render import basis_lights
 from lightpaint.cli.commands.answer_text import show_glare
 from lightpaint.cli.output import terminal
@@ -14,7 +15,8 @@ from lightpaint.cli.output.lines import CommandOutcome
 from lightpaint.errors import OutputError, SceneError
 from lightpaint.files import check_files, check_writable
 from lightpaint.lighting.answer.lighting_file import read_lighting
-from lightpaint.lighting.constraints.absolute_scale import with_sure_scale
+from lightpaint.lighting.constraints.absolute_scale import with_scale
+from lightpaint.lighting.constraints.constraints import Constraints
 from lightpaint.lighting.constraints.constraints_file import constraints_of
 from lightpaint.photometry.illuminance import Illuminance
 from lightpaint.photometry.measure import measure_illuminance
@@ -31,6 +33,11 @@ from lightpaint.photometry.readings_file import (
 from lightpaint.photometry.wish_presets import PRESETS
 from lightpaint.pipeline.job.settings import Settings
 from lightpaint.pipeline.job.sources import SceneFile
+from lightpaint.pipeline.wished_planes import (
+    check_reached,
+    constraints_and_unscaled,
+    no_glare_remark,
+)
 from lightpaint.progress import stage
 from lightpaint.relit import scene_of
 from lightpaint.report import glare_sentences
@@ -48,7 +55,7 @@ def measure(
     settings: Settings,
 ) -> CommandOutcome:
     """Run `lightpaint measure SCENE`."""
-    content, emission, unit = _lit_scene(scene, lighting, settings)
+    content, emission, unit, unscaled = _lit_scene(scene, lighting, settings)
     planes_path = planes or planes_file_beside(content.path)
     if planes is None and not planes_path.is_file():
         raise SceneError(
@@ -75,7 +82,11 @@ def measure(
             "progress": listen,
         }
         measured = measure_illuminance(content, found.planes, spp=settings.spp, **options)
-        glare = measure_glare(content, found.observers, **options) if found.observers else None
+        check_reached(measured, unscaled, weights)
+        rates_glare = found.observers and not unscaled
+        glare = measure_glare(content, found.observers, **options) if rates_glare else None
+    if unscaled:
+        terminal.say(no_glare_remark(unscaled))
     origin = content.path.name + ("" if lighting is None else f" lit by {lighting.name}")
     with staged(output) as folder:
         write_readings(folder, measured, weights, origin, glare=glare)
@@ -91,18 +102,21 @@ def measure(
 
 def _lit_scene(
     source: SceneFile, lighting: Path | None, settings: Settings
-) -> tuple[Scene, Mapping[str, RGB] | None, float]:
-    """Return the scene, the emissions of a lighting, and cd/m² of a radiance of 1.
+) -> tuple[Scene, Mapping[str, RGB] | None, float, tuple[BasisLight, ...]]:
+    """Return the scene, the emissions of a lighting, cd/m² of a radiance of 1, and the lights of
+    which that is a guess.
 
-    Raises SceneError if nothing says the last.
+    Raises SceneError if nothing says cd/m².
     """
     scene, emission = source.content, None
-    own = with_sure_scale(constraints_of(scene.requests), basis_lights(scene)).cd_per_unit
+    own = with_scale(constraints_of(scene.requests), basis_lights(scene)).cd_per_unit
+    unscaled = constraints_and_unscaled(scene, Constraints(), settings)[1]
     if lighting is not None:
         finish(lighting.parent)
         answer = read_lighting(lighting)
         scene, emission = scene_of(scene, answer), answer.emission
         own = answer.cd_per_unit or own
+        unscaled = () if answer.cd_per_unit else unscaled
     given = settings.cd_per_unit
     if given is None and own is None:
         raise SceneError(
@@ -117,7 +131,7 @@ def _lit_scene(
             Hint("cd_per_unit"),
             ": leave one out",
         )
-    return scene, emission, float(given or own or 0)
+    return scene, emission, float(given or own or 0), unscaled
 
 
 def _weights(scene: Scene, emission: Mapping[str, RGB] | None) -> Doubles:

@@ -26,18 +26,32 @@ def with_sure_scale(constraints: Constraints, lights: Sequence[BasisLight]) -> C
     Raises ConstraintError if nothing says the scale, and a light beside luminaires is not in
     candela or lumens: its brightness would be a guess.
     """
-    scaled = with_scale(constraints, lights)
-    if scaled is constraints:
-        return constraints
-    for light, constraint in zip(lights, constraints_by_light(constraints, lights), strict=True):
-        if not (_is_luminaire(light) or _is_absolute(constraint)):
-            raise ConstraintError(
-                f"light {light.name!r} is in {light.unit}, beside luminaires in candela: list its "
-                "emitters in cd or lm, or say how many candelas an intensity of 1 is, by ",
-                Hint("cd_per_unit", 1),
-                " or by cd_per_unit = 1 in the lights file",
-            )
-    return scaled
+    for light in unscaled_lights(constraints, lights):
+        raise unscaled_error(light)
+    return with_scale(constraints, lights)
+
+
+def unscaled_lights(
+    constraints: Constraints, lights: Sequence[BasisLight]
+) -> tuple[BasisLight, ...]:
+    """Return the lights beside luminaires that are not in candela or lumens; none if constraints
+    say the scale.
+    """
+    if with_scale(constraints, lights) is constraints:
+        return ()
+    pairs = zip(lights, constraints_by_light(constraints, lights), strict=True)
+    return tuple(x for x, given in pairs if not (_is_luminaire(x) or _is_absolute(given)))
+
+
+def unscaled_error(light: BasisLight, place: str = "") -> ConstraintError:
+    """Return the error of a light whose brightness is a guess. place: what it lights."""
+    return ConstraintError(
+        f"light {light.name!r}{place and f', which reaches {place},'} is in {light.unit}, beside "
+        "luminaires in candela: list its emitters in cd or lm, or say how many candelas an "
+        "intensity of 1 is, by ",
+        Hint("cd_per_unit", 1),
+        " or by cd_per_unit = 1 in the lights file",
+    )
 
 
 def _is_luminaire(light: BasisLight) -> bool:

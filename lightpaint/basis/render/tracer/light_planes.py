@@ -34,6 +34,10 @@ class LightPlanes:
     start: initial sums, in the form returned by `sums`; None for zeros. texels: the texels of
     images; None if there are none.
 
+    Float32 sums of many samples would lose what each of them adds. So the tracer calls `end_block`
+    after each block of samples, and blocks are summed in turn. is_in_blocks: False if memory for
+    the ended blocks is not affordable.
+
     The sums are attributes of this object rather than variables of the tracing loop, because Dr.Jit
     rejects a loop variable that never changes, such as `seen` where all lights are points.
     """
@@ -46,10 +50,11 @@ class LightPlanes:
         *,
         is_shared: bool = False,
         is_split: bool = False,
+        is_in_blocks: bool = True,
         start: Floats | None = None,
         texels: TexelTable | None = None,
     ) -> None:
-        self._texels = texels
+        self._texels, self.is_in_blocks = texels, is_in_blocks
         self.count, self.size = lights * (2 if is_split else 1), size
         self._first_indirect = lights if is_split else 0
         pixels = size[0] * size[1]
@@ -61,6 +66,7 @@ class LightPlanes:
             self._sums = dr.zeros(mi.Float, self.count * pixels * 3)
         else:
             self._sums = mi.Float(start.ravel())
+        self._ended = None  # Sums of ended blocks
         self._seen = dr.zeros(mi.Float, pixels)
 
     def discard_light(self) -> None:
@@ -106,8 +112,14 @@ class LightPlanes:
 
     def evaluate(self) -> None:
         """Run the recorded kernels, and wait for them: a running kernel cannot be interrupted."""
-        dr.eval(self._sums, self._seen)
+        dr.eval(self._sums, self._ended, self._seen)
         dr.sync_thread()
+
+    def end_block(self) -> None:
+        """Add the sums to those of ended blocks, after `evaluate`, and begin a new block."""
+        self._ended = self._sums if self._ended is None else self._ended + self._sums
+        self._sums = dr.zeros(mi.Float, dr.width(self._ended))
+        self.evaluate()
 
     def sums(self, *, shares_memory: bool = False) -> Floats:
         """Return the sums, (lights, rows, columns, 3).
@@ -116,7 +128,10 @@ class LightPlanes:
         indirect. shares_memory: whether to return the sums themselves, if nothing more will be
         added, rather than a copy.
         """
-        sums = np.asarray(self._sums) if shares_memory else np.array(self._sums)
+        if self._ended is None:
+            sums = np.asarray(self._sums) if shares_memory else np.array(self._sums)
+        else:
+            sums = np.array(self._ended + self._sums)
         return sums.reshape(self.count, *self.size, 3)
 
     def seen(self) -> Floats:
@@ -181,9 +196,12 @@ class SpectralPlanes(LightPlanes):
         *,
         tables: ColorTables,
         is_split: bool = False,
+        is_in_blocks: bool = True,
         start: Floats | None = None,
     ) -> None:
-        super().__init__(light_of, lights, size, is_split=is_split, start=start)
+        super().__init__(
+            light_of, lights, size, is_split=is_split, is_in_blocks=is_in_blocks, start=start
+        )
         self._tables = tables
 
     @dr.syntax

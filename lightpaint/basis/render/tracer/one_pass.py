@@ -29,6 +29,7 @@ import numpy as np
 
 from lightpaint.arrays import Floats, Indices, aligned
 from lightpaint.basis.render.integrators import depth_limit, has_indirect_planes, needs_a_bounce
+from lightpaint.basis.render.render_budget import BLOCK_SPP
 from lightpaint.basis.render.tracer.emitter_guide import EmitterGuide
 from lightpaint.basis.render.tracer.light_planes import (
     ColorTables,
@@ -156,13 +157,16 @@ class Tracer:
         """True once the guide is trained."""
         return self.guide_table is not None
 
-    def planes(self, rows: range, start: Floats | None = None) -> LightPlanes:
+    def planes(
+        self, rows: range, start: Floats | None = None, *, is_in_blocks: bool = True
+    ) -> LightPlanes:
         """Return planes for some rows, without added samples.
 
-        start: initial sums of earlier samples, (planes, rows, columns, 3).
+        start: initial sums of earlier samples, (planes, rows, columns, 3). is_in_blocks: as in
+        `LightPlanes`.
         """
         size = len(rows), self.scene.size[1]
-        return self._planes(size, start=start)
+        return self._planes(size, start=start, is_in_blocks=is_in_blocks)
 
     def pixel_planes(self, pixels: int) -> LightPlanes:
         """Return planes for a number of single pixels, without added samples."""
@@ -175,8 +179,14 @@ class Tracer:
         first: number of earlier samples per pixel of that half.
         """
         with self.scene.variant(), kernels():
-            self._trace_rows(half, planes, rows, first, spp)
-            planes.evaluate()
+            while spp > 0:
+                # Blocks begin at multiples of their size, however samples are divided into passes.
+                part = min(spp, BLOCK_SPP - first % BLOCK_SPP) if planes.is_in_blocks else spp
+                self._trace_rows(half, planes, rows, first, part)
+                planes.evaluate()
+                first, spp = first + part, spp - part
+                if planes.is_in_blocks and first % BLOCK_SPP == 0:
+                    planes.end_block()
 
     def top_up(
         self, planes: LightPlanes, half: int, pixels: Indices, first: Indices, spp: Indices
@@ -188,9 +198,12 @@ class Tracer:
         first: (p,), number of samples in earlier calls. spp: (p,), number of samples to take.
         """
         with self.scene.variant(), kernels():
-            places = np.arange(pixels.size)
-            self._trace(FIRST_TOP_UP_STREAM + half, planes, places, pixels, first, spp)
-            planes.evaluate()
+            places, stream = np.arange(pixels.size), FIRST_TOP_UP_STREAM + half
+            for done in range(0, int(spp.max(initial=0)), BLOCK_SPP):
+                part = np.clip(spp - done, 0, BLOCK_SPP)
+                self._trace(stream, planes, places, pixels, first + done, part)
+                planes.evaluate()
+                planes.end_block()
 
     def close(self) -> None:
         """Release the scene and everything that refers to it."""
