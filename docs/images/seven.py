@@ -51,13 +51,6 @@ SKY, SUN = ("#7c96ff", -1.5, (0.6, 0.4)), ("#ffb070", 0.0, (0.25, 0.36))
 WIDTH = 900
 
 
-def choose_answer(designer: Designer, name: str) -> None:
-    """Press one of the three answers."""
-    designer.page.locator(".answer-choice", has_text=name).click()
-    designer.page.wait_for_timeout(2000)
-    designer.done(f"press {name}")
-
-
 def drag_objects(designer: Designer, up: float, right: float, *places: tuple[float, float]) -> None:
     """Ask for objects, by drags of as many pixels."""
     if not designer.page.get_by_role("group", name="Area", exact=True).count():
@@ -81,7 +74,6 @@ def sculptures(designer: Designer) -> None:
     """Sculptures, warm in a cool dark room."""
     designer.whole(-1.5, -40)
     drag_objects(designer, 140, 70, FIGURE, KNOT, VASE)
-    choose_answer(designer, "Bold")
 
 
 def moonlight(designer: Designer) -> None:

@@ -26,6 +26,7 @@ if TYPE_CHECKING:
     from lightpaint.target.template import write_template as write_template
     from lightpaint.target.wish_finding import extend_saturated as extend_saturated
     from lightpaint.target.wish_finding import find_wishes as find_wishes
+    from lightpaint.target.wish_finding import number_places as number_places
     from lightpaint.target.wish_finding import split_wishes as split_wishes
 
 if not TYPE_CHECKING:  # a type checker would take any name

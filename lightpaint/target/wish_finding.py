@@ -23,7 +23,7 @@ from math import ceil
 import numpy as np
 import numpy.typing as npt
 
-from lightpaint.arrays import Bools, Doubles, Floats
+from lightpaint.arrays import Bools, Doubles, Floats, Indices
 from lightpaint.colour import LUMINANCE, decode_display, encode_display
 from lightpaint.images import block_sums, enlarged
 from lightpaint.target.target import Target, Wish
@@ -59,6 +59,13 @@ MAX_PIXELS = 2**14
 
 #: Importance, or coverage, that counts as painted.
 PAINTED = 0.02
+
+#: Coverage, relative to the largest of a wish, from which a pixel is within one of its places: soft
+#: edges of two places meet.
+WITHIN_PLACE = 0.5
+
+#: Least share of a wish of one of its places: smaller ones are crumbs.
+PLACE_SHARE = 0.1
 
 #: Weight that holds the colour of a stroke near what is painted, where the look alone does not tell
 #: how much of it covers; relative to all changes.
@@ -121,6 +128,23 @@ def split_wishes(
         found = [replace(layer, area=part.astype(np.float32)) for part in parts]
         wishes += found or [layer]
     return tuple(wishes)
+
+
+def number_places(area: Doubles) -> Indices:
+    """Return the number of the separate place of a wish to which each pixel belongs, (h, w).
+
+    area: (h, w), from 0 to 1. 0 is for pixels outside of its largest `MAX_WISHES` places, and for
+    all if it has only one.
+    """
+    mask = area > WITHIN_PLACE * max(float(area.max(initial=0)), PAINTED)
+    radius = round(JOINING * area.shape[1])
+    least = max(MIN_SHARE * area.size, PLACE_SHARE * float(mask.sum()))
+    places = _connected(mask, radius, least)
+    numbers = np.zeros(area.shape, np.intp)
+    if len(places) > 1:
+        for k, place in enumerate(sorted(places, key=lambda x: -int(x.sum()))[:MAX_WISHES]):
+            numbers[place] = k + 1
+    return numbers
 
 
 @dataclass(frozen=True)

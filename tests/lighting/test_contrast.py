@@ -1,16 +1,21 @@
 """Contrasts of wishes: the ratio of a subject's light to the rest comes out as painted."""
 
 from dataclasses import replace
+from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
 
 import lightpaint as lp
-from lightpaint.lighting.loss import contrast
+from lightpaint.basis.basis import meter_exposure
+from lightpaint.colour.color import kelvin_to_rgb, luminance
+from lightpaint.lighting.loss import contrast, expected_lights
 from lightpaint.lighting.loss.contrast import ContrastRows
 from lightpaint.lighting.loss.expected_lights import ExpectedLights, Wash, adjusted_share
 from lightpaint.target.target import Wish
+
+SCENES = Path(__file__).parents[2] / "scenes"
 
 H, W = 24, 40
 
@@ -168,6 +173,36 @@ def test_light_set_by_hand_wins_over_grey(make_basis: Any, monkeypatch: pytest.M
     assert missed[2] < 0.5 * missed[0]
 
 
+def test_each_place_of_a_wish_stands_out(make_basis: Any, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Two sculptures of one layer: a mean of both could be had by one that is very bright."""
+    places = np.zeros((2, H, W), bool)
+    places[0, 10:14, 6:10] = places[1, 10:14, 28:32] = True
+    # The spot on the second spills over the rest.
+    pools = [np.ones((H, W)), np.where(places[0], 1, 0.05), np.where(places[1], 1, 0.3)]
+    images = np.array(pools)[..., None] * np.ones(3)
+    emission = [(0.3,) * 3, (0.1,) * 3, (0.1,) * 3]
+    basis = make_basis(images=images, names=["wash", "one", "other"], emission=emission)
+    area = places.any(axis=0).astype(np.float32)
+    image = basis.current_look * np.where(area > 0, 1.5, 0.4)[..., None]
+    wishes = Wish("rest", 1 - area), Wish("sculptures", area)
+    target = replace(painting(basis, image), wishes=wishes)
+
+    def least() -> float:
+        """The contrast of the fainter place to the rest, relative to the painted one."""
+        got = basis.mix(lp.solve(basis, target).weights)
+        came = [got[x].mean() / got[area == 0].mean() for x in places]
+        asked = [image[x].mean() / image[area == 0].mean() for x in places]
+        return float(np.min(np.divide(came, asked)))
+
+    of_each = least()
+    wash = Wash.of(basis, target)
+    assert wash.places.max(axis=1).tolist() == [0, 2]
+    rows = ContrastRows.of(wash, target.transform)
+    np.testing.assert_allclose(rows.share, [0.5, 0.5])
+    monkeypatch.setattr(expected_lights, "wish_places", lambda x, _: np.zeros(x.shape, int))
+    assert of_each > least() + 0.05
+
+
 def test_an_unpainted_rest_has_no_contrast(make_basis: Any) -> None:
     basis = room(make_basis)
     target = lp.Target(
@@ -268,3 +303,49 @@ def test_views_keep_their_wishes_apart(make_basis: Any) -> None:
     assert joined.wishes.shape == (4, 2 * wash.counts.size)
     assert not (joined.wishes[:2, wash.counts.size :]).any()
     assert not (joined.wishes[2:, : wash.counts.size]).any()
+
+
+@pytest.mark.nightly
+def test_in_the_gallery_light_set_by_hand_wins_over_grey(monkeypatch: pytest.MonkeyPatch) -> None:
+    """By the whole loss, pixels and contrasts: three warm spots in a room bluer than painted."""
+    scene = lp.load_scene(SCENES / "gallery" / "scene.xml").reduced("160x90")
+    basis = lp.render_basis(scene, spp=64)
+    assert basis.objects is not None
+    masks = [basis.objects.mask(name) for name in ("knot", "figure", "vase")]
+    area = np.any(masks, axis=0).astype(np.float32)
+    asked = np.where(area[..., None] > 0, 2**-0.1 * warmer(30), 2**-1.5 * warmer(-40))
+    image = basis.current_look * asked
+    for subjects in ([area], [mask.astype(np.float32) for mask in masks]):
+        target = lp.Target(
+            "sculptures",
+            image.astype(np.float32),
+            np.ones(basis.size, np.float32),
+            everything=False,
+            transform=lp.ViewTransform("srgb", meter_exposure(basis.current_look, basis)),
+            through_view=True,
+            over_look=True,
+            wishes=(Wish("rest", 1 - area), *(Wish("subject", x) for x in subjects)),
+        )
+        solution = lp.solve(basis, target)
+        with monkeypatch.context() as without:
+            for name in ("CONTRAST", "EXACT_CONTRAST", "EXACT_REST"):
+                without.setattr(contrast, name, 0.0)
+            grey = lp.solve(basis, target).weights
+        is_spot = np.isin(basis.names, ["spot_figure", "spot_knot", "spot_vase"])[:, None]
+        gains = np.where(is_spot, 2**0.5 * warmer(150), 2**-1.5 * warmer(-150))
+        by_hand = _missed(solution.problem, basis.current_weights * gains)
+        without_contrasts = _missed(solution.problem, grey)
+        assert without_contrasts[0] < by_hand[0]
+        assert _missed(solution.problem, solution.weights)[1] < by_hand[1] < without_contrasts[1]
+
+
+def _missed(problem: Any, weights: np.ndarray) -> tuple[float, float]:
+    """The loss of pixels, and that with contrasts."""
+    pixels = float(problem.objective(weights).sum())
+    return pixels, pixels + float(problem.contrast.objective(weights).sum())
+
+
+def warmer(mired: float) -> np.ndarray:
+    """Gains (3,) of luminance 1 that make a white of 5000 K warmer, or cooler below 0."""
+    gains = kelvin_to_rgb(1e6 / (200 + mired)) / kelvin_to_rgb(5000)
+    return np.asarray(gains / luminance(gains))

@@ -7,7 +7,7 @@ import lightpaint as lp
 from lightpaint.colour.srgb import decode_display, encode_display
 from lightpaint.errors import SizeError
 from lightpaint.target.target import Wish, separate
-from lightpaint.target.wish_finding import asked_ratio, find_wishes
+from lightpaint.target.wish_finding import asked_ratio, find_wishes, number_places
 
 LOOK = np.full((40, 60, 3), 0.2, np.float32)
 
@@ -155,3 +155,21 @@ def test_wishes_follow_the_size_of_the_target():
 def test_a_wish_of_another_size_is_refused():
     with pytest.raises(SizeError, match="wish"):
         target(LOOK, wishes=(Wish("small", np.ones((2, 2), np.float32)),))
+
+
+@pytest.mark.parametrize(
+    ("squares", "counts"),
+    [
+        ([((2, 6), (4, 8)), ((12, 16), (4, 8))], [0, 16, 16]),
+        ([((2, 12), (4, 14)), ((20, 24), (4, 8))], [0, 100, 16]),
+        ([((2, 6), (4, 8))], [0]),  # one place is the wish
+        ([((2, 22), (4, 14)), ((28, 30), (20, 21))], [0]),  # a crumb of less than a tenth
+    ],
+)
+def test_separate_places_of_a_wish_have_numbers(squares, counts):
+    """The larger ones first; soft edges belong to none."""
+    area = np.full((32, 48), 0.1)
+    for rows, columns in squares:
+        area[slice(*rows), slice(*columns)] = 0.9
+    numbers = number_places(area)
+    assert [int((numbers == k).sum()) for k in range(1, numbers.max() + 1)] == counts[1:]

@@ -11,7 +11,12 @@ from lightpaint.basis import Basis
 from lightpaint.colour import ViewTransform
 from lightpaint.images import block_mean, block_sums, enlarged
 from lightpaint.lighting.live.tiles import MAX_CHEAP_LIGHTS, TiledEquations
-from lightpaint.lighting.loss.expected_lights import Wash, exact_share, wish_shares
+from lightpaint.lighting.loss.expected_lights import (
+    Wash,
+    exact_share,
+    wish_places,
+    wish_shares,
+)
 from lightpaint.lighting.loss.loss import STRIP_PIXELS
 from lightpaint.lighting.loss.painting_loss import PaintedPixels, join_pixels
 from lightpaint.lighting.loss.reweighting import interpolate
@@ -217,8 +222,9 @@ class SmallFilm:
         small_importance = importance.reshape(self._size)
         wishes = layers(self._side)
         shares = wish_shares(wishes, painted, small_importance, look)
-        exact = exact_share(wishes, self._size)
-        return Wash(self.rows, self._painted, self._current, importance, counts, shares, exact)
+        exact, places = exact_share(wishes, self._size), wish_places(shares, self._size)
+        light = self.rows, self._painted, self._current
+        return Wash(*light, importance, counts, shares, exact, places)
 
     @cached_property
     def _counts(self) -> Doubles:

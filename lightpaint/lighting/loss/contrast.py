@@ -12,6 +12,9 @@ A the change of a display value with a relative change of light there. It is a q
 weights. The paper weighs surfaces so that large unpainted ones do not overwhelm small painted ones;
 this does the same between painted ones.
 
+A wish may be about several places, as three sculptures are. Then each counts by itself: in their
+mean, one that is very bright would stand for all.
+
 A brush is sloppy, and numbers are meant: the more of the rest was adjusted by a number, the
 stronger a contrast to it. A subject that cannot be lifted, as under a locked lamp, must not pull
 such a rest down instead, so the light of the rest shall come as painted, too:
@@ -24,7 +27,7 @@ from typing import Self
 
 import numpy as np
 
-from lightpaint.arrays import Doubles
+from lightpaint.arrays import Doubles, Indices
 from lightpaint.colour import ViewTransform
 from lightpaint.lighting.loss.expected_lights import UNIFORM_STOPS, Wash, adjusted_share
 from lightpaint.lighting.normal_equations import NormalEquations
@@ -35,7 +38,7 @@ from lightpaint.threads import one_thread
 CONTRAST, EXACT_CONTRAST = 0.5, 8.0
 
 #: The same of the light of a rest that was adjusted by a number.
-EXACT_REST = 4.0
+EXACT_REST = 1.5
 
 #: Smallest share of the rest of a picture that must be painted for a contrast to be asked for: an
 #: unpainted rest is held to the look, which was not meant as a contrast.
@@ -50,17 +53,18 @@ BLACK = 1e-3
 
 @dataclass(frozen=True)
 class ContrastRows:
-    """The terms of the contrasts of k wishes, rows in the weights of n lights.
+    """The terms of the contrasts of k places of wishes, rows in the weights of n lights.
 
     contrast: (k, 3, n), A_o (ō_i / O − r̄_i / R), which shall be 0. rest: (k, 3, n), A_r r̄_i / R,
     whose sum over the lights shall be A_r, (k, 3), `rest_goal`. exact: (k,), the share of the rest
-    that was adjusted by a number.
+    that was adjusted by a number. share: (k,), of all contrasts; each wish has the same.
     """
 
     contrast: Doubles
     rest: Doubles
     rest_goal: Doubles
     exact: Doubles
+    share: Doubles
 
     @classmethod
     @one_thread()
@@ -69,11 +73,12 @@ class ContrastRows:
         n = wash.rows.shape[1]
         goal = np.where(wash.importance > 0, wash.painted, wash.look)
         total = float(wash.counts.sum())
-        parts = [x for area in wash.wishes for x in _subject_and_rest(wash, area, total)]
-        if not parts:
+        wishes = zip(wash.wishes, wash.places, strict=True)
+        found = [x for wish in wishes if (x := _subjects_and_rests(wash, *wish, total))]
+        if not found:
             none = np.zeros((0, 3, n))
-            return cls(none, none, np.zeros((0, 3)), np.zeros(0))
-        shares = np.array(parts)  # (2 k, p)
+            return cls(none, none, np.zeros((0, 3)), np.zeros(0), np.zeros(0))
+        shares = np.array([x for parts in found for pair in parts for x in pair])  # (2 k, p)
         black = BLACK * float(np.average(goal.mean(axis=0), weights=wash.counts))
         inside, outside = (shares @ goal.T).reshape(-1, 2, 3).transpose(1, 0, 2)  # (k, 3) each
         # (k, 3, n) each
@@ -94,13 +99,14 @@ class ContrastRows:
             rest_amplitude[..., None] * rest,
             rest_amplitude,
             shares[1::2] @ exact,
+            np.array([1 / len(found) / len(parts) for parts in found for _ in parts]),
         )
 
     def term(self, strength: float) -> NormalEquations | None:
         """Return the term of the loss; None without any. strength: the importance of all paint."""
         if not len(self.contrast) or strength <= 0:
             return None
-        each = strength / len(self.contrast)
+        each = strength * self.share
         lift = each * (CONTRAST + self.exact * (EXACT_CONTRAST - CONTRAST))
         keep = each * EXACT_REST * self.exact
         M = np.einsum("k,kci,kcj->cij", lift, self.contrast, self.contrast)
@@ -109,11 +115,13 @@ class ContrastRows:
         return NormalEquations(M, b, keep @ self.rest_goal**2)
 
 
-def _subject_and_rest(wash: Wash, area: Doubles, total: float) -> list[Doubles]:
-    """Return the shares of blocks, (p,), whose sums are means over a wish and over the rest; none
-    for a wish without a contrast.
+def _subjects_and_rests(
+    wash: Wash, area: Doubles, places: Indices, total: float
+) -> list[tuple[Doubles, Doubles]]:
+    """Return the shares of blocks, (p,), whose sums are means over each place of a wish and over
+    the rest of the picture; none for a wish without a contrast.
 
-    total: the number of pixels.
+    area, places: (p,), see `Wash`. total: the number of pixels.
     """
     own = wash.counts * area * wash.importance
     rest = wash.counts * (1 - area)
@@ -122,7 +130,9 @@ def _subject_and_rest(wash: Wash, area: Doubles, total: float) -> list[Doubles]:
         return []
     if painted_rest <= 0 or painted_rest < PAINTED_REST * rest.sum():
         return []
-    return [own / own.sum(), rest / rest.sum()]
+    parts = [own * (places == k) for k in range(1, places.max(initial=0) + 1)]
+    subjects = [x for x in parts if x.any()] or [own]
+    return [(x / x.sum(), rest / rest.sum()) for x in subjects]
 
 
 def display_amplitude(light: Doubles, transform: ViewTransform | None) -> Doubles:

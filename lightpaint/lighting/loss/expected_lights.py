@@ -17,7 +17,7 @@ from lightpaint.arrays import Doubles, Floats, Indices
 from lightpaint.basis import Basis, Planes, block_means
 from lightpaint.colour import luminance
 from lightpaint.images import block_sums
-from lightpaint.target import Target, Wish, extend_saturated, split_wishes
+from lightpaint.target import Target, Wish, extend_saturated, number_places, split_wishes
 from lightpaint.threads import one_thread
 
 #: Approximate number of blocks of pixels over which the light of a painting is compared.
@@ -60,6 +60,8 @@ class Wash:
     rows: (3, n, p), Φ. painted, look: (3, p), linear. importance: (p,), the share of a block that
     is painted. counts: (p,), the number of its pixels that count. wishes: (k, p), the share of a
     block that each wish covers; exact: (p,), that of wishes whose colours were given as numbers.
+    places: (k, p), the number of the separate place of each wish to which a block belongs, and 0
+    for none.
     """
 
     rows: Floats
@@ -69,6 +71,7 @@ class Wash:
     counts: Doubles
     wishes: Floats
     exact: Doubles
+    places: Indices
 
     @classmethod
     def of(cls, basis: Basis, target: Target) -> "Wash":
@@ -84,11 +87,13 @@ class Wash:
         joined = {k: np.concatenate([getattr(x, k) for x in views], axis=-1) for k in names}
         pixels = np.cumsum([0, *(x.counts.size for x in views)])
         wishes = np.zeros((sum(len(x.wishes) for x in views), pixels[-1]))
+        places = np.zeros(wishes.shape, np.intp)
         first = 0
         for view, start in zip(views, pixels, strict=False):
-            wishes[first : first + len(view.wishes), start : start + view.counts.size] = view.wishes
+            own = slice(first, first + len(view.wishes)), slice(start, start + view.counts.size)
+            wishes[own], places[own] = view.wishes, view.places
             first += len(view.wishes)
-        return cls(**joined, wishes=wishes)
+        return cls(**joined, wishes=wishes, places=places)
 
     def sample(self, count: int, count_of_wish: int) -> tuple[Indices, Doubles]:
         """Return about `count` painted blocks, (m,), and the number of painted pixels for which
@@ -175,14 +180,16 @@ class PaintedBlocks:
     @property
     def wash(self) -> Wash:
         """The wash of the view, with its wishes."""
+        wishes = wish_shares(self.layers, self.painted, self.importance, self.look)
         return Wash(
             self.rows,
             self.painted.reshape(-1, 3).T,
             self.look.reshape(-1, 3).T,
             self.importance.ravel(),
             self.counts.ravel(),
-            wish_shares(self.layers, self.painted, self.importance, self.look),
+            wishes,
             exact_share(self.layers, self.importance.shape),
+            wish_places(wishes, self.importance.shape),
         )
 
 
@@ -264,6 +271,15 @@ def wish_shares(
     whole = Wish("painting", importance.astype(np.float32), has_strokes=True)
     wishes = split_wishes(layers or [whole], painted, importance, look)
     return np.array([wish.area.ravel() for wish in wishes], np.float64)
+
+
+def wish_places(shares: Doubles, size: tuple[int, int]) -> Indices:
+    """Return the number of the separate place of each wish to which a block belongs, (k, p).
+
+    shares: (k, p), see `wish_shares`. size: (h, w), in blocks.
+    """
+    places = [number_places(share.reshape(size)).ravel() for share in shares]
+    return np.array(places, np.intp).reshape(shares.shape)
 
 
 def adjusted_share(wash: Wash, stops: Doubles) -> Doubles:

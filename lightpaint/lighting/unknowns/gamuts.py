@@ -44,6 +44,11 @@ PAINTED_MARGIN = 0.01
 #: large, so that only paint that is a white of any temperature is taken for one.
 PAINTED_FACTOR = 10
 
+#: Change towards cooler whites that a lamp may make, relative to the change that is painted where
+#: it shines: a room into which a warm spot spills stays as cool as painted only if its other lamps
+#: are cooler than that.
+COOL_OVERSHOOT = 1.5
+
 #: The same distance from whites and from painted colours for bold answers, which keep to hues
 #: alone: at the edge of what looks green.
 BOLD_MARGIN = 0.006
@@ -149,6 +154,7 @@ class Gamuts:
         lamps, whites = (reach_of(white_range(*k).colors) for k in (LAMP_KELVINS, ALL_KELVINS))
         self._reach = np.maximum(own_reach + 2 * REACH_STEP, lamps + WHITE_MARGIN)
         self._whites = whites
+        self._cool_whites = reach_of(white_range(LAMP_KELVINS[1], ALL_KELVINS[1]).colors)
         # Off-white lamps lie near the whites, and so do surfaces under them; coloured lamps do not.
         self._off_white = np.maximum(own_reach - whites, 0).max(axis=1)
         is_near_white = self._off_white <= PAINTED_MARGIN
@@ -165,7 +171,11 @@ class Gamuts:
         if light not in self._gamuts:
             if self._needed is None:
                 self._needed = _NeededLight.of(self._light(), self._power, self._current)
-            own_reach, needed = self._reach[light], self._needed.reach(light)
+            needed = self._needed.reach(light)
+            lamp = chromaticity(self._own[light]) @ DIRECTIONS.T
+            cooler = lamp + COOL_OVERSHOOT * np.maximum(needed - lamp, 0)
+            cooler = np.minimum(cooler, self._cool_whites) + WHITE_MARGIN
+            own_reach = np.maximum(self._reach[light], cooler)
             if self._is_bold:
                 reach = np.maximum(self._whites, needed) + BOLD_MARGIN
                 self._gamuts[light] = self._hull(light, np.maximum(own_reach, reach))

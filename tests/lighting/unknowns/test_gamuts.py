@@ -12,7 +12,7 @@ from lightpaint.lighting import problem
 from lightpaint.lighting.fit import resolve_for_targets
 from lightpaint.lighting.live.live import LiveSolver
 from lightpaint.lighting.live.live_view import LiveView
-from lightpaint.lighting.unknowns.gamuts import PAINTED_MARGIN
+from lightpaint.lighting.unknowns.gamuts import PAINTED_MARGIN, Gamuts, PaintedLight
 
 SIZE = (24, 30)
 
@@ -141,3 +141,22 @@ def test_gamuts_are_no_wider_than_what_is_painted(make_basis: Any) -> None:
     for gamut in (gamuts[k] for k in range(len(basis.lights))):
         # What several lamps mix that have other colours is between these.
         assert (gamut.reach <= reach + PAINTED_MARGIN + 1e-3).all()
+
+
+@pytest.mark.parametrize(
+    ("kelvin", "within", "beyond"), [(5500, 9000, 11_000), (9000, 12_000, 18_000)]
+)
+def test_lamps_may_be_half_as_much_cooler_than_painted(
+    kelvin: float, within: float, beyond: float
+) -> None:
+    """So that a room stays cool where a warmer lamp spills. None of them may be green."""
+    own = kelvin_to_rgb(5500)
+    rows = np.random.default_rng(4).uniform(0.1, 1, (1, 60, 1)) * np.ones(3)
+    light = PaintedLight(
+        rows, rows[0] * kelvin_to_rgb(kelvin), np.ones(60), np.ones((60, 3), np.float32)
+    )
+    gamut = Gamuts(lambda: light, np.ones((1, 3)), own[None])[0]
+    # 1.5 times from 5500 to 9000 K in (u', v') is 12,800 K, and the margin beside it more.
+    assert gamut.has(kelvin_to_rgb(within))
+    assert not gamut.has(kelvin_to_rgb(beyond))
+    assert not gamut.has(kelvin_to_rgb(kelvin) * [0.85, 1, 0.85])
