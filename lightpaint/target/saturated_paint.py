@@ -1,4 +1,4 @@
-"""What paint at the top of its range asks for.
+"""The wish of paint that ends at the top of its range.
 
 Eight bits end at the white of a display, so a wash that makes a room warmer ends there at a lamp
 that is white already. Read as it stands, that place asks for less than the paint around it: a wish
