@@ -73,7 +73,7 @@ def is_of_kind(value: Any, kind: Any) -> bool:
     kind = origin or kind
     if kind is None:
         return value is None
-    if not isinstance(kind, type) or getattr(kind, "_is_protocol", False):
+    if kind is Any or not isinstance(kind, type) or getattr(kind, "_is_protocol", False):
         return True  # Any, or a protocol that no instance can be compared with
     if kind in (float, int):
         expected = Real if kind is float else Integral
@@ -98,6 +98,8 @@ def _have_kind(value: Any, origin: Any, inner: tuple[Any, ...]) -> bool:
     is_list = origin in (Sequence, Collection, list) or (origin is tuple and inner[1:] == (...,))
     if is_list and isinstance(value, list | tuple):
         return all(is_of_kind(item, inner[0]) for item in value)
+    if origin is tuple and isinstance(value, list | tuple):
+        return len(value) == len(inner) and all(map(is_of_kind, value, inner))
     return True
 
 
@@ -144,7 +146,7 @@ _Call = TypeVar("_Call", bound=Callable[..., Any])
 
 
 def keywords(*passed_on: type) -> Callable[[_Call], _Call]:
-    """Make a function, or a class when it is called, explain arguments that it cannot take.
+    """Make a function, or a class and its public methods, explain arguments that they cannot take.
 
     It raises KeywordError for an unknown name: Python's own TypeError suggests no near name before
     3.13, and knows nothing of arguments that are passed on. An error of Python or of a library
@@ -181,10 +183,22 @@ def keywords(*passed_on: type) -> Callable[[_Call], _Call]:
 
         if isinstance(call, type):
             call.__init__ = checked  # type: ignore[misc]
+            _check_methods(call)
             return call
         return checked  # type: ignore[return-value]
 
     return decorate
+
+
+def _check_methods(kind: type) -> None:
+    """Make the public methods that a class itself defines explain their arguments, too."""
+    for name, value in list(vars(kind).items()):
+        if name.startswith("_"):
+            continue
+        if isinstance(value, classmethod | staticmethod):
+            setattr(kind, name, type(value)(keywords()(value.__func__)))
+        elif inspect.isfunction(value):
+            setattr(kind, name, keywords()(value))
 
 
 def _names(parameters: Mapping[str, inspect.Parameter]) -> set[str]:

@@ -82,8 +82,26 @@ def test_methods_take_arguments_of_other_kinds_alike(values: dict[str, Any]) -> 
                 method(*[wrong] * len(required(method)))
 
 
+def test_methods_of_public_classes_explain_their_arguments(values: dict[str, Any]) -> None:
+    """Every public method of what a day's work passes around, but those that take anything."""
+    not_checked, raw = {"of_weights", "get"}, []
+    prediction = lp.combine(values["basis"], values["lighting"])
+    for owner in (values["basis"], values["target"], values["lighting"], prediction):
+        for name in sorted(set(vars(type(owner))) - not_checked):
+            method = getattr(owner, name, None)
+            if name.startswith("_") or not callable(method) or not required(method):
+                continue
+            for wrong in (None, -1, float("nan"), "no such thing", {}, [], object()):
+                try:
+                    refuse(method, *[wrong] * len(required(method)))
+                except Exception as error:
+                    raw.append(f"{type(owner).__name__}.{name}({wrong!r}): {error!r}")
+    assert raw == []
+
+
 def test_what_is_wrong_is_named(values: dict[str, Any], tmp_path: Path) -> None:
     basis, lighting, scene = (values[x] for x in ("basis", "lighting", "scene"))
+    target = values["target"]
     cases: list[tuple[Callable[[], Any], str]] = [
         (lambda: lp.write_basis(basis, tmp_path / "a"), r"write_basis\(\): path is a Basis"),
         (lambda: lp.write_lighting(lighting, "a"), r"write_lighting\(\): path is a Lighting"),
@@ -99,6 +117,17 @@ def test_what_is_wrong_is_named(values: dict[str, Any], tmp_path: Path) -> None:
         (lambda: lp.Lighting.of_weights(basis, np.ones((3, 2))), r"shape \(3, 2\): expected"),
         (lambda: lp.display_picture(np.ones((2, 2))), r"expected \(height, width, 3\)"),
         (lambda: lp.display_picture(np.ones((2, 2, 3)), zoom=10**7), "zoom is 10000000: expected"),
+        (lambda: lp.display_picture(np.ones((2, 2, 3)), stops=10**12), "stops is 1000000000000"),
+        (lambda: lp.display_picture(np.full((2, 2, 3), np.nan)), "an image with NaN"),
+        (lambda: lp.solve([basis, basis], [target]), "1 targets for bases of 2 views"),
+        (lambda: target.reduced(0), "blocks of 0x0 pixels: an image of 12x8 has blocks of 1 to 8"),
+        (lambda: target.reduced(10**12), "blocks of 1000000000000x"),
+        (lambda: target.resized((0, 5)), "a size of 5x0 pixels"),
+        (lambda: target.fitted_to((0, 0), resize=True), "a size of 0x0 pixels"),
+        (lambda: target.resized((10**6, 10**6)), "a size of 1000000x1000000 pixels"),
+        (lambda: target.resized((1, 2, 3)), r"size is a tuple of int, expected a tuple of whole"),
+        (lambda: scene.moved(None), r"Scene.moved\(\): poses is None"),
+        (lambda: scene.with_new_emitters(5), r"Scene.with_new_emitters\(\): emitters is 5"),
     ]
     for call, words in cases:
         with pytest.raises(lp.LightpaintError, match=words):

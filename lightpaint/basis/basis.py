@@ -363,7 +363,6 @@ class Basis(Shown):
         """
         vars(self)["_power_and_totals"] = power, totals  # where cached_property stores its value
 
-    @keywords()
     def mix(self, weights: Doubles) -> npt.NDArray[np.float32]:
         """Return the image Σ w_i Φ_i, (h, w, 3) float32.
 
@@ -378,7 +377,6 @@ class Basis(Shown):
         if shape and shape != expected:
             raise BasisError(f"weights of the shape {shape}: expected {expected}, a row per light")
 
-    @keywords()
     def predict(self, weights: Doubles) -> Estimate:
         """Return the image Σ w_i Φ_i with its noise, read-only. weights: (n, 3).
 

@@ -39,6 +39,7 @@ if TYPE_CHECKING:
     from lightpaint.colour.color_ranges import white_range as white_range
     from lightpaint.colour.display.exposure import choose_exposure as choose_exposure
     from lightpaint.colour.display.tone_curves import BUILT_IN as BUILT_IN
+    from lightpaint.colour.display.view_transform import MAX_STOPS as MAX_STOPS
     from lightpaint.colour.display.view_transform import TransformChoice as TransformChoice
     from lightpaint.colour.display.view_transform import ViewTransform as ViewTransform
     from lightpaint.colour.display.view_transform import curve_of as curve_of

@@ -41,6 +41,8 @@ if TYPE_CHECKING:
     from lightpaint.images.pixel_blocks import block_pixels as block_pixels
     from lightpaint.images.pixel_blocks import block_sums as block_sums
     from lightpaint.images.pixel_blocks import blocks_in as blocks_in
+    from lightpaint.images.pixel_blocks import check_factor as check_factor
+    from lightpaint.images.pixel_blocks import check_size as check_size
     from lightpaint.images.pixel_blocks import covered as covered
     from lightpaint.images.pixel_blocks import enlarged as enlarged
     from lightpaint.images.pixel_blocks import fitting_factor as fitting_factor

@@ -11,7 +11,7 @@ from lightpaint.display_text import short_repr, some_names
 from lightpaint.errors import ImageError
 from lightpaint.files import one_line
 from lightpaint.images.formats.exr import ExrPart, read_parts, rgb_channels, write_parts
-from lightpaint.images.pixel_blocks import block_mean
+from lightpaint.images.pixel_blocks import block_mean, check_factor
 from lightpaint.keywords import keywords
 
 #: EXR layer that holds half the difference of two independent halves of the samples.
@@ -47,7 +47,6 @@ class Estimate:
             )
 
     @classmethod
-    @keywords()
     def of_halves(cls, a: Floats, b: Floats) -> "Estimate":
         """Return the estimate of two independent renders of equal sample count."""
         return cls((a + b) / 2, (a - b) / 2)
@@ -58,7 +57,11 @@ class Estimate:
         return self.image.shape[0], self.image.shape[1]
 
     def reduced(self, factor: int) -> "Estimate":
-        """Return the estimate averaged over blocks of factor × factor pixels."""
+        """Return the estimate averaged over blocks of factor × factor pixels.
+
+        Raises SizeError where it has no such blocks.
+        """
+        check_factor(self.size, factor)
         return Estimate(block_mean(self.image, factor), block_mean(self.half_difference, factor))
 
     def variance(self, *, radius: int = 2) -> Floats:

@@ -10,6 +10,7 @@ import numpy as np
 import numpy.typing as npt
 
 from lightpaint.arrays import Doubles, Floats
+from lightpaint.errors import SizeError
 
 
 def resampled(planes: Floats, size: tuple[int, int]) -> Floats:
@@ -37,6 +38,9 @@ Size = tuple[int, int]
 #: mean.
 MAX_ADDED_SIDE = 8
 
+#: Most pixels of an image that is resampled: those of the largest film.
+MAX_RESIZED = 2**28
+
 
 def whole_factor(larger: Size, smaller: Size) -> int | None:
     """Return the side of the largest blocks that `larger` has as many of as `smaller` has pixels.
@@ -50,6 +54,25 @@ def whole_factor(larger: Size, smaller: Size) -> int | None:
 def blocks_in(size: Size, factor: int) -> Size:
     """Return the number of blocks of factor × factor pixels along each side of an image."""
     return size[0] // factor, size[1] // factor
+
+
+def check_factor(size: Size, factor: int) -> None:
+    """Raise SizeError unless an image has blocks of factor × factor pixels."""
+    if not 1 <= factor <= min(size):
+        raise SizeError(
+            f"blocks of {factor}x{factor} pixels: an image of {size[1]}x{size[0]} has blocks of 1 "
+            f"to {min(size)}"
+        )
+
+
+def check_size(size: Size) -> None:
+    """Raise SizeError unless an image may have this size."""
+    height, width = size
+    if min(size) < 1 or height * width > MAX_RESIZED:
+        raise SizeError(
+            f"a size of {width}x{height} pixels: expected at least 1 along each side, and at most "
+            f"{MAX_RESIZED} in all"
+        )
 
 
 def fitting_factor(size: Size, factor: int) -> int:

@@ -166,7 +166,6 @@ class Problem(LinearProblem):
     __repr__ = short_repr
 
     @classmethod
-    @keywords()
     def of(
         cls,
         basis: Basis | Sequence[Basis],
@@ -322,6 +321,10 @@ def _resolve_views(
     """Return the views at the size of their bases, with the importance that the fit gives each
     pixel, and the fit with no option left open.
     """
+    if len(targets) != len(bases):
+        raise TargetError(
+            f"{len(targets)} targets for bases of {len(bases)} views: give one for each"
+        )
     fitted = [
         resolve_importance(
             target.fitted_to(basis.size, resize=resize), basis.emitters_seen, fit.emitters

@@ -120,19 +120,16 @@ class Illuminance:
     def _slices(self) -> dict[str, slice]:
         return slices_of(self.planes)
 
-    @keywords()
     def points_of(self, plane: str) -> slice:
         """Return where the points of a plane lie among all. Raises SceneError without it."""
         if plane not in self._slices:
             raise SceneError(f"no plane {plane!r}: there is {some_names(self._slices)}")
         return self._slices[plane]
 
-    @keywords()
     def of(self, weights: Doubles) -> Doubles:
         """Return the illuminance in lx at all points, (p,). weights: (n, 3)."""
         return self._mix(self.matrix, weights)
 
-    @keywords()
     def standard_errors(self, weights: Doubles) -> Doubles:
         """Return the standard errors of `of(weights)`, (p,) in lx.
 
@@ -151,7 +148,6 @@ class Illuminance:
                 errors[part] = np.sqrt(squares)
         return errors
 
-    @keywords()
     def reading(self, plane: str, weights: Doubles) -> PlaneReading:
         """Return the illuminance on a plane. weights: (n, 3). Raises SceneError without it."""
         part = self.points_of(plane)
@@ -175,7 +171,6 @@ class Illuminance:
             least_bias=_bias_bound(values, errors),
         )
 
-    @keywords()
     def readings(self, weights: Doubles) -> dict[str, PlaneReading]:
         """Return the illuminance on all planes, by name. weights: (n, 3)."""
         return {plane.name: self.reading(plane.name, weights) for plane in self.planes}

@@ -83,7 +83,6 @@ class Rigging:
         return f"Rigging({some_of(parts, '; ', room=600)})"
 
     @classmethod
-    @keywords()
     def of(
         cls,
         light: Mapping[str, Mapping[str, Any]] | None = None,

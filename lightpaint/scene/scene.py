@@ -283,7 +283,6 @@ class Scene(SceneFiles, Shown):
         """Return the light called `name`. Raises SceneError if it does not exist."""
         return light_named(name, self.lights, scene=str(self.path))
 
-    @keywords()
     def reduced(self, resolution: str) -> "Scene":
         """Return this scene on a smaller film, on which each pixel is the mean of a square block.
 
@@ -310,7 +309,6 @@ class Scene(SceneFiles, Shown):
             return self.points.place_beside()
         return self.camera(loaded).world_transform().translation()
 
-    @keywords()
     def only(self, names: Collection[str]) -> "Scene":
         """Return this scene with only the lights `names`.
 

@@ -11,7 +11,7 @@ from lightpaint.arrays import Floats
 from lightpaint.colour import ViewTransform, luminance
 from lightpaint.display_text import Shown
 from lightpaint.errors import SizeError, TargetError
-from lightpaint.images import block_mean, resampled, whole_factor
+from lightpaint.images import block_mean, check_factor, check_size, resampled, whole_factor
 from lightpaint.keywords import keywords
 from lightpaint.sentences import Hint, Remedy
 from lightpaint.target.painted_pixels import TargetPixels
@@ -185,7 +185,6 @@ class Target(Shown):
         _check_range(self.title, self.image, self.importance > 0)
 
     @classmethod
-    @keywords()
     def of(
         cls,
         image: npt.ArrayLike,
@@ -264,18 +263,17 @@ class Target(Shown):
         """`painted_share` as text, such as `63.7 %`, the same everywhere."""
         return spoken_share(self.painted_share)
 
-    @keywords()
     def resized(self, size: tuple[int, int]) -> "Target":
         """Return the target resampled to `size` (height, width), in linear light, weighted by
-        importance.
+        importance. Raises SizeError for a size that no image has.
         """
+        check_size(size)
         if size == self.size:
             return self
         return self._with_pixels(
             self._pixels.resampled(size), [wish.resized(size) for wish in self.wishes]
         )
 
-    @keywords()
     def cropped(self, height: int, width: int) -> "Target":
         """Return the top left part of the target, of this size.
 
@@ -290,13 +288,14 @@ class Target(Shown):
             [wish.cropped(height, width) for wish in self.wishes],
         )
 
-    @keywords()
     def reduced(self, factor: int) -> "Target":
         """Return the target averaged over blocks of factor × factor pixels, weighted by importance.
 
         The importance of a block is the mean over its pixels. For images that are constant in each
-        block, the squared residual stays the same up to a constant.
+        block, the squared residual stays the same up to a constant. Raises
+        SizeError where the target has no such blocks.
         """
+        check_factor(self.size, factor)
         if factor == 1:
             return self
         return self._with_pixels(
@@ -312,7 +311,6 @@ class Target(Shown):
         share = self.painted_share
         return replace(self, **pixels._asdict(), full_size_share=share, wishes=tuple(wishes))
 
-    @keywords()
     def without(self, holes: npt.NDArray[np.bool_]) -> "Target":
         """Return the target with importance 0 in the pixels `holes`, (h, w), which the basis
         lacks.
@@ -326,7 +324,6 @@ class Target(Shown):
             not_finite=self.not_finite + int(lost_mask.sum()),
         )
 
-    @keywords()
     def fitted_to(self, size: tuple[int, int], *, resize: bool) -> "Target":
         """Return the target at `size` (height, width) of the basis.
 
@@ -334,6 +331,7 @@ class Target(Shown):
         if it was painted in full size for a basis on a reduced film. Raises SizeError if it has
         another size and must not be resampled.
         """
+        check_size(size)
         if factor := whole_factor(self.size, size):
             return self.reduced(factor)
         if self.size != size and not resize:

@@ -214,7 +214,9 @@ def test_white_paint_everywhere_ends(make_basis: Any, seed: int):
     """No light is too much for it, so each step to more promises a little, however long."""
     images = np.random.default_rng(seed).random((10, 12, 16, 3)) ** 8
     basis = make_basis(images=images, emission=np.ones((10, 3)))
-    target = Target("t", np.full((12, 16, 3), 30.0, np.float32), np.ones((12, 16), np.float32))
+    target = Target(
+        "t", np.full((12, 16, 3), 30.0, np.float32), np.ones((12, 16), np.float32), True
+    )
     solution = solve(basis, target, space="display", transform=SRGB, colors="gentle")
     assert solution.certificate.converged
     shown = SRGB.encode(combine(basis, solution.lighting).image)

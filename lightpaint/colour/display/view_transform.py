@@ -60,7 +60,6 @@ class ViewTransform:
         _encoding(self.name)
 
     @staticmethod
-    @keywords()
     def parse(text: str, stops: float = 0.0) -> "ViewTransform":
         """Return the transform named `text`, so that `ViewTransform.parse(t.name, t.stops) == t`.
 
@@ -91,12 +90,10 @@ class ViewTransform:
         encoding = _encoding(self.name)
         return isinstance(encoding, Curve) and encoding.matrix is None
 
-    @keywords()
     def encode(self, image: "Floats") -> "Floats":
         """Return a linear Rec.709 image (..., 3) as display values in [0, 1]."""
         return _encoding(self.name).encode(image * 2.0**self.stops)
 
-    @keywords()
     def decode(self, image_display: "Floats") -> "Floats":
         """Return display values in [0, 1], (..., 3), as linear Rec.709. Clipping cannot be
         undone.
@@ -146,7 +143,6 @@ class TransformChoice:
         self.over(None)
 
     @staticmethod
-    @keywords()
     def of(transform: "ViewTransform | TransformChoice | None") -> "TransformChoice":
         """Return a transform as a choice, a choice unchanged, or the open choice for None."""
         if isinstance(transform, ViewTransform):

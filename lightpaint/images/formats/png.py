@@ -14,6 +14,7 @@ from PIL.PngImagePlugin import PngInfo
 
 from lightpaint.arrays import Floats
 from lightpaint.colour import (
+    MAX_STOPS,
     Profile,
     choose_exposure,
     encode_display,
@@ -114,6 +115,10 @@ def display_picture(image: Floats, *, stops: float | None = None, zoom: int = 1)
         raise ImageError(f"an image of the shape {np.shape(image)}: expected (height, width, 3)")
     if not 1 <= zoom <= MAX_ZOOM:
         raise ImageError(f"zoom is {zoom}: expected a whole number from 1 to {MAX_ZOOM}")
+    if np.isnan(image).any():
+        raise ImageError("an image with NaN: np.nan_to_num(image) shows it with black there")
+    if stops is not None and not abs(stops) <= MAX_STOPS:
+        raise ImageError(f"stops is {stops}: expected from {-MAX_STOPS:g} to {MAX_STOPS:g}")
     exposure = choose_exposure(image) if stops is None else stops
     pixels = to_8_bit(encode_display(image, stops=exposure))
     return Image.fromarray(np.kron(pixels, np.ones((zoom, zoom, 1), np.uint8)))

@@ -357,7 +357,6 @@ class Lighting(Shown, Mapping[str, LightSetting]):
         """RGB emission by name of light."""
         return {light.name: light.emission for light in self.lights}
 
-    @keywords()
     def photometry(self, light: LightSetting) -> Photometry:
         """Return colour, temperature and flux of one of its lights.
 
@@ -427,7 +426,6 @@ class Lighting(Shown, Mapping[str, LightSetting]):
             attrs={"target": self.target},
         )
 
-    @keywords()
     def with_emission(self, name: str, emission: RGB) -> "Lighting":
         """Return the lighting with another RGB emission for one light, and without its certificate.
 
@@ -471,7 +469,6 @@ class Lighting(Shown, Mapping[str, LightSetting]):
         return replace(self, certificate=certificate)
 
     @classmethod
-    @keywords()
     def of_weights(
         cls,
         lights: Basis | Lights,
@@ -515,12 +512,10 @@ class Lighting(Shown, Mapping[str, LightSetting]):
         return cls(settings, **fields)
 
     @classmethod
-    @keywords()
     def current(cls, basis: Basis) -> "Lighting":
         """Return the current lighting of the scene."""
         return cls.of_weights(basis, basis.current_weights)
 
-    @keywords()
     def weights_for(self, lights: Basis | Lights) -> Doubles:
         """Return weights (n, 3) in the order of `lights`, which may be those of a basis.
 

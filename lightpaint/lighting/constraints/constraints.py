@@ -242,7 +242,6 @@ class Constraints:
         return is_any_set or bool(self.lights or self.ties or self.sparse is not None)
 
     @classmethod
-    @keywords()
     def of(
         cls,
         light: Mapping[str, Mapping[str, Any]] | None = None,
@@ -290,7 +289,6 @@ class Constraints:
             parse_preference(prefer_emitters, source / "prefer_emitters"),
         )
 
-    @keywords()
     def and_then(self, others: "Constraints") -> "Constraints":
         """Return these constraints with `others`, which replace contradictory ones.
 

@@ -283,7 +283,6 @@ class Job:
         )
 
     @staticmethod
-    @keywords()
     def from_json(text: str) -> "Job":
         """Return the job that `to_json` wrote, with the files as they are on this machine.
 
