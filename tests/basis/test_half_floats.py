@@ -195,6 +195,24 @@ def test_memory_holds_many_planes_in_two_bytes_a_number(
         np.testing.assert_allclose(lp.solve(basis, target).weights, expected.weights, rtol=1e-12)
 
 
+def test_planes_that_were_decoded_are_written_as_they_came() -> None:
+    """The walks share float32, and no half floats stay beside them."""
+    flat = np.zeros_like(plane(0.1)[1])
+    pairs = [plane(0.1), plane(1e-9), (1 + plane(0.1)[0], flat)]  # noisy, scaled, clean
+    encoded = [x for image, noise in pairs for x in encode_pair(image, noise)]
+    assert {x.encoding.kind for x in encoded} == {HALF, FLOAT}
+    assert any(x.encoding.scale != 1 for x in encoded)
+    planes = EncodedPlanes(encoded)
+    values = np.stack([x.encoding.decoded(np.stack(x.numbers)) for x in encoded])
+    np.testing.assert_array_equal(planes.array(), values.transpose(0, 2, 3, 1))
+    assert planes.nbytes == values.nbytes
+    for i, before in enumerate(encoded):
+        after = planes.encoded(i)
+        assert after.encoding == before.encoding
+        assert after.size == before.size
+        assert np.stack(after.numbers).tobytes() == np.stack(before.numbers).tobytes()
+
+
 @pytest.mark.parametrize("limit", [0, 2**27])
 def test_what_is_kept_is_rounded_once(
     tmp_path: Path, basis: lp.Basis, monkeypatch: pytest.MonkeyPatch, limit: int

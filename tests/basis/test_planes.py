@@ -5,6 +5,7 @@ import errno
 import gc
 import os
 import weakref
+import zlib
 from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
@@ -447,6 +448,14 @@ def test_several_pictures_in_one_row(monkeypatch: pytest.MonkeyPatch, images: np
         np.testing.assert_array_equal(actual, expected_sum)
 
 
+@pytest.mark.parametrize("size", [1, 2, 3, 16, 31, 1000, 4097])
+def test_packed_bytes_are_unpacked_as_they_were(size: int) -> None:
+    plain = np.random.default_rng(size).integers(0, 256, size).astype(np.uint8)
+    packed = zlib.compress(exr_rows.zip_filtered(plain[None]).tobytes())
+    np.testing.assert_array_equal(exr_rows._unpacked(packed, size), plain)
+    assert not exr_rows._unpacked(packed[:-5], size).size
+
+
 def test_a_chunk_of_a_packed_file_is_unpacked_once_for_a_walk(
     tmp_path: Path, make_basis: Any, monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -457,7 +466,7 @@ def test_a_chunk_of_a_packed_file_is_unpacked_once_for_a_walk(
     unpacked = []
     plain = exr_rows._unpacked
 
-    def count_chunks(compressed: bytes, size: int) -> bytes:
+    def count_chunks(compressed: bytes, size: int) -> np.ndarray:
         unpacked.append(size)
         return plain(compressed, size)
 

@@ -24,6 +24,7 @@ from lightpaint.arrays import (
     Indices,
     copy_as_singles,
     read_only,
+    release_freed_memory,
     round_to_halves,
 )
 from lightpaint.basis.file.file_planes import RowPlanes
@@ -91,32 +92,41 @@ class EncodedPlanes(RowPlanes):
     invisible.
 
     planes: one for each light. is_decoded_once: whether walks share what the first has decoded, if
-    that takes little memory.
+    that takes little memory; the stored numbers, which follow from it, are then forgotten.
     """
 
     def __init__(self, planes: Sequence[EncodedPlane], *, is_decoded_once: bool = True) -> None:
-        self._encoded, self._is_decoded_once = tuple(planes), is_decoded_once
+        self._stored, self._is_decoded_once = list(planes), is_decoded_once
+        self._count, self._size = len(planes), planes[0].size
         self._lock = Lock()
         self._decoded: npt.NDArray[np.float32] | None = None
 
     @property
     def count(self) -> int:
         """Number of lights."""
-        return len(self._encoded)
+        return self._count
 
     @property
     def size(self) -> tuple[int, int]:
         """(height, width) in pixels."""
-        return self._encoded[0].size
+        return self._size
 
     @property
     def nbytes(self) -> int:
         """Bytes of memory that the planes take."""
-        return sum(channel.nbytes for plane in self._encoded for channel in plane.numbers)
+        if self._decoded is not None:
+            return self._decoded.nbytes
+        return sum(channel.nbytes for plane in self._stored for channel in plane.numbers)
 
     def encoded(self, i: int) -> EncodedPlane:
         """Return the plane of light i in its stored encoding."""
-        return self._encoded[i]
+        with self._lock:
+            plane = self._stored[i]
+            if self._decoded is None:
+                return plane
+            # Numbers that were decoded are rounded to themselves.
+            singles = self._decoded[i].reshape(3, *self._size)
+            return EncodedPlane(plane.encoding, plane.encoding.encoded(singles))
 
     def plane(self, i: int) -> Floats:
         """Return the plane of light i, (h, w, 3)."""
@@ -139,7 +149,9 @@ class EncodedPlanes(RowPlanes):
                 decoded = np.empty((self.count, 3, pixels), np.float32)
                 for i, channels in enumerate(decoded):
                     self._decode(i, slice(None), channels)
+                    self._stored[i] = EncodedPlane(self._stored[i].encoding, ())
                 self._decoded = read_only(decoded)
+                release_freed_memory()
             return self._decoded
 
     def rows(self, top: int, bottom: int) -> Floats:
@@ -153,7 +165,7 @@ class EncodedPlanes(RowPlanes):
         """Return some pixels of all planes, (n, p, 3)."""
         if self._singles is not None:
             return self._singles[:, :, where].transpose(0, 2, 1)
-        length = self._encoded[0].numbers[0].reshape(-1)[where].size
+        length = self._stored[0].numbers[0].reshape(-1)[where].size
         # Channels first, which is how they are stored and summed.
         block = np.empty((self.count, 3, length), np.float32)
         for i, channels in enumerate(block):
@@ -162,7 +174,7 @@ class EncodedPlanes(RowPlanes):
 
     def _decode(self, i: int, where: slice | Indices, into: Floats) -> None:
         """Decode some pixels of light i into an array (3, p)."""
-        encoded = self._encoded[i]
+        encoded = self._stored[i]
         for stored, channel in zip(encoded.numbers, into, strict=True):
             copy_as_singles(stored.reshape(-1)[where], channel)
         if encoded.encoding.scale != 1:
