@@ -1,8 +1,10 @@
-"""Colour wheels: the slots that a channel can choose, and the colour that each gives a lamp.
+"""Colour wheels: the slots that a channel can choose, and the colour that each gives a lamp; and
+filters of colour temperature, which become wheels of some steps.
 
 Only levels at which a slot stands in the beam count: between two slots a wheel shows both.
 """
 
+import math
 import re
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
@@ -30,6 +32,7 @@ from lightpaint.dmx.gdtf.emitter_colour import (
     EmitterColour,
     bounded,
     filter_spectrum,
+    filtered_white,
     parsed_colour,
     possible_kelvin,
     rgb_of_xy,
@@ -45,6 +48,13 @@ CLEAR = 0.9
 
 #: Least share of light of two slots together, and the CIEDE2000 below which colours are alike.
 DARKEST, ALIKE = 0.005, 2.0
+
+#: Steps of a filter of colour temperature, at equal distances in mireds: some two fifths of a full
+#: CTO in a range of 6500 K to 2800 K.
+WHITE_STEPS = 6
+
+#: Combinations of slots up to which those of several wheels count.
+MAX_COMBINATIONS = 2**12
 
 #: PhysicalFrom and PhysicalTo of a set that does not say how far a wheel is from a slot.
 _NOT_SAID = (0.0, 1.0)
@@ -100,6 +110,25 @@ def wheel_slots(
     return found
 
 
+def white_slots(function: ChannelFunction, own: float) -> list[SlotColour]:
+    """Return steps of a filter that moves in without any, and sets a colour temperature.
+
+    function: by which its channel does so. own: kelvin of the lamp, at which it is open.
+    """
+    own = possible_kelvin(own)
+    start, end = function.ends
+    steps = 1e6 / np.linspace(1e6 / start, 1e6 / end, WHITE_STEPS)
+    is_open = int(np.argmin(np.abs(1e6 / steps - 1e6 / own)))
+    steps[is_open] = np.clip(own, min(start, end), max(start, end))
+    levels = [function.level_of(kelvin) for kelvin in steps.tolist()]
+    middles = [(a + b) // 2 for a, b in pairwise(levels)]
+    firsts, lasts = [function.first, *(x + 1 for x in middles)], [*middles, function.last]
+    return [
+        SlotColour(RigSlot(*of_slot), filtered_white(f"{kelvin:.0f} K", own, kelvin))
+        for kelvin, *of_slot in zip(steps.tolist(), levels, firsts, lasts, strict=True)
+    ]
+
+
 @dataclass(frozen=True)
 class SlotCombination:
     """Slots of wheels one behind the other, one of each: the light behind them, and what they let
@@ -116,11 +145,15 @@ def slot_combinations(
 ) -> list[SlotCombination]:
     """Return the combinations of slots of wheels, of which those of a single wheel come first.
 
-    Transmissions multiply. Of the others, the brightest remain whose colour no brighter one has.
-    kelvin: of the lamp. The open slot of a wheel is its brightest.
+    Transmissions multiply. Of the others, the brightest remain whose colour no brighter one has;
+    of very many combinations, none. kelvin: of the lamp. The open slot of a wheel is its brightest.
     """
     opens = [int(np.argmax([x.colour.share for x in slots])) for slots in wheels]
-    every = [*product(*(range(len(x)) for x in wheels))]
+    if math.prod(map(len, wheels)) <= MAX_COMBINATIONS:
+        every = [*product(*(range(len(x)) for x in wheels))]
+    else:
+        alone = ((j, k) for j, slots in enumerate(wheels) for k in range(len(slots)))
+        every = [*dict.fromkeys((*opens[:j], k, *opens[j + 1 :]) for j, k in alone)]
     turned = {c: [j for j, k in enumerate(c) if k != opens[j]] for c in every}
     found = {c: _combined(c, wheels, opens, kelvin) for c in every}
     # Of a single wheel they keep its order.
