@@ -178,7 +178,7 @@ WRONG = {
     "g.spdx": ("<a><b></a>", "is not TM-27: mismatched tag"),
     "h.spdx": ("<!DOCTYPE a><a/>", "document type declaration"),
     "i.spdx": ("<a>" * 40, "nested more than 32 deep"),
-    "j.spdx": (TM27.format(""), "has 0 points"),
+    "j.spdx": (TM27.format(""), "is not TM-27: it has no SpectralData"),
     "k.csv": (None, "no such spectrum"),
     "D66": (None, "a file .* a black body .* or an illuminant"),
     "90K blackbody": (None, "90 K: expected 500 to 100000"),

@@ -12,7 +12,7 @@ from lightpaint.colour.color import matching_functions
 from lightpaint.colour.lamp import Lamp, LampEmitter
 from lightpaint.colour.primaries import REC2020, rgb_to_xyz
 from lightpaint.dmx.console_rig import ConsoleRig, RigLight
-from lightpaint.dmx.gdtf.emitter_colour import xy_of_kelvin
+from lightpaint.dmx.gdtf.emitter_colour import rgb_of_xy, xy_of_kelvin
 from lightpaint.dmx.gdtf.fixture_type import FixtureType
 from lightpaint.dmx.gdtf.mode_lights import FixtureMode
 from lightpaint.dmx.levels import decode_levels, encode_levels
@@ -403,45 +403,22 @@ def test_wheels_in_front_of_what_a_lamp_mixes_filter_it(tmp_path: Path, kind: st
     assert [x.channels for x in rows] == [(16,), (17,)]
 
 
-CTO = channel("CTO", "8,9", function='PhysicalFrom="6500" PhysicalTo="2800"')
-
-
-def test_a_cto_beside_filters_is_a_wheel_of_whites(tmp_path: Path) -> None:
-    rig = _rig_of(tmp_path, gdtf(BESIDE["filters"] + CTO, geometries=LAMP))
-    light = _light(rig)
-    names = [x.name for x in light.wheel.filters]
-    # At equal distances in mireds.
-    kelvins = [1e6 / x for x in np.linspace(1e6 / 6500, 1e6 / 2800, 6)]
-    assert names == [f"{x:.0f} K" for x in kelvins]
-    lamp = _xyz(xy_of_kelvin(6500))
-    wide = np.linalg.inv(rgb_to_xyz(REC2020))
-    for kelvin, x in zip(kelvins, light.wheel.filters, strict=True):
-        # Through the filter the lamp has that temperature.
-        passed = rgb_to_xyz(REC2020) @ (np.array(x.transmission) * (wide @ lamp))
-        assert passed[:2] / passed.sum() == pytest.approx(xy_of_kelvin(kelvin), abs=2e-4)
-        assert max(x.transmission) <= 1
-        levels = encode_levels(rig, {light.name: {"red": 0.5, f"wheel {x.name}": 1.0}})
-        level = int.from_bytes(levels[1][17:19], "big")
-        assert level / 65535 == pytest.approx((6500 - kelvin) / 3700, abs=1e-4)
-        found = decode_levels(rig, levels)[light.name]
-        assert [name for name in found if name.startswith("wheel ")] == [f"wheel {x.name}"]
-    # A full CTO (Lee 204, from 6500 K to 3200 K) lets 55.4 % of the light through.
-    assert 0.5 < np.array(light.wheel.filters[-1].transmission) @ [0.2627, 0.678, 0.0593] < 0.6
-    # Whatever level stands between two is that of the nearer one.
-    levels = {1: bytearray(encode_levels(rig, {light.name: {"red": 1.0}})[1])}
-    for level in range(0, 65536, 257):
-        levels[1][17:19] = level.to_bytes(2, "big")
-        shown = [x for x in decode_levels(rig, levels)[light.name] if x.startswith("wheel ")]
-        assert len(shown) == 1
-
-
-def test_a_cto_multiplies_with_wheels_and_rests_beside_leds(tmp_path: Path) -> None:
-    rig = _rig_of(tmp_path, gdtf(BESIDE["filters"] + TURNING + CTO, geometries=LAMP, wheels=WHEELS))
-    names = [x.name for x in _light(rig).wheel.filters]
-    assert {"open", "red", "2800 K", "half + 2800 K"} <= {*names}
-    mode = read_mode(gdtf(BESIDE["emitters"] + CTO, geometries=LAMP))
+@pytest.mark.parametrize("kind", ["emitters", "filters"])
+def test_a_cto_beside_what_mixes_its_whites_rests(kind: str, tmp_path: Path) -> None:
+    """Whatever such a filter leaves of full drives, less of each drive is the same light."""
+    cto = channel("CTO", "8,9", function='PhysicalFrom="6500" PhysicalTo="2800"')
+    mode = read_mode(gdtf(BESIDE[kind] + cto, geometries=LAMP))
     assert mode.lights[0].wheel is None
     assert "at rest: CTO" in mode.remarks
+    columns = np.array([rgb_of_xy(x.xy) * x.candela for x in mode.lights[0].emitters])
+    full = columns.sum(axis=0)
+    for kelvin in (2800, 3200, 4200, 5600):
+        filtered = rgb_of_xy(xy_of_kelvin(kelvin))
+        # No channel has more light than the lamp.
+        filtered *= (full / filtered).min()
+        drives = np.linalg.solve(columns.T, filtered)
+        assert (drives >= 0).all()
+        assert (drives <= 1 + 1e-9).all()
 
 
 def test_very_many_combinations_are_left_out(tmp_path: Path) -> None:

@@ -218,4 +218,6 @@ def _points_of_tm27(data: bytes, path: Path) -> list[tuple[float, ...]]:
         parser.Parse(data, True)
     except (expat.ExpatError, ValueError) as error:
         raise ColorError(path, f" is not TM-27: {one_line(str(error))}") from None
+    if not points:
+        raise ColorError(path, " is not TM-27: it has no SpectralData")
     return points

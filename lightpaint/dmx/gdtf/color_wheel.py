@@ -1,5 +1,4 @@
-"""Colour wheels: the slots that a channel can choose, and the colour that each gives a lamp; and
-filters of colour temperature, which become wheels of some steps.
+"""Colour wheels: the slots that a channel can choose, and the colour that each gives a lamp.
 
 Only levels at which a slot stands in the beam count: between two slots a wheel shows both.
 """
@@ -32,7 +31,6 @@ from lightpaint.dmx.gdtf.emitter_colour import (
     EmitterColour,
     bounded,
     filter_spectrum,
-    filtered_white,
     parsed_colour,
     possible_kelvin,
     rgb_of_xy,
@@ -48,10 +46,6 @@ CLEAR = 0.9
 
 #: Least share of light of two slots together, and the CIEDE2000 below which colours are alike.
 DARKEST, ALIKE = 0.005, 2.0
-
-#: Steps of a filter of colour temperature, at equal distances in mireds: some two fifths of a full
-#: CTO in a range of 6500 K to 2800 K.
-WHITE_STEPS = 6
 
 #: Combinations of slots up to which those of several wheels count.
 MAX_COMBINATIONS = 2**12
@@ -108,25 +102,6 @@ def wheel_slots(
             name = _free_name(elements[k - 1], k, {x.colour.name for x in found})
             found.append(SlotColour(slot, _colour(name, elements[k - 1], filters, kelvin)))
     return found
-
-
-def white_slots(function: ChannelFunction, own: float) -> list[SlotColour]:
-    """Return steps of a filter that moves in without any, and sets a colour temperature.
-
-    function: by which its channel does so. own: kelvin of the lamp, at which it is open.
-    """
-    own = possible_kelvin(own)
-    start, end = function.ends
-    steps = 1e6 / np.linspace(1e6 / start, 1e6 / end, WHITE_STEPS)
-    is_open = int(np.argmin(np.abs(1e6 / steps - 1e6 / own)))
-    steps[is_open] = np.clip(own, min(start, end), max(start, end))
-    levels = [function.level_of(kelvin) for kelvin in steps.tolist()]
-    middles = [(a + b) // 2 for a, b in pairwise(levels)]
-    firsts, lasts = [function.first, *(x + 1 for x in middles)], [*middles, function.last]
-    return [
-        SlotColour(RigSlot(*of_slot), filtered_white(f"{kelvin:.0f} K", own, kelvin))
-        for kelvin, *of_slot in zip(steps.tolist(), levels, firsts, lasts, strict=True)
-    ]
 
 
 @dataclass(frozen=True)

@@ -208,20 +208,17 @@ def xy_of_kelvin(kelvin: float) -> Chromaticity:
     return xy_of(xyz_of(uv))
 
 
-def filtered_white(name: str, own: float, kelvin: float) -> EmitterColour:
-    """Return a white of a lamp whose colour is filtered.
-
-    own: its own colour temperature, of all its light. Filters let through as much as they can: all
-    of the channel in which the other colour has most.
-    """
-    lamp, xy = rgb_of_xy(xy_of_kelvin(own)), xy_of_kelvin(kelvin)
-    return EmitterColour(name, xy, float(1 / np.max(rgb_of_xy(xy) / lamp)))
-
-
 def whites_of(own: float, ends: tuple[float, float]) -> list[EmitterColour]:
-    """Return the coolest and the warmest white of a lamp, as `filtered_white`. ends: in kelvin."""
-    named = ("cool white", max(ends)), ("warm white", min(ends))
-    return [filtered_white(name, own, kelvin) for name, kelvin in named]
+    """Return the coolest and the warmest white of a lamp whose colour is filtered.
+
+    own: its own colour temperature, of all its light. ends: of the range, in kelvin. Filters let
+    through as much as they can: all of the channel in which the other colour has most.
+    """
+    lamp, found = rgb_of_xy(xy_of_kelvin(own)), []
+    for name, kelvin in (("cool white", max(ends)), ("warm white", min(ends))):
+        xy = xy_of_kelvin(kelvin)
+        found.append(EmitterColour(name, xy, float(1 / np.max(rgb_of_xy(xy) / lamp))))
+    return found
 
 
 @dataclass(frozen=True)

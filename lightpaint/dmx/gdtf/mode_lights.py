@@ -17,12 +17,7 @@ import numpy as np
 from lightpaint.arrays import Doubles
 from lightpaint.dmx.color_mixing import can_invert
 from lightpaint.dmx.console_rig import DmxChannel, RigEmitter, RigFilter, RigWheel
-from lightpaint.dmx.gdtf.color_wheel import (
-    SlotColour,
-    slot_combinations,
-    wheel_slots,
-    white_slots,
-)
+from lightpaint.dmx.gdtf.color_wheel import SlotColour, slot_combinations, wheel_slots
 from lightpaint.dmx.gdtf.emitter_colour import (
     SPACES,
     USUAL_FILTERS,
@@ -455,8 +450,7 @@ class ModeReader:
         return not (self.whites or self.slots)
 
     def _wheel(self) -> RigWheel | None:
-        """Return the colour wheels of all beams, and filters of colour temperature in front of
-        others; None without one of at least two slots.
+        """Return the colour wheels of all beams; None without one of at least two slots.
 
         Of a lamp that mixes no colours and can be dimmed the slots become the emitters. In front of
         channels that mix, they filter.
@@ -473,14 +467,6 @@ class ModeReader:
                     wheels.append(slots)
                     turn = "in front of what it mixes" if mixes else "one at a time"
                     self._remark(f"{match[0]} is a wheel of {len(slots)} colours, {turn}")
-        if self.way is _FILTERED:
-            # LEDs are at drives of their own in each white; filters may have none as warm.
-            for k, match in self._with_attribute(_WARMTH):
-                if (function := self._kelvin_function(k)) is not None:
-                    channels.append(k)
-                    wheels.append(white_slots(function, kelvin))
-                    ends = " to ".join(f"{x:.0f} K" for x in function.ends)
-                    self._remark(f"{match[0]} filters from {ends}, in front of what it mixes")
         if not wheels:
             return None
         found = slot_combinations(wheels, kelvin)
@@ -502,7 +488,11 @@ class ModeReader:
         if self.way is not None or not self._common_dimmers or self._is_placeholder():
             return []
         for k, _ in self._with_attribute(_WARMTH):
-            if (function := self._kelvin_function(k)) is not None:
+            function = self._warmth_of(k)
+            ends = [] if function is None else sorted(function.ends)
+            is_range = bool(ends) and LEAST_KELVIN <= ends[0] < ends[1] <= MOST_KELVIN
+            above = all(self.channels[k].node in beam.placed.ancestry for beam in self.beams)
+            if function is not None and is_range and above:
                 levels = (function.first, function.last)
                 pairs = zip(levels, function.ends, strict=True)
                 curve: Curve = tuple(
@@ -511,16 +501,6 @@ class ModeReader:
                 self.dmx[k] = replace(self.dmx[k], curve=curve)
                 return [k]
         return []
-
-    def _kelvin_function(self, place: int) -> ChannelFunction | None:
-        """Return the function by which a channel sets the colour temperature of all beams; None
-        without a range in kelvin.
-        """
-        function = self._warmth_of(place)
-        ends = [] if function is None else sorted(function.ends)
-        is_range = bool(ends) and LEAST_KELVIN <= ends[0] < ends[1] <= MOST_KELVIN
-        above = all(self.channels[place].node in beam.placed.ancestry for beam in self.beams)
-        return function if is_range and above else None
 
     def _warmth_of(self, place: int) -> ChannelFunction | None:
         """Return the function by which a channel sets a colour temperature."""
