@@ -39,11 +39,11 @@ def improve_slots(
     """
     if reduction.requirements is not None:
         return reduction
-    return _Search(equations, norm2 or 1.0, MAX_TRIALS).improve(reduction, weights)
+    return _SlotSearch(equations, norm2 or 1.0, MAX_TRIALS).improve(reduction, weights)
 
 
 @dataclass
-class _Search:
+class _SlotSearch:
     """The trials of a search. Errors are of the picture, relative to the painting."""
 
     equations: NormalEquations
