@@ -211,7 +211,8 @@ def test_scalar_variants_and_saved_bases_are_refused_in_one_line(room: Path) -> 
     write_rgb(folder / "painting.exr", np.ones((20, 24, 3), np.float32))
     solve = ("solve", "room.xml", "painting.exr", "--spectral")
     line = run_refused(folder, *solve, "--variant", "scalar_rgb", by=spawn)
-    assert "spectra are only rendered where one pass renders all lights" in line
+    assert "spectra are only rendered where one pass renders all lights: use -m llvm_ad_rgb" in line
+    assert "--integrator" not in line
     succeed(folder, "basis", "room.xml", "--spp", 2, "-o", "room.basis.exr")
     line = run_refused(folder, "solve", "room.basis.exr", "painting.exr", "--spectral")
     assert "--spectral cannot change a saved basis" in line
@@ -219,3 +220,13 @@ def test_scalar_variants_and_saved_bases_are_refused_in_one_line(room: Path) -> 
     assert "--rf panel is 120" in line
     line = run_refused(folder, *solve, "--kelvin", "panel=2700:6500")
     assert "has a range of kelvin" in line
+
+
+def test_named_spectra_without_the_option_are_remarked_on(room: Path) -> None:
+    picture = room.with_name("painting.exr")
+    write_rgb(picture, np.ones((20, 24, 3), np.float32))
+    solve = ("solve", "room.xml", "painting.exr", "--spp", 2, "--no-verify")
+    said = " ".join(run_command(room.parent, *solve, "--no-cache").stderr.split())
+    remark = "bulb, panel have spectra, of which pictures in RGB show the colour alone: --spectral"
+    assert said.count(remark) == 1
+    assert not any("have spectra" in str(x) for x in _job(room, picture).remarks)

@@ -87,6 +87,7 @@ if TYPE_CHECKING:
     from lightpaint.colour.spectra.spectrum_source import FEWEST_POINTS as FEWEST_POINTS
     from lightpaint.colour.spectra.spectrum_source import daylight as daylight
     from lightpaint.colour.spectra.spectrum_source import file_of_spectrum as file_of_spectrum
+    from lightpaint.colour.spectra.spectrum_source import measured_points as measured_points
     from lightpaint.colour.spectra.spectrum_source import named_spectrum as named_spectrum
     from lightpaint.colour.srgb import decode_display as decode_display
     from lightpaint.colour.srgb import encode_display as encode_display

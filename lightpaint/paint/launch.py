@@ -142,17 +142,20 @@ class SessionFile:
 
     def _on_scene_loaded(self, k: int, lazy_scene: LazyScene, scene: Scene) -> None:
         """Complete the identity with the scene of view k, which was not cached."""
+        from lightpaint.lighting.constraints.constraints_file import constraints_of
         from lightpaint.pipeline.job.remarks import (
             remarks_of_film,
             remarks_of_memory,
             remarks_of_scene,
+            remarks_on_spectra,
         )
 
         self._loaded[k] = scene
         if (identity := session_identity(self._subjects, self._loaded)) is not None:
             self._open_with(identity)
         lasting = *remarks_of_scene(scene), *remarks_of_film(scene, lazy_scene.settings)
-        self._report_new((*lasting, *remarks_of_memory(scene)))
+        of_spectra = remarks_on_spectra(scene, constraints_of(scene.requests))
+        self._report_new((*lasting, *of_spectra, *remarks_of_memory(scene)))
         from lightpaint.scene.runtime.variant import use_variant
 
         # Remarks about this machine may not hold next time.

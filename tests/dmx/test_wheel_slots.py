@@ -12,7 +12,7 @@ from lightpaint.colour.color import matching_functions
 from lightpaint.colour.lamp import Lamp, LampEmitter
 from lightpaint.colour.primaries import REC2020, rgb_to_xyz
 from lightpaint.dmx.console_rig import ConsoleRig, RigLight
-from lightpaint.dmx.gdtf.emitter_colour import xy_of_kelvin
+from lightpaint.dmx.gdtf.emitter_colour import rgb_of_xy, xy_of_kelvin
 from lightpaint.dmx.gdtf.fixture_type import FixtureType
 from lightpaint.dmx.gdtf.mode_lights import FixtureMode
 from lightpaint.dmx.levels import DriveFade, check_drives, decode_levels, drives_of, encode_levels
@@ -399,6 +399,33 @@ def test_wheels_in_front_of_what_a_lamp_mixes_filter_it(tmp_path: Path, kind: st
     assert [*levels[1][15:17]] == [0, 0]  # where they rest, which is open
     [*rows] = [x for x in level_rows(rig, {light.name: sent}, {1: 1}) if x.emitter == "wheel"]
     assert [x.channels for x in rows] == [(16,), (17,)]
+
+
+@pytest.mark.parametrize("kind", ["emitters", "filters"])
+def test_a_cto_beside_what_mixes_its_whites_rests(kind: str, tmp_path: Path) -> None:
+    """Whatever such a filter leaves of full drives, less of each drive is the same light."""
+    cto = channel("CTO", "8,9", function='PhysicalFrom="6500" PhysicalTo="2800"')
+    mode = read_mode(gdtf(BESIDE[kind] + cto, geometries=LAMP))
+    assert mode.lights[0].wheel is None
+    assert "at rest: CTO" in mode.remarks
+    columns = np.array([rgb_of_xy(x.xy) * x.candela for x in mode.lights[0].emitters])
+    full = columns.sum(axis=0)
+    for kelvin in (2800, 3200, 4200, 5600):
+        filtered = rgb_of_xy(xy_of_kelvin(kelvin))
+        # No channel has more light than the lamp.
+        filtered *= (full / filtered).min()
+        drives = np.linalg.solve(columns.T, filtered)
+        assert (drives >= 0).all()
+        assert (drives <= 1 + 1e-9).all()
+
+
+def test_very_many_combinations_are_left_out(tmp_path: Path) -> None:
+    """Nine wheels of 25 slots have four million million combinations."""
+    slots = [(f"S{k}", f"0.3,0.{300 + k},90") for k in range(40)]
+    wheels = "".join(_wheel_of(f"W{j}", *slots) for j in range(9))
+    turning = "".join(_turning(f"Color{j + 1}", str(10 + j), f"W{j}", 25) for j in range(9))
+    data = gdtf(channel("Dimmer", "1") + turning, geometries=LAMP, wheels=wheels)
+    assert len(_light(_rig_of(tmp_path, data)).emitters) == 40
 
 
 def test_of_several_slots_alike_the_brightest_remains(tmp_path: Path) -> None:

@@ -8,6 +8,7 @@ import pytest
 
 from lightpaint.colour.color import kelvin_to_rgb
 from lightpaint.colour.color_difference import delta_e
+from lightpaint.colour.display.view_transform import ViewTransform
 from lightpaint.colour.spectra.color_rendering import fidelity
 from lightpaint.colour.spectra.spectrum import WAVELENGTHS, rgb_of_powers, spectrum_of
 from lightpaint.lighting.analysis.analysis import analyse
@@ -17,6 +18,9 @@ from lightpaint.lighting.constraints.constraints import Constraints
 from lightpaint.lighting.display import display_transform
 from lightpaint.lighting.held_mixes import HELD
 from lightpaint.lighting.solve import solve
+from lightpaint.paint.session.snapshot import SessionSnapshot
+from lightpaint.paint.store.session_requests import SessionRequests
+from lightpaint.pipeline.job.settings import Settings
 from lightpaint.report.phrases import rendering_sentences
 from lightpaint.target.target import Target
 
@@ -230,3 +234,20 @@ def test_the_file_has_what_was_chosen(make_basis, tmp_path):
     write_lighting(tmp_path / "a.json", lighting)
     assert read_lighting(tmp_path / "a.json") == lighting.of_lamps()
     assert renderings_of(read_lighting(tmp_path / "a.json")) == renderings_of(lighting)
+
+
+@pytest.mark.parametrize("wish", [{}, {"color": "3200K"}])
+def test_a_session_at_rest_has_the_mixes_of_a_solve(wish, make_basis):
+    basis = _basis(make_basis, "grey", "warm")
+    painted = 0.5 * POOR
+    expected = _solved(basis, prefer="rf", painted=painted, **wish).lighting.of_lamps()["a"]
+    weights = np.repeat((painted * LEVEL)[:, None], 3, axis=1)
+    target = Target("t", basis.mix(weights), np.ones(SIZE, np.float32), everything=True)
+    constraints = Constraints.of({"a": {"emitters": EMITTERS, **wish}}, prefer_emitters="rf")
+    snapshot = SessionSnapshot(
+        *(0, (basis,), (target,), SessionRequests(), Settings(literal=True, spectral=True)),
+        *(constraints, ViewTransform()),
+    )
+    found = snapshot.solution().lighting.of_lamps()["a"]
+    assert found.drives == pytest.approx(expected.drives, abs=1e-9)
+    assert fidelity(found.powers) > fidelity(painted @ found.lamp.powers_at_full) + 10

@@ -7,6 +7,7 @@ from typing import Any
 import numpy as np
 import pytest
 from least_squares import stack_rows
+from lightpaint.dmx.rig_drives import drives_of
 from nightly import seeds
 from scipy.optimize import lsq_linear
 
@@ -208,7 +209,8 @@ def test_a_scale_alone_is_kept(make_basis):
 
 
 def test_a_narrow_spectrum_has_the_colour_of_its_wavelength(make_basis):
-    emitters = [{"name": "laser", "spectrum": [[519, 0], [520, 1], [521, 0]], "Y": 1}]
+    line = [[400, 0], [519, 0], [520, 1], [521, 0], [700, 0]]
+    emitters = [{"name": "laser", "spectrum": line, "Y": 1}]
     basis, target, constraints = _case(make_basis, 1, par={"emitters": emitters})
     rgb = solve(basis, target, constraints=constraints).problem.reduction.lamps[0].columns[0]
     xyz = (
@@ -264,15 +266,25 @@ def test_drives_that_somebody_changed_are_refused_with_the_emission_that_they_mi
         read_lighting(file)
 
 
-def test_other_drives_of_the_same_emission_are_no_mistake(make_basis, tmp_path):
+def test_other_drives_of_the_same_emission_are_sent(make_basis, tmp_path):
     basis, target, constraints = _case(make_basis, 3, wash={"emitters": SIX})
-    preferred = constraints.and_then(Constraints.of(prefer_emitters="white"))
+    lighting = solve(basis, target, constraints=constraints).lighting
+    lamp = lighting["wash"].lamp
+    emission = tuple(lamp.mix(np.full(6, 0.3)).tolist())
     file = tmp_path / "a.json"
-    write_lighting(file, solve(basis, target, constraints=preferred).lighting)
+    write_lighting(file, lighting.with_emission("wash", emission))
     data = json.loads(file.read_text())
-    del data["lights"]["wash"]["prefer"]
+    preferred = data["lights"]["wash"]["drives"]
+    assert read_lighting(file)["wash"].edited_mix is None
+    data["lights"]["wash"]["drives"] = edited = dict.fromkeys(preferred, 0.3)
     file.write_text(json.dumps(data))
-    assert read_lighting(file)["wash"].lamp.prefer == "watts"
+    found = read_lighting(file)
+    assert np.abs(np.array([*preferred.values()]) - 0.3).max() > 0.05
+    assert found["wash"].drives == drives_of(found)["wash"] == edited
+    write_lighting(tmp_path / "b.json", found)
+    assert read_lighting(tmp_path / "b.json") == found
+    # At another emission, the lamp mixes what it prefers.
+    assert found.with_emission("wash", emission)["wash"].drives == pytest.approx(preferred)
 
 
 def test_rf_of_unknown_spectra_is_refused(make_basis):
@@ -311,6 +323,10 @@ def test_a_lights_file_describes_emitters(tmp_path):
     assert "60% of full power" in repr(constraints)
 
 
+def _with_spectrum(pairs):
+    return {"emitters": [{"name": "a", "spectrum": pairs, "Y": 1}]}
+
+
 WRONG = {
     "no list": ({"emitters": "red"}, "expected a list of emitters"),
     "no colour": ({"emitters": [{"name": "a", "cd": 1}]}, "no colour: expected one of xy, rgb"),
@@ -333,12 +349,25 @@ WRONG = {
         {"emitters": [{**RGBW[0], "name": str(k)} for k in range(11)]},
         "at most 10 can be mixed",
     ),
-    "spectrum": (
-        {"emitters": [{"name": "a", "spectrum": [[600, 1], [500, 1]], "Y": 1}]},
-        "is not a spectrum",
+    "spectrum": (_with_spectrum([[600, "much"]]), "is not a spectrum"),
+    "few points": (
+        _with_spectrum([[400, 0], [620, 0.1], [632, 1], [700, 0]]),
+        r"light\.par\.emitters\.1\.spectrum has 4 points: expected 5 to",
+    ),
+    "falling": (
+        _with_spectrum([[400, 0], [600, 1], [500, 1], [650, 0], [700, 0]]),
+        "goes from 600 to 500 nm",
+    ),
+    "red alone": (
+        _with_spectrum([[620, 0.1], [630, 0.8], [632, 1], [640, 0.5], [644, 0.1]]),
+        "covers 620 to 644 nm: expected 400 to 700 at least",
+    ),
+    "negative": (
+        _with_spectrum([[400, 0], [600, -0.5], [610, 1], [650, 0], [700, 0]]),
+        "has the power -0.5 at 600 nm",
     ),
     "infrared": (
-        {"emitters": [{"name": "a", "spectrum": [[900, 1], [950, 1]], "Y": 1}]},
+        _with_spectrum([[400, 0], [500, 0], [700, 0], [850, 0], [900, 1]]),
         "no power that eyes see",
     ),
     "primaries": (

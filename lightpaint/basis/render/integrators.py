@@ -7,7 +7,7 @@ their basis is then the same up to noise.
 from lightpaint.errors import SceneError
 from lightpaint.scene import ENVIRONMENTS, Integrator, Scene
 from lightpaint.scene.runtime.variant import FAST_VARIANT, use_variant
-from lightpaint.sentences import Hint
+from lightpaint.sentences import Hint, Word
 
 #: Integrators that end after one bounce.
 DIRECT = ("direct", "direct_projective")
@@ -43,11 +43,11 @@ def why_not_one_pass(scene: Scene) -> str | None:
 def check_renders_spectra(scene: Scene) -> None:
     """Raise SceneError for a scene that cannot be rendered with spectra."""
     if (reason := why_not_one_pass(scene)) is not None:
-        raise SceneError(
-            f"{reason}, and spectra are only rendered where one pass renders all lights: use ",
-            Hint("integrator", "path"),
-            f" and a variant like {FAST_VARIANT}",
-        )
+        needed: tuple[str | Hint, ...] = (Hint("integrator", "path"),)
+        if not use_variant().is_jit:
+            needed = (Hint("variant", Word(FAST_VARIANT)), " or another that is not scalar")
+        text = f"{reason}, and spectra are only rendered where one pass renders all lights: use "
+        raise SceneError(text, *needed)
     if "hair" in scene.materials:
         raise SceneError(
             f"{scene.path} has hair, whose fibres scatter each wavelength in its own direction: "

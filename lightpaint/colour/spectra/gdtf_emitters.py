@@ -25,6 +25,8 @@ def gdtf_and_emitter(name: str) -> tuple[str, str] | None:
 def read_gdtf_emitter(path: Path, name: str) -> list[tuple[float, float]]:
     """Return the spectrum of an emitter at its highest level: nanometres, rising, and power.
 
+    Negative energies are noise, and count as 0, as where `lightpaint rig` reads them.
+
     Raises ColorError for a file that is not a GDTF, and for a name, even "", that none of its
     measured emitters has; it lists those.
     """
@@ -51,7 +53,7 @@ def _measured(emitter: Element, path: Path) -> Iterator[tuple[float, float]]:
         levels = {float(x.get("Physical", "0")): x for x in emitter.iterfind("Measurement")}
         points = levels[max(levels)].iterfind("MeasurementPoint") if levels else ()
         for point in points:
-            yield float(point.get("WaveLength", "")), float(point.get("Energy", ""))
+            yield float(point.get("WaveLength", "")), max(float(point.get("Energy", "")), 0.0)
     except ValueError as error:
         name = one_line(repr(emitter.get("Name", "")))
         raise ColorError(

@@ -114,34 +114,39 @@ def read_sensitivities(path: Path) -> tuple[Doubles, Doubles]:
 def _measured(
     points: Sequence[tuple[float, ...]], path: Path, what: str
 ) -> tuple[Doubles, Doubles]:
+    """Return nanometres (k,) and values (k, n) of the points of a file, as `measured_points`."""
+    try:
+        return measured_points(points, what)
+    except ColorError as error:
+        raise ColorError(path, " ", error) from None
+
+
+def measured_points(
+    points: Sequence[tuple[float, ...]], what: str = "the power"
+) -> tuple[Doubles, Doubles]:
     """Return nanometres (k,) and values (k, n) of measured points, checked, without their noise.
 
-    what: the values in words.
+    what: the values in words. Raises ColorError, which says what is wrong without a name.
     """
     if not FEWEST_POINTS <= len(points) <= MAX_POINTS:
-        raise ColorError(
-            path, f" has {len(points)} points: expected {FEWEST_POINTS} to {MAX_POINTS}"
-        )
+        raise ColorError(f"has {len(points)} points: expected {FEWEST_POINTS} to {MAX_POINTS}")
     table = np.array(points, np.float64)
     waves, values = table[:, 0], table[:, 1:]
     if not np.isfinite(table).all():
-        raise ColorError(path, " has a number that is not finite")
+        raise ColorError("has a number that is not finite")
     if (falls := np.flatnonzero(np.diff(waves) <= 0)).size:
         k = int(falls[0])
-        raise ColorError(
-            path, f" goes from {waves[k]:g} to {waves[k + 1]:g} nm: wavelengths have to rise"
-        )
+        raise ColorError(f"goes from {waves[k]:g} to {waves[k + 1]:g} nm: wavelengths have to rise")
     low, high = COVERED
     if waves[0] > low or waves[-1] < high:
         raise ColorError(
-            path, f" covers {waves[0]:g} to {waves[-1]:g} nm: expected {low:g} to {high:g} at least"
+            f"covers {waves[0]:g} to {waves[-1]:g} nm: expected {low:g} to {high:g} at least"
         )
     if values.min() < -NOISE * values.max():
         k = int(values.min(axis=1).argmin())
         raise ColorError(
-            path,
-            f" has {what} {values[k].min():g} at {waves[k]:g} nm: there is none below 0, apart "
-            f"from noise of {100 * NOISE:g} % of the largest",
+            f"has {what} {values[k].min():g} at {waves[k]:g} nm: there is none below 0, apart "
+            f"from noise of {100 * NOISE:g} % of the largest"
         )
     return waves, np.maximum(values, 0)
 
@@ -213,4 +218,6 @@ def _points_of_tm27(data: bytes, path: Path) -> list[tuple[float, ...]]:
         parser.Parse(data, True)
     except (expat.ExpatError, ValueError) as error:
         raise ColorError(path, f" is not TM-27: {one_line(str(error))}") from None
+    if not points:
+        raise ColorError(path, " is not TM-27: it has no SpectralData")
     return points

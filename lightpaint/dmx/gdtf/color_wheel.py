@@ -3,6 +3,7 @@
 Only levels at which a slot stands in the beam count: between two slots a wheel shows both.
 """
 
+import math
 import re
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
@@ -45,6 +46,9 @@ CLEAR = 0.9
 
 #: Least share of light of two slots together, and the CIEDE2000 below which colours are alike.
 DARKEST, ALIKE = 0.005, 2.0
+
+#: Combinations of slots up to which those of several wheels count.
+MAX_COMBINATIONS = 2**12
 
 #: PhysicalFrom and PhysicalTo of a set that does not say how far a wheel is from a slot.
 _NOT_SAID = (0.0, 1.0)
@@ -116,11 +120,15 @@ def slot_combinations(
 ) -> list[SlotCombination]:
     """Return the combinations of slots of wheels, of which those of a single wheel come first.
 
-    Transmissions multiply. Of the others, the brightest remain whose colour no brighter one has.
-    kelvin: of the lamp. The open slot of a wheel is its brightest.
+    Transmissions multiply. Of the others, the brightest remain whose colour no brighter one has;
+    of very many combinations, none. kelvin: of the lamp. The open slot of a wheel is its brightest.
     """
     opens = [int(np.argmax([x.colour.share for x in slots])) for slots in wheels]
-    every = [*product(*(range(len(x)) for x in wheels))]
+    if math.prod(map(len, wheels)) <= MAX_COMBINATIONS:
+        every = [*product(*(range(len(x)) for x in wheels))]
+    else:
+        alone = ((j, k) for j, slots in enumerate(wheels) for k in range(len(slots)))
+        every = [*dict.fromkeys((*opens[:j], k, *opens[j + 1 :]) for j, k in alone)]
     turned = {c: [j for j, k in enumerate(c) if k != opens[j]] for c in every}
     found = {c: _combined(c, wheels, opens, kelvin) for c in every}
     # Of a single wheel they keep its order.

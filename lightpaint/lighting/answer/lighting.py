@@ -63,7 +63,8 @@ class LightSetting:
     may be negative.
     part_of: of an emitter that is a light, as in a basis of spectra, the name of its lamp. mix,
     mix_errors: of a lamp of such lights, the drives of its emitters and their standard errors; None
-    where they follow from the emission.
+    where they follow from the emission. edited_mix: other drives that mix it than the lamp prefers,
+    which somebody wrote into its file.
     mixed_emission: of a lamp with a colour wheel that shines, the emission that the solve found
     before the wheel came to a slot, unless the slot was fixed.
     solved_mix: the drives of its emitters that the solve
@@ -92,6 +93,7 @@ class LightSetting:
     part_of: str = ""
     mix: tuple[float, ...] | None = None
     mix_errors: tuple[float | None, ...] | None = None
+    edited_mix: tuple[float, ...] | None = None
     mixed_emission: RGB | None = None
     solved_mix: tuple[float, ...] | None = None
     held_mix_change: float | None = None
@@ -103,12 +105,10 @@ class LightSetting:
             object.__setattr__(self, "members", (self.name,))
         if self.mixed_emission is not None and (self.lamp is None or not self.lamp.is_wheel):
             raise LightingError(f"light {self.name!r} has no colour wheel, and a colour for it")
-        if self.mix is not None and (
-            self.lamp is None
-            or len(self.mix) != len(self.lamp.emitters)
-            or not all(map(is_amount, self.mix))
-        ):
-            raise LightingError(f"light {self.name!r} has drives that are not of its emitters")
+        for drives in filter(None, (self.mix, self.edited_mix)):
+            is_own = self.lamp is not None and len(drives) == len(self.lamp.emitters)
+            if not is_own or not all(map(is_amount, drives)):
+                raise LightingError(f"light {self.name!r} has drives that are not of its emitters")
         self._check_errors()
         values = {"emission": self.emission, "weight": self.weight}
         values |= {} if self.mixed_emission is None else {"mixed_emission": self.mixed_emission}
@@ -170,6 +170,7 @@ class LightSetting:
             weight=weight,
             mix=None,
             mix_errors=None,
+            edited_mix=None,
             mixed_emission=None,
             solved_mix=None,
             held_mix_change=None,
@@ -183,12 +184,13 @@ class LightSetting:
     def drives(self) -> Mapping[str, float]:
         """The drive of each of its emitters, 0 to 1, by name; empty without a lamp of emitters.
 
-        Of an emission that they cannot mix, those of the nearest that they can.
+        Those of its file, if somebody chose another mix there. Of an emission that they cannot mix,
+        those of the nearest that they can.
         """
         if self.lamp is None:
             return {}
-        if self.mix is not None:
-            return dict(zip(self.lamp.names, self.mix, strict=True))
+        if (given := self.mix or self.edited_mix) is not None:
+            return dict(zip(self.lamp.names, given, strict=True))
         drives = self.lamp.drives_for(np.array(self.emission))
         return dict(zip(self.lamp.names, drives.tolist(), strict=True))
 
@@ -623,6 +625,7 @@ def parts_of(light: LightSetting) -> tuple[LightSetting, ...]:
             part_of=light.name,
             mix=None,
             mix_errors=None,
+            edited_mix=None,
             solved_mix=None,
             standard_error=None,
             interval=None,

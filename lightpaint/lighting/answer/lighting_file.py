@@ -36,6 +36,9 @@ LAMP_FIELDS = ("emitters", "power_share", "prefer", "is_wheel", "least_rf", "beh
 #: Difference of drives, and of emissions relative to their size, that is rounding of a file.
 SAME_DRIVES = 1e-3
 
+#: Difference of drives that is round-off.
+ROUNDED = 1e-9
+
 #: Key of a lamp whose drives are the answer, found with spectra; its emission follows from them.
 SPECTRAL = "is_spectral"
 
@@ -177,12 +180,15 @@ def _read_setting(name: str, data: Mapping[str, Any]) -> LightSetting:
             fields["mix_errors"] = [errors.get(name) for name in names] if errors else None
     light: LightSetting = read_record(LightSetting, fields, others=True)
     if light.lamp is not None and light.mix is None and "drives" in data:
-        _check_drives(light, light.lamp, data["drives"])
+        return _with_drives(light, light.lamp, data["drives"])
     return light
 
 
-def _check_drives(light: LightSetting, lamp: Lamp, drives: Mapping[str, Any]) -> None:
-    """Raise LightingError for drives that somebody has changed, without the emission they mix."""
+def _with_drives(light: LightSetting, lamp: Lamp, drives: Mapping[str, Any]) -> LightSetting:
+    """Return a light with the drives of its file, if its lamp prefers others.
+
+    Raises LightingError for drives that somebody has changed, without the emission that they mix.
+    """
     if set(drives) != set(lamp.names) or not all(map(is_number, drives.values())):
         raise LightingError(
             f"light {light.name!r} has drives that are not numbers of its emitters, "
@@ -190,15 +196,18 @@ def _check_drives(light: LightSetting, lamp: Lamp, drives: Mapping[str, Any]) ->
         )
     written = np.array([drives[name] for name in lamp.names], np.float64)
     mixed, emission = lamp.mix(written), np.array(light.emission)
+    own = np.array([*light.drives.values()])
     if np.abs(mixed - emission).max() <= SAME_DRIVES * np.abs(emission).max():
-        return
+        is_own = np.abs(written - own).max() <= ROUNDED
+        return light if is_own else replace(light, edited_mix=tuple(written.tolist()))
     # An emission that they cannot mix has the drives of the nearest that they can.
-    if np.abs(written - np.array([*light.drives.values()])).max() > SAME_DRIVES:
-        own, other = (" ".join(f"{x:.6g}" for x in rgb) for rgb in (mixed, emission))
+    if np.abs(written - own).max() > SAME_DRIVES:
+        own_text, other = (" ".join(f"{x:.6g}" for x in rgb) for rgb in (mixed, emission))
         raise LightingError(
-            f"light {light.name!r} has drives that mix {own}, and the emission {other}: set "
+            f"light {light.name!r} has drives that mix {own_text}, and the emission {other}: set "
             "emission and weight to what the drives mix, or leave drives out"
         )
+    return light
 
 
 def _place_fields(place: EmitterPlace) -> dict[str, Any]:

@@ -2,7 +2,6 @@
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from itertools import pairwise
 from pathlib import Path
 from typing import Any, Literal
 
@@ -19,6 +18,7 @@ from lightpaint.colour import (
     Spectrum,
     luminance,
     matching_functions,
+    measured_points,
     named_spectrum,
     photometry,
     rgb_to_xyz,
@@ -40,9 +40,6 @@ SLOT_KEYS = ("name", "transmission")
 
 #: Bits of the channels of fixtures.
 BITS = (8, 16, 24)
-
-#: Wavelengths of a spectrum in nanometres, and the numbers of them.
-WAVELENGTHS, SPECTRUM_SIZES = (300.0, 1000.0), range(2, 1001)
 
 
 @dataclass(frozen=True)
@@ -266,27 +263,22 @@ def _parse_spectrum(value: Any, where: SourceKey) -> tuple[Doubles, Spectrum]:
 
 
 def _pairs(value: Any, where: SourceKey) -> tuple[Doubles, Doubles]:
-    """Return nanometres and power, (k,) each, of a list of pairs."""
+    """Return nanometres and power, (k,) each, of a list of pairs. Raises ColorError for one that a
+    table could not have, either.
+    """
     is_list = isinstance(value, Sequence)
     pairs = [
         (float(pair[0]), float(pair[1]))
         for pair in (value if is_list else [])
         if isinstance(pair, Sequence) and len(pair) == 2 and all(map(is_number, pair))
     ]
-    low, high = WAVELENGTHS
-    waves = [wave for wave, _ in pairs]
-    if (
-        not is_list
-        or len(pairs) != len(value)
-        or len(pairs) not in SPECTRUM_SIZES
-        or any(b <= a for a, b in pairwise(waves))
-        or not low <= waves[0] <= waves[-1] <= high
-        or not all(0 <= power <= BRIGHTEST for _, power in pairs)
-    ):
+    is_bright = any(abs(power) > BRIGHTEST for _, power in pairs)
+    if not is_list or not pairs or len(pairs) != len(value) or is_bright:
         raise ConstraintError(
             where,
-            f" is not a spectrum: expected pairs of nanometres, rising from {low:g} to {high:g}, "
-            "and power, [[620, 0.1], [632, 1], [644, 0.1]]; or the name of a file or a light, "
+            " is not a spectrum: expected pairs of nanometres and power, [[400, 0], [620, 0.1], "
+            "[632, 1], [644, 0.1], [700, 0]]; or the name of a file or a light, "
             '"led.csv", "spot.gdtf:Red", "3200K blackbody"',
         )
-    return np.array(waves), np.array([power for _, power in pairs])
+    waves, powers = measured_points(pairs)
+    return waves, powers[:, 0]

@@ -44,6 +44,7 @@ from lightpaint.pipeline.job.remarks import (
     remarks_of_pictures,
     remarks_of_scene,
     remarks_of_target,
+    remarks_on_spectra,
 )
 from lightpaint.pipeline.job.settings import Settings
 from lightpaint.pipeline.job.sources import (
@@ -357,6 +358,8 @@ class Job:
         films = [scene.size for scene in scenes] if rendered_scenes else [None] * len(targets)
         for target, view, film in zip(targets, self.views, films, strict=True):
             remarks += remarks_of_target(target, view.target.size, view.scene, self.fit, film=film)
+        for scene in rendered_scenes[:1]:
+            remarks += remarks_on_spectra(scene, self.all_constraints)
         for scene in rendered_scenes:
             remarks += [*remarks_of_film(scene, self.settings), *remarks_of_memory(scene)]
         return remarks + remarks_of_pictures()

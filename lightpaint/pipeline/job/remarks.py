@@ -1,8 +1,11 @@
 """Remarks for the user before a job runs, in plain text."""
 
+from collections.abc import Mapping
+
 from lightpaint.basis.render import memory_needed, remark_on_separate_renders, renders_in_bands
 from lightpaint.display_text import some_names
 from lightpaint.images import MISSING_REMARK, Size, left_over, oidn_is_installed, whole_factor
+from lightpaint.lighting.constraints.constraints import Constraints
 from lightpaint.pipeline.job.settings import Settings
 from lightpaint.scene import Scene
 from lightpaint.scene.quality_presets import PRESETS
@@ -53,6 +56,26 @@ def remarks_of_scene(scene: Scene, *, is_rendered: bool = True) -> list[str]:
     if not note and is_rendered:
         note = remark_on_separate_renders(scene) or ""
     return [*remarks, note] if note else remarks
+
+
+def remarks_on_spectra(scene: Scene, constraints: Constraints) -> list[Sentence]:
+    """Return a remark on lamps with spectra in a scene that is rendered without them."""
+    names = {
+        name
+        for name, table, _ in constraints.lights
+        for emitter in table.get("emitters", ())
+        if isinstance(emitter, Mapping) and "spectrum" in emitter
+    }
+    if scene.is_spectral or not names:
+        return []
+    verb = "has" if len(names) == 1 else "have"
+    remark = Sentence(
+        f"{some_names(sorted(names))} {verb} spectra, of which pictures in RGB show the colour "
+        "alone: ",
+        Hint("spectral", True),
+        " renders with them",
+    )
+    return [remark]
 
 
 def remarks_of_film(scene: Scene, settings: Settings) -> list[str]:
