@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 import pytest
 from least_squares import stack_rows
-from lightpaint.dmx.rig_drives import drives_of
+from lightpaint.dmx import drives_of
 from nightly import seeds
 from scipy.optimize import lsq_linear
 
