@@ -153,7 +153,11 @@ def test_processes_find_what_one_finds(how: str, folder: Path, tmp_path: Path, m
 
 WRONG = {
     "no curves": ("camera.csv", "none.csv", "no such observer"),
-    "no spectra": ("spectral = true, ", "", "a camera sees spectra alone: also pass settings.spectral = true"),
+    "no spectra": (
+        "spectral = true, ",
+        "",
+        "a camera sees spectra alone: also pass settings.spectral = true",
+    ),
     "sums alone": (
         'want = ["solve", "predict"]\n[look.constraints.light.panel]\noff = true',
         'want = ["lights"]\n[look.constraints.light.panel]\nrf = 80',

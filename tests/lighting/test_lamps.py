@@ -7,11 +7,11 @@ from typing import Any
 import numpy as np
 import pytest
 from least_squares import stack_rows
-from lightpaint.dmx import drives_of
 from nightly import seeds
 from scipy.optimize import lsq_linear
 
 from lightpaint.colour.color import cct_and_duv, kelvin_to_rgb
+from lightpaint.dmx import drives_of
 from lightpaint.errors import BasisError, ConstraintError, LightingError
 from lightpaint.lighting.analysis.analysis import analyse
 from lightpaint.lighting.answer.lighting_file import read_lighting, write_lighting
