@@ -26,7 +26,7 @@ from rows import add_csv, write_rows
 import lightpaint as lp
 from lightpaint.lighting.loss import warm_start
 from lightpaint.lighting.solution import Solution
-from lightpaint.lighting.solve import loss_with_pull
+from lightpaint.lighting.solver import loss_with_pull
 
 
 def main() -> None:

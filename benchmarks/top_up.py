@@ -38,7 +38,7 @@ from lightpaint.colour.color import LUMINANCE
 from lightpaint.lighting.analysis.noise.uncertainty import error_bars
 from lightpaint.lighting.problem import Problem
 from lightpaint.lighting.solution import Solution
-from lightpaint.lighting.solve import solution_of
+from lightpaint.lighting.solver import solution_of
 from lightpaint.pipeline.job.settings import PILOT_SPP
 from lightpaint.pipeline.job_bases import without_noise
 from lightpaint.pipeline.needed_samples import add_needed_samples

@@ -26,7 +26,7 @@ from lightpaint.colour.display.view_transform import ViewTransform
 from lightpaint.lighting.constraints.constraints import Constraints
 from lightpaint.lighting.fit import Fit
 from lightpaint.lighting.problem import Problem
-from lightpaint.lighting.solve import solution_of
+from lightpaint.lighting.solver import solution_of
 from lightpaint.lighting.unknowns.reduction import reduce_to
 from lightpaint.lighting.wishes.required_problem import with_wishes
 from lightpaint.lighting.wishes.wished_light import wished_light

@@ -73,7 +73,7 @@ if TYPE_CHECKING:
     from lightpaint.lighting.fit import Fit as Fit
     from lightpaint.lighting.problem import Problem as Problem
     from lightpaint.lighting.solution import Solution as Solution
-    from lightpaint.lighting.solve import solve as solve
+    from lightpaint.lighting.solver import solve as solve
     from lightpaint.paint.notebook.widget import Painter as Painter
     from lightpaint.photometry.illuminance import Illuminance as Illuminance
     from lightpaint.photometry.measure import measure_illuminance as measure_illuminance

@@ -46,7 +46,7 @@ def test_start_loads_no_library(code: str):
 
 def test_a_name_loads_its_own_room_and_no_renderer():
     loaded = _loaded_by("import lightpaint as lp; lp.solve; lp.read_target; lp.display_picture")
-    assert "lightpaint.lighting.solve" in loaded
+    assert "lightpaint.lighting.solver" in loaded
     assert not loaded & {"mitsuba", "OpenImageIO", "colour", "rich", "lightpaint.pipeline.pipeline"}
 
 
@@ -71,7 +71,7 @@ def test_every_public_name_is_there_and_seen_by_type_checkers():
 
 
 def test_no_name_is_that_of_a_room():
-    import lightpaint.lighting.solve as module
+    import lightpaint.lighting.solver as module
 
     assert module.solve is lp.solve
     for name in set(lp.__all__) - {"__version__"}:

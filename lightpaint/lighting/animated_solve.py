@@ -16,7 +16,7 @@ from lightpaint.lighting.loss.weight_penalty import pull_to_current
 from lightpaint.lighting.normal_equations import NormalEquations
 from lightpaint.lighting.problem import Problem
 from lightpaint.lighting.solution import Solution
-from lightpaint.lighting.solve import solution_of, solve_tethered
+from lightpaint.lighting.solver import solution_of, solve_tethered
 
 #: Strength of the tie between two neighbouring keys, relative to the loss of a painted picture. On
 #: a shot of 24 frames (benchmarks/frames.py) it takes a third of the flicker out of four inexact

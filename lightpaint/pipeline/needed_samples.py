@@ -18,7 +18,7 @@ from lightpaint.lighting.analysis.noise.sample_demand import (
 )
 from lightpaint.lighting.analysis.noise.uncertainty import error_bars
 from lightpaint.lighting.solution import Solution
-from lightpaint.lighting.solve import solution_of
+from lightpaint.lighting.solver import solution_of
 from lightpaint.pipeline.job.job import Job
 from lightpaint.pipeline.job.settings import PILOT_SPP
 from lightpaint.pipeline.job_bases import problem_of, view_listener, without_noise

@@ -17,7 +17,7 @@ from lightpaint.lighting.answer.lighting import Lighting
 from lightpaint.lighting.answer.lighting_keys import LightingKey
 from lightpaint.lighting.problem import Problem
 from lightpaint.lighting.solution import Solution
-from lightpaint.lighting.solve import choose_mixes, solution_of
+from lightpaint.lighting.solver import choose_mixes, solution_of
 from lightpaint.lighting.wishes.planes_answer import PlanesAnswer
 from lightpaint.pipeline.job.job import Job, PaintedView
 from lightpaint.pipeline.job.settings import Settings

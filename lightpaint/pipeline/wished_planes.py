@@ -21,7 +21,7 @@ from lightpaint.lighting.constraints.constraints import Constraints
 from lightpaint.lighting.constraints.constraints_file import constraints_of
 from lightpaint.lighting.problem import Problem
 from lightpaint.lighting.solution import Solution
-from lightpaint.lighting.solve import solution_of
+from lightpaint.lighting.solver import solution_of
 from lightpaint.lighting.unknowns.reduction import Reduction, reduce_to
 from lightpaint.lighting.wishes.planes_answer import PlanesAnswer, planes_answer
 from lightpaint.lighting.wishes.required_problem import RequiredProblem, with_wishes, without_wishes

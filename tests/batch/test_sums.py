@@ -23,7 +23,7 @@ from lightpaint.lighting.constraints.constraints import Constraints
 from lightpaint.lighting.fit import Fit
 from lightpaint.lighting.linear_problem import Sums, reason_against_sums, sum_rows, summed_problem
 from lightpaint.lighting.linear_solve import solve_linear
-from lightpaint.lighting.solve import solve
+from lightpaint.lighting.solver import solve
 from lightpaint.scene.runtime.kernel_threads import limit_threads
 from lightpaint.target.target import Target
 

@@ -18,7 +18,7 @@ from lightpaint.lighting.loss.lit_pixels import LitPixels
 from lightpaint.lighting.loss.warm_start import sample_pixels
 from lightpaint.lighting.problem import Problem
 from lightpaint.lighting.solution import Solution
-from lightpaint.lighting.solve import solve
+from lightpaint.lighting.solver import solve
 from lightpaint.target.target import Target
 
 SIZE = (48, 60)

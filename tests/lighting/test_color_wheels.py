@@ -21,7 +21,7 @@ from lightpaint.lighting.fit import Fit, resolve_for_targets
 from lightpaint.lighting.live.live import LiveSolver
 from lightpaint.lighting.live.live_view import LiveView
 from lightpaint.lighting.problem import Problem
-from lightpaint.lighting.solve import solve
+from lightpaint.lighting.solver import solve
 from lightpaint.lighting.unknowns import slot_search
 from lightpaint.report.phrases import spoken_lamp, spoken_wheels
 from lightpaint.target.target import Target

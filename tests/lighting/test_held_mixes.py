@@ -17,7 +17,7 @@ from lightpaint.lighting.answer.lighting_file import read_lighting, write_lighti
 from lightpaint.lighting.constraints.constraints import Constraints
 from lightpaint.lighting.display import display_transform
 from lightpaint.lighting.held_mixes import HELD
-from lightpaint.lighting.solve import solve
+from lightpaint.lighting.solver import solve
 from lightpaint.paint.session.snapshot import SessionSnapshot
 from lightpaint.paint.store.session_requests import SessionRequests
 from lightpaint.pipeline.job.settings import Settings

@@ -14,7 +14,7 @@ from lightpaint.basis.texel_images import joined_texels, light_images, texel_lig
 from lightpaint.lighting.fit import Fit
 from lightpaint.lighting.loss import weight_penalty
 from lightpaint.lighting.loss.weight_penalty import image_prior
-from lightpaint.lighting.solve import solve
+from lightpaint.lighting.solver import solve
 from lightpaint.scene.lights.texels.image_domains import solid_angles
 from lightpaint.scene.lights.texels.texel import TexelLayout, mirrored_pairs, texel_names
 from lightpaint.target.target import Target

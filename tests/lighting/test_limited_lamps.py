@@ -12,7 +12,7 @@ from lightpaint.colour.color import luminance
 from lightpaint.colour.lamp import Lamp, LampEmitter
 from lightpaint.errors import ConstraintError
 from lightpaint.lighting.constraints.constraints import Constraints
-from lightpaint.lighting.solve import solve
+from lightpaint.lighting.solver import solve
 from lightpaint.target.target import Target
 
 SIZE = (5, 4)

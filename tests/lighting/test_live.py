@@ -19,7 +19,7 @@ from lightpaint.lighting.live.live import ANSWERS_PER_READING, LiveSolver
 from lightpaint.lighting.live.live_view import LiveView
 from lightpaint.lighting.loss.painting import unpainted_weight_of
 from lightpaint.lighting.problem import Problem
-from lightpaint.lighting.solve import solution_of
+from lightpaint.lighting.solver import solution_of
 from lightpaint.target.target import Target
 
 SIZES = (37, 41), (31, 17)

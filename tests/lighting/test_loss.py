@@ -20,7 +20,7 @@ from lightpaint.lighting.loss.lit_pixels import DeferredSquares, LitPixels
 from lightpaint.lighting.loss.loss import Cut, Loss, PixelLoss, planes_of
 from lightpaint.lighting.normal_equations import NormalEquations
 from lightpaint.lighting.problem import Problem
-from lightpaint.lighting.solve import solution_of
+from lightpaint.lighting.solver import solution_of
 from lightpaint.target.target import Target
 
 SIZE = 12, 17

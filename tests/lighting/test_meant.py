@@ -16,7 +16,7 @@ from lightpaint.lighting.loss import contrast
 from lightpaint.lighting.loss.painting import unpainted_weight_of
 from lightpaint.lighting.loss.weight_penalty import CLEAR_PULL, COLOR_PULL, MAX_DIMMING
 from lightpaint.lighting.problem import Problem
-from lightpaint.lighting.solve import solution_of
+from lightpaint.lighting.solver import solution_of
 
 SRGB = lp.ViewTransform()
 

@@ -12,7 +12,7 @@ from scipy.optimize import minimize, nnls
 from lightpaint.basis.basis import Basis
 from lightpaint.colour.display.view_transform import ViewTransform
 from lightpaint.images.estimate import Estimate
-from lightpaint.lighting import solve as solve_module
+from lightpaint.lighting import solver as solve_module
 from lightpaint.lighting.analysis.diagnosis import diagnose
 from lightpaint.lighting.analysis.noise.noise_correction import correct_noise
 from lightpaint.lighting.analysis.noise.refinement import refine
@@ -28,7 +28,7 @@ from lightpaint.lighting.loss.painting_loss import PaintingLoss
 from lightpaint.lighting.normal_equations import inner_products
 from lightpaint.lighting.problem import Problem
 from lightpaint.lighting.solution import Solution
-from lightpaint.lighting.solve import solve, solve_again
+from lightpaint.lighting.solver import solve, solve_again
 from lightpaint.lighting.unknowns.reduced_problem import solve_reduced
 from lightpaint.target.target import Target
 

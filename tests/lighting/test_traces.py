@@ -10,7 +10,7 @@ from lightpaint.basis.basis import Basis, Origin
 from lightpaint.basis.lights import BasisLight
 from lightpaint.lighting.constraints.constraints import Constraints
 from lightpaint.lighting.problem import remove_traces
-from lightpaint.lighting.solve import solve
+from lightpaint.lighting.solver import solve
 from lightpaint.target.target import Target
 
 SIZE = (24, 32)

@@ -18,7 +18,7 @@ from lightpaint.colour.display.view_transform import ViewTransform
 from lightpaint.errors import SceneError
 from lightpaint.lighting.constraints.constraints import Constraints
 from lightpaint.lighting.solution import Solution
-from lightpaint.lighting.solve import solve
+from lightpaint.lighting.solver import solve
 from lightpaint.placement.place_search import (
     check_suggestible,
     emitter_xml,

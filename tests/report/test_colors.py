@@ -11,7 +11,7 @@ from lightpaint.colour.color import kelvin_to_rgb
 from lightpaint.colour.color_difference import hue_name
 from lightpaint.lighting.analysis.appearance.color_choices import ColorChoice
 from lightpaint.lighting.answer.combination import combine
-from lightpaint.lighting.solve import solve
+from lightpaint.lighting.solver import solve
 from lightpaint.report.diagnosis_sentences import fit_options, fit_sentence
 from lightpaint.report.page.constraint_section import closer_choice, colors_section, spoken_choice
 from lightpaint.report.page.page import report_page

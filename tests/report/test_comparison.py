@@ -24,7 +24,7 @@ from lightpaint.lighting.analysis.appearance.delivery import Delivery
 from lightpaint.lighting.answer.combination import combine
 from lightpaint.lighting.answer.lighting import Lighting
 from lightpaint.lighting.constraints.constraints import Constraints
-from lightpaint.lighting.solve import solve
+from lightpaint.lighting.solver import solve
 from lightpaint.pipeline.job.job import Job
 from lightpaint.pipeline.job.sources import Painting
 from lightpaint.pipeline.pipeline import run

@@ -10,7 +10,7 @@ from lightpaint.colour.display.view_transform import ViewTransform
 from lightpaint.lighting.analysis.analysis import without_constraints
 from lightpaint.lighting.analysis.noise.noise_correction import correct_noise
 from lightpaint.lighting.constraints.constraints import Constraints
-from lightpaint.lighting.solve import solve
+from lightpaint.lighting.solver import solve
 from lightpaint.report.page.constraint_section import constraints_section
 from lightpaint.target.target import Target
 

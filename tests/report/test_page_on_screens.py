@@ -18,7 +18,7 @@ from lightpaint.lighting.analysis.noise.uncertainty import Uncertainty
 from lightpaint.lighting.answer.combination import combine
 from lightpaint.lighting.constraints.constraints import Constraints
 from lightpaint.lighting.solution import Solution
-from lightpaint.lighting.solve import solve
+from lightpaint.lighting.solver import solve
 from lightpaint.relit.verification import compare
 from lightpaint.report.page.html import ROWS_SHOWN
 from lightpaint.report.page.page import report_page

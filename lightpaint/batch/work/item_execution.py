@@ -37,7 +37,7 @@ from lightpaint.lighting.fit import Fit
 from lightpaint.lighting.linear_problem import Sums, sum_rows, summed_problem
 from lightpaint.lighting.linear_solve import solve_linear
 from lightpaint.lighting.problem import Problem
-from lightpaint.lighting.solve import solution_of
+from lightpaint.lighting.solver import solution_of
 from lightpaint.pipeline.job.job import Job
 from lightpaint.pipeline.job.job_record import decode_job
 from lightpaint.pipeline.job.settings import Settings

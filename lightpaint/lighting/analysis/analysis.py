@@ -26,7 +26,7 @@ from lightpaint.lighting.constraints.constraints import Constraints
 from lightpaint.lighting.linear_problem import reduce_lights
 from lightpaint.lighting.problem import gamuts_for, whites_for
 from lightpaint.lighting.solution import Solution
-from lightpaint.lighting.solve import solution_of
+from lightpaint.lighting.solver import solution_of
 from lightpaint.progress import stage
 
 

@@ -29,7 +29,7 @@ from lightpaint.lighting.analysis.noise.residuals import Residuals, channel_grai
 from lightpaint.lighting.analysis.noise.weight_directions import all_columns
 from lightpaint.lighting.answer.certificate import Bound
 from lightpaint.lighting.solution import Solution
-from lightpaint.lighting.solve import solve_again
+from lightpaint.lighting.solver import solve_again
 from lightpaint.threads import parallel_map
 
 #: Blocks along each side of the image for finding where light is missing, and regions along each

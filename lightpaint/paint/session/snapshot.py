@@ -25,7 +25,7 @@ from lightpaint.lighting.fit import Colors
 from lightpaint.lighting.linear_problem import reduce_lights
 from lightpaint.lighting.problem import Problem
 from lightpaint.lighting.solution import Solution
-from lightpaint.lighting.solve import choose_mixes, solution_of
+from lightpaint.lighting.solver import choose_mixes, solution_of
 from lightpaint.paint.session.picture_table import Picture, display_thumbnail
 from lightpaint.paint.session.session_messages import preview_text, why_not_closer
 from lightpaint.paint.store.session_requests import SessionRequests

@@ -23,7 +23,7 @@ from lightpaint.lighting.analysis.appearance.unpainted_change import unpainted_c
 from lightpaint.lighting.analysis.noise.uncertainty import error_bars
 from lightpaint.lighting.answer.combination import combine
 from lightpaint.lighting.constraints.constraints import Constraints
-from lightpaint.lighting.solve import solve
+from lightpaint.lighting.solver import solve
 from lightpaint.report.verdict_sentences import headline
 from lightpaint.scene.lights.texels.texel import texel_names
 from lightpaint.target.target import Target, Wish

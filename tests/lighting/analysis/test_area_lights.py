@@ -9,7 +9,7 @@ import pytest
 from lightpaint.images.object_map import Objects
 from lightpaint.lighting.analysis.appearance.appearance import compare_appearance
 from lightpaint.lighting.analysis.appearance.area_lights import AreaLights, lights_of_area
-from lightpaint.lighting.solve import solve
+from lightpaint.lighting.solver import solve
 from lightpaint.target.target import Target
 
 SIZE = (24, 48)

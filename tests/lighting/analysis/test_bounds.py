@@ -19,7 +19,7 @@ from lightpaint.lighting.analysis.diagnosis import diagnose
 from lightpaint.lighting.answer.certificate import Bound
 from lightpaint.lighting.answer.lighting_file import read_lighting, write_lighting
 from lightpaint.lighting.constraints.constraints import Constraints
-from lightpaint.lighting.solve import solve
+from lightpaint.lighting.solver import solve
 from lightpaint.target.target import Target
 
 SIZE = (5, 4)

@@ -9,7 +9,7 @@ from lightpaint.lighting.analysis.appearance.appearance import compare_appearanc
 from lightpaint.lighting.analysis.appearance.color_choices import MIN_SAMPLE, color_choices
 from lightpaint.lighting.constraints.constraints import Constraints
 from lightpaint.lighting.fit import Colors
-from lightpaint.lighting.solve import solve
+from lightpaint.lighting.solver import solve
 from lightpaint.target.target import Target
 
 SIZE = (20, 24)

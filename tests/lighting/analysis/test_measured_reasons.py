@@ -13,7 +13,7 @@ from lightpaint.lighting.analysis.appearance.constraint_kinds import Constraints
 from lightpaint.lighting.analysis.noise.noise_correction import correct_noise
 from lightpaint.lighting.constraints.constraints import Constraints
 from lightpaint.lighting.solution import Solution
-from lightpaint.lighting.solve import solve
+from lightpaint.lighting.solver import solve
 from lightpaint.target.target import Target
 
 SIZE = (90, 150)

@@ -10,7 +10,7 @@ from lightpaint.colour.display.view_transform import ViewTransform
 from lightpaint.lighting.analysis.noise.noise_correction import correct_noise
 from lightpaint.lighting.analysis.noise.pixel_gradients import steadier_light
 from lightpaint.lighting.analysis.noise.uncertainty import error_bars
-from lightpaint.lighting.solve import solve
+from lightpaint.lighting.solver import solve
 from lightpaint.target.target import Target
 
 SIZE = (24, 24)

@@ -27,7 +27,7 @@ from lightpaint.lighting.analysis.noise.uncertainty import (
 from lightpaint.lighting.analysis.noise.weight_directions import _one_sided
 from lightpaint.lighting.constraints.constraints import Constraints
 from lightpaint.lighting.normal_equations import NormalEquations
-from lightpaint.lighting.solve import solve
+from lightpaint.lighting.solver import solve
 from lightpaint.target.target import Target
 
 SIZE = (24, 24)

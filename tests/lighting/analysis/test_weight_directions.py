@@ -14,7 +14,7 @@ from lightpaint.lighting.analysis.noise.noise import denoised_matrix, pseudo_inv
 from lightpaint.lighting.analysis.noise.weight_directions import Directions
 from lightpaint.lighting.constraints.constraints import Constraints
 from lightpaint.lighting.normal_equations import NormalEquations, block_diagonal
-from lightpaint.lighting.solve import solve
+from lightpaint.lighting.solver import solve
 from lightpaint.lighting.unknowns.reduction import reduce_to
 from lightpaint.target.target import Target
 

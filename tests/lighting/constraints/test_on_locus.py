@@ -14,7 +14,7 @@ from lightpaint.lighting.live.live import LiveSolver
 from lightpaint.lighting.live.live_view import LiveView
 from lightpaint.lighting.normal_equations import NormalEquations
 from lightpaint.lighting.problem import Problem
-from lightpaint.lighting.solve import solution_of
+from lightpaint.lighting.solver import solution_of
 from lightpaint.lighting.unknowns.reduced_problem import solve_reduced
 from lightpaint.lighting.unknowns.white_mixes import next_whites
 

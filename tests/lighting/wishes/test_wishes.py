@@ -14,7 +14,7 @@ from lightpaint.errors import ConstraintError
 from lightpaint.lighting.constraints.constraints import Constraints
 from lightpaint.lighting.fit import Fit
 from lightpaint.lighting.problem import Problem
-from lightpaint.lighting.solve import solution_of
+from lightpaint.lighting.solver import solution_of
 from lightpaint.lighting.unknowns.reduction import reduce_to
 from lightpaint.lighting.wishes.linear_programs import least_watts, power_of, shares_given_up
 from lightpaint.lighting.wishes.planes_answer import planes_answer

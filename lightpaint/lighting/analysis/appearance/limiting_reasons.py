@@ -33,7 +33,7 @@ from lightpaint.lighting.constraints.constraints import Constraints
 from lightpaint.lighting.fit import Fit
 from lightpaint.lighting.problem import Problem
 from lightpaint.lighting.solution import Solution
-from lightpaint.lighting.solve import solution_of
+from lightpaint.lighting.solver import solution_of
 
 #: Share of the error from which a reason counts, and from which a headline names it.
 MIN_SHARE, HEADLINE_SHARE = 0.05, 1 / 3

@@ -23,7 +23,7 @@ from lightpaint.lighting.joined_views import Views
 from lightpaint.lighting.loss.painting import importance_sums, unpainted_weight
 from lightpaint.lighting.problem import Problem
 from lightpaint.lighting.solution import Solution
-from lightpaint.lighting.solve import solution_of
+from lightpaint.lighting.solver import solution_of
 from lightpaint.target import Target, find_wishes
 
 #: Lights beyond which their colours are not tried as a reason.

@@ -34,7 +34,7 @@ from lightpaint.lighting.analysis.noise.weight_directions import (
 from lightpaint.lighting.joined_views import joint_basis
 from lightpaint.lighting.normal_equations import NormalEquations, block_diagonal
 from lightpaint.lighting.solution import Solution
-from lightpaint.lighting.solve import solve_again
+from lightpaint.lighting.solver import solve_again
 from lightpaint.sentences import Hint
 
 #: Fewest lights for which sums use averaged light: with a dozen, the basis itself is as good.

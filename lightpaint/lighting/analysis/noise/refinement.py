@@ -26,7 +26,7 @@ from lightpaint.lighting.analysis.noise.weight_directions import free_directions
 from lightpaint.lighting.normal_equations import NormalEquations
 from lightpaint.lighting.problem import Refinement
 from lightpaint.lighting.solution import Solution
-from lightpaint.lighting.solve import solve_again
+from lightpaint.lighting.solver import solve_again
 from lightpaint.progress import with_progress
 from lightpaint.sentences import Hint
 
