@@ -43,7 +43,7 @@ from lightpaint.batch.work.work_items import (
 from lightpaint.batch.work.worker_storage import Spool, WorkerCache
 from lightpaint.errors import BasisError, SceneError
 from lightpaint.images import Estimate
-from lightpaint.lighting.linear_problem import Sums
+from lightpaint.lighting import Sums
 from lightpaint.pipeline.job.job import Job
 from lightpaint.pipeline.job.sources import Painting, SceneFile
 from lightpaint.progress import Listener, Progress

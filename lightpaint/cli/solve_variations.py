@@ -19,7 +19,7 @@ from lightpaint.batch.work.item_execution import is_disk_full
 from lightpaint.cli.output import terminal
 from lightpaint.cli.output.documents import files_document
 from lightpaint.errors import LOOK_ERRORS, LightpaintError, OutputError
-from lightpaint.lighting.answer.lighting import Lighting
+from lightpaint.lighting import Lighting
 from lightpaint.pipeline.job.job import Job
 from lightpaint.pipeline.results.result_folder import ResultFolder
 from lightpaint.progress import Listener

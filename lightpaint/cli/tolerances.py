@@ -2,7 +2,7 @@
 
 from dataclasses import dataclass
 
-from lightpaint.lighting.analysis.appearance.appearance import Appearance
+from lightpaint.lighting import Appearance
 
 
 @dataclass(frozen=True)

@@ -30,7 +30,7 @@ from lightpaint.dmx.console_rig import (
     filter_drive,
 )
 from lightpaint.errors import RigError
-from lightpaint.lighting.answer.lighting import Lighting, LightSetting
+from lightpaint.lighting import Lighting, LightSetting
 
 #: Drives by name of emitter.
 Drives = Mapping[str, float]

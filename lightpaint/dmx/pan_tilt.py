@@ -9,7 +9,7 @@ import numpy as np
 
 from lightpaint.arrays import Doubles, Position
 from lightpaint.dmx.console_rig import ConsoleRig, RigAxis, RigFixture, RigHead
-from lightpaint.lighting.answer.lighting import Lighting
+from lightpaint.lighting import Lighting
 from lightpaint.scene.properties.site import unit
 
 #: Degrees by which a beam may miss unnoticed: several levels of 16 bits, and less than is seen.

@@ -7,7 +7,7 @@ from threading import RLock
 from typing import Any, Generic, NamedTuple, TypeVar
 
 from lightpaint.errors import PaintError
-from lightpaint.lighting.answer.lighting import Lighting
+from lightpaint.lighting import Lighting
 from lightpaint.paint.background_threads import StoppedError
 from lightpaint.paint.layers.canvas import ViewLayers
 from lightpaint.paint.protocol import Message, PictureUpdate, ProgressReport

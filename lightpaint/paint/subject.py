@@ -15,7 +15,7 @@ from lightpaint.colour import TransformChoice, ViewTransform, read_observer
 from lightpaint.display_text import some_names
 from lightpaint.errors import PaintError
 from lightpaint.files import is_name, one_line, scene_name
-from lightpaint.lighting.constraints.constraints import Constraints
+from lightpaint.lighting import Constraints
 from lightpaint.paint.store.history_steps import Identity, ViewIdentity
 from lightpaint.paint.store.session_requests import SessionRequests
 from lightpaint.pipeline.job.settings import Settings

@@ -10,12 +10,16 @@ from lightpaint.colour import TransformChoice, read_observer
 from lightpaint.errors import PaintError, SceneError
 from lightpaint.file_reading import file_length
 from lightpaint.files import scene_name
-from lightpaint.lighting.constraints.absolute_scale import with_sure_scale
-from lightpaint.lighting.constraints.constraints import Constraints, LightConstraint, is_pattern
-from lightpaint.lighting.constraints.constraints_file import constraints_of
-from lightpaint.lighting.joined_views import check_same_lights
-from lightpaint.lighting.unknowns.reduction import reduce_to
-from lightpaint.lighting.wishes.wished_light import check_powers
+from lightpaint.lighting import (
+    Constraints,
+    LightConstraint,
+    check_powers,
+    check_same_lights,
+    constraints_of,
+    is_pattern,
+    reduce_to,
+    with_sure_scale,
+)
 from lightpaint.paint.layers.layer_files import check_kind
 from lightpaint.paint.store.session_requests import SessionRequests
 from lightpaint.paint.subject import LazyScene, Subject, check_view_names, session_identity

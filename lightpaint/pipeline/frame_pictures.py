@@ -15,8 +15,7 @@ from lightpaint.errors import BasisError, ImageError, OutputError
 from lightpaint.files import check_files
 from lightpaint.images.formats import read_headers, write_parts
 from lightpaint.keywords import keywords
-from lightpaint.lighting.answer.lighting import Lighting
-from lightpaint.lighting.answer.lighting_file import read_lighting
+from lightpaint.lighting import Lighting, read_lighting
 from lightpaint.pipeline.job.job import Job
 from lightpaint.pipeline.job.sources import GroupsFile
 from lightpaint.pipeline.results.answer_folder import LIGHTING

@@ -7,9 +7,7 @@ from dataclasses import replace
 from lightpaint.basis import Basis
 from lightpaint.basis.cache import Render, cache, folder, obtain_basis
 from lightpaint.basis.render import render_basis, samples_for
-from lightpaint.lighting.analysis.noise.noise_correction import correct_noise
-from lightpaint.lighting.problem import Problem
-from lightpaint.lighting.solution import Solution
+from lightpaint.lighting import Problem, Solution, correct_noise
 from lightpaint.pipeline.job.job import Job, PaintedView
 from lightpaint.pipeline.job.settings import Settings
 from lightpaint.progress import Announcement, Listener, Pace, Progress, labelled, listener
@@ -23,15 +21,16 @@ def obtain(
     progress: Progress,
     *,
     views: int = 1,
-    render: Render = render_basis,
+    render: Render | None = None,
     before: Basis | None = None,
     names_cache: bool = True,
 ) -> Basis:
     """Return the basis of `scene` on its film, from the cache or rendered.
 
     views: number of views that share the rendering time. render: function that renders missing
-    samples. before: a basis of the scene with lights elsewhere, whose other planes are taken.
-    names_cache: whether remarks name the argument that does without the cache.
+    samples, by default `render_basis`. before: a basis of the scene with lights elsewhere, whose
+    other planes are taken. names_cache: whether remarks name the argument that does without the
+    cache.
     """
     listen = listener(progress)
     watch = _RenderWatch(listen, has_moved=before is not None, names_cache=names_cache)
@@ -45,7 +44,7 @@ def obtain(
         use_cache=settings.use_cache,
         exact_spp=settings.exact_spp,
         progress=watch.report,
-        render=render,
+        render=render or render_basis,
         report_reuse=watch.report_reuse,
         before=before,
     )

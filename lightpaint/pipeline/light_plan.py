@@ -5,12 +5,16 @@ from pathlib import Path
 
 from lightpaint.basis.render import basis_lights
 from lightpaint.keywords import keywords
-from lightpaint.lighting.answer.lighting import Lighting
-from lightpaint.lighting.constraints.constraints import Constraints
-from lightpaint.lighting.unknowns.reduction import Reduction, reduce_to
-from lightpaint.lighting.wishes.linear_programs import least_watts
-from lightpaint.lighting.wishes.planes_answer import PlanesAnswer, planes_answer
-from lightpaint.lighting.wishes.wished_light import check_powers
+from lightpaint.lighting import (
+    Constraints,
+    Lighting,
+    PlanesAnswer,
+    Reduction,
+    check_powers,
+    least_watts,
+    planes_answer,
+    reduce_to,
+)
 from lightpaint.pipeline.job.settings import Settings
 from lightpaint.pipeline.results.answer_folder import answer_files
 from lightpaint.pipeline.results.result_folder import ResultFolder, files_of_planes

@@ -9,7 +9,7 @@ from lightpaint.errors import LightpaintError, OutputError
 from lightpaint.files import check_files, check_writable, write_bytes
 from lightpaint.images import denoiser_text
 from lightpaint.images.formats import png_bytes, png_has_text
-from lightpaint.lighting.answer.lighting_file import read_lighting
+from lightpaint.lighting import read_lighting
 from lightpaint.pipeline.results.answer_folder import LIGHTING
 from lightpaint.progress import Progress, silent
 from lightpaint.report import HungLight, light_sheet

@@ -11,14 +11,14 @@ from lightpaint.basis import Basis, texel_lights
 from lightpaint.basis.cache import obtain_basis, top_up_basis
 from lightpaint.basis.render import ONE_PASS, KeptTracer, kept_loaded
 from lightpaint.colour import LUMINANCE
-from lightpaint.lighting.analysis.noise.sample_demand import (
+from lightpaint.lighting import (
+    Solution,
+    error_bars,
     pixel_variances,
     sample_demand,
+    solution_of,
     top_up_counts,
 )
-from lightpaint.lighting.analysis.noise.uncertainty import error_bars
-from lightpaint.lighting.solution import Solution
-from lightpaint.lighting.solver import solution_of
 from lightpaint.pipeline.job.job import Job
 from lightpaint.pipeline.job.settings import PILOT_SPP
 from lightpaint.pipeline.job_bases import problem_of, view_listener, without_noise

@@ -9,7 +9,7 @@ from lightpaint.basis.cache import check_same_view
 from lightpaint.colour import TransformChoice
 from lightpaint.errors import SceneError, TargetError
 from lightpaint.keywords import keywords
-from lightpaint.lighting.constraints.constraints import Constraints
+from lightpaint.lighting import Constraints
 from lightpaint.pipeline.job.job import Job
 from lightpaint.pipeline.job.settings import Settings
 from lightpaint.pipeline.job.sources import BasisFile, Painting, SceneFile, check_needed

@@ -10,15 +10,21 @@ from lightpaint.basis import Basis
 from lightpaint.colour import daylight
 from lightpaint.images import Estimate, write_estimate
 from lightpaint.keywords import keywords
-from lightpaint.lighting.analysis.analysis import Analysis, analyse, with_findings
-from lightpaint.lighting.analysis.surface_colors import SurfaceColor, surface_colors
-from lightpaint.lighting.animated_solve import solve_frames
-from lightpaint.lighting.answer.lighting import Lighting
-from lightpaint.lighting.answer.lighting_keys import LightingKey
-from lightpaint.lighting.problem import Problem
-from lightpaint.lighting.solution import Solution
-from lightpaint.lighting.solver import choose_mixes, solution_of
-from lightpaint.lighting.wishes.planes_answer import PlanesAnswer
+from lightpaint.lighting import (
+    Analysis,
+    Lighting,
+    LightingKey,
+    PlanesAnswer,
+    Problem,
+    Solution,
+    SurfaceColor,
+    analyse,
+    choose_mixes,
+    solution_of,
+    solve_frames,
+    surface_colors,
+    with_findings,
+)
 from lightpaint.pipeline.job.job import Job, PaintedView
 from lightpaint.pipeline.job.settings import Settings
 from lightpaint.pipeline.job_bases import obtain_bases_of, problem_of, view_listener, without_noise

@@ -20,10 +20,7 @@ from lightpaint.colour import luminance
 from lightpaint.display_text import some_names
 from lightpaint.errors import SceneError
 from lightpaint.images import Estimate, block_mean
-from lightpaint.lighting.constraints.constraints import Constraints
-from lightpaint.lighting.problem import Problem
-from lightpaint.lighting.solution import Solution
-from lightpaint.lighting.solver import solution_of
+from lightpaint.lighting import Constraints, Problem, Solution, solution_of
 from lightpaint.pipeline.job.job import Job
 from lightpaint.pipeline.job.job_checks import sky_for_sun, wanted_sun
 from lightpaint.pipeline.job.settings import Settings

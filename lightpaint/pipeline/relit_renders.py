@@ -18,7 +18,7 @@ from lightpaint.images import (
     write_estimate,
 )
 from lightpaint.images.formats import ExrPart, rgb_channels, write_parts, write_png, write_png_16
-from lightpaint.lighting.answer.lighting import Lighting
+from lightpaint.lighting import Lighting
 from lightpaint.pipeline.job.remarks import remarks_of_pictures
 from lightpaint.pipeline.results.answer_folder import (
     RELIT,

@@ -10,27 +10,29 @@ from lightpaint.arrays import Doubles
 from lightpaint.basis import BasisLight, Lights
 from lightpaint.basis.render import basis_lights
 from lightpaint.display_text import some_names
-from lightpaint.lighting.analysis.appearance.display_difference import PaintComparison
-from lightpaint.lighting.constraints.absolute_scale import (
-    unscaled_error,
-    unscaled_lights,
-    with_scale,
-    with_sure_scale,
-)
-from lightpaint.lighting.constraints.constraints import Constraints
-from lightpaint.lighting.constraints.constraints_file import constraints_of
-from lightpaint.lighting.problem import Problem
-from lightpaint.lighting.solution import Solution
-from lightpaint.lighting.solver import solution_of
-from lightpaint.lighting.unknowns.reduction import Reduction, reduce_to
-from lightpaint.lighting.wishes.planes_answer import PlanesAnswer, planes_answer
-from lightpaint.lighting.wishes.required_problem import RequiredProblem, with_wishes, without_wishes
-from lightpaint.lighting.wishes.wished_light import (
+from lightpaint.lighting import (
+    Constraints,
     LitCase,
+    PaintComparison,
+    PlanesAnswer,
+    Problem,
+    Reduction,
+    RequiredProblem,
+    Solution,
     WishedLight,
     check_powers,
+    constraints_of,
+    planes_answer,
+    reduce_to,
+    solution_of,
+    unscaled_error,
+    unscaled_lights,
     watts_allowed,
     wished_light,
+    with_scale,
+    with_sure_scale,
+    with_wishes,
+    without_wishes,
 )
 from lightpaint.photometry.glare import Glare
 from lightpaint.photometry.illuminance import Illuminance

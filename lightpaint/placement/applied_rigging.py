@@ -10,7 +10,7 @@ import numpy as np
 from lightpaint.arrays import Position
 from lightpaint.display_text import some_names, with_similar_name
 from lightpaint.errors import ConstraintError, SceneError
-from lightpaint.lighting.constraints.constraints import Constraints, is_pattern
+from lightpaint.lighting import Constraints, is_pattern
 from lightpaint.placement.free_space import as_position
 from lightpaint.placement.freedom import Freedom
 from lightpaint.placement.lights_to_place import followers_of, free_light, new_lights_of

@@ -11,11 +11,15 @@ from lightpaint.arrays import Floats
 from lightpaint.basis import Basis, BasisLight
 from lightpaint.errors import SceneError
 from lightpaint.images import block_mean, whole_factor
-from lightpaint.lighting.constraints.constraints import Constraints, LightConstraint
-from lightpaint.lighting.normal_equations import NormalEquations
-from lightpaint.lighting.problem import Problem
-from lightpaint.lighting.solution import Solution
-from lightpaint.lighting.unknowns.reduction import Reduction, reduce_to
+from lightpaint.lighting import (
+    Constraints,
+    LightConstraint,
+    NormalEquations,
+    Problem,
+    Reduction,
+    Solution,
+    reduce_to,
+)
 from lightpaint.scene import Scene, reduction_to
 
 #: Number of pixels of the small films, on which all places are compared, and of the larger films

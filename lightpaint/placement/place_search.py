@@ -14,8 +14,7 @@ from lightpaint.basis import Basis
 from lightpaint.basis.render import why_not_one_pass
 from lightpaint.errors import NoPlaceError, SceneError
 from lightpaint.keywords import keywords
-from lightpaint.lighting.constraints.constraints import Constraints
-from lightpaint.lighting.solution import Solution
+from lightpaint.lighting import Constraints, Solution
 from lightpaint.placement.free_space import as_position, pixels_of
 from lightpaint.placement.freedom import Freedom
 from lightpaint.placement.lights_to_place import (

@@ -22,12 +22,14 @@ import numpy as np
 from lightpaint.arrays import Bools, Doubles, Floats, Indices
 from lightpaint.basis import Basis, BasisLight, Planes
 from lightpaint.images import block_mean
-from lightpaint.lighting.algebra.optimum import minimise
-from lightpaint.lighting.analysis.noise.noise import denoised_matrix
-from lightpaint.lighting.constraints.constraints import Constraints
-from lightpaint.lighting.normal_equations import NormalEquations
-from lightpaint.lighting.solution import Solution
-from lightpaint.lighting.unknowns.reduced_problem import reduced_problems
+from lightpaint.lighting import (
+    Constraints,
+    NormalEquations,
+    Solution,
+    denoised_matrix,
+    minimise,
+    reduced_problems,
+)
 from lightpaint.placement.look_goals import LookGoal, balanced, goal_of
 
 #: Share of a column that others cannot replace, below which it counts as none.

@@ -14,8 +14,7 @@ from lightpaint.display_text import some_of
 from lightpaint.errors import ConstraintError
 from lightpaint.files import one_line
 from lightpaint.keywords import keywords
-from lightpaint.lighting.constraints.constraints import LightConstraint, is_pattern
-from lightpaint.lighting.constraints.values import check_keys
+from lightpaint.lighting import LightConstraint, check_keys, is_pattern
 from lightpaint.placement.freedom import EDGE
 from lightpaint.scene import FARTHEST
 from lightpaint.scene.lights.lights_file import MOVES, SceneRequests

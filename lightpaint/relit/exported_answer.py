@@ -16,7 +16,7 @@ from lightpaint.arrays import RGB, Doubles, Floats, Position
 from lightpaint.basis import LightGroups, joined_texels
 from lightpaint.colour import photometry
 from lightpaint.errors import LightpaintError
-from lightpaint.lighting.answer.lighting import Lighting
+from lightpaint.lighting import Lighting
 from lightpaint.luminaires import FULL
 from lightpaint.progress import Listener
 from lightpaint.relit.emission_xml import safe_name

@@ -17,7 +17,7 @@ from lightpaint.display_text import some_names
 from lightpaint.errors import LightpaintError, OutputError
 from lightpaint.files import write_bytes, write_text
 from lightpaint.images.formats import write_rgb
-from lightpaint.lighting.answer.lighting import Lighting, LightSetting
+from lightpaint.lighting import Lighting, LightSetting
 from lightpaint.progress import Listener
 from lightpaint.relit.export.exports import blender_script, plain_cell, scene_script
 from lightpaint.relit.export.fixtures import fixtures_csv, fixtures_json

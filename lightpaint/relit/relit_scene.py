@@ -19,7 +19,7 @@ from lightpaint.errors import LightingError, OutputError, SceneError
 from lightpaint.files import write_bytes
 from lightpaint.images.formats import write_rgb
 from lightpaint.keywords import keywords
-from lightpaint.lighting.answer.lighting import Lighting
+from lightpaint.lighting import Lighting
 from lightpaint.relit.emission_xml import written_emission
 from lightpaint.relit.relit_files import relit_files, settings_of
 from lightpaint.scene import Scaling, Scene, load_scene, new_emitter_at, pose_of, with_split

@@ -28,7 +28,7 @@ from lightpaint.errors import SizeError
 from lightpaint.images import Estimate, box_mean, whole_factor
 from lightpaint.images import block_sums as whole_block_sums
 from lightpaint.keywords import keywords
-from lightpaint.lighting.answer.lighting import Lighting
+from lightpaint.lighting import Lighting
 
 #: Side of the blocks of pixels over which differences are summed before the tests.
 BLOCK = 8

@@ -24,10 +24,7 @@ from lightpaint.basis.render import check_samples
 from lightpaint.errors import SizeError
 from lightpaint.images import Estimate, Size, whole_factor
 from lightpaint.keywords import keywords
-from lightpaint.lighting.analysis.noise.refinement import refine
-from lightpaint.lighting.answer.lighting import Lighting
-from lightpaint.lighting.joined_views import joint_estimate
-from lightpaint.lighting.solution import Solution
+from lightpaint.lighting import Lighting, Solution, joint_estimate, refine
 from lightpaint.progress import Progress, silent
 from lightpaint.relit.relit_scene import relight
 from lightpaint.relit.verification import (

@@ -25,7 +25,7 @@ from lightpaint.images import (
     denoised,
     denoiser_text,
 )
-from lightpaint.lighting.solution import Solution
+from lightpaint.lighting import Solution
 from lightpaint.report.basis_memo import cached_clean_planes
 from lightpaint.target import Target
 

@@ -11,8 +11,7 @@ from lightpaint.arrays import Floats
 from lightpaint.basis import Basis
 from lightpaint.colour import ViewTransform, to_8_bit
 from lightpaint.images import block_mean, enlarged, whole_factor
-from lightpaint.lighting.analysis.appearance.appearance import Appearance, compare_appearance
-from lightpaint.lighting.solution import Solution
+from lightpaint.lighting import Appearance, Solution, compare_appearance
 from lightpaint.report.answer_pictures import (
     CleanLooks,
     Residual,

@@ -15,7 +15,7 @@ from lightpaint.basis import Basis, LightImage, light_images
 from lightpaint.colour import encode_display, to_8_bit
 from lightpaint.display_text import visible
 from lightpaint.images import block_mean, denoised
-from lightpaint.lighting.answer.lighting import Lighting
+from lightpaint.lighting import Lighting
 from lightpaint.report.comparison import shorten_to_width
 from lightpaint.report.measures import energy_shares
 from lightpaint.report.page.figures import exposure_of

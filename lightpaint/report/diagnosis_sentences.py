@@ -7,20 +7,23 @@ from typing import Any
 
 from lightpaint.basis import Basis, joined_texels
 from lightpaint.display_text import some_names, some_of
-from lightpaint.lighting.analysis.appearance.appearance import Appearance
-from lightpaint.lighting.analysis.appearance.delivery import (
+from lightpaint.lighting import (
+    Appearance,
+    Bound,
     Delivery,
+    Diagnosis,
+    Lighting,
+    LightSetting,
+    Loosening,
+    Reason,
+    Solution,
+    Uncertainty,
+    error_shares,
     main_deliveries,
     mean_shares,
     newest_delivery,
     spoken_share,
 )
-from lightpaint.lighting.analysis.appearance.limiting_reasons import Loosening, Reason
-from lightpaint.lighting.analysis.diagnosis import Diagnosis, error_shares
-from lightpaint.lighting.analysis.noise.uncertainty import Uncertainty
-from lightpaint.lighting.answer.certificate import Bound
-from lightpaint.lighting.answer.lighting import Lighting, LightSetting
-from lightpaint.lighting.solution import Solution
 from lightpaint.report.measures import (
     brightness,
     energy_shares,

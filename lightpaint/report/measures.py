@@ -6,9 +6,7 @@ from lightpaint.arrays import Doubles, Floats
 from lightpaint.basis import Basis
 from lightpaint.colour import LUMINANCE
 from lightpaint.images import Estimate, sum_by_bands
-from lightpaint.lighting.analysis.noise.uncertainty import Uncertainty
-from lightpaint.lighting.answer.lighting import Lighting
-from lightpaint.lighting.solution import Solution
+from lightpaint.lighting import Lighting, Solution, Uncertainty
 
 #: Share of a picture's light from which on a light's error counts in proportion to the light.
 LEAST_SHARE = 0.05

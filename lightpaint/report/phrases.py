@@ -8,10 +8,7 @@ import numpy as np
 from lightpaint.basis import TEXELS, is_of_texels, joined_texels
 from lightpaint.colour import luminance
 from lightpaint.display_text import some_names, some_of
-from lightpaint.lighting.analysis.appearance.unpainted_change import UnpaintedChange
-from lightpaint.lighting.analysis.diagnosis import Place
-from lightpaint.lighting.answer.light_rendering import LightRendering
-from lightpaint.lighting.answer.lighting import LightSetting
+from lightpaint.lighting import LightRendering, LightSetting, Place, UnpaintedChange
 
 CHANNELS = ("red", "green", "blue")
 

@@ -4,7 +4,7 @@ import math
 from collections.abc import Iterator, Mapping
 from typing import Any
 
-from lightpaint.lighting.wishes.planes_answer import PlanesAnswer, WishOutcome
+from lightpaint.lighting import PlanesAnswer, WishOutcome
 from lightpaint.photometry.glare import LARGEST_ANGLE, LEAST_ANGLE, LEAST_RATING, GlareReading
 from lightpaint.photometry.illuminance import NORMAL_95, PlaneReading
 from lightpaint.photometry.measuring_plane import MeasuringPlane, plane_title

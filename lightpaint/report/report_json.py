@@ -13,15 +13,18 @@ import numpy as np
 from lightpaint.basis import Basis
 from lightpaint.colour import ViewTransform, luminance
 from lightpaint.images import Estimate
-from lightpaint.lighting.analysis.appearance.appearance import Appearance, compare_appearance
-from lightpaint.lighting.analysis.appearance.color_choices import ColorChoice
-from lightpaint.lighting.analysis.appearance.delivery import Delivery
-from lightpaint.lighting.analysis.appearance.limiting_reasons import Reason
-from lightpaint.lighting.analysis.appearance.unpainted_change import UnpaintedChange
-from lightpaint.lighting.analysis.diagnosis import Diagnosis
-from lightpaint.lighting.analysis.noise.uncertainty import Uncertainty
-from lightpaint.lighting.answer.lighting import Lighting
-from lightpaint.lighting.solution import Solution
+from lightpaint.lighting import (
+    Appearance,
+    ColorChoice,
+    Delivery,
+    Diagnosis,
+    Lighting,
+    Reason,
+    Solution,
+    Uncertainty,
+    UnpaintedChange,
+    compare_appearance,
+)
 from lightpaint.placement.suggestion import MoveSuggestion, Suggestion
 from lightpaint.relit.verification import ERROR, Verification
 from lightpaint.report.answer_pictures import (

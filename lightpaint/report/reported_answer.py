@@ -5,13 +5,15 @@ from dataclasses import dataclass
 
 from lightpaint.basis import Basis
 from lightpaint.images import Estimate
-from lightpaint.lighting.analysis.appearance.appearance import Appearance
-from lightpaint.lighting.analysis.appearance.color_choices import Choices
-from lightpaint.lighting.analysis.diagnosis import Diagnosis
-from lightpaint.lighting.analysis.noise.uncertainty import Uncertainty
-from lightpaint.lighting.analysis.surface_colors import SurfaceColor
-from lightpaint.lighting.solution import Solution
-from lightpaint.lighting.wishes.planes_answer import PlanesAnswer
+from lightpaint.lighting import (
+    Appearance,
+    Choices,
+    Diagnosis,
+    PlanesAnswer,
+    Solution,
+    SurfaceColor,
+    Uncertainty,
+)
 from lightpaint.placement.suggestion import MoveSuggestion, Suggestion
 from lightpaint.relit.verification import Verification
 from lightpaint.report.rig.hung_lights import HungLights

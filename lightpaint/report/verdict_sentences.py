@@ -7,17 +7,18 @@ from lightpaint.colour import luminance
 from lightpaint.display_text import some_names
 from lightpaint.images import Estimate
 from lightpaint.keywords import keywords
-from lightpaint.lighting.analysis.appearance.appearance import (
+from lightpaint.lighting import (
     CLOSE,
     Appearance,
+    Delivery,
+    LimitGroup,
+    Reason,
+    Solution,
     compare_appearance,
+    error_bars,
+    main_deliveries,
     with_undetermined,
 )
-from lightpaint.lighting.analysis.appearance.delivery import Delivery, main_deliveries
-from lightpaint.lighting.analysis.appearance.limiting_reasons import Reason
-from lightpaint.lighting.analysis.appearance.pixel_sample import LimitGroup
-from lightpaint.lighting.analysis.noise.uncertainty import error_bars
-from lightpaint.lighting.solution import Solution
 from lightpaint.relit.verification import ERROR, Verification
 from lightpaint.report.diagnosis_sentences import (
     ALONE_ADVICE,

@@ -9,8 +9,7 @@ from lightpaint.basis import Basis, joined_texels, texel_lights
 from lightpaint.colour import luminance
 from lightpaint.display_text import some_of
 from lightpaint.images import Estimate, sum_by_bands
-from lightpaint.lighting.loss.painting import ignored_paint
-from lightpaint.lighting.solution import Solution
+from lightpaint.lighting import Solution, ignored_paint
 from lightpaint.scene.lights.texels import image_of
 from lightpaint.sentences import Hint, Sentence, Word
 from lightpaint.target import Target

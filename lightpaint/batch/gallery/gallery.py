@@ -43,7 +43,7 @@ from lightpaint.errors import LightpaintError
 from lightpaint.file_reading import read_text
 from lightpaint.files import write_bytes, write_text
 from lightpaint.images.formats import png_bytes
-from lightpaint.lighting.answer.lighting_file import read_lighting
+from lightpaint.lighting import read_lighting
 from lightpaint.pipeline.job.job import Job
 from lightpaint.pipeline.job.sources import BasisFile, GroupsFile, SceneFile, content
 from lightpaint.pipeline.results.results import hung_of

@@ -24,7 +24,7 @@ from lightpaint.errors import LightpaintError
 from lightpaint.file_reading import read_text
 from lightpaint.files import replacing
 from lightpaint.images import block_mean, denoised, fitting_factor, read_estimate
-from lightpaint.lighting.answer.lighting_file import read_lighting
+from lightpaint.lighting import read_lighting
 from lightpaint.photometry.measuring_plane import plane_title
 from lightpaint.photometry.readings_file import PLANES
 from lightpaint.pipeline.results.result_folder import PLANES_FOLDER as PLANES_FOLDER

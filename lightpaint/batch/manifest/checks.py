@@ -20,8 +20,7 @@ from lightpaint.batch.manifest.manifest import Manifest, Table, subject_keys
 from lightpaint.display_text import some_names
 from lightpaint.errors import LightpaintError
 from lightpaint.files import is_name
-from lightpaint.lighting.constraints.constraints import Constraints
-from lightpaint.lighting.constraints.constraints_file import read_constraints
+from lightpaint.lighting import Constraints, read_constraints
 from lightpaint.pipeline.job.settings import Settings
 from lightpaint.pipeline.job.sources import GroupsFile
 from lightpaint.relit import FORMS, check_usd

@@ -38,7 +38,7 @@ from lightpaint.colour import TransformChoice
 from lightpaint.display_text import some_names
 from lightpaint.errors import BatchError, LightpaintError
 from lightpaint.files import is_name
-from lightpaint.lighting.constraints.constraints import Constraints
+from lightpaint.lighting import Constraints
 from lightpaint.pipeline.job.settings import Settings
 from lightpaint.pipeline.job.sources import BasisFile, GroupsFile, Painting, SceneFile
 

@@ -17,9 +17,7 @@ from lightpaint.arrays import RGB
 from lightpaint.colour import kelvin_to_rgb, luminance, photometry
 from lightpaint.errors import BatchError, LightpaintError
 from lightpaint.files import one_line
-from lightpaint.lighting.answer.lighting import Lighting, LightSetting
-from lightpaint.lighting.constraints.constraints import Constraints
-from lightpaint.lighting.fit import DEFAULT_HOLD
+from lightpaint.lighting import DEFAULT_HOLD, Constraints, Lighting, LightSetting
 from lightpaint.pipeline.job.settings import Settings
 from lightpaint.relit import FORMS
 from lightpaint.scene import check_resolution

@@ -11,7 +11,7 @@ from lightpaint.batch.manifest.keys import Space, with_emission
 from lightpaint.colour import WHITE_DUV, cct_and_duv, kelvin_to_rgb, luminance
 from lightpaint.display_text import some_names
 from lightpaint.errors import LightingError
-from lightpaint.lighting.answer.lighting import Lighting, LightSetting
+from lightpaint.lighting import Lighting, LightSetting
 
 #: Stops below the brighter end at which a light that is off begins or ends, in `log`.
 OFF_STOPS = 10.0

@@ -30,11 +30,13 @@ from lightpaint.batch.work.worker_storage import WorkerCache
 from lightpaint.display_text import some_names
 from lightpaint.errors import LOOK_ERRORS, BatchError, LightpaintError
 from lightpaint.files import check_writable
-from lightpaint.lighting.answer.lighting_file import read_lighting
-from lightpaint.lighting.constraints.constraints import Constraints
-from lightpaint.lighting.constraints.start_lighting import start_weights
-from lightpaint.lighting.linear_problem import reason_against_sums
-from lightpaint.lighting.unknowns.reduction import reduce_to
+from lightpaint.lighting import (
+    Constraints,
+    read_lighting,
+    reason_against_sums,
+    reduce_to,
+    start_weights,
+)
 from lightpaint.photometry.measure import DEFAULT_ERROR, FIRST_SPP, MOST_SPP
 from lightpaint.photometry.planes_file import PlanesFile, read_planes
 from lightpaint.pipeline.job.job import Job

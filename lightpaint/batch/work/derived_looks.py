@@ -7,9 +7,7 @@ from typing import Any
 
 from lightpaint.basis import Basis, LightGroups
 from lightpaint.batch.manifest.keys import SHIFTED_WORDS, SOLVED_WORDS, shift, vary
-from lightpaint.lighting.answer.combination import combine
-from lightpaint.lighting.answer.lighting import Lighting
-from lightpaint.lighting.constraints.constraints import Constraints
+from lightpaint.lighting import Constraints, Lighting, combine
 from lightpaint.pipeline.job.job import Job
 from lightpaint.pipeline.job.settings import Settings
 from lightpaint.pipeline.results.answer_folder import LIGHTING, answer_files, new_answer

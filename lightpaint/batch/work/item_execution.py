@@ -31,13 +31,17 @@ from lightpaint.batch.work.worker_storage import WorkerCache
 from lightpaint.errors import LightpaintError
 from lightpaint.files import first_line, one_line
 from lightpaint.images import Estimate
-from lightpaint.lighting.answer.lighting import Lighting
-from lightpaint.lighting.answer.lighting_file import read_lighting
-from lightpaint.lighting.fit import Fit
-from lightpaint.lighting.linear_problem import Sums, sum_rows, summed_problem
-from lightpaint.lighting.linear_solve import solve_linear
-from lightpaint.lighting.problem import Problem
-from lightpaint.lighting.solver import solution_of
+from lightpaint.lighting import (
+    Fit,
+    Lighting,
+    Problem,
+    Sums,
+    read_lighting,
+    solution_of,
+    solve_linear,
+    sum_rows,
+    summed_problem,
+)
 from lightpaint.pipeline.job.job import Job
 from lightpaint.pipeline.job.job_record import decode_job
 from lightpaint.pipeline.job.settings import Settings

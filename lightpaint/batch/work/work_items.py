@@ -11,7 +11,7 @@ from typing import Any, Literal, Protocol
 from lightpaint.basis.render import Part
 from lightpaint.batch.manifest.keys import Final
 from lightpaint.colour import Observer
-from lightpaint.lighting.fit import Emitters
+from lightpaint.lighting import Emitters
 from lightpaint.pipeline.job.sources import Painting, SceneFile, vars_of
 from lightpaint.scene.quality_presets import Quality
 

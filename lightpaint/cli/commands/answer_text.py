@@ -14,11 +14,7 @@ from lightpaint.cli.output.tables import spoken_agreement
 from lightpaint.cli.output.vocabulary import BY_OPTION, spoken
 from lightpaint.colour import LUMINANCE, luminance, rgb_to_hex
 from lightpaint.display_text import some_names, some_of
-from lightpaint.lighting.analysis.appearance.constraint_kinds import KEYS_BY_KIND
-from lightpaint.lighting.analysis.appearance.limiting_reasons import Reason
-from lightpaint.lighting.answer.light_rendering import renderings_of
-from lightpaint.lighting.answer.lighting import LightSetting
-from lightpaint.lighting.wishes.planes_answer import PlanesAnswer
+from lightpaint.lighting import KEYS_BY_KIND, LightSetting, PlanesAnswer, Reason, renderings_of
 from lightpaint.photometry.glare import GlareReading
 from lightpaint.pipeline.job.settings import Settings
 from lightpaint.pipeline.results.results import Look

@@ -29,8 +29,7 @@ from lightpaint.dmx import (
 )
 from lightpaint.errors import ConsoleError, LightingError, OutputError
 from lightpaint.files import check_files, check_writable, write_text
-from lightpaint.lighting.answer.lighting import Lighting
-from lightpaint.lighting.answer.lighting_file import read_lighting
+from lightpaint.lighting import Lighting, read_lighting
 from lightpaint.relit import LevelRow, level_csv, level_document, level_json, level_rows
 from lightpaint.signals import interruptible_between_pieces
 from lightpaint.storage.staging import finish

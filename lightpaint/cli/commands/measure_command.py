@@ -14,10 +14,7 @@ from lightpaint.cli.output import terminal
 from lightpaint.cli.output.lines import CommandOutcome
 from lightpaint.errors import OutputError, SceneError
 from lightpaint.files import check_files, check_writable
-from lightpaint.lighting.answer.lighting_file import read_lighting
-from lightpaint.lighting.constraints.absolute_scale import with_scale
-from lightpaint.lighting.constraints.constraints import Constraints
-from lightpaint.lighting.constraints.constraints_file import constraints_of
+from lightpaint.lighting import Constraints, constraints_of, read_lighting, with_scale
 from lightpaint.photometry.illuminance import Illuminance
 from lightpaint.photometry.measure import measure_illuminance
 from lightpaint.photometry.measure_glare import measure_glare

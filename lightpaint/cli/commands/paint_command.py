@@ -14,7 +14,7 @@ from lightpaint.cli.output import lines, terminal
 from lightpaint.cli.output.lines import CommandOutcome, output_mode
 from lightpaint.colour import TransformChoice
 from lightpaint.errors import LightpaintError, OutputError
-from lightpaint.lighting.constraints.constraints import Constraints
+from lightpaint.lighting import Constraints
 from lightpaint.paint import DEFAULT_NEAR, Reach, SessionRequests
 from lightpaint.pipeline.job.settings import Settings
 from lightpaint.pipeline.job.sources import BasisFile, GroupsFile, SceneFile

@@ -11,7 +11,7 @@ from lightpaint.cli.output import documents, terminal
 from lightpaint.cli.output.lines import CommandOutcome
 from lightpaint.errors import SceneError
 from lightpaint.files import write_text
-from lightpaint.lighting.constraints.constraints import Constraints
+from lightpaint.lighting import Constraints
 from lightpaint.photometry.planes_file import planes_file_beside
 from lightpaint.pipeline.job.settings import Settings
 from lightpaint.pipeline.job.sources import SceneFile

@@ -21,8 +21,7 @@ from lightpaint.cli.output.lines import CommandOutcome
 from lightpaint.dmx import ConsoleRig, aimed_rig, directions_of
 from lightpaint.errors import LightingError, LightpaintError, OutputError
 from lightpaint.files import check_files, check_writable, write_bytes
-from lightpaint.lighting.answer.lighting import Lighting
-from lightpaint.lighting.answer.lighting_file import read_lighting
+from lightpaint.lighting import Lighting, read_lighting
 from lightpaint.paint import SESSION_FILE, read_kept_looks
 from lightpaint.pipeline.job.sources import GroupsFile, SceneFile, content
 from lightpaint.relit import (

@@ -17,8 +17,7 @@ from lightpaint.colour import ViewTransform
 from lightpaint.demo import write_demo
 from lightpaint.errors import BackendError, OutputError
 from lightpaint.files import check_files, check_name, check_writable
-from lightpaint.lighting.answer.lighting_file import read_lighting
-from lightpaint.lighting.constraints.absolute_scale import agreed_scale
+from lightpaint.lighting import agreed_scale, read_lighting
 from lightpaint.pipeline.job.job import Job
 from lightpaint.pipeline.job.remarks import remarks_of_film, remarks_of_memory, remarks_of_scene
 from lightpaint.pipeline.job.settings import Settings

@@ -25,7 +25,7 @@ from lightpaint.cli.options.source_options import (
 from lightpaint.cli.tolerances import Tolerances
 from lightpaint.errors import BatchError
 from lightpaint.files import scene_name
-from lightpaint.lighting.constraints.constraints_file import read_constraints
+from lightpaint.lighting import read_constraints
 from lightpaint.pipeline.job.settings import Settings
 from lightpaint.pipeline.job.sources import GroupsFile, SceneFile
 

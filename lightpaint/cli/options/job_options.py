@@ -21,8 +21,7 @@ from lightpaint.colour import TransformChoice
 from lightpaint.display_text import some_names
 from lightpaint.errors import LOOK_ERRORS, LightpaintError, OutputError, TargetError
 from lightpaint.files import check_files, is_name, is_utf_8, one_line
-from lightpaint.lighting.constraints.constraints import LAMP_KEYS, LIGHT_KEYS, Constraints
-from lightpaint.lighting.constraints.constraints_file import read_constraints
+from lightpaint.lighting import LAMP_KEYS, LIGHT_KEYS, Constraints, read_constraints
 from lightpaint.pipeline.job.settings import Settings
 from lightpaint.pipeline.job.sources import Painting, PlacementFile, SceneFile
 from lightpaint.placement import Rigging

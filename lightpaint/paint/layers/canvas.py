@@ -14,7 +14,7 @@ from lightpaint.arrays import Floats
 from lightpaint.basis import Basis, as_halves
 from lightpaint.colour import ViewTransform
 from lightpaint.errors import PaintError
-from lightpaint.lighting.live.live_view import LiveView
+from lightpaint.lighting import LiveView
 from lightpaint.paint.layers.composed_layers import Change, ComposedLayers
 from lightpaint.paint.layers.composition import (
     MAX_LIGHT,

@@ -10,7 +10,7 @@ import numpy.typing as npt
 from lightpaint.arrays import Floats
 from lightpaint.basis import Basis
 from lightpaint.errors import PaintError
-from lightpaint.lighting.live.live_view import LiveView
+from lightpaint.lighting import LiveView
 from lightpaint.paint.layers.canvas import Canvas
 from lightpaint.paint.layers.layer_pixels import (
     SELECTION_ID,

@@ -22,7 +22,7 @@ from markupsafe import Markup
 from lightpaint.basis import Basis
 from lightpaint.colour import ViewTransform, to_8_bit
 from lightpaint.images import block_mean, fitting_factor
-from lightpaint.lighting.answer.lighting import Lighting
+from lightpaint.lighting import Lighting
 from lightpaint.paint.background_threads import error_text, error_tone, lower_priority
 from lightpaint.paint.message_frames import is_other_version, parse_request
 from lightpaint.paint.protocol import Closing, Failure, Hello, Message, TakeOver

@@ -20,12 +20,15 @@ from weakref import WeakValueDictionary
 from lightpaint.colour import TransformChoice, ViewTransform
 from lightpaint.errors import PaintError
 from lightpaint.files import first_line
-from lightpaint.lighting.analysis.analysis import analyse, with_findings
-from lightpaint.lighting.answer.combination import dimmed
-from lightpaint.lighting.answer.lighting import Lighting
-from lightpaint.lighting.answer.lighting_file import write_lighting
-from lightpaint.lighting.constraints.constraints import Constraints
-from lightpaint.lighting.solution import Solution
+from lightpaint.lighting import (
+    Constraints,
+    Lighting,
+    Solution,
+    analyse,
+    dimmed,
+    with_findings,
+    write_lighting,
+)
 from lightpaint.paint.background_threads import error_text
 from lightpaint.paint.notebook import widget_arguments
 from lightpaint.paint.notebook.cell_views import CellOutput, KernelThread, WidgetViews, static_view

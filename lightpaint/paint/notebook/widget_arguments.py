@@ -12,9 +12,7 @@ import numpy as np
 from lightpaint.basis import Basis, LightGroups
 from lightpaint.colour import TransformChoice, ViewTransform
 from lightpaint.errors import KeywordError, LightpaintError, PaintError
-from lightpaint.lighting.answer.lighting import Lighting
-from lightpaint.lighting.constraints.constraints import Constraints
-from lightpaint.lighting.loss.painting import resolve_importance
+from lightpaint.lighting import Constraints, Lighting, resolve_importance
 from lightpaint.paint.session.session import Session
 from lightpaint.paint.store.database import OTHER_FOLDER, START_AFRESH
 from lightpaint.paint.store.history_steps import Pixels

@@ -7,7 +7,7 @@ from typing import Any
 
 from lightpaint.display_text import some_names
 from lightpaint.errors import LightpaintError, PaintError
-from lightpaint.lighting.solution import Solution
+from lightpaint.lighting import Solution
 from lightpaint.paint.background_threads import BackgroundThreads, StoppedError
 from lightpaint.paint.protocol import (
     EstimatePlaces,

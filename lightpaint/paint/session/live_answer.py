@@ -15,13 +15,15 @@ from lightpaint.arrays import RGB, Doubles
 from lightpaint.basis import Basis, Lights
 from lightpaint.colour import Lamp, ViewTransform
 from lightpaint.errors import LightpaintError
-from lightpaint.lighting.constraints.absolute_scale import with_sure_scale
-from lightpaint.lighting.constraints.constraints import Constraints
-from lightpaint.lighting.constraints.constraints_file import constraints_of
-from lightpaint.lighting.fit import resolve_fit
-from lightpaint.lighting.linear_problem import reduce_lights
-from lightpaint.lighting.live.live import LiveSolver
-from lightpaint.lighting.live.live_view import LiveView
+from lightpaint.lighting import (
+    Constraints,
+    LiveSolver,
+    LiveView,
+    constraints_of,
+    reduce_lights,
+    resolve_fit,
+    with_sure_scale,
+)
 from lightpaint.paint.protocol import PlanesReading
 from lightpaint.paint.session.session_planes import SessionPlanes, WishesInEffect
 from lightpaint.paint.store.session_requests import SessionRequests

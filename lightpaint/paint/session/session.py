@@ -20,9 +20,7 @@ from lightpaint.arrays import Doubles, Floats
 from lightpaint.basis import Basis, denoise_mix
 from lightpaint.colour import ViewTransform
 from lightpaint.errors import LightpaintError, PaintError
-from lightpaint.lighting.constraints.constraints import Constraints
-from lightpaint.lighting.constraints.start_lighting import start_weights
-from lightpaint.lighting.solution import Solution
+from lightpaint.lighting import Constraints, Solution, start_weights
 from lightpaint.paint import protocol
 from lightpaint.paint.layers.canvases import LayeredPaintings
 from lightpaint.paint.layers.layer_pixels import selection_patch

@@ -19,13 +19,19 @@ from lightpaint.colour import (
     photometry,
     rgb_to_hex,
 )
-from lightpaint.lighting.analysis.analysis import Analysis
-from lightpaint.lighting.analysis.appearance.appearance import INVISIBLE, Appearance
-from lightpaint.lighting.analysis.appearance.delivery import Delivery, merge_views
-from lightpaint.lighting.analysis.appearance.limiting_reasons import Reason
-from lightpaint.lighting.analysis.appearance.unpainted_change import UnpaintedChange
-from lightpaint.lighting.answer.lighting import Lighting, color_of_emitter, in_own_color
-from lightpaint.lighting.fit import DEFAULT_HOLD
+from lightpaint.lighting import (
+    DEFAULT_HOLD,
+    INVISIBLE,
+    Analysis,
+    Appearance,
+    Delivery,
+    Lighting,
+    Reason,
+    UnpaintedChange,
+    color_of_emitter,
+    in_own_color,
+    merge_views,
+)
 from lightpaint.paint.layers.canvases import Canvases
 from lightpaint.paint.layers.layer_stack import Layer
 from lightpaint.paint.protocol import (

@@ -8,11 +8,16 @@ import numpy as np
 
 from lightpaint.arrays import Bools, Doubles
 from lightpaint.basis import Lights
-from lightpaint.lighting.constraints.requirements import Requirements
-from lightpaint.lighting.unknowns.reduction import Reduction
-from lightpaint.lighting.wishes.planes_answer import WishOutcome, planes_answer
-from lightpaint.lighting.wishes.required_problem import requirements_within_reach
-from lightpaint.lighting.wishes.wished_light import WishedLight, watts_allowed, wished_light
+from lightpaint.lighting import (
+    Reduction,
+    Requirements,
+    WishedLight,
+    WishOutcome,
+    planes_answer,
+    requirements_within_reach,
+    watts_allowed,
+    wished_light,
+)
 from lightpaint.paint.protocol import (
     Camera,
     MeasuredPlane,

@@ -10,22 +10,23 @@ import numpy.typing as npt
 from lightpaint.arrays import Doubles
 from lightpaint.basis import Basis, DenoisedPlanes
 from lightpaint.colour import ViewTransform
-from lightpaint.lighting.analysis.analysis import analyse
-from lightpaint.lighting.analysis.appearance.display_difference import PaintComparison
-from lightpaint.lighting.analysis.appearance.error_place import NOTICED
-from lightpaint.lighting.analysis.appearance.unpainted_change import (
+from lightpaint.lighting import (
+    NOTICED,
+    Colors,
+    Constraints,
+    Lighting,
+    PaintComparison,
+    Problem,
+    Solution,
+    analyse,
     change_from_scene,
+    choose_mixes,
+    constraints_of,
+    correct_noise,
+    reduce_lights,
+    solution_of,
     unpainted_change,
 )
-from lightpaint.lighting.analysis.noise.noise_correction import correct_noise
-from lightpaint.lighting.answer.lighting import Lighting
-from lightpaint.lighting.constraints.constraints import Constraints
-from lightpaint.lighting.constraints.constraints_file import constraints_of
-from lightpaint.lighting.fit import Colors
-from lightpaint.lighting.linear_problem import reduce_lights
-from lightpaint.lighting.problem import Problem
-from lightpaint.lighting.solution import Solution
-from lightpaint.lighting.solver import choose_mixes, solution_of
 from lightpaint.paint.session.picture_table import Picture, display_thumbnail
 from lightpaint.paint.session.session_messages import preview_text, why_not_closer
 from lightpaint.paint.store.session_requests import SessionRequests

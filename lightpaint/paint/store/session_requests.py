@@ -11,8 +11,7 @@ import numpy as np
 from lightpaint.arrays import Bools, Doubles
 from lightpaint.basis import BasisLight
 from lightpaint.errors import PaintError
-from lightpaint.lighting.constraints.constraints import Constraints
-from lightpaint.lighting.constraints.light_patterns import tables_by_light, tied_lights
+from lightpaint.lighting import Constraints, tables_by_light, tied_lights
 from lightpaint.pipeline.job.settings import Settings
 from lightpaint.validation import is_amount, is_number
 

@@ -10,9 +10,7 @@ from typing import Any, Literal
 
 from lightpaint.basis import Basis, DenoisedPlanes, as_halves
 from lightpaint.errors import PaintError
-from lightpaint.lighting.analysis.analysis import analyse, with_findings
-from lightpaint.lighting.answer.combination import dimmed
-from lightpaint.lighting.answer.lighting import Lighting
+from lightpaint.lighting import Lighting, analyse, dimmed, with_findings
 from lightpaint.paint import protocol
 from lightpaint.paint.background_threads import BackgroundThreads, StoppedError
 from lightpaint.paint.protocol import (

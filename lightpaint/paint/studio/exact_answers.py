@@ -12,14 +12,14 @@ from typing import Any, get_args
 
 from lightpaint.basis import Basis, DenoisedPlanes
 from lightpaint.errors import ConstraintError
-from lightpaint.lighting.analysis.analysis import analyse
-from lightpaint.lighting.analysis.appearance.color_choices import can_change_colors
-from lightpaint.lighting.analysis.appearance.delivery import (
+from lightpaint.lighting import (
+    Solution,
+    analyse,
+    can_change_colors,
     mean_shares,
     measure_deliveries,
     worst_delivery,
 )
-from lightpaint.lighting.solution import Solution
 from lightpaint.paint.background_threads import ExactSolveLoop, LatestWork
 from lightpaint.paint.protocol import (
     AnswerChoice,

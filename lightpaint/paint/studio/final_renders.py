@@ -11,7 +11,7 @@ import numpy as np
 
 from lightpaint.errors import PaintError
 from lightpaint.files import check_writable
-from lightpaint.lighting.answer.lighting import Lighting
+from lightpaint.lighting import Lighting
 from lightpaint.paint import protocol
 from lightpaint.paint.background_threads import BackgroundThreads, StoppedError, error_text
 from lightpaint.paint.protocol import Message, RenderInfo, RenderList

@@ -15,7 +15,7 @@ from lightpaint.basis import (
     read_denoised_planes,
 )
 from lightpaint.files import one_line
-from lightpaint.lighting.solution import Solution
+from lightpaint.lighting import Solution
 from lightpaint.paint.background_threads import LatestWork, StoppedError
 from lightpaint.paint.layers.canvas import Canvas
 from lightpaint.paint.protocol import ProgressReport, Tone

@@ -13,8 +13,7 @@ from lightpaint.errors import OutputError, PaintError
 from lightpaint.files import write_bytes
 from lightpaint.images import denoised, denoiser_text
 from lightpaint.images.formats import png_bytes
-from lightpaint.lighting.answer.combination import combine
-from lightpaint.lighting.answer.lighting import Lighting
+from lightpaint.lighting import Lighting, combine
 from lightpaint.paint.layers.canvas import ViewLayers
 from lightpaint.paint.layers.layer_files import write_layers_exr, write_layers_openraster
 from lightpaint.paint.session.snapshot import SessionSnapshot

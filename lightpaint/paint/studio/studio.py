@@ -13,8 +13,7 @@ from typing import Any
 import numpy.typing as npt
 
 from lightpaint.arrays import Position
-from lightpaint.lighting.answer.lighting import Lighting
-from lightpaint.lighting.solution import Solution
+from lightpaint.lighting import Lighting, Solution
 from lightpaint.paint import protocol
 from lightpaint.paint.background_threads import (
     BackgroundThreads,

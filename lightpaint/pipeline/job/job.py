@@ -20,12 +20,15 @@ from lightpaint.errors import ConstraintError, LightpaintError, TargetError
 from lightpaint.files import check_writable
 from lightpaint.images import whole_factor
 from lightpaint.keywords import keywords
-from lightpaint.lighting.constraints.absolute_scale import agreed_scale, with_sure_scale
-from lightpaint.lighting.constraints.constraints import Constraints
-from lightpaint.lighting.constraints.constraints_file import constraints_of
-from lightpaint.lighting.fit import resolve_for_targets
-from lightpaint.lighting.unknowns.reduction import reduce_to
-from lightpaint.lighting.wishes.wished_light import check_powers
+from lightpaint.lighting import (
+    Constraints,
+    agreed_scale,
+    check_powers,
+    constraints_of,
+    reduce_to,
+    resolve_for_targets,
+    with_sure_scale,
+)
 from lightpaint.pipeline.job.job_checks import (
     check_animation,
     check_inputs,

@@ -12,8 +12,7 @@ from lightpaint.errors import (
     SceneError,
     TargetError,
 )
-from lightpaint.lighting.constraints.constraints import Constraints
-from lightpaint.lighting.joined_views import check_same_lights
+from lightpaint.lighting import Constraints, check_same_lights
 from lightpaint.pipeline.job.settings import Settings
 from lightpaint.pipeline.job.sources import Painting, content
 from lightpaint.placement import Rigging, check_rigging, rigged_lights, rigging_of

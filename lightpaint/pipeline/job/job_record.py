@@ -8,7 +8,7 @@ from typing import Any
 
 from lightpaint.basis import FrameSequence, find_frames
 from lightpaint.errors import LightpaintError
-from lightpaint.lighting.constraints.constraints import Constraints
+from lightpaint.lighting import Constraints
 from lightpaint.pipeline.job.settings import Settings
 from lightpaint.pipeline.job.sources import (
     BasisFile,

@@ -5,7 +5,7 @@ from collections.abc import Mapping
 from lightpaint.basis.render import memory_needed, remark_on_separate_renders, renders_in_bands
 from lightpaint.display_text import some_names
 from lightpaint.images import MISSING_REMARK, Size, left_over, oidn_is_installed, whole_factor
-from lightpaint.lighting.constraints.constraints import Constraints
+from lightpaint.lighting import Constraints
 from lightpaint.pipeline.job.settings import Settings
 from lightpaint.scene import Scene
 from lightpaint.scene.quality_presets import PRESETS

@@ -6,8 +6,7 @@ from typing import Annotated, TypedDict
 from lightpaint.errors import LightpaintError
 from lightpaint.field_options import Option
 from lightpaint.keywords import keywords
-from lightpaint.lighting.algebra.method import Method
-from lightpaint.lighting.fit import Colors, Emitters, Fit, Space
+from lightpaint.lighting import Colors, Emitters, Fit, Method, Space
 from lightpaint.scene.limits import MAX_SPP, MAX_TEXELS
 from lightpaint.scene.quality_presets import Quality, samples
 from lightpaint.sentences import Hint

@@ -15,10 +15,7 @@ from lightpaint.basis.render import basis_lights, check_renders_spectra
 from lightpaint.colour import EYE, Observer, TransformChoice, read_observer
 from lightpaint.errors import BasisError, LightpaintError, SceneError
 from lightpaint.keywords import keywords
-from lightpaint.lighting.constraints.constraints import Constraints
-from lightpaint.lighting.constraints.constraints_file import constraints_of
-from lightpaint.lighting.unknowns.lamp_parts import WholeLamps
-from lightpaint.lighting.unknowns.reduction import lamps_by_name
+from lightpaint.lighting import Constraints, WholeLamps, constraints_of, lamps_by_name
 from lightpaint.pipeline.job.settings import Settings
 from lightpaint.placement import PlacementRecord, read_placement
 from lightpaint.scene import Scene, load_scene, part_name

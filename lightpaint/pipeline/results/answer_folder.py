@@ -10,8 +10,7 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 
 from lightpaint.basis import LightGroups
-from lightpaint.lighting.answer.lighting import Lighting
-from lightpaint.lighting.answer.lighting_file import write_lighting
+from lightpaint.lighting import Lighting, write_lighting
 from lightpaint.pipeline.results.result_folder import ResultFolder
 from lightpaint.relit import EXPORTS, check_relightable, relight, settle, write_exports
 from lightpaint.scene import Scene, load_scene

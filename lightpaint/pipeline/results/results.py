@@ -14,13 +14,15 @@ from lightpaint.files import is_name, one_line, write_bytes, write_text
 from lightpaint.images import Estimate, Size, in_turns, read_estimate, whole_factor, write_estimate
 from lightpaint.images.formats import png_bytes
 from lightpaint.keywords import keywords
-from lightpaint.lighting.analysis.analysis import Analysis
-from lightpaint.lighting.analysis.diagnosis import Diagnosis
-from lightpaint.lighting.analysis.noise.uncertainty import Uncertainty
-from lightpaint.lighting.analysis.surface_colors import SurfaceColor
-from lightpaint.lighting.answer.lighting import Lighting
-from lightpaint.lighting.solution import Solution
-from lightpaint.lighting.wishes.planes_answer import PlanesAnswer
+from lightpaint.lighting import (
+    Analysis,
+    Diagnosis,
+    Lighting,
+    PlanesAnswer,
+    Solution,
+    SurfaceColor,
+    Uncertainty,
+)
 from lightpaint.placement import (
     HARDLY_VISIBLE,
     TO_END,

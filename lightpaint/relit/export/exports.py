@@ -22,8 +22,7 @@ from lightpaint.errors import LightingError
 from lightpaint.files import write_text
 from lightpaint.images.formats import ExrPart, rgb_channels, write_parts
 from lightpaint.keywords import keywords
-from lightpaint.lighting.answer.lighting import Lighting, LightSetting
-from lightpaint.lighting.answer.lighting_keys import key_slopes
+from lightpaint.lighting import Lighting, LightSetting, key_slopes
 from lightpaint.relit.export.nuke import LAYERS, copied_part, needs_copy, nuke_script
 from lightpaint.relit.export.program_axes import (
     SAME_PLACE,

@@ -21,7 +21,7 @@ import numpy as np
 
 from lightpaint.arrays import RGB, Position
 from lightpaint.colour import LampEmitter
-from lightpaint.lighting.answer.lighting import Lighting, LightSetting
+from lightpaint.lighting import Lighting, LightSetting
 from lightpaint.relit.export.exports import plain_cell
 from lightpaint.version import __version__
 

@@ -18,7 +18,7 @@ import numpy as np
 from lightpaint.arrays import Doubles
 from lightpaint.colour import REC709, luminance, rgb_to_xyz
 from lightpaint.dmx import DESCRIPTION, KIND, MM, NamedFixture, named_fixtures, show_nodes
-from lightpaint.lighting.answer.lighting import Lighting
+from lightpaint.lighting import Lighting
 from lightpaint.scene.properties.site import EmitterPlace, rotation_between
 from lightpaint.storage.rig_archive import RigArchive, reading
 

@@ -26,7 +26,7 @@ from lightpaint.basis import LightGroups, RenderLayer, free_name
 from lightpaint.colour import to_rec709
 from lightpaint.files import one_line
 from lightpaint.images.formats import ExrPart, rgb_channels
-from lightpaint.lighting.answer.lighting import Lighting
+from lightpaint.lighting import Lighting
 from lightpaint.relit.export.program_axes import axis_conversions, conversion_of
 from lightpaint.scene.properties.site import Site
 

@@ -10,9 +10,7 @@ from lightpaint.basis import Basis
 from lightpaint.colour import ViewTransform, cct_and_duv, hue_name, to_8_bit
 from lightpaint.display_text import some_names
 from lightpaint.images import block_mean, denoised
-from lightpaint.lighting.analysis.appearance.color_choices import Choices, ColorChoice
-from lightpaint.lighting.fit import Colors
-from lightpaint.lighting.solution import Solution
+from lightpaint.lighting import Choices, ColorChoice, Colors, Solution
 from lightpaint.report.answer_pictures import CleanLooks
 from lightpaint.report.basis_memo import ROWS_SHOWN, SPARE_ROWS
 from lightpaint.report.measures import relative_residual

@@ -9,11 +9,7 @@ from lightpaint.arrays import Floats
 from lightpaint.basis import Basis
 from lightpaint.colour import ViewTransform, luminance, to_8_bit
 from lightpaint.images import by_bands
-from lightpaint.lighting.analysis.appearance.appearance import Appearance
-from lightpaint.lighting.analysis.diagnosis import Diagnosis
-from lightpaint.lighting.analysis.noise.uncertainty import Uncertainty
-from lightpaint.lighting.answer.certificate import Bound
-from lightpaint.lighting.solution import Solution
+from lightpaint.lighting import Appearance, Bound, Diagnosis, Solution, Uncertainty
 from lightpaint.report.answer_pictures import (
     FINEST_SCALE,
     coverage,

@@ -13,7 +13,7 @@ from lightpaint.arrays import Floats, largest
 from lightpaint.colour import ViewTransform, encode_display, to_8_bit
 from lightpaint.images import denoised
 from lightpaint.images.formats import png_bytes
-from lightpaint.lighting.solution import Solution
+from lightpaint.lighting import Solution
 from lightpaint.relit.verification import LIMIT, Verification
 from lightpaint.report.answer_pictures import (
     DIVERGING,

@@ -10,9 +10,7 @@ from lightpaint.arrays import RGB, Doubles, Floats, Indices
 from lightpaint.basis import Basis, BasisLight, LightImage, light_images
 from lightpaint.colour import Photometry, encode_display, luminance, rgb_to_hex, to_8_bit
 from lightpaint.images import block_mean, in_turns
-from lightpaint.lighting.analysis.noise.uncertainty import Uncertainty
-from lightpaint.lighting.answer.lighting import ALL_REACHED, Lighting, LightSetting
-from lightpaint.lighting.solution import Solution
+from lightpaint.lighting import ALL_REACHED, Lighting, LightSetting, Solution, Uncertainty
 from lightpaint.report.basis_memo import (
     ROWS_SHOWN,
     SPARE_ROWS,

@@ -36,8 +36,7 @@ from lightpaint.colour import (
     to_8_bit,
 )
 from lightpaint.images import PackedPicture, block_mean, in_turns, pack_picture
-from lightpaint.lighting.answer.lighting import ALL_REACHED, Lighting
-from lightpaint.lighting.answer.lighting_file import lighting_fields
+from lightpaint.lighting import ALL_REACHED, Lighting, lighting_fields
 from lightpaint.progress import with_progress
 from lightpaint.report.basis_memo import MAX_PIXELS, cached_clean_planes, make_once, page_reduction
 from lightpaint.report.page.figures import CLEAN_REDUCTION, data_uri

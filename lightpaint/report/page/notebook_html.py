@@ -25,9 +25,7 @@ from lightpaint.colour import (
 )
 from lightpaint.images import Estimate, covered, denoised, enlarged
 from lightpaint.images.formats import png_bytes
-from lightpaint.lighting.analysis.appearance.appearance import Appearance
-from lightpaint.lighting.answer.lighting import Lighting
-from lightpaint.lighting.solution import Solution
+from lightpaint.lighting import Appearance, Lighting, Solution
 from lightpaint.relit.verification import Verification
 from lightpaint.report.answer_pictures import paint_coverage, report_transform, unpainted_look
 from lightpaint.report.comparison import SURROUND, TEXT, shorten_to_width

@@ -22,12 +22,15 @@ from lightpaint.basis import Basis
 from lightpaint.colour import ViewTransform, to_8_bit
 from lightpaint.display_text import some_of
 from lightpaint.images import Estimate, covered, in_turns
-from lightpaint.lighting.analysis.appearance.appearance import Appearance
-from lightpaint.lighting.analysis.appearance.delivery import spoken_share
-from lightpaint.lighting.answer.certificate import Software, version
-from lightpaint.lighting.loss.painting import ignored_paint
-from lightpaint.lighting.solution import Solution
-from lightpaint.lighting.wishes.planes_answer import PlanesAnswer
+from lightpaint.lighting import (
+    Appearance,
+    PlanesAnswer,
+    Software,
+    Solution,
+    ignored_paint,
+    spoken_share,
+    version,
+)
 from lightpaint.photometry.false_colour import false_colours
 from lightpaint.photometry.measuring_plane import plane_title
 from lightpaint.relit.verification import ERROR, Verification, limit_of_tests

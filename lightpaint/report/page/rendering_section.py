@@ -8,9 +8,7 @@ from markupsafe import Markup
 
 from lightpaint.arrays import RGB
 from lightpaint.colour import encode_display, to_8_bit
-from lightpaint.lighting.analysis.surface_colors import SurfaceColor
-from lightpaint.lighting.answer.light_rendering import LightRendering, renderings_of
-from lightpaint.lighting.answer.lighting import Lighting
+from lightpaint.lighting import Lighting, LightRendering, SurfaceColor, renderings_of
 from lightpaint.report.page.html import html
 from lightpaint.report.phrases import rendering_sentences
 

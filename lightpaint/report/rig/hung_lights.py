@@ -6,7 +6,7 @@ from typing import Any
 
 from lightpaint.arrays import RGB, Position
 from lightpaint.display_text import some_names
-from lightpaint.lighting.answer.lighting import Lighting
+from lightpaint.lighting import Lighting
 from lightpaint.report.phrases import spoken_percent
 from lightpaint.scene.properties.site import EmitterPlace
 
