@@ -44,8 +44,7 @@ from lightpaint.batch.work.worker_storage import Spool, WorkerCache
 from lightpaint.errors import BasisError, SceneError
 from lightpaint.images import Estimate
 from lightpaint.lighting import Sums
-from lightpaint.pipeline.job.job import Job
-from lightpaint.pipeline.job.sources import Painting, SceneFile
+from lightpaint.pipeline import Job, Painting, SceneFile
 from lightpaint.progress import Listener, Progress
 from lightpaint.scene import Scene, estimate_of, passes_of, ranges_of
 from lightpaint.scene.quality_presets import samples

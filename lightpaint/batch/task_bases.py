@@ -22,10 +22,7 @@ from lightpaint.errors import SceneError
 from lightpaint.files import write_bytes, write_text
 from lightpaint.images import write_estimate
 from lightpaint.images.formats import png_bytes
-from lightpaint.pipeline.job.settings import Settings
-from lightpaint.pipeline.job.sources import SceneFile
-from lightpaint.pipeline.job_bases import obtain
-from lightpaint.pipeline.placed_lights import moved_basis, say_changes
+from lightpaint.pipeline import SceneFile, Settings, moved_basis, obtain, say_changes
 from lightpaint.placement import PlacementRecord, read_placement
 from lightpaint.progress import Listener
 from lightpaint.report import HungLight, rig_drawing

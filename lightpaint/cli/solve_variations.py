@@ -20,8 +20,7 @@ from lightpaint.cli.output import terminal
 from lightpaint.cli.output.documents import files_document
 from lightpaint.errors import LOOK_ERRORS, LightpaintError, OutputError
 from lightpaint.lighting import Lighting
-from lightpaint.pipeline.job.job import Job
-from lightpaint.pipeline.results.result_folder import ResultFolder
+from lightpaint.pipeline import Job, ResultFolder
 from lightpaint.progress import Listener
 from lightpaint.sentences import Hint, Sentence
 

@@ -143,7 +143,7 @@ class SessionFile:
     def _on_scene_loaded(self, k: int, lazy_scene: LazyScene, scene: Scene) -> None:
         """Complete the identity with the scene of view k, which was not cached."""
         from lightpaint.lighting import constraints_of
-        from lightpaint.pipeline.job.remarks import (
+        from lightpaint.pipeline import (
             remarks_of_film,
             remarks_of_memory,
             remarks_of_scene,

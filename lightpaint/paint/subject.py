@@ -18,8 +18,8 @@ from lightpaint.files import is_name, one_line, scene_name
 from lightpaint.lighting import Constraints
 from lightpaint.paint.store.history_steps import Identity, ViewIdentity
 from lightpaint.paint.store.session_requests import SessionRequests
+from lightpaint.pipeline import SceneFile, vars_of
 from lightpaint.pipeline.job.settings import Settings
-from lightpaint.pipeline.job.sources import SceneFile, vars_of
 from lightpaint.placement import rigging_of
 from lightpaint.progress import Progress, silent
 from lightpaint.scene import Scene
@@ -191,7 +191,7 @@ class Subject:
             yield cached
             return
         # Imported here: a basis that exists needs no renderer.
-        from lightpaint.pipeline.job_bases import obtain
+        from lightpaint.pipeline import obtain
 
         # Further samples for an error follow the paint.
         settings = replace(self.settings, error=None)

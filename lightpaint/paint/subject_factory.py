@@ -23,14 +23,14 @@ from lightpaint.lighting import (
 from lightpaint.paint.layers.layer_files import check_kind
 from lightpaint.paint.store.session_requests import SessionRequests
 from lightpaint.paint.subject import LazyScene, Subject, check_view_names, session_identity
-from lightpaint.pipeline.job.settings import Settings
-from lightpaint.pipeline.job.sources import (
+from lightpaint.pipeline import (
     BasisFile,
     GroupsFile,
     SceneFile,
     check_nothing_unused,
     content,
 )
+from lightpaint.pipeline.job.settings import Settings
 from lightpaint.scene import Scene
 from lightpaint.scene.lights.lights_file import lights_file_for
 from lightpaint.scene.quality_presets import on_film
@@ -130,7 +130,7 @@ def _scene_on_film(
 
         _check_constraints(basis_lights(scene), constraints, settings, check_lamps)
         if settings.planes is not None:
-            from lightpaint.pipeline.wished_planes import check_planes, constraints_for_planes
+            from lightpaint.pipeline import check_planes, constraints_for_planes
 
             every = constraints_for_planes(scene, constraints, settings)
             check_planes(scene, settings.planes, every)
@@ -162,7 +162,7 @@ def _with_spectra(scene: Scene, *, settings: Settings, constraints: Constraints)
     """
     if not settings.spectral:
         return scene
-    from lightpaint.pipeline.job.sources import (
+    from lightpaint.pipeline import (
         check_spectral,
         observer_of,
         spectral_scene,

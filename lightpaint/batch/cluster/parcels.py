@@ -17,7 +17,7 @@ from lightpaint.batch.work.work_items import ItemResult, WorkItem
 from lightpaint.display_text import some_names
 from lightpaint.errors import BatchError, OutputError
 from lightpaint.files import first_line
-from lightpaint.pipeline.results.result_folder import RECORD, ResultFolder
+from lightpaint.pipeline import RECORD, ResultFolder
 from lightpaint.sentences import Hint, Sentence
 from lightpaint.storage.json_records import strict_json
 from lightpaint.storage.staging import is_below

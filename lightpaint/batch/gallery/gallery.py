@@ -44,9 +44,7 @@ from lightpaint.file_reading import read_text
 from lightpaint.files import write_bytes, write_text
 from lightpaint.images.formats import png_bytes
 from lightpaint.lighting import read_lighting
-from lightpaint.pipeline.job.job import Job
-from lightpaint.pipeline.job.sources import BasisFile, GroupsFile, SceneFile, content
-from lightpaint.pipeline.results.results import hung_of
+from lightpaint.pipeline import BasisFile, GroupsFile, Job, SceneFile, content, hung_of
 from lightpaint.placement import PlacementRecord
 from lightpaint.report import (
     LightChange,

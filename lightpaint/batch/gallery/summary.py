@@ -27,8 +27,8 @@ from lightpaint.images import block_mean, denoised, fitting_factor, read_estimat
 from lightpaint.lighting import read_lighting
 from lightpaint.photometry.measuring_plane import plane_title
 from lightpaint.photometry.readings_file import PLANES
-from lightpaint.pipeline.results.result_folder import PLANES_FOLDER as PLANES_FOLDER
-from lightpaint.pipeline.results.result_folder import RECORD
+from lightpaint.pipeline import PLANES_FOLDER as PLANES_FOLDER
+from lightpaint.pipeline import RECORD
 from lightpaint.relit import plain_cell
 from lightpaint.storage.json_records import strict_json
 from lightpaint.version import __version__

@@ -21,8 +21,7 @@ from lightpaint.display_text import some_names
 from lightpaint.errors import LightpaintError
 from lightpaint.files import is_name
 from lightpaint.lighting import Constraints, read_constraints
-from lightpaint.pipeline.job.settings import Settings
-from lightpaint.pipeline.job.sources import GroupsFile
+from lightpaint.pipeline import GroupsFile, Settings
 from lightpaint.relit import FORMS, check_usd
 
 #: Default steps of a look that is solved, and of a given lighting or a frame.

@@ -39,8 +39,7 @@ from lightpaint.display_text import some_names
 from lightpaint.errors import BatchError, LightpaintError
 from lightpaint.files import is_name
 from lightpaint.lighting import Constraints
-from lightpaint.pipeline.job.settings import Settings
-from lightpaint.pipeline.job.sources import BasisFile, GroupsFile, Painting, SceneFile
+from lightpaint.pipeline import BasisFile, GroupsFile, Painting, SceneFile, Settings
 
 #: Maximum number of looks of one batch.
 MAX_LOOKS = 10_000

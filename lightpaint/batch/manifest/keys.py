@@ -18,7 +18,7 @@ from lightpaint.colour import kelvin_to_rgb, luminance, photometry
 from lightpaint.errors import BatchError, LightpaintError
 from lightpaint.files import one_line
 from lightpaint.lighting import DEFAULT_HOLD, Constraints, Lighting, LightSetting
-from lightpaint.pipeline.job.settings import Settings
+from lightpaint.pipeline import Settings
 from lightpaint.relit import FORMS
 from lightpaint.scene import check_resolution
 from lightpaint.scene.limits import MAX_SPP

@@ -39,12 +39,16 @@ from lightpaint.lighting import (
 )
 from lightpaint.photometry.measure import DEFAULT_ERROR, FIRST_SPP, MOST_SPP
 from lightpaint.photometry.planes_file import PlanesFile, read_planes
-from lightpaint.pipeline.job.job import Job
-from lightpaint.pipeline.job.settings import Settings
-from lightpaint.pipeline.job.sources import check_nothing_unused, content
-from lightpaint.pipeline.results.result_folder import is_as_written
-from lightpaint.pipeline.results.results import view_names
-from lightpaint.pipeline.wished_planes import check_planes, constraints_for_planes
+from lightpaint.pipeline import (
+    Job,
+    Settings,
+    check_nothing_unused,
+    check_planes,
+    constraints_for_planes,
+    content,
+    is_as_written,
+    view_names,
+)
 from lightpaint.relit import scene_of
 from lightpaint.scene import Scene
 from lightpaint.scene.quality_presets import on_film

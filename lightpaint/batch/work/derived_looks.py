@@ -8,16 +8,20 @@ from typing import Any
 from lightpaint.basis import Basis, LightGroups
 from lightpaint.batch.manifest.keys import SHIFTED_WORDS, SOLVED_WORDS, shift, vary
 from lightpaint.lighting import Constraints, Lighting, combine
-from lightpaint.pipeline.job.job import Job
-from lightpaint.pipeline.job.settings import Settings
-from lightpaint.pipeline.results.answer_folder import LIGHTING, answer_files, new_answer
-from lightpaint.pipeline.results.result_folder import ResultFolder, files_of_planes, write_planes
-from lightpaint.pipeline.results.results import write_predicted
-from lightpaint.pipeline.wished_planes import (
+from lightpaint.pipeline import (
+    LIGHTING,
+    Job,
     MeasuredPlanes,
+    ResultFolder,
+    Settings,
+    answer_files,
     constraints_for_planes,
+    files_of_planes,
     measure_planes,
+    new_answer,
     with_glare,
+    write_planes,
+    write_predicted,
 )
 from lightpaint.progress import Listener
 from lightpaint.relit import scene_of

@@ -42,16 +42,21 @@ from lightpaint.lighting import (
     sum_rows,
     summed_problem,
 )
-from lightpaint.pipeline.job.job import Job
-from lightpaint.pipeline.job.job_record import decode_job
-from lightpaint.pipeline.job.settings import Settings
-from lightpaint.pipeline.job.sources import BasisFile, GroupsFile, content
-from lightpaint.pipeline.pipeline import run
-from lightpaint.pipeline.placed_lights import find_places
-from lightpaint.pipeline.relit_renders import relight_look, relit_folder
-from lightpaint.pipeline.results.answer_folder import new_answer
-from lightpaint.pipeline.results.result_folder import ResultFolder
-from lightpaint.pipeline.results.results import view_names
+from lightpaint.pipeline import (
+    BasisFile,
+    GroupsFile,
+    Job,
+    ResultFolder,
+    Settings,
+    content,
+    decode_job,
+    find_places,
+    new_answer,
+    relight_look,
+    relit_folder,
+    run,
+    view_names,
+)
 from lightpaint.placement import record_of
 from lightpaint.progress import Listener
 from lightpaint.relit import Source, names_of_forms, write_content, writers_of

@@ -10,9 +10,14 @@ from lightpaint.batch.manifest.entries import LookEntry
 from lightpaint.batch.manifest.keys import SHIFTED_WORDS, Final, Handover, Space
 from lightpaint.batch.work.work_items import PathMap
 from lightpaint.errors import BatchError
-from lightpaint.pipeline.job.job_record import encode_job
-from lightpaint.pipeline.job.settings import Settings
-from lightpaint.pipeline.job.sources import BasisFile, GroupsFile, PlacementFile, SceneFile
+from lightpaint.pipeline import (
+    BasisFile,
+    GroupsFile,
+    PlacementFile,
+    SceneFile,
+    Settings,
+    encode_job,
+)
 from lightpaint.storage.json_records import read_record, strict_json
 
 FORMAT: Literal["lightpaint-task 1"] = "lightpaint-task 1"

@@ -12,7 +12,7 @@ from lightpaint.basis.render import Part
 from lightpaint.batch.manifest.keys import Final
 from lightpaint.colour import Observer
 from lightpaint.lighting import Emitters
-from lightpaint.pipeline.job.sources import Painting, SceneFile, vars_of
+from lightpaint.pipeline import Painting, SceneFile, vars_of
 from lightpaint.scene.quality_presets import Quality
 
 #: Map from a path to that on another machine.

@@ -31,7 +31,7 @@ from lightpaint.batch.work.work_items import (
 from lightpaint.errors import BasisError, OutputError
 from lightpaint.files import first_line
 from lightpaint.images import read_estimate
-from lightpaint.pipeline.job.sources import BasisFile, GroupsFile, SceneFile
+from lightpaint.pipeline import BasisFile, GroupsFile, SceneFile
 from lightpaint.placement import read_placement
 from lightpaint.scene import Scene, Stream, pass_sum, passes_of
 from lightpaint.scene.quality_presets import on_film

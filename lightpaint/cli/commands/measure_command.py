@@ -28,9 +28,9 @@ from lightpaint.photometry.readings_file import (
     write_readings,
 )
 from lightpaint.photometry.wish_presets import PRESETS
-from lightpaint.pipeline.job.settings import Settings
-from lightpaint.pipeline.job.sources import SceneFile
-from lightpaint.pipeline.wished_planes import (
+from lightpaint.pipeline import (
+    SceneFile,
+    Settings,
     check_reached,
     constraints_and_unscaled,
     no_glare_remark,

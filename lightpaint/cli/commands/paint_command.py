@@ -16,8 +16,7 @@ from lightpaint.colour import TransformChoice
 from lightpaint.errors import LightpaintError, OutputError
 from lightpaint.lighting import Constraints
 from lightpaint.paint import DEFAULT_NEAR, Reach, SessionRequests
-from lightpaint.pipeline.job.settings import Settings
-from lightpaint.pipeline.job.sources import BasisFile, GroupsFile, SceneFile
+from lightpaint.pipeline import BasisFile, GroupsFile, SceneFile, Settings
 from lightpaint.sentences import Hint
 
 if TYPE_CHECKING:

@@ -13,11 +13,16 @@ from lightpaint.errors import SceneError
 from lightpaint.files import write_text
 from lightpaint.lighting import Constraints
 from lightpaint.photometry.planes_file import planes_file_beside
-from lightpaint.pipeline.job.settings import Settings
-from lightpaint.pipeline.job.sources import SceneFile
-from lightpaint.pipeline.light_plan import PLAN, LightPlan, plan_folder, plan_lighting
-from lightpaint.pipeline.results.answer_folder import new_answer
-from lightpaint.pipeline.results.result_folder import write_planes
+from lightpaint.pipeline import (
+    PLAN,
+    LightPlan,
+    SceneFile,
+    Settings,
+    new_answer,
+    plan_folder,
+    plan_lighting,
+    write_planes,
+)
 from lightpaint.report import planes_numbers, spoken_drives
 from lightpaint.version import __version__
 

@@ -23,7 +23,7 @@ from lightpaint.errors import LightingError, LightpaintError, OutputError
 from lightpaint.files import check_files, check_writable, write_bytes
 from lightpaint.lighting import Lighting, read_lighting
 from lightpaint.paint import SESSION_FILE, read_kept_looks
-from lightpaint.pipeline.job.sources import GroupsFile, SceneFile, content
+from lightpaint.pipeline import GroupsFile, SceneFile, content
 from lightpaint.relit import (
     FORMS,
     Cue,

@@ -18,26 +18,29 @@ from lightpaint.demo import write_demo
 from lightpaint.errors import BackendError, OutputError
 from lightpaint.files import check_files, check_name, check_writable
 from lightpaint.lighting import agreed_scale, read_lighting
-from lightpaint.pipeline.job.job import Job
-from lightpaint.pipeline.job.remarks import remarks_of_film, remarks_of_memory, remarks_of_scene
-from lightpaint.pipeline.job.settings import Settings
-from lightpaint.pipeline.job.sources import (
+from lightpaint.pipeline import (
     BasisFile,
     GroupsFile,
+    Job,
     Painting,
+    ResultFolder,
     SceneFile,
+    Settings,
     check_nothing_unused,
-)
-from lightpaint.pipeline.job_bases import obtain
-from lightpaint.pipeline.light_sheets import check_sheet, render_sheet
-from lightpaint.pipeline.relit_renders import relight_look, relit_folder
-from lightpaint.pipeline.results.result_folder import ResultFolder
-from lightpaint.pipeline.results.results import result_folders, verify_result
-from lightpaint.pipeline.templates import (
+    check_sheet,
     look_of_basis,
+    obtain,
+    relight_look,
+    relit_folder,
+    remarks_of_film,
+    remarks_of_memory,
+    remarks_of_scene,
     render_look,
+    render_sheet,
     render_template,
+    result_folders,
     template_of_basis,
+    verify_result,
 )
 from lightpaint.progress import stage
 from lightpaint.relit import solved_identity

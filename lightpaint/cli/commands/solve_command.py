@@ -12,10 +12,7 @@ from lightpaint.cli.output.lines import CommandOutcome
 from lightpaint.cli.tolerances import Tolerances
 from lightpaint.display_text import some_of
 from lightpaint.errors import LOOK_ERRORS
-from lightpaint.pipeline.frame_pictures import frames_to_write, relight_frames
-from lightpaint.pipeline.job.job import Job, PaintedView
-from lightpaint.pipeline.pipeline import run
-from lightpaint.pipeline.results.results import Look
+from lightpaint.pipeline import Job, Look, PaintedView, frames_to_write, relight_frames, run
 from lightpaint.placement import PlacementRecord, record_of
 from lightpaint.relit import EXPORTS
 from lightpaint.report import spoken_turn

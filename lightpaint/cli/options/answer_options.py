@@ -8,7 +8,7 @@ from lightpaint.batch.run_options import RunOptions
 from lightpaint.cli.options import arguments
 from lightpaint.cli.options.option_groups import add_fields, add_output, add_view_transform
 from lightpaint.colour import Preference
-from lightpaint.pipeline.job.settings import Settings
+from lightpaint.pipeline import Settings
 
 #: Names of the variations.
 VARIATIONS = "warmer,cooler,fewer-lights,white-only,held-harder"

@@ -26,8 +26,7 @@ from lightpaint.cli.tolerances import Tolerances
 from lightpaint.errors import BatchError
 from lightpaint.files import scene_name
 from lightpaint.lighting import read_constraints
-from lightpaint.pipeline.job.settings import Settings
-from lightpaint.pipeline.job.sources import GroupsFile, SceneFile
+from lightpaint.pipeline import GroupsFile, SceneFile, Settings
 
 if TYPE_CHECKING:
     from lightpaint.batch.run_options import RunOptions

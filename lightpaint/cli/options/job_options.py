@@ -22,13 +22,12 @@ from lightpaint.display_text import some_names
 from lightpaint.errors import LOOK_ERRORS, LightpaintError, OutputError, TargetError
 from lightpaint.files import check_files, is_name, is_utf_8, one_line
 from lightpaint.lighting import LAMP_KEYS, LIGHT_KEYS, Constraints, read_constraints
-from lightpaint.pipeline.job.settings import Settings
-from lightpaint.pipeline.job.sources import Painting, PlacementFile, SceneFile
+from lightpaint.pipeline import Painting, PlacementFile, SceneFile, Settings
 from lightpaint.placement import Rigging
 from lightpaint.scene.lights.lights_file import MOVES
 
 if TYPE_CHECKING:
-    from lightpaint.pipeline.job.job import Job
+    from lightpaint.pipeline import Job
 
 
 def is_folder(output: Path) -> bool:
@@ -53,7 +52,7 @@ def jobs_of(
     failure, by the name of the folder, if the others are to go on.
     """
     # Imported late: jobs import much that other commands do not need.
-    from lightpaint.pipeline.job.job import Job
+    from lightpaint.pipeline import Job
 
     if (sequence := sequence_of(options)) is not None:
         return [_job_of_frames(options, settings, sequence)]
@@ -108,7 +107,7 @@ def jobs_of(
 
 def _job_of_frames(options: Namespace, settings: Settings, sequence: FrameSequence) -> "Job":
     """Return the job of a shot whose frames are views of one lighting."""
-    from lightpaint.pipeline.job.job import Job
+    from lightpaint.pipeline import Job
 
     if options.variations:
         raise LightpaintError("--variations are of one picture: give one frame, or leave them out")

@@ -46,7 +46,7 @@ from lightpaint.cli.options.option_groups import (
     add_view,
     add_view_transform,
 )
-from lightpaint.pipeline.job.settings import Settings
+from lightpaint.pipeline import Settings
 from lightpaint.validation import parse_share
 from lightpaint.version import __version__
 

@@ -23,7 +23,7 @@ from lightpaint.basis import (
 )
 from lightpaint.display_text import visible
 from lightpaint.errors import BasisError, TargetError
-from lightpaint.pipeline.job.sources import BasisFile, GroupsFile, SceneFile, check_needed
+from lightpaint.pipeline import BasisFile, GroupsFile, SceneFile, check_needed
 
 #: Options for loading a scene, by their Python names.
 LOADING = (

@@ -10,9 +10,7 @@ from lightpaint.basis.cache import cache
 from lightpaint.cli.doctor import Finding
 from lightpaint.cli.output.tables import photometry_of
 from lightpaint.cli.tolerances import Tolerances
-from lightpaint.pipeline.job.job import Job, PaintedView
-from lightpaint.pipeline.results.result_folder import RECORD
-from lightpaint.pipeline.results.results import Look
+from lightpaint.pipeline import RECORD, Job, Look, PaintedView
 from lightpaint.relit import Verification
 from lightpaint.report import finite, verification_numbers
 from lightpaint.scene import MULTIPLE, WHOLE_EMISSION, Light, Scene

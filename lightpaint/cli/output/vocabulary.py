@@ -6,7 +6,7 @@ from collections.abc import Mapping, Sequence
 
 from lightpaint.batch.run_options import RunOptions
 from lightpaint.field_options import options_of
-from lightpaint.pipeline.job.settings import Settings
+from lightpaint.pipeline import Settings
 from lightpaint.sentences import Datum, Hint, Lead, Sentence, SourceKey, Word
 
 #: The records whose fields have options.

@@ -177,12 +177,13 @@ class FinalRenders:
     ) -> None:
         """Render the answer in a view, and write it to a new folder."""
         # Imported here: they load all rooms, and painting needs only a few.
-        from lightpaint.pipeline.relit_renders import (
+        from lightpaint.pipeline import (
+            LIGHTING,
             render_final,
+            write_answer,
             write_final_exr,
             write_final_png,
         )
-        from lightpaint.pipeline.results.answer_folder import LIGHTING, write_answer
 
         def report(label: str, done: int, total: int, unit: str = "passes") -> None:
             if not self._change_info(number, done=done, total=total):
@@ -245,7 +246,7 @@ class FinalRenders:
         """Return the small picture of a render of before. Raises LightpaintError without a file."""
         # Imported here, as what renders is.
         from lightpaint.images import read_picture
-        from lightpaint.pipeline.relit_renders import DENOISED
+        from lightpaint.pipeline import DENOISED
 
         by_name = {Path(file).name: file for file in info.files}
         if file := by_name.get(PICTURES["png"]):

@@ -106,7 +106,7 @@ class PlaneMeasurements:
         a limit of power.
         """
         # Imported here: a session without planes needs no renderer.
-        from lightpaint.pipeline.wished_planes import (
+        from lightpaint.pipeline import (
             constraints_for_planes,
             limited_power,
             measure_planes,

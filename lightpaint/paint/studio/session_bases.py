@@ -365,7 +365,7 @@ def add_round(
     # Imported here: saved bases need no renderer.
     from lightpaint.basis.cache import top_up_basis
     from lightpaint.basis.render import ONE_PASS, kept_loaded
-    from lightpaint.pipeline.needed_samples import Certainty, needed_counts
+    from lightpaint.pipeline import Certainty, needed_counts
 
     settings, bases = snapshot.settings, list(snapshot.bases)
     painted = [bases[k] for k in snapshot.painted_views]

@@ -18,9 +18,7 @@ from lightpaint.paint.layers.canvas import ViewLayers
 from lightpaint.paint.layers.layer_files import write_layers_exr, write_layers_openraster
 from lightpaint.paint.session.snapshot import SessionSnapshot
 from lightpaint.paint.subject import Subject, layers_paths, painting_path, picture_path
-from lightpaint.pipeline.job.job import Job
-from lightpaint.pipeline.pipeline import run
-from lightpaint.pipeline.results.answer_folder import LIGHTING, RELIT, write_answer
+from lightpaint.pipeline import LIGHTING, RELIT, Job, run, write_answer
 from lightpaint.progress import Progress
 from lightpaint.relit import relight, verify_in_stages
 from lightpaint.report import CleanLooks, spoken_distance
