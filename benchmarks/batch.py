@@ -30,7 +30,7 @@ from lightpaint.basis.lights import BasisLight
 from lightpaint.batch.cluster.cluster import Cluster
 from lightpaint.batch.distributed_work import PartwiseRender
 from lightpaint.batch.engine import Engine, InProcess
-from lightpaint.batch.plan.planner import plan
+from lightpaint.batch.plan.planner import plan_batch
 from lightpaint.batch.run import run_batch
 from lightpaint.batch.run_options import RunOptions
 from lightpaint.batch.work.task import Task
@@ -153,12 +153,12 @@ def looks(folder: Path, count: int, steps: str, **options: Any) -> None:
     with tempfile.TemporaryDirectory(dir=folder) as place:
         address = options.get("cluster")
         start_s = time.perf_counter()
-        planned = plan(folder / "looks.toml", Path(place) / "out")
+        planned = plan_batch(folder / "looks.toml", Path(place) / "out")
         checked_s = time.perf_counter() - start_s
 
         if address:  # workers begin with the first
             assert not run_batch(planned.select("p000[01]"), RunOptions(**options)).failed
-            planned, count = plan(folder / "looks.toml", Path(place) / "out"), count - 2
+            planned, count = plan_batch(folder / "looks.toml", Path(place) / "out"), count - 2
 
         def work() -> None:
             assert not run_batch(planned, RunOptions(**options)).failed

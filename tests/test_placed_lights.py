@@ -14,7 +14,7 @@ from nightly import nightly
 from renderer import LIGHTS, write_room
 
 import lightpaint as lp
-from lightpaint.batch.plan.planner import plan
+from lightpaint.batch.plan.planner import plan_batch
 from lightpaint.errors import BatchError, LightpaintError
 from lightpaint.files import write_bytes
 from lightpaint.images.estimate import Estimate
@@ -412,9 +412,9 @@ def test_sums_alone_are_refused_where_lights_may_move(tmp_path: Path) -> None:
     settings = '[look.settings]\nspace = "linear"\nliteral = true\n'
     (tmp_path / "looks.toml").write_text(f"[[look]]\n{look}{settings}")
     with pytest.raises(BatchError, match="lights may move in it, unless move_lights is false"):
-        plan(tmp_path / "looks.toml", tmp_path / "out")
+        plan_batch(tmp_path / "looks.toml", tmp_path / "out")
     (tmp_path / "looks.toml").write_text(f"[[look]]\n{look}{settings}move_lights = false\n")
-    assert not plan(tmp_path / "looks.toml", tmp_path / "out").looks[0].failure
+    assert not plan_batch(tmp_path / "looks.toml", tmp_path / "out").looks[0].failure
 
 
 class _Remarks:

@@ -16,7 +16,7 @@ from pathlib import Path
 
 from PIL import Image
 
-from lightpaint.batch.plan.planner import plan
+from lightpaint.batch.plan.planner import plan_batch
 from lightpaint.batch.run import run_batch
 
 HERE = Path(__file__).resolve().parent
@@ -65,7 +65,7 @@ def main() -> None:
     asked = parser.parse_args()
     with tempfile.TemporaryDirectory() as made:
         folder = Path(made)
-        outcome = run_batch(plan(manifest(folder, asked.spp), folder / "looks"))
+        outcome = run_batch(plan_batch(manifest(folder, asked.spp), folder / "looks"))
         assert not outcome.failed, outcome.failed
         photographed(folder / "looks" / "index.html", folder / "page.png")
         with Image.open(folder / "page.png") as picture:

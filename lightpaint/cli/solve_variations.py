@@ -6,16 +6,20 @@ from pathlib import Path
 from typing import Any
 
 from lightpaint.basis import Basis
-from lightpaint.batch.gallery.gallery import counts_text, entry_of, write_solve_gallery
-from lightpaint.batch.manifest.entries import LookEntry
-from lightpaint.batch.manifest.file_names import FILES, check_gallery, is_reserved
-from lightpaint.batch.work.derived_looks import (
+from lightpaint.batch import (
+    FILES,
+    LookEntry,
+    check_gallery,
+    counts_text,
+    entry_of,
+    is_disk_full,
+    is_reserved,
     publish_shifted,
     shifted_folders,
     variation_folder,
     variation_jobs,
+    write_solve_gallery,
 )
-from lightpaint.batch.work.item_execution import is_disk_full
 from lightpaint.cli.output import terminal
 from lightpaint.cli.output.documents import files_document
 from lightpaint.errors import LOOK_ERRORS, LightpaintError, OutputError

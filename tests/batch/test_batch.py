@@ -25,7 +25,7 @@ from lightpaint.batch.gallery.summary import LightRow, SummaryRow, summary_csv
 from lightpaint.batch.manifest.file_names import FILES, is_reserved
 from lightpaint.batch.manifest.keys import as_key
 from lightpaint.batch.manifest.manifest import read_manifest
-from lightpaint.batch.plan.planner import plan
+from lightpaint.batch.plan.planner import plan_batch
 from lightpaint.batch.run import _Run, run_batch
 from lightpaint.batch.run_options import RunOptions
 from lightpaint.batch.work import item_execution
@@ -54,7 +54,7 @@ def batch_folder(tmp_path: Path) -> Path:
 
 
 def run_item(folder: Path, **options: Any) -> Any:
-    return run_batch(plan(folder / "looks.toml", folder / "out"), RunOptions(**options))
+    return run_batch(plan_batch(folder / "looks.toml", folder / "out"), RunOptions(**options))
 
 
 def test_every_look_is_what_solve_makes_of_it(
@@ -156,7 +156,7 @@ def test_a_damaged_journal_is_said_and_its_look_done_again(batch_folder: Path) -
 
 @pytest.mark.nightly
 def test_only_some(batch_folder: Path) -> None:
-    partial_plan = plan(batch_folder / "looks.toml", batch_folder / "out").select("dusk-1")
+    partial_plan = plan_batch(batch_folder / "looks.toml", batch_folder / "out").select("dusk-1")
     outcome = run_batch(partial_plan)
     assert outcome.done == ["p0", "third", "dusk-1"]
     assert [row.state for row in outcome.rows].count("waiting") == 7
@@ -223,14 +223,16 @@ def test_a_look_can_have_no_variations_though_the_defaults_do(batch_folder: Path
     looks += '\n[[look]]\npainting = "p2.exr"\nvariations = []\nwant = ["lights"]\n'
     looks += "settings = { literal = true }\n"
     (batch_folder / "looks.toml").write_text(defaults + looks, encoding="utf-8")
-    planned = plan(batch_folder / "looks.toml", batch_folder / "out")
+    planned = plan_batch(batch_folder / "looks.toml", batch_folder / "out")
     names = [look.entry.name for look in planned.looks]
     assert names == ["p0", "p0-warmer", "p0-white-only", "p1", "p2"]
 
 
 def test_a_failure_names_keys_of_the_manifest(batch_folder: Path) -> None:
     write_rgb(batch_folder / "p1.exr", np.ones((5, 7, 3), dtype=np.float32))
-    failures = {x.entry.name: x.failure for x in plan(batch_folder / "looks.toml", "out").looks}
+    failures = {
+        x.entry.name: x.failure for x in plan_batch(batch_folder / "looks.toml", "out").looks
+    }
     assert failures["p1"].endswith("or pass settings.resize = true"), failures
 
 
@@ -409,7 +411,7 @@ def test_workers_that_are_all_gone_are_no_look_s_failure(
 
 
 def test_two_batches_do_not_work_in_one_folder(batch_folder: Path) -> None:
-    planned, remarks = plan(batch_folder / "looks.toml", batch_folder / "out"), []
+    planned, remarks = plan_batch(batch_folder / "looks.toml", batch_folder / "out"), []
 
     def other(*_: Any) -> None:
         with pytest.raises(OutputError, match="another batch is at work"):
@@ -421,7 +423,7 @@ def test_two_batches_do_not_work_in_one_folder(batch_folder: Path) -> None:
 
 
 def test_tasks_are_the_same_wherever_they_are_sent(batch_folder: Path) -> None:
-    for look in plan(batch_folder / "looks.toml", batch_folder / "out").looks:
+    for look in plan_batch(batch_folder / "looks.toml", batch_folder / "out").looks:
         for step in look.steps:
             assert Task.from_json(step.task.to_json()) == step.task
     for text in ("", "[]", "{}", '{"format": "lightpaint-task 1", "share": "a"}'):
@@ -447,7 +449,7 @@ class _AtWork:
 def test_workers_make_the_same_and_one_that_dies_costs_nothing(
     batch_folder: Path, reference_batch: tuple[Path, dict[str, bytes]]
 ) -> None:
-    planned, pids = plan(batch_folder / "looks.toml", batch_folder / "out"), []
+    planned, pids = plan_batch(batch_folder / "looks.toml", batch_folder / "out"), []
 
     def record_remark(*_: Any) -> None:
         if not pids:  # the first answer is here, and another is on its way
@@ -500,7 +502,7 @@ def test_the_others_go_on_while_a_worker_hangs(
             stopped.append(_first_process(started[-1]))
             os.kill(stopped[0], signal.SIGSTOP)
 
-    planned = plan(batch_folder / "looks.toml", batch_folder / "out")
+    planned = plan_batch(batch_folder / "looks.toml", batch_folder / "out")
     options = RunOptions(workers=2, task_limit_s=60)
     outcome = run_batch(planned, options, on_step=stop_one)
     [failed] = [name for name, reason in outcome.failed.items() if "longer than 60 s" in reason]
@@ -604,14 +606,14 @@ def test_a_first_manifest_is_one_that_can_be_run(batch_folder: Path) -> None:
     text = text.replace('scene = "../room.xml"', 'basis = "../b.basis.exr"')
     text = text.replace('"verify", ', "").replace('quality = "preview"', "")
     (batch_folder / "sub" / "l.toml").write_text(text, encoding="utf-8")
-    planned = plan(batch_folder / "sub" / "l.toml", batch_folder / "out")
+    planned = plan_batch(batch_folder / "sub" / "l.toml", batch_folder / "out")
     assert [look.entry.name for look in planned.looks] == ["p0", "p1"]
     assert not any(look.failure for look in planned.looks)
 
 
 def test_without_anybody_listening(batch_folder: Path) -> None:
     assert run_batch(
-        plan(batch_folder / "looks.toml", batch_folder / "out").select("third"), None, silent
+        plan_batch(batch_folder / "looks.toml", batch_folder / "out").select("third"), None, silent
     ).done
 
 
@@ -663,7 +665,7 @@ def test_several_patterns_choose_looks_of_each(batch_folder: Path) -> None:
     assert "third" in output
     assert "p0" in output
     assert "p1" not in output
-    planned = plan(batch_folder / "looks.toml", batch_folder / "out")
+    planned = plan_batch(batch_folder / "looks.toml", batch_folder / "out")
     with pytest.raises(BatchError, match=r"no look matches 'x\*'"):
         planned.select("p0", "x*")
 

@@ -22,7 +22,7 @@ from lightpaint.basis.file import basis_file
 from lightpaint.basis.render import banded_film, basis_render
 from lightpaint.basis.render import render_parts as parts_module
 from lightpaint.batch.cluster.cluster import Cluster
-from lightpaint.batch.plan.planner import plan
+from lightpaint.batch.plan.planner import plan_batch
 from lightpaint.batch.run import BatchOutcome, run_batch
 from lightpaint.batch.run_options import RunOptions
 from lightpaint.images.formats.exr import write_rgb
@@ -76,7 +76,7 @@ def reference_batch(tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, dic
         render_small_parts(patch, folder / "cache-alone")
         limit_threads(1)
         try:
-            outcome = run_batch(plan(folder / "looks.toml", folder / "alone"))
+            outcome = run_batch(plan_batch(folder / "looks.toml", folder / "alone"))
         finally:
             limit_threads(None)
     assert not outcome.failed
@@ -120,7 +120,7 @@ def run_item(
 ) -> BatchOutcome:
     with pytest.MonkeyPatch.context() as patch:
         render_small_parts(patch, folder / f"cache-{name}")
-        planned = plan(folder / "looks.toml", folder / name)
+        planned = plan_batch(folder / "looks.toml", folder / name)
         outcome = run_batch(planned, RunOptions(cluster=workers.address, **options), listener)  # type: ignore[arg-type]
     assert not outcome.failed
     return outcome

@@ -23,7 +23,7 @@ from lightpaint.batch.gallery.summary import (
     summary_csv,
 )
 from lightpaint.batch.plan.plan import estimate
-from lightpaint.batch.plan.planner import plan
+from lightpaint.batch.plan.planner import plan_batch
 from lightpaint.batch.run import run_batch
 from lightpaint.batch.run_options import RunOptions
 from lightpaint.batch.work.item_execution import run_item
@@ -67,7 +67,7 @@ def folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
 
 
 def run_looks(folder: Path) -> list[str]:
-    return run_batch(plan(folder / "looks.toml", folder / "out"), RunOptions()).done
+    return run_batch(plan_batch(folder / "looks.toml", folder / "out"), RunOptions()).done
 
 
 def summary_rows(folder: Path) -> list[dict[str, str]]:
@@ -100,9 +100,9 @@ def test_looks_give_the_light_and_another_planes_file_makes_them_stale(folder: P
 def test_the_estimate_has_the_lux_once_for_all_looks(folder: Path) -> None:
     def bases_s(planes: str = PLANES) -> float:
         (folder / "project" / "floor.planes.toml").write_text(planes, encoding="utf-8")
-        return estimate(plan(folder / "looks.toml", folder / "out")).bases_s
+        return estimate(plan_batch(folder / "looks.toml", folder / "out")).bases_s
 
-    planned = plan(folder / "looks.toml", folder / "out")
+    planned = plan_batch(folder / "looks.toml", folder / "out")
     assert [*planned.measurements] == ["dark", "dark-warmer"]
     without = estimate(replace(planned, measurements={})).bases_s
     alone = estimate(replace(planned, measurements={"dark": planned.measurements["dark"]})).bases_s
@@ -134,7 +134,7 @@ def test_a_worker_elsewhere_gets_the_planes_file_and_does_the_same(
     folder: Path, tmp_path: Path
 ) -> None:
     run_looks(folder)
-    task = plan(folder / "looks.toml", folder / "again").looks[0].steps[0].task
+    task = plan_batch(folder / "looks.toml", folder / "again").looks[0].steps[0].task
     scene = load_scene(folder / "project" / "room.xml")
     write_basis(tmp_path / "b.basis.exr", obtain_basis(scene, spp=4))
     task = replace(task, files=(str(tmp_path / "b.basis.exr"),))
@@ -153,7 +153,7 @@ def test_a_worker_elsewhere_gets_the_planes_file_and_does_the_same(
 
 def _points_and_error(folder: Path, out: str) -> tuple[bytes, float]:
     """The points of the look, and the relative error of the mean of its plane."""
-    assert run_batch(plan(folder / "looks.toml", folder / out), RunOptions()).done
+    assert run_batch(plan_batch(folder / "looks.toml", folder / out), RunOptions()).done
     planes = json.loads((folder / out / "dark/planes/planes.json").read_text("utf-8"))["planes"]
     error = planes["floor"]["mean_error"] / planes["floor"]["mean"]
     return (folder / out / "dark/planes/planes.csv").read_bytes(), error
@@ -174,7 +174,7 @@ def test_planes_are_measured_as_well_as_they_ask_whatever_is_cached(folder: Path
 
 def test_the_error_of_a_manifest_holds_for_planes_too(folder: Path) -> None:
     (folder / "looks.toml").write_text(LOOKS.replace("spp = 4", "error = 0.004"), encoding="utf-8")
-    step = plan(folder / "looks.toml", folder / "out").looks[0].steps[0]
+    step = plan_batch(folder / "looks.toml", folder / "out").looks[0].steps[0]
     values = json.loads(step.task.job)["settings"]
     settings = Settings(**{key: values[key] for key in ("planes", "error")})
     scene = load_scene(folder / "project" / "room.xml")
@@ -200,7 +200,7 @@ def test_a_plan_finds_what_planes_lack_before_anything_is_rendered(
     if planes is not None:
         (folder / "project" / "floor.planes.toml").write_text(planes, encoding="utf-8")
     with pytest.raises(BatchError) as error:
-        plan(folder / "looks.toml", folder / "out")
+        plan_batch(folder / "looks.toml", folder / "out")
     assert expected in str(error.value)
     assert "look 'dark.exr'" in str(error.value)
 

@@ -59,12 +59,12 @@ def test_its_commands_done_one_by_one_leave_what_one_batch_leaves(folder: Path) 
 
 
 def test_those_that_share_a_folder_keep_others_out(folder: Path) -> None:
-    from lightpaint.batch.plan.planner import plan
+    from lightpaint.batch.plan.planner import plan_batch
     from lightpaint.batch.run import run_batch
     from lightpaint.batch.run_options import RunOptions
     from lightpaint.errors import OutputError
 
-    planned, remarks = plan(folder / "looks.toml", folder / "out"), []
+    planned, remarks = plan_batch(folder / "looks.toml", folder / "out"), []
 
     def occupy(*_: Any) -> None:
         with pytest.raises(OutputError, match="another batch is at work"):
@@ -74,7 +74,7 @@ def test_those_that_share_a_folder_keep_others_out(folder: Path) -> None:
     run_batch(planned.select("p0"), RunOptions(shares_folder=True), on_step=occupy)
     assert remarks == [["p1"]]
     assert not (folder / "out" / "index.html").exists()
-    assert set(run_batch(plan(folder / "looks.toml", folder / "out")).skipped) == {"p0", "p1"}
+    assert set(run_batch(plan_batch(folder / "looks.toml", folder / "out")).skipped) == {"p0", "p1"}
 
 
 def test_files_in_the_folder_of_the_job_go_with_it(folder: Path) -> None:

@@ -9,7 +9,7 @@ from batches import contents, write_batch
 from light_groups import interleaved, pictures
 
 from lightpaint.batch.cluster.parcels import FileHashes, Parcel, ParcelStore, pack, pieces, unpack
-from lightpaint.batch.plan.planner import plan
+from lightpaint.batch.plan.planner import plan_batch
 from lightpaint.batch.run import run_batch
 from lightpaint.batch.work.item_execution import run_item
 from lightpaint.batch.work.task import Task
@@ -34,7 +34,7 @@ def store(tmp_path: Path) -> ParcelStore:
 
 def task(manifest: Path, output_folder: Path, look: str = "p0") -> Task:
     return next(
-        x.steps[0].task for x in plan(manifest, output_folder).looks if x.entry.name == look
+        x.steps[0].task for x in plan_batch(manifest, output_folder).looks if x.entry.name == look
     )
 
 
@@ -56,7 +56,7 @@ def test_a_look_done_elsewhere_is_the_look_done_here(
     folder: Path, store: ParcelStore, is_whole: bool
 ) -> None:
     base = folder if is_whole else Path()
-    run_batch(plan(base / "looks.toml", base / "expected").select("p0"))
+    run_batch(plan_batch(base / "looks.toml", base / "expected").select("p0"))
     item = task(base / "looks.toml", base / "expected")
     remote_task = task(base / "looks.toml", base / "out")
     parcel = pack(remote_task, FileHashes(), run="a", is_shared=False)
@@ -95,7 +95,7 @@ def test_light_groups_in_a_folder_among_paintings_are_the_same_elsewhere(
         'variations = ["warmer"], want = ["predict"] }]',
         encoding="utf-8",
     )
-    run_batch(plan(base / "groups.toml", base / "expected"))
+    run_batch(plan_batch(base / "groups.toml", base / "expected"))
     for look in ("p0", "p1", "p1-warmer"):
         item = task(base / "groups.toml", base / "out", look)
         parcel = pack(item, FileHashes(), run="a", is_shared=False)

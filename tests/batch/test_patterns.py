@@ -10,7 +10,7 @@ import pytest
 from lightpaint.batch.manifest import entries
 from lightpaint.batch.manifest.file_names import files_matching
 from lightpaint.batch.manifest.manifest import read_manifest
-from lightpaint.batch.plan.planner import plan
+from lightpaint.batch.plan.planner import plan_batch
 from lightpaint.errors import BatchError
 
 
@@ -52,7 +52,7 @@ def test_one_that_means_the_whole_machine_ends_soon(folder: Path, pattern: str) 
     (folder / "looks.toml").write_text(f'[[look]]\nscene = "room.xml"\npainting = "{pattern}"\n')
     began_s = time.monotonic()
     with pytest.raises(BatchError, match="more than 20000 files to look at: name a folder"):
-        plan("looks.toml", "out")
+        plan_batch("looks.toml", "out")
     assert time.monotonic() - began_s < 15
 
 
@@ -73,4 +73,4 @@ def test_looks_have_a_number(folder: Path, monkeypatch: pytest.MonkeyPatch) -> N
     monkeypatch.setattr(entries, "MAX_LOOKS", 20)
     manifest.write_text(text.format(names[:21]))
     with pytest.raises(BatchError, match="asks for more than 20 looks"):
-        plan(manifest, "out")
+        plan_batch(manifest, "out")

@@ -10,7 +10,7 @@ import pytest
 from renderer import write_room
 
 import lightpaint as lp
-from lightpaint.batch.plan.planner import plan
+from lightpaint.batch.plan.planner import plan_batch
 from lightpaint.batch.run import run_batch
 from lightpaint.batch.run_options import RunOptions
 from lightpaint.errors import BatchError
@@ -77,7 +77,7 @@ class RemarkListener(Listener):
 def run_all(folder: Path, **options: Any) -> tuple[Any, RemarkListener]:
     listener = RemarkListener()
     return run_batch(
-        plan(folder / "looks.toml", folder / "out"), RunOptions(**options), listener
+        plan_batch(folder / "looks.toml", folder / "out"), RunOptions(**options), listener
     ), listener
 
 
@@ -130,14 +130,14 @@ def test_looks_hang_their_lights_once_and_dim_them_each(folder: Path) -> None:
 @pytest.mark.nightly
 def test_places_that_were_found_are_not_searched_for_again(folder: Path) -> None:
     """A batch that was stopped after its search goes on from there."""
-    first = plan(folder / "looks.toml", folder / "out")
+    first = plan_batch(folder / "looks.toml", folder / "out")
     run_batch(first.select("day"), RunOptions(shares_folder=True))
     outcome, listener = run_all(folder)
     assert "poses" not in listener.labels
     assert sorted(outcome.done) == sorted(set(NAMES) - {"day"})
     # Half a file counts as none.
     (folder / "out" / "places" / "day.json").write_text('{"moves": [', encoding="utf-8")
-    assert plan(folder / "looks.toml", folder / "out").groups[0].read_record() is None
+    assert plan_batch(folder / "looks.toml", folder / "out").groups[0].read_record() is None
 
 
 @pytest.mark.nightly
@@ -169,11 +169,11 @@ def test_looks_that_cannot_share_places(folder: Path, change: tuple[str, str], w
     text = LOOKS.replace(*change, 1)
     (folder / "looks.toml").write_text(text, encoding="utf-8")
     with pytest.raises(BatchError, match=words):
-        plan(folder / "looks.toml", folder / "out")
+        plan_batch(folder / "looks.toml", folder / "out")
 
 
 def test_a_job_with_places_is_sent_and_read_again(folder: Path) -> None:
-    first = plan(folder / "looks.toml", folder / "out")
+    first = plan_batch(folder / "looks.toml", folder / "out")
     [task] = [x.steps[0].task for x in first.looks if x.entry.name == "day"]
     moved_task = task.with_paths(lambda text: text.replace(str(folder), "/elsewhere"))
     assert moved_task.places == "/elsewhere/out/places/day.json"
@@ -188,6 +188,6 @@ def test_an_interrupt_amid_the_search_leaves_no_places(folder: Path) -> None:
                 raise KeyboardInterrupt
 
     with pytest.raises(Interrupted, match="6 looks are left; run the same command to continue"):
-        run_batch(plan(folder / "looks.toml", folder / "out"), RunOptions(), Stopped())
+        run_batch(plan_batch(folder / "looks.toml", folder / "out"), RunOptions(), Stopped())
     assert not (folder / "out" / "places").exists()
-    assert len(plan(folder / "looks.toml", folder / "out").chosen_looks) == len(NAMES)
+    assert len(plan_batch(folder / "looks.toml", folder / "out").chosen_looks) == len(NAMES)

@@ -11,7 +11,7 @@ from command import run, run_refused, succeed
 from renderer import LIGHTS, write_room
 
 from lightpaint.batch import task_bases
-from lightpaint.batch.plan.planner import plan
+from lightpaint.batch.plan.planner import plan_batch
 from lightpaint.images.estimate import read_estimate
 from lightpaint.images.formats.exr import write_rgb
 from lightpaint.lighting.answer.lighting_file import read_lighting
@@ -239,7 +239,7 @@ def test_a_batch_says_that_it_finds_no_sun(tmp_path: Path, count: int) -> None:
     (tmp_path / "room.lights.toml").write_text(lights, encoding="utf-8")
     looks = '[[look]]\nname = "one"\nscene = "room.xml"\npainting = "p.exr"\nwant = ["predict"]\n'
     (tmp_path / "looks.toml").write_text(looks, encoding="utf-8")
-    [look] = plan(tmp_path / "looks.toml", tmp_path / "out").looks
+    [look] = plan_batch(tmp_path / "looks.toml", tmp_path / "out").looks
     assert not look.failure
     remarks = [text for text in look.remarks if "asks for a sun in sky" in text]
     assert len(remarks) == (1 if count else 0)

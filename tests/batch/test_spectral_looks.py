@@ -13,7 +13,7 @@ from spectral_room import DRIVES, PEAKS, paint_spectral_room, write_spectral_roo
 from lightpaint.batch.gallery.summary import SummaryRow, lights_of_answer, summary_csv
 from lightpaint.batch.manifest.keys import shift
 from lightpaint.batch.manifest.sequence import interpolate
-from lightpaint.batch.plan.planner import plan
+from lightpaint.batch.plan.planner import plan_batch
 from lightpaint.batch.run import run_batch
 from lightpaint.batch.run_options import RunOptions
 from lightpaint.colour.color import luminance
@@ -72,7 +72,7 @@ def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
     (folder / "looks.toml").write_text(LOOKS, encoding="utf-8")
     with pytest.MonkeyPatch.context() as patch:
         patch.setenv("LIGHTPAINT_CACHE", str(folder / "cache"))
-        assert not run_batch(plan(folder / "looks.toml", folder / "one")).failed
+        assert not run_batch(plan_batch(folder / "looks.toml", folder / "one")).failed
     return folder
 
 
@@ -143,7 +143,7 @@ def test_processes_find_what_one_finds(how: str, folder: Path, tmp_path: Path, m
 
             workers = stack.enter_context(cluster_of(2, tmp_path, can_be_held=False))
             options = RunOptions(cluster=workers.address)
-        outcome = run_batch(plan(folder / "looks.toml", folder / how), options)
+        outcome = run_batch(plan_batch(folder / "looks.toml", folder / how), options)
     assert not outcome.failed
     for name in ("eye", "camera", "dark", "fade-1", "eye-warmer"):
         for file in ("lighting.json", "relit.xml"):
@@ -177,7 +177,7 @@ def test_mistakes_are_found_before_anything_is_rendered(case: str, folder: Path)
     manifest = folder / f"{case.replace(' ', '-')}.toml"
     manifest.write_text(LOOKS.replace(old, new), encoding="utf-8")
     with pytest.raises(BatchError) as error:
-        plan(manifest, folder / "wrong")
+        plan_batch(manifest, folder / "wrong")
     assert any(message in str(line) for line in error.value.mistakes)
 
 

@@ -13,7 +13,7 @@ from renderer import LIGHTS, write_room
 
 from lightpaint.basis.basis import Basis
 from lightpaint.basis.render import basis_render, render_parts
-from lightpaint.batch.plan.planner import plan
+from lightpaint.batch.plan.planner import plan_batch
 from lightpaint.batch.run import run_batch
 from lightpaint.errors import BatchError, TargetError
 from lightpaint.images.formats.exr import write_rgb
@@ -139,9 +139,9 @@ def test_a_batch_of_lightings(batch_folder: Path, monkeypatch: pytest.MonkeyPatc
     for step in ("lights", "solve"):
         (batch_folder / "looks.toml").write_text(LOOKS.replace("WANT", step), encoding="utf-8")
         output_folder = batch_folder / step
-        outcome = run_batch(plan(batch_folder / "looks.toml", output_folder))
+        outcome = run_batch(plan_batch(batch_folder / "looks.toml", output_folder))
         assert not outcome.failed
-        assert run_batch(plan(batch_folder / "looks.toml", output_folder)).done == []
+        assert run_batch(plan_batch(batch_folder / "looks.toml", output_folder)).done == []
         answers = {
             name: read_lighting(output_folder / name / "lighting.json")
             for name in ("bright", "dark")
@@ -158,7 +158,7 @@ def test_a_batch_of_lightings(batch_folder: Path, monkeypatch: pytest.MonkeyPatc
     (batch_folder / "looks.toml").write_text(text, encoding="utf-8")
     labels: list[str] = []
     outcome = run_batch(
-        plan(batch_folder / "looks.toml", batch_folder / "kept"), None, label_listener(labels)
+        plan_batch(batch_folder / "looks.toml", batch_folder / "kept"), None, label_listener(labels)
     )
     assert outcome.done == ["bright", "dark"]
     assert "basis" not in labels
@@ -190,7 +190,7 @@ def test_what_does_not_go_with_it_is_said_before_anything_is_rendered(
     text = LOOKS.replace("WANT", "lights").replace(change, replacements)
     (batch_folder / "wrong.toml").write_text(text, encoding="utf-8")
     with pytest.raises(BatchError, match=message):
-        plan(batch_folder / "wrong.toml", batch_folder / "wrong")
+        plan_batch(batch_folder / "wrong.toml", batch_folder / "wrong")
 
 
 def test_light_groups_are_lit_without_a_picture_too(tmp_path: Path) -> None:
@@ -205,9 +205,9 @@ def test_light_groups_are_lit_without_a_picture_too(tmp_path: Path) -> None:
         text = LOOKS.replace('scene = "room.xml"', 'light_groups = "groups.exr"')
         text = text.replace("spp = 16, ", "").replace("WANT", step)
         (tmp_path / "looks.toml").write_text(text, encoding="utf-8")
-        outcome = run_batch(plan(tmp_path / "looks.toml", tmp_path / step))
+        outcome = run_batch(plan_batch(tmp_path / "looks.toml", tmp_path / step))
         assert (outcome.done, outcome.failed) == (["bright", "dark"], {})
-        assert run_batch(plan(tmp_path / "looks.toml", tmp_path / step)).done == []
+        assert run_batch(plan_batch(tmp_path / "looks.toml", tmp_path / step)).done == []
         for name in outcome.done:
             folder = tmp_path / step / name
             lightings[step, name] = read_lighting(folder / "lighting.json")

@@ -57,7 +57,7 @@ from lightpaint.scene.quality_presets import on_film
 LUX_SPP = 4096
 
 
-def plan(
+def plan_batch(
     manifest: str | Path, folder: str | Path, *, force: bool = False, command: str = ""
 ) -> Plan:
     """Read `manifest` (docs/batch.md), and check all its looks before anything is rendered.

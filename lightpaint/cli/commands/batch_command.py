@@ -7,16 +7,23 @@ from datetime import UTC, datetime
 from pathlib import Path
 from typing import Any
 
-from lightpaint.batch.gallery.gallery import counts_text
-from lightpaint.batch.gallery.summary import SummaryRow, summary_document
-from lightpaint.batch.manifest.file_names import FILES
-from lightpaint.batch.manifest.manifest import write_starter_manifest
-from lightpaint.batch.plan.openjd import LOOK_PARAMETER, write_openjd
-from lightpaint.batch.plan.plan import Plan, PlannedLook, estimate
-from lightpaint.batch.plan.planner import plan
-from lightpaint.batch.run import BatchOutcome, run_batch
-from lightpaint.batch.run_options import RunOptions
-from lightpaint.batch.work.work_items import ItemResult
+from lightpaint.batch import (
+    FILES,
+    LOOK_PARAMETER,
+    BatchOutcome,
+    ItemResult,
+    Plan,
+    PlannedLook,
+    RunOptions,
+    SummaryRow,
+    counts_text,
+    estimate,
+    plan_batch,
+    run_batch,
+    summary_document,
+    write_openjd,
+    write_starter_manifest,
+)
 from lightpaint.cli.output import documents, terminal
 from lightpaint.cli.output.lines import CommandOutcome
 from lightpaint.display_text import some_of, visible
@@ -51,17 +58,17 @@ def batch(
     # The same command in all reports, however often and from wherever the batch is run.
     manifest, output_folder = (str(Path(x).absolute()) for x in (paths[0], folder))
     command = shlex.join(["lightpaint", "batch", manifest, "-o", output_folder])
-    plan_ = plan(paths[0], folder, force=force, command=command).select(*name_patterns)
+    plan = plan_batch(paths[0], folder, force=force, command=command).select(*name_patterns)
     if is_dry:
-        return _show_plan(plan_)
+        return _show_plan(plan)
     if form is not None:
-        return _export(plan_, Path(paths[1]), force=force)
+        return _export(plan, Path(paths[1]), force=force)
     note = _log(log)
-    note(f"{command}: {len(plan_.chosen_looks)} looks")
-    _say_remarks(plan_, note)
-    outcome = _run(plan_, run_options, note)
+    note(f"{command}: {len(plan.chosen_looks)} looks")
+    _say_remarks(plan, note)
+    outcome = _run(plan, run_options, note)
     note(f"done {len(outcome.done)}, failed {len(outcome.failed)}")
-    return _outcome(plan_, outcome)
+    return _outcome(plan, outcome)
 
 
 def _write_first_manifest(
@@ -74,10 +81,10 @@ def _write_first_manifest(
     return CommandOutcome(lambda: {"manifest": str(path), "looks": len(paintings)})
 
 
-def _say_remarks(plan_: Plan, note: Callable[[str], Any]) -> None:
+def _say_remarks(plan: Plan, note: Callable[[str], Any]) -> None:
     """Say the remarks of a plan and of its looks, each once. note: adds a line to the log."""
-    of_looks = (x for look in plan_.chosen_looks for x in look.remarks)
-    remarks = list(dict.fromkeys((*plan_.remarks, *of_looks)))
+    of_looks = (x for look in plan.chosen_looks for x in look.remarks)
+    remarks = list(dict.fromkeys((*plan.remarks, *of_looks)))
     for remark in remarks:
         note(remark)
     for remark in remarks[:MAX_LISTED]:
@@ -103,7 +110,7 @@ class _LoggedListener(terminal.TerminalListener):
         super().say(text)
 
 
-def _run(plan_: Plan, run_options: RunOptions, note: Callable[[str], Any]) -> BatchOutcome:
+def _run(plan: Plan, run_options: RunOptions, note: Callable[[str], Any]) -> BatchOutcome:
     """Run a plan, and say which look is done. note: adds a line to the log."""
     listen = _LoggedListener(note)
 
@@ -119,21 +126,21 @@ def _run(plan_: Plan, run_options: RunOptions, note: Callable[[str], Any]) -> Ba
         return "" if result.left_s is None else f", {spoken_time(result.left_s)} left"
 
     with listen:
-        return run_batch(plan_, run_options, listen, on_step=on_step)
+        return run_batch(plan, run_options, listen, on_step=on_step)
 
 
-def _export(plan_: Plan, folder: Path, *, force: bool) -> CommandOutcome:
+def _export(plan: Plan, folder: Path, *, force: bool) -> CommandOutcome:
     """Write a job for a farm, and print how to run it here."""
-    path = write_openjd(folder, plan_, command=("--only", LOOK_PARAMETER, "--apart"), force=force)
-    terminal.write(f"{path}: {len(plan_.chosen_looks)} looks; run them here with")
+    path = write_openjd(folder, plan, command=("--only", LOOK_PARAMETER, "--apart"), force=force)
+    terminal.write(f"{path}: {len(plan.chosen_looks)} looks; run them here with")
     terminal.write(f"openjd run {shlex.quote(str(path))}")
     return CommandOutcome(lambda: documents.files_document(folder, [path]))
 
 
-def _outcome(plan_: Plan, outcome: BatchOutcome) -> CommandOutcome:
+def _outcome(plan: Plan, outcome: BatchOutcome) -> CommandOutcome:
     """Print the results of a run, and return them for programs."""
-    _show(plan_, outcome.rows)
-    folder = plan_.folder
+    _show(plan, outcome.rows)
+    folder = plan.folder
     for name, reason in list(outcome.failed.items())[:MAX_LISTED]:
         terminal.complain("batch", Sentence(f"{name}: ", reason))
     if len(outcome.failed) > MAX_LISTED:
@@ -156,7 +163,7 @@ def _outcome(plan_: Plan, outcome: BatchOutcome) -> CommandOutcome:
     )
 
 
-def _show(plan_: Plan, rows: list[SummaryRow]) -> None:
+def _show(plan: Plan, rows: list[SummaryRow]) -> None:
     """Print a row for each look; of very many, only the unfinished ones."""
     shown_rows = (
         rows
@@ -169,14 +176,14 @@ def _show(plan_: Plan, rows: list[SummaryRow]) -> None:
     for row in shown_rows:
         agreement = "" if row.agrees is None else "agrees" if row.agrees else "disagrees"
         delta_e = "" if row.delta_e is None else f"{row.delta_e:.1f}"
-        table.row(row.look, row.state, delta_e, agreement, str(plan_.folder / row.folder))
+        table.row(row.look, row.state, delta_e, agreement, str(plan.folder / row.folder))
     terminal.print_table(table)
 
 
-def _show_plan(plan_: Plan) -> CommandOutcome:
+def _show_plan(plan: Plan) -> CommandOutcome:
     """Print what would be done and its cost, without doing it."""
     table, looks = terminal.table("look", "what", "of"), []
-    for look in plan_.chosen_looks:
+    for look in plan.chosen_looks:
         action = look.failure or ("done earlier" if look.is_done else ", ".join(look.entry.want))
         paintings = (_short_path(x.path) for x in look.entry.paintings)
         inputs = ", ".join([*paintings, *look.entry.combined_looks])
@@ -184,13 +191,13 @@ def _show_plan(plan_: Plan) -> CommandOutcome:
         document = {"look": look.entry.name, "is_done": look.is_done, "want": look.entry.want}
         looks.append({**document, "why": look.failure} if look.failure else document)
     terminal.print_table(table)
-    cost, lux = estimate(plan_), " and lux" * bool(plan_.measurements)
+    cost, lux = estimate(plan), " and lux" * bool(plan.measurements)
     terminal.write(
         f"bases{lux} {spoken_time(cost.bases_s)} unless they are in the cache, looks "
         f"{spoken_time(cost.looks_s)}, by one process on two cores; "
         f"{cost.memory / 1e9:.1f} GB of memory"
     )
-    failed_names = [look.entry.name for look in plan_.chosen_looks if look.failure]
+    failed_names = [look.entry.name for look in plan.chosen_looks if look.failure]
     if failed_names:
         terminal.complain("batch", f"cannot be done: {some_of(failed_names)}")
     return CommandOutcome(lambda: {"looks": looks, **vars(cost)}, 1 if failed_names else 0)

@@ -4,7 +4,7 @@ import argparse
 from collections.abc import Callable, Mapping
 from typing import Any, get_args
 
-from lightpaint.batch.run_options import RunOptions
+from lightpaint.batch import RunOptions
 from lightpaint.cli.options import arguments
 from lightpaint.cli.options.option_groups import add_fields, add_output, add_view_transform
 from lightpaint.colour import Preference

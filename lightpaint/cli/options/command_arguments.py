@@ -29,7 +29,7 @@ from lightpaint.lighting import read_constraints
 from lightpaint.pipeline import GroupsFile, SceneFile, Settings
 
 if TYPE_CHECKING:
-    from lightpaint.batch.run_options import RunOptions
+    from lightpaint.batch import RunOptions
 
 
 def values_of(options: Namespace, words: Sequence[str]) -> dict[str, Any]:
@@ -186,7 +186,7 @@ def _solve_arguments(options: Namespace, settings: Settings) -> dict[str, Any]:
         return {"jobs": jobs_of(options, settings), **arguments}
 
     # Imported late: a single look needs no gallery.
-    from lightpaint.batch.manifest.keys import parse_variations
+    from lightpaint.batch import parse_variations
     from lightpaint.cli.solve_variations import look_set
 
     failures: dict[str, str] = {}
@@ -218,7 +218,7 @@ def _batch_arguments(options: Namespace) -> dict[str, Any]:
 
 def _run_options(options: Namespace) -> "RunOptions":
     """Return the options of a run. Raises BatchError if they exclude each other."""
-    from lightpaint.batch.run_options import RunOptions
+    from lightpaint.batch import RunOptions
 
     if options.cluster is None and options.shared_fs:
         raise BatchError("--shared-fs concerns workers of a cluster: give --cluster ADDRESS, too")

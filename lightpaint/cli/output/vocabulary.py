@@ -4,7 +4,7 @@ import os
 import shlex
 from collections.abc import Mapping, Sequence
 
-from lightpaint.batch.run_options import RunOptions
+from lightpaint.batch import RunOptions
 from lightpaint.field_options import options_of
 from lightpaint.pipeline import Settings
 from lightpaint.sentences import Datum, Hint, Lead, Sentence, SourceKey, Word
