@@ -24,7 +24,7 @@ import numpy as np
 from rows import add_csv, write_rows
 
 import lightpaint as lp
-from lightpaint.lighting.loss import warm_start
+from lightpaint.lighting.loss import reweighting
 from lightpaint.lighting.solution import Solution
 from lightpaint.lighting.solver import loss_with_pull
 
@@ -53,7 +53,7 @@ def main() -> None:
         view = lp.ViewTransform(name, stops)
         sampled, all_pixels = [], []
         for _ in range(options.repeats):
-            sampled.append(timed(basis, target, view, sample=warm_start.MIN_SAMPLE))
+            sampled.append(timed(basis, target, view, sample=reweighting.MIN_SAMPLE))
             all_pixels.append(timed(basis, target, view, sample=10**12))
         (a, solution), (b, expected) = (
             min(each, key=lambda x: x[0]) for each in (sampled, all_pixels)
@@ -88,13 +88,13 @@ def main() -> None:
 
 def timed(basis: lp.Basis, target: lp.Target, view: Any, *, sample: int) -> tuple[float, Solution]:
     """Seconds of the processor, and the solution."""
-    usual, warm_start.MIN_SAMPLE = warm_start.MIN_SAMPLE, sample
+    usual, reweighting.MIN_SAMPLE = reweighting.MIN_SAMPLE, sample
     try:
         start = time.process_time()
         solution = lp.solve(basis, target, transform=view)
         return time.process_time() - start, solution
     finally:
-        warm_start.MIN_SAMPLE = usual
+        reweighting.MIN_SAMPLE = usual
 
 
 def command(basis: str, painting: str, *options: str, repeats: int) -> tuple[float, float]:

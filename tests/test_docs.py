@@ -22,7 +22,7 @@ from lightpaint.cli.commands.render_commands import template_lines
 from lightpaint.cli.options.parser import command_parser
 from lightpaint.dmx.network.console_link import PRIORITY
 from lightpaint.dmx.network.console_receiver import LOOPBACK, USUAL_PRIORITY
-from lightpaint.lighting.constraints.color_restrictions import LAMP_KELVINS
+from lightpaint.lighting.constraints.light_constraints import LAMP_KELVINS
 from lightpaint.lighting.fit import DEFAULT_HOLD
 from lightpaint.paint.server.address import DEFAULT_PORT
 from lightpaint.paint.server.client import MAX_QUEUED, MAX_QUEUED_BYTES

@@ -5,7 +5,7 @@ from typing import TYPE_CHECKING
 from lightpaint.lazy_names import lazy_names
 
 if TYPE_CHECKING:
-    from lightpaint.lighting.algebra.method import Method as Method
+    from lightpaint.lighting.algebra.optimum import Method as Method
     from lightpaint.lighting.algebra.optimum import minimise as minimise
     from lightpaint.lighting.analysis.analysis import Analysis as Analysis
     from lightpaint.lighting.analysis.analysis import analyse as analyse
@@ -95,15 +95,15 @@ if TYPE_CHECKING:
     from lightpaint.lighting.constraints.constraints import LIGHT_KEYS as LIGHT_KEYS
     from lightpaint.lighting.constraints.constraints import Constraints as Constraints
     from lightpaint.lighting.constraints.constraints import LightConstraint as LightConstraint
+    from lightpaint.lighting.constraints.constraints import Requirements as Requirements
     from lightpaint.lighting.constraints.constraints import is_pattern as is_pattern
     from lightpaint.lighting.constraints.constraints_file import constraints_of as constraints_of
     from lightpaint.lighting.constraints.constraints_file import (
         read_constraints as read_constraints,
     )
-    from lightpaint.lighting.constraints.light_patterns import tables_by_light as tables_by_light
-    from lightpaint.lighting.constraints.light_patterns import tied_lights as tied_lights
-    from lightpaint.lighting.constraints.requirements import Requirements as Requirements
-    from lightpaint.lighting.constraints.start_lighting import start_weights as start_weights
+    from lightpaint.lighting.constraints.light_constraints import start_weights as start_weights
+    from lightpaint.lighting.constraints.light_constraints import tables_by_light as tables_by_light
+    from lightpaint.lighting.constraints.light_constraints import tied_lights as tied_lights
     from lightpaint.lighting.constraints.values import check_keys as check_keys
     from lightpaint.lighting.fit import DEFAULT_HOLD as DEFAULT_HOLD
     from lightpaint.lighting.fit import Colors as Colors

@@ -8,7 +8,7 @@ from lightpaint.colour import ViewTransform
 from lightpaint.errors import LightpaintError, TargetError
 from lightpaint.field_options import Option
 from lightpaint.keywords import keywords
-from lightpaint.lighting.algebra.method import Method
+from lightpaint.lighting.algebra.optimum import Method
 from lightpaint.sentences import Hint
 from lightpaint.validation import a, check_fields, number
 

@@ -17,15 +17,15 @@ from lightpaint.colour import ViewTransform
 from lightpaint.display_text import short_repr
 from lightpaint.errors import TargetError
 from lightpaint.lighting.constraints.absolute_scale import with_scale
-from lightpaint.lighting.constraints.color_restrictions import (
+from lightpaint.lighting.constraints.constraints import Constraints
+from lightpaint.lighting.constraints.constraints_file import constraints_of
+from lightpaint.lighting.constraints.light_constraints import (
     WhiteLimits,
     keep_own_colors,
     own_color_labels,
+    start_weights,
     whiten_open_lights,
 )
-from lightpaint.lighting.constraints.constraints import Constraints
-from lightpaint.lighting.constraints.constraints_file import constraints_of
-from lightpaint.lighting.constraints.start_lighting import start_weights
 from lightpaint.lighting.fit import Fit, resolve_fit, resolve_for_targets
 from lightpaint.lighting.loss.expected_lights import ExpectedLights
 from lightpaint.lighting.loss.painting import ignored_paint

@@ -1,4 +1,6 @@
-"""The problem to solve: pictures, their goals, the lights and their constraints."""
+"""The problem to solve: pictures, their goals, the lights and their constraints; and light as a
+display shows it, in the view of a problem.
+"""
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
@@ -10,15 +12,19 @@ import numpy.typing as npt
 
 from lightpaint.arrays import Bools, Doubles, Floats
 from lightpaint.basis import Basis, Lights, texel_lights
-from lightpaint.colour import ViewTransform
+from lightpaint.colour import ViewTransform, choose_exposure, decode_display
 from lightpaint.display_text import short_repr
 from lightpaint.errors import BasisError, ConstraintError, TargetError
 from lightpaint.keywords import keywords
 from lightpaint.lighting.constraints.absolute_scale import with_scale
-from lightpaint.lighting.constraints.color_restrictions import WhiteLimits, painted_whites
 from lightpaint.lighting.constraints.constraints import Constraints
 from lightpaint.lighting.constraints.constraints_file import constraints_of
-from lightpaint.lighting.constraints.start_lighting import held_at_start, start_weights
+from lightpaint.lighting.constraints.light_constraints import (
+    WhiteLimits,
+    held_at_start,
+    painted_whites,
+    start_weights,
+)
 from lightpaint.lighting.fit import Fit, Space, resolve_for_targets
 from lightpaint.lighting.joined_views import Views, joint_basis
 from lightpaint.lighting.linear_problem import LinearProblem, reduce_lights
@@ -435,3 +441,19 @@ def _targets(targets: Any) -> list[Target]:
     if isinstance(targets, Sequence) and targets and all(isinstance(t, Target) for t in targets):
         return list(targets)
     raise TargetError(f"the target is a {type(targets).__name__}: give what read_target returns")
+
+
+def display_light(pixels: Doubles, transform: ViewTransform) -> Doubles:
+    """Return the light that a display emits for light (..., 3), white = 1."""
+    if transform.name == "srgb":  # encoding and decoding cancel
+        return np.asarray(np.clip(pixels * 2.0**transform.stops, 0, 1))
+    return np.asarray(decode_display(transform.encode(pixels)), np.float64)
+
+
+def display_transform(problem: Problem) -> ViewTransform:
+    """Return the view of the painting or, if it holds light, sRGB at a fitting exposure."""
+    target = problem.views.targets[0]
+    chosen = problem.fit.transform or target.transform
+    if chosen is not None:
+        return chosen
+    return ViewTransform("srgb", choose_exposure(target.image[target.importance > 0][None]))

@@ -15,7 +15,7 @@ from lightpaint.lighting.constraints.absolute_scale import with_sure_scale
 from lightpaint.lighting.constraints.constraints import Constraints
 from lightpaint.lighting.constraints.constraints_file import constraints_of
 from lightpaint.lighting.fit import Fit
-from lightpaint.lighting.held_mixes import choose_held_mixes
+from lightpaint.lighting.held_mixes import choose_held_mixes, with_mixes_at
 from lightpaint.lighting.linear_solve import (
     LinearAnswer,
     make_answer,
@@ -31,15 +31,15 @@ from lightpaint.lighting.loss.reweighting import (
     Descent,
     WeightTerms,
     descend,
+    find_near_optimum,
     interpolate,
+    is_sampled,
     total_loss,
 )
-from lightpaint.lighting.loss.warm_start import find_near_optimum, is_sampled
 from lightpaint.lighting.loss.weight_penalty import pull_to_current
 from lightpaint.lighting.normal_equations import NormalEquations
 from lightpaint.lighting.problem import Problem
 from lightpaint.lighting.solution import Solution
-from lightpaint.lighting.unknowns.dimmed_mixes import with_mixes_at
 from lightpaint.lighting.unknowns.lamp_parts import WholeLamps
 from lightpaint.lighting.unknowns.reduced_problem import (
     ReducedOptimum,

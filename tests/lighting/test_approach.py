@@ -13,9 +13,9 @@ from lightpaint.basis.basis import Basis
 from lightpaint.colour.display.view_transform import ViewTransform
 from lightpaint.lighting.constraints.constraints import Constraints
 from lightpaint.lighting.fit import Fit
-from lightpaint.lighting.loss import lit_pixels, loss, warm_start
+from lightpaint.lighting.loss import lit_pixels, loss, reweighting
 from lightpaint.lighting.loss.lit_pixels import LitPixels
-from lightpaint.lighting.loss.warm_start import sample_pixels
+from lightpaint.lighting.loss.reweighting import sample_pixels
 from lightpaint.lighting.problem import Problem
 from lightpaint.lighting.solution import Solution
 from lightpaint.lighting.solver import solve
@@ -28,8 +28,8 @@ VIEWS = [ViewTransform("srgb"), ViewTransform("agx", 1.0), ViewTransform("filmic
 @pytest.fixture
 def few_samples(monkeypatch: pytest.MonkeyPatch) -> pytest.MonkeyPatch:
     """Samples of 400 pixels, and strips of 500."""
-    monkeypatch.setattr(warm_start, "MIN_SAMPLE", 400)
-    monkeypatch.setattr(warm_start, "PIXELS_PER_LIGHT", 1)
+    monkeypatch.setattr(reweighting, "MIN_SAMPLE", 400)
+    monkeypatch.setattr(reweighting, "PIXELS_PER_LIGHT", 1)
     monkeypatch.setattr(loss, "STRIP_PIXELS", 500)
     return monkeypatch
 
@@ -50,7 +50,7 @@ def _random_problem(make_basis: Any, seed: int, *, n: int = 4) -> tuple[Basis, T
 def _solve_by_rounds(few: pytest.MonkeyPatch, *args: Any, **options: Any) -> Solution:
     """By rounds over all pixels alone."""
     with few.context() as patch:
-        patch.setattr(warm_start, "MIN_SAMPLE", 10**9)
+        patch.setattr(reweighting, "MIN_SAMPLE", 10**9)
         return solve(*args, **options)
 
 
@@ -212,7 +212,7 @@ def test_few_pixels_need_no_sample(make_basis: Any, few_samples: Any):
     is_counted = np.zeros(SIZE, np.float32)
     is_counted[:10] = 1
     calls: list[int] = []
-    few_samples.setattr(warm_start, "sample_pixels", lambda *args: calls.append(1))
+    few_samples.setattr(reweighting, "sample_pixels", lambda *args: calls.append(1))
     solution = solve(basis, replace(target, importance=is_counted), transform=VIEWS[0])
     assert not calls
     assert solution.certificate.converged

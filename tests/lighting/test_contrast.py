@@ -10,9 +10,9 @@ import pytest
 import lightpaint as lp
 from lightpaint.basis.basis import meter_exposure
 from lightpaint.colour.color import kelvin_to_rgb, luminance
-from lightpaint.lighting.loss import contrast, expected_lights
-from lightpaint.lighting.loss.contrast import ContrastRows
+from lightpaint.lighting.loss import expected_lights, weight_penalty
 from lightpaint.lighting.loss.expected_lights import ExpectedLights, Wash, adjusted_share
+from lightpaint.lighting.loss.weight_penalty import ContrastRows
 from lightpaint.target.target import Wish
 
 SCENES = Path(__file__).parents[2] / "scenes"
@@ -71,11 +71,13 @@ def test_the_term_vanishes_for_what_was_painted(make_basis: Any) -> None:
     assert numbers.objective(meant).max() < 1e-9
     # Twice the light of an exact rest misses it by itself.
     np.testing.assert_allclose(
-        numbers.objective(2 * meant), contrast.EXACT_REST * 7.0 * rows.rest_goal[0] ** 2, rtol=1e-5
+        numbers.objective(2 * meant),
+        weight_penalty.EXACT_REST * 7.0 * rows.rest_goal[0] ** 2,
+        rtol=1e-5,
     )
     other = meant * [[1], [2]]
     value = 7.0 * np.einsum("kcn,nc->kc", rows.contrast, other)[0] ** 2
-    np.testing.assert_allclose(brush.objective(other), contrast.CONTRAST * value, rtol=1e-9)
+    np.testing.assert_allclose(brush.objective(other), weight_penalty.CONTRAST * value, rtol=1e-9)
     half = replace(rows, exact=np.array([0.5])).term(7.0)
     assert half is not None
     np.testing.assert_allclose(
@@ -103,7 +105,7 @@ def test_a_small_subject_stands_out(make_basis: Any, monkeypatch: pytest.MonkeyP
 
     with_contrast = ratio()
     for name in ("CONTRAST", "EXACT_CONTRAST", "EXACT_REST"):
-        monkeypatch.setattr(contrast, name, 0.0)
+        monkeypatch.setattr(weight_penalty, name, 0.0)
     assert with_contrast > ratio() + 0.05
 
 
@@ -138,7 +140,7 @@ def test_a_locked_subject_leaves_most_of_its_light_to_the_rest(
         return float(got / image[~subject()].mean())
 
     kept = rest()
-    monkeypatch.setattr(contrast, "EXACT_REST", 0.0)
+    monkeypatch.setattr(weight_penalty, "EXACT_REST", 0.0)
     assert kept > rest() + 0.03
 
 
@@ -156,7 +158,7 @@ def test_light_set_by_hand_wins_over_grey(make_basis: Any, monkeypatch: pytest.M
     by_hand = basis.current_weights * [0.2 * cool**1.5, 4 * warm**1.5]
     answer = lp.solve(basis, target).weights
     for name in ("CONTRAST", "EXACT_CONTRAST", "EXACT_REST"):
-        monkeypatch.setattr(contrast, name, 0.0)
+        monkeypatch.setattr(weight_penalty, name, 0.0)
     grey = lp.solve(basis, target).weights
     monkeypatch.undo()
 
@@ -329,7 +331,7 @@ def test_in_the_gallery_light_set_by_hand_wins_over_grey(monkeypatch: pytest.Mon
         solution = lp.solve(basis, target)
         with monkeypatch.context() as without:
             for name in ("CONTRAST", "EXACT_CONTRAST", "EXACT_REST"):
-                without.setattr(contrast, name, 0.0)
+                without.setattr(weight_penalty, name, 0.0)
             grey = lp.solve(basis, target).weights
         is_spot = np.isin(basis.names, ["spot_figure", "spot_knot", "spot_vase"])[:, None]
         gains = np.where(is_spot, 2**0.5 * warmer(150), 2**-1.5 * warmer(-150))

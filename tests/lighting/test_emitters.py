@@ -11,7 +11,7 @@ from lightpaint.basis.basis import Basis
 from lightpaint.lighting.fit import resolve_for_targets
 from lightpaint.lighting.live.live import LiveSolver
 from lightpaint.lighting.live.live_view import LiveView
-from lightpaint.lighting.loss.paint_on_emitters import find_glow_paint
+from lightpaint.lighting.loss.painting import find_glow_paint
 
 SIZE = (36, 30)
 FLAME = (slice(16, 19), slice(14, 17))

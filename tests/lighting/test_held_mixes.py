@@ -15,8 +15,8 @@ from lightpaint.lighting.analysis.analysis import analyse
 from lightpaint.lighting.answer.light_rendering import renderings_of
 from lightpaint.lighting.answer.lighting_file import read_lighting, write_lighting
 from lightpaint.lighting.constraints.constraints import Constraints
-from lightpaint.lighting.display import display_transform
 from lightpaint.lighting.held_mixes import HELD
+from lightpaint.lighting.problem import display_transform
 from lightpaint.lighting.solver import solve
 from lightpaint.paint.session.snapshot import SessionSnapshot
 from lightpaint.paint.store.session_requests import SessionRequests

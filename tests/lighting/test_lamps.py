@@ -17,7 +17,7 @@ from lightpaint.lighting.analysis.analysis import analyse
 from lightpaint.lighting.answer.lighting_file import read_lighting, write_lighting
 from lightpaint.lighting.constraints.constraints import Constraints
 from lightpaint.lighting.constraints.constraints_file import read_constraints
-from lightpaint.lighting.constraints.light_patterns import constraints_by_light, tables_by_light
+from lightpaint.lighting.constraints.light_constraints import constraints_by_light, tables_by_light
 from lightpaint.lighting.solver import solve
 from lightpaint.lighting.unknowns.reduction import reduce_to
 from lightpaint.target.target import Target

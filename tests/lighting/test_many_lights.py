@@ -6,8 +6,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from lightpaint.lighting.constraints.constraints import Constraints
-from lightpaint.lighting.constraints.requirements import Requirements
+from lightpaint.lighting.constraints.constraints import Constraints, Requirements
 from lightpaint.lighting.fit import Fit, resolve_for_targets
 from lightpaint.lighting.live import live as live_module
 from lightpaint.lighting.live import many_lights

@@ -12,7 +12,7 @@ from lightpaint.colour.color import LUMINANCE, cct_and_duv, kelvin_to_rgb
 from lightpaint.errors import TargetError
 from lightpaint.lighting import problem
 from lightpaint.lighting.fit import DEFAULT_HOLD, Fit, resolve_for_targets
-from lightpaint.lighting.loss import contrast
+from lightpaint.lighting.loss import weight_penalty
 from lightpaint.lighting.loss.painting import unpainted_weight_of
 from lightpaint.lighting.loss.weight_penalty import CLEAR_PULL, COLOR_PULL, MAX_DIMMING
 from lightpaint.lighting.problem import Problem
@@ -107,7 +107,7 @@ def test_colors_are_pulled_as_the_formula_says(make_basis: Any, monkeypatch: pyt
     """
     monkeypatch.setattr(problem, "gamuts_for", lambda *_: None)
     for name in ("CONTRAST", "EXACT_CONTRAST", "EXACT_REST"):
-        monkeypatch.setattr(contrast, name, 0.0)
+        monkeypatch.setattr(weight_penalty, name, 0.0)
     basis = _basis(make_basis)
     target = _paint(basis, over_look=True)
     solution = lp.solve(basis, target, hold=0)

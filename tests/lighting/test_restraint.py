@@ -7,7 +7,7 @@ import pytest
 
 import lightpaint as lp
 from lightpaint.colour.color import luminance
-from lightpaint.lighting.analysis.appearance.compensation import compensating_lights
+from lightpaint.lighting.analysis.appearance.area_lights import compensating_lights
 from lightpaint.lighting.fit import Fit
 from lightpaint.lighting.loss import weight_penalty
 from lightpaint.lighting.loss.expected_lights import DARK

@@ -16,7 +16,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from lightpaint.arrays import Bools, Doubles, Indices
-from lightpaint.lighting.algebra.lapack import large_libraries
+from lightpaint.lighting.algebra.symmetric_matrices import large_libraries
 
 #: Columns beside a factor: at least so many, and else this share of its unknowns. With more, a new
 #: factor is as quick.

@@ -1,5 +1,5 @@
 """Newton's step on the free unknowns, clipped to the bounds: finds the optimum in a few steps, or
-fails.
+fails; and the optimum nearest to the start, where several are equally good.
 
 Unlike `active_set.polish` it lets the objective rise on its way, and holds and releases as many
 unknowns at a time as the gradient suggests. So it is fast, also from an answer to another target,
@@ -9,6 +9,10 @@ them, and three channels in one call cost hardly more than one.
 
 Under caps each step also guesses anew which caps hold: it holds a cap that is exceeded and releases
 one that would have to push outwards. The steps may violate caps on their way.
+
+Two lights at one place make M singular: light moved from one to the other changes no picture. A
+solver's steps in such a direction are round-off divided by round-off, which differs between
+processors.
 """
 
 from collections.abc import Callable
@@ -17,9 +21,13 @@ import numpy as np
 
 from lightpaint.arrays import Bools, Doubles, Indices
 from lightpaint.lighting.algebra.interior_point import NearOptimum
-from lightpaint.lighting.algebra.nearest_optimum import is_suspect
 from lightpaint.lighting.algebra.quadratic import EPSILON, Quadratic, kkt_residual, kkt_step
+from lightpaint.lighting.algebra.symmetric_matrices import eigenvectors
 from lightpaint.progress import cancellation_check
+
+#: The eigenvalue of M, of unit diagonal, below which a step along its vector changes nothing that
+#: counts; and the squared pivot of a Cholesky factor below which such vectors are worth a search.
+NULL_EIGENVALUE, SUSPECT_PIVOT = 1e-13, 1e-10
 
 #: Ridge per √n on the unit diagonal of M, so that no set of lights is singular, not even of
 #: coincident ones. Each step is then one of the proximal-point method, whose repetition converges
@@ -43,6 +51,49 @@ MAX_CAPPED_STEPS = 20
 NewtonStep = Callable[[Bools, Doubles], Doubles]
 
 
+def is_suspect(M: Doubles) -> bool:
+    """Return whether any of these matrices, (…, n, n), is singular or nearly so."""
+    try:
+        pivots = np.linalg.cholesky(M).diagonal(axis1=-2, axis2=-1)
+    except np.linalg.LinAlgError:
+        return True
+    return bool(np.square(pivots.min(initial=1.0)) < SUSPECT_PIVOT)
+
+
+def nearest_equal(
+    q: Quadratic,
+    x: Doubles,
+    begin: Doubles,
+    *,
+    knows_regular: Callable[[Bools], bool] = lambda free: False,
+) -> Doubles:
+    """Return the point nearest to `begin` among those as good as x, (n,), as far as bounds allow.
+
+    Unknowns at bounds stay there, and the sums that caps limit keep their values. knows_regular:
+    whether the matrix of some unknowns, (n,), is known not to be singular.
+    """
+    free: Bools = (x > q.lower) & (x < q.upper) & (np.diag(q.M) > 0)
+    f = np.flatnonzero(free)
+    if f.size < 2 or knows_regular(free):
+        return x
+    matrix = q.M[f][:, f]
+    if q.groups:
+        matrix = matrix + q.A[:, f].T @ q.A[:, f]
+    if not is_suspect(matrix):
+        return x
+    values, vectors = eigenvectors(matrix)
+    idle = vectors[:, values <= NULL_EIGENVALUE]
+    away = idle @ (idle.T @ (x - begin)[f])
+    # An unknown that has not moved limits nothing.
+    f, away = f[away != 0], away[away != 0]
+    # Straight back, up to the first bound.
+    room = np.where(away > 0, x[f] - q.lower[f], q.upper[f] - x[f])
+    part = float(np.min(room / np.abs(away), initial=1.0))
+    nearest = x.copy()
+    nearest[f] = np.clip(x[f] - part * away, q.lower[f], q.upper[f])
+    return nearest if f.size else x
+
+
 def clipped_newton(
     M: Doubles,
     b: Doubles,
@@ -61,7 +112,7 @@ def clipped_newton(
     size: (c,), scale of the KKT residuals. newton_step: of one problem, a quicker way to steps.
     Returns x, which equals the bounds that hold it to the last bit, the KKT residuals, (c,), the
     number of steps, and whether the matrix of the last step may be singular: other x are then as
-    good (see nearest_optimum.py); not known with `newton_step`. If a residual is above `tolerance`,
+    good (see `nearest_equal`); not known with `newton_step`. If a residual is above `tolerance`,
     x is useless.
     """
     matrix, counts = np.eye(0), np.einsum("cii->ci", M) > 0

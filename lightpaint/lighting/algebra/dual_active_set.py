@@ -21,9 +21,9 @@ import numpy as np
 from lightpaint.arrays import Bools, Doubles, Indices
 from lightpaint.lighting.algebra.bordered_factor import BorderedFactor
 from lightpaint.lighting.algebra.interior_point import interior_point
-from lightpaint.lighting.algebra.lapack import large_libraries
 from lightpaint.lighting.algebra.optimum import NO_CAPS, Optimum
 from lightpaint.lighting.algebra.quadratic import EPSILON, Cap, Quadratic, kkt_residual
+from lightpaint.lighting.algebra.symmetric_matrices import large_libraries
 from lightpaint.progress import cancellation_check
 from lightpaint.threads import one_thread
 

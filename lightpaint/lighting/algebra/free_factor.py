@@ -10,10 +10,9 @@ from dataclasses import dataclass
 import numpy as np
 
 from lightpaint.arrays import Bools, Doubles, Indices
-from lightpaint.lighting.algebra.clipped_newton import RIDGE, solve_ridged
-from lightpaint.lighting.algebra.lapack import large_libraries
-from lightpaint.lighting.algebra.nearest_optimum import SUSPECT_PIVOT
+from lightpaint.lighting.algebra.clipped_newton import RIDGE, SUSPECT_PIVOT, solve_ridged
 from lightpaint.lighting.algebra.quadratic import Quadratic, kkt_residual
+from lightpaint.lighting.algebra.symmetric_matrices import large_libraries
 from lightpaint.progress import cancellation_check
 
 #: Unknowns that may differ from those of the factor, as a share of these: with more, a new factor

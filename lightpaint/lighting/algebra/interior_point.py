@@ -14,8 +14,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from lightpaint.arrays import Bools, Doubles, Indices
-from lightpaint.lighting.algebra.lapack import large_libraries
 from lightpaint.lighting.algebra.quadratic import Quadratic
+from lightpaint.lighting.algebra.symmetric_matrices import large_libraries
 from lightpaint.progress import cancellation_check
 
 #: Largest number of steps; complementarity that ends them, relative to that of the start; and the

@@ -2,21 +2,28 @@
 
 from collections.abc import Iterable
 from dataclasses import dataclass
+from typing import Literal
 
 import numpy as np
 import numpy.typing as npt
 
 from lightpaint.arrays import Doubles, Indices
 from lightpaint.lighting.algebra.active_set import polish
-from lightpaint.lighting.algebra.clipped_newton import MANY_UNKNOWNS, capped_newton, clipped_newton
+from lightpaint.lighting.algebra.clipped_newton import (
+    MANY_UNKNOWNS,
+    capped_newton,
+    clipped_newton,
+    nearest_equal,
+)
 from lightpaint.lighting.algebra.free_factor import FreeFactor, projected_newton
 from lightpaint.lighting.algebra.gauss_seidel import sweep
 from lightpaint.lighting.algebra.interior_point import interior_point
-from lightpaint.lighting.algebra.method import Method
-from lightpaint.lighting.algebra.nearest_optimum import nearest_equal
 from lightpaint.lighting.algebra.quadratic import UNREACHED_POWER, Cap, Quadratic, scaled
 from lightpaint.progress import cancellation_check
 from lightpaint.threads import one_thread, parallel_map
+
+#: Newton's method on the active set, which falls back on the paper's iteration; or that one alone.
+Method = Literal["polished", "gauss-seidel"]
 
 #: Largest KKT residual of an optimum, unless the round-off of M x − b is larger.
 TOLERANCE = 1e-12
@@ -82,7 +89,7 @@ def minimise(
     result.
 
     If M is singular, as with two lights at one place, many x are optimal: the answer is one near
-    `start` (nearest_optimum.py). Unknowns with M_ii = 0 keep their start.
+    `start` (`nearest_equal`). Unknowns with M_ii = 0 keep their start.
 
     Raises ValueError if shapes do not fit or no x satisfies bounds and caps.
     """

@@ -6,7 +6,7 @@ from dataclasses import replace
 from lightpaint.basis import BasisLight
 from lightpaint.errors import ConstraintError
 from lightpaint.lighting.constraints.constraints import Constraints, LightConstraint
-from lightpaint.lighting.constraints.light_patterns import constraints_by_light
+from lightpaint.lighting.constraints.light_constraints import constraints_by_light
 from lightpaint.luminaires import LUMINAIRE_PLUGINS
 from lightpaint.sentences import Hint
 

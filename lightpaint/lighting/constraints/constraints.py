@@ -1,4 +1,5 @@
-"""Constraints on lights, in the terms of lighting artists: locked, limited, dimmed.
+"""Constraints on lights, in the terms of lighting artists: locked, limited, dimmed; and sums of
+light and of power that a lighting has to reach.
 
 A lights file, the options of the command line and `Constraints.of` share keys and values. This
 module checks them once; `reduction.py` derives the unknowns of the solve from them.
@@ -9,7 +10,7 @@ from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Any
 
-from lightpaint.arrays import RGB
+from lightpaint.arrays import RGB, Doubles
 from lightpaint.colour import Preference, SlotFilter, WhiteRange
 from lightpaint.display_text import some_of
 from lightpaint.errors import ConstraintError
@@ -20,7 +21,6 @@ from lightpaint.lighting.constraints.emitter_values import (
     parse_emitters,
     parse_slots,
 )
-from lightpaint.lighting.constraints.requirements import Requirements
 from lightpaint.lighting.constraints.values import (
     Level,
     Lock,
@@ -50,6 +50,26 @@ LIGHT_KEYS = ("lock", "off", "limits", "color", "kelvin", "duv", "primaries", "r
 
 #: Keys that determine the colours of a light, which can have one of them.
 COLOR_KEYS = ("color", "kelvin", "primaries")
+
+
+@dataclass(frozen=True)
+class Requirements:
+    """Sums that have to reach given values: Σ rows·w + watts P ≥ least, P the power of all lamps.
+
+    rows: (m, n, 3), the part of each weight. watts: (m,), -1 for a limit of the power, 0 for sums
+    of light. least: (m,).
+    """
+
+    rows: Doubles
+    watts: Doubles
+    least: Doubles
+
+    def __len__(self) -> int:
+        return len(self.least)
+
+    def lowered(self, slack: Doubles) -> "Requirements":
+        """Return requirements that ask for less. slack: (m,)."""
+        return Requirements(self.rows, self.watts, self.least - slack)
 
 
 @dataclass(frozen=True)

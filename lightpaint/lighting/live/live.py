@@ -21,9 +21,12 @@ from operator import add
 from lightpaint.arrays import RGB, Doubles
 from lightpaint.basis import Basis, texel_lights
 from lightpaint.colour import Lamp
-from lightpaint.lighting.constraints.color_restrictions import WhiteLimits, painted_whites
 from lightpaint.lighting.constraints.constraints import Constraints
-from lightpaint.lighting.constraints.start_lighting import start_weights
+from lightpaint.lighting.constraints.light_constraints import (
+    WhiteLimits,
+    painted_whites,
+    start_weights,
+)
 from lightpaint.lighting.fit import Fit, Space
 from lightpaint.lighting.linear_problem import reduce_lights
 from lightpaint.lighting.live.live_sums import MAX_FILM_PIXELS, Films, SmallFilm

@@ -7,14 +7,14 @@ import numpy as np
 from lightpaint.arrays import RGB, Doubles, Floats, Slices
 from lightpaint.basis import Basis
 from lightpaint.colour import ViewTransform
-from lightpaint.lighting.constraints.start_lighting import held_at_start
+from lightpaint.lighting.constraints.light_constraints import held_at_start
 from lightpaint.lighting.live.live_sums import (
     MAX_FILM_PIXELS,
     LayerWishes,
     PaintedTiles,
     SmallFilm,
 )
-from lightpaint.lighting.loss.paint_on_emitters import (
+from lightpaint.lighting.loss.painting import (
     affected_region,
     dark_threshold,
     find_glow_paint,

@@ -25,7 +25,7 @@ from lightpaint.colour import (
     sides_of,
     white_range,
 )
-from lightpaint.lighting.constraints.color_restrictions import LAMP_KELVINS
+from lightpaint.lighting.constraints.light_constraints import LAMP_KELVINS
 
 #: Whites that paint may ask for, in kelvin: those that have a name.
 ALL_KELVINS = (1901, 100_000)

@@ -16,9 +16,13 @@ from dataclasses import dataclass
 import numpy as np
 
 from lightpaint.arrays import Bools, Doubles, Indices
-from lightpaint.lighting.algebra.clipped_newton import MANY_UNKNOWNS, RIDGE, solve_ridged
+from lightpaint.lighting.algebra.clipped_newton import (
+    MANY_UNKNOWNS,
+    RIDGE,
+    is_suspect,
+    solve_ridged,
+)
 from lightpaint.lighting.algebra.free_factor import KEPT_PROMISE, SHORTEST_PART
-from lightpaint.lighting.algebra.nearest_optimum import is_suspect
 from lightpaint.lighting.algebra.optimum import NO_CAPS, Optimum
 from lightpaint.lighting.algebra.quadratic import EPSILON, UNREACHED_POWER, kkt_step
 from lightpaint.lighting.unknowns.emission_mixes import MAX_EMITTERS, EmissionMixes

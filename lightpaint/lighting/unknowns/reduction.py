@@ -20,13 +20,12 @@ from lightpaint.colour import Lamp
 from lightpaint.display_text import some_names
 from lightpaint.errors import ConstraintError
 from lightpaint.lighting.algebra.quadratic import Cap
-from lightpaint.lighting.constraints.constraints import Constraints, LightConstraint
-from lightpaint.lighting.constraints.light_patterns import (
+from lightpaint.lighting.constraints.constraints import Constraints, LightConstraint, Requirements
+from lightpaint.lighting.constraints.light_constraints import (
     constraints_by_light,
     constraints_on_parts,
     tied_lights,
 )
-from lightpaint.lighting.constraints.requirements import Requirements
 from lightpaint.lighting.unknowns.gamuts import Gamuts
 from lightpaint.lighting.unknowns.knobs import (
     Knob,
@@ -45,8 +44,9 @@ from lightpaint.lighting.unknowns.lamp_parts import (
     WholeLamps,
     emission_of_parts,
     part_lamps,
+    watts_of_fixed,
+    watts_of_unknowns,
 )
-from lightpaint.lighting.unknowns.lamp_powers import watts_of_fixed, watts_of_unknowns
 from lightpaint.lighting.unknowns.mixed_lights import MixedLights
 from lightpaint.lighting.unknowns.unknown_blocks import (
     AlikeBlocks,

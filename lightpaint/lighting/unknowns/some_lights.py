@@ -7,11 +7,11 @@ from functools import cached_property
 import numpy as np
 
 from lightpaint.arrays import Doubles, Indices
-from lightpaint.lighting.constraints.requirements import Requirements
+from lightpaint.lighting.constraints.constraints import Requirements
 from lightpaint.lighting.normal_equations import NormalEquations
 from lightpaint.lighting.unknowns.gamuts import GamutsOfSome
 from lightpaint.lighting.unknowns.knobs import Knob
-from lightpaint.lighting.unknowns.lamp_powers import watts_of_fixed
+from lightpaint.lighting.unknowns.lamp_parts import watts_of_fixed
 from lightpaint.lighting.unknowns.reduction import Reduction
 
 

@@ -12,7 +12,7 @@ import numpy as np
 from lightpaint.arrays import Doubles, Indices
 from lightpaint.errors import LightpaintError
 from lightpaint.lighting.algebra.required_sums import RequiredSums
-from lightpaint.lighting.unknowns.lamp_powers import watts_of_fixed, watts_of_unknowns
+from lightpaint.lighting.unknowns.lamp_parts import watts_of_fixed, watts_of_unknowns
 from lightpaint.lighting.unknowns.reduction import Reduction
 from lightpaint.lighting.wishes.wished_light import WishedLight
 from lightpaint.progress import cancellation_check

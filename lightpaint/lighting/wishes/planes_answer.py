@@ -8,7 +8,7 @@ import numpy as np
 
 from lightpaint.arrays import Doubles
 from lightpaint.errors import ConstraintError
-from lightpaint.lighting.unknowns.lamp_powers import watts_of_fixed
+from lightpaint.lighting.unknowns.lamp_parts import watts_of_fixed
 from lightpaint.lighting.unknowns.reduction import Reduction
 from lightpaint.lighting.wishes.wished_light import LightWish, WishedLight, check_powers
 from lightpaint.photometry.glare import Glare, GlareReading

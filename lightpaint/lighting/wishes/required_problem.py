@@ -5,7 +5,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from lightpaint.arrays import Doubles
-from lightpaint.lighting.constraints.requirements import Requirements
+from lightpaint.lighting.constraints.constraints import Requirements
 from lightpaint.lighting.problem import Problem
 from lightpaint.lighting.unknowns.reduced_problem import solve_reduced
 from lightpaint.lighting.unknowns.reduction import Reduction

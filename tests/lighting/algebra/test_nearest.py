@@ -6,8 +6,7 @@ import numpy as np
 import pytest
 
 from lightpaint.lighting.algebra import optimum
-from lightpaint.lighting.algebra.clipped_newton import capped_newton
-from lightpaint.lighting.algebra.nearest_optimum import nearest_equal
+from lightpaint.lighting.algebra.clipped_newton import capped_newton, nearest_equal
 from lightpaint.lighting.algebra.optimum import Cap, minimise, minimise_each
 from lightpaint.lighting.algebra.quadratic import clip_to_sums, scaled
 

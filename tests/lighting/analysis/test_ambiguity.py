@@ -6,7 +6,7 @@ import numpy as np
 
 from lightpaint.basis.basis import Basis, Origin
 from lightpaint.basis.lights import BasisLight
-from lightpaint.lighting.analysis.ambiguity import ambiguities, indistinguishable
+from lightpaint.lighting.analysis.analysis import ambiguities, indistinguishable
 from lightpaint.lighting.solver import solve
 from lightpaint.target.target import Target
 

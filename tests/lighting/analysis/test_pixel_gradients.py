@@ -8,7 +8,7 @@ from nightly import nightly
 
 from lightpaint.colour.display.view_transform import ViewTransform
 from lightpaint.lighting.analysis.noise.noise_correction import correct_noise
-from lightpaint.lighting.analysis.noise.pixel_gradients import steadier_light
+from lightpaint.lighting.analysis.noise.residuals import steadier_light
 from lightpaint.lighting.analysis.noise.uncertainty import error_bars
 from lightpaint.lighting.solver import solve
 from lightpaint.target.target import Target

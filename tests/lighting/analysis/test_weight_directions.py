@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 
 from lightpaint.basis.lights import BasisLight, Lights
-from lightpaint.lighting.algebra import eigenvectors
-from lightpaint.lighting.algebra.eigenvectors import excess_above
+from lightpaint.lighting.algebra import symmetric_matrices
+from lightpaint.lighting.algebra.symmetric_matrices import excess_above
 from lightpaint.lighting.analysis.appearance import limiting_reasons
 from lightpaint.lighting.analysis.noise import noise
 from lightpaint.lighting.analysis.noise.noise import denoised_matrix, pseudo_inverse
@@ -107,7 +107,7 @@ def test_large_matrices_are_worked_on_as_small_ones(monkeypatch: pytest.MonkeyPa
         ]
 
     small = results()
-    for module in (noise, eigenvectors):
+    for module in (noise, symmetric_matrices):
         monkeypatch.setattr(module, "SMALL_MATRIX", 0)
     for one, other in zip(small, results(), strict=True):
         np.testing.assert_allclose(other, one, rtol=1e-9, atol=1e-9)  # condition 10⁴

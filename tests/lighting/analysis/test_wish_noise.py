@@ -7,7 +7,7 @@ import pytest
 
 import lightpaint as lp
 from lightpaint.lighting.analysis.noise import uncertainty
-from lightpaint.lighting.analysis.noise.wish_noise import ReadingNoise
+from lightpaint.lighting.analysis.noise.uncertainty import ReadingNoise
 from lightpaint.lighting.loss.expected_lights import NoisyBlocks, PaintedBlocks, Wash
 from lightpaint.target.wish_finding import DISTINCT_STOPS, find_wishes
 

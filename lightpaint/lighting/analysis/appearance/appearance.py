@@ -15,8 +15,11 @@ from lightpaint.colour import luminance
 from lightpaint.display_text import short_repr
 from lightpaint.images import Estimate
 from lightpaint.keywords import keywords
-from lightpaint.lighting.analysis.appearance.area_lights import AreaLights, lights_of_area
-from lightpaint.lighting.analysis.appearance.compensation import compensating_lights
+from lightpaint.lighting.analysis.appearance.area_lights import (
+    AreaLights,
+    compensating_lights,
+    lights_of_area,
+)
 from lightpaint.lighting.analysis.appearance.delivery import (
     Delivery,
     DeliveryReport,
@@ -50,7 +53,7 @@ from lightpaint.lighting.analysis.diagnosis import (
     error_shares,
 )
 from lightpaint.lighting.analysis.noise.uncertainty import Uncertainty
-from lightpaint.lighting.constraints.light_patterns import constraints_by_light, tied_lights
+from lightpaint.lighting.constraints.light_constraints import constraints_by_light, tied_lights
 from lightpaint.lighting.solution import Solution
 
 #: Mean ΔE up to which a result is close: visible only side by side; and from which on it is another

@@ -26,8 +26,8 @@ from lightpaint.lighting.loss.reweighting import (
     WeightTerms,
     relative_change,
     run_rounds,
+    sample_pixels,
 )
-from lightpaint.lighting.loss.warm_start import sample_pixels
 from lightpaint.lighting.normal_equations import NormalEquations
 from lightpaint.lighting.problem import (
     Problem,

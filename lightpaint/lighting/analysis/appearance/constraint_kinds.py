@@ -6,7 +6,7 @@ from typing import Any, Literal
 
 from lightpaint.basis import BasisLight, light_images
 from lightpaint.lighting.constraints.constraints import COLOR_KEYS, Constraints
-from lightpaint.lighting.constraints.light_patterns import tables_by_light, tied_lights
+from lightpaint.lighting.constraints.light_constraints import tables_by_light, tied_lights
 from lightpaint.sentences import SourceKey
 
 #: Kinds of constraints: of single lights, of those on one dimmer, and of all together.

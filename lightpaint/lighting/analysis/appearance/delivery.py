@@ -1,8 +1,8 @@
 """The delivery of wishes: how much came of each change of brightness, and of colour.
 
 A wish asks for a change from the current look N to the painting A; the answer made G of it. All are
-washes (`washes.py`). Brightness is L*; colour is a*b* of all three at the luminance of A, so that
-colour counts for itself where brightness is missing. Of the asked change A − N, the share
+washes (`wish_parts.py`). Brightness is L*; colour is a*b* of all three at the luminance of A,
+so that colour counts for itself where brightness is missing. Of the asked change A − N, the share
 
     Σ ω (A − N)·(G − N) / Σ ω |A − N|²
 
@@ -26,9 +26,14 @@ from lightpaint.arrays import Bools, Doubles, Floats
 from lightpaint.colour import ciede2000, lab, luminance
 from lightpaint.display_text import visible
 from lightpaint.keywords import keywords
-from lightpaint.lighting.analysis.appearance.washes import AreaWashes, Washes
-from lightpaint.lighting.analysis.appearance.wish_parts import WishKind, WishPart, wish_parts
-from lightpaint.lighting.display import display_transform
+from lightpaint.lighting.analysis.appearance.wish_parts import (
+    AreaWashes,
+    Washes,
+    WishKind,
+    WishPart,
+    wish_parts,
+)
+from lightpaint.lighting.problem import display_transform
 from lightpaint.lighting.solution import Solution
 from lightpaint.target import Target, find_wishes
 

@@ -10,9 +10,8 @@ import numpy.typing as npt
 from lightpaint.arrays import Bools, Doubles, Floats
 from lightpaint.basis import Planes
 from lightpaint.colour import ViewTransform, ciede2000, lab
-from lightpaint.lighting.display import display_light, display_transform
 from lightpaint.lighting.loss.painting import at_least_mask, target_light
-from lightpaint.lighting.problem import Problem
+from lightpaint.lighting.problem import Problem, display_light, display_transform
 
 #: Painted pixels that are compared, and pixels along the side of a block that averages noise.
 MAX_COMPARED_PIXELS, BLOCK = 2**15, 8

@@ -19,11 +19,14 @@ import numpy as np
 
 from lightpaint.arrays import Bools, Doubles, Floats, Indices
 from lightpaint.basis import BLOCK_PIXELS, FEW_LIGHTS, Planes, as_slice, block_of
-from lightpaint.lighting.algebra.eigenvectors import SMALL_MATRIX, eigenvectors, excess_above
-from lightpaint.lighting.algebra.lapack import large_libraries
+from lightpaint.lighting.algebra.symmetric_matrices import (
+    SMALL_MATRIX,
+    eigenvectors,
+    excess_above,
+    large_libraries,
+)
 from lightpaint.lighting.analysis.noise.dominant_pixels import Peaks, t_ratios
-from lightpaint.lighting.analysis.noise.pixel_gradients import PixelGradients
-from lightpaint.lighting.analysis.noise.residuals import Residuals, channel_grain
+from lightpaint.lighting.analysis.noise.residuals import PixelGradients, Residuals, channel_grain
 from lightpaint.lighting.normal_equations import NormalEquations
 from lightpaint.lighting.problem import Problem
 from lightpaint.lighting.solution import Solution
@@ -101,7 +104,7 @@ class Noise:
 
     power: (3, n, n), N_ij = Σ D h_i h_j, the part of M that is noise. target_noise: (3, n), the
     mean error of b: noise of the current look, where this is a goal, and that of squares which
-    follow from noisy light (pixel_gradients.py).
+    follow from noisy light (residuals.py).
     doubt: (3, n), an estimate of the error that may be left in target_noise.
     gradient: (3, n, 3, n), covariance of the gradient. objective_error, objective_noise: as in
     `Uncertainty`.

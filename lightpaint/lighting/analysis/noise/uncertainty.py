@@ -1,4 +1,5 @@
-"""Error bars: the effect of the basis's noise on the answer, from half differences.
+"""Error bars: the effect on the answer of the basis's noise, from half differences, and of noise in
+what its painting is read to ask for.
 
 The two halves of the samples give two gradients of the objective at the solved weights. Half
 their difference, pixel by pixel, gives the covariance of the gradient's noise, and the inverse
@@ -8,11 +9,21 @@ In a picture that is all fireflies, power cannot be told from noise, and the lig
 dim. At most half of M is removed as noise, since the rest would be noise itself. So the least
 power of a light in a render without noise is estimated; the answer with that power tells how far
 the true one may be (docs/method.md, "How sure").
+
+A sketch is read before it is fitted: the ratio of painting and current look shows its wishes, whose
+contrasts count, and how clearly it asks each light for another colour. The look is noisy, so two
+bases of one scene may find other wishes in one painting: where a place asks for about as much as it
+takes to be a wish, two become one, or one more is found. The noise of M does not show that.
+
+So the painting is read again and again with noise added, the half difference of each block of
+pixels with either sign (a wild bootstrap, Wu 1986), and the last linear problem is solved with what
+each reading asks for (docs/method.md, "How sure").
 """
 
 import math
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
+from typing import Self
 
 import numpy as np
 
@@ -21,7 +32,7 @@ from lightpaint.basis import BLOCK_PIXELS, FEW_LIGHTS
 from lightpaint.colour import LUMINANCE
 from lightpaint.display_text import short_repr
 from lightpaint.keywords import keywords
-from lightpaint.lighting.analysis.noise.dominant_pixels import NORMAL_95
+from lightpaint.lighting.analysis.noise.dominant_pixels import NORMAL_95, t_ratios
 from lightpaint.lighting.analysis.noise.noise import (
     Noise,
     denoised_matrix,
@@ -31,11 +42,25 @@ from lightpaint.lighting.analysis.noise.noise import (
     pseudo_inverse,
 )
 from lightpaint.lighting.analysis.noise.weight_directions import WeightResponse, solve_for
-from lightpaint.lighting.analysis.noise.wish_noise import ReadingNoise
 from lightpaint.lighting.answer.lighting import LightSetting
+from lightpaint.lighting.loss.expected_lights import NoisyBlocks, Wash
 from lightpaint.lighting.normal_equations import NormalEquations
+from lightpaint.lighting.problem import Problem, are_sketches, terms_of_wash
 from lightpaint.lighting.solution import Solution
 from lightpaint.progress import with_progress
+
+#: Readings of a painting, and of one for many lights, whose solves take long.
+READINGS, FEW_READINGS = 8, 3
+
+#: Fewest lights that count as many.
+MANY_LIGHTS = 64
+
+#: Amount of noise that is added, relative to that of the basis. A threshold answers less to noise
+#: that comes on top of other noise (docs/benchmarks.md has how often intervals hold).
+AMOUNT = 1.2
+
+#: Seed of the signs of the noise that is added.
+SEED = 1
 
 #: Shares of noise in the part of a light that no other can replace, between which doubt rises from
 #: 0 to 1.
@@ -43,6 +68,42 @@ DOUBT_RANGE = 0.6, 0.8
 
 #: Standard errors on the safe side of a sum, and the least share of M that remains of a light.
 SAFE_ERRORS, MIN_LEFT = 1.0, 1e-3
+
+
+@dataclass(frozen=True)
+class ReadingNoise:
+    """The noise in the reading of a painting.
+
+    scatter: (n, 3), standard deviation of the weights by it. widening: ratio of an interval to that
+    of a standard deviation which is known.
+    """
+
+    scatter: Doubles
+    widening: float
+
+    @classmethod
+    def of(cls, solution: Solution) -> Self:
+        """Read the painting of an answer several times; a literal one has no such noise."""
+        problem = solution.problem
+        if not problem.fit.reads_wishes(is_sketch=are_sketches(problem.views)):
+            return cls(np.zeros_like(solution.weights), 1.0)
+        count = READINGS if len(solution.weights) < MANY_LIGHTS else FEW_READINGS
+        as_read = solve_for(solution, problem.solved)
+        changes = []
+        for wash in _disturbed_washes(problem, count):
+            terms = terms_of_wash(wash, problem.views, problem.fit, problem.reference)
+            disturbed = replace(problem, **vars(terms))
+            moved = solve_for(replace(solution, problem=disturbed), problem.solved)
+            changes.append(moved - as_read)
+        return cls(np.sqrt(np.square(changes).mean(axis=0)), float(t_ratios(np.array(count))))
+
+
+def _disturbed_washes(problem: Problem, count: int) -> Iterator[Wash]:
+    """Yield washes of the views of a problem, each with other noise."""
+    rng, views = np.random.default_rng(SEED), problem.views
+    blocks = [NoisyBlocks.of(*view) for view in zip(views.bases, views.targets, strict=True)]
+    for _ in with_progress(range(count), "readings"):
+        yield Wash.joined([view.disturbed(rng, AMOUNT) for view in blocks])
 
 
 def noise_doubts(solution: Solution, power: Doubles) -> Doubles:

@@ -12,7 +12,7 @@ from typing import Self
 import numpy as np
 
 from lightpaint.arrays import Bools, Doubles, Indices
-from lightpaint.lighting.algebra.eigenvectors import excess_above, sandwich
+from lightpaint.lighting.algebra.symmetric_matrices import excess_above, sandwich
 from lightpaint.lighting.analysis.noise.dominant_pixels import NORMAL_95
 from lightpaint.lighting.analysis.noise.noise import (
     NULL_EIGENVALUE,

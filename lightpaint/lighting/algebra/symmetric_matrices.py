@@ -1,10 +1,14 @@
-"""Eigenvectors and products of symmetric matrices; an interrupt need not wait for large ones."""
+"""Symmetric matrices: eigenvectors and products, which an interrupt need not wait for; and SciPy's
+LAPACK and BLAS, where unknowns are many.
+"""
+
+from functools import cache
+from typing import Any
 
 import numpy as np
 
 from lightpaint.arrays import Doubles
-from lightpaint.lighting.algebra.lapack import large_libraries
-from lightpaint.threads import run_apart
+from lightpaint.threads import find_loaded_libraries, run_apart
 
 #: Maximum number of rows of a matrix that takes less than a second.
 QUICK_MATRIX = 1024
@@ -12,6 +16,17 @@ QUICK_MATRIX = 1024
 #: Maximum number of rows of a matrix for which several threads only wait for each other, and some
 #: eigenvectors take as long as all.
 SMALL_MATRIX = 256
+
+
+@cache
+def large_libraries() -> tuple[Any, Any]:
+    """Return SciPy's LAPACK and BLAS, loaded where unknowns are many; `one_thread` limits them
+    from then on.
+    """
+    from scipy.linalg import blas, lapack
+
+    find_loaded_libraries()
+    return lapack, blas
 
 
 def eigenvectors(M: Doubles) -> tuple[Doubles, Doubles]:

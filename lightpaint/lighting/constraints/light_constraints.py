@@ -1,13 +1,23 @@
-"""Constraints of each light, resolved from names and patterns."""
+"""Constraints of each light: resolved from names and patterns, restricted where a lamp's colour is
+open, and the weights to start from.
+
+The painting is answered by lights near to it: unpainted parts are held to its look, the colours of
+its lamps count as theirs, and what the painting leaves open stays as it is.
+"""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from fnmatch import fnmatchcase
 from typing import Any
 
-from lightpaint.basis import BasisLight
+import numpy as np
+
+from lightpaint.arrays import RGB, Doubles
+from lightpaint.basis import Basis, BasisLight, Lights
+from lightpaint.colour import cct_and_duv
 from lightpaint.display_text import some_names, with_similar_name
 from lightpaint.errors import ConstraintError
+from lightpaint.images import Estimate
 from lightpaint.lighting.constraints.constraints import (
     LAMP_KEYS,
     Constraints,
@@ -18,6 +28,24 @@ from lightpaint.lighting.constraints.constraints import (
 )
 from lightpaint.scene.lights.texels import coarse_name, image_of
 from lightpaint.sentences import Hint, Lead, SourceKey
+
+#: The range of usual lamps, in kelvin.
+LAMP_KELVINS = (2200, 9000)
+
+#: Whites that the range is widened to where warmer or bluer ones are painted, up to moonlight.
+WARMER_KELVINS, BLUER_KELVINS = (2000.0,), (12_000.0, 16_000.0, 20_000.0, 25_000.0)
+
+#: Largest distance from Planck's locus at which a painted colour is a white.
+WHITE_DUV = 0.02
+
+#: Ratio by which a range reaches beyond the mean white that is painted.
+BEYOND_MEAN = 1.1
+
+#: The range of white of each light, in kelvin.
+WhiteLimits = tuple[tuple[float, float], ...]
+
+#: That restriction in few words, for tables.
+OWN_COLOR_LABEL = "own colour"
 
 
 def constraints_by_light(
@@ -144,3 +172,90 @@ def _is_meant(light: str, name: str) -> bool:
     """
     matching = fnmatchcase if is_pattern(name) else str.__eq__
     return name in (light, image_of(light)) or matching(coarse_name(light) or light, name)
+
+
+def start_weights(start: Mapping[str, RGB], lights: Sequence[BasisLight]) -> Doubles:
+    """Return the weights (n, 3) that a solve starts from: those of the scene for other lights.
+
+    start: emissions by name. Raises ConstraintError for a light that is not there, or is fixed.
+    """
+    weights = np.array(Lights.of(lights).current_weights)
+    names = [light.name for light in lights]
+    for name, emission in start.items():
+        if name not in names:
+            hint = with_similar_name(f"there are {some_names(names)}", name, names)
+            raise ConstraintError(f"start: no light {name!r}; {hint}")
+        light = lights[names.index(name)]
+        if light.is_fixed or (light.is_scalar and len(set(emission)) > 1):
+            reason = "is fixed" if light.is_fixed else "can only be dimmed as a whole"
+            raise ConstraintError(f"start.{name} is {list(emission)}, and {name!r} {reason}")
+        weights[names.index(name)] = emission
+    return weights
+
+
+def held_at_start(basis: Basis, start: Mapping[str, RGB]) -> Basis:
+    """Return a basis whose unpainted parts are held to the look of the lighting to start from."""
+    if not start:
+        return basis
+    weights = start_weights(start, basis.lights)
+    return replace(basis, former=Estimate(basis.mix(weights), basis.noise.mix(weights)))
+
+
+def painted_whites(emission: Doubles) -> WhiteLimits:
+    """Return the ranges of lights that are painted as emission (n, 3): that of usual lamps, and as
+    far as bluer or warmer whites are painted.
+    """
+    return tuple(_painted_white(color) for color in emission)
+
+
+def _painted_white(color: Doubles) -> tuple[float, float]:
+    white = cct_and_duv(color)
+    low, high = map(float, LAMP_KELVINS)
+    if white is None or abs(white[1]) > WHITE_DUV:
+        return low, high
+    kelvin, _ = white
+    low = next((x for x in (low, *WARMER_KELVINS) if x <= kelvin), WARMER_KELVINS[-1])
+    wanted = BEYOND_MEAN * kelvin
+    return low, next((x for x in (high, *BLUER_KELVINS) if x >= wanted), BLUER_KELVINS[-1])
+
+
+def whiten_open_lights(
+    constraints: Constraints, lights: Sequence[BasisLight], whites: WhiteLimits | None = None
+) -> Constraints:
+    """Return constraints in which every light of open colour also stays between two whites.
+
+    whites: of each light, in kelvin; None for LAMP_KELVINS.
+    """
+    limits = whites or (LAMP_KELVINS,) * len(lights)
+    return constraints.and_then(
+        Constraints.of(
+            {
+                lights[k].name: {"kelvin": list(limits[k])}
+                for k in lights_of_open_color(constraints, lights)
+            }
+        )
+    )
+
+
+def keep_own_colors(constraints: Constraints, lights: Sequence[BasisLight]) -> Constraints:
+    """Return constraints in which every light of open colour also keeps its current one.
+
+    A light that is off has no colour, and is white.
+    """
+    own = start_weights(constraints.start, lights)
+    own_colors = {
+        lights[k].name: {"color": own[k].tolist() if own[k].any() else "#fff"}
+        for k in lights_of_open_color(constraints, lights)
+    }
+    return constraints.and_then(Constraints.of(own_colors))
+
+
+def own_color_labels(
+    labels: Sequence[str], constraints: Constraints, lights: Sequence[BasisLight]
+) -> tuple[str, ...]:
+    """Return the labels (n,) of lights under `constraints` together with that restriction."""
+    open_lights = set(lights_of_open_color(constraints, lights))
+    return tuple(
+        ", ".join(filter(None, [label, OWN_COLOR_LABEL])) if k in open_lights else label
+        for k, label in enumerate(labels)
+    )
