@@ -39,8 +39,7 @@ from scipy.ndimage import gaussian_filter
 import lightpaint as lp
 from lightpaint.basis.basis import meter_exposure
 from lightpaint.basis.cache.cached_render import obtain_basis
-from lightpaint.colour.color import kelvin_to_rgb, luminance
-from lightpaint.colour.color_difference import delta_e
+from lightpaint.colour.color import delta_e, kelvin_to_rgb, luminance
 from lightpaint.errors import PaintError
 from lightpaint.paint.presets.presets import PRESETS
 from lightpaint.paint.protocol import ApplyPreset

@@ -313,7 +313,7 @@ def delta_e_mean(picture: Any, truth: Any) -> float:
 
     The larger is averaged over blocks to the size of the smaller.
     """
-    from lightpaint.colour.color_difference import delta_e
+    from lightpaint.colour.color import delta_e
     from lightpaint.colour.display.exposure import choose_exposure
     from lightpaint.images.pixel_blocks import block_mean
 

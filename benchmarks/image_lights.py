@@ -33,8 +33,7 @@ import lightpaint as lp
 from lightpaint.arrays import Doubles, Floats
 from lightpaint.basis.basis import Basis
 from lightpaint.basis.texel_images import LightImage, light_images
-from lightpaint.colour.color import luminance
-from lightpaint.colour.color_difference import delta_e
+from lightpaint.colour.color import delta_e, luminance
 from lightpaint.images.formats.exr import write_rgb
 from lightpaint.scene.lights.texels.texel import parse_size
 from lightpaint.scene.scene import Scene

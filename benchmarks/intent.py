@@ -52,8 +52,7 @@ from scipy.ndimage import gaussian_filter, label
 import lightpaint as lp
 from lightpaint.basis.basis import meter_exposure
 from lightpaint.basis.cache.cached_render import obtain_basis
-from lightpaint.colour.color import kelvin_to_rgb, luminance
-from lightpaint.colour.color_difference import delta_e
+from lightpaint.colour.color import delta_e, kelvin_to_rgb, luminance
 from lightpaint.images.denoiser import denoised
 from lightpaint.lighting.analysis.appearance import limiting_reasons
 from lightpaint.lighting.live.live import LiveSolver

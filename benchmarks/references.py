@@ -39,8 +39,7 @@ from scipy.ndimage import gaussian_filter
 import lightpaint as lp
 from lightpaint.basis.basis import meter_exposure
 from lightpaint.basis.cache.cached_render import obtain_basis
-from lightpaint.colour.color import luminance
-from lightpaint.colour.color_difference import delta_e
+from lightpaint.colour.color import delta_e, luminance
 from lightpaint.paint.protocol import ApplyPreset, LookLike, PlacePair
 from lightpaint.paint.session.session import Session
 from lightpaint.paint.store.history_steps import Identity

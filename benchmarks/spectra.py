@@ -29,8 +29,7 @@ from lightpaint import Basis, Scene, load_scene, relight, render_basis
 from lightpaint.basis.render.basis_render import train_guide
 from lightpaint.basis.render.render_parts import PartRenderer, plan_parts
 from lightpaint.basis.render.tracer import wavelengths
-from lightpaint.colour.color import luminance
-from lightpaint.colour.color_difference import ciede2000, lab
+from lightpaint.colour.color import ciede2000, lab, luminance
 from lightpaint.colour.lamp import Lamp, LampEmitter
 from lightpaint.colour.primaries import colour_science
 from lightpaint.colour.spectra.observer import EYE

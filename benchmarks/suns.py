@@ -27,7 +27,7 @@ import lightpaint as lp
 from lightpaint.arrays import Doubles, Floats
 from lightpaint.basis.texel_images import light_images
 from lightpaint.colour.color import luminance
-from lightpaint.colour.srgb import encode_display, to_8_bit
+from lightpaint.colour.primaries import encode_display, to_8_bit
 from lightpaint.images.formats.exr import write_rgb
 from lightpaint.images.formats.png import png_bytes
 from lightpaint.scene.lights.texels.image_domains import Sky, solid_angles

@@ -31,7 +31,7 @@ from known_places import references
 import lightpaint as lp
 from lightpaint.basis.cache.cached_render import obtain_basis
 from lightpaint.basis.denoised_mixes import denoise_current_look
-from lightpaint.colour.srgb import encode_display, to_8_bit
+from lightpaint.colour.primaries import encode_display, to_8_bit
 
 #: Share of a picture's size at which scenes are painted, by scene.
 RESOLUTION = {"gallery": "1/2", "stage": "1/2", "table": "1/4"}

@@ -13,9 +13,15 @@ Preference = Literal["watts", "white", "fewest", "rf"]
 if TYPE_CHECKING:
     from lightpaint.colour.color import C2 as C2
     from lightpaint.colour.color import LUMINANCE as LUMINANCE
+    from lightpaint.colour.color import WHITE_DUV as WHITE_DUV
     from lightpaint.colour.color import cct_and_duv as cct_and_duv
+    from lightpaint.colour.color import ciede2000 as ciede2000
+    from lightpaint.colour.color import delta_e as delta_e
     from lightpaint.colour.color import hex_to_rgb as hex_to_rgb
+    from lightpaint.colour.color import hue_name as hue_name
     from lightpaint.colour.color import kelvin_to_rgb as kelvin_to_rgb
+    from lightpaint.colour.color import lab as lab
+    from lightpaint.colour.color import lab_of_lights as lab_of_lights
     from lightpaint.colour.color import luminance as luminance
     from lightpaint.colour.color import matching_functions as matching_functions
     from lightpaint.colour.color import rgb_to_hex as rgb_to_hex
@@ -23,12 +29,6 @@ if TYPE_CHECKING:
     from lightpaint.colour.color import xy_of as xy_of
     from lightpaint.colour.color import xy_of_spectrum as xy_of_spectrum
     from lightpaint.colour.color import xyz_of as xyz_of
-    from lightpaint.colour.color_difference import WHITE_DUV as WHITE_DUV
-    from lightpaint.colour.color_difference import ciede2000 as ciede2000
-    from lightpaint.colour.color_difference import delta_e as delta_e
-    from lightpaint.colour.color_difference import hue_name as hue_name
-    from lightpaint.colour.color_difference import lab as lab
-    from lightpaint.colour.color_difference import lab_of_lights as lab_of_lights
     from lightpaint.colour.color_ranges import DIRECTIONS as DIRECTIONS
     from lightpaint.colour.color_ranges import ROUND_OFF as ROUND_OFF
     from lightpaint.colour.color_ranges import ColorHull as ColorHull
@@ -65,10 +65,13 @@ if TYPE_CHECKING:
     from lightpaint.colour.primaries import SPACES as SPACES
     from lightpaint.colour.primaries import are_same as are_same
     from lightpaint.colour.primaries import converted as converted
+    from lightpaint.colour.primaries import decode_display as decode_display
+    from lightpaint.colour.primaries import encode_display as encode_display
     from lightpaint.colour.primaries import from_rec709 as from_rec709
     from lightpaint.colour.primaries import is_rec709 as is_rec709
     from lightpaint.colour.primaries import primaries_in as primaries_in
     from lightpaint.colour.primaries import rgb_to_xyz as rgb_to_xyz
+    from lightpaint.colour.primaries import to_8_bit as to_8_bit
     from lightpaint.colour.primaries import to_rec709 as to_rec709
     from lightpaint.colour.spectra.color_rendering import ColorRendering as ColorRendering
     from lightpaint.colour.spectra.color_rendering import adapted_color as adapted_color
@@ -78,20 +81,17 @@ if TYPE_CHECKING:
     from lightpaint.colour.spectra.observer import EYE as EYE
     from lightpaint.colour.spectra.observer import Observer as Observer
     from lightpaint.colour.spectra.observer import read_observer as read_observer
+    from lightpaint.colour.spectra.spectrum import FEWEST_POINTS as FEWEST_POINTS
     from lightpaint.colour.spectra.spectrum import STEP as STEP
     from lightpaint.colour.spectra.spectrum import WAVELENGTHS as WAVELENGTHS
     from lightpaint.colour.spectra.spectrum import Spectrum as Spectrum
+    from lightpaint.colour.spectra.spectrum import daylight as daylight
+    from lightpaint.colour.spectra.spectrum import file_of_spectrum as file_of_spectrum
+    from lightpaint.colour.spectra.spectrum import measured_points as measured_points
+    from lightpaint.colour.spectra.spectrum import named_spectrum as named_spectrum
     from lightpaint.colour.spectra.spectrum import rgb_of_powers as rgb_of_powers
     from lightpaint.colour.spectra.spectrum import spectrum_of as spectrum_of
     from lightpaint.colour.spectra.spectrum import xyz_of_powers as xyz_of_powers
-    from lightpaint.colour.spectra.spectrum_source import FEWEST_POINTS as FEWEST_POINTS
-    from lightpaint.colour.spectra.spectrum_source import daylight as daylight
-    from lightpaint.colour.spectra.spectrum_source import file_of_spectrum as file_of_spectrum
-    from lightpaint.colour.spectra.spectrum_source import measured_points as measured_points
-    from lightpaint.colour.spectra.spectrum_source import named_spectrum as named_spectrum
-    from lightpaint.colour.srgb import decode_display as decode_display
-    from lightpaint.colour.srgb import encode_display as encode_display
-    from lightpaint.colour.srgb import to_8_bit as to_8_bit
 
 if not TYPE_CHECKING:  # a type checker would take any name
     __getattr__, __dir__, __all__ = lazy_names(__name__)

@@ -12,8 +12,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from lightpaint.arrays import Floats
-from lightpaint.colour.primaries import REC709, adaptation, rgb_to_xyz, to_rec709
-from lightpaint.colour.srgb import decode_display
+from lightpaint.colour.primaries import REC709, adaptation, decode_display, rgb_to_xyz, to_rec709
 from lightpaint.errors import ImageError
 
 Curve = Callable[[Floats], Floats]

@@ -20,7 +20,7 @@ from lightpaint.batch.gallery import summary
 from lightpaint.batch.gallery.gallery import gallery_page, planes_name, read_planes, write_planes
 from lightpaint.batch.gallery.summary import NARROW, WIDE, LightRow, SummaryRow, lights_of_answer
 from lightpaint.colour.display.view_transform import ViewTransform
-from lightpaint.colour.srgb import to_8_bit
+from lightpaint.colour.primaries import to_8_bit
 from lightpaint.images.estimate import Estimate, write_estimate
 from lightpaint.lighting.answer.lighting import Lighting
 from lightpaint.lighting.answer.lighting_file import read_lighting, write_lighting

@@ -7,8 +7,7 @@ import pytest
 
 from lightpaint.colour.color import kelvin_to_rgb
 from lightpaint.colour.lamp import Lamp, LampEmitter
-from lightpaint.colour.spectra.best_mix import MARGIN, MixFidelity
-from lightpaint.colour.spectra.color_rendering import fidelity
+from lightpaint.colour.spectra.color_rendering import MARGIN, MixFidelity, fidelity
 from lightpaint.colour.spectra.spectrum import WAVELENGTHS, rgb_of_powers, spectrum_of
 
 #: Peak and width in nanometres, and watts.

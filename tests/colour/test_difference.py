@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from lightpaint.colour.color_difference import ciede2000, delta_e, lab
+from lightpaint.colour.color import ciede2000, delta_e, lab
 from lightpaint.colour.primaries import REC709, colour_science, rgb_to_xyz
 
 
@@ -55,7 +55,7 @@ def test_lab_and_the_difference_of_light_against_colour_science():
 def test_the_library_is_not_waited_for():
     """colour-science takes a second to import."""
     code = (
-        "import sys, numpy as np; from lightpaint.colour.color_difference import delta_e; "
+        "import sys, numpy as np; from lightpaint.colour.color import delta_e; "
         "delta_e(np.zeros(3), np.ones(3)); sys.exit('colour' in sys.modules)"
     )
     assert subprocess.run([sys.executable, "-c", code], check=False).returncode == 0

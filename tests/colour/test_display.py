@@ -8,7 +8,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from PIL import Image
 
-from lightpaint.colour.srgb import encode_display, to_8_bit
+from lightpaint.colour.primaries import encode_display, to_8_bit
 from lightpaint.images.formats.png import png_bytes, write_png
 
 

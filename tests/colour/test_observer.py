@@ -5,11 +5,15 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from lightpaint.colour.color_difference import ciede2000, lab
+from lightpaint.colour.color import ciede2000, lab
 from lightpaint.colour.primaries import REC709, colour_science, rgb_to_xyz
 from lightpaint.colour.spectra.observer import EYE, read_observer
-from lightpaint.colour.spectra.spectrum import WAVELENGTHS, rgb_of_powers, spectrum_of
-from lightpaint.colour.spectra.spectrum_source import named_spectrum
+from lightpaint.colour.spectra.spectrum import (
+    WAVELENGTHS,
+    named_spectrum,
+    rgb_of_powers,
+    spectrum_of,
+)
 from lightpaint.errors import ColorError
 
 WAVES = WAVELENGTHS.astype(np.float64)

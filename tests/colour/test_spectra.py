@@ -14,11 +14,12 @@ from lightpaint.colour.primaries import colour_science
 from lightpaint.colour.spectra.color_rendering import color_rendering, fidelity
 from lightpaint.colour.spectra.spectrum import (
     WAVELENGTHS,
+    named_spectrum,
+    read_spectrum,
     rgb_of_powers,
     spectrum_of,
     xyz_of_powers,
 )
-from lightpaint.colour.spectra.spectrum_source import named_spectrum, read_spectrum
 from lightpaint.errors import ColorError, ConstraintError
 from lightpaint.lighting.constraints.constraints import Constraints, LightConstraint
 from lightpaint.sentences import SourceKey

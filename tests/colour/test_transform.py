@@ -11,7 +11,7 @@ from transform_slopes import slopes_of
 
 from lightpaint.colour.display.tone_curves import AGX_INSET, MIDDLE_GREY
 from lightpaint.colour.display.view_transform import ViewTransform
-from lightpaint.colour.srgb import decode_display, encode_display
+from lightpaint.colour.primaries import decode_display, encode_display
 from lightpaint.errors import ViewError
 
 BUILT_IN = ["srgb", "linear", "filmic", "agx"]

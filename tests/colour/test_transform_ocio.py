@@ -9,7 +9,7 @@ import pytest
 from transform_slopes import slopes_of
 
 from lightpaint.colour.display.view_transform import ViewTransform
-from lightpaint.colour.srgb import encode_display
+from lightpaint.colour.primaries import encode_display
 from lightpaint.errors import ViewError
 
 ocio: Any = pytest.importorskip("PyOpenColorIO", reason="OpenColorIO")

@@ -10,7 +10,6 @@ from hypothesis import strategies as st
 from rig_files import channel, fixture, gdtf, layered, write_mvr
 
 from lightpaint.colour.color import cct_and_duv
-from lightpaint.dmx.color_mixing import can_invert
 from lightpaint.dmx.console_rig import (
     ConsoleRig,
     DmxChannel,
@@ -20,7 +19,7 @@ from lightpaint.dmx.console_rig import (
     RigLight,
 )
 from lightpaint.dmx.gdtf.emitter_colour import rgb_of_xy, xy_of_kelvin
-from lightpaint.dmx.levels import decode_levels, encode_levels
+from lightpaint.dmx.levels import can_invert, decode_levels, encode_levels
 from lightpaint.dmx.mvr import read_rig
 from lightpaint.dmx.rig_scene import lights_text
 

@@ -16,8 +16,7 @@ from picture_files import ADOBE, P3, SRGB, SRGB_CURVE, curv, icc, layered, para,
 from PIL import Image, ImageCms
 
 from lightpaint.colour.display.view_transform import ViewTransform
-from lightpaint.colour.primaries import colour_science
-from lightpaint.colour.srgb import decode_display
+from lightpaint.colour.primaries import colour_science, decode_display
 from lightpaint.errors import ImageError
 from lightpaint.images.formats import openraster
 from lightpaint.images.formats.png import MAX_CHUNK, longest_png

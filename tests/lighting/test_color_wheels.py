@@ -9,8 +9,7 @@ from least_squares import stack_rows
 from nightly import seeds
 from scipy.optimize import lsq_linear, nnls
 
-from lightpaint.colour.color import luminance
-from lightpaint.colour.color_difference import ciede2000, lab
+from lightpaint.colour.color import ciede2000, lab, luminance
 from lightpaint.colour.primaries import REC709, REC2020, rgb_to_xyz
 from lightpaint.errors import ConstraintError
 from lightpaint.lighting.analysis.analysis import analyse

@@ -6,8 +6,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from lightpaint.colour.color import kelvin_to_rgb
-from lightpaint.colour.color_difference import delta_e
+from lightpaint.colour.color import delta_e, kelvin_to_rgb
 from lightpaint.colour.display.view_transform import ViewTransform
 from lightpaint.colour.spectra.color_rendering import fidelity
 from lightpaint.colour.spectra.spectrum import WAVELENGTHS, rgb_of_powers, spectrum_of

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 import lightpaint as lp
-from lightpaint.colour.color_difference import delta_e
+from lightpaint.colour.color import delta_e
 
 SIZE = (36, 64)
 

@@ -8,7 +8,7 @@ from nightly import nightly
 
 import lightpaint as lp
 from lightpaint.basis.basis import meter_exposure
-from lightpaint.colour.color_difference import delta_e
+from lightpaint.colour.color import delta_e
 from lightpaint.errors import PaintError
 from lightpaint.paint import protocol
 from lightpaint.paint.presets.presets import PRESETS

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from nightly import nightly
 
-from lightpaint.colour.color_difference import delta_e
+from lightpaint.colour.color import delta_e
 from lightpaint.errors import SizeError
 from lightpaint.images.estimate import Estimate
 from lightpaint.relit.verification import LIMIT, compare

@@ -7,8 +7,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from lightpaint.colour.color import kelvin_to_rgb
-from lightpaint.colour.color_difference import hue_name
+from lightpaint.colour.color import hue_name, kelvin_to_rgb
 from lightpaint.lighting.analysis.appearance.color_choices import ColorChoice
 from lightpaint.lighting.answer.combination import combine
 from lightpaint.lighting.solver import solve

@@ -14,7 +14,7 @@ import lightpaint as lp
 from lightpaint.colour.color import luminance
 from lightpaint.colour.display.exposure import choose_exposure
 from lightpaint.colour.display.view_transform import ViewTransform
-from lightpaint.colour.srgb import encode_display, to_8_bit
+from lightpaint.colour.primaries import encode_display, to_8_bit
 from lightpaint.errors import SizeError
 from lightpaint.files import write_bytes
 from lightpaint.images.formats.exr import write_rgb

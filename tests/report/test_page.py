@@ -12,7 +12,7 @@ import numpy as np
 import pytest
 from PIL import Image
 
-from lightpaint.colour.srgb import encode_display, to_8_bit
+from lightpaint.colour.primaries import encode_display, to_8_bit
 from lightpaint.errors import SizeError
 from lightpaint.images.estimate import Estimate
 from lightpaint.lighting.answer.combination import combine

@@ -6,7 +6,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from lightpaint.colour.srgb import to_8_bit
+from lightpaint.colour.primaries import to_8_bit
 from lightpaint.images.estimate import Estimate
 from lightpaint.relit.verification import LIMIT, Verification, compare
 from lightpaint.report.page.figures import (

@@ -9,7 +9,7 @@ import pytest
 from PIL import Image
 
 from lightpaint.colour.display.view_transform import TransformChoice, ViewTransform
-from lightpaint.colour.srgb import decode_display
+from lightpaint.colour.primaries import decode_display
 from lightpaint.errors import SizeError, TargetError, ViewError
 from lightpaint.images.formats.exr import ExrPart, write_parts, write_rgb
 from lightpaint.images.formats.png import write_png_16

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from lightpaint.colour.display.view_transform import ViewTransform
-from lightpaint.colour.srgb import encode_display
+from lightpaint.colour.primaries import encode_display
 from lightpaint.errors import SizeError, TargetError
 from lightpaint.images.formats.exr import read_parts
 from lightpaint.lighting.solver import solve

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 import lightpaint as lp
-from lightpaint.colour.srgb import decode_display, encode_display
+from lightpaint.colour.primaries import decode_display, encode_display
 from lightpaint.errors import SizeError
 from lightpaint.target.target import Wish, separate
 from lightpaint.target.wish_finding import asked_ratio, find_wishes, number_places

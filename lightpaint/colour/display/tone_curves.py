@@ -9,7 +9,7 @@ from typing import Protocol
 import numpy as np
 
 from lightpaint.arrays import Floats
-from lightpaint.colour.srgb import decode_display, encode_display
+from lightpaint.colour.primaries import decode_display, encode_display
 
 
 class Encoding(Protocol):

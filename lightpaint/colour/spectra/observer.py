@@ -14,11 +14,14 @@ from pathlib import Path
 import numpy as np
 
 from lightpaint.arrays import RGB, Doubles
-from lightpaint.colour.color import matching_functions
-from lightpaint.colour.color_difference import ciede2000, lab
+from lightpaint.colour.color import ciede2000, lab, matching_functions
 from lightpaint.colour.primaries import REC709, colour_science, rgb_to_xyz
-from lightpaint.colour.spectra.spectrum import WAVELENGTHS, spectrum_of
-from lightpaint.colour.spectra.spectrum_source import named_spectrum, read_sensitivities
+from lightpaint.colour.spectra.spectrum import (
+    WAVELENGTHS,
+    named_spectrum,
+    read_sensitivities,
+    spectrum_of,
+)
 from lightpaint.errors import ColorError
 
 #: Digits of a sensitivity in files, of the largest of its channel.

@@ -1,18 +1,31 @@
-"""Spectra of lights on a grid of 5 nm, and their colours.
+"""Spectra of lights on a grid of 5 nm, and their colours; and spectra as people name them: a black
+body, an illuminant of the CIE, an emitter of a GDTF, a file of a measurement.
+
+Files are tables of two columns, nanometres and power, IES TM-27 (.spdx), or GDTF, of which one
+emitter is named.
 
 A spectrum is its power per nanometre at WAVELENGTHS, straight between these and dark beyond. That
 is the grid on which CIE 13.3 and TM-30 are defined, and finer than LEDs are wide. Only its shape
 counts: it is scaled to luminance 1.
 """
 
+import re
+from collections.abc import Iterator, Sequence
 from functools import cache
+from pathlib import Path
+from xml.etree.ElementTree import Element
+from xml.parsers import expat
 
 import numpy as np
 
 from lightpaint.arrays import Doubles, Floats
 from lightpaint.colour.color import C2, matching_functions
-from lightpaint.colour.primaries import REC709, rgb_to_xyz
-from lightpaint.errors import ColorError
+from lightpaint.colour.primaries import REC709, colour_science, rgb_to_xyz
+from lightpaint.display_text import some_names
+from lightpaint.errors import ColorError, RigError
+from lightpaint.file_reading import read_bytes, read_text
+from lightpaint.files import one_line
+from lightpaint.storage.rig_archive import RigArchive
 
 #: Nanometres of a spectrum, and the distance between two.
 STEP = 5
@@ -26,6 +39,28 @@ LOST = 0.01
 
 #: Power per nanometre at each of WAVELENGTHS, for luminance 1.
 Spectrum = tuple[float, ...]
+
+_NAME = re.compile(r"(.+\.gdtf)(?::(.*))?", re.IGNORECASE)
+
+#: Endings of files: tables, and TM-27.
+TABLES, TM27 = (".csv", ".txt", ".dat", ".spd"), (".spdx", ".xml")
+
+#: Longest file of a spectrum in bytes, and most points in it.
+MAX_BYTES, MAX_POINTS = 2**20, 5000
+
+#: Nanometres that a measurement has to cover, and the fewest points that it needs.
+COVERED, FEWEST_POINTS = (400.0, 700.0), 5
+
+#: Largest negative power that counts as noise of a measurement, relative to its largest power.
+NOISE = 0.01
+
+#: Kelvin of black bodies.
+KELVINS = (500.0, 100_000.0)
+
+#: Deepest nesting of XML.
+MAX_NESTING = 32
+
+_BLACK_BODY = re.compile(r"(\d+(?:\.\d+)?) ?k(?: ?black ?body)?", re.IGNORECASE)
 
 
 def spectrum_of(waves: Floats, powers: Floats) -> Spectrum:
@@ -77,3 +112,233 @@ def _observer() -> Doubles:
     nanometres = waves * 1e9
     hats = np.maximum(0, 1 - np.abs(nanometres - WAVELENGTHS[:, None]) / STEP)
     return np.asarray(hats @ observer)
+
+
+def gdtf_and_emitter(name: str) -> tuple[str, str] | None:
+    """Return the file and the emitter that a name like `spot.gdtf:Red` means; None for others.
+
+    The emitter is "" where the name is that of a file alone.
+    """
+    match = _NAME.fullmatch(name.strip())
+    return None if match is None else (match[1], (match[2] or "").strip())
+
+
+def read_gdtf_emitter(path: Path, name: str) -> list[tuple[float, float]]:
+    """Return the spectrum of an emitter at its highest level: nanometres, rising, and power.
+
+    Negative energies are noise, and count as 0, as where `lightpaint rig` reads them.
+
+    Raises ColorError for a file that is not a GDTF, and for a name, even "", that none of its
+    measured emitters has; it lists those.
+    """
+    try:
+        with RigArchive(path, str(path), "GDTF") as archive:
+            root = archive.xml("description.xml")
+    except RigError as error:
+        raise ColorError(error.sentence) from None
+    elements = root.findall("FixtureType/PhysicalDescriptions/Emitters/Emitter")
+    measured = {x.get("Name", ""): points for x in elements if (points := [*_points_of(x, path)])}
+    by_case = {x.casefold(): x for x in measured}
+    if found := measured.get(name, measured.get(by_case.get(name.casefold(), ""), [])):
+        return sorted(found)
+    if not measured:
+        raise ColorError(path, " has no emitter with a measured spectrum: name a table instead")
+    mistake = f"has no measured emitter {one_line(repr(name))}" if name else "names no emitter"
+    example = f"{path.name}:{next(iter(measured))}"
+    raise ColorError(path, f' {mistake}: it has {some_names(measured)}; write "{example}"')
+
+
+def _points_of(emitter: Element, path: Path) -> Iterator[tuple[float, float]]:
+    """Yield nanometres and power of the measurement at the highest level; nothing without one."""
+    try:
+        levels = {float(x.get("Physical", "0")): x for x in emitter.iterfind("Measurement")}
+        points = levels[max(levels)].iterfind("MeasurementPoint") if levels else ()
+        for point in points:
+            yield float(point.get("WaveLength", "")), max(float(point.get("Energy", "")), 0.0)
+    except ValueError as error:
+        name = one_line(repr(emitter.get("Name", "")))
+        raise ColorError(
+            path, f": emitter {name} has a value that is not a number: {one_line(str(error))}"
+        ) from None
+
+
+def file_of_spectrum(name: str) -> str | None:
+    """Return the file in which a spectrum of this name is; None for that of a light."""
+    if found := gdtf_and_emitter(name):
+        return found[0]
+    return name if Path(name).suffix.lower() in (*TABLES, *TM27) else None
+
+
+def named_spectrum(name: str, folder: Path) -> tuple[Doubles, Doubles]:
+    """Return nanometres (k,), rising, and power (k,) of a spectrum by its name or file.
+
+    name: `3200K blackbody`, an illuminant like `D65`, a file, or an emitter of a GDTF, like
+    `spot.gdtf:Red`. folder: of relative paths. Raises ColorError, which says what is wrong without
+    the name.
+    """
+    if found := gdtf_and_emitter(name):
+        path = folder / found[0]
+        return _curve(read_gdtf_emitter(path, found[1]), path)
+    if file_of_spectrum(name):
+        return read_spectrum(folder / name)
+    if match := _BLACK_BODY.fullmatch(name.strip()):
+        kelvin = float(match[1])
+        if not KELVINS[0] <= kelvin <= KELVINS[1]:
+            raise ColorError(f"{kelvin:g} K: expected {KELVINS[0]:g} to {KELVINS[1]:g}")
+        return WAVELENGTHS.astype(np.float64), np.array(black_body(kelvin))
+    illuminants = colour_science().SDS_ILLUMINANTS
+    if name in illuminants:
+        illuminant = illuminants[name]
+        return np.array(illuminant.wavelengths), np.array(illuminant.values)
+    raise ColorError(
+        f"{one_line(repr(name))}: expected pairs of nanometres and power, a file "
+        '("led.csv", "led.spdx"), an emitter of a GDTF ("spot.gdtf:Red"), a black body '
+        '("3200K blackbody") or an illuminant of the CIE ("D65", "A", "FL2")'
+    )
+
+
+@cache
+def daylight() -> Doubles:
+    """Return D65, (81,) at WAVELENGTHS, for luminance 1."""
+    return np.array(spectrum_of(*named_spectrum("D65", Path())))
+
+
+def read_spectrum(path: Path) -> tuple[Doubles, Doubles]:
+    """Return nanometres (k,), rising, and power (k,), >= 0, of a measurement in a file.
+
+    Raises ColorError for a file that is missing, or is not a spectrum of visible light.
+    """
+    if path.suffix.lower() in TM27:
+        points = _points_of_tm27(read_bytes(path, "spectrum", ColorError, limit=MAX_BYTES), path)
+    else:
+        text = read_text(path, "spectrum", ColorError, limit=MAX_BYTES)
+        points = _points_of_table(text, path, "nanometres and power", 2)
+    return _curve(points, path)
+
+
+def _curve(points: Sequence[tuple[float, ...]], path: Path) -> tuple[Doubles, Doubles]:
+    """Return nanometres (k,) and power (k,) of measured points, checked."""
+    waves, powers = _measured(points, path, "the power")
+    return waves, powers[:, 0]
+
+
+def read_sensitivities(path: Path) -> tuple[Doubles, Doubles]:
+    """Return nanometres (k,), rising, and the sensitivities (k, 3), >= 0, of a camera's channels.
+
+    Raises ColorError for a file that is missing, or has no three curves of visible light.
+    """
+    text = read_text(path, "observer", ColorError, limit=MAX_BYTES)
+    points = _points_of_table(text, path, "nanometres, red, green and blue", 4)
+    return _measured(points, path, "the sensitivity")
+
+
+def _measured(
+    points: Sequence[tuple[float, ...]], path: Path, what: str
+) -> tuple[Doubles, Doubles]:
+    """Return nanometres (k,) and values (k, n) of the points of a file, as `measured_points`."""
+    try:
+        return measured_points(points, what)
+    except ColorError as error:
+        raise ColorError(path, " ", error) from None
+
+
+def measured_points(
+    points: Sequence[tuple[float, ...]], what: str = "the power"
+) -> tuple[Doubles, Doubles]:
+    """Return nanometres (k,) and values (k, n) of measured points, checked, without their noise.
+
+    what: the values in words. Raises ColorError, which says what is wrong without a name.
+    """
+    if not FEWEST_POINTS <= len(points) <= MAX_POINTS:
+        raise ColorError(f"has {len(points)} points: expected {FEWEST_POINTS} to {MAX_POINTS}")
+    table = np.array(points, np.float64)
+    waves, values = table[:, 0], table[:, 1:]
+    if not np.isfinite(table).all():
+        raise ColorError("has a number that is not finite")
+    if (falls := np.flatnonzero(np.diff(waves) <= 0)).size:
+        k = int(falls[0])
+        raise ColorError(f"goes from {waves[k]:g} to {waves[k + 1]:g} nm: wavelengths have to rise")
+    low, high = COVERED
+    if waves[0] > low or waves[-1] < high:
+        raise ColorError(
+            f"covers {waves[0]:g} to {waves[-1]:g} nm: expected {low:g} to {high:g} at least"
+        )
+    if values.min() < -NOISE * values.max():
+        k = int(values.min(axis=1).argmin())
+        raise ColorError(
+            f"has {what} {values[k].min():g} at {waves[k]:g} nm: there is none below 0, apart "
+            f"from noise of {100 * NOISE:g} % of the largest"
+        )
+    return waves, np.maximum(values, 0)
+
+
+def _points_of_table(text: str, path: Path, what: str, width: int) -> list[tuple[float, ...]]:
+    """Return the points of a table, whose first lines may be a heading.
+
+    what: its columns in words. width: their number.
+    """
+    points: list[tuple[float, ...]] = []
+    wrong = ""
+    for number, line in enumerate(text.splitlines(), 1):
+        # A comma between digits of a semicolon's or tab's table is a decimal one.
+        if ";" in line or "\t" in line:
+            line = line.replace(",", ".")
+        cells = re.split(r"[,;\s]+", line.split("#")[0].strip(" ,;\t"))
+        if cells == [""]:
+            continue
+        if len(cells) == width and _are_numbers(cells):
+            points.append(tuple(map(float, cells)))
+        elif points or (_are_numbers(cells) and not wrong):
+            wrong = f" has {one_line(repr(line))} in line {number}: expected {what}"
+            if points:
+                raise ColorError(path, wrong)
+    if wrong and not points:
+        raise ColorError(path, wrong)
+    return points
+
+
+def _are_numbers(cells: Sequence[str]) -> bool:
+    try:
+        list(map(float, cells))
+    except ValueError:
+        return False
+    return True
+
+
+def _points_of_tm27(data: bytes, path: Path) -> list[tuple[float, ...]]:
+    """Return the points of IES TM-27. A document type, which entities need, is refused."""
+    parser = expat.ParserCreate()
+    parser.buffer_text = True
+    points: list[tuple[float, ...]] = []
+    open_waves: list[str] = []
+    texts: list[str] = []
+    depth = 0
+
+    def start(tag: str, attributes: dict[str, str]) -> None:
+        nonlocal depth
+        depth += 1
+        if depth > MAX_NESTING:
+            raise ColorError(path, f" is nested more than {MAX_NESTING} deep")
+        if tag.rpartition(":")[2] == "SpectralData":
+            open_waves.append(attributes.get("wavelength", ""))
+            texts.clear()
+
+    def end(tag: str) -> None:
+        nonlocal depth
+        depth -= 1
+        if tag.rpartition(":")[2] == "SpectralData":
+            points.append((float(open_waves.pop()), float("".join(texts))))
+
+    def refuse(*_: object) -> None:
+        raise ColorError(path, " has a document type declaration: it is not read")
+
+    parser.StartElementHandler, parser.EndElementHandler = start, end
+    parser.CharacterDataHandler = texts.append
+    parser.StartDoctypeDeclHandler = refuse
+    try:
+        parser.Parse(data, True)
+    except (expat.ExpatError, ValueError) as error:
+        raise ColorError(path, f" is not TM-27: {one_line(str(error))}") from None
+    if not points:
+        raise ColorError(path, " is not TM-27: it has no SpectralData")
+    return points

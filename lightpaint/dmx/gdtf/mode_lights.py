@@ -15,7 +15,6 @@ from xml.etree.ElementTree import Element
 import numpy as np
 
 from lightpaint.arrays import Doubles
-from lightpaint.dmx.color_mixing import can_invert
 from lightpaint.dmx.console_rig import DmxChannel, RigEmitter, RigFilter, RigWheel
 from lightpaint.dmx.gdtf.color_wheel import SlotColour, slot_combinations, wheel_slots
 from lightpaint.dmx.gdtf.emitter_colour import (
@@ -40,6 +39,7 @@ from lightpaint.dmx.gdtf.mode_channels import (
     mode_heads,
     shutter_levels,
 )
+from lightpaint.dmx.levels import can_invert
 from lightpaint.dmx.spot_cone import solid_angle
 from lightpaint.sentences import Hint, Sentence
 

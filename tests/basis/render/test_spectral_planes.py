@@ -8,17 +8,16 @@ from renderer import LIGHTS, write_room
 
 from lightpaint.basis.basis import Basis
 from lightpaint.basis.render.basis_render import render_basis
-from lightpaint.colour.color import luminance, matching_functions
-from lightpaint.colour.color_difference import delta_e
+from lightpaint.colour.color import delta_e, luminance, matching_functions
 from lightpaint.colour.lamp import Lamp, LampEmitter
 from lightpaint.colour.primaries import REC709, rgb_to_xyz
 from lightpaint.colour.spectra.spectrum import (
     WAVELENGTHS,
     Spectrum,
+    named_spectrum,
     rgb_of_powers,
     spectrum_of,
 )
-from lightpaint.colour.spectra.spectrum_source import named_spectrum
 from lightpaint.errors import SceneError
 from lightpaint.lighting.answer.combination import combine
 from lightpaint.lighting.answer.lighting import Lighting

@@ -12,13 +12,11 @@ from spectral_room import DRIVES, write_spectral_room
 from lightpaint.basis.basis import Basis
 from lightpaint.basis.render.basis_render import render_basis
 from lightpaint.basis.render.render_origin import basis_lights
-from lightpaint.colour.color import luminance
-from lightpaint.colour.color_difference import ciede2000, delta_e, lab
+from lightpaint.colour.color import ciede2000, delta_e, lab, luminance
 from lightpaint.colour.lamp import Lamp, LampEmitter
 from lightpaint.colour.primaries import colour_science
 from lightpaint.colour.spectra.observer import EYE, Observer
-from lightpaint.colour.spectra.spectrum import WAVELENGTHS, Spectrum, spectrum_of
-from lightpaint.colour.spectra.spectrum_source import named_spectrum
+from lightpaint.colour.spectra.spectrum import WAVELENGTHS, Spectrum, named_spectrum, spectrum_of
 from lightpaint.lighting.answer.combination import combine
 from lightpaint.lighting.answer.lighting import Lighting
 from lightpaint.lighting.constraints.constraints_file import constraints_of

@@ -6,8 +6,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from lightpaint.colour.color import luminance
-from lightpaint.colour.color_difference import delta_e
+from lightpaint.colour.color import delta_e, luminance
 from lightpaint.colour.display.view_transform import ViewTransform
 from lightpaint.images.object_map import Objects
 from lightpaint.lighting.analysis.analysis import analyse

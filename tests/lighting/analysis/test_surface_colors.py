@@ -14,11 +14,11 @@ from lightpaint.colour.primaries import colour_science
 from lightpaint.colour.spectra.color_rendering import adapted_color
 from lightpaint.colour.spectra.spectrum import (
     WAVELENGTHS,
+    daylight,
     rgb_of_powers,
     spectrum_of,
     xyz_of_powers,
 )
-from lightpaint.colour.spectra.spectrum_source import daylight
 from lightpaint.images.object_map import Objects
 from lightpaint.lighting.analysis.surface_colors import surface_colors
 from lightpaint.lighting.constraints.constraints import Constraints

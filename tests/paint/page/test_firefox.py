@@ -22,7 +22,7 @@ from patience import PATIENCE_S
 from websockets.sync.client import ClientConnection, connect
 
 import lightpaint as lp
-from lightpaint.colour.srgb import to_8_bit
+from lightpaint.colour.primaries import to_8_bit
 from lightpaint.paint.server.server import Server
 from lightpaint.paint.store.store import MemoryStore
 from lightpaint.paint.studio.studio import Studio

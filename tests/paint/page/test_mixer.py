@@ -16,7 +16,7 @@ from painter_page import Finger
 import lightpaint as lp
 from lightpaint.colour.color import kelvin_to_rgb
 from lightpaint.colour.display.view_transform import curve_of, lattice_of
-from lightpaint.colour.srgb import to_8_bit
+from lightpaint.colour.primaries import to_8_bit
 from lightpaint.images.packed_picture import BRIGHTEST, DROPPED_BITS, PackedPicture, pack_picture
 from lightpaint.lighting.answer.lighting import Lighting
 from lightpaint.report.page.html import ROWS_SHOWN

@@ -26,7 +26,7 @@ from renderer import REPOSITORY
 
 import lightpaint as lp
 from lightpaint.cli.commands.paint_command import command_for_paintings
-from lightpaint.colour.srgb import to_8_bit
+from lightpaint.colour.primaries import to_8_bit
 from lightpaint.dmx.console_rig import ConsoleRig
 from lightpaint.dmx.levels import encode_levels
 from lightpaint.dmx.network.console_link import ConsoleLink
