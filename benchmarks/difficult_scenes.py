@@ -32,6 +32,7 @@ from pathlib import Path
 import numpy as np
 from coverage import HARD_LAMPS, ROOM
 from hall import write_hall
+from rows import add_csv, write_rows
 
 import lightpaint as lp
 from lightpaint.basis.cache.cached_render import obtain_basis
@@ -148,10 +149,12 @@ def main() -> None:
     parser.add_argument("--seeds", type=int, default=6, metavar="N")
     parser.add_argument("--spp", type=int, default=32)
     parser.add_argument("--quick", action="store_true", help="two scenes, two seeds, 4 samples")
+    add_csv(parser)
     options = parser.parse_args()
     if options.quick:
         options.scenes, options.seeds, options.spp = ["glass", "screen"], 2, 4
     wrong = of = 0
+    rows: list[dict[str, object]] = []
     print(heading())
     with tempfile.TemporaryDirectory() as folder:
         write_pictures(Path(folder))
@@ -160,6 +163,8 @@ def main() -> None:
             found = measure(name, Path(folder), seeds=options.seeds, spp=options.spp)
             print(f"{line(name, found)}{time.process_time() - began_s:8.0f}", flush=True)
             wrong, of = wrong + found.wrong, of + found.ratios.size
+            rows.append(row(name, found))
+            write_rows(options.csv, rows)
     print(f"wrong headlines of what can be met: {wrong} of {of}")
 
 
@@ -198,6 +203,22 @@ def line(name: str, found: Findings) -> str:
     wrong = f"{found.wrong} of {found.ratios.size}"
     headlines = f"{found.met:6.2f}{wrong:>10s}{found.unmet:7.2f}"
     return f"{name:14s}{shares}{headlines}{mean:13.4f} ± {error:.4f}"
+
+
+def row(name: str, found: Findings) -> dict[str, object]:
+    """Return the row of a scene for a CSV file, with the columns of `line`."""
+    mean, error = found.ratio
+    return {
+        "scene": name,
+        "held": f"{found.held:.3f}",
+        "told": f"{found.told:.3f}",
+        "met": f"{found.met:.2f}",
+        "wrong": found.wrong,
+        "seeds": found.ratios.size,
+        "unmet": f"{found.unmet:.2f}",
+        "render / prediction": f"{mean:.4f}",
+        "standard error": f"{error:.4f}",
+    }
 
 
 def measure(name: str, folder: Path, *, seeds: int, spp: int) -> Findings:

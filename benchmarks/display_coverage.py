@@ -20,6 +20,7 @@ from pathlib import Path
 
 import numpy as np
 from coverage import rendered_bases
+from rows import add_csv, write_rows
 
 import lightpaint as lp
 from lightpaint.basis.basis import Basis
@@ -104,18 +105,26 @@ def main() -> None:
     parser.add_argument("--gallery", default="1/8", metavar="1/N", help="resolution of the gallery")
     parser.add_argument("--seeds", type=int, default=200, metavar="N")
     parser.add_argument("--spp", type=int, default=64)
+    add_csv(parser)
     options = parser.parse_args()
     use_variant()
+    rows: list[dict[str, object]] = []
     print(f"{'':20s}{'held':>8s}{'least':>8s}{'RMS error':>11s}")
     with tempfile.TemporaryDirectory() as folder:
         for room in options.rooms:
             scene = make_scene(room, Path(folder), options.gallery)
             is_literal = options.answers == "literal"
-            measure(room, scene, seeds=options.seeds, spp=options.spp, is_literal=is_literal)
+            rows += measure(
+                room, scene, seeds=options.seeds, spp=options.spp, is_literal=is_literal
+            )
+            write_rows(options.csv, rows)
 
 
-def measure(room: str, scene: Scene, *, seeds: int, spp: int, is_literal: bool) -> None:
-    """Render, solve and print two lines."""
+def measure(
+    room: str, scene: Scene, *, seeds: int, spp: int, is_literal: bool
+) -> list[dict[str, object]]:
+    """Render, solve and print two lines. Returns a row for each."""
+    rows: list[dict[str, object]] = []
     *bases, truth = rendered_bases(scene, seeds, spp, 1)
     target = painted(truth)
     best = answers(truth, target, is_literal)[1].weights
@@ -133,7 +142,19 @@ def measure(room: str, scene: Scene, *, seeds: int, spp: int, is_literal: bool) 
         # Of a channel that is mostly off, half the interval is cut off at zero.
         is_told &= np.median(low, axis=0) > 0
         error = ((np.array(found) / np.where(best > 0, best, 1) - 1)[:, is_told] ** 2).mean() ** 0.5
-        print(f"{name:20s}{held[is_told].mean():8.3f}{held[is_told].min():8.2f}{error:11.3f}")
+        mean, least = held[is_told].mean(), held[is_told].min()
+        print(f"{name:20s}{mean:8.3f}{least:8.2f}{error:11.3f}")
+        rows.append(
+            {
+                "room": f"{room}, {scene.size[1]}x{scene.size[0]}",
+                "answers": "literal" if is_literal else "default",
+                "noise correction": ("no", "yes")[k],
+                "held": f"{mean:.3f}",
+                "held least": f"{least:.2f}",
+                "error of weights": f"{error:.3f}",
+            }
+        )
+    return rows
 
 
 def answers(basis: Basis, target: Target, is_literal: bool) -> tuple[lp.Solution, lp.Solution]:

@@ -24,6 +24,7 @@ from contextlib import contextmanager
 from pathlib import Path
 
 import numpy as np
+from rows import add_csv, write_rows
 
 from lightpaint import Basis, Scene, load_scene, relight, render_basis
 from lightpaint.basis.render.basis_render import train_guide
@@ -75,7 +76,9 @@ def main() -> None:
     parser.add_argument("--resolution", default="1/2")
     parser.add_argument("--only-costs", action="store_true", help="leave the verifications out")
     parser.add_argument("--bias", action="store_true", help="measure the colours of pictures alone")
+    add_csv(parser)
     options = parser.parse_args()
+    rows: list[dict[str, str]] = []
     for path in options.scenes:
         scene = load_scene(path, use_lights_file=False).reduced(options.resolution)
         scene = scene.with_lights(*whole_lights(scene))
@@ -83,7 +86,9 @@ def main() -> None:
         if options.bias:
             print_bias(scene, options.spp)
             continue
-        print_costs(scene, options.spp, options.rounds)
+        costs = print_costs(scene, options.spp, options.rounds)
+        rows += [{"scene": str(path)} | cost for cost in costs]
+        write_rows(options.csv, rows)
         if not options.only_costs:
             print_verifications(scene, options.spp)
     if not options.bias:
@@ -112,8 +117,9 @@ def with_lamps(scene: Scene, lamp: Lamp) -> Scene:
     return scene.with_lamps({x.name: lamp for x in scene.lights if not x.is_fixed})
 
 
-def print_costs(scene: Scene, spp: int, rounds: int) -> None:
-    """Print time, noise and both of bases, relative to RGB."""
+def print_costs(scene: Scene, spp: int, rounds: int) -> list[dict[str, str]]:
+    """Print time, noise and both of bases, relative to RGB. Returns the rows."""
+    rows: list[dict[str, str]] = []
     scenes = {
         "RGB": scene,
         "white": with_lamps(scene, lamp_of(["white"])),
@@ -139,6 +145,10 @@ def print_costs(scene: Scene, spp: int, rounds: int) -> None:
         first = first or noise
         both = ratio * noise / first
         print(f"{label:12s}  {ratio:4.2f}   {noise / first:4.2f}         {both:4.2f}", flush=True)
+        shown = (ratio, noise / first, both)
+        columns = ("time", "variance", "for equal noise")
+        rows.append({"lamps": label} | {x: f"{y:.2f}" for x, y in zip(columns, shown, strict=True)})
+    return rows
 
 
 def picture(basis: Basis, lit: Sequence[str]) -> Estimate:
