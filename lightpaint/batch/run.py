@@ -47,7 +47,8 @@ from lightpaint.sentences import Hint, Sentence
 class BatchOutcome:
     """Outcome of a run. done, failed: names of looks, and reasons. skipped: done earlier.
 
-    waiting: not started. rows: of all looks, as in the summary.
+    waiting: not started. rows: of all looks, as in the summary. spent_s: seconds that the steps of
+    a look took in this run, by its name.
     """
 
     done: list[str] = field(default_factory=list)
@@ -55,6 +56,7 @@ class BatchOutcome:
     skipped: list[str] = field(default_factory=list)
     waiting: list[str] = field(default_factory=list)
     rows: list[SummaryRow] = field(default_factory=list)
+    spent_s: dict[str, float] = field(default_factory=dict)
 
 
 def run_batch(
@@ -284,7 +286,8 @@ class _Run:
 
     def _record(self, step: PlanStep, result: ItemResult) -> None:
         """Record the result of a step, and report it."""
-        look = self._looks[result.look]
+        look, seconds = self._looks[result.look], self.outcome.spent_s
+        seconds[result.look] = seconds.get(result.look, 0.0) + result.spent_s
         if result.failure:
             self._fail(look, step, result.failure, result)
         else:

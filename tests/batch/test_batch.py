@@ -4,6 +4,7 @@ import csv
 import json
 import os
 import random
+import shlex
 import shutil
 import signal
 import subprocess
@@ -55,6 +56,33 @@ def batch_folder(tmp_path: Path) -> Path:
 
 def run_item(folder: Path, **options: Any) -> Any:
     return run_batch(plan_batch(folder / "looks.toml", folder / "out"), RunOptions(**options))
+
+
+def test_equal_runs_leave_equal_files(batch_folder: Path) -> None:
+    """Also the reports, which hold the command; only the document on stdout has times."""
+    looks = LOOKS.replace('"predict"]', '"predict", "report"]', 1)
+    (batch_folder / "looks.toml").write_text(looks, encoding="utf-8")
+    options, left = ("--only", "p1*", "--json", "-q"), {}
+    for name in ("one", "two"):
+        document = json.loads(succeed(batch_folder, "batch", "looks.toml", "-o", name, *options))
+        left[name] = contents(batch_folder / name)
+        chosen = [look for look in document["looks"] if look["look"].startswith("p1")]
+        assert all(look["seconds"] > 0 for look in chosen)
+        assert not any("seconds" in x for x in document["looks"] if x not in chosen)
+    assert "p1-white-only/report.html" in left["one"]
+    assert left["one"] == left["two"]
+
+
+def test_the_command_in_a_report_of_a_batch_runs_it_again(batch_folder: Path) -> None:
+    """In the folder of the batch, also where that is a link to somewhere else."""
+    (batch_folder / "elsewhere" / "out").mkdir(parents=True)
+    (batch_folder / "out").symlink_to(batch_folder / "elsewhere" / "out")
+    succeed(batch_folder, "batch", "looks.toml", "-o", "out", "--only", "p0", "-q")
+    command = json.loads((batch_folder / "out/p0/report.json").read_text("utf-8"))["command"]
+    answer = (batch_folder / "out/p0/lighting.json").read_bytes()
+    shutil.rmtree(batch_folder / "out/p0")
+    succeed(batch_folder / "out", *shlex.split(command)[1:], "--only", "p0", "-q")
+    assert (batch_folder / "out/p0/lighting.json").read_bytes() == answer
 
 
 def test_every_look_is_what_solve_makes_of_it(

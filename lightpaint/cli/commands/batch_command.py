@@ -55,20 +55,29 @@ def batch(
     if form is None and len(paths) > 1:
         raise BatchError(f"{len(paths)} manifests: give one, or --init SCENE PAINTING...")
     folder = output or Path(scene_name(Path(paths[0])))
-    # The same command in all reports, however often and from wherever the batch is run.
-    manifest, output_folder = (str(Path(x).absolute()) for x in (paths[0], folder))
-    command = shlex.join(["lightpaint", "batch", manifest, "-o", output_folder])
+    command = _command_in(folder, paths[0])
     plan = plan_batch(paths[0], folder, force=force, command=command).select(*name_patterns)
     if is_dry:
         return _show_plan(plan)
     if form is not None:
         return _export(plan, Path(paths[1]), force=force)
     note = _log(log)
-    note(f"{command}: {len(plan.chosen_looks)} looks")
+    manifest, output_folder = (str(Path(x).absolute()) for x in (paths[0], folder))
+    words = ["lightpaint", "batch", manifest, "-o", output_folder]
+    note(f"{shlex.join(words)}: {len(plan.chosen_looks)} looks")
     _say_remarks(plan, note)
     outcome = _run(plan, run_options, note)
     note(f"done {len(outcome.done)}, failed {len(outcome.failed)}")
     return _outcome(plan, outcome)
+
+
+def _command_in(folder: Path, manifest: str) -> str:
+    """Return the command that runs a batch from its own folder, for the reports.
+
+    It is the same however often and wherever the batch is run, so equal batches have equal reports.
+    """
+    path = os.path.relpath(os.path.realpath(manifest), os.path.realpath(folder))
+    return shlex.join(["lightpaint", "batch", path, "-o", "."])
 
 
 def _write_first_manifest(
@@ -157,10 +166,20 @@ def _outcome(plan: Plan, outcome: BatchOutcome) -> CommandOutcome:
         lambda: {
             "folder": str(folder),
             "files": [str(folder / name) for name in FILES if outcome.rows],
-            **summary_document(outcome.rows),
+            **_document(outcome),
         },
         1 if outcome.failed or outcome.waiting else 0,
     )
+
+
+def _document(outcome: BatchOutcome) -> dict[str, Any]:
+    """Return the summary with the seconds that looks took, which no file of a batch holds."""
+    document, seconds = summary_document(outcome.rows), outcome.spent_s
+    looks = [
+        {**look, "seconds": seconds[look["look"]]} if look["look"] in seconds else look
+        for look in document["looks"]
+    ]
+    return {**document, "looks": looks}
 
 
 def _show(plan: Plan, rows: list[SummaryRow]) -> None:
