@@ -109,7 +109,9 @@ class LitPixels:
         et al. 1993, Eq 7-9).
         """
         if known is not None:
-            is_other = (image != known.image) | (weight != known.weight)
+            # Images do not count where they have no weight, as of pixels that exceed their goal.
+            is_other = (image != known.image) & (weight > 0)
+            is_other |= weight != known.weight
             changed = np.flatnonzero(is_other.any(axis=0))
             if changed.size <= MAX_UPDATED_SHARE * len(self.pixels):
                 return known.updated(self.planes, changed, image, weight)
