@@ -143,7 +143,7 @@ PARTS: dict[str, tuple[str, ...]] = {
     "lighting.answer.lighting": ("LightSetting",),
     "lighting.answer.lighting_keys": ("LightingKey",),
     "colour.luminous_flux": ("Photometry",),
-    "lighting.analysis.ambiguity": ("Ambiguity",),
+    "lighting.analysis.analysis": ("Ambiguity",),
     "lighting.analysis.appearance.area_lights": ("AreaLights",),
     "lighting.analysis.appearance.color_choices": ("ColorChoice",),
     "lighting.analysis.appearance.delivery": ("Delivery",),
