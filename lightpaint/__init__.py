@@ -80,13 +80,13 @@ if TYPE_CHECKING:
     from lightpaint.photometry.measure_glare import measure_glare as measure_glare
     from lightpaint.photometry.measuring_plane import MeasuringPlane as MeasuringPlane
     from lightpaint.photometry.planes_file import read_planes as read_planes
-    from lightpaint.pipeline.frame_pictures import relight_frames as relight_frames
     from lightpaint.pipeline.job.job import Job as Job
     from lightpaint.pipeline.job.settings import Settings as Settings
     from lightpaint.pipeline.job.sources import Painting as Painting
     from lightpaint.pipeline.job.sources import SceneFile as SceneFile
     from lightpaint.pipeline.one_call import paint_with_light as paint_with_light
     from lightpaint.pipeline.pipeline import run as run
+    from lightpaint.pipeline.relit_renders import relight_frames as relight_frames
     from lightpaint.pipeline.results.results import Look as Look
     from lightpaint.pipeline.templates import render_template as render_template
     from lightpaint.pipeline.templates import template_of_basis as template_of_basis

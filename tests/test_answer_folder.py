@@ -8,8 +8,12 @@ from renderer import write_room
 
 from lightpaint.lighting.answer.lighting import Lighting, LightSetting
 from lightpaint.lighting.answer.lighting_file import read_lighting
-from lightpaint.pipeline.results.answer_folder import answer_files, new_answer, write_answer
-from lightpaint.pipeline.results.result_folder import ResultFolder
+from lightpaint.pipeline.results.result_folder import (
+    ResultFolder,
+    answer_files,
+    new_answer,
+    write_answer,
+)
 from lightpaint.scene.scene import Scene
 from lightpaint.scene.scene_reader import load_scene
 

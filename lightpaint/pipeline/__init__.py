@@ -5,16 +5,14 @@ from typing import TYPE_CHECKING
 from lightpaint.lazy_names import lazy_names
 
 if TYPE_CHECKING:
-    from lightpaint.pipeline.frame_pictures import frames_to_write as frames_to_write
-    from lightpaint.pipeline.frame_pictures import relight_frames as relight_frames
     from lightpaint.pipeline.job.job import Job as Job
     from lightpaint.pipeline.job.job import PaintedView as PaintedView
+    from lightpaint.pipeline.job.job_checks import remarks_of_film as remarks_of_film
+    from lightpaint.pipeline.job.job_checks import remarks_of_memory as remarks_of_memory
+    from lightpaint.pipeline.job.job_checks import remarks_of_scene as remarks_of_scene
+    from lightpaint.pipeline.job.job_checks import remarks_on_spectra as remarks_on_spectra
     from lightpaint.pipeline.job.job_record import decode_job as decode_job
     from lightpaint.pipeline.job.job_record import encode_job as encode_job
-    from lightpaint.pipeline.job.remarks import remarks_of_film as remarks_of_film
-    from lightpaint.pipeline.job.remarks import remarks_of_memory as remarks_of_memory
-    from lightpaint.pipeline.job.remarks import remarks_of_scene as remarks_of_scene
-    from lightpaint.pipeline.job.remarks import remarks_on_spectra as remarks_on_spectra
     from lightpaint.pipeline.job.settings import Settings as Settings
     from lightpaint.pipeline.job.settings import SettingsByName as SettingsByName
     from lightpaint.pipeline.job.sources import BasisFile as BasisFile
@@ -34,8 +32,6 @@ if TYPE_CHECKING:
     from lightpaint.pipeline.light_plan import LightPlan as LightPlan
     from lightpaint.pipeline.light_plan import plan_folder as plan_folder
     from lightpaint.pipeline.light_plan import plan_lighting as plan_lighting
-    from lightpaint.pipeline.light_sheets import check_sheet as check_sheet
-    from lightpaint.pipeline.light_sheets import render_sheet as render_sheet
     from lightpaint.pipeline.needed_samples import Certainty as Certainty
     from lightpaint.pipeline.needed_samples import needed_counts as needed_counts
     from lightpaint.pipeline.one_call import paint_with_light as paint_with_light
@@ -44,21 +40,23 @@ if TYPE_CHECKING:
     from lightpaint.pipeline.placed_lights import moved_basis as moved_basis
     from lightpaint.pipeline.placed_lights import say_changes as say_changes
     from lightpaint.pipeline.relit_renders import DENOISED as DENOISED
+    from lightpaint.pipeline.relit_renders import frames_to_write as frames_to_write
+    from lightpaint.pipeline.relit_renders import relight_frames as relight_frames
     from lightpaint.pipeline.relit_renders import relight_look as relight_look
     from lightpaint.pipeline.relit_renders import relit_folder as relit_folder
     from lightpaint.pipeline.relit_renders import render_final as render_final
     from lightpaint.pipeline.relit_renders import write_final_exr as write_final_exr
     from lightpaint.pipeline.relit_renders import write_final_png as write_final_png
-    from lightpaint.pipeline.results.answer_folder import LIGHTING as LIGHTING
-    from lightpaint.pipeline.results.answer_folder import RELIT as RELIT
-    from lightpaint.pipeline.results.answer_folder import answer_files as answer_files
-    from lightpaint.pipeline.results.answer_folder import new_answer as new_answer
-    from lightpaint.pipeline.results.answer_folder import write_answer as write_answer
+    from lightpaint.pipeline.results.result_folder import LIGHTING as LIGHTING
     from lightpaint.pipeline.results.result_folder import PLANES_FOLDER as PLANES_FOLDER
     from lightpaint.pipeline.results.result_folder import RECORD as RECORD
+    from lightpaint.pipeline.results.result_folder import RELIT as RELIT
     from lightpaint.pipeline.results.result_folder import ResultFolder as ResultFolder
+    from lightpaint.pipeline.results.result_folder import answer_files as answer_files
     from lightpaint.pipeline.results.result_folder import files_of_planes as files_of_planes
     from lightpaint.pipeline.results.result_folder import is_as_written as is_as_written
+    from lightpaint.pipeline.results.result_folder import new_answer as new_answer
+    from lightpaint.pipeline.results.result_folder import write_answer as write_answer
     from lightpaint.pipeline.results.result_folder import write_planes as write_planes
     from lightpaint.pipeline.results.results import Look as Look
     from lightpaint.pipeline.results.results import hung_of as hung_of
@@ -66,8 +64,10 @@ if TYPE_CHECKING:
     from lightpaint.pipeline.results.results import verify_result as verify_result
     from lightpaint.pipeline.results.results import view_names as view_names
     from lightpaint.pipeline.results.results import write_predicted as write_predicted
+    from lightpaint.pipeline.templates import check_sheet as check_sheet
     from lightpaint.pipeline.templates import look_of_basis as look_of_basis
     from lightpaint.pipeline.templates import render_look as render_look
+    from lightpaint.pipeline.templates import render_sheet as render_sheet
     from lightpaint.pipeline.templates import render_template as render_template
     from lightpaint.pipeline.templates import template_of_basis as template_of_basis
     from lightpaint.pipeline.wished_planes import MeasuredPlanes as MeasuredPlanes

@@ -16,8 +16,7 @@ from lightpaint.lighting import (
     reduce_to,
 )
 from lightpaint.pipeline.job.settings import Settings
-from lightpaint.pipeline.results.answer_folder import answer_files
-from lightpaint.pipeline.results.result_folder import ResultFolder, files_of_planes
+from lightpaint.pipeline.results.result_folder import ResultFolder, answer_files, files_of_planes
 from lightpaint.pipeline.wished_planes import (
     MeasuredPlanes,
     check_reached,

@@ -30,14 +30,14 @@ from lightpaint.pipeline.job.settings import Settings
 from lightpaint.pipeline.job_bases import obtain_bases_of, problem_of, view_listener, without_noise
 from lightpaint.pipeline.needed_samples import add_needed_samples
 from lightpaint.pipeline.placed_lights import find_suns, place_lights, suggest_move
-from lightpaint.pipeline.results.answer_folder import (
+from lightpaint.pipeline.results.result_folder import (
     LIGHTING,
     AnswerFolder,
     new_answer,
     reload_relit,
     with_places,
+    write_planes,
 )
-from lightpaint.pipeline.results.result_folder import write_planes
 from lightpaint.pipeline.results.results import Look, write_predicted, write_report
 from lightpaint.pipeline.wished_planes import (
     MeasuredPlanes,

@@ -12,9 +12,9 @@ from renderer import LIGHTS, write_room
 
 import lightpaint as lp
 from lightpaint.images.formats.png import png_has_text
-from lightpaint.pipeline import light_sheets
-from lightpaint.pipeline.light_sheets import SHEET_KEY, recorded_places
-from lightpaint.pipeline.results.answer_folder import write_answer
+from lightpaint.pipeline import templates
+from lightpaint.pipeline.results.result_folder import write_answer
+from lightpaint.pipeline.templates import SHEET_KEY, recorded_places
 from lightpaint.report.rig.rig_drawing import CHANGED
 from lightpaint.scene.lights.new_emitter import NewEmitter
 from lightpaint.scene.runtime.variant import use_variant
@@ -85,7 +85,7 @@ def test_where_rendering_is_slow_the_list_is_all(
     room: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     slow = replace(use_variant(), note="rendering is slow here")
-    monkeypatch.setattr(light_sheets, "use_variant", lambda: slow)
+    monkeypatch.setattr(templates, "use_variant", lambda: slow)
     monkeypatch.setenv("LIGHTPAINT_CACHE", str(room.parent / "cache"))
     completed = run(room.parent, "lights", room)
     assert completed.returncode == 0
@@ -96,8 +96,8 @@ def test_where_rendering_is_slow_the_list_is_all(
 def test_a_render_for_each_light_is_not_made_just_to_look(
     room: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(light_sheets, "why_not_one_pass", lambda _scene: "fog")
-    monkeypatch.setattr(light_sheets, "MAX_RENDERS", 1)
+    monkeypatch.setattr(templates, "why_not_one_pass", lambda _scene: "fog")
+    monkeypatch.setattr(templates, "MAX_RENDERS", 1)
     monkeypatch.setenv("LIGHTPAINT_CACHE", str(room.parent / "cache"))
     completed = run(room.parent, "lights", room)
     assert "no lights.png: fog, so that each light needs a render of its own" in completed.stderr

@@ -196,7 +196,7 @@ def test_a_line_of_stderr_has_an_end(capfd: pytest.CaptureFixture[str]) -> None:
 
 def test_a_fault_of_its_own_is_one_line_and_steers_nothing(tmp_path: Path) -> None:
     (tmp_path / "sitecustomize.py").write_text(
-        "import lightpaint.cli.commands.maintenance as c\n"
+        "import lightpaint.cli.commands.program_commands as c\n"
         "def fails(**_): raise RuntimeError('\\x1b[2J told')\n"
         "c.doctor = fails\n"
     )

@@ -13,7 +13,7 @@ from lightpaint.colour.luminous_flux import point_flux
 from lightpaint.errors import SceneError
 from lightpaint.images.formats.exr import write_rgb
 from lightpaint.lighting.answer.lighting_file import read_lighting
-from lightpaint.pipeline.job.remarks import remarks_of_scene
+from lightpaint.pipeline.job.job_checks import remarks_of_scene
 from lightpaint.scene.lights.emitters import Emitter
 from lightpaint.scene.lights.light_choice import (
     MAX_SEPARATE,

@@ -13,7 +13,7 @@ from lightpaint.basis.render.basis_render import _render_one_by_one, render_basi
 from lightpaint.basis.render.render_budget import Budget, Keeper
 from lightpaint.errors import SceneError
 from lightpaint.images.pixel_blocks import block_mean, enlarged, whole_factor
-from lightpaint.pipeline.job.remarks import remarks_of_film, remarks_of_target
+from lightpaint.pipeline.job.job_checks import remarks_of_film, remarks_of_target
 from lightpaint.pipeline.job.settings import Settings
 from lightpaint.progress import silent
 from lightpaint.scene.limits import MAX_PIXELS

@@ -1,4 +1,6 @@
-"""`lightpaint send` and `lightpaint listen`: levels for a console, and what arrives of them."""
+"""`lightpaint rig`, `send` and `listen`: the fixtures of a show as a scene, levels for a console,
+and what arrives of them.
+"""
 
 import time
 from collections.abc import Iterator, Mapping
@@ -7,8 +9,9 @@ from pathlib import Path
 from typing import Any
 
 from lightpaint.cli.options.console_options import RigFile, Sending
-from lightpaint.cli.output import lines, terminal
+from lightpaint.cli.output import documents, lines, terminal
 from lightpaint.cli.output.lines import CommandOutcome, output_mode
+from lightpaint.cli.output.vocabulary import spoken
 from lightpaint.display_text import some_names, some_of
 from lightpaint.dmx import (
     LOOPBACK,
@@ -17,22 +20,36 @@ from lightpaint.dmx import (
     ConsoleLink,
     ConsoleReceiver,
     ConsoleRig,
+    KindSummary,
     RigDrives,
     RigFixture,
+    Room,
+    RoomFiles,
+    Show,
     address_text,
     aimed_rig,
+    cd_per_unit,
     check_drives,
     decode_levels,
     directions_of,
     drives_of,
+    lights_of,
+    lights_text,
     network_universes,
+    read_show,
+    room_of_scene,
+    room_of_show,
+    scene_text,
+    spectrum_tables,
 )
-from lightpaint.errors import ConsoleError, LightingError, OutputError
-from lightpaint.files import check_files, check_writable, write_text
+from lightpaint.errors import ConsoleError, LightingError, OutputError, RigError
+from lightpaint.files import check_files, check_writable, write_bytes, write_text
 from lightpaint.lighting import Lighting, read_lighting
 from lightpaint.relit import LevelRow, level_csv, level_document, level_json, level_rows
+from lightpaint.scene.lights.lights_file import lights_file_beside
+from lightpaint.sentences import Hint, Sentence
 from lightpaint.signals import interruptible_between_pieces
-from lightpaint.storage.staging import finish
+from lightpaint.storage.staging import finish, staged
 
 #: Seconds between two looks at the link.
 POLL_S = 0.05
@@ -42,6 +59,112 @@ DUMP_SUFFIXES = (".csv", ".json")
 
 #: Seconds between lines on the same subject, so that a fade can be read.
 LINE_S = 0.2
+
+
+def rig(
+    *,
+    show: Path,
+    output: Path,
+    room: Path | None,
+    only_lights: bool,
+    force: bool,
+    gdtf_folder: Path | None,
+    zoom: float | None,
+    pixels: bool,
+    usual_colors: bool,
+    open_wheels: bool,
+) -> CommandOutcome:
+    """Run `lightpaint rig SHOW.mvr -o F.xml`."""
+    if room is not None and only_lights:
+        raise RigError("--only-lights leaves the room out: give --room, or --only-lights")
+    content = read_show(
+        show, gdtf_folder=gdtf_folder, zoom=zoom, pixels=pixels, usual_colors=usual_colors
+    )
+    folder, surroundings = output.parent, RoomFiles(Room(), {})
+    if room is not None:
+        surroundings = RoomFiles(room_of_scene(room, folder), {})
+    elif not only_lights:
+        surroundings = room_of_show(show, content.models)
+    unit = cd_per_unit(content.rig)
+    texts = {
+        output: scene_text(content.rig, unit, None if only_lights else surroundings.room),
+        lights_file_beside(output): lights_text(
+            content.rig, unit, open_wheels=open_wheels, stem=output.stem
+        ),
+    }
+    tables = spectrum_tables(content.rig, output.stem)
+    texts |= {folder / name: text for name, text in tables.items()}
+    files = [*texts, *(folder / name for name in surroundings.files)]
+    _check(files, [show, *([] if room is None else [room])], folder, force=force)
+    with staged(folder) as stage:
+        for file, text in texts.items():
+            write_text(stage / file.name, text)
+        for name, data in surroundings.files.items():
+            write_bytes(stage / name, data)
+    _print(content, files)
+    remarks = [*content.remarks, *surroundings.remarks]
+    for remark in remarks:
+        terminal.say(remark)
+    return CommandOutcome(lambda: _document(show, files, content, unit, remarks))
+
+
+def _check(files: list[Path], inputs: list[Path], folder: Path, *, force: bool) -> None:
+    check_files(files, inputs)
+    check_writable(folder)
+    finish(folder)
+    if not force and (existing_files := [file for file in files if file.exists()]):
+        raise OutputError(
+            f"{existing_files[0]} exists: name another file with -o, or pass ",
+            Hint("force", True),
+        )
+
+
+def _print(show: Show, files: list[Path]) -> None:
+    """Print a row for each type, with what is to know of it below, and the main files."""
+    table = terminal.table("fixtures", "type", "mode", "emitters", "light from")
+    for kind in show.kinds:
+        emitters = ", ".join(kind.emitters) or "none"
+        table.row(str(len(kind.fixtures)), kind.kind, kind.mode, emitters, kind.emission)
+    terminal.print_table(table)
+    for kind in show.kinds:
+        for remark in kind.remarks:
+            terminal.write(spoken(Sentence(f"{kind.kind}: ", remark)))
+    count = len(lights_of(show.rig))
+    universes = ", ".join(map(str, show.rig.universes))
+    terminal.write(f"{count} {'lights' if count > 1 else 'light'}, universes {universes}")
+    for file in files[:2]:
+        terminal.write(str(file))
+
+
+def _document(
+    path: Path, files: list[Path], show: Show, unit: float, remarks: list[str]
+) -> dict[str, Any]:
+    """Return the document of `rig`."""
+    fixtures = [
+        {
+            "id": fixture.fixture_id,
+            "name": fixture.name,
+            "type": fixture.kind,
+            "mode": fixture.mode,
+            "addresses": {str(k): address_text(x) for k, x in fixture.addresses.items()},
+            "lights": [light.name for light in fixture.lights],
+        }
+        for fixture in show.rig.fixtures
+    ]
+    return documents.files_document(
+        files[0].parent,
+        files,
+        rig=str(path),
+        cd_per_unit=unit,
+        types=[_kind(kind) for kind in show.kinds],
+        fixtures=fixtures,
+        remarks=[spoken(x) for x in remarks],
+    )
+
+
+def _kind(kind: KindSummary) -> dict[str, Any]:
+    fields = {("type" if key == "kind" else key): value for key, value in vars(kind).items()}
+    return {**fields, "remarks": [spoken(x) for x in kind.remarks]}
 
 
 def read_rig_file(rig: RigFile) -> ConsoleRig:

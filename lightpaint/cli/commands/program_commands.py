@@ -1,4 +1,6 @@
-"""`lightpaint export`, and `lightpaint blender`: answers for other programs, and the add-on."""
+"""`lightpaint export` and `blender`: answers for other programs, and the add-on; `cache` and
+`doctor`: what lightpaint keeps, and what works here.
+"""
 
 import io
 import shutil
@@ -14,12 +16,16 @@ import numpy as np
 
 from lightpaint.arrays import Floats, Position
 from lightpaint.basis import LightGroups, find_frames, first_frame, is_pattern
+from lightpaint.basis.cache import cache as bases
+from lightpaint.basis.cache import delete_orphans, folder
 from lightpaint.cli.commands import console_commands
+from lightpaint.cli.doctor import examine
 from lightpaint.cli.options.console_options import RigFile
-from lightpaint.cli.output import documents, terminal
+from lightpaint.cli.output import documents, tables, terminal
 from lightpaint.cli.output.lines import CommandOutcome
+from lightpaint.display_text import some_names
 from lightpaint.dmx import ConsoleRig, aimed_rig, directions_of
-from lightpaint.errors import LightingError, LightpaintError, OutputError
+from lightpaint.errors import BasisError, LightingError, LightpaintError, OutputError
 from lightpaint.files import check_files, check_writable, write_bytes
 from lightpaint.lighting import Lighting, read_lighting
 from lightpaint.paint import SESSION_FILE, read_kept_looks
@@ -264,3 +270,59 @@ def _label_of(lighting: Path) -> str:
     """Return the name of a look: its file's, or its folder's where all files are called alike."""
     path = lighting.absolute()
     return path.parent.name if path.stem == "lighting" else path.stem
+
+
+def cache(*, action: str, names: Sequence[str]) -> CommandOutcome:
+    """Run `lightpaint cache [list | drop NAME... | clear]`."""
+    if action != "drop" and names:
+        raise BasisError(f"cache {action} takes no name: did you mean cache drop {names[0]}?")
+    if action == "list":
+        listed_entries = bases.entries()
+        fields = {"folder": str(folder()), "largest": bases.MAX_BYTES}
+        tables.show_kept(listed_entries)
+        size = sum(entry.size for entry in listed_entries) / 1e6
+        terminal.write(f"kept in {folder()}: {size:.0f} of at most {bases.MAX_BYTES / 1e6:.0f} MB")
+        kept_documents = [documents.kept_document(entry) for entry in reversed(listed_entries)]
+        return CommandOutcome(lambda: {**fields, "kept": kept_documents})
+    deleted = bases.entries() if action == "clear" else _kept_by_names(names)
+    freed_bytes = bases.delete_entries(deleted)
+    if action == "clear":
+        freed_bytes += delete_orphans()
+    if action == "drop":
+        tables.show_kept(deleted)
+    terminal.write(f"{len(deleted)} deleted from {folder()}: {freed_bytes / 1e6:.1f} MB are free")
+    deleted_documents = [documents.kept_document(entry) for entry in deleted]
+    return CommandOutcome(
+        lambda: {"folder": str(folder()), "dropped": deleted_documents, "freed": freed_bytes}
+    )
+
+
+def _kept_by_names(names: Sequence[str]) -> list[bases.Entry]:
+    """Return the bases of these names, each once. Raises BasisError for an unknown name."""
+    if not names:
+        raise BasisError(
+            "cache drop needs the name of a scene or of a file, as cache list shows it"
+        )
+    by_path: dict[Path, bases.Entry] = {}
+    for name in names:
+        if not (matches := bases.entries_named(name)):
+            scenes = {entry.origin.scene for entry in bases.entries() if entry.origin is not None}
+            known_scenes = some_names(sorted(scenes)) or "none"
+            raise BasisError(f"no basis of {name!r} is kept in {folder()}: it has {known_scenes}")
+        by_path |= {entry.path: entry for entry in matches}
+    return list(by_path.values())
+
+
+def doctor(*, variant: str | None) -> CommandOutcome:
+    """Run `lightpaint doctor`."""
+    findings = examine(variant)
+    width = max(len(finding.subject) for finding in findings)
+    for finding in findings:
+        mark = {"ok": "ok", "missing": "MISSING", "info": ""}[finding.state]
+        terminal.write(f"{finding.subject:{width}s} {mark:8s} {finding.result}")
+    missing = [finding for finding in findings if finding.state == "missing"]
+    for finding in missing:
+        if finding.remedy:
+            terminal.write(f"to fix {finding.subject}: {finding.remedy}")
+    terminal.write("something is missing" if missing else "everything that is needed works")
+    return CommandOutcome(lambda: documents.doctor_document(findings), 2 if missing else 0)

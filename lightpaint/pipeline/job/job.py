@@ -35,20 +35,18 @@ from lightpaint.pipeline.job.job_checks import (
     check_painting_is_no_light,
     check_places,
     checked_scale,
-    rigging_for,
-    sky_for_sun,
-    wanted_sun,
-    with_same_lights,
-)
-from lightpaint.pipeline.job.job_record import decode_job, encode_job
-from lightpaint.pipeline.job.remarks import (
     remarks_of_film,
     remarks_of_memory,
     remarks_of_pictures,
     remarks_of_scene,
     remarks_of_target,
     remarks_on_spectra,
+    rigging_for,
+    sky_for_sun,
+    wanted_sun,
+    with_same_lights,
 )
+from lightpaint.pipeline.job.job_record import decode_job, encode_job
 from lightpaint.pipeline.job.settings import Settings
 from lightpaint.pipeline.job.sources import (
     BasisFile,
@@ -62,8 +60,7 @@ from lightpaint.pipeline.job.sources import (
     observer_of,
     spectral_scene,
 )
-from lightpaint.pipeline.results.answer_folder import answer_files
-from lightpaint.pipeline.results.result_folder import ResultFolder, files_of_planes
+from lightpaint.pipeline.results.result_folder import ResultFolder, answer_files, files_of_planes
 from lightpaint.pipeline.results.results import (
     SOLVE_RESULTS,
     VIEW_RESULTS,

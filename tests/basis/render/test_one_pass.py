@@ -25,7 +25,7 @@ from lightpaint.basis.render.render_origin import ONE_PASS, SEPARATE
 from lightpaint.basis.render.separate_renders import BLACK, WHITE
 from lightpaint.errors import SceneError
 from lightpaint.lighting.answer.lighting import Lighting
-from lightpaint.pipeline.job.remarks import remarks_of_scene
+from lightpaint.pipeline.job.job_checks import remarks_of_scene
 from lightpaint.progress import silent
 from lightpaint.relit.relit_scene import relight
 from lightpaint.scene.runtime.variant import use_variant

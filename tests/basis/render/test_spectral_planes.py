@@ -21,7 +21,7 @@ from lightpaint.colour.spectra.spectrum import (
 from lightpaint.errors import SceneError
 from lightpaint.lighting.answer.combination import combine
 from lightpaint.lighting.answer.lighting import Lighting
-from lightpaint.pipeline.job.remarks import remarks_of_scene
+from lightpaint.pipeline.job.job_checks import remarks_of_scene
 from lightpaint.relit.relit_scene import relight
 from lightpaint.relit.verification_render import verify
 from lightpaint.scene.properties.measuring_points import MeasuringPoints
