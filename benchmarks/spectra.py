@@ -40,7 +40,7 @@ from lightpaint.images.pixel_blocks import block_mean
 from lightpaint.lighting.answer.combination import combine
 from lightpaint.lighting.answer.lighting import Lighting
 from lightpaint.lighting.unknowns.lamp_parts import part_lamps
-from lightpaint.scene.properties import observed_spectra
+from lightpaint.scene.properties import film
 from lightpaint.scene.properties.emission import MULTIPLE
 from lightpaint.scene.scene_render import Stream, render
 
@@ -183,20 +183,18 @@ def print_verifications(scene: Scene, spp: int) -> None:
             relit = relight(scene, lighting, Path(folder) / "relit.xml")
             height, width = scene.size
             relit = relit if relit.size == scene.size else relit.reduced(f"{width}x{height}")
-            ratios = [
-                noise_by_share(relit, share, spp) for share in (1.0, observed_spectra.EVEN_SHARE)
-            ]
+            ratios = [noise_by_share(relit, share, spp) for share in (1.0, film.EVEN_SHARE)]
         of_basis = variance(combine(basis, lighting))
         print(f"{label:14s} {ratios[0] / of_basis:10.1f} {ratios[1] / of_basis:13.1f}", flush=True)
 
 
 def noise_by_share(relit: Scene, share: float, spp: int) -> float:
     """Return the variance where that share of wavelengths is sampled as the eye sees them."""
-    shipped, observed_spectra.EVEN_SHARE = observed_spectra.EVEN_SHARE, share
+    shipped, film.EVEN_SHARE = film.EVEN_SHARE, share
     try:
         return variance(render(relit, spp=spp, seed=3, stream=Stream.VERIFICATION))
     finally:
-        observed_spectra.EVEN_SHARE = shipped
+        film.EVEN_SHARE = shipped
 
 
 def print_bias(scene: Scene, spp: int) -> None:

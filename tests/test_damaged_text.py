@@ -22,7 +22,7 @@ from nightly import FIFTHS, examples, fifth_of, nightly
 
 from lightpaint.colour.display.view_transform import ViewTransform
 from lightpaint.errors import LightingError, LightpaintError, SceneError, TargetError
-from lightpaint.file_reading import MAX_TEXT
+from lightpaint.files import MAX_TEXT
 from lightpaint.lighting.answer.certificate import Bound
 from lightpaint.lighting.answer.lighting import Certificate, Lighting, LightSetting
 from lightpaint.lighting.answer.lighting_file import read_lighting, write_lighting

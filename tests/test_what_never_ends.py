@@ -17,7 +17,7 @@ from command import run_refused
 from patience import PATIENCE_S
 from renderer import write_room
 
-from lightpaint import file_reading
+from lightpaint import files
 from lightpaint.basis.file.basis_file import write_basis
 from lightpaint.errors import SceneError
 from lightpaint.images.formats.exr import write_rgb
@@ -165,7 +165,7 @@ def test_a_drive_that_does_not_answer(folder: Path, monkeypatch: pytest.MonkeyPa
     """Neither where it is asked what there is, nor where it is read, at once or half-way."""
     room = folder / "room.xml"
     open_again, asleep = threading.Event(), []
-    monkeypatch.setattr(file_reading, "FILE_TIMEOUT_S", 0.05)
+    monkeypatch.setattr(files, "FILE_TIMEOUT_S", 0.05)
 
     def sleeps(*_: object) -> Any:
         asleep.append(threading.current_thread())
@@ -181,15 +181,15 @@ def test_a_drive_that_does_not_answer(folder: Path, monkeypatch: pytest.MonkeyPa
         {"_is_sparse": lambda *_: False, "_open": sleeps},
         {
             "_is_sparse": lambda *_: False,
-            "_read_first_chunk": lambda _: (half_way, bytes(file_reading.CHUNK)),
+            "_read_first_chunk": lambda _: (half_way, bytes(files.CHUNK)),
         },
     ):
         with monkeypatch.context() as patch:
             for name, stub in stubs.items():
-                patch.setattr(file_reading, name, stub)
+                patch.setattr(files, name, stub)
             start_s = time.monotonic()
             with pytest.raises(SceneError, match=r"cannot read .*room\.xml: no answer within"):
-                file_reading.read_text(room, "scene file", SceneError)
+                files.read_text(room, "scene file", SceneError)
             assert time.monotonic() - start_s < PATIENCE_S
     assert all(thread.daemon for thread in asleep)  # none is waited for at the end
     open_again.set()
@@ -204,12 +204,12 @@ def test_a_long_file_of_nearly_nothing(tmp_path: Path, ending: str) -> None:
         file.write(b"ply\nformat ascii 1.0\nelement vertex 3\n")
         file.truncate(2**32 - 10)
     with pytest.raises(SceneError, match="nearly all of it was never written"):
-        file_reading.file_length(path, "file to read", SceneError, limit=2**32)
+        files.file_length(path, "file to read", SceneError, limit=2**32)
     # One that has holes, and is mostly there, is a file like any other.
     with path.open("wb") as file:
         file.seek(2**26)
         file.write(bytes(2**20))
-    assert file_reading.file_length(path, "file to read", SceneError, limit=2**32) == 2**26 + 2**20
+    assert files.file_length(path, "file to read", SceneError, limit=2**32) == 2**26 + 2**20
 
 
 def test_what_goes_wrong_in_time_is_told_as_ever(tmp_path: Path) -> None:
@@ -217,18 +217,18 @@ def test_what_goes_wrong_in_time_is_told_as_ever(tmp_path: Path) -> None:
         raise OSError(errno.EIO, "broken")
 
     with pytest.raises(OSError, match="broken"):
-        file_reading._call_in_time(fails)
-    assert file_reading._call_in_time(lambda: np.pi) == np.pi
+        files._call_in_time(fails)
+    assert files._call_in_time(lambda: np.pi) == np.pi
 
 
 def test_files_that_are_read_as_they_were(tmp_path: Path) -> None:
     path = tmp_path / "a"
-    for size in (1, 2, file_reading.CHUNK, file_reading.CHUNK + 1):
+    for size in (1, 2, files.CHUNK, files.CHUNK + 1):
         path.write_bytes(b"x" * size)
-        assert file_reading.read_bytes(path, "file", SceneError) == b"x" * size
+        assert files.read_bytes(path, "file", SceneError) == b"x" * size
     with pytest.raises(SceneError, match="bytes long"):
-        file_reading.read_bytes(path, "file", SceneError, limit=file_reading.CHUNK)
+        files.read_bytes(path, "file", SceneError, limit=files.CHUNK)
     path.write_bytes(b"")
-    assert file_reading.read_bytes(path, "file", SceneError, may_be_empty=True) == b""
+    assert files.read_bytes(path, "file", SceneError, may_be_empty=True) == b""
     with pytest.raises(SceneError, match="a is empty, or only made up"):
-        file_reading.file_length(path, "file", SceneError)
+        files.file_length(path, "file", SceneError)

@@ -19,10 +19,9 @@ from threadpoolctl import threadpool_limits
 from lightpaint.batch.work.item_execution import run_item
 from lightpaint.batch.work.work_items import ItemResult, WorkItem, item_label
 from lightpaint.batch.work.worker_storage import WorkerCache
-from lightpaint.field_options import Option
 from lightpaint.progress import Listener, silent
 from lightpaint.scene.runtime.kernel_threads import limit_threads
-from lightpaint.validation import a, check_fields, number, whole
+from lightpaint.validation import Option, a, check_fields, number, whole
 
 #: Maximum number of processes, and of repetitions of a step: larger numbers are typing errors.
 MAX_WORKERS, MAX_RETRY = 1024, 100

@@ -20,7 +20,7 @@ from lightpaint.dmx.gdtf.fixture_type import FixtureType
 from lightpaint.dmx.gdtf.mode_channels import ModeHead
 from lightpaint.dmx.gdtf.mode_lights import FixtureMode, ModeLight
 from lightpaint.errors import RigError
-from lightpaint.file_reading import read_bytes
+from lightpaint.files import read_bytes
 from lightpaint.scene.properties.site import unit
 from lightpaint.sentences import Hint
 from lightpaint.storage.rig_archive import RigArchive, library, reading

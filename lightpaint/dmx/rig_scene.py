@@ -22,8 +22,7 @@ from lightpaint.dmx.console_rig import ConsoleRig, RigEmitter, RigFixture, RigLi
 from lightpaint.dmx.mvr import KIND, PlacedModel
 from lightpaint.dmx.spot_cone import spot_cone
 from lightpaint.errors import SceneError
-from lightpaint.file_reading import read_bytes
-from lightpaint.files import first_line
+from lightpaint.files import first_line, read_bytes
 from lightpaint.scene.checks.tokens import markup, tag
 from lightpaint.scene.properties.site import across
 from lightpaint.storage.rig_archive import MAX_XML, RigArchive

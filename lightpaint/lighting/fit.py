@@ -6,11 +6,10 @@ from typing import TYPE_CHECKING, Annotated, Literal, TypeVar
 
 from lightpaint.colour import ViewTransform
 from lightpaint.errors import LightpaintError, TargetError
-from lightpaint.field_options import Option
 from lightpaint.keywords import keywords
 from lightpaint.lighting.algebra.optimum import Method
 from lightpaint.sentences import Hint
-from lightpaint.validation import a, check_fields, number
+from lightpaint.validation import Option, a, check_fields, number
 
 if TYPE_CHECKING:
     from lightpaint.target import Target

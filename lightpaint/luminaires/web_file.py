@@ -15,8 +15,7 @@ import numpy as np
 
 from lightpaint.arrays import Doubles
 from lightpaint.errors import SceneError
-from lightpaint.file_reading import read_bytes
-from lightpaint.files import one_line
+from lightpaint.files import one_line, read_bytes
 from lightpaint.luminaires.web import Opening, PhotometricWeb, Symmetry, unfolded
 from lightpaint.validation import BRIGHTEST, parse_number
 

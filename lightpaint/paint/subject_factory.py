@@ -8,8 +8,7 @@ from typing import Any
 from lightpaint.basis import Basis, LightGroups, Lights
 from lightpaint.colour import TransformChoice, read_observer
 from lightpaint.errors import PaintError, SceneError
-from lightpaint.file_reading import file_length
-from lightpaint.files import scene_name
+from lightpaint.files import file_length, scene_name
 from lightpaint.lighting import (
     Constraints,
     LightConstraint,

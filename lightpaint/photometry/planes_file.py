@@ -14,8 +14,7 @@ import numpy as np
 from lightpaint.arrays import Doubles, Position
 from lightpaint.display_text import some_names, with_similar_name
 from lightpaint.errors import SceneError
-from lightpaint.file_reading import read_text
-from lightpaint.files import is_name, one_line
+from lightpaint.files import is_name, one_line, read_text
 from lightpaint.keywords import keywords
 from lightpaint.photometry.glare import GlareObserver
 from lightpaint.photometry.measure import DEFAULT_ERROR, LEAST_ERROR

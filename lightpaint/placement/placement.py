@@ -15,7 +15,7 @@ from lightpaint.arrays import RGB, Floats
 from lightpaint.colour import lambertian_flux, point_flux, spot_flux
 from lightpaint.display_text import rounded_text
 from lightpaint.errors import SceneError
-from lightpaint.file_reading import read_text
+from lightpaint.files import read_text
 from lightpaint.keywords import keywords
 from lightpaint.placement.free_space import as_position
 from lightpaint.scene import NewEmitter, Pose, Scene

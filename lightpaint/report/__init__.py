@@ -39,13 +39,14 @@ if TYPE_CHECKING:
     from lightpaint.report.diagnosis_sentences import unreached_channels as unreached_channels
     from lightpaint.report.diagnosis_sentences import untold_lights as untold_lights
     from lightpaint.report.measures import LEAST_SHARE as LEAST_SHARE
+    from lightpaint.report.measures import ReportedAnswer as ReportedAnswer
     from lightpaint.report.measures import energy_shares as energy_shares
     from lightpaint.report.measures import picture_errors as picture_errors
-    from lightpaint.report.page.constraint_section import closer_choice as closer_choice
     from lightpaint.report.page.figures import data_uri as data_uri
     from lightpaint.report.page.figures import resized as resized
     from lightpaint.report.page.figures import thumbnail as thumbnail
     from lightpaint.report.page.html import html as html
+    from lightpaint.report.page.limit_sections import closer_choice as closer_choice
     from lightpaint.report.page.mixer import kelvin_colors as kelvin_colors
     from lightpaint.report.page.mixer import light_data as light_data
     from lightpaint.report.page.mixer import lighting_data as lighting_data
@@ -82,7 +83,6 @@ if TYPE_CHECKING:
     from lightpaint.report.report_json import finite as finite
     from lightpaint.report.report_json import report_numbers as report_numbers
     from lightpaint.report.report_json import verification_numbers as verification_numbers
-    from lightpaint.report.reported_answer import ReportedAnswer as ReportedAnswer
     from lightpaint.report.rig.hung_lights import HungLight as HungLight
     from lightpaint.report.rig.hung_lights import HungLights as HungLights
     from lightpaint.report.rig.hung_lights import LightChange as LightChange

@@ -1,4 +1,9 @@
-"""Measures of a result: shares of energy, errors as root mean squares, and errors of lights."""
+"""An answer with everything that its report contains, from which pages and numbers are made; and
+its measures: shares of energy, errors as root mean squares, and errors of lights.
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
 
 import numpy as np
 
@@ -6,10 +11,54 @@ from lightpaint.arrays import Doubles, Floats
 from lightpaint.basis import Basis
 from lightpaint.colour import LUMINANCE
 from lightpaint.images import Estimate, sum_by_bands
-from lightpaint.lighting import Lighting, Solution, Uncertainty
+from lightpaint.lighting import (
+    Appearance,
+    Choices,
+    Diagnosis,
+    Lighting,
+    PlanesAnswer,
+    Solution,
+    SurfaceColor,
+    Uncertainty,
+)
+from lightpaint.placement.suggestion import MoveSuggestion, Suggestion
+from lightpaint.relit.verification import Verification
+from lightpaint.report.rig.hung_lights import HungLights
+from lightpaint.target import Target
 
 #: Share of a picture's light from which on a light's error counts in proportion to the light.
 LEAST_SHARE = 0.05
+
+
+@dataclass(frozen=True, kw_only=True)
+class ReportedAnswer:
+    """The answer to a painting, with its analysis as far as it is known.
+
+    basis, target, solution: of one view. predicted: Σ w_i Φ_i. verification: None without a render
+    that checks the prediction. command: the shell command that made the result. uncertainty,
+    diagnosis, unconstrained, suggestions, hung: without them the report has no such section.
+    turn: the turn of a spot that would help most, if any. appearance: the result of
+    `compare_appearance`, if known. color_choices: the answers of other colours, if known. planes:
+    what it gives on measuring planes, if there are any. surfaces: colours of objects under it, if
+    it has spectra.
+    """
+
+    basis: Basis
+    target: Target
+    solution: Solution
+    predicted: Estimate
+    verification: Verification | None
+    command: str = ""
+    uncertainty: Uncertainty | None = None
+    diagnosis: Diagnosis | None = None
+    unconstrained: Solution | None = None
+    suggestions: Sequence[Suggestion] | None = None
+    turn: MoveSuggestion | None = None
+    hung: HungLights | None = None
+    appearance: Appearance | None = None
+    color_choices: Choices = ()
+    planes: PlanesAnswer | None = None
+    surfaces: Sequence[SurfaceColor] = ()
 
 
 def energy_shares(basis: Basis, lighting: Lighting) -> Doubles:

@@ -35,6 +35,7 @@ from lightpaint.report.answer_pictures import (
 )
 from lightpaint.report.diagnosis_sentences import UNTOLD_HERE, fit_options
 from lightpaint.report.measures import (
+    ReportedAnswer,
     brightness,
     count_at_least_pixels,
     energy_shares,
@@ -46,10 +47,9 @@ from lightpaint.report.measures import (
     relative_errors,
     relative_residual,
 )
-from lightpaint.report.page.diagnosis_section import maps_limit
-from lightpaint.report.page.rendering_section import rendering_numbers
+from lightpaint.report.page.lights_table import rendering_numbers
+from lightpaint.report.page.limit_sections import maps_limit
 from lightpaint.report.planes_text import planes_numbers
-from lightpaint.report.reported_answer import ReportedAnswer
 from lightpaint.report.rig.hung_lights import placement_numbers
 from lightpaint.target import Target
 from lightpaint.version import __version__

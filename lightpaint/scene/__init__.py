@@ -29,11 +29,11 @@ if TYPE_CHECKING:
     from lightpaint.scene.properties.emission import PLUGINS as PLUGINS
     from lightpaint.scene.properties.emission import Scaling as Scaling
     from lightpaint.scene.properties.emission import child_named as child_named
+    from lightpaint.scene.properties.film import MeasuringPoints as MeasuringPoints
     from lightpaint.scene.properties.film import check_resolution as check_resolution
     from lightpaint.scene.properties.film import reduction_to as reduction_to
     from lightpaint.scene.properties.film import with_width as with_width
     from lightpaint.scene.properties.integrator import Integrator as Integrator
-    from lightpaint.scene.properties.measuring_points import MeasuringPoints as MeasuringPoints
     from lightpaint.scene.properties.pose import FARTHEST as FARTHEST
     from lightpaint.scene.properties.pose import Pose as Pose
     from lightpaint.scene.properties.pose import motion_of as motion_of

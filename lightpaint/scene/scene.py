@@ -43,10 +43,15 @@ from lightpaint.scene.lights.texels.image_domains import GridSize
 from lightpaint.scene.lights.texels.texel import TexelLayout
 from lightpaint.scene.plane_identity import SceneHasher
 from lightpaint.scene.properties.emission import ENVIRONMENTS, read_emitted_image
-from lightpaint.scene.properties.film import Film, camera_named, reduced, reduction
+from lightpaint.scene.properties.film import (
+    Film,
+    MeasuringPoints,
+    bands_of,
+    camera_named,
+    reduced,
+    reduction,
+)
 from lightpaint.scene.properties.integrator import Integrator, IntegratorChoice
-from lightpaint.scene.properties.measuring_points import MeasuringPoints
-from lightpaint.scene.properties.observed_spectra import bands_of
 from lightpaint.scene.properties.pose import Pose, motion_of, upward_axis
 from lightpaint.scene.properties.site import EmitterPlace, Site
 from lightpaint.scene.runtime.kernel_threads import kernels

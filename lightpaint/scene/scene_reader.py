@@ -7,7 +7,7 @@ from fnmatch import fnmatchcase
 from pathlib import Path
 
 from lightpaint.errors import SceneError
-from lightpaint.file_reading import file_length
+from lightpaint.files import file_length
 from lightpaint.keywords import keywords
 from lightpaint.scene.checks.xml_checks import MAX_XML
 from lightpaint.scene.lights.emitters import Emitter, check_emitters

@@ -12,7 +12,7 @@ from lightpaint.arrays import RGB, Doubles, Floats
 from lightpaint.errors import SceneError
 from lightpaint.images import Estimate, block_mean
 from lightpaint.progress import Progress, silent
-from lightpaint.scene.properties.observed_spectra import as_seen
+from lightpaint.scene.properties.film import as_seen
 from lightpaint.scene.runtime.kernel_threads import kernels
 from lightpaint.scene.runtime.render_lock import tracing
 from lightpaint.scene.scene import Scene

@@ -18,7 +18,7 @@ from lightpaint.errors import SceneError
 from lightpaint.scene.checks.assets import check_assets
 from lightpaint.scene.checks.xml_checks import check_nodes, check_required, check_xml
 from lightpaint.scene.properties.emission import EmitterSetting, child_named, set_emission
-from lightpaint.scene.properties.film import Film
+from lightpaint.scene.properties.film import Bands, Film
 from lightpaint.scene.properties.integrator import (
     Integrator,
     IntegratorChoice,
@@ -26,7 +26,6 @@ from lightpaint.scene.properties.integrator import (
     read_integrator,
     replace_integrator,
 )
-from lightpaint.scene.properties.observed_spectra import Bands
 from lightpaint.scene.properties.pose import Motion, moved_parameters
 from lightpaint.scene.runtime.kernel_threads import kernels, kernels_for_all_sizes
 from lightpaint.scene.runtime.mitsuba_errors import mitsuba_errors

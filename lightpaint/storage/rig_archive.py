@@ -17,8 +17,7 @@ from xml.etree.ElementTree import Element, ParseError, TreeBuilder
 from xml.parsers import expat
 
 from lightpaint.errors import RigError
-from lightpaint.file_reading import file_length
-from lightpaint.files import first_line, one_line
+from lightpaint.files import file_length, first_line, one_line
 from lightpaint.storage.staging import is_below
 
 #: Largest sum of all members in bytes, unpacked, and largest number of them.

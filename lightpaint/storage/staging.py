@@ -20,8 +20,7 @@ from functools import partial
 from pathlib import Path
 
 from lightpaint.errors import LightpaintError, OutputError
-from lightpaint.file_reading import MAX_TEXT, read_text
-from lightpaint.files import flush, write_text
+from lightpaint.files import MAX_TEXT, flush, read_text, write_text
 from lightpaint.sentences import Datum
 from lightpaint.signals import interruptible_between_pieces
 from lightpaint.storage.json_records import read_record, strict_json

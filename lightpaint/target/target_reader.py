@@ -26,8 +26,7 @@ from lightpaint.target.painted_pixels import (
     lossy_difference,
     painted_where,
 )
-from lightpaint.target.painting_file import painted_of
-from lightpaint.target.target import Target, describe_negative, share_of, spoken_share
+from lightpaint.target.target import Target, describe_negative, painted_of, share_of, spoken_share
 from lightpaint.target.template import (
     CLEAN,
     LIGHT_FILE,

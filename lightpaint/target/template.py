@@ -14,8 +14,7 @@ import numpy as np
 from lightpaint.arrays import Floats
 from lightpaint.colour import ViewTransform, to_8_bit
 from lightpaint.errors import LightpaintError, TargetError, ViewError
-from lightpaint.file_reading import read_text
-from lightpaint.files import one_line, write_bytes, write_text
+from lightpaint.files import one_line, read_text, write_bytes, write_text
 from lightpaint.images.formats import (
     TRANSFORM_KEY,
     ExrPart,

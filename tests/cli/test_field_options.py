@@ -12,9 +12,8 @@ from lightpaint.batch.engine import RunOptions
 from lightpaint.cli.options.option_groups import add_fields
 from lightpaint.cli.options.parser import command_parser
 from lightpaint.cli.output.vocabulary import OPTIONS, RECORDS, SPELLINGS
-from lightpaint.field_options import FieldOption, Option, options_of
 from lightpaint.pipeline.job.settings import Settings
-from lightpaint.validation import number, whole
+from lightpaint.validation import FieldOption, Option, number, options_of, whole
 
 #: Fields that no option of their own sets, and why.
 WITHOUT = {

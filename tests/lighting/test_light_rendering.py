@@ -17,7 +17,7 @@ from lightpaint.lighting.constraints.constraints import Constraints
 from lightpaint.lighting.constraints.constraints_file import read_constraints
 from lightpaint.lighting.solver import solve
 from lightpaint.relit.formats import spectra_csv
-from lightpaint.report.page.rendering_section import rendering_numbers, rendering_section
+from lightpaint.report.page.lights_table import rendering_numbers, rendering_section
 from lightpaint.report.phrases import rendering_sentences
 from lightpaint.target.target import Target
 

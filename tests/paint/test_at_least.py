@@ -22,7 +22,7 @@ from lightpaint.paint.session.session import Session
 from lightpaint.paint.store.history_steps import Identity
 from lightpaint.paint.store.store import MemoryStore, Store
 from lightpaint.pipeline.job.settings import Settings
-from lightpaint.target.painting_file import write_painting
+from lightpaint.target.target import write_painting
 
 SIZE = (18, 32)
 WHOLE = (0, *SIZE[:1], 0, SIZE[1])

@@ -13,8 +13,12 @@ import lightpaint as lp
 from lightpaint.errors import OutputError, PaintError
 from lightpaint.images.denoiser import denoised
 from lightpaint.lighting.answer.lighting import Lighting
-from lightpaint.paint.studio.export_folders import folder_name, new_folder
-from lightpaint.paint.studio.session_exports import answer_png, render_verification
+from lightpaint.paint.studio.session_exports import (
+    answer_png,
+    folder_name,
+    new_folder,
+    render_verification,
+)
 from lightpaint.paint.subject_factory import make_subject
 from lightpaint.pipeline.job.settings import Settings
 from lightpaint.pipeline.job.sources import SceneFile

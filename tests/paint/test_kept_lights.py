@@ -8,7 +8,7 @@ from moving import MovingStudio, exact_answer, stroke
 
 from lightpaint.basis.lights import BasisLight, Lights
 from lightpaint.paint import protocol
-from lightpaint.paint.session.request_changes import keep_moved_lights
+from lightpaint.paint.session.live_answer import keep_moved_lights
 from lightpaint.paint.store.session_requests import SessionRequests
 
 MOVED: dict[str, Any] = {"a": {"position": [0.0, 1.0, 0.0]}}

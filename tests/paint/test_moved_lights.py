@@ -26,7 +26,7 @@ from lightpaint.errors import LightpaintError
 from lightpaint.paint import protocol
 from lightpaint.paint.rig import lamp_rig
 from lightpaint.paint.rig.light_placer import SearchNotes
-from lightpaint.paint.session.request_changes import changed_requests
+from lightpaint.paint.session.live_answer import changed_requests
 from lightpaint.paint.store.session_requests import SessionRequests
 from lightpaint.paint.store.store import Store
 from lightpaint.scene.properties.pose import Site

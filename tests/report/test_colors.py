@@ -12,10 +12,10 @@ from lightpaint.lighting.analysis.appearance.color_choices import ColorChoice
 from lightpaint.lighting.answer.combination import combine
 from lightpaint.lighting.solver import solve
 from lightpaint.report.diagnosis_sentences import fit_options, fit_sentence
-from lightpaint.report.page.constraint_section import closer_choice, colors_section, spoken_choice
+from lightpaint.report.measures import ReportedAnswer
+from lightpaint.report.page.limit_sections import closer_choice, colors_section, spoken_choice
 from lightpaint.report.page.page import report_page
 from lightpaint.report.report_json import report_numbers
-from lightpaint.report.reported_answer import ReportedAnswer
 from lightpaint.target.target import Target
 
 WARM, NEUTRAL, COOL = (tuple(kelvin_to_rgb(k).tolist()) for k in (2700.0, 5000.0, 12000.0))

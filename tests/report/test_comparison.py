@@ -41,8 +41,8 @@ from lightpaint.report.answer_pictures import (
     unpainted_look,
 )
 from lightpaint.report.comparison import SURROUND, Tile, comparison_image, compose
+from lightpaint.report.measures import ReportedAnswer
 from lightpaint.report.report_json import report_numbers
-from lightpaint.report.reported_answer import ReportedAnswer
 from lightpaint.report.verdict_sentences import headline
 from lightpaint.target.target import Target
 from lightpaint.target.target_reader import read_target

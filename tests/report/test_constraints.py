@@ -11,7 +11,7 @@ from lightpaint.lighting.analysis.analysis import without_constraints
 from lightpaint.lighting.analysis.noise.noise_correction import correct_noise
 from lightpaint.lighting.constraints.constraints import Constraints
 from lightpaint.lighting.solver import solve
-from lightpaint.report.page.constraint_section import constraints_section
+from lightpaint.report.page.limit_sections import constraints_section
 from lightpaint.target.target import Target
 
 SIZE = (10, 12)

@@ -19,11 +19,15 @@ from lightpaint.lighting.answer.combination import combine
 from lightpaint.lighting.answer.lighting import Lighting
 from lightpaint.lighting.solver import solve
 from lightpaint.relit.verification import compare
-from lightpaint.report.measures import energy_shares, noise_residual, relative_residual
+from lightpaint.report.measures import (
+    ReportedAnswer,
+    energy_shares,
+    noise_residual,
+    relative_residual,
+)
 from lightpaint.report.page.figures import data_uri, thumbnail
 from lightpaint.report.page.lights_table import hex_color
 from lightpaint.report.page.page import report_page
-from lightpaint.report.reported_answer import ReportedAnswer
 from lightpaint.target.target import Target
 
 SIZE = (24, 32)

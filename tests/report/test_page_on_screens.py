@@ -20,9 +20,9 @@ from lightpaint.lighting.constraints.constraints import Constraints
 from lightpaint.lighting.solution import Solution
 from lightpaint.lighting.solver import solve
 from lightpaint.relit.verification import compare
+from lightpaint.report.measures import ReportedAnswer
 from lightpaint.report.page.html import ROWS_SHOWN
 from lightpaint.report.page.page import report_page
-from lightpaint.report.reported_answer import ReportedAnswer
 from lightpaint.target.target import Target
 
 SIZE = (27, 48)

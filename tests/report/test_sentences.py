@@ -23,7 +23,7 @@ from lightpaint.report.diagnosis_sentences import (
     uncertainty_sentence,
 )
 from lightpaint.report.measures import halving_spp
-from lightpaint.report.page.diagnosis_section import missed_section, sure_section
+from lightpaint.report.page.limit_sections import missed_section, sure_section
 from lightpaint.report.phrases import (
     spoken_difference,
     spoken_lights,

@@ -41,8 +41,7 @@ from lightpaint.basis.file.lit_planes import MIN_LIGHTS, LitCollector, LitPlane,
 from lightpaint.basis.lights import BasisLight, Lights
 from lightpaint.basis.planes import IndirectLight, Planes, as_planes
 from lightpaint.errors import BasisError, ImageError, LightpaintError
-from lightpaint.file_reading import file_length
-from lightpaint.files import one_line
+from lightpaint.files import file_length, one_line
 from lightpaint.images.formats import (
     Channels,
     ExrPart,

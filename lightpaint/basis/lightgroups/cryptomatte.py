@@ -17,8 +17,7 @@ import numpy.typing as npt
 
 from lightpaint.display_text import some_names
 from lightpaint.errors import BasisError
-from lightpaint.file_reading import read_bytes
-from lightpaint.files import one_line
+from lightpaint.files import one_line, read_bytes
 from lightpaint.images import BACKGROUND, Objects
 from lightpaint.images.formats import ExrPart, channel_named
 

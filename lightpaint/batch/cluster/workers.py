@@ -22,8 +22,7 @@ from lightpaint.batch.cluster import worker as cluster_worker
 from lightpaint.batch.cluster.parcels import Parcel, files_to_send, pieces
 from lightpaint.batch.cluster.worker import versions as own_versions
 from lightpaint.errors import BatchError, LightpaintError
-from lightpaint.file_reading import call_with_timeout
-from lightpaint.files import first_line
+from lightpaint.files import call_with_timeout, first_line
 from lightpaint.progress import Listener
 
 #: Seconds for the scheduler to answer, to reconnect, and between refreshes of the workers.

@@ -40,8 +40,7 @@ from lightpaint.batch.work.worker_storage import WorkerCache
 from lightpaint.colour import ViewTransform
 from lightpaint.display_text import visible
 from lightpaint.errors import LightpaintError
-from lightpaint.file_reading import read_text
-from lightpaint.files import write_bytes, write_text
+from lightpaint.files import read_text, write_bytes, write_text
 from lightpaint.images.formats import png_bytes
 from lightpaint.lighting import read_lighting
 from lightpaint.pipeline import BasisFile, GroupsFile, Job, SceneFile, content, hung_of

@@ -21,8 +21,7 @@ from lightpaint.batch.plan.plan import Plan, PlannedLook
 from lightpaint.batch.work.task import EXPORT, Kind
 from lightpaint.colour import ViewTransform, choose_exposure, to_8_bit
 from lightpaint.errors import LightpaintError
-from lightpaint.file_reading import read_text
-from lightpaint.files import replacing
+from lightpaint.files import read_text, replacing
 from lightpaint.images import block_mean, denoised, fitting_factor, read_estimate
 from lightpaint.lighting import read_lighting
 from lightpaint.photometry.measuring_plane import plane_title

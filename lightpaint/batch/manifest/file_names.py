@@ -11,7 +11,7 @@ from pathlib import Path
 from re import Pattern, compile
 
 from lightpaint.errors import BatchError, LightpaintError, OutputError
-from lightpaint.file_reading import read_text
+from lightpaint.files import read_text
 from lightpaint.sentences import Hint
 from lightpaint.storage.json_records import strict_json
 

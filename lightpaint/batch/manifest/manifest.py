@@ -16,8 +16,7 @@ from lightpaint.batch.manifest.keys import (
     Mistakes,
 )
 from lightpaint.errors import BatchError, OutputError
-from lightpaint.file_reading import read_text
-from lightpaint.files import check_files, one_line, write_text
+from lightpaint.files import check_files, one_line, read_text, write_text
 from lightpaint.sentences import Hint
 from lightpaint.storage.json_records import strict_toml
 from lightpaint.validation import Check, a

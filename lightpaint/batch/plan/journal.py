@@ -21,8 +21,7 @@ from lightpaint.batch.manifest.file_names import JOURNAL, JOURNAL_PART
 from lightpaint.batch.manifest.keys import Final, Handover
 from lightpaint.batch.work.task import Kind
 from lightpaint.errors import BatchError, LightpaintError, OutputError
-from lightpaint.file_reading import read_bytes
-from lightpaint.files import write_text
+from lightpaint.files import read_bytes, write_text
 from lightpaint.storage.json_records import read_record, strict_json
 from lightpaint.version import __version__
 

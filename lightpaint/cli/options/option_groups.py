@@ -6,9 +6,8 @@ from typing import Any, get_args
 
 from lightpaint.cli.options import arguments
 from lightpaint.cli.output.vocabulary import RECORDS
-from lightpaint.field_options import FieldOption, Option, Theme, options_of
 from lightpaint.pipeline import Settings
-from lightpaint.validation import SWITCH, Check
+from lightpaint.validation import SWITCH, Check, FieldOption, Option, Theme, options_of
 
 
 def add_scene(parser: argparse.ArgumentParser) -> None:

@@ -5,9 +5,9 @@ import shlex
 from collections.abc import Mapping, Sequence
 
 from lightpaint.batch import RunOptions
-from lightpaint.field_options import options_of
 from lightpaint.pipeline import Settings
 from lightpaint.sentences import Datum, Hint, Lead, Sentence, SourceKey, Word
+from lightpaint.validation import options_of
 
 #: The records whose fields have options.
 RECORDS = (Settings, RunOptions)

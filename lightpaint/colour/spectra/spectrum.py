@@ -23,8 +23,7 @@ from lightpaint.colour.color import C2, matching_functions
 from lightpaint.colour.primaries import REC709, colour_science, rgb_to_xyz
 from lightpaint.display_text import some_names
 from lightpaint.errors import ColorError, RigError
-from lightpaint.file_reading import read_bytes, read_text
-from lightpaint.files import one_line
+from lightpaint.files import one_line, read_bytes, read_text
 from lightpaint.storage.rig_archive import RigArchive
 
 #: Nanometres of a spectrum, and the distance between two.

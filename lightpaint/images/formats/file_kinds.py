@@ -4,8 +4,7 @@ import sys
 from pathlib import Path
 
 from lightpaint.errors import ImageError
-from lightpaint.file_reading import file_length
-from lightpaint.files import is_utf_8, one_line
+from lightpaint.files import file_length, is_utf_8, one_line
 
 #: First bytes of files, the usual name of the format, and its kind; "" if it is not supported.
 SIGNATURES = (

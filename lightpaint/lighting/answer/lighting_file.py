@@ -11,8 +11,7 @@ import numpy as np
 from lightpaint.colour import Lamp
 from lightpaint.display_text import some_names
 from lightpaint.errors import LightingError
-from lightpaint.file_reading import read_text
-from lightpaint.files import one_line, write_text
+from lightpaint.files import one_line, read_text, write_text
 from lightpaint.keywords import keywords
 from lightpaint.lighting.answer.certificate import Certificate
 from lightpaint.lighting.answer.lighting import ALL_REACHED, Lighting, LightSetting

@@ -33,15 +33,13 @@ from lightpaint.paint.session.live_answer import (
     LiveAnswer,
     LiveDrives,
     LiveReadings,
-    weights_by_name,
-)
-from lightpaint.paint.session.moved_lights import MovedLights, NoPlaneSource, Placed, PlaneSource
-from lightpaint.paint.session.request_changes import (
     RequestChange,
     changed_requests,
     move_lights,
     previewed_requests,
+    weights_by_name,
 )
+from lightpaint.paint.session.moved_lights import MovedLights, NoPlaneSource, Placed, PlaneSource
 from lightpaint.paint.session.session_messages import (
     Judgement,
     answer_findings,

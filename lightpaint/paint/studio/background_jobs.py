@@ -28,7 +28,7 @@ from lightpaint.paint.session.snapshot import SessionSnapshot
 from lightpaint.paint.session_access import Publisher, SessionAccess
 from lightpaint.paint.store.history_steps import name_in_view
 from lightpaint.paint.store.session_requests import SessionRequests
-from lightpaint.paint.studio.export_folders import EXPORTS, folder_name, new_folder
+from lightpaint.paint.studio.session_exports import EXPORTS, folder_name, new_folder
 from lightpaint.paint.subject import Subject, painting_path
 from lightpaint.progress import Progress, cancellable
 

@@ -19,7 +19,7 @@ from lightpaint.paint.session.picture_table import Picture, display_thumbnail
 from lightpaint.paint.session.snapshot import SessionSnapshot
 from lightpaint.paint.session_access import Publisher, SessionAccess
 from lightpaint.paint.store.store import StoredRecords
-from lightpaint.paint.studio.export_folders import RENDERS, folder_name, new_folder
+from lightpaint.paint.studio.session_exports import RENDERS, folder_name, new_folder
 from lightpaint.paint.subject import Subject
 from lightpaint.progress import cancellable
 from lightpaint.scene.runtime.render_lock import MITSUBA

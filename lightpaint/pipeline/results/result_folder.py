@@ -17,8 +17,7 @@ from typing import Literal
 from lightpaint.arrays import Doubles
 from lightpaint.basis import LightGroups
 from lightpaint.errors import LightpaintError, OutputError
-from lightpaint.file_reading import read_text
-from lightpaint.files import check_files, check_writable, one_line, write_text
+from lightpaint.files import check_files, check_writable, one_line, read_text, write_text
 from lightpaint.lighting import Lighting, write_lighting
 from lightpaint.photometry.glare import Glare
 from lightpaint.photometry.illuminance import Illuminance

@@ -1,7 +1,10 @@
-"""The table of lights in the report."""
+"""The table of lights in the report, and the section on how lamps render colours, where their
+spectra are known.
+"""
 
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
+from typing import Any
 
 import numpy as np
 from markupsafe import Markup
@@ -10,7 +13,16 @@ from lightpaint.arrays import RGB, Doubles, Floats, Indices
 from lightpaint.basis import Basis, BasisLight, LightImage, light_images
 from lightpaint.colour import Photometry, encode_display, luminance, rgb_to_hex, to_8_bit
 from lightpaint.images import block_mean, in_turns
-from lightpaint.lighting import ALL_REACHED, Lighting, LightSetting, Solution, Uncertainty
+from lightpaint.lighting import (
+    ALL_REACHED,
+    Lighting,
+    LightRendering,
+    LightSetting,
+    Solution,
+    SurfaceColor,
+    Uncertainty,
+    renderings_of,
+)
 from lightpaint.report.basis_memo import (
     ROWS_SHOWN,
     SPARE_ROWS,
@@ -27,7 +39,13 @@ from lightpaint.report.diagnosis_sentences import (
 from lightpaint.report.measures import energy_shares
 from lightpaint.report.page.figures import data_uri, thumbnail
 from lightpaint.report.page.html import html
-from lightpaint.report.phrases import spoken_lamp, spoken_percent, spoken_preference, spoken_wheels
+from lightpaint.report.phrases import (
+    rendering_sentences,
+    spoken_lamp,
+    spoken_percent,
+    spoken_preference,
+    spoken_wheels,
+)
 
 #: Width of the map of an image in pixels.
 MAP_WIDTH = 144
@@ -36,6 +54,67 @@ CLIPPED_SHARE = 0.02
 
 #: Number of lights beyond which only rows that are not folded have a picture, of 10 kB each.
 MAX_THUMBNAILS = 300
+
+
+def rendering_section(lighting: Lighting, surfaces: Sequence[SurfaceColor] = ()) -> Markup:
+    """Return the section; "" without spectra. surfaces: colours of objects under the lighting."""
+    found = renderings_of(lighting)
+    if not found:
+        return Markup("")
+    lamps = [{"name": name, "cells": _cells(x)} for name, x in found.items()]
+    return html(
+        "rendering",
+        lamps=lamps,
+        sentences=rendering_sentences(found),
+        surfaces=[_surface(x) for x in surfaces],
+    )
+
+
+def rendering_numbers(lighting: Lighting) -> dict[str, dict[str, Any]] | None:
+    """Return the same for programs, by name of lamp; None without spectra."""
+    numbers = {
+        name: {
+            **({} if x.color is None else vars(x.color)),
+            "best_rf": x.best_rf,
+            "lm_per_w": x.lm_per_w,
+            **({} if x.wanted_rf is None else _wish(x)),
+        }
+        for name, x in renderings_of(lighting).items()
+    }
+    return numbers or None
+
+
+def _surface(found: SurfaceColor) -> dict[str, Any]:
+    """Return a row of the table of objects."""
+    return {
+        "name": found.name,
+        "colors": [None if x is None else _hex(x) for x in (found.daylight, found.seen)],
+        "delta_e": "coloured light" if found.delta_e is None else f"{found.delta_e:.1f}",
+    }
+
+
+def _hex(rgb: RGB) -> str:
+    red, green, blue = to_8_bit(encode_display(np.clip(rgb, 0, 1))).tolist()
+    return f"#{red:02x}{green:02x}{blue:02x}"
+
+
+def _wish(found: LightRendering) -> dict[str, Any]:
+    keys = ("wanted_rf", "watts", "plain_rf", "plain_watts", "held_mix_change")
+    return {key: getattr(found, key) for key in keys}
+
+
+def _cells(found: LightRendering) -> list[str]:
+    efficacy = "" if found.lm_per_w is None else f"{found.lm_per_w:.0f}"
+    if (color := found.color) is None:
+        return ["coloured", *[""] * 6, efficacy]
+    return [
+        f"{color.kelvin:.0f} K",
+        f"{round(color.duv, 4) + 0.0:+.4f}",
+        *(f"{x:.0f}" for x in (color.ra, color.r9, color.rf)),
+        "" if found.best_rf is None else f"{found.best_rf:.0f}",
+        f"{color.rg:.0f}",
+        efficacy,
+    ]
 
 
 @dataclass(frozen=True)

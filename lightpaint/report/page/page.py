@@ -49,20 +49,29 @@ from lightpaint.report.diagnosis_sentences import (
     wish_name,
 )
 from lightpaint.report.measures import (
+    ReportedAnswer,
     count_at_least_pixels,
     error_in_codes,
     linear_residual,
     noise_residual,
     relative_residual,
 )
-from lightpaint.report.page.constraint_section import colors_section, constraints_section
-from lightpaint.report.page.diagnosis_section import missed_section, sure_section
 from lightpaint.report.page.figures import PagePicture, data_uri, maps, wipe
 from lightpaint.report.page.html import facts, html, name_list
-from lightpaint.report.page.lights_table import MAX_THUMBNAILS, lights_table, thumbnails_of
+from lightpaint.report.page.lights_table import (
+    MAX_THUMBNAILS,
+    lights_table,
+    rendering_section,
+    thumbnails_of,
+)
+from lightpaint.report.page.limit_sections import (
+    colors_section,
+    constraints_section,
+    missed_section,
+    sure_section,
+)
 from lightpaint.report.page.mixer import mixer_assets, mixer_html, planes_for_page
 from lightpaint.report.page.placement_section import placement_section, suggestion_section
-from lightpaint.report.page.rendering_section import rendering_section
 from lightpaint.report.planes_text import (
     GLARE_HEADINGS,
     HEADINGS,
@@ -71,7 +80,6 @@ from lightpaint.report.planes_text import (
     plane_rows,
     planes_sentences,
 )
-from lightpaint.report.reported_answer import ReportedAnswer
 from lightpaint.report.verdict_sentences import spoken_samples, verdict
 from lightpaint.report.visible_emitters import emitter_remarks
 from lightpaint.target import Target

@@ -15,8 +15,7 @@ import numpy as np
 import numpy.typing as npt
 
 from lightpaint.errors import ImageError, SceneError
-from lightpaint.file_reading import file_length
-from lightpaint.files import one_line
+from lightpaint.files import file_length, one_line
 from lightpaint.images.formats import read_parts
 from lightpaint.luminaires import LUMINAIRE_PLUGINS, read_web
 

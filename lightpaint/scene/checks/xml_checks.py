@@ -14,8 +14,7 @@ from typing import Any
 import numpy as np
 
 from lightpaint.errors import SceneError
-from lightpaint.file_reading import file_length, read_bytes
-from lightpaint.files import one_line
+from lightpaint.files import file_length, one_line, read_bytes
 from lightpaint.scene.checks.tokens import attributes, encoding_of, line_of, markup, place_of_node
 
 #: Maximum size of all XML in bytes; a file that is included twice counts twice.

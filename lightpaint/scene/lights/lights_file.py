@@ -13,8 +13,7 @@ from typing import Any
 from lightpaint.colour import file_of_spectrum
 from lightpaint.display_text import known_keys
 from lightpaint.errors import SceneError
-from lightpaint.file_reading import read_text
-from lightpaint.files import one_line
+from lightpaint.files import one_line, read_text
 from lightpaint.luminaires import LUMINAIRE_KEYS, PHOTOMETRY, LuminaireRequest, luminaires_in
 from lightpaint.scene.lights.texels.image_domains import GridSize
 from lightpaint.scene.lights.texels.texel import TexelLayout, image_of, parse_size

@@ -1,26 +1,149 @@
-"""The film of a sensor, in full size or reduced so that each pixel is a block of full-size pixels.
+"""The film of a sensor, in full size or reduced so that each pixel is a block of full-size pixels;
+what it records of spectra; and points at which light is measured instead of its pixels.
 
 Only then is a box-filtered render on the reduced film the block mean of a full-size one, so that a
 painting or a verification in full size can be compared with it exactly. If film size, crop window
 and offset are multiples of the block size, Mitsuba's own film is made smaller. Otherwise the film
 keeps its size, its crop window is cut to whole blocks, and a pixel is the mean of a block.
+
+By itself Mitsuba samples wavelengths as the eye sees them. Of a narrow LED most samples then see
+nothing: the noise is some five times that of RGB. But a `specfilm` samples them by the sum of its
+channels. So it gets a channel for each curve of the observer, and one more, whose values are not
+used: the light of the scene's emitters.
 """
 
+import hashlib
 import math
 import re
-from collections.abc import Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
+import numpy as np
+
+from lightpaint.arrays import Bools, Doubles, Floats
+from lightpaint.colour import Observer
 from lightpaint.display_text import some_names
 from lightpaint.errors import SceneError
 from lightpaint.images import blocks_in, left_over, whole_factor
 from lightpaint.scene.limits import MAX_PIXELS, MAX_SPP
-from lightpaint.scene.properties.observed_spectra import Bands
+
+#: Wavelengths of the channels in nm.
+WAVES = np.arange(380, 781, dtype=np.float64)
+
+#: Share of the samples whose wavelengths are those that the observer sees, whatever lamps emit.
+EVEN_SHARE = 0.25
 
 #: Maximum number of sizes that an error lists.
 LISTED_SIZES = 8
+
+
+@dataclass(frozen=True)
+class Bands:
+    """The bands that a film records: integrals of radiance over the curves of an observer.
+
+    curves: (401, 3) at WAVES, >= 0. emitted: (401,), the density with which other wavelengths are
+    sampled as well; 0 if the curves suffice.
+    """
+
+    curves: Doubles
+    emitted: Doubles
+
+    def channels(self) -> dict[str, Any]:
+        """Return the channels of Mitsuba's film: those of the observer come first."""
+        columns = [x for x in (*self.curves.T, self.emitted) if x.any()]
+        return {
+            f"channel_{k}": {
+                "type": "regular",
+                "wavelength_min": WAVES[0],
+                "wavelength_max": WAVES[-1],
+                "values": ",".join(f"{x:.7g}" for x in column),
+            }
+            for k, column in enumerate(columns)
+        }
+
+
+def bands_of(state: Any, emissions: Iterable[tuple[int, str]], observer: Observer) -> Bands:
+    """Return the bands of renders of a scene.
+
+    state: its nodes, from Mitsuba's parser. emissions: node and parameter of those of its emitters.
+    """
+    curves = observer.curves(WAVES)
+    seen, emitted = np.linalg.norm(observer.response(WAVES), axis=1), np.zeros(len(WAVES))
+    for power in _spectra(state, emissions):
+        contributed = power * seen
+        if total := contributed.sum():
+            emitted += contributed / total
+    if total := emitted.sum():
+        emitted *= (1 / EVEN_SHARE - 1) * curves.sum() / total
+    return Bands(curves, emitted)
+
+
+def _spectra(state: Any, emissions: Iterable[tuple[int, str]]) -> Iterator[Doubles]:
+    """Yield the power at WAVES of each emitter; that of RGB counts as even."""
+    import mitsuba as mi
+
+    for node, parameter in emissions:
+        props = state.nodes[node].props
+        if parameter not in props or props.type(parameter) != mi.Properties.Type.Spectrum:
+            yield np.ones(len(WAVES))
+            continue
+        spectrum = props[parameter]
+        waves, values = np.array(spectrum.wavelengths), np.array(spectrum.values)
+        if len(waves) > 1:
+            yield np.maximum(np.interp(WAVES, waves, values, left=0, right=0), 0)
+
+
+def as_seen(image: Floats, observer: Observer) -> Floats:
+    """Return what a film of `Bands` recorded, (h, w, 3 or 4), as linear Rec.709 (h, w, 3)."""
+    import mitsuba as mi
+
+    matrix = mi.MI_CIE_Y_NORMALIZATION * observer.matrix
+    return np.asarray(image[..., :3] @ matrix.T.astype(np.float32))
+
+
+@dataclass(frozen=True, eq=False)
+class MeasuringPoints:
+    """Points, and the directions in which irradiance is measured there.
+
+    positions: (p, 3) in scene units. normals: (p, 3), unit vectors. is_cylindrical: (p,), whether
+    the irradiance is the mean over all directions perpendicular to the normal. is_split: whether
+    light that comes straight from emitters is kept apart from all other.
+    """
+
+    positions: Doubles
+    normals: Doubles
+    is_cylindrical: Bools
+    is_split: bool = False
+
+    def __post_init__(self) -> None:
+        count = len(self.positions)
+        if not 0 < count <= MAX_PIXELS:
+            raise SceneError(f"{count} measuring points: expected 1 to {MAX_PIXELS}")
+        if not np.isfinite(self.positions).all():
+            raise SceneError("a measuring point has a position that is not finite")
+        if not np.allclose(np.linalg.norm(self.normals, axis=1), 1, atol=1e-5):
+            raise SceneError("the normal of a measuring point is not of unit length")
+
+    def __len__(self) -> int:
+        return len(self.positions)
+
+    def place_beside(self) -> Any:
+        """Return a place from which all points are about equally far, as an `mi.Point3f`."""
+        import mitsuba as mi
+
+        low, high = self.positions.min(axis=0), self.positions.max(axis=0)
+        return mi.Point3f(*map(float, high + np.linalg.norm(high - low) + 1))
+
+    def identify(self, content: str) -> str:
+        """Return the identity of `content`, a hash of a scene, seen at these points."""
+        digest = hashlib.sha256(content.encode())
+        for values in (self.positions, self.normals, self.is_cylindrical):
+            digest.update(np.ascontiguousarray(values).tobytes())
+        if self.is_split:
+            digest.update(b"split")
+        return digest.hexdigest()[:32]
 
 
 @dataclass(frozen=True)

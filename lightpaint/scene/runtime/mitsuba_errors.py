@@ -10,8 +10,7 @@ from contextlib import contextmanager
 from pathlib import Path
 
 from lightpaint.errors import SceneError
-from lightpaint.file_reading import read_bytes
-from lightpaint.files import one_line, without_path
+from lightpaint.files import one_line, read_bytes, without_path
 from lightpaint.scene.checks.tokens import attributes, markup
 from lightpaint.scene.properties.integrator import IntegratorChoice
 from lightpaint.scene.runtime.plugins import UnknownPluginError

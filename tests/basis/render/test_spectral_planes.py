@@ -24,7 +24,7 @@ from lightpaint.lighting.answer.lighting import Lighting
 from lightpaint.pipeline.job.job_checks import remarks_of_scene
 from lightpaint.relit.relit_scene import relight
 from lightpaint.relit.verification_render import verify
-from lightpaint.scene.properties.measuring_points import MeasuringPoints
+from lightpaint.scene.properties.film import MeasuringPoints
 from lightpaint.scene.scene_reader import load_scene
 
 WAVES = np.arange(380, 781.0)

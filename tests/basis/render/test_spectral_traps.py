@@ -25,7 +25,7 @@ from lightpaint.lighting.unknowns.reduction import lamps_by_name
 from lightpaint.relit.relit_scene import relight
 from lightpaint.relit.verification import LightShares, with_light_tests
 from lightpaint.relit.verification_render import verify
-from lightpaint.scene.properties import observed_spectra
+from lightpaint.scene.properties import film
 from lightpaint.scene.runtime.variant import spectral_variant, use_variant
 from lightpaint.scene.scene_reader import load_scene
 from lightpaint.scene.scene_render import Stream, render
@@ -209,8 +209,8 @@ def test_wavelengths_of_the_emitters_leave_less_noise(tmp_path: Path, monkeypatc
     lighting = Lighting.of_weights(basis, np.ones((1, 3)), lamps={0: part})
     relit = relight(load_scene(tmp_path / "wall.xml"), lighting, tmp_path / "relit.xml")
     variances, means = [], []
-    for share in (1.0, observed_spectra.EVEN_SHARE):
-        monkeypatch.setattr(observed_spectra, "EVEN_SHARE", share)
+    for share in (1.0, film.EVEN_SHARE):
+        monkeypatch.setattr(film, "EVEN_SHARE", share)
         picture = render(relit, spp=256, seed=3, stream=Stream.VERIFICATION)
         variances.append(float(np.square(picture.half_difference).mean()))
         means.append(picture.image.mean(axis=(0, 1)))

@@ -23,7 +23,7 @@ from lightpaint.images.object_map import Objects
 from lightpaint.lighting.analysis.surface_colors import surface_colors
 from lightpaint.lighting.constraints.constraints import Constraints
 from lightpaint.lighting.solver import solve
-from lightpaint.report.page.rendering_section import rendering_section
+from lightpaint.report.page.lights_table import rendering_section
 from lightpaint.scene.scene_reader import load_scene
 from lightpaint.scene.surfaces import render_reflectances
 from lightpaint.target.target import Target

@@ -19,10 +19,10 @@ from lightpaint.colour.display.view_transform import curve_of, lattice_of
 from lightpaint.colour.primaries import to_8_bit
 from lightpaint.images.packed_picture import BRIGHTEST, DROPPED_BITS, PackedPicture, pack_picture
 from lightpaint.lighting.answer.lighting import Lighting
+from lightpaint.report.measures import ReportedAnswer
 from lightpaint.report.page.html import ROWS_SHOWN
 from lightpaint.report.page.mixer import mixer_assets, mixer_html
 from lightpaint.report.page.page import report_page
-from lightpaint.report.reported_answer import ReportedAnswer
 
 SIZE = (36, 64)
 EVIL = "</script><script>document.title='x'</script>"
