@@ -32,8 +32,7 @@ from lightpaint.batch.distributed_work import PartwiseRender
 from lightpaint.batch.engine import Engine, InProcess, RunOptions
 from lightpaint.batch.plan.planner import plan_batch
 from lightpaint.batch.run import run_batch
-from lightpaint.batch.work.task import Task
-from lightpaint.batch.work.work_items import SceneFilm
+from lightpaint.batch.work.work_items import SceneFilm, Task
 from lightpaint.batch.work.worker_storage import WorkerCache
 from lightpaint.images.formats.exr import write_rgb
 from lightpaint.pipeline.job.sources import SceneFile

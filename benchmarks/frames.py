@@ -21,8 +21,8 @@ from scipy.ndimage import gaussian_filter
 
 import lightpaint as lp
 from lightpaint.arrays import Doubles
-from lightpaint.lighting.animated_solve import solve_frames
 from lightpaint.lighting.answer.lighting_keys import LightingKey, weights_at
+from lightpaint.lighting.solver import solve_frames
 
 ROOT = Path(__file__).resolve().parent.parent
 sys.path.insert(0, str(ROOT / "tests"))

@@ -12,7 +12,7 @@ from PIL import Image
 
 import lightpaint as lp
 from lightpaint.basis.file import basis_file, file_planes
-from lightpaint.images import bands, denoiser
+from lightpaint.images import denoiser, pixel_blocks
 from lightpaint.images.formats.png import png_bytes
 from lightpaint.lighting.loss import loss
 from lightpaint.report import answer_pictures
@@ -32,10 +32,10 @@ def stay_in_the_file(patch: pytest.MonkeyPatch, large: int) -> None:
     # A few rows: a walk along single ones would take most of the time.
     patch.setattr(file_planes, "STRIP_CACHE_BYTES", 16 * large)
     patch.setattr(file_planes, "PICKED_MAX_BYTES", 16 * large)
-    patch.setattr(bands, "BAND_PIXELS", large // 8)
+    patch.setattr(pixel_blocks, "BAND_PIXELS", large // 8)
     patch.setattr(loss, "MAX_KEPT_PIXELS", large)
     patch.setattr(loss, "STRIP_PIXELS", min(loss.STRIP_PIXELS, large // 4))
-    for module in (bands, denoiser, answer_pictures):
+    for module in (pixel_blocks, denoiser, answer_pictures):
         patch.setattr(module, "LARGE_PICTURE", large)
 
 

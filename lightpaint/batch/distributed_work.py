@@ -28,7 +28,6 @@ from lightpaint.basis.render import (
 )
 from lightpaint.batch.engine import Engine
 from lightpaint.batch.work.item_execution import attempt, job_fields, publish_solved_lights
-from lightpaint.batch.work.task import Task
 from lightpaint.batch.work.work_items import (
     SAMPLE_S,
     GuideTraining,
@@ -38,6 +37,7 @@ from lightpaint.batch.work.work_items import (
     Passes,
     SceneFilm,
     SumsOfRows,
+    Task,
     render_seconds,
 )
 from lightpaint.batch.work.worker_storage import Spool, WorkerCache

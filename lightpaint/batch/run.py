@@ -34,8 +34,7 @@ from lightpaint.batch.work.item_execution import (
     is_disk_full,
     job_fields,
 )
-from lightpaint.batch.work.task import Task
-from lightpaint.batch.work.work_items import ItemResult
+from lightpaint.batch.work.work_items import ItemResult, Task
 from lightpaint.errors import BatchError, LightpaintError, OutputError
 from lightpaint.files import sweep
 from lightpaint.progress import Interrupted, Listener, Progress, listener, silent

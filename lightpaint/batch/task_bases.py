@@ -14,8 +14,7 @@ from lightpaint.batch.distributed_work import PartwiseRender
 from lightpaint.batch.engine import Engine
 from lightpaint.batch.plan.plan import PlaceGroup
 from lightpaint.batch.work.item_execution import SharedPlacing, job_fields
-from lightpaint.batch.work.task import Task, key_of_scene
-from lightpaint.batch.work.work_items import SceneFilm
+from lightpaint.batch.work.work_items import SceneFilm, Task, key_of_scene
 from lightpaint.batch.work.worker_storage import WorkerCache
 from lightpaint.display_text import some_names
 from lightpaint.errors import SceneError

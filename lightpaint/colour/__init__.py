@@ -44,10 +44,6 @@ if TYPE_CHECKING:
     from lightpaint.colour.display.view_transform import ViewTransform as ViewTransform
     from lightpaint.colour.display.view_transform import curve_of as curve_of
     from lightpaint.colour.display.view_transform import lattice_of as lattice_of
-    from lightpaint.colour.icc import Profile as Profile
-    from lightpaint.colour.icc import gamma_profile as gamma_profile
-    from lightpaint.colour.icc import read_icc as read_icc
-    from lightpaint.colour.icc import srgb_profile as srgb_profile
     from lightpaint.colour.lamp import MAX_EMITTERS as MAX_EMITTERS
     from lightpaint.colour.lamp import MAX_SLOTS as MAX_SLOTS
     from lightpaint.colour.lamp import OPAQUE as OPAQUE
@@ -63,14 +59,18 @@ if TYPE_CHECKING:
     from lightpaint.colour.primaries import REC709 as REC709
     from lightpaint.colour.primaries import REC2020 as REC2020
     from lightpaint.colour.primaries import SPACES as SPACES
+    from lightpaint.colour.primaries import Profile as Profile
     from lightpaint.colour.primaries import are_same as are_same
     from lightpaint.colour.primaries import converted as converted
     from lightpaint.colour.primaries import decode_display as decode_display
     from lightpaint.colour.primaries import encode_display as encode_display
     from lightpaint.colour.primaries import from_rec709 as from_rec709
+    from lightpaint.colour.primaries import gamma_profile as gamma_profile
     from lightpaint.colour.primaries import is_rec709 as is_rec709
     from lightpaint.colour.primaries import primaries_in as primaries_in
+    from lightpaint.colour.primaries import read_icc as read_icc
     from lightpaint.colour.primaries import rgb_to_xyz as rgb_to_xyz
+    from lightpaint.colour.primaries import srgb_profile as srgb_profile
     from lightpaint.colour.primaries import to_8_bit as to_8_bit
     from lightpaint.colour.primaries import to_rec709 as to_rec709
     from lightpaint.colour.spectra.color_rendering import ColorRendering as ColorRendering

@@ -5,13 +5,6 @@ from typing import TYPE_CHECKING
 from lightpaint.lazy_names import lazy_names
 
 if TYPE_CHECKING:
-    from lightpaint.images.bands import BAND_PIXELS as BAND_PIXELS
-    from lightpaint.images.bands import LARGE_PICTURE as LARGE_PICTURE
-    from lightpaint.images.bands import bands_of as bands_of
-    from lightpaint.images.bands import by_bands as by_bands
-    from lightpaint.images.bands import in_turns as in_turns
-    from lightpaint.images.bands import is_large as is_large
-    from lightpaint.images.bands import sum_by_bands as sum_by_bands
     from lightpaint.images.denoiser import DARKEST as DARKEST
     from lightpaint.images.denoiser import DENOISED_KEY as DENOISED_KEY
     from lightpaint.images.denoiser import MISSING_REMARK as MISSING_REMARK
@@ -36,18 +29,25 @@ if TYPE_CHECKING:
     from lightpaint.images.picture import naming_file as naming_file
     from lightpaint.images.picture import read_mask as read_mask
     from lightpaint.images.picture import read_picture as read_picture
+    from lightpaint.images.pixel_blocks import BAND_PIXELS as BAND_PIXELS
+    from lightpaint.images.pixel_blocks import LARGE_PICTURE as LARGE_PICTURE
     from lightpaint.images.pixel_blocks import Size as Size
+    from lightpaint.images.pixel_blocks import bands_of as bands_of
     from lightpaint.images.pixel_blocks import block_mean as block_mean
     from lightpaint.images.pixel_blocks import block_pixels as block_pixels
     from lightpaint.images.pixel_blocks import block_sums as block_sums
     from lightpaint.images.pixel_blocks import blocks_in as blocks_in
+    from lightpaint.images.pixel_blocks import by_bands as by_bands
     from lightpaint.images.pixel_blocks import check_factor as check_factor
     from lightpaint.images.pixel_blocks import check_size as check_size
     from lightpaint.images.pixel_blocks import covered as covered
     from lightpaint.images.pixel_blocks import enlarged as enlarged
     from lightpaint.images.pixel_blocks import fitting_factor as fitting_factor
+    from lightpaint.images.pixel_blocks import in_turns as in_turns
+    from lightpaint.images.pixel_blocks import is_large as is_large
     from lightpaint.images.pixel_blocks import left_over as left_over
     from lightpaint.images.pixel_blocks import resampled as resampled
+    from lightpaint.images.pixel_blocks import sum_by_bands as sum_by_bands
     from lightpaint.images.pixel_blocks import whole_factor as whole_factor
     from lightpaint.images.surface_filter import SurfaceFilter as SurfaceFilter
 

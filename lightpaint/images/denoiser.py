@@ -15,9 +15,8 @@ import numpy as np
 from lightpaint.arrays import Floats
 from lightpaint.colour import REC709, rgb_to_xyz
 from lightpaint.errors import SizeError
-from lightpaint.images.bands import LARGE_PICTURE
 from lightpaint.images.estimate import box_mean, shifted
-from lightpaint.images.pixel_blocks import block_mean
+from lightpaint.images.pixel_blocks import LARGE_PICTURE, block_mean
 
 #: Key of the text in a denoised PNG that names the denoiser and the file of the raw render.
 DENOISED_KEY = "lightpaint.denoised"

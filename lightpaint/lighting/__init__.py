@@ -67,7 +67,6 @@ if TYPE_CHECKING:
     from lightpaint.lighting.analysis.noise.uncertainty import error_bars as error_bars
     from lightpaint.lighting.analysis.surface_colors import SurfaceColor as SurfaceColor
     from lightpaint.lighting.analysis.surface_colors import surface_colors as surface_colors
-    from lightpaint.lighting.animated_solve import solve_frames as solve_frames
     from lightpaint.lighting.answer.certificate import Bound as Bound
     from lightpaint.lighting.answer.certificate import Certificate as Certificate
     from lightpaint.lighting.answer.certificate import Software as Software
@@ -130,6 +129,7 @@ if TYPE_CHECKING:
     from lightpaint.lighting.solver import choose_mixes as choose_mixes
     from lightpaint.lighting.solver import solution_of as solution_of
     from lightpaint.lighting.solver import solve as solve
+    from lightpaint.lighting.solver import solve_frames as solve_frames
     from lightpaint.lighting.unknowns.lamp_parts import WholeLamps as WholeLamps
     from lightpaint.lighting.unknowns.reduced_problem import reduced_problems as reduced_problems
     from lightpaint.lighting.unknowns.reduction import Reduction as Reduction

@@ -19,16 +19,15 @@ from lightpaint.keywords import keywords
 from lightpaint.photometry.glare import GlareObserver
 from lightpaint.photometry.measure import DEFAULT_ERROR, LEAST_ERROR
 from lightpaint.photometry.measuring_plane import (
+    PRESETS,
     LightCase,
     MeasuringPlane,
     PowerBudget,
     Ratio,
     Wishes,
 )
-from lightpaint.photometry.observer_placement import CAMERA, ObserverRequest, place_observers
 from lightpaint.photometry.plane_placement import CYLINDRICAL, PlaneRequest, place_plane
-from lightpaint.photometry.room_rays import RoomRays
-from lightpaint.photometry.wish_presets import PRESETS
+from lightpaint.photometry.room_rays import CAMERA, ObserverRequest, RoomRays, place_observers
 from lightpaint.scene import FARTHEST, Scene
 from lightpaint.scene.runtime.variant import use_variant
 from lightpaint.sentences import SourceKey

@@ -16,8 +16,7 @@ from lightpaint.images.formats import png_bytes
 from lightpaint.photometry.false_colour import false_colours
 from lightpaint.photometry.glare import Glare, GlareReading
 from lightpaint.photometry.illuminance import Illuminance, PlaneReading, relative_intervals
-from lightpaint.photometry.measuring_plane import MeasuringPlane, Wishes
-from lightpaint.photometry.wish_presets import PRESETS
+from lightpaint.photometry.measuring_plane import PRESETS, MeasuringPlane, Wishes
 from lightpaint.storage.json_records import strict_json
 
 FORMAT = "lightpaint-illuminance 1"

@@ -10,14 +10,14 @@ if TYPE_CHECKING:
     from lightpaint.relit.export.exports import plain_cell as plain_cell
     from lightpaint.relit.export.exports import relit_part as relit_part
     from lightpaint.relit.export.exports import write_exports as write_exports
-    from lightpaint.relit.export.level_table import Cue as Cue
-    from lightpaint.relit.export.level_table import LevelRow as LevelRow
-    from lightpaint.relit.export.level_table import cue_list_csv as cue_list_csv
-    from lightpaint.relit.export.level_table import level_csv as level_csv
-    from lightpaint.relit.export.level_table import level_document as level_document
-    from lightpaint.relit.export.level_table import level_json as level_json
-    from lightpaint.relit.export.level_table import level_rows as level_rows
     from lightpaint.relit.export.nuke import spoken_unreadable as spoken_unreadable
+    from lightpaint.relit.export.rig_files import Cue as Cue
+    from lightpaint.relit.export.rig_files import LevelRow as LevelRow
+    from lightpaint.relit.export.rig_files import cue_list_csv as cue_list_csv
+    from lightpaint.relit.export.rig_files import level_csv as level_csv
+    from lightpaint.relit.export.rig_files import level_document as level_document
+    from lightpaint.relit.export.rig_files import level_json as level_json
+    from lightpaint.relit.export.rig_files import level_rows as level_rows
     from lightpaint.relit.export.usd import check_usd as check_usd
     from lightpaint.relit.exported_answer import Source as Source
     from lightpaint.relit.formats import FORMS as FORMS

@@ -21,9 +21,9 @@ from lightpaint.lighting import Lighting, LightSetting
 from lightpaint.progress import Listener
 from lightpaint.relit.export.exports import blender_script, plain_cell, scene_script
 from lightpaint.relit.export.fixtures import fixtures_csv, fixtures_json
-from lightpaint.relit.export.mvr_copy import show_copy
 from lightpaint.relit.export.nuke import needs_copy, nuke_lights, nuke_script, spoken_unreadable
 from lightpaint.relit.export.program_axes import SkyMap
+from lightpaint.relit.export.rig_files import show_copy
 from lightpaint.relit.export.usd import check_usd, usd_overrides
 from lightpaint.relit.export.usd_groups import usd_multipliers
 from lightpaint.relit.exported_answer import (

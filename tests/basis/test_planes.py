@@ -28,7 +28,7 @@ from lightpaint.errors import BasisError, ImageError
 from lightpaint.images.formats import exr_rows
 from lightpaint.images.formats.exr_rows import RowFile
 from lightpaint.lighting.fit import Fit
-from lightpaint.lighting.loss.pixel_bins import bin_pixels
+from lightpaint.lighting.loss.lit_pixels import bin_pixels
 from lightpaint.lighting.problem import Problem
 
 PACKAGE = Path(lightpaint.__file__).parent

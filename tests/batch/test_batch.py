@@ -29,8 +29,7 @@ from lightpaint.batch.manifest.manifest import read_manifest
 from lightpaint.batch.plan.planner import plan_batch
 from lightpaint.batch.run import _Run, run_batch
 from lightpaint.batch.work import item_execution
-from lightpaint.batch.work.task import Task
-from lightpaint.batch.work.work_items import ItemResult
+from lightpaint.batch.work.work_items import ItemResult, Task
 from lightpaint.errors import BatchError, OutputError
 from lightpaint.images.formats.exr import write_rgb
 from lightpaint.lighting.answer.lighting_file import read_lighting

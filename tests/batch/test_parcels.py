@@ -12,8 +12,7 @@ from lightpaint.batch.cluster.parcels import FileHashes, Parcel, ParcelStore, pa
 from lightpaint.batch.plan.planner import plan_batch
 from lightpaint.batch.run import run_batch
 from lightpaint.batch.work.item_execution import run_item
-from lightpaint.batch.work.task import Task
-from lightpaint.batch.work.work_items import ItemResult, WorkItem
+from lightpaint.batch.work.work_items import ItemResult, Task, WorkItem
 from lightpaint.batch.work.worker_storage import WorkerCache
 from lightpaint.errors import BatchError, OutputError
 from lightpaint.progress import silent

@@ -402,7 +402,7 @@ def test_help_does_not_wait_for_mitsuba(tmp_path: Path) -> None:
 
 def test_commands_load_scipy_where_they_need_it() -> None:
     """It takes as long to load as all modules of a command."""
-    code = "import sys, lightpaint.cli.commands.solve_command; print(*sys.modules)"
+    code = "import sys, lightpaint.cli.commands.render_commands; print(*sys.modules)"
     completed = subprocess.run(
         [sys.executable, "-c", code], capture_output=True, text=True, check=True
     )

@@ -8,8 +8,13 @@ import pytest
 from picture_files import ADOBE, P3, SRGB, SRGB_CURVE, curv, icc, para
 from PIL import Image, ImageCms
 
-from lightpaint.colour.icc import gamma_profile, read_icc
-from lightpaint.colour.primaries import colour_science, decode_display, encode_display
+from lightpaint.colour.primaries import (
+    colour_science,
+    decode_display,
+    encode_display,
+    gamma_profile,
+    read_icc,
+)
 from lightpaint.errors import ImageError
 
 

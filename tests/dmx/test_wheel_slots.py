@@ -21,7 +21,7 @@ from lightpaint.dmx.rig_scene import cd_per_unit, lights_text, scene_text
 from lightpaint.dmx.spot_cone import solid_angle
 from lightpaint.lighting.answer.lighting import Lighting, LightSetting
 from lightpaint.lighting.constraints.constraints import LightConstraint
-from lightpaint.relit.export.level_table import Cue, cue_list_csv, level_rows
+from lightpaint.relit.export.rig_files import Cue, cue_list_csv, level_rows
 
 #: Name, colour under D65, and the levels of each slot.
 SLOTS = (

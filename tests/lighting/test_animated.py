@@ -10,8 +10,8 @@ from scipy.optimize import lsq_linear
 
 import lightpaint as lp
 from lightpaint.errors import LightingError
-from lightpaint.lighting.animated_solve import TIE, solve_frames
 from lightpaint.lighting.answer.lighting_keys import LightingKey, key_slopes, weights_at
+from lightpaint.lighting.solver import TIE, solve_frames
 
 
 def keys_of(frames: Any, weights: Any) -> list[LightingKey]:

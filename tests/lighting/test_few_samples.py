@@ -21,8 +21,8 @@ from lightpaint.lighting.analysis.noise.noise_correction import correct_noise
 from lightpaint.lighting.fit import resolve_for_targets
 from lightpaint.lighting.live.live import LiveSolver
 from lightpaint.lighting.live.live_view import LiveView
+from lightpaint.lighting.loss.lit_pixels import bin_pixels, block_side
 from lightpaint.lighting.loss.painting_loss import PaintingLoss
-from lightpaint.lighting.loss.pixel_bins import bin_pixels, block_side
 
 SCENES = Path(__file__).parent.parent.parent / "scenes"
 FILMS = {"cornell": "32x32", "stage": "80x45", "gallery": "80x45"}

@@ -12,10 +12,10 @@ from lightpaint.lighting.live import live as live_module
 from lightpaint.lighting.live import many_lights
 from lightpaint.lighting.live.live import LiveSolver
 from lightpaint.lighting.live.live_view import LiveView
+from lightpaint.lighting.live.many_lights import SomeLights
 from lightpaint.lighting.problem import Problem
 from lightpaint.lighting.solver import solution_of
 from lightpaint.lighting.unknowns.reduction import reduce_to
-from lightpaint.lighting.unknowns.some_lights import SomeLights
 from lightpaint.target.target import Target
 
 LIGHTS, SIZE = 24, (30, 40)

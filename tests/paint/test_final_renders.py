@@ -19,7 +19,7 @@ from lightpaint.images.estimate import read_estimate
 from lightpaint.images.formats.exr import read_parts
 from lightpaint.lighting.answer.lighting import Lighting
 from lightpaint.paint import protocol
-from lightpaint.paint.studio import final_renders
+from lightpaint.paint.studio import session_exports
 from lightpaint.pipeline import relit_renders
 from lightpaint.pipeline.relit_renders import DENOISED, render_final
 
@@ -176,7 +176,7 @@ def test_final_renders_go_in_the_order_of_their_requests(
 ) -> None:
     """Also if the exact answer of a later one is there first."""
     is_second_answered = Event()
-    solve = final_renders.FinalRenders._run
+    solve = session_exports.FinalRenders._run
 
     def run(self: Any, number: int, message: protocol.RenderFinal) -> None:
         exact_answer = self._exact_answer
@@ -195,7 +195,7 @@ def test_final_renders_go_in_the_order_of_their_requests(
         mine._exact_answer = late if number == 1 else early
         solve(mine, number, message)
 
-    monkeypatch.setattr(final_renders.FinalRenders, "_run", run)
+    monkeypatch.setattr(session_exports.FinalRenders, "_run", run)
     moving.send(request())
     moving.send(request())
     wait_for(moving, "done", 2)

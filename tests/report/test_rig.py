@@ -16,10 +16,10 @@ from lightpaint.report.rig.hung_lights import (
     HungLight,
     HungLights,
     LightChange,
+    ViewGeometry,
     spoken_fraction,
 )
 from lightpaint.report.rig.rig_drawing import CHANGED, FINER, plan_and_elevation, rig_drawing
-from lightpaint.report.rig.view_geometry import ViewGeometry
 from lightpaint.scene.properties.site import EmitterPlace, Site
 
 EYE, FOCAL, SIZE = np.array([0.5, 1.5, 4.0]), 60.0, (48, 64)

@@ -12,8 +12,7 @@ from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 
-from lightpaint.batch.work.task import Task
-from lightpaint.batch.work.work_items import ItemResult, WorkItem
+from lightpaint.batch.work.work_items import ItemResult, Task, WorkItem
 from lightpaint.display_text import some_names
 from lightpaint.errors import BatchError, OutputError
 from lightpaint.files import first_line

@@ -35,7 +35,7 @@ from lightpaint.batch.manifest.file_names import SUMMARY, THUMBNAILS
 from lightpaint.batch.plan.journal import JournalLine
 from lightpaint.batch.plan.plan import PlaceGroup, Plan, PlannedLook, PlanStep
 from lightpaint.batch.work.item_execution import job_fields
-from lightpaint.batch.work.task import Kind, Task
+from lightpaint.batch.work.work_items import Kind, Task
 from lightpaint.batch.work.worker_storage import WorkerCache
 from lightpaint.colour import ViewTransform
 from lightpaint.display_text import visible

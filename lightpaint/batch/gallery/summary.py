@@ -18,7 +18,7 @@ from lightpaint.basis import light_images
 from lightpaint.batch.manifest.file_names import SUMMARY_FORMAT, THUMBNAILS
 from lightpaint.batch.plan.journal import JournalLine
 from lightpaint.batch.plan.plan import Plan, PlannedLook
-from lightpaint.batch.work.task import EXPORT, Kind
+from lightpaint.batch.work.work_items import EXPORT, Kind
 from lightpaint.colour import ViewTransform, choose_exposure, to_8_bit
 from lightpaint.errors import LightpaintError
 from lightpaint.files import read_text, replacing

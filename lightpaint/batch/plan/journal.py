@@ -19,7 +19,7 @@ from typing import Any, Literal
 from lightpaint.batch.manifest.entries import LookEntry
 from lightpaint.batch.manifest.file_names import JOURNAL, JOURNAL_PART
 from lightpaint.batch.manifest.keys import Final, Handover
-from lightpaint.batch.work.task import Kind
+from lightpaint.batch.work.work_items import Kind
 from lightpaint.errors import BatchError, LightpaintError, OutputError
 from lightpaint.files import read_bytes, write_text
 from lightpaint.storage.json_records import read_record, strict_json

@@ -12,8 +12,7 @@ from pathlib import Path
 
 from lightpaint.batch.manifest.entries import LookEntry
 from lightpaint.batch.manifest.file_names import PLACES
-from lightpaint.batch.work.task import Kind, Task, render_settings
-from lightpaint.batch.work.work_items import SAMPLE_S, render_seconds
+from lightpaint.batch.work.work_items import SAMPLE_S, Kind, Task, render_seconds, render_settings
 from lightpaint.batch.work.worker_storage import WorkerCache
 from lightpaint.display_text import some_names
 from lightpaint.errors import BatchError, LightpaintError

@@ -25,7 +25,14 @@ from lightpaint.batch.plan.plan import (
     places_of,
 )
 from lightpaint.batch.work.derived_looks import adjusted_light_count, derived_folder
-from lightpaint.batch.work.task import EXPORT, Task, answer_task, bases_of, export_task, render_task
+from lightpaint.batch.work.work_items import (
+    EXPORT,
+    Task,
+    answer_task,
+    bases_of,
+    export_task,
+    render_task,
+)
 from lightpaint.batch.work.worker_storage import WorkerCache
 from lightpaint.display_text import some_names
 from lightpaint.errors import LOOK_ERRORS, BatchError, LightpaintError

@@ -17,14 +17,15 @@ from lightpaint.batch.work.derived_looks import (
     measure_derived,
     publish_derived,
 )
-from lightpaint.batch.work.task import EXPORT, Task
 from lightpaint.batch.work.work_items import (
+    EXPORT,
     GuideTraining,
     ItemResult,
     PartOfBasis,
     Passes,
     PathMap,
     SumsOfRows,
+    Task,
     WorkItem,
 )
 from lightpaint.batch.work.worker_storage import WorkerCache

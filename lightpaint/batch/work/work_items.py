@@ -1,25 +1,46 @@
-"""Work items, which engines run: steps of looks (see task.py), and parts of renders.
+"""Work items, which engines run: steps of looks, and parts of renders.
 
 A work item is files and plain values. It can be sent anywhere and done twice, with the same result.
 """
 
 import json
-from collections.abc import Callable
-from dataclasses import dataclass, field, replace
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import asdict, dataclass, field, replace
+from pathlib import Path
 from typing import Any, Literal, Protocol
 
 from lightpaint.basis.render import Part
-from lightpaint.batch.manifest.keys import Final
+from lightpaint.batch.manifest.entries import LookEntry
+from lightpaint.batch.manifest.keys import SHIFTED_WORDS, Final, Handover, Space
 from lightpaint.colour import Observer
+from lightpaint.errors import BatchError
 from lightpaint.lighting import Emitters
-from lightpaint.pipeline import Painting, SceneFile, vars_of
+from lightpaint.pipeline import (
+    BasisFile,
+    GroupsFile,
+    Painting,
+    PlacementFile,
+    SceneFile,
+    Settings,
+    encode_job,
+    vars_of,
+)
 from lightpaint.scene.quality_presets import Quality
+from lightpaint.storage.json_records import read_record, strict_json
 
 #: Map from a path to that on another machine.
 PathMap = Callable[[str], str]
 
 #: Seconds of a sample of one pixel for all lights together, and in addition for each light.
 SAMPLE_S, LIGHT_SAMPLE_S = 9.6e-7, 1e-8
+
+FORMAT: Literal["lightpaint-task 1"] = "lightpaint-task 1"
+
+#: Steps: the answer, its final render, and exports for other programs.
+Kind = Literal["answer", "render", "export"]
+
+#: Folder of the exports, in that of the look.
+EXPORT = "export"
 
 
 class WorkItem(Protocol):
@@ -271,3 +292,184 @@ def scene_with_paths(scene: SceneFile, move: PathMap) -> SceneFile:
 def render_seconds(samples: int, lights: int) -> float:
     """Return the seconds for that many samples of a basis."""
     return samples * (SAMPLE_S + LIGHT_SAMPLE_S * lights)
+
+
+@dataclass(frozen=True)
+class Task:
+    """A step of one look, of files and plain values.
+
+    look: name. kind: step. job: the text of `Job.to_json`; without a target if it is derived.
+    lightings: files that it combines; source_files: all others but bases; share, space: between two
+    lightings; mireds: how much warmer. final: options of the final render. handover: exports for
+    other programs. bases: keys of its bases; files: where these are saved, "" if they have to be
+    obtained; former_look_files: the pictures before lights were moved. places: file of the places
+    of lights that may move, which one search for all looks that share them writes. expected_s:
+    rough estimate of its time. is_by_sums: whether only the lighting is requested.
+    """
+
+    look: str
+    kind: Kind
+    job: str
+    lightings: tuple[str, ...] = ()
+    source_files: tuple[str, ...] = ()
+    share: float = 0.0
+    space: Space = "log"
+    mireds: float = 0.0
+    final: Final = field(default_factory=Final)
+    handover: Handover = field(default_factory=Handover)
+    bases: tuple[str, ...] = ()
+    files: tuple[str, ...] = ()
+    former_look_files: tuple[str, ...] = ()
+    places: str = ""
+    expected_s: float = 0.0
+    is_by_sums: bool = False
+    format: Literal["lightpaint-task 1"] = FORMAT
+
+    @property
+    def name(self) -> str:
+        """Name of the look; see `WorkItem`."""
+        return self.look
+
+    @property
+    def output_folder(self) -> str:
+        """Folder of the results; see `WorkItem`."""
+        return str(json.loads(self.job)["folder"])
+
+    @property
+    def force(self) -> bool:
+        """True if results of something else, or changed by hand, are replaced."""
+        return bool(json.loads(self.job)["settings"]["force"])
+
+    @property
+    def input_files(self) -> tuple[str, ...]:
+        """Files that it reads (see `WorkItem`); a render needs those beside its lighting, too."""
+        results: list[str] = []
+        if self.kind == "render":
+            results = [str(x) for x in sorted(Path(self.output_folder).rglob("*")) if x.is_file()]
+        places = [self.places] if self.places and self.kind == "answer" else []
+        return tuple(dict.fromkeys([*self.source_files, *self.lightings, *places, *results]))
+
+    @property
+    def local_files(self) -> tuple[str, ...]:
+        """Saved bases; see `WorkItem`."""
+        return tuple(file for file in (*self.files, *self.former_look_files) if file)
+
+    def with_paths(self, move: PathMap) -> "Task":
+        """Return the same task with other paths."""
+        return replace(
+            self,
+            job=json.dumps(_map_paths(json.loads(self.job), move)),
+            bases=tuple(json.dumps(_map_paths(json.loads(key), move)) for key in self.bases),
+            lightings=tuple(map(move, self.lightings)),
+            source_files=tuple(map(move, self.source_files)),
+            files=tuple(file and move(file) for file in self.files),
+            former_look_files=tuple(file and move(file) for file in self.former_look_files),
+            places=self.places and move(self.places),
+        )
+
+    def to_json(self) -> str:
+        """Return this task as text, for another process."""
+        return json.dumps(asdict(self))
+
+    @staticmethod
+    def from_json(text: str) -> "Task":
+        """Return the task that `to_json` wrote. Raises BatchError for anything else."""
+        try:
+            data = strict_json(text)
+            numbers = {
+                key: data.pop(key) for key in ("expected_s", "mireds", "share") if key in data
+            }
+            return read_record(Task, {**data, **{k: float(v) for k, v in numbers.items()}})
+        except (AttributeError, TypeError, ValueError) as error:
+            reason = " ".join(str(error).split())
+            raise BatchError(f"this is not a task: {reason}; make one with Task.to_json") from None
+
+
+def answer_task(
+    entry: LookEntry,
+    folders: Mapping[str, Path],
+    *,
+    source_files: Sequence[Path] = (),
+    force: bool,
+    command: str,
+) -> Task:
+    """Return the task of a look's answer. folders: of all looks, by name."""
+    lightings = [str(folders[name] / "lighting.json") for name in entry.combined_looks]
+    return Task(
+        entry.name,
+        "answer",
+        encode_job(
+            entry.scenes,
+            entry.paintings,
+            entry.basis,
+            entry.constraints,
+            replace(entry.settings, force=force, command=command),
+            folder=str(folders[entry.name]),
+            by_sensor=entry.by_sensor,
+            placement=PlacementFile(entry.places) if entry.places else None,
+        ),
+        tuple([entry.lighting] if entry.lighting else lightings),
+        tuple(map(str, source_files)),
+        entry.share,
+        entry.space,
+        SHIFTED_WORDS.get(entry.variation, 0.0),
+        entry.final,
+        entry.handover,
+        bases_of(entry),
+        ("",) * len(bases_of(entry)),
+        places=entry.places,
+        is_by_sums=entry.is_by_sums,
+    )
+
+
+def render_task(answer: Task, entry: LookEntry, folder: Path) -> Task:
+    """Return the task of a look's final render. answer: the task of its answer, in `folder`."""
+    lighting = str(folder / "lighting.json")
+    return Task(
+        entry.name, "render", answer.job, (lighting,), answer.source_files, final=entry.final
+    )
+
+
+def export_task(answer: Task, entry: LookEntry, folder: Path) -> Task:
+    """Return the task of a look's exports. answer: the task of its answer, in `folder`."""
+    lighting = str(folder / "lighting.json")
+    # An export to light groups needs their names.
+    bases = answer.bases if isinstance(entry.basis, GroupsFile) else ()
+    options: dict[str, Any] = {"handover": entry.handover, "bases": bases}
+    return Task(entry.name, "export", answer.job, (lighting,), answer.source_files, **options)
+
+
+def bases_of(entry: LookEntry) -> tuple[str, ...]:
+    """Return the key of each basis that a look is solved with: equal keys mean equal bases."""
+    if entry.basis is not None:
+        return (key_of_basis(entry.basis),)
+    return tuple(key_of_scene(scene, entry.settings, entry.places) for scene in entry.scenes)
+
+
+def key_of_basis(basis: BasisFile | GroupsFile) -> str:
+    """Return the key of a saved basis, or of light groups."""
+    return json.dumps({"basis": asdict(basis)})
+
+
+def key_of_scene(scene: SceneFile, settings: Settings, places: str = "") -> str:
+    """Return the key of a rendered basis: the scene with its sensor, and the render settings.
+
+    places: file of the places of lights that may move; "" for the basis of the unchanged scene.
+    """
+    key = {"scene": asdict(scene), **render_settings(settings)}
+    return json.dumps(key | ({"places": places} if places else {}))
+
+
+def render_settings(settings: Settings) -> dict[str, Any]:
+    """Return the settings that a rendered basis depends on, by name."""
+    names = ("spp", "time_s", "error", "seed", "resolution", "quality", "use_cache", "exact_spp")
+    return {name: getattr(settings, name) for name in names}
+
+
+def _map_paths(content: Any, move: PathMap) -> Any:
+    """Return a job's plain values with other paths; `move` leaves all other texts unchanged."""
+    if isinstance(content, dict):
+        return {key: _map_paths(value, move) for key, value in content.items()}
+    if isinstance(content, list):
+        return [_map_paths(value, move) for value in content]
+    return move(content) if isinstance(content, str) else content

@@ -20,13 +20,13 @@ from lightpaint.basis import Basis, read_basis
 from lightpaint.basis.cache import PARTS, folder, is_trusted_owner
 from lightpaint.basis.render import Part, PartRenderer
 from lightpaint.batch.manifest.keys import Final
-from lightpaint.batch.work.task import key_of_basis
 from lightpaint.batch.work.work_items import (
     PaintingOfSums,
     PartOfBasis,
     Passes,
     SceneFilm,
     SumsOfRows,
+    key_of_basis,
 )
 from lightpaint.errors import BasisError, OutputError
 from lightpaint.files import first_line

@@ -21,6 +21,7 @@ from lightpaint.lighting import Constraints, constraints_of, read_lighting, with
 from lightpaint.photometry.illuminance import Illuminance
 from lightpaint.photometry.measure import measure_illuminance
 from lightpaint.photometry.measure_glare import measure_glare
+from lightpaint.photometry.measuring_plane import PRESETS
 from lightpaint.photometry.planes_file import planes_file_beside, read_planes
 from lightpaint.photometry.readings_file import (
     POINTS,
@@ -30,7 +31,6 @@ from lightpaint.photometry.readings_file import (
     readings_files,
     write_readings,
 )
-from lightpaint.photometry.wish_presets import PRESETS
 from lightpaint.pipeline import (
     PLAN,
     LightPlan,

@@ -33,8 +33,8 @@ from lightpaint.lighting.live.live_sums import MAX_FILM_PIXELS, Films, SmallFilm
 from lightpaint.lighting.live.live_view import LiveView
 from lightpaint.lighting.live.many_lights import MANY_LIGHTS, MAX_FILM_VALUES, ManyLights
 from lightpaint.lighting.loss.expected_lights import ExpectedLights, Wash
+from lightpaint.lighting.loss.lit_pixels import block_side
 from lightpaint.lighting.loss.painting import unpainted_weight
-from lightpaint.lighting.loss.pixel_bins import block_side
 from lightpaint.lighting.loss.weight_penalty import PaintTerms, joint_pull, pull_to_current
 from lightpaint.lighting.normal_equations import NormalEquations
 from lightpaint.lighting.unknowns.gamuts import Gamuts, PaintedLight

@@ -1,26 +1,62 @@
-"""The pixels that count, with each light's part of them: the data of a descent."""
+"""The pixels that count, with each light's part of them, the data of a descent: one by one, or
+averaged in blocks where single ones are mostly noise.
 
+The mean display value of a noisy pixel differs from the display value of its mean light, since the
+curve of the display is bent, and steepest in the dark. A fit of noisy pixels makes up for that with
+light that nobody painted, and a lamp that shows only in stray pixels may get any weight. The remedy
+is the average of a block: many more samples of nearly the same light. The noise of the current
+look, as the display shows it, determines the size of blocks.
+"""
+
+from collections.abc import Sequence
 from dataclasses import dataclass
-from functools import cached_property
+from functools import cached_property, partial
 
 import numpy as np
 
-from lightpaint.arrays import Doubles, Floats, Indices
-from lightpaint.basis import Basis, Planes, mix_channels
+from lightpaint.arrays import Bools, Doubles, Floats, Indices
+from lightpaint.basis import (
+    BLOCK_PIXELS,
+    Basis,
+    Planes,
+    as_planes,
+    block_means,
+    in_one_row,
+    mix_channels,
+    spooled,
+)
+from lightpaint.colour import ViewTransform
+from lightpaint.images import Estimate, block_sums, enlarged
+from lightpaint.lighting.joined_views import Views
 from lightpaint.lighting.loss.loss import (
+    Cut,
     Loss,
     PixelLoss,
     SquaredPixels,
     Squares,
     image_in_place,
 )
+from lightpaint.lighting.loss.weight_penalty import pull_to_current
 from lightpaint.lighting.normal_equations import NormalEquations
+from lightpaint.progress import with_progress
 
 #: Share of pixels with other squares up to which a problem is updated rather than summed anew.
 MAX_UPDATED_SHARE = 0.25
 
 #: Share of pixels without importance from which a copy of the others is worth its time.
 MIN_SKIPPED_SHARE = 0.1
+
+#: Largest RMS noise of the current look, relative to the display's range, at which single pixels
+#: are fitted: that of some 32 samples per pixel on the shipped scenes (docs/benchmarks.md).
+NOISY_DISPLAY = 0.035
+
+#: Sides of blocks to try, and the fewest blocks along the shorter side of a picture.
+BLOCK_SIDES, MIN_BLOCKS = (1, 2, 3, 4, 6, 8), 16
+#: Pixels that suffice to measure the noise of a picture, and rows of a strip of them.
+NOISE_PIXELS, STRIP_ROWS = 2**16, 24
+
+#: Strength of the pull to the current lighting in proportion to the noise of a light.
+PRIOR_STRENGTH = 0.1
 
 
 @dataclass(frozen=True)
@@ -197,3 +233,134 @@ class DeferredSquares(Squares):
         """Forget the arrays, which are made again when somebody asks for them."""
         for name in ("_arrays", "importance", "pixels"):
             self.__dict__.pop(name, None)
+
+
+@dataclass(frozen=True)
+class BinnedPixels:
+    """Blocks of all views behind each other, as a picture of one row.
+
+    Attributes:
+        basis: (n, 1, p, 3) images of the lights, means over each block, weighted by importance.
+        loss: The loss of a picture of these blocks; one counts as much as all its pixels.
+        side: Pixels along the side of a block.
+    """
+
+    basis: Basis
+    loss: Loss
+    side: int
+
+    @cached_property
+    def equations(self) -> NormalEquations:
+        """The linear problem at the current lighting, with the importance of all pixels of a
+        block."""
+        goal = self.loss.goal(self.basis.current_look)
+        return NormalEquations.of(self.basis, goal, self.loss.importance[..., None])
+
+    @cached_property
+    def prior(self) -> NormalEquations:
+        """The pull s Σᵢ Nᵢ (wᵢ − presentᵢ)², Nᵢ the noise's power in the blocks of light i, s
+        `PRIOR_STRENGTH`.
+
+        Samples determine a light as far as its power exceeds its noise; for a light that is all
+        noise the current lighting is the best guess. M contains N anyway, where it pulls towards 0.
+        """
+        current = self.basis.current_weights
+        current_picture = LitPixels.whole(self.basis, self.loss).predicted(current)
+        _, weight = self.loss.pixels.squares(current_picture, from_clipping=False)
+        power = np.zeros(current.shape)
+        for start in with_progress(range(0, weight.shape[1], BLOCK_PIXELS)):
+            where = slice(start, start + BLOCK_PIXELS)
+            halves = self.basis.noise.pixels(where).astype(np.float64)
+            power += np.einsum("cp,npc->nc", weight[:, where], np.square(halves))
+        return pull_to_current(PRIOR_STRENGTH * power, current)
+
+
+def block_side(bases: Sequence[Basis], transform: ViewTransform | None) -> int:
+    """Return the side, in pixels, of blocks whose noise is small on a display; 1 for no blocks.
+
+    The noise is that of the current look, not of the painting, so that no stroke changes the
+    problem elsewhere. The side is 1 for unknown noise, and in linear light, where the equations
+    are corrected for noise.
+    """
+    if transform is None or not all(basis.knows_noise for basis in bases):
+        return 1
+    shortest = min(min(basis.size) for basis in bases)
+    sides = [side for side in BLOCK_SIDES if shortest >= MIN_BLOCKS * side]
+    if len(sides) < 2:
+        return 1
+    strips = [_strips(basis) for basis in bases]
+    for side in sides:
+        noise = [_display_noise(look, half, seen, transform, side) for look, half, seen in strips]
+        if np.sqrt(np.mean(np.concatenate(noise))) <= NOISY_DISPLAY:
+            return side
+    return sides[-1]
+
+
+def _strips(basis: Basis) -> tuple[Floats, Floats, Bools]:
+    """Return the current look of enough of a picture, its half difference, and the pixels of
+    emitters.
+
+    The strips, of whole blocks of any side, are spread over the picture.
+    """
+    step = max(1, basis.emitters_seen.size // NOISE_PIXELS)
+    rows = np.flatnonzero(np.arange(basis.size[0]) // STRIP_ROWS % step == 0)
+    weights = basis.current_weights
+    pixels = np.flatnonzero(np.repeat(np.isin(np.arange(basis.size[0]), rows), basis.size[1]))
+    picture = (len(rows), basis.size[1], 3)
+    look, half = (
+        x.picked(pixels).mix(weights).reshape(picture) for x in (basis.planes, basis.noise)
+    )
+    return look, half, basis.emitters_seen[rows]
+
+
+def _display_noise(
+    look: Floats, half: Floats, seen: Bools, transform: ViewTransform, side: int
+) -> Doubles:
+    """Return squared half differences of display values of blocks, (k,), without emitters."""
+    unseen = (~seen).astype(np.float64)
+    counts = block_sums(unseen, side)
+    safe = np.where(counts > 0, counts, 1)[..., None]
+    light, noise = (block_sums(x * unseen[..., None], side) / safe for x in (look, half))
+    ends = (transform.encode(np.maximum(light + sign * noise, 0)) for sign in (1, -1))
+    return np.asarray(np.square(np.subtract(*ends, dtype=np.float64) / 2)[counts > 0].ravel())
+
+
+def bin_pixels(views: Views, loss: Loss, side: int) -> BinnedPixels | None:
+    """Return the blocks of a loss over all `views`, with pixels weighted by importance.
+
+    None for a loss that only fits single pixels.
+    """
+    images: list[Planes] = []
+    halves: list[Planes] = []
+    looks: list[Estimate] = []
+    parts: list[tuple[Cut, Doubles]] = []
+    for k, basis in enumerate(views.bases):
+        cut = partial(views.part, k=k)
+        view_loss = loss.cut(cut)
+        counts = view_loss.importance.astype(np.float64)
+        # Emitters that may be brighter count in a block that has nothing else.
+        glows = basis.emitters_seen & view_loss.exceeds(np.inf).all(axis=-1)
+        weights = enlarged(block_sums(np.where(glows, 0, counts), side), side)
+        counts[glows & (weights[: counts.shape[0], : counts.shape[1]] > 0)] = 0
+        # Each step of the solve needs the images again, but only some sums need their noise.
+        images.append(spooled(block_means(basis.planes, counts, side)))
+        halves.append(block_means(basis.noise, counts, side))
+        if basis.former is not None:
+            looks.append(
+                Estimate(
+                    *(
+                        block_means(as_planes(x[None]), counts, side).plane(0).reshape(1, -1, 3)
+                        for x in (basis.former.image, basis.former.half_difference)
+                    )
+                )
+            )
+        parts.append((cut, counts))
+    if (blocks := loss.block_means(parts, side)) is None:
+        return None
+    row, noise = in_one_row(images), in_one_row(halves)
+    look = None
+    if looks:
+        pictures = zip(*((x.image, x.half_difference) for x in looks), strict=True)
+        look = Estimate(*(np.concatenate(parts, axis=1) for parts in pictures))
+    basis = views.bases[0].on_pixels(row, noise, np.zeros(row.size, dtype=bool), look)
+    return BinnedPixels(basis, blocks, side)

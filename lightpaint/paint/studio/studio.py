@@ -52,9 +52,9 @@ from lightpaint.paint.studio.exact_answers import (
     raise_outdated,
 )
 from lightpaint.paint.studio.file_imports import LayerImports, ReferenceImports
-from lightpaint.paint.studio.final_renders import FinalRenders
 from lightpaint.paint.studio.plane_measurements import PlaneMeasurements
 from lightpaint.paint.studio.session_bases import BackgroundSampling, PlaneDenoiser, SessionBases
+from lightpaint.paint.studio.session_exports import FinalRenders
 from lightpaint.paint.subject import Subject
 from lightpaint.progress import cancellable
 

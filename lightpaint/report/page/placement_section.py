@@ -16,9 +16,8 @@ from lightpaint.placement.suggestion import MoveSuggestion, Suggestion
 from lightpaint.report.page.figures import data_uri
 from lightpaint.report.page.html import html
 from lightpaint.report.phrases import spoken_percent
-from lightpaint.report.rig.hung_lights import HungLight, HungLights, spoken_fraction
+from lightpaint.report.rig.hung_lights import HungLight, HungLights, ViewGeometry, spoken_fraction
 from lightpaint.report.rig.rig_drawing import CHANGED, FINER, GROUND, arrow, circle, rig_drawing
-from lightpaint.report.rig.view_geometry import ViewGeometry
 from lightpaint.scene.properties.site import Site
 
 #: Width that narrower pictures are enlarged to.

@@ -12,7 +12,7 @@ from lightpaint.dmx.console_rig import (
     RigLight,
 )
 from lightpaint.dmx.levels import encode_levels
-from lightpaint.relit.export.level_table import Cue, cue_list_csv, level_csv, level_rows
+from lightpaint.relit.export.rig_files import Cue, cue_list_csv, level_csv, level_rows
 
 EMITTERS = tuple(
     RigEmitter(name, xy, 1000.0, ())

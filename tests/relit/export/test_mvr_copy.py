@@ -13,7 +13,7 @@ from lightpaint.arrays import RGB, Position
 from lightpaint.dmx.console_rig import RigLight
 from lightpaint.dmx.mvr import read_rig
 from lightpaint.lighting.answer.lighting import Lighting, LightSetting
-from lightpaint.relit.export.mvr_copy import show_copy
+from lightpaint.relit.export.rig_files import show_copy
 from lightpaint.scene.properties.site import EmitterPlace, Site, unit
 
 #: Matrices have nine digits, places are in micrometres.
