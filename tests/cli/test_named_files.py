@@ -162,6 +162,12 @@ CASES = {
         UNFIT,
     ),
     "show": Given(("rig", "show.mvr", *OUT_RIG, "--room", "room.xml"), "show.mvr", _rig),
+    "room of a show": Given(
+        ("rig", "show.mvr", *OUT_RIG, "--room", "room.xml"),
+        "room.xml",
+        _rig,
+        (b"<scene/>", b"<a/>"),
+    ),
     "type of a fixture": Given(
         ("rig", "show.mvr", *OUT_RIG, "--gdtf", "types"), f"types/{TYPE}", _rig
     ),
