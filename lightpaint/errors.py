@@ -30,10 +30,14 @@ the command line and manifests spell in their own way.
 
 import errno
 import os
+import re
 from collections.abc import Sequence
 from typing import cast
 
 from lightpaint.sentences import Sentence
+
+#: The end of a line of text, and spaces around it.
+_LINE_END = re.compile(r"\s*[\n\r]\s*")
 
 
 class LightpaintError(Exception):
@@ -48,8 +52,12 @@ class LightpaintError(Exception):
     """
 
     def __init__(self, *parts: object) -> None:
-        """Make an error of texts, of data like `Hint("resize", True)`, and of other errors."""
-        super().__init__(Sentence(*parts))
+        """Make an error of texts, of data like `Hint("resize", True)`, and of other errors.
+
+        Texts are put into one line: the repr of an array has several.
+        """
+        texts = (_LINE_END.sub(" ", x) if type(x) is str else x for x in parts)
+        super().__init__(Sentence(*texts))
 
     @property
     def sentence(self) -> Sentence:

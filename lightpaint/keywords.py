@@ -15,6 +15,7 @@ from os import PathLike
 from pathlib import Path
 from types import NoneType, UnionType
 from typing import Any, Literal, TypeVar, Union, get_args, get_origin
+from weakref import WeakSet
 
 from lightpaint.display_text import some_names
 from lightpaint.errors import ArgumentError, KeywordError, LightpaintError, refusal_of
@@ -73,8 +74,10 @@ def is_of_kind(value: Any, kind: Any) -> bool:
     kind = origin or kind
     if kind is None:
         return value is None
-    if kind is Any or not isinstance(kind, type) or getattr(kind, "_is_protocol", False):
-        return True  # Any, or a protocol that no instance can be compared with
+    if kind is Any or not isinstance(kind, type):
+        return True
+    if getattr(kind, "_is_protocol", False):
+        return all(_has(value, name) for name in _members(kind))
     if kind in (float, int):
         expected = Real if kind is float else Integral
         return isinstance(value, expected) and not isinstance(value, bool)
@@ -87,6 +90,18 @@ def is_of_kind(value: Any, kind: Any) -> bool:
     if kind.__name__ == "ndarray":
         return hasattr(value, "__array__")
     return isinstance(value, kind)
+
+
+def _members(protocol: type) -> list[str]:
+    """Return the public attributes and methods that a protocol asks for."""
+    bases = [base for base in protocol.__mro__ if getattr(base, "_is_protocol", False)]
+    names = [x for base in bases for x in (*vars(base), *vars(base).get("__annotations__", ()))]
+    return [name for name in names if not name.startswith("_")]
+
+
+def _has(value: Any, name: str) -> bool:
+    """Return whether a value has an attribute, without computing it."""
+    return inspect.getattr_static(value, name, _has) is not _has
 
 
 def _have_kind(value: Any, origin: Any, inner: tuple[Any, ...]) -> bool:
@@ -144,6 +159,9 @@ def _with_article(noun: str) -> str:
 
 _Call = TypeVar("_Call", bound=Callable[..., Any])
 
+#: Functions that explain their arguments already.
+_EXPLAINED: "WeakSet[Callable[..., Any]]" = WeakSet()
+
 
 def keywords(*passed_on: type) -> Callable[[_Call], _Call]:
     """Make a function, or a class and its public methods, explain arguments that they cannot take.
@@ -154,21 +172,19 @@ def keywords(*passed_on: type) -> Callable[[_Call], _Call]:
     AccessError if the system has refused a file.
 
     passed_on: dataclasses that the function passes its `**` on to. A function with `**` and no such
-    dataclass is left alone: the function that it passes them to checks them.
+    dataclass may have any name: the function that it passes them to checks them.
     """
 
     def decorate(call: _Call) -> _Call:
         inner: Any = call.__init__ if isinstance(call, type) else call  # type: ignore[misc]
         parameters = inspect.signature(inner).parameters
         names = _names(parameters) | {x.name for kind in passed_on for x in fields(kind) if x.init}
-
-        if not passed_on and any(x.kind is x.VAR_KEYWORD for x in parameters.values()):
-            return call
+        takes_any = not passed_on and any(x.kind is x.VAR_KEYWORD for x in parameters.values())
 
         @wraps(inner)
         def checked(*args: Any, **kwargs: Any) -> Any:
             for name in kwargs:
-                if name not in names:
+                if name not in names and not takes_any:
                     # Named after the function that was called, not the decorator.
                     raise _unknown(call.__qualname__, name, names) from None
             try:
@@ -181,6 +197,7 @@ def keywords(*passed_on: type) -> Callable[[_Call], _Call]:
                     raise
                 raise explained from error
 
+        _EXPLAINED.add(checked)
         if isinstance(call, type):
             call.__init__ = checked  # type: ignore[misc]
             _check_methods(call)
@@ -191,9 +208,12 @@ def keywords(*passed_on: type) -> Callable[[_Call], _Call]:
 
 
 def _check_methods(kind: type) -> None:
-    """Make the public methods that a class itself defines explain their arguments, too."""
-    for name, value in list(vars(kind).items()):
-        if name.startswith("_"):
+    """Make the public methods of a class, also those of our bases, explain their arguments."""
+    package = __name__.split(".", 1)[0]
+    ours = [base for base in kind.__mro__ if base.__module__.split(".", 1)[0] == package]
+    for name in dict.fromkeys(name for base in ours for name in vars(base)):
+        value = inspect.getattr_static(kind, name)
+        if name.startswith("_") or getattr(value, "__func__", value) in _EXPLAINED:
             continue
         if isinstance(value, classmethod | staticmethod):
             setattr(kind, name, type(value)(keywords()(value.__func__)))

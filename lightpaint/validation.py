@@ -199,6 +199,21 @@ def _is_bool(value: Any) -> bool:
     return isinstance(value, bool)
 
 
+def check_shape(
+    name: str,
+    array: Any,
+    expected: tuple[int, ...],
+    axes: str,
+    *,
+    error: type[LightpaintError] = LightpaintError,
+) -> None:
+    """Raise `error` for an array of another shape. axes: what they are, in words."""
+    import numpy as np  # late: most checks are of plain values
+
+    if (shape := np.shape(array)) != expected:
+        raise error(f"{name} of the shape {shape}: expected {expected}, {axes}")
+
+
 SWITCH = Check(_is_bool, "True or False", {"type": "boolean"})
 
 

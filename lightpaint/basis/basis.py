@@ -22,6 +22,7 @@ from lightpaint.errors import BasisError
 from lightpaint.images import Estimate, Features, Objects, SurfaceFilter
 from lightpaint.keywords import keywords
 from lightpaint.scene.lights.lights_file import SceneRequests
+from lightpaint.validation import check_shape
 from lightpaint.version import __version__
 
 #: Maximum number of samples per pixel, beyond that of any render.
@@ -266,8 +267,8 @@ class Basis(Shown):
         """
         return replace(
             self,
-            planes=as_planes(planes),
-            noise=as_planes(noise),
+            planes=planes,
+            noise=noise,
             emitters_seen=emitters_seen,
             guide_table=None,
             features=None,
@@ -359,23 +360,27 @@ class Basis(Shown):
         """Set `power` and `totals` to known values, so that no walk over the planes computes them.
 
         power, totals: (n, 3) float64, for exactly these planes. Must be called before either is
-        read.
+        read. Raises BasisError for other shapes.
         """
+        for name, values in (("power", power), ("totals", totals)):
+            check_shape(name, values, (len(self.lights), 3), "a row per light", error=BasisError)
         vars(self)["_power_and_totals"] = power, totals  # where cached_property stores its value
 
     def mix(self, weights: Doubles) -> npt.NDArray[np.float32]:
         """Return the image Σ w_i Φ_i, (h, w, 3) float32.
 
-        weights: (n, 3), as lights are ordered. Raises BasisError for another shape.
+        weights: (n, 3), as lights are ordered, finite. Raises BasisError for others.
         """
         self._check_weights(weights)
         return self.planes.mix(weights)
 
     def _check_weights(self, weights: Doubles) -> None:
-        """Raise BasisError unless there are three weights for each light."""
-        shape, expected = np.shape(weights), (len(self.lights), 3)
-        if shape and shape != expected:
-            raise BasisError(f"weights of the shape {shape}: expected {expected}, a row per light")
+        """Raise BasisError unless there are three finite weights for each light."""
+        expected = (len(self.lights), 3)
+        if np.shape(weights):
+            check_shape("weights", weights, expected, "a row per light", error=BasisError)
+        if not np.isfinite(weights).all():
+            raise BasisError("weights that are infinite or no numbers: expected amounts of light")
 
     def predict(self, weights: Doubles) -> Estimate:
         """Return the image Σ w_i Φ_i with its noise, read-only. weights: (n, 3).

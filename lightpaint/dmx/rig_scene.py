@@ -23,7 +23,14 @@ from lightpaint.dmx.mvr import KIND, PlacedModel
 from lightpaint.dmx.spot_cone import spot_cone
 from lightpaint.errors import SceneError
 from lightpaint.files import first_line, read_bytes
-from lightpaint.scene.checks.tokens import markup, tag
+from lightpaint.scene.checks.tokens import (
+    attributes,
+    decoded,
+    encoding_of,
+    line_of,
+    markup,
+    tag,
+)
 from lightpaint.scene.properties.site import across
 from lightpaint.storage.rig_archive import MAX_XML, RigArchive
 
@@ -322,12 +329,11 @@ class RoomFiles:
 def room_of_scene(path: Path, folder: Path) -> Room:
     """Return the room of a user's scene, for a rig's scene in `folder`.
 
-    Raises SceneError for a scene that cannot be read. Mitsuba checks the rest of it.
+    Raises SceneError for a file that is not the XML of a scene. Mitsuba checks the rest of it.
     """
-    tags = []
+    raw = read_bytes(path, "scene file", SceneError, limit=MAX_XML)
     try:
-        for token in markup(read_bytes(path, "scene file", SceneError, limit=MAX_XML)):
-            tags.append(token["tag"])
+        tags = _scene_tags(raw.decode(encoding_of(raw), "replace").encode())
     except ValueError as error:
         raise SceneError(f"{path}, {error}") from None
     # What it includes may have them as well.
@@ -335,6 +341,25 @@ def room_of_scene(path: Path, folder: Path) -> Room:
     place = os.path.relpath(path.resolve(), folder.resolve())
     has_sensor, has_integrator = (has_more or x in tags for x in (b"sensor", b"integrator"))
     return Room(Path(place).as_posix(), has_sensor, has_integrator)
+
+
+def _scene_tags(text: bytes) -> list[bytes]:
+    """Return the names of the elements of a scene. text: UTF-8. Raises ValueError for other XML."""
+    names, open_names, roots = [], [], []
+    for token in markup(text):
+        if (name := token["tag"]) is not None:
+            names.append(name)
+            if not open_names:
+                roots.append(token)
+            if not token["empty"]:
+                open_names.append(name)
+        elif (end := token["end"]) is not None and (not open_names or open_names.pop() != end):
+            raise ValueError(f"line {line_of(text, token.start())}: </{decoded(end)}> ends nothing")
+    if open_names:
+        raise ValueError(f"it ends before </{decoded(open_names[-1])}>")
+    if [x["tag"] for x in roots] != [b"scene"] or "version" not in attributes(roots[0]):
+        raise ValueError('it is no scene of Mitsuba: expected one <scene version="3.0.0">')
+    return names
 
 
 def room_of_show(path: Path, models: Sequence[PlacedModel]) -> RoomFiles:

@@ -48,7 +48,12 @@ class Estimate:
 
     @classmethod
     def of_halves(cls, a: Floats, b: Floats) -> "Estimate":
-        """Return the estimate of two independent renders of equal sample count."""
+        """Return the estimate of two independent renders of equal sample count.
+
+        a, b: (h, w, 3). Raises ImageError for images of different shapes.
+        """
+        if np.shape(a) != np.shape(b):
+            raise ImageError(f"halves {np.shape(a)} and {np.shape(b)} differ in shape")
         return cls((a + b) / 2, (a - b) / 2)
 
     @property

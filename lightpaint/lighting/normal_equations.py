@@ -11,8 +11,9 @@ import numpy.typing as npt
 
 from lightpaint.arrays import Doubles, Floats
 from lightpaint.basis import Basis, MemoryPlanes
-from lightpaint.errors import SizeError
+from lightpaint.errors import LightingError, SizeError
 from lightpaint.lighting.algebra.quadratic import UNREACHED_POWER
+from lightpaint.validation import check_shape
 
 
 @dataclass(frozen=True)
@@ -61,8 +62,10 @@ class NormalEquations:
     def objective(self, w: Doubles) -> Doubles:
         """Return ‖Ψ − Σ w_i Φ_i‖² per channel, (3,). w: (n, 3).
 
-        Coupled channels share the coupling term equally, so that one alone may be below 0.
+        Coupled channels share the coupling term equally, so that one alone may be below 0. Raises
+        LightingError for weights of another shape.
         """
+        check_shape("weights", w, self.b.shape[::-1], "a row per light", error=LightingError)
         quadratic = np.einsum("ic,cij,jc->c", w, self.M, w)
         value = self.target_norm2 - 2 * np.einsum("ci,ic->c", self.b, w) + quadratic
         if self.coupling is not None:

@@ -7,6 +7,7 @@ from dataclasses import replace
 from lightpaint.basis import Basis
 from lightpaint.basis.cache import Render, cache, folder, obtain_basis
 from lightpaint.basis.render import render_basis, samples_for
+from lightpaint.errors import BasisError
 from lightpaint.lighting import Problem, Solution, correct_noise
 from lightpaint.pipeline.job.job import Job, PaintedView
 from lightpaint.pipeline.job.settings import Settings
@@ -145,6 +146,8 @@ def obtain_bases_of(job: Job, bases: list[Basis] | None, listen: Listener) -> li
     if bases is None:
         new_bases = [_basis_of(job, view, listen) for view in job.views]
     else:
+        if len(bases) != len(job.views):
+            raise BasisError(f"{len(bases)} bases for {len(job.views)} views: give one for each")
         new_bases = list(bases)
         bases.clear()
     # With the current requests of the lights file, even for bases from before it changed.

@@ -103,7 +103,10 @@ def paint_with_light(
     }
     bases = basis if isinstance(basis, list) else None
     if bases is not None:
-        scene = [_with_film_of(*pair) for pair in zip(_as_list(scene), bases, strict=True)]
+        scenes = _as_list(scene)
+        if len(scenes) != len(bases):
+            raise SceneError(f"{len(scenes)} scenes for {len(bases)} bases: give one for each")
+        scene = [_with_film_of(*pair) for pair in zip(scenes, bases, strict=True)]
         # These scenes have the films of their bases already.
         basis, settings = None, settings | {"resolution": "1/1"}
     read = {"mask": mask and str(mask), "layer": layer, "find": find}

@@ -171,7 +171,7 @@ class MirroredPair:
     def __post_init__(self) -> None:
         names = self.lights
         if isinstance(names, str) or len(tuple(names)) != 2 or len({*names}) != 2:
-            raise SceneError(f"a pair is of {names!r}: expected the names of two lights")
+            raise SceneError(f"a pair is of {brief(names)}: expected the names of two lights")
         object.__setattr__(self, "lights", tuple(names))
         Mirror.of(self.mirror)
 

@@ -387,7 +387,7 @@ def suggest_lights(
     """
     if count < 1:
         raise SceneError(f"{count} lights cannot be suggested: ask for one or more")
-    scene = scenes if isinstance(scenes, Scene) else scenes[0]
+    scene = check_views(scenes, bases)[0][0]
     check_suggestible(scene)
     norm2 = float(solution.norm2.sum())
     if sum(solution.certificate.objective) <= NOTHING_MISSED**2 * norm2:

@@ -15,7 +15,8 @@ from typing import Any, TypeVar
 
 from lightpaint.arrays import RGB, Floats, Position
 from lightpaint.colour import EYE, Lamp, Observer
-from lightpaint.display_text import Listed, Shown, some_of
+from lightpaint.display_text import Listed, Shown, some_of, visible
+from lightpaint.errors import SceneError
 from lightpaint.keywords import keywords
 from lightpaint.luminaires import LUMINAIRE_PLUGINS
 from lightpaint.scene.lights.emitters import Emitter, find_emitters
@@ -419,7 +420,12 @@ class Scene(SceneFiles, Shown):
         return self.requests.cd_per_unit if is_absolute else None
 
     def relocated(self, old: Path, new: Path) -> "Scene":
-        """Return this scene after its folder `old` was moved to `new`."""
+        """Return this scene after its folder `old` was moved to `new`.
+
+        Raises SceneError for a folder that it is not in.
+        """
+        if not self.path.is_relative_to(old):
+            raise SceneError(f"{visible(str(self.path))} is not in {visible(str(old))}")
         parsed = self.parsed.relocated(old, new)
         return replace(self, path=parsed.path, files=parsed.files, parsed=parsed)
 
@@ -428,7 +434,7 @@ class Scene(SceneFiles, Shown):
         self,
         emission: Mapping[str, RGB] | None = None,
         *,
-        views: Sequence["Scene"] = (),
+        views: "Sequence[Scene]" = (),
         evenly: bool = False,
     ) -> Any:
         """Load the `mi.Scene` with lights set to `emission`; other lights stay as they are.
@@ -456,7 +462,7 @@ class Scene(SceneFiles, Shown):
         work: Callable[[Any], _Result_T],
         emission: Mapping[str, RGB] | None = None,
         *,
-        views: Sequence["Scene"] = (),
+        views: "Sequence[Scene]" = (),
     ) -> _Result_T:
         """Return the result of `work` on the loaded scene, which is released afterwards."""
         with self.variant():

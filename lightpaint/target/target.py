@@ -31,6 +31,7 @@ from lightpaint.keywords import keywords
 from lightpaint.sentences import Hint, Remedy
 from lightpaint.storage.json_records import fields_of, read_record, strict_json
 from lightpaint.target.painted_pixels import TargetPixels
+from lightpaint.validation import check_shape
 
 #: Negative luminance that resampling leaves beside bright edges, as a share of the brightest.
 NEGATIVE = 1e-3
@@ -334,8 +335,11 @@ class Target(Shown):
 
     def without(self, holes: npt.NDArray[np.bool_]) -> "Target":
         """Return the target with importance 0 in the pixels `holes`, (h, w), which the basis
-        lacks.
+        lacks. Raises SizeError for another shape, TargetError for an array of numbers.
         """
+        check_shape("holes", holes, self.importance.shape, "the target's pixels", error=SizeError)
+        if holes.dtype != np.bool_:
+            raise TargetError(f"holes of {holes.dtype}: expected True and False")
         lost_mask = holes & (self.importance > 0)
         if not lost_mask.any():
             return self

@@ -4,9 +4,11 @@ A person who gave twelve has to know which. So each command gets each of its fil
 ways that any file can be, and in some that only its kind can be.
 """
 
+import io
 import json
 import re
 import shutil
+import zipfile
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from pathlib import Path
@@ -92,6 +94,19 @@ def _spectra(folder: Path) -> None:
     write_rgb(folder / "p.exr", image)
 
 
+def _layers(folder: Path) -> None:
+    """A basis, and an OpenRaster file of its size with one layer."""
+    _pictures(folder)
+    picture = io.BytesIO()
+    Image.new("RGBA", (12, 8), (9, 9, 9, 255)).save(picture, "png")
+    stack = '<image w="12" h="8"><stack><layer name="a" src="data/a.png"/></stack></image>'
+    with zipfile.ZipFile(folder / "layers.ora", "w") as archive:
+        archive.writestr("mimetype", "image/openraster")
+        archive.writestr("stack.xml", stack)
+        for name in ("data/a.png", "mergedimage.png"):
+            archive.writestr(name, picture.getvalue())
+
+
 def _groups(folder: Path) -> None:
     """Light groups, a file each."""
     _pictures(folder)
@@ -162,6 +177,12 @@ CASES = {
         UNFIT,
     ),
     "show": Given(("rig", "show.mvr", *OUT_RIG, "--room", "room.xml"), "show.mvr", _rig),
+    "room of a show": Given(
+        ("rig", "show.mvr", *OUT_RIG, "--room", "room.xml"),
+        "room.xml",
+        _rig,
+        (b"<scene/>", b"<a/>"),
+    ),
     "type of a fixture": Given(
         ("rig", "show.mvr", *OUT_RIG, "--gdtf", "types"), f"types/{TYPE}", _rig
     ),
@@ -177,6 +198,11 @@ CASES = {
         "camera.csv",
         _spectra,
         (b"400,1,1,1\n", b"400,1\n500,1\n", b"400,0,0,0\n700,0,0,0\n"),
+    ),
+    "layers to paint on": Given(
+        ("paint", "b.basis.exr", *OUT, "--layers", "layers.ora", "--port", "0", "--no-browser"),
+        "layers.ora",
+        _layers,
     ),
     "light group": Given(("solve", "groups", "p0.exr", *OUT), "groups/lamp_1.exr", _groups),
 }

@@ -36,6 +36,7 @@ from lightpaint.dmx.rig_scene import (
     room_of_show,
     scene_text,
 )
+from lightpaint.errors import SceneError
 from lightpaint.lighting.constraints.constraints_file import constraints_of
 from lightpaint.lighting.unknowns.reduction import lamps_by_name
 from lightpaint.scene.scene_reader import load_scene
@@ -85,6 +86,39 @@ def test_a_room_without_a_sensor_gets_one(tmp_path: Path) -> None:
     assert (found.has_sensor, found.has_integrator) == (False, False)
     text = scene_text(read_rig(EXAMPLE), 500, found)
     assert text.count("<sensor") == text.count("<integrator") == 1
+
+
+ROOM_TEXT = """<?xml version="1.0"?><!-- a <room> --><scene version="3.0.0">
+<shape type="sphere"><bsdf type="diffuse"/></shape><sensor type="perspective"/></scene>"""
+
+
+@pytest.mark.parametrize("encoding", ["utf-8", "utf-8-sig", "utf-16", "utf-32"])
+def test_a_room_is_read_in_every_encoding_that_mitsuba_reads(tmp_path: Path, encoding: str) -> None:
+    room = tmp_path / "room.xml"
+    room.write_text(ROOM_TEXT, encoding=encoding)
+    found = room_of_scene(room, tmp_path)
+    assert (found.has_sensor, found.has_integrator) == (True, False)
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "words"),
+    [
+        ("</shape>", "", "line 2: </scene> ends nothing"),
+        ("</scene>", "", "it ends before </scene>"),
+        (ROOM_TEXT, "no such thing", "expected one <scene"),
+        (' version="3.0.0"', "", "expected one <scene"),
+        ("</scene>", "</scene><scene/>", "expected one <scene"),
+        ("<shape", "<5 <shape", "line 2: cannot read '<5"),
+    ],
+)
+def test_a_damaged_room_is_refused_by_its_name(
+    tmp_path: Path, old: str, new: str, words: str
+) -> None:
+    room = tmp_path / "room.xml"
+    room.write_text(ROOM_TEXT.replace(old, new), encoding="utf-8")
+    with pytest.raises(SceneError, match=words) as raised:
+        room_of_scene(room, tmp_path)
+    assert str(raised.value).startswith(f"{room}, ")
 
 
 def test_lights_alone_are_a_scene_to_include() -> None:

@@ -122,6 +122,32 @@ def test_unit_is_what_the_scene_has(assets: Path, kind: str) -> None:
     assert np.abs(planes.sum(axis=0) - rendered).max() <= SAME_SAMPLES * rendered.max()
 
 
+def _lit_blocks(image: np.ndarray) -> np.ndarray:
+    """The means of blocks of 4x4 pixels of the room, (30,)."""
+    return image.reshape(5, 4, 6, 4, 3).mean(axis=(1, 3, 4)).ravel()
+
+
+@pytest.mark.nightly
+def test_a_basis_of_sun_and_sky_is_what_mitsuba_renders(assets: Path) -> None:
+    """As a basis chooses emitters and places on them, in blocks of pixels, within their noise."""
+    scene = load_scene(write_room(assets, lights=KINDS["sun and sky"][0]))
+    bases, renders = (
+        np.stack([_lit_blocks(image) for image in images])
+        for images in (
+            [render_basis(scene, spp=256, seed=seed).images[0] for seed in range(4)],
+            [mitsuba_render(scene, seed=seed, spp=256) for seed in range(8)],
+        )
+    )
+    lit = renders.mean(axis=0) > 0
+    assert lit.sum() > 20
+    errors2 = sum(x.var(axis=0, ddof=1) / len(x) for x in (bases, renders))
+    differences = (bases.mean(axis=0) - renders.mean(axis=0))[lit]
+    # Noise: the errors are known of few renders, so all blocks are judged at once. Each block is
+    # lit within 4 %.
+    assert np.sqrt((differences**2).sum() / errors2[lit].sum()) < 2
+    assert np.abs(differences / renders.mean(axis=0)[lit]).max() < 0.04
+
+
 def test_a_slide_that_is_never_sampled_is_dark_and_comes_back(assets: Path) -> None:
     xml = KINDS["projector"][0]
     dark = xml.replace("</emitter>", '<float name="sampling_weight" value="0"/></emitter>')

@@ -75,7 +75,12 @@ class FrameSequence:
         raise BasisError(f"{visible(str(path))} is not a frame of {visible(self.pattern)}")
 
     def with_hashes(self, file: Path, frame: int) -> Path:
-        """Return the path of a frame, or of a file in its folder, with `####` for the number."""
+        """Return the path of a frame, or of a file in its folder, with `####` for the number.
+
+        Raises BasisError for a file that is neither.
+        """
+        if not file.is_relative_to(self.path(frame)):
+            raise BasisError(f"{visible(str(file))} is not in frame {frame}")
         tail = Path(self.pattern).relative_to(self.folder).as_posix()
         hashes = SIGN.sub(lambda sign: "#" * _length(sign), tail)
         below = file.relative_to(self.path(frame)).as_posix()

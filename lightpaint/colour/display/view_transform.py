@@ -91,20 +91,26 @@ class ViewTransform:
         return isinstance(encoding, Curve) and encoding.matrix is None
 
     def encode(self, image: "Floats") -> "Floats":
-        """Return a linear Rec.709 image (..., 3) as display values in [0, 1]."""
+        """Return a linear Rec.709 image (..., 3) as display values in [0, 1].
+
+        Raises ViewError for another shape, unless no channel depends on another.
+        """
+        self._check_channels(image, -1)
         return _encoding(self.name).encode(image * 2.0**self.stops)
 
     def decode(self, image_display: "Floats") -> "Floats":
         """Return display values in [0, 1], (..., 3), as linear Rec.709. Clipping cannot be
-        undone.
+        undone. Raises ViewError as `encode` does.
         """
         import numpy as np
 
+        self._check_channels(image_display, -1)
         linear = _encoding(self.name).decode(np.clip(image_display, 0, 1))
         return np.asarray(linear / 2.0**self.stops)
 
     def encode_planes(self, planes: "Floats") -> "Floats":
         """Return `encode` of linear light with channels first, (3, p)."""
+        self._check_channels(planes, 0)
         return _encoding(self.name).encode_planes(planes * 2.0**self.stops)
 
     def with_slopes(self, planes: "Floats") -> "tuple[Floats, Floats]":
@@ -114,9 +120,18 @@ class ViewTransform:
         i by linear channel j, (3, 3, p), which are 0 where the display clips. If channels do not
         mix (they do only in `agx` and `ocio:`), only their diagonal, (3, p).
         """
+        self._check_channels(planes, 0)
         scale = 2.0**self.stops
         shown, slopes = _encoding(self.name).with_slopes(planes * scale)
         return shown, slopes * scale if self.stops else slopes
+
+    def _check_channels(self, image: "Floats", axis: int) -> None:
+        """Raise ViewError unless channels that mix are those along an axis, 0 or -1."""
+        shape = getattr(image, "shape", ())
+        is_right = not shape or (shape[axis] == 3 and (axis == -1 or len(shape) == 2))
+        if not (is_right or self.is_per_channel):
+            expected = "(..., 3)" if axis else "(3, p)"
+            raise ViewError(f"pixels of the shape {shape}: expected {expected}")
 
 
 @keywords()

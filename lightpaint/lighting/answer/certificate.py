@@ -10,8 +10,10 @@ import numpy as np
 
 from lightpaint.arrays import RGB, Doubles, as_rgb
 from lightpaint.display_text import short_repr
+from lightpaint.errors import LightingError
 from lightpaint.keywords import keywords
 from lightpaint.threads import linear_algebra
+from lightpaint.validation import check_shape
 from lightpaint.version import __version__
 
 #: Kinds of bounds: light is not negative; a light is not adjusted; constraints.
@@ -161,7 +163,12 @@ class Certificate:
     def with_objective(
         self, objective: Doubles, norm2: Doubles, *, error: RGB | None = None
     ) -> "Certificate":
-        """Return the certificate with this loss, (3,), and that of a black picture, (3,)."""
+        """Return the certificate with this loss, (3,), and that of a black picture, (3,).
+
+        Raises LightingError for arrays of other shapes.
+        """
+        for name, values in (("objective", objective), ("norm2", norm2)):
+            check_shape(name, values, (3,), "one for each channel", error=LightingError)
         norm = np.where(norm2 > 0, norm2, 1)
         return replace(
             self,

@@ -22,13 +22,13 @@ from lightpaint.colour import (
     rgb_of_powers,
 )
 from lightpaint.dataframes import CHANNELS, by_channel, number, pandas, xarray
-from lightpaint.display_text import Shown, some_names, some_of
+from lightpaint.display_text import Shown, brief, some_names, some_of
 from lightpaint.errors import LightingError, UnknownLightError
 from lightpaint.keywords import keywords
 from lightpaint.lighting.answer.certificate import Certificate
 from lightpaint.lighting.answer.lighting_keys import LightingKey, check_keys, key_span, weights_at
 from lightpaint.scene.properties.site import EmitterPlace
-from lightpaint.validation import BRIGHTEST, MAX_NAME, is_amount
+from lightpaint.validation import BRIGHTEST, MAX_NAME, check_shape, is_amount
 
 #: A number of each channel, None if undetermined; an interval of each.
 Errors = tuple[float | None, float | None, float | None]
@@ -328,9 +328,9 @@ class Lighting(Shown, Mapping[str, LightSetting]):
 
     def __getitem__(self, name: str) -> LightSetting:
         """Return the light of that name. Raises UnknownLightError, a KeyError, if there is none."""
-        if name not in self._by_name:
+        if not isinstance(name, str) or name not in self._by_name:
             raise UnknownLightError(
-                f"no light {name!r} in the lighting: it has {some_of([*self], room=400)}"
+                f"no light {brief(name)} in the lighting: it has {some_of([*self], room=400)}"
             )
         return self._by_name[name]
 
@@ -493,11 +493,9 @@ class Lighting(Shown, Mapping[str, LightSetting]):
             fields.setdefault("scene_identity", lights.origin.scene_identity)
             lights = lights.lights
         count = len(lights)
-        if np.shape(weights) != (count, 3):
-            raise LightingError(
-                f"weights of the shape {np.shape(weights)}: expected {(count, 3)}, a row per light"
-            )
+        check_shape("weights", weights, (count, 3), "a row per light", error=LightingError)
         is_reached = np.ones((count, 3), dtype=bool) if reached is None else reached
+        check_shape("reached", is_reached, (count, 3), "a row per light", error=LightingError)
         settings = tuple(
             _setting(
                 light,

@@ -12,7 +12,7 @@ from typing import Any
 
 from lightpaint.arrays import RGB, Doubles
 from lightpaint.colour import Preference, SlotFilter, WhiteRange
-from lightpaint.display_text import some_of
+from lightpaint.display_text import brief, some_of
 from lightpaint.errors import ConstraintError
 from lightpaint.keywords import keywords
 from lightpaint.lighting.constraints.emitter_values import (
@@ -375,7 +375,7 @@ def _check_contradictions(table: Mapping[str, Any], where: SourceKey) -> None:
 
 def _parse_ties(value: Any, where: SourceKey) -> tuple[Tie, ...]:
     expected = Sentence(
-        where, f' is {value!r}: expected lists of names, [["a", "b"]], or tables [[tie]]'
+        where, f' is {brief(value)}: expected lists of names, [["a", "b"]], or tables [[tie]]'
     )
     if isinstance(value, str | Mapping) or not isinstance(value, Sequence):
         raise ConstraintError(expected)

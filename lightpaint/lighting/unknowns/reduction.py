@@ -17,7 +17,7 @@ import numpy as np
 from lightpaint.arrays import RGB, Bools, Doubles, Indices, as_rgb
 from lightpaint.basis import BasisLight
 from lightpaint.colour import Lamp
-from lightpaint.display_text import some_names
+from lightpaint.display_text import brief, some_names
 from lightpaint.errors import ConstraintError
 from lightpaint.lighting.algebra.quadratic import Cap
 from lightpaint.lighting.constraints.constraints import Constraints, LightConstraint, Requirements
@@ -150,9 +150,14 @@ class Reduction:
         return tuple(k for k in self.slots if any(x.upper > 0 for x in self.knobs[k].unknowns))
 
     def at_slots(self, places: Mapping[int, int]) -> "Reduction":
-        """Return the reduction with wheels, by the place of the knob, at other slots."""
+        """Return the reduction with wheels, by the place of the knob, at other slots.
+
+        Raises ConstraintError for a place without a wheel.
+        """
         knobs, slots, lamps = [*self.knobs], {**self.slots}, {**self.lamps}
         for k, place in places.items():
+            if k not in slots:
+                raise ConstraintError(f"no colour wheel at {brief(k)}: they are at {[*slots]}")
             option = slots[k].options[place]
             knobs[k], slots[k] = option.knob, replace(slots[k], at=place)
             if option.lamp is not None:

@@ -16,7 +16,7 @@ from lightpaint.basis import Basis, FrameSequence, LightGroups, Lights, spoken_f
 from lightpaint.basis.cache import check_same_view
 from lightpaint.basis.render import basis_lights
 from lightpaint.display_text import short_repr
-from lightpaint.errors import ConstraintError, LightpaintError, TargetError
+from lightpaint.errors import ConstraintError, LightpaintError, SceneError, TargetError
 from lightpaint.files import check_writable
 from lightpaint.images import whole_factor
 from lightpaint.keywords import keywords
@@ -249,8 +249,11 @@ class Job:
     def with_moved_lights(self, scenes: Sequence[Scene], constraints: Constraints) -> "Job":
         """Return this job with moved lights.
 
-        scenes: the scene of each view, on the same film. constraints: on added lights.
+        scenes: the scene of each view, on the same film. constraints: on added lights. Raises
+        SceneError for another number of scenes.
         """
+        if len(scenes) != len(self.views):
+            raise SceneError(f"{len(scenes)} scenes for {len(self.views)} views: give one for each")
         views = zip(self.views, scenes, strict=True)
         return copy(self)._set(
             all_constraints=self.all_constraints.and_then(constraints),

@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 
 from lightpaint.arrays import RGB, Position, as_rgb
+from lightpaint.display_text import brief
 from lightpaint.errors import SceneError
 from lightpaint.keywords import keywords
 from lightpaint.scene.checks.tokens import tag
@@ -186,7 +187,7 @@ def _amounts(name: str, emission: Any) -> RGB:
         rgb = (float("nan"),) * 3
     if not all(map(is_amount, rgb)):
         raise SceneError(
-            f"new light {name!r} has the emission {emission!r}: expected three amounts"
+            f"new light {name!r} has the emission {brief(emission)}: expected three amounts"
         )
     return rgb
 

@@ -27,6 +27,7 @@ from lightpaint.colour import Observer
 from lightpaint.display_text import some_names
 from lightpaint.errors import SceneError
 from lightpaint.images import blocks_in, left_over, whole_factor
+from lightpaint.keywords import describe_value
 from lightpaint.scene.limits import MAX_PIXELS, MAX_SPP
 
 #: Wavelengths of the channels in nm.
@@ -327,6 +328,8 @@ def check_film(path: Path, film: Film, spp: int) -> None:
 
 def camera_named(loaded: Any, name: str) -> Any:
     """Return the sensor with that id in a loaded scene. Raises SceneError."""
+    if not hasattr(loaded, "sensors"):
+        raise SceneError(f"loaded is {describe_value(loaded)}: expected what Scene.load() returns")
     for sensor in loaded.sensors():
         if sensor.id() == name:
             return sensor

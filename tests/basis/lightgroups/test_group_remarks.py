@@ -2,6 +2,7 @@
 
 from pathlib import Path
 
+import numpy as np
 import pytest
 from light_groups import interleaved, pictures
 
@@ -43,3 +44,21 @@ def test_no_whole_picture(tmp_path: Path, renderer: str):
     setting = next(x.beauty_setting for x in CONVENTIONS if x.renderer == renderer)
     text = remarks(tmp_path, renderer, share=0, has_beauty=False)
     assert f"render it with them ({setting})" in text
+
+
+def test_light_that_fast_gi_adds_is_the_rest(tmp_path: Path):
+    """Cycles adds ambient occlusion of method Add to the whole picture, and to no group."""
+    key, fill, occlusion = pictures(3)
+    names = {"ViewLayer.Combined_key": key, "ViewLayer.Combined_fill": fill}
+    whole = {"ViewLayer.Combined": key + fill + 0.2 * occlusion}
+    groups = read_light_groups(interleaved(tmp_path / "shot.exr", names | whole))
+    [remark] = [x for x in groups.remarks if "Fast GI Approximation of method Add" in x]
+    assert remark.endswith("is in none")
+    rest = groups.basis.images[groups.basis.names.index("rest")]
+    # Precision: sums of float32.
+    np.testing.assert_allclose(rest, 0.2 * occlusion, rtol=0, atol=4e-7 * whole.popitem()[1].max())
+    assert groups.basis.is_fixed.tolist() == [False, False, True]
+
+
+def test_other_renderers_have_no_fast_gi(tmp_path: Path):
+    assert "Fast GI" not in remarks(tmp_path, "Arnold", share=0.5)

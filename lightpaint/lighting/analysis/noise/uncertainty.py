@@ -69,6 +69,9 @@ DOUBT_RANGE = 0.6, 0.8
 #: Standard errors on the safe side of a sum, and the least share of M that remains of a light.
 SAFE_ERRORS, MIN_LEFT = 1.0, 1e-3
 
+#: The least share of a light within what M determines, if no other lights replace it exactly.
+OWN = 1 - 1e-6
+
 
 @dataclass(frozen=True)
 class ReadingNoise:
@@ -137,9 +140,11 @@ def weakest_matrix(
     # The power that no other light can replace is 1 over the diagonal of the inverse.
     noisy_inverse = [np.diag(pseudo_inverse(x)) for x in M]
     inverse = [pseudo_inverse(x) for x in weakest]
+    # A light that others replace exactly has no part of its own which could be weaker.
+    is_own = [np.einsum("ij,ji->i", *pair) > OWN for pair in zip(inverse, weakest, strict=True)]
     for k in with_progress(in_doubt, "lights"):
         image, half = (planes.plane(k) for planes in (basis.planes, basis.noise))
-        for c in np.flatnonzero(doubts[k] > 0):
+        for c in (c for c in np.flatnonzero(doubts[k] > 0) if is_own[c][k]):
             D = weight[..., c % weight.shape[2]].ravel()
             smooth, error = _least_power(image[..., c].ravel(), half[..., c].ravel(), D)
             # Only the part that no other light can replace may shrink.
