@@ -1,5 +1,6 @@
 """The pixels that count, with each light's part of them: the data of a descent."""
 
+from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cached_property
 
@@ -125,8 +126,8 @@ class LitPixels:
         No more than a block of these squares is in memory.
         """
 
-        def squares(where: slice | Indices, lit: Floats) -> tuple[Doubles, Doubles]:
-            x = mix_channels(lit, weights)
+        def squares(where: slice | Indices, light: Callable[[], Floats]) -> tuple[Doubles, Doubles]:
+            x = mix_channels(light(), weights)
             image, weight = self.pixels.subset(where).squares(x, from_clipping=False)
             return weight.T, image.T
 
