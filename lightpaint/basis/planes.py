@@ -77,6 +77,9 @@ class Planes(Protocol):
     def plane(self, i: int) -> Floats:
         """Return the plane of light i, (h, w, 3)."""
 
+    def lit_plane(self, i: int) -> tuple[slice | Indices, Floats]:
+        """Return pixels of light i, outside of which it is black, and their light, (3, p)."""
+
     def rows(self, top: int, bottom: int) -> Floats:
         """Return rows `top` to `bottom` of all planes, (n, bottom - top, w, 3)."""
 
@@ -144,6 +147,10 @@ class PlanesBase:
     def plane(self, i: int) -> Floats:
         """Return the plane of light i, (h, w, 3)."""
         raise NotImplementedError
+
+    def lit_plane(self, i: int) -> tuple[slice | Indices, Floats]:
+        """Return pixels of light i, outside of which it is black, and their light, (3, p)."""
+        return slice(None), self.plane(i).reshape(-1, 3).T
 
     @property
     def is_noisy(self) -> bool:

@@ -205,20 +205,35 @@ class LitPlanes(RowPlanes):
         """True if most planes are stored in half floats, whose rounding their noise hides."""
         return self._is_noisy
 
-    def plane(self, i: int) -> Floats:
-        """Return the plane of light i, (h, w, 3)."""
+    def lit_plane(self, i: int) -> tuple[slice | Indices, Floats]:
+        """Return pixels of light i, outside of which it is black, and their light, (3, p)."""
+        pixels: slice | Indices = slice(None)
         if i in self._clean:
-            plane = self._clean[i].copy()
+            values = self._clean[i].copy()
         else:
             # One copy of all strips: there are many, of few lit pixels each.
             of_strips = [strip.lit_of(i) for strip in self._lit]
             lit = [x.astype(np.intp) + y for (x, _), y in zip(of_strips, self._begins, strict=True)]
-            numbers = np.concatenate([x for _, x in of_strips], axis=1)
-            plane = np.zeros((3, self._size[0] * self._size[1]), np.float32)
-            plane[:, np.concatenate(lit)] = _singles(numbers)
+            pixels = np.concatenate(lit)
+            values = _singles(np.concatenate([x for _, x in of_strips], axis=1))
         if self._scales[i] != 1:
-            plane *= self._scales[i]
+            values *= self._scales[i]
+        return pixels, values
+
+    def plane(self, i: int) -> Floats:
+        """Return the plane of light i, (h, w, 3)."""
+        pixels, values = self.lit_plane(i)
+        plane = np.zeros((3, self._size[0] * self._size[1]), np.float32)
+        plane[:, pixels] = values
         return np.ascontiguousarray(plane.T).reshape(*self._size, 3)
+
+    def pixels(self, where: slice | Indices) -> Floats:
+        """Return some pixels of all planes, (n, p, 3)."""
+        if isinstance(where, slice) or (lit := self.lit_entries(where)) is None:
+            return super().pixels(where)
+        picked = np.zeros((3, *lit.shape), np.float32)
+        picked.reshape(3, -1)[:, lit.places] = lit.values
+        return picked.transpose(1, 2, 0)
 
     def rows(self, top: int, bottom: int) -> Floats:
         """Return rows `top` to `bottom` of all planes, (n, bottom - top, w, 3)."""

@@ -294,7 +294,7 @@ class NoisyPixels:
         own, of_pixels = self.own_share if own_share is None else own_share, self.gradients
         D = self.weight[pixels, c % self.weight.shape[1]].astype(kind)
         mean, half = (x[pixels, c].astype(kind) for x in (of_pixels.mean, of_pixels.half))
-        of_noise = of_light = doubt = None
+        of_noise, of_light, doubt = None, None, np.zeros_like(D)
         if of_pixels.bend is not None and of_pixels.doubt is not None:
             mixed = self.residuals.half[pixels, c].astype(kind)
             of_noise = D * mixed + half

@@ -117,7 +117,7 @@ class ChannelPixels:
     own_share: float
     of_noise: Doubles | None
     of_light: Doubles | None
-    doubt: Doubles | None
+    doubt: Doubles
 
     @property
     def own_share_of_pull(self) -> float:
@@ -157,7 +157,7 @@ def dense_rows(
         return room
     if pixels.of_noise is not None:
         sums.target_noise[c] += h @ pixels.of_noise
-    if pixels.of_light is not None and pixels.doubt is not None:
+    if pixels.of_light is not None:
         sums.target_noise[c] += lit @ pixels.of_light
         sums.doubt[c] += lit @ pixels.doubt
     squares = np.square(room)
@@ -187,15 +187,20 @@ class LitPairs:
             values = noise.values, light.values
             return cls(light.lights, light.columns, light.places, *values, shape)
         is_lit = np.zeros(shape[0] * shape[1], np.bool_)
-        is_lit[noise.places] = is_lit[light.places] = True
-        places = np.flatnonzero(is_lit)
-        order = np.zeros(is_lit.size, np.intp)
-        order[places] = np.arange(places.size)
-        joined = np.zeros((2, 3, places.size), np.float32)
-        for k, entries in enumerate((noise, light)):
-            joined[k][:, order[entries.places]] = entries.values
-        lights, columns = np.divmod(places, shape[1])
-        return cls(lights, columns, places, joined[0], joined[1], shape)
+        is_lit[light.places] = True
+        only_noise = np.flatnonzero(~is_lit[noise.places])
+        lights, columns = (
+            np.concatenate([getattr(light, name), getattr(noise, name)[only_noise]])
+            for name in ("lights", "columns")
+        )
+        places = lights * shape[1] + columns
+        halves, values = np.empty((2, 3, places.size), np.float32)
+        values[:, : light.places.size], values[:, light.places.size :] = light.values, 0
+        room = np.zeros(is_lit.size, np.float32)
+        for into, channel in zip(halves, noise.values, strict=True):
+            room[noise.places] = channel
+            into[...] = room[places]
+        return cls(lights, columns, places, halves, values, shape)
 
     @cached_property
     def places_beside(self) -> Indices:
@@ -213,6 +218,9 @@ class LitPairs:
         room[...] = 0
         flat = room.reshape(-1)
         flat[self.places] = light
+        if sums is not None and pixels.of_light is not None:
+            sums.target_noise[c] += room @ pixels.of_light
+            sums.doubt[c] += room @ pixels.doubt
         beside = flat[self.places_beside]
         mixed = mixed_with_beside(light, beside, h, pixels.own_share)
         row = h * pixels.mean[at] + mixed * pixels.half[at]
@@ -223,24 +231,11 @@ class LitPairs:
             power = mixed_with_beside(light, beside, h, pixels.own_share_of_pull) * h
             row += pixels.pulled[of] * pixels.unseen[at] * power
         if sums is not None:
+            if pixels.of_noise is not None:
+                flat[self.places] = h
+                sums.target_noise[c] += room @ pixels.of_noise
             flat[self.places] = np.sqrt(pixels.D)[at] * h
             sums.power[c] += room @ room.T
-            self._add(pixels, h, light, row, sums)
+            sums.fourth[c] += np.bincount(of, np.square(np.square(row)), len(room))
         flat[self.places] = row
         return room
-
-    def _add(
-        self, pixels: ChannelPixels, h: Doubles, light: Doubles, row: Doubles, sums: NoiseSums
-    ) -> None:
-        """Add what needs no product of lights. h, light, row: (m,)."""
-        c, at = pixels.c, self.columns
-
-        def by_light(values: Doubles) -> Doubles:
-            return np.asarray(np.bincount(self.lights, values, self.shape[0]), np.float64)
-
-        if pixels.of_noise is not None:
-            sums.target_noise[c] += by_light(h * pixels.of_noise[at])
-        if pixels.of_light is not None and pixels.doubt is not None:
-            sums.target_noise[c] += by_light(light * pixels.of_light[at])
-            sums.doubt[c] += by_light(light * pixels.doubt[at])
-        sums.fourth[c] += by_light(np.square(np.square(row)))
