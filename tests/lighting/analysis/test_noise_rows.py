@@ -11,7 +11,7 @@ from lightpaint.basis.file.lit_planes import LitPlane, LitPlanes
 from lightpaint.basis.planes import MemoryPlanes
 from lightpaint.colour.display.view_transform import ViewTransform
 from lightpaint.lighting.analysis.noise.noise import NoisyPixels, noise_sums
-from lightpaint.lighting.solve import solve
+from lightpaint.lighting.solver import solve
 from lightpaint.target.target import Target
 
 N, SIZE = 4, (9, 11)
