@@ -130,17 +130,17 @@ def noise_sums(solution: Solution, *, removed: float | None = None) -> Noise:
     weights, pixels = solution.weights, NoisyPixels.of(solution, removed=removed)
     counted, weight, residuals = pixels.counted, pixels.weight, pixels.residuals
     is_coupled = _is_coupled(solution)
-    # The same parts on every machine, added in order, give the same bits.
-    length = BLOCK_PIXELS * max(1, -(-counted.size // (BLOCK_PIXELS * PARTS)))
-    parts = [counted[k : k + length] for k in range(0, counted.size, length)]
     sums = NoiseSums.zeros(len(weights))
-    for of_part in (
-        parallel_map(lambda x: pixels.sums(x, is_coupled=is_coupled), parts, unit="parts")
-        if len(weights) <= FEW_LIGHTS
-        else (pixels.sums(x, is_coupled=is_coupled) for x in with_progress(parts, "parts"))
-    ):
-        sums.add(of_part)
-        del of_part  # of many lights, the next one needs its room
+    if len(weights) > FEW_LIGHTS:  # channels are summed in parallel, and sums need much room
+        pixels.add(counted, sums, is_coupled=is_coupled)
+    else:
+        # The same parts on every machine, added in order, give the same bits.
+        length = BLOCK_PIXELS * max(1, -(-counted.size // (BLOCK_PIXELS * PARTS)))
+        parts = [counted[k : k + length] for k in range(0, counted.size, length)]
+        for of_part in parallel_map(
+            lambda x: pixels.sums(x, is_coupled=is_coupled), parts, unit="parts"
+        ):
+            sums.add(of_part)
     error, noise = np.zeros((2, 3))
     for start in with_progress(range(0, len(weight), BLOCK_PIXELS)):
         part = slice(start, start + BLOCK_PIXELS)
@@ -254,14 +254,18 @@ class NoisyPixels:
 
     def sums(self, counted: Indices, *, is_coupled: bool) -> NoiseSums:
         """Sum over some pixels."""
-        n = len(self.weights)
-        sums, (step, kind) = NoiseSums.zeros(n), block_of(self.planes)
+        sums = NoiseSums.zeros(len(self.weights))
+        self.add(counted, sums, is_coupled=is_coupled)
+        return sums
+
+    def add(self, counted: Indices, sums: NoiseSums, *, is_coupled: bool) -> None:
+        """Add some pixels to sums."""
+        n, (step, kind) = len(self.weights), block_of(self.planes)
         rooms = Rooms(n, n * min(step, counted.size), kind, are_kept=is_coupled)
         with one_thread():
             for start in with_progress(range(0, counted.size, step)):
                 pixels = as_slice(counted[start : start + step])
                 self._add_block(pixels, sums, rooms, is_coupled=is_coupled)
-        return sums
 
     def _add_block(
         self, pixels: slice | Indices, sums: NoiseSums, rooms: Rooms, *, is_coupled: bool
