@@ -53,8 +53,10 @@ if TYPE_CHECKING:
     from lightpaint.basis.planes import BLOCK_PIXELS as BLOCK_PIXELS
     from lightpaint.basis.planes import FEW_LIGHTS as FEW_LIGHTS
     from lightpaint.basis.planes import IndirectLight as IndirectLight
+    from lightpaint.basis.planes import LitEntries as LitEntries
     from lightpaint.basis.planes import MemoryPlanes as MemoryPlanes
     from lightpaint.basis.planes import Planes as Planes
+    from lightpaint.basis.planes import Rooms as Rooms
     from lightpaint.basis.planes import as_planes as as_planes
     from lightpaint.basis.planes import as_slice as as_slice
     from lightpaint.basis.planes import block_of as block_of

@@ -5,8 +5,8 @@ Code outside this package uses the protocol below and never indexes an array of 
 """
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from contextlib import nullcontext
 from dataclasses import dataclass
+from functools import cached_property
 from itertools import pairwise
 from typing import Any, Protocol
 
@@ -26,13 +26,31 @@ FEW_LIGHTS = 256
 #: Rows of a strip of which some pixels are collected, and the maximum number of bytes of these.
 THINNED_ROWS, THINNED_MAX_BYTES = 8, 2**27
 
-#: A function from some pixels and their light, (n, p, 3), to weights, (p, 1) or (p, 3), and an
-#: image, (p, 3).
-SquaresOfLight = Callable[[slice | Indices, Floats], tuple[Floats, Floats]]
+#: A function from some pixels, and a function that returns their light, (n, p, 3), to weights, (p,
+#: 1) or (p, 3), and an image, (p, 3).
+SquaresOfLight = Callable[[slice | Indices, Callable[[], Floats]], tuple[Floats, Floats]]
 
 #: Share of the pixels, those with the most noise, that do not count. A single stray sample may have
 #: more than all the others, and four times as many samples would not remove it.
 STRAY_SHARE = 1 / 1000
+
+
+@dataclass(frozen=True)
+class LitEntries:
+    """The lit pixels of all planes among p pixels, in any order.
+
+    lights, columns: (m,), the light and the pixel of each. values: (3, m) float32. shape: (n, p).
+    """
+
+    lights: Indices
+    columns: Indices
+    values: Floats
+    shape: tuple[int, int]
+
+    @cached_property
+    def places(self) -> Indices:
+        """Where they are in an array (n, p), (m,)."""
+        return self.lights * self.shape[1] + self.columns
 
 
 class Planes(Protocol):
@@ -59,11 +77,17 @@ class Planes(Protocol):
     def plane(self, i: int) -> Floats:
         """Return the plane of light i, (h, w, 3)."""
 
+    def lit_plane(self, i: int) -> tuple[slice | Indices, Floats]:
+        """Return pixels of light i, outside of which it is black, and their light, (3, p)."""
+
     def rows(self, top: int, bottom: int) -> Floats:
         """Return rows `top` to `bottom` of all planes, (n, bottom - top, w, 3)."""
 
     def pixels(self, where: slice | Indices) -> Floats:
         """Return some pixels of all planes, (n, p, 3), indexed in row-major order."""
+
+    def lit_entries(self, where: slice | Indices) -> LitEntries | None:
+        """Return the lit ones of some pixels of all planes; None if the planes do not know them."""
 
     def picked(self, where: slice | Indices) -> "Planes":
         """Return these pixels as planes with a single row, (1, p, 3) each."""
@@ -124,6 +148,10 @@ class PlanesBase:
         """Return the plane of light i, (h, w, 3)."""
         raise NotImplementedError
 
+    def lit_plane(self, i: int) -> tuple[slice | Indices, Floats]:
+        """Return pixels of light i, outside of which it is black, and their light, (3, p)."""
+        return slice(None), self.plane(i).reshape(-1, 3).T
+
     @property
     def is_noisy(self) -> bool:
         """True if most planes are stored in half floats, whose rounding their noise hides."""
@@ -132,6 +160,10 @@ class PlanesBase:
     def pixels(self, where: slice | Indices) -> Floats:
         """Return some pixels of all planes, (n, p, 3)."""
         raise NotImplementedError
+
+    def lit_entries(self, where: slice | Indices) -> LitEntries | None:
+        """Return the lit ones of some pixels of all planes; None if the planes do not know them."""
+        return None
 
     def __repr__(self) -> str:
         height, width = self.size
@@ -200,21 +232,89 @@ class PlanesBase:
         step, kind = block_of(self)
         # Pixels without weight in between cost less than gathering the others.
         spare = 0 if n <= FEW_LIGHTS else step // 8
-        room = np.empty((n + 1, min(step, counted.size) + spare), kind)
-        with one_thread() if n <= FEW_LIGHTS else nullcontext():
+        rooms = Rooms(n, (n + 1) * (min(step, counted.size) + spare), kind)
+        with one_thread():
             for start in with_progress(range(0, counted.size, step)):
                 where = as_slice(counted[start : start + step], spare=spare)
-                values = self.pixels(where)
-                weights, painted = squares(where, values)
-                root, is_per_channel = np.sqrt(weights, dtype=kind), weights.shape[1] == 3
-                # (n + 1, block): the target goes along as one more row.
-                block = room[:, : len(painted)]
-                for c in with_progress(range(3)):
-                    channel_root = root[:, c * is_per_channel]
-                    np.multiply(values[..., c], channel_root, out=block[:n])
-                    np.multiply(painted[:, c], channel_root, out=block[n], casting="same_kind")
-                    gram[c] += block @ block.T
+                light = _LightOf(self, where)
+                _add_products(gram, light, *squares(where, light.dense), rooms)
         return gram[:, :n, :n], gram[:, :n, n], gram[:, n, n]
+
+
+class Rooms:
+    """Memory for matrices of the light of some pixels, as many as channels are worked on at once.
+
+    Products of many lights take long enough for each channel to have a thread: BLAS's own threads
+    would wait for each other half of the time.
+    """
+
+    def __init__(self, n: int, length: int, kind: Any, *, are_kept: bool = False) -> None:
+        """Make rooms.
+
+        n: number of lights. length: of the longest matrix. are_kept: whether the matrix of a
+        channel is needed after the work on the next one.
+        """
+        self._is_parallel = n > FEW_LIGHTS
+        self._rooms = np.empty((3 if self._is_parallel or are_kept else 1, length), kind)
+
+    @property
+    def kind(self) -> Any:
+        """Type of the numbers."""
+        return self._rooms.dtype
+
+    def array(self, c: int, shape: tuple[int, int]) -> npt.NDArray[Any]:
+        """Return a matrix of this shape for channel c, with what was in it before."""
+        room: npt.NDArray[Any] = self._rooms[c % len(self._rooms)][: shape[0] * shape[1]]
+        return room.reshape(shape)
+
+    def each_channel(self, work: Callable[[int], None]) -> None:
+        """Do `work(c)` for each channel."""
+        if self._is_parallel:
+            parallel_map(work, range(3))
+            return
+        for c in with_progress(range(3)):
+            work(c)
+
+
+class _LightOf:
+    """The light of some pixels of all planes, by their lit pixels if the planes know these."""
+
+    def __init__(self, planes: PlanesBase, where: slice | Indices) -> None:
+        self._planes, self._where = planes, where
+        self._lit = planes.lit_entries(where)
+
+    def dense(self) -> Floats:
+        """Return all of it, (n, p, 3)."""
+        return self._dense
+
+    @cached_property
+    def _dense(self) -> Floats:
+        return self._planes.pixels(self._where)
+
+    def multiply(self, c: int, factors: npt.NDArray[Any], into: npt.NDArray[Any]) -> None:
+        """Write the light of channel c times factors, (p,), into an array, (n, p)."""
+        if self._lit is None:
+            np.multiply(self._dense[..., c], factors, out=into)
+            return
+        into[...] = 0
+        into.reshape(-1)[self._lit.places] = self._lit.values[c] * factors[self._lit.columns]
+
+
+def _add_products(
+    gram: Doubles, light: _LightOf, weights: Floats, painted: Floats, rooms: Rooms
+) -> None:
+    """Add the weighted products of lights and image, (3, n + 1, n + 1), over some pixels."""
+    n, kind = gram.shape[1] - 1, rooms.kind
+    roots = np.broadcast_to(np.sqrt(weights, dtype=kind), painted.shape)
+
+    def add(c: int) -> None:
+        # (n + 1, block): the target goes along as one more row.
+        block = rooms.array(c, (n + 1, len(roots)))
+        light.multiply(c, roots[:, c], block[:n])
+        np.multiply(painted[:, c], roots[:, c], out=block[n], casting="same_kind")
+        gram[c] += block @ block.T
+
+    rooms.each_channel(add)
 
 
 class MemoryPlanes(PlanesBase):

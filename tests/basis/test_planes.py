@@ -206,6 +206,8 @@ def test_lit_pixels_of_many_lights_are_those_of_their_planes(
     monkeypatch.setattr(basis_file, "SPARSE_MIN_BYTES", sparse)
     monkeypatch.setattr(basis_file, "MIN_LIGHTS", N)
     monkeypatch.setattr(file_planes, "STRIP_CACHE_BYTES", room)
+    assert lp.read_basis(path).planes.lit_entries(slice(0, 9)) is None  # too many are lit
+    monkeypatch.setattr(lit_planes, "MAX_LIT_SHARE", 1.0)
     reread = lp.read_basis(path)
     assert isinstance(reread.planes, LitPlanes)
     assert isinstance(reread.noise, LitPlanes)
@@ -388,7 +390,7 @@ def test_sums_of_squares_made_block_by_block(
     weight.reshape(-1, 3)[indices] = 1 + np.square(light.reshape(-1, 3)[indices])
 
     def squares(pixels: Any, radiance: Any) -> tuple[Any, Any]:
-        x = np.einsum("npc,nc->pc", radiance, w)
+        x = np.einsum("npc,nc->pc", radiance(), w)
         return 1 + np.square(x), 2 * x
 
     for planes in (MemoryPlanes(images), CountedPlanes(images)):

@@ -7,6 +7,7 @@ memory of float32.
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from functools import cached_property
 from itertools import pairwise
 from typing import Any
 
@@ -15,11 +16,15 @@ import numpy.typing as npt
 
 from lightpaint.arrays import Bools, Doubles, Floats, Indices, copy_as_singles
 from lightpaint.basis.file.file_planes import RowPlanes
+from lightpaint.basis.planes import LitEntries
 from lightpaint.progress import with_progress
 from lightpaint.threads import parallel_map
 
 #: Number of lights from which planes may be kept by their lit pixels.
 MIN_LIGHTS = 128
+
+#: Share of the pixels of all planes that are lit, up to which these are faster one by one.
+MAX_LIT_SHARE = 0.25
 
 #: Maximum size in bytes of both sets of planes, images and noise, that are kept so.
 MAX_BYTES = 2**30
@@ -123,6 +128,19 @@ class _LitStrip:
         part = slice(self.begins[i], self.begins[i + 1])
         return self.lit[part], self.numbers[:, part]
 
+    def entries(self, columns: Indices) -> tuple[Indices, Indices, npt.NDArray[np.float32]]:
+        """Return lights, columns, (m,) each, and numbers, (3, m), of the pixels that have a column.
+
+        columns: (pixels,), -1 for a pixel without one.
+        """
+        lights, its_columns = self.of_planes(np.arange(len(self.begins) - 1)), columns[self.lit]
+        numbers = self.numbers
+        if columns.min(initial=0) < 0:
+            has_column = its_columns >= 0
+            lights, its_columns = lights[has_column], its_columns[has_column]
+            numbers = numbers[:, has_column]
+        return lights, its_columns, _singles(numbers)
+
     def mix(self, weights: Doubles) -> Doubles:
         """Return Σ w_i of the planes, (3, pixels) float64. weights: (n, 3), with the scales."""
         return np.stack(
@@ -187,20 +205,35 @@ class LitPlanes(RowPlanes):
         """True if most planes are stored in half floats, whose rounding their noise hides."""
         return self._is_noisy
 
-    def plane(self, i: int) -> Floats:
-        """Return the plane of light i, (h, w, 3)."""
+    def lit_plane(self, i: int) -> tuple[slice | Indices, Floats]:
+        """Return pixels of light i, outside of which it is black, and their light, (3, p)."""
+        pixels: slice | Indices = slice(None)
         if i in self._clean:
-            plane = self._clean[i].copy()
+            values = self._clean[i].copy()
         else:
             # One copy of all strips: there are many, of few lit pixels each.
             of_strips = [strip.lit_of(i) for strip in self._lit]
             lit = [x.astype(np.intp) + y for (x, _), y in zip(of_strips, self._begins, strict=True)]
-            numbers = np.concatenate([x for _, x in of_strips], axis=1)
-            plane = np.zeros((3, self._size[0] * self._size[1]), np.float32)
-            plane[:, np.concatenate(lit)] = _singles(numbers)
+            pixels = np.concatenate(lit)
+            values = _singles(np.concatenate([x for _, x in of_strips], axis=1))
         if self._scales[i] != 1:
-            plane *= self._scales[i]
+            values *= self._scales[i]
+        return pixels, values
+
+    def plane(self, i: int) -> Floats:
+        """Return the plane of light i, (h, w, 3)."""
+        pixels, values = self.lit_plane(i)
+        plane = np.zeros((3, self._size[0] * self._size[1]), np.float32)
+        plane[:, pixels] = values
         return np.ascontiguousarray(plane.T).reshape(*self._size, 3)
+
+    def pixels(self, where: slice | Indices) -> Floats:
+        """Return some pixels of all planes, (n, p, 3)."""
+        if isinstance(where, slice) or (lit := self.lit_entries(where)) is None:
+            return super().pixels(where)
+        picked = np.zeros((3, *lit.shape), np.float32)
+        picked.reshape(3, -1)[:, lit.places] = lit.values
+        return picked.transpose(1, 2, 0)
 
     def rows(self, top: int, bottom: int) -> Floats:
         """Return rows `top` to `bottom` of all planes, (n, bottom - top, w, 3)."""
@@ -213,6 +246,35 @@ class LitPlanes(RowPlanes):
             for k in range(top // step, -(-bottom // step))
         ]
         return strips[0] if len(strips) == 1 else np.concatenate(strips, axis=1)
+
+    @cached_property
+    def _is_mostly_black(self) -> bool:
+        pixels = self._size[0] * self._size[1]
+        lit = pixels * len(self._clean) + sum(strip.lit.size for strip in self._lit)
+        return lit <= MAX_LIT_SHARE * self._count * pixels
+
+    def lit_entries(self, where: slice | Indices) -> LitEntries | None:
+        """Return the lit ones of some pixels, in row-major order, of all planes; None if many
+        are.
+        """
+        pixels = self._size[0] * self._size[1]
+        if not self._is_mostly_black:
+            return None
+        if isinstance(where, slice):
+            where = np.arange(*where.indices(pixels))
+        ends = np.searchsorted(where, [*self._begins, pixels])
+        parts = []
+        for k in np.flatnonzero(np.diff(ends)):
+            inside = slice(ends[k], ends[k + 1])
+            columns = np.full(self._lit[k].size, -1)
+            columns[where[inside] - self._begins[k]] = np.arange(inside.start, inside.stop)
+            parts.append(self._lit[k].entries(columns))
+        for i, plane in self._clean.items():
+            parts.append((np.full(len(where), i), np.arange(len(where)), plane[:, where]))
+        lights, columns, values = (np.concatenate(x, axis=-1) for x in zip(*parts, strict=True))
+        if (self._scales != 1).any():
+            values *= self._scales[lights]
+        return LitEntries(lights, columns, values, (self._count, len(where)))
 
     def _read_strip(self, k: int) -> Floats:
         """Return a strip, (n, rows, w, 3)."""

@@ -8,7 +8,7 @@ is the average of a block: many more samples of nearly the same light. The noise
 look, as the display shows it, determines the size of blocks.
 """
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from functools import cached_property, partial
 
@@ -161,8 +161,8 @@ class LitPixels:
         No more than a block of these squares is in memory.
         """
 
-        def squares(where: slice | Indices, lit: Floats) -> tuple[Doubles, Doubles]:
-            x = mix_channels(lit, weights)
+        def squares(where: slice | Indices, light: Callable[[], Floats]) -> tuple[Doubles, Doubles]:
+            x = mix_channels(light(), weights)
             image, weight = self.pixels.subset(where).squares(x, from_clipping=False)
             return weight.T, image.T
 

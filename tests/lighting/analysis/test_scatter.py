@@ -5,9 +5,9 @@ from typing import Any
 import numpy as np
 import pytest
 
-from lightpaint.lighting.analysis.noise import noise
-from lightpaint.lighting.analysis.noise.noise import UNCORRECTED, factor, values_beside
+from lightpaint.lighting.analysis.noise import noise_rows
 from lightpaint.lighting.analysis.noise.noise_correction import correct_noise
+from lightpaint.lighting.analysis.noise.noise_rows import UNCORRECTED, factor, values_beside
 from lightpaint.lighting.analysis.noise.uncertainty import error_bars
 from lightpaint.lighting.analysis.noise.weight_directions import WeightSpread
 from lightpaint.lighting.solver import solve
@@ -56,7 +56,7 @@ def test_pairs_of_pixels_have_the_variance_of_the_gradient(
     monkeypatch: pytest.MonkeyPatch, removed: float
 ):
     """One light under two, by the definition: g = Φ̂ (Ψ − P̂) + s h ν, of paths that hit both."""
-    monkeypatch.setattr(noise, "MAX_HALVES_APART", np.inf)
+    monkeypatch.setattr(noise_rows, "MAX_HALVES_APART", np.inf)
     rng, batches, count = np.random.default_rng(0), 50, 20_000
     shape = (2, 2, batches, count)
     both = rng.gamma(0.2, 1 / 0.2, (2, 1, batches, count))

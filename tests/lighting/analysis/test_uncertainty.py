@@ -11,6 +11,7 @@ import scipy
 from nightly import nightly
 
 from lightpaint.basis.basis import Basis, Origin
+from lightpaint.basis.file.lit_planes import LitPlane, LitPlanes
 from lightpaint.basis.lights import BasisLight
 from lightpaint.basis.planes import MemoryPlanes
 from lightpaint.errors import BasisError, SizeError
@@ -21,6 +22,7 @@ from lightpaint.lighting.analysis.noise.noise_correction import correct_noise
 from lightpaint.lighting.analysis.noise.refinement import refine
 from lightpaint.lighting.analysis.noise.uncertainty import (
     _least_power,
+    _power_error,
     error_bars,
     weakest_matrix,
     with_error_bars,
@@ -622,7 +624,13 @@ def test_a_limit_that_is_met_leaves_one_side(make_basis: Any):
         assert (ends[0] < ends[1]).all()
 
 
-def test_the_weakest_matrix_is_that_of_an_inverse_for_each_light():
+def lit_planes_of(images: Any) -> LitPlanes:
+    channels = np.moveaxis(images, -1, 1)
+    return LitPlanes([LitPlane.of(list(x), 1.0) for x in channels], images.shape[1:3])
+
+
+@pytest.mark.parametrize("kind", [MemoryPlanes, lit_planes_of])
+def test_the_weakest_matrix_is_that_of_an_inverse_for_each_light(kind: Any):
     """Against the pseudo-inverse anew after each light; to round-off of the inverses."""
     rng = np.random.default_rng(1)
     n, size = 12, (6, 8)
@@ -635,16 +643,16 @@ def test_the_weakest_matrix_is_that_of_an_inverse_for_each_light():
     corrected = denoised_matrix(NormalEquations(M, np.zeros((3, n)), np.zeros(3)), power)
     doubts = np.clip(rng.uniform(-0.5, 1.3, (n, 3)), 0, 1)
     solution = SimpleNamespace(
-        basis=SimpleNamespace(planes=MemoryPlanes(image), noise=MemoryPlanes(half)),
+        basis=SimpleNamespace(planes=kind(image), noise=kind(half)),
         equations=SimpleNamespace(M=M),
         problem=SimpleNamespace(squares=SimpleNamespace(weight=importance)),
     )
     weakest = weakest_matrix(solution, power, doubts, corrected)  # type: ignore[arg-type]
     expected = corrected.copy()
     for k, c in np.argwhere(doubts > 0):
-        smooth, error = _least_power(
-            image[k, ..., c].ravel(), half[k, ..., c].ravel(), importance.ravel()
-        )
+        D = importance.ravel()
+        smooth = _least_power(D, image[k, ..., c].ravel(), float(D.sum()))
+        error = _power_error(D, half[k, ..., c].ravel())
         noisy, alone = (1 / pseudo_inverse(x[c])[k, k] for x in (M, expected))
         least = max(
             noisy - power[c, k, k] - error, alone - expected[c, k, k] + smooth, 1e-3 * M[c, k, k]

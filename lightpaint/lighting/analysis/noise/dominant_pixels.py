@@ -10,7 +10,7 @@ from dataclasses import dataclass, field
 import numpy as np
 import numpy.typing as npt
 
-from lightpaint.arrays import Doubles
+from lightpaint.arrays import Doubles, Indices
 
 #: Share of the possible push on a light from which a single pixel is one of few that decide.
 PEAK_SHARE = 0.4
@@ -58,6 +58,15 @@ class Peaks:
         if light.size:
             numbers = u2[light, pixel], np.square(push[light, pixel])
             self.candidates.append((light + first, *numbers))
+
+    def add_entries(self, lights: Indices, could: Doubles, push: Doubles) -> None:
+        """Add a block by its lit pixels: their lights, u and z, (m,) each."""
+        u2, z2 = np.square(could), np.square(push)
+        self.total += np.bincount(lights, u2, self.total.size)
+        self.pushed += np.bincount(lights, z2, self.total.size)
+        large = np.flatnonzero(u2 > PEAK_SHARE * self.total[lights])
+        if large.size:
+            self.candidates.append((lights[large], u2[large], z2[large]))
 
     def merge(self, more: "Peaks") -> None:
         """Include the pixels that others collected."""

@@ -18,27 +18,29 @@ from dataclasses import dataclass
 import numpy as np
 
 from lightpaint.arrays import Bools, Doubles, Floats, Indices
-from lightpaint.basis import BLOCK_PIXELS, FEW_LIGHTS, Planes, as_slice, block_of
+from lightpaint.basis import BLOCK_PIXELS, FEW_LIGHTS, Planes, Rooms, as_slice, block_of
 from lightpaint.lighting.algebra.symmetric_matrices import (
     SMALL_MATRIX,
     eigenvectors,
     excess_above,
     large_libraries,
 )
-from lightpaint.lighting.analysis.noise.dominant_pixels import Peaks, t_ratios
+from lightpaint.lighting.analysis.noise.dominant_pixels import t_ratios
+from lightpaint.lighting.analysis.noise.noise_rows import (
+    UNCORRECTED,
+    ChannelPixels,
+    LitPairs,
+    NoiseSums,
+    RowsOf,
+    dense_rows,
+    factor,
+)
 from lightpaint.lighting.analysis.noise.residuals import PixelGradients, Residuals, channel_grain
 from lightpaint.lighting.normal_equations import NormalEquations
 from lightpaint.lighting.problem import Problem
 from lightpaint.lighting.solution import Solution
 from lightpaint.progress import with_progress
 from lightpaint.threads import one_thread, parallel_map
-
-#: Half differences by which the pixel beside may differ. Beyond, it shows something else: an edge,
-#: or a highlight that both halves have met.
-MAX_HALVES_APART = 1.5
-
-#: Share of a pixel's own value in a factor where all of the noise power is in the equations.
-UNCORRECTED = 0.5
 
 #: The largest share of M, in any direction of the weights, that may be removed as noise. Beyond,
 #: the estimate is itself noise, and the rest of M would soon be indefinite.
@@ -49,9 +51,6 @@ MIN_PAINTING_NOISE = 0.02
 
 #: Parts of the pixels that are summed in parallel.
 PARTS = 4
-
-#: Numbers of some lights for which the steps to their rows stay in the processor's cache.
-CACHED_NUMBERS = 2**16
 
 #: Eigenvalues of M, scaled to a unit diagonal, below which a direction changes no pixel.
 NULL_EIGENVALUE = 1e-12
@@ -71,31 +70,6 @@ def own_share(problem: Problem, removed: float | None) -> float:
     refinement = problem.refinement
     of_basis = 1.0 if refinement is None else 1 - refinement.share
     return UNCORRECTED * of_basis * (1 - (problem.noise_removed if removed is None else removed))
-
-
-def factor(values: Doubles, halves: Doubles, own_share: float) -> Doubles:
-    """Return values, of which a share is a pixel's own, and the rest that of the pixel beside.
-
-    values, halves: (…, pixels), of pixels in the order of the picture, and their half differences.
-    """
-    if own_share == 1:
-        return values
-    beside = values_beside(values)
-    is_alike = np.abs(beside - values) <= MAX_HALVES_APART * np.abs(halves)
-    return np.where(is_alike, own_share * values + (1 - own_share) * beside, values)
-
-
-def values_beside(values: Doubles) -> Doubles:
-    """Return for each pixel the value of the other one of its pair, (…, pixels).
-
-    The last of an odd number takes the pixel before it, and a single one itself.
-    """
-    beside, count = np.empty_like(values), values.shape[-1]
-    even = count // 2 * 2
-    beside[..., :even:2], beside[..., 1:even:2] = values[..., 1:even:2], values[..., :even:2]
-    if count % 2:
-        beside[..., -1] = values[..., max(count - 2, 0)]
-    return beside
 
 
 @dataclass(frozen=True)
@@ -156,17 +130,17 @@ def noise_sums(solution: Solution, *, removed: float | None = None) -> Noise:
     weights, pixels = solution.weights, NoisyPixels.of(solution, removed=removed)
     counted, weight, residuals = pixels.counted, pixels.weight, pixels.residuals
     is_coupled = _is_coupled(solution)
-    # The same parts on every machine, added in order, give the same bits.
-    length = BLOCK_PIXELS * max(1, -(-counted.size // (BLOCK_PIXELS * PARTS)))
-    parts = [counted[k : k + length] for k in range(0, counted.size, length)]
-    sums = _Sums.zeros(len(weights))
-    for of_part in (
-        parallel_map(lambda x: pixels.sums(x, is_coupled=is_coupled), parts, unit="parts")
-        if len(weights) <= FEW_LIGHTS
-        else (pixels.sums(x, is_coupled=is_coupled) for x in with_progress(parts, "parts"))
-    ):
-        sums.add(of_part)
-        del of_part  # of many lights, the next one needs its room
+    sums = NoiseSums.zeros(len(weights))
+    if len(weights) > FEW_LIGHTS:  # channels are summed in parallel, and sums need much room
+        pixels.add(counted, sums, is_coupled=is_coupled)
+    else:
+        # The same parts on every machine, added in order, give the same bits.
+        length = BLOCK_PIXELS * max(1, -(-counted.size // (BLOCK_PIXELS * PARTS)))
+        parts = [counted[k : k + length] for k in range(0, counted.size, length)]
+        for of_part in parallel_map(
+            lambda x: pixels.sums(x, is_coupled=is_coupled), parts, unit="parts"
+        ):
+            sums.add(of_part)
     error, noise = np.zeros((2, 3))
     for start in with_progress(range(0, len(weight), BLOCK_PIXELS)):
         part = slice(start, start + BLOCK_PIXELS)
@@ -230,37 +204,6 @@ def painting_covariance(solution: Solution) -> Doubles | None:
 
 
 @dataclass(frozen=True)
-class _Sums:
-    """Sums over some pixels, as in `Noise`.
-
-    fourth: (3, n), fourth powers of the half differences of the gradient. peaks: of each channel.
-    """
-
-    power: Doubles
-    target_noise: Doubles
-    doubt: Doubles
-    gradient: Doubles
-    fourth: Doubles
-    peaks: tuple[Peaks, ...]
-
-    @classmethod
-    def zeros(cls, n: int) -> "_Sums":
-        """Return sums over no pixels."""
-        peaks = tuple(Peaks.empty(n) for _ in range(3))
-        gradient, fourth = np.zeros((3, n, 3, n)), np.zeros((3, n))
-        power, (target_noise, doubt) = np.zeros((3, n, n)), np.zeros((2, 3, n))
-        return cls(power, target_noise, doubt, gradient, fourth, peaks)
-
-    def add(self, part: "_Sums") -> None:
-        """Add the sums over other pixels."""
-        for name in ("power", "target_noise", "doubt", "gradient", "fourth"):
-            total = getattr(self, name)
-            total += getattr(part, name)
-        for peaks, more in zip(self.peaks, part.peaks, strict=True):
-            peaks.merge(more)
-
-
-@dataclass(frozen=True)
 class NoisyPixels:
     """Data of all pixels of a solution, from which the noise in its gradient follows.
 
@@ -303,77 +246,94 @@ class NoisyPixels:
         """Return the half differences of the gradient that some pixels make by their own samples
         alone, (3, n, pixels).
         """
-        arrays = self.noise.pixels(pixels), self.planes.pixels(pixels)
-        missed = self.residuals.residual(pixels)
-        return np.stack([self._rows(None, pixels, arrays, missed, c) for c in range(3)])
+        missed, rows_of = self.residuals.residual(pixels), self._rows_of(pixels)
+        # One by one, pixels show their own noise; in sums none is multiplied by itself.
+        channels = [self._channel(pixels, missed, c, own_share=1.0) for c in range(3)]
+        shape = len(self.weights), len(missed)
+        return np.stack([rows_of(x, None, np.empty(shape, x.D.dtype)) for x in channels])
 
-    def sums(self, counted: Indices, *, is_coupled: bool) -> _Sums:
+    def sums(self, counted: Indices, *, is_coupled: bool) -> NoiseSums:
         """Sum over some pixels."""
-        sums = _Sums.zeros(len(self.weights))
-        step, _ = block_of(self.planes)
-        for start in with_progress(range(0, counted.size, step)):
-            pixels = as_slice(counted[start : start + step])
-            arrays = self.noise.pixels(pixels), self.planes.pixels(pixels)
-            missed = self.residuals.residual(pixels)
-            rows = [self._rows(sums, pixels, arrays, missed, c) for c in with_progress(range(3))]
-            for c in with_progress(range(3)):
-                sums.gradient[c, :, c] += rows[c] @ rows[c].T
-                squares = np.square(rows[c])
-                sums.fourth[c] += np.einsum("ip,ip->i", squares, squares)
-            if is_coupled:
-                # One path carries all three channels, so their noise goes together.
-                for c, d in with_progress(((0, 1), (0, 2), (1, 2))):
-                    product = rows[c] @ rows[d].T
-                    sums.gradient[c, :, d] += product
-                    sums.gradient[d, :, c] += product.T
+        sums = NoiseSums.zeros(len(self.weights))
+        self.add(counted, sums, is_coupled=is_coupled)
         return sums
 
-    def _rows(
-        self,
-        sums: _Sums | None,
-        pixels: slice | Indices,
-        arrays: tuple[Floats, Floats],
-        missed: Doubles,
-        c: int,
-    ) -> Doubles:
-        """Return the noise in the gradient of a channel, (n, pixels); add all else to `sums`.
+    def add(self, counted: Indices, sums: NoiseSums, *, is_coupled: bool) -> None:
+        """Add some pixels to sums."""
+        n, (step, kind) = len(self.weights), block_of(self.planes)
+        rooms = Rooms(n, n * min(step, counted.size), kind, are_kept=is_coupled)
+        with one_thread():
+            for start in with_progress(range(0, counted.size, step)):
+                pixels = as_slice(counted[start : start + step])
+                self._add_block(pixels, sums, rooms, is_coupled=is_coupled)
 
-        arrays: (n, pixels, 3), noise and planes there. missed: (pixels, 3), the residual.
+    def _add_block(
+        self, pixels: slice | Indices, sums: NoiseSums, rooms: Rooms, *, is_coupled: bool
+    ) -> None:
+        """Add some pixels to sums."""
+        rows_of, missed = self._rows_of(pixels), self.residuals.residual(pixels)
+        rows = [np.empty((0, 0))] * 3
+
+        def add(c: int) -> None:
+            room = rooms.array(c, (len(self.weights), len(missed)))
+            rows[c] = rows_of(self._channel(pixels, missed, c), sums, room)
+            sums.gradient[c, :, c] += rows[c] @ rows[c].T
+
+        rooms.each_channel(add)
+        if is_coupled:
+            # One path carries all three channels, so their noise goes together.
+            for c, d in with_progress(((0, 1), (0, 2), (1, 2))):
+                product = rows[c] @ rows[d].T
+                sums.gradient[c, :, d] += product
+                sums.gradient[d, :, c] += product.T
+
+    def _channel(
+        self, pixels: slice | Indices, missed: Doubles, c: int, *, own_share: float | None = None
+    ) -> ChannelPixels:
+        """Return what some pixels of a channel share for all lights.
+
+        missed: (pixels, 3), the residual. own_share: as of the pixels, by default.
         """
         _, kind = block_of(self.planes)
+        own, of_pixels = self.own_share if own_share is None else own_share, self.gradients
         D = self.weight[pixels, c % self.weight.shape[1]].astype(kind)
-        h, lit = (x[..., c].astype(kind, copy=False) for x in arrays)
-        of_pixels = self.gradients
         mean, half = (x[pixels, c].astype(kind) for x in (of_pixels.mean, of_pixels.half))
-        # One by one, pixels show their own noise; in sums none is multiplied by itself.
-        own = 1.0 if sums is None else self.own_share
-        missing, of_mean = np.abs(missed[:, c].astype(kind)), factor(mean, half, own)
-        weights, pulled = (x[:, c, None].astype(kind) for x in (self.weights, self.pulled))
-        rows = np.empty_like(h)
-        step = max(1, CACHED_NUMBERS // max(h.shape[1], 1))
-        for first in range(0, len(h), step):
-            some = slice(first, first + step)
-            noise, light, row = h[some], lit[some], rows[some]
-            row[...] = noise * of_mean + factor(light, noise, own) * half
-            if sums is not None:
-                size = missing + weights[some] * light
-                sums.peaks[c].add(D * light * size, row, first=first)
-            if self.pulled.any():
-                # The noise correction leaves the pull as it is.
-                power = factor(light, noise, max(own, UNCORRECTED)) * noise
-                row += pulled[some] * np.where(self.unseen[pixels], power, 0)
-        if sums is None:
-            return rows
-        weighted = np.sqrt(D) * h
-        sums.power[c] += weighted @ weighted.T
+        of_noise, of_light, doubt = None, None, np.zeros_like(D)
         if of_pixels.bend is not None and of_pixels.doubt is not None:
             mixed = self.residuals.half[pixels, c].astype(kind)
-            bend, doubt = (x[pixels, c].astype(kind) for x in (of_pixels.bend, of_pixels.doubt))
-            sums.target_noise[c] += h @ (D * mixed + half) + lit @ bend
-            sums.doubt[c] += lit @ doubt
+            of_noise = D * mixed + half
+            of_light, doubt = (x[pixels, c].astype(kind) for x in (of_pixels.bend, of_pixels.doubt))
         elif self.residuals.current is not None:
             shared = D * self.share[pixels, c % self.share.shape[1]]
-            sums.target_noise[c] += h @ (shared * self.residuals.current[pixels, c]).astype(kind)
+            of_noise = (shared * self.residuals.current[pixels, c]).astype(kind)
+        return ChannelPixels(
+            c=c,
+            D=D,
+            half=half,
+            mean=factor(mean, half, own),
+            missing=np.abs(missed[:, c].astype(kind)),
+            unseen=self.unseen[pixels],
+            weights=self.weights[:, c].astype(kind),
+            pulled=self.pulled[:, c].astype(kind),
+            has_pull=bool(self.pulled.any()),
+            own_share=own,
+            of_noise=of_noise,
+            of_light=of_light,
+            doubt=doubt,
+        )
+
+    def _rows_of(self, pixels: slice | Indices) -> RowsOf:
+        """Return the function for the rows of a channel of some pixels: of their lit ones alone,
+        where the planes know these.
+        """
+        noise, light = (x.lit_entries(pixels) for x in (self.noise, self.planes))
+        if noise is not None and light is not None:
+            return LitPairs.of(noise, light).rows
+        halves, images = self.noise.pixels(pixels), self.planes.pixels(pixels)
+
+        def rows(pixels: ChannelPixels, sums: NoiseSums | None, room: Doubles) -> Doubles:
+            return dense_rows(pixels, halves[..., pixels.c], images[..., pixels.c], sums, room)
+
         return rows
 
 

@@ -142,11 +142,14 @@ def weakest_matrix(
     inverse = [pseudo_inverse(x) for x in weakest]
     # A light that others replace exactly has no part of its own which could be weaker.
     is_own = [np.einsum("ij,ji->i", *pair) > OWN for pair in zip(inverse, weakest, strict=True)]
+    channels = [weight[..., c % weight.shape[2]].ravel() for c in range(3)]
+    totals = [_sum(D) for D in channels]
     for k in with_progress(in_doubt, "lights"):
-        image, half = (planes.plane(k) for planes in (basis.planes, basis.noise))
+        light, half = (planes.lit_plane(k) for planes in (basis.planes, basis.noise))
         for c in (c for c in np.flatnonzero(doubts[k] > 0) if is_own[c][k]):
-            D = weight[..., c % weight.shape[2]].ravel()
-            smooth, error = _least_power(image[..., c].ravel(), half[..., c].ravel(), D)
+            of_light, of_half = ((channels[c][where], x[c]) for where, x in (light, half))
+            smooth = _least_power(*of_light, totals[c])
+            error = _power_error(*of_half)
             # Only the part that no other light can replace may shrink.
             noisy, alone = 1 / float(noisy_inverse[c][k]), 1 / float(inverse[c][k, k])
             least = max(
@@ -164,20 +167,30 @@ def weakest_matrix(
     return weakest
 
 
-def _least_power(image: Floats, half: Floats, D: Floats) -> tuple[float, float]:
+def _least_power(D: Floats, image: Floats, total: float) -> float:
     """Return the least ‖Φ‖² that a light may have without noise, by its light alone.
 
-    That is ‖Φ‖² ≥ (Σ D Φ)² / Σ D. Also returns the standard error of Σ D h². All (pixels,).
+    That is ‖Φ‖² ≥ (Σ D Φ)² / Σ D. D, image: (pixels,), where it is not black. total: Σ D.
     """
-    squares = light = lights = total = 0.0
-    for start in range(0, image.size, BLOCK_PIXELS):
-        pixels = slice(start, start + BLOCK_PIXELS)
-        d, f, h = (x[pixels].astype(np.float64) for x in (D, image, half))
-        squares += float(np.square(d * h * h).sum())
+    light = lights = 0.0
+    for d, f in _blocks(D, image):
         light, lights = light + float(d @ f), lights + float(np.square(d * f).sum())
-        total += float(d.sum())
-    smooth = (light * _poisson_lower_limit(light**2 / lights)) ** 2 / total if lights > 0 else 0.0
-    return smooth, math.sqrt(squares)
+    return (light * _poisson_lower_limit(light**2 / lights)) ** 2 / total if lights > 0 else 0.0
+
+
+def _power_error(D: Floats, half: Floats) -> float:
+    """Return the standard error of Σ D h², of half differences, (pixels,)."""
+    return math.sqrt(sum(float(np.square(d * h * h).sum()) for d, h in _blocks(D, half)))
+
+
+def _sum(D: Floats) -> float:
+    return sum(float(d.sum()) for (d,) in _blocks(D))
+
+
+def _blocks(*pixels: Floats) -> Iterator[tuple[Doubles, ...]]:
+    """Yield blocks of pixels in float64."""
+    for start in range(0, pixels[0].size, BLOCK_PIXELS):
+        yield tuple(x[start : start + BLOCK_PIXELS].astype(np.float64) for x in pixels)
 
 
 def _poisson_lower_limit(paths: float) -> float:

@@ -1,0 +1,241 @@
+"""The noise of some pixels in the gradient of each light, and what is summed of it.
+
+Of many lights most pixels are black, and these are not looked at: where neither a light nor its
+half difference is, nothing is added.
+"""
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from functools import cached_property
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+
+from lightpaint.arrays import Bools, Doubles, Floats, Indices
+from lightpaint.basis import LitEntries
+from lightpaint.lighting.analysis.noise.dominant_pixels import Peaks
+
+#: Half differences by which the pixel beside may differ. Beyond, it shows something else: an edge,
+#: or a highlight that both halves have met.
+MAX_HALVES_APART = 1.5
+
+#: Share of a pixel's own value in a factor where all of the noise power is in the equations.
+UNCORRECTED = 0.5
+
+#: Numbers of some lights for which the steps to their rows stay in the processor's cache.
+CACHED_NUMBERS = 2**16
+
+
+def factor(values: Doubles, halves: Doubles, own_share: float) -> Doubles:
+    """Return values, of which a share is a pixel's own, and the rest that of the pixel beside.
+
+    values, halves: (…, pixels), of pixels in the order of the picture, and their half differences.
+    """
+    if own_share == 1:
+        return values
+    return mixed_with_beside(values, values_beside(values), halves, own_share)
+
+
+def mixed_with_beside(
+    values: Doubles, beside: Doubles, halves: Doubles, own_share: float
+) -> Doubles:
+    """Return values mixed with those of the pixels beside, where these are alike.
+
+    All of the same shape. halves: half differences of the values.
+    """
+    if own_share == 1:
+        return values
+    is_alike = np.abs(beside - values) <= MAX_HALVES_APART * np.abs(halves)
+    return np.where(is_alike, own_share * values + (1 - own_share) * beside, values)
+
+
+def values_beside(values: npt.NDArray[Any]) -> npt.NDArray[Any]:
+    """Return for each pixel the value of the other one of its pair, (…, pixels).
+
+    The last of an odd number takes the pixel before it, and a single one itself.
+    """
+    beside, count = np.empty_like(values), values.shape[-1]
+    even = count // 2 * 2
+    beside[..., :even:2], beside[..., 1:even:2] = values[..., 1:even:2], values[..., :even:2]
+    if count % 2:
+        beside[..., -1] = values[..., max(count - 2, 0)]
+    return beside
+
+
+@dataclass(frozen=True)
+class NoiseSums:
+    """Sums over some pixels, as in `Noise`.
+
+    fourth: (3, n), fourth powers of the half differences of the gradient. peaks: of each channel.
+    """
+
+    power: Doubles
+    target_noise: Doubles
+    doubt: Doubles
+    gradient: Doubles
+    fourth: Doubles
+    peaks: tuple[Peaks, ...]
+
+    @classmethod
+    def zeros(cls, n: int) -> "NoiseSums":
+        """Return sums over no pixels."""
+        peaks = tuple(Peaks.empty(n) for _ in range(3))
+        gradient, fourth = np.zeros((3, n, 3, n)), np.zeros((3, n))
+        power, (target_noise, doubt) = np.zeros((3, n, n)), np.zeros((2, 3, n))
+        return cls(power, target_noise, doubt, gradient, fourth, peaks)
+
+    def add(self, part: "NoiseSums") -> None:
+        """Add the sums over other pixels."""
+        for name in ("power", "target_noise", "doubt", "gradient", "fourth"):
+            total = getattr(self, name)
+            total += getattr(part, name)
+        for peaks, more in zip(self.peaks, part.peaks, strict=True):
+            peaks.merge(more)
+
+
+@dataclass(frozen=True)
+class ChannelPixels:
+    """Some pixels of a channel, as all lights share them.
+
+    c: the channel. D: their weight. mean, half: factors of the half differences and of the light of
+    each light in its gradient. missing: |residual|. unseen: where no emitter is. All (p,). weights,
+    pulled: (n,), of the lights; has_pull: whether any light is pulled, in any channel. own_share:
+    of a pixel in a factor. of_noise, of_light, doubt: (p,), by which half differences and light add
+    to `target_noise` and `doubt`; None if they do not.
+    """
+
+    c: int
+    D: Doubles
+    half: Doubles
+    mean: Doubles
+    missing: Doubles
+    unseen: Bools
+    weights: Doubles
+    pulled: Doubles
+    has_pull: bool
+    own_share: float
+    of_noise: Doubles | None
+    of_light: Doubles | None
+    doubt: Doubles
+
+    @property
+    def own_share_of_pull(self) -> float:
+        """Share of a pixel in a factor of the pull, which the noise correction leaves as it is."""
+        return max(self.own_share, UNCORRECTED)
+
+
+#: A function from pixels of a channel, sums to which to add (None for none), and an array (n, p) to
+#: write to, to the noise in the gradient, (n, p).
+RowsOf = Callable[[ChannelPixels, NoiseSums | None, Doubles], Doubles]
+
+
+def dense_rows(
+    pixels: ChannelPixels, noise: Floats, light: Floats, sums: NoiseSums | None, room: Doubles
+) -> Doubles:
+    """Return the noise in the gradient, (n, p); add all else to `sums`.
+
+    noise, light: (n, p), half differences and light. room: (n, p), written to.
+    """
+    c, kind, own = pixels.c, pixels.D.dtype, pixels.own_share
+    h, lit = (x.astype(kind, copy=False) for x in (noise, light))
+    step = max(1, CACHED_NUMBERS // max(h.shape[1], 1))
+    if sums is not None:
+        np.multiply(np.sqrt(pixels.D), h, out=room)
+        sums.power[c] += room @ room.T
+    for first in range(0, len(h), step):
+        some = slice(first, first + step)
+        half, own_light, row = h[some], lit[some], room[some]
+        row[...] = half * pixels.mean + factor(own_light, half, own) * pixels.half
+        if sums is not None:
+            size = pixels.missing + pixels.weights[some, None] * own_light
+            sums.peaks[c].add(pixels.D * own_light * size, row, first=first)
+        if pixels.has_pull:
+            power = factor(own_light, half, pixels.own_share_of_pull) * half
+            row += pixels.pulled[some, None] * np.where(pixels.unseen, power, 0)
+    if sums is None:
+        return room
+    if pixels.of_noise is not None:
+        sums.target_noise[c] += h @ pixels.of_noise
+    if pixels.of_light is not None:
+        sums.target_noise[c] += lit @ pixels.of_light
+        sums.doubt[c] += lit @ pixels.doubt
+    squares = np.square(room)
+    sums.fourth[c] += np.einsum("ip,ip->i", squares, squares)
+    return room
+
+
+@dataclass(frozen=True)
+class LitPairs:
+    """The pixels in which lights or their half differences are not black.
+
+    lights, columns, places: (m,), of each, as in `LitEntries`. noise, light: (3, m). shape: (n, p).
+    """
+
+    lights: Indices
+    columns: Indices
+    places: Indices
+    noise: Floats
+    light: Floats
+    shape: tuple[int, int]
+
+    @classmethod
+    def of(cls, noise: LitEntries, light: LitEntries) -> "LitPairs":
+        """Return the lit pixels of half differences and light, of the same pixels."""
+        shape = light.shape
+        if np.array_equal(noise.places, light.places):
+            values = noise.values, light.values
+            return cls(light.lights, light.columns, light.places, *values, shape)
+        is_lit = np.zeros(shape[0] * shape[1], np.bool_)
+        is_lit[light.places] = True
+        only_noise = np.flatnonzero(~is_lit[noise.places])
+        lights, columns = (
+            np.concatenate([getattr(light, name), getattr(noise, name)[only_noise]])
+            for name in ("lights", "columns")
+        )
+        places = lights * shape[1] + columns
+        halves, values = np.empty((2, 3, places.size), np.float32)
+        values[:, : light.places.size], values[:, light.places.size :] = light.values, 0
+        room = np.zeros(is_lit.size, np.float32)
+        for into, channel in zip(halves, noise.values, strict=True):
+            room[noise.places] = channel
+            into[...] = room[places]
+        return cls(lights, columns, places, halves, values, shape)
+
+    @cached_property
+    def places_beside(self) -> Indices:
+        """The place of the other pixel of each one's pair, (m,)."""
+        columns = np.arange(self.shape[1])
+        return self.places + (values_beside(columns) - columns)[self.columns]
+
+    def rows(self, pixels: ChannelPixels, sums: NoiseSums | None, room: Doubles) -> Doubles:
+        """Return the noise in the gradient, (n, p); add all else to `sums`.
+
+        room: (n, p), written to.
+        """
+        c, at, of = pixels.c, self.columns, self.lights
+        h, light = (x[c].astype(room.dtype, copy=False) for x in (self.noise, self.light))
+        room[...] = 0
+        flat = room.reshape(-1)
+        flat[self.places] = light
+        if sums is not None and pixels.of_light is not None:
+            sums.target_noise[c] += room @ pixels.of_light
+            sums.doubt[c] += room @ pixels.doubt
+        beside = flat[self.places_beside]
+        mixed = mixed_with_beside(light, beside, h, pixels.own_share)
+        row = h * pixels.mean[at] + mixed * pixels.half[at]
+        if sums is not None:
+            could = pixels.D[at] * light * (pixels.missing[at] + pixels.weights[of] * light)
+            sums.peaks[c].add_entries(of, could, row)
+        if pixels.has_pull:
+            power = mixed_with_beside(light, beside, h, pixels.own_share_of_pull) * h
+            row += pixels.pulled[of] * pixels.unseen[at] * power
+        if sums is not None:
+            if pixels.of_noise is not None:
+                flat[self.places] = h
+                sums.target_noise[c] += room @ pixels.of_noise
+            flat[self.places] = np.sqrt(pixels.D)[at] * h
+            sums.power[c] += room @ room.T
+            sums.fourth[c] += np.bincount(of, np.square(np.square(row)), len(room))
+        flat[self.places] = row
+        return room
