@@ -55,6 +55,12 @@ class LitPlane:
         """Return this plane with numbers of this kind."""
         return replace(self, numbers=self.numbers.astype(kind, copy=False))
 
+    def at(self, pixels: npt.NDArray[np.uint32]) -> "LitPlane":
+        """Return this plane with these lit pixels, which include its own."""
+        numbers = np.zeros((3, pixels.size), self.numbers.dtype)
+        numbers[:, np.searchsorted(pixels, self.pixels)] = self.numbers
+        return replace(self, pixels=pixels, numbers=numbers)
+
     def dense(self, pixels: int) -> npt.NDArray[np.float32]:
         """Return all pixels, (3, pixels), not yet multiplied by the scale."""
         plane = np.zeros((3, pixels), np.float32)
@@ -187,17 +193,23 @@ class LitPlanes(RowPlanes):
         """True if most planes are stored in half floats, whose rounding their noise hides."""
         return self._is_noisy
 
+    def stored(self, i: int) -> LitPlane:
+        """Return the plane of light i as it is stored."""
+        scale = float(self._scales[i])
+        if i in self._clean:
+            return LitPlane.of(self._clean[i], scale)
+        # One copy of all strips: there are many, of few lit pixels each.
+        of_strips = [strip.lit_of(i) for strip in self._lit]
+        lit = [x + np.uint32(y) for (x, _), y in zip(of_strips, self._begins, strict=True)]
+        return LitPlane(
+            np.concatenate(lit), np.concatenate([x for _, x in of_strips], axis=1), scale
+        )
+
     def plane(self, i: int) -> Floats:
         """Return the plane of light i, (h, w, 3)."""
-        if i in self._clean:
-            plane = self._clean[i].copy()
-        else:
-            # One copy of all strips: there are many, of few lit pixels each.
-            of_strips = [strip.lit_of(i) for strip in self._lit]
-            lit = [x.astype(np.intp) + y for (x, _), y in zip(of_strips, self._begins, strict=True)]
-            numbers = np.concatenate([x for _, x in of_strips], axis=1)
-            plane = np.zeros((3, self._size[0] * self._size[1]), np.float32)
-            plane[:, np.concatenate(lit)] = _singles(numbers)
+        stored = self.stored(i)
+        plane = np.zeros((3, self._size[0] * self._size[1]), np.float32)
+        plane[:, stored.pixels] = _singles(stored.numbers)
         if self._scales[i] != 1:
             plane *= self._scales[i]
         return np.ascontiguousarray(plane.T).reshape(*self._size, 3)
