@@ -177,11 +177,13 @@ def _is_encoded(lights: int, size: tuple[int, int]) -> bool:
 def _encoded(basis: Basis) -> Basis:
     """Return `basis` with planes in the encoding of its file."""
     numbers = with_progress(range(len(basis.lights)), "lights")
-    of_lights = zip(*(stored_planes_of(basis, k) for k in numbers), strict=True)
-    sets = [list(planes) for planes in of_lights]
-    held = []
+    of_lights = (stored_planes_of(basis, k) for k in numbers)
+    sets = [list(planes) for planes in zip(*of_lights, strict=True)]
+    held = list[Planes]()
     while sets:  # one is gone before the next is joined
         held.append(_in_memory(sets.pop(0), basis.size, is_indirect=len(held) > 1))
+        if is_large(len(basis.lights), basis.size):
+            release_freed_memory()
     indirect = IndirectLight(*held[2:]) if held[2:] else None
     return replace(basis, planes=held[0], noise=held[1], indirect=indirect)
 
@@ -193,11 +195,10 @@ def _in_memory(
 
     Walks over indirect light are rare, and need no copy in float32.
     """
-    are_lit = all(isinstance(plane, LitPlane) for plane in planes)
-    lit_bytes = sum(plane.nbytes for plane in planes if isinstance(plane, LitPlane))
-    is_sparse = are_lit and lit_bytes < 6 * len(planes) * size[0] * size[1]
-    if len(planes) >= MIN_LIGHTS and is_sparse and not is_indirect:
-        return LitPlanes([plane for plane in planes if isinstance(plane, LitPlane)], size)
+    count, whole_bytes = len(planes), 6 * size[0] * size[1]  # in half floats
+    lit_bytes = sum(x.nbytes if isinstance(x, LitPlane) else whole_bytes for x in planes)
+    if count >= MIN_LIGHTS and not is_indirect and lit_bytes < count * whole_bytes / 2:
+        return LitPlanes([as_lit_plane(plane) for plane in planes], size)
     whole = [as_encoded_plane(plane, size) for plane in planes]
     return EncodedPlanes(whole, is_decoded_once=not is_indirect)
 

@@ -423,7 +423,7 @@ class TemporaryArray:
         Calls of the system take less time than page faults in the mapped array, and leave no pages
         in the memory of the process. into: contiguous float32.
         """
-        part = memoryview(into.reshape(-1)).cast("B")
+        part = into.reshape(-1).view(np.uint8).data
         if not hasattr(os, "preadv"):
             into.reshape(-1)[...] = self.array.reshape(-1)[first : first + into.size]
             self.release()
@@ -434,7 +434,7 @@ class TemporaryArray:
 
     def write(self, first: int, numbers: Floats) -> None:
         """Write numbers from the one with index `first` on, in row-major order."""
-        part = memoryview(np.ascontiguousarray(numbers, np.float32).reshape(-1)).cast("B")
+        part = np.ascontiguousarray(numbers, np.float32).reshape(-1).view(np.uint8).data
         if not hasattr(os, "pwrite"):
             self.array.reshape(-1)[first : first + numbers.size] = numbers.reshape(-1)
             self.release()

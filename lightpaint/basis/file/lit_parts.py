@@ -24,17 +24,19 @@ MAX_STEP = 2**11
 
 def as_lit_plane(plane: EncodedPlane | LitPlane) -> LitPlane:
     """Return the lit pixels of a plane."""
-    return plane if isinstance(plane, LitPlane) else LitPlane.of(plane.numbers, plane.scale)
+    return plane if isinstance(plane, LitPlane) else LitPlane.of([*plane.numbers], plane.scale)
 
 
 def as_lit_planes(planes: Sequence[EncodedPlane | LitPlane]) -> list[LitPlane]:
     """Return the planes of a light with the same lit pixels."""
     lit = [as_lit_plane(plane) for plane in planes]
     pixels = lit[0].pixels
-    if all(x.pixels is pixels for x in lit):
+    if all(x.pixels is pixels or np.array_equal(x.pixels, pixels) for x in lit):
         return lit
-    union = np.unique(np.concatenate([x.pixels for x in lit]))
-    return [x.at(union) for x in lit]
+    merged = np.sort(np.concatenate([x.pixels for x in lit]), kind="stable")
+    is_new = np.ones(merged.size, bool)
+    np.not_equal(merged[1:], merged[:-1], out=is_new[1:])
+    return [x.at(merged[is_new]) for x in lit]
 
 
 def as_encoded_plane(plane: EncodedPlane | LitPlane, size: tuple[int, int]) -> EncodedPlane:

@@ -13,7 +13,7 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from lightpaint.arrays import Bools, Doubles, Floats, Indices, copy_as_singles
+from lightpaint.arrays import Bools, Doubles, Floats, Indices, copy_as_singles, release_freed_memory
 from lightpaint.basis.file.file_planes import RowPlanes
 from lightpaint.progress import with_progress
 from lightpaint.threads import parallel_map
@@ -197,7 +197,7 @@ class LitPlanes(RowPlanes):
         """Return the plane of light i as it is stored."""
         scale = float(self._scales[i])
         if i in self._clean:
-            return LitPlane.of(self._clean[i], scale)
+            return LitPlane.of([*self._clean[i]], scale)
         # One copy of all strips: there are many, of few lit pixels each.
         of_strips = [strip.lit_of(i) for strip in self._lit]
         lit = [x + np.uint32(y) for (x, _), y in zip(of_strips, self._begins, strict=True)]
@@ -290,4 +290,5 @@ class LitCollector:
         joined = []
         while sets:  # one is gone before the next is joined
             joined.append(LitPlanes(sets.pop(0), self._size))
+            release_freed_memory()
         return joined

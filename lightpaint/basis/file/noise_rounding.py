@@ -90,9 +90,9 @@ def _rounded_pair(
     numbers = round_to_halves(_rounded(light, of_numbers, dither) / np.float32(scale))
     # The other bits of the same random number.
     ratios = round_to_halves(_rounded(ratio, np.uint32(RATIO_DIGITS), ~dither >> np.uint32(9)))
-    of_noise = np.where(
-        is_rounded, round_to_halves(noise / np.float32(scale)), noise_numbers(numbers, ratios)
-    )
+    of_noise = noise_numbers(numbers, ratios)
+    if is_rounded.any():
+        of_noise[is_rounded] = round_to_halves(noise[is_rounded] / np.float32(scale))
     error = np.abs(as_singles(numbers) * np.float32(scale) - light)
     error_of_noise = as_singles(of_noise) * np.float32(scale) - noise
     limit = (LARGEST_SHARE / HIDDEN_SHARE) ** 2 * hidden
@@ -105,7 +105,7 @@ def _rounded_pair(
 
 def _has_half_digits(values: Floats) -> npt.NDArray[np.bool_]:
     """Return which numbers have no more digits than half floats, as those that were rounded."""
-    return (values.view(np.uint32) << np.uint32(32 - SINGLE_DIGITS + HALF_DIGITS)) == 0
+    return np.asarray(values.view(np.uint32) << np.uint32(32 - SINGLE_DIGITS + HALF_DIGITS) == 0)
 
 
 def _rounded(
@@ -137,7 +137,7 @@ def _exact_pixels(
     is_clean = (np.abs(noise) <= np.float32(CLEAN) * np.abs(light)).all(axis=0)
     is_clean &= (light != 0).any(axis=0)
     if not is_clean.any():
-        return is_clean
+        return np.asarray(is_clean)
     picture = np.zeros(size, bool)
     picture.reshape(-1)[lit] = is_clean
     return inner_pixels(picture).reshape(-1)[lit]

@@ -191,12 +191,11 @@ class FileSums:
         """All sums, mapped from the file."""
         return self._file.array
 
-    def read(self, half: int, rows: range) -> Floats:
-        """Return a copy of some rows of one half, (planes, rows, w, 3)."""
-        _, planes, _, width, _ = self.array.shape
+    def read(self, half: int, rows: range) -> Floats | None:
+        """Return a copy of some rows of one half, (planes, rows, w, 3); None if they are zero."""
         if not self._is_written[half, rows.start : rows.stop].any():
-            return np.zeros((planes, len(rows), width, 3), np.float32)
-        return self._block(half, range(planes), rows)
+            return None
+        return self._block(half, range(self.array.shape[1]), rows)
 
     def _block(self, half: int, planes: range, rows: range) -> Floats:
         block = np.empty((len(planes), len(rows), *self.array.shape[3:]), np.float32)
@@ -207,7 +206,7 @@ class FileSums:
     def _place(self, half: int, plane: int, rows: range) -> int:
         """Return the index of the first number of some rows, in row-major order."""
         _, planes, height, width, channels = self.array.shape
-        return ((half * planes + plane) * height + rows.start) * width * channels
+        return int(((half * planes + plane) * height + rows.start) * width * channels)
 
     def write(self, half: int, rows: range, sums: Floats) -> None:
         """Write some rows of one half, (planes, rows, w, 3)."""
