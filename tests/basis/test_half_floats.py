@@ -207,7 +207,7 @@ def test_planes_that_were_decoded_are_written_as_they_came() -> None:
     np.testing.assert_array_equal(planes.array(), values.transpose(0, 2, 3, 1))
     assert planes.nbytes == values.nbytes
     for i, before in enumerate(encoded):
-        after = planes.encoded(i)
+        after = planes.stored(i)
         assert after.encoding == before.encoding
         assert after.size == before.size
         assert np.stack(after.numbers).tobytes() == np.stack(before.numbers).tobytes()

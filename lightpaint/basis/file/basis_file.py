@@ -7,7 +7,7 @@ file is read completely into memory or, if it is large, row by row on request.
 import json
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
-from functools import partial
+from functools import cache, partial
 from pathlib import Path
 
 import numpy as np
@@ -16,28 +16,34 @@ from lightpaint.arrays import release_freed_memory
 from lightpaint.basis.basis import Basis, Origin
 from lightpaint.basis.file.file_parts import (
     CHECKSUMS_KEY,
-    INDIRECT_CHANNELS,
     LARGEST_SCALE,
-    LIGHT_CHANNELS,
     LIGHT_KEY,
-    PLANE_CHANNELS,
     Checksums,
+    all_channels,
     check,
     checked_text,
     checksum,
-    encoded_planes_of,
     fields_of_others,
-    light_channels,
     light_texts,
     other_parts,
+    picture_size,
     plane_sets,
+    planes_of_part,
     scales_of,
-    stack_channels,
-    stored_channels,
+    stored_planes_of,
 )
 from lightpaint.basis.file.file_planes import FilePlanes
-from lightpaint.basis.file.half_floats import EncodedPlanes, PlaneEncoding, encoded_plane
+from lightpaint.basis.file.half_floats import EncodedPlane, EncodedPlanes
+from lightpaint.basis.file.light_channels import (
+    INDIRECT_CHANNELS,
+    LIGHT_CHANNELS,
+    PLANE_CHANNELS,
+    has_indirect_channels,
+    is_lit_part,
+)
+from lightpaint.basis.file.lit_parts import as_encoded_plane, as_lit_plane, lit_channels
 from lightpaint.basis.file.lit_planes import MIN_LIGHTS, LitCollector, LitPlane, LitPlanes
+from lightpaint.basis.file.noise_rounding import MANY_LIGHTS
 from lightpaint.basis.lights import BasisLight, Lights
 from lightpaint.basis.planes import IndirectLight, Planes, as_planes
 from lightpaint.errors import BasisError, ImageError, LightpaintError
@@ -59,8 +65,10 @@ from lightpaint.progress import with_progress
 from lightpaint.storage.json_records import fields_of, read_record, strict_json
 from lightpaint.threads import parallel_map
 
-#: The written format, and an older one that is still read, in which all planes are float32.
-FORMAT, OLD_FORMAT = "lightpaint-basis 2", "lightpaint-basis 1"
+#: The written formats, of which the second has parts with only lit pixels, and an older one that is
+#: still read, in which all planes are float32.
+FORMAT, LIT_FORMAT, OLD_FORMAT = (f"lightpaint-basis {k}" for k in (2, 3, 1))
+FORMATS = FORMAT, LIT_FORMAT, OLD_FORMAT
 FORMAT_KEY = "lightpaint.format"
 ORIGIN_KEY = "lightpaint.origin"
 
@@ -103,15 +111,17 @@ def write_basis(path: str | Path, basis: Basis) -> None:
     # Newer fields are left out at their defaults, as in files that are older than these fields.
     later = ("each_light", "integrator", "is_composed", "extra_spp", "observer")
     of_origin = json.dumps(fields_of(basis.origin, *later), ensure_ascii=False)
-    others, sums = list(other_parts(basis)), dict[str, str]()
+    others, sums, has_lit_parts = list(other_parts(basis)), dict[str, str](), list[bool]()
 
     def parts() -> Iterator[tuple[PartHead, Channels]]:
         for k, light in enumerate(with_progress(basis.lights, "lights")):
-            planes = encoded_planes_of(basis, k)
-            texts = light_texts(light, [part.encoding for part in planes])
-            channels = light_channels(planes)
+            planes = stored_planes_of(basis, k)
+            texts = light_texts(light, [plane.scale for plane in planes])
+            lit = lit_channels(planes, basis.size) if len(basis.lights) >= MANY_LIGHTS else None
+            channels = lit or all_channels([as_encoded_plane(x, basis.size) for x in planes])
+            has_lit_parts.append(lit is not None)
             sums[light.name] = checksum(checked_text(texts), channels)
-            yield PartHead.of(light.name, channels, texts), channels
+            yield PartHead.of(light.name, channels, texts, display=basis.size), channels
         for part in others:
             head = PartHead.of(part.name, part.channels, part.attributes, display=part.display)
             yield head, part.channels
@@ -120,17 +130,16 @@ def write_basis(path: str | Path, basis: Basis) -> None:
         seen_checksum = checksum("", others[0].channels)
         guide = "" if basis.guide_table is None else checksum("", others[1].channels)
         checksums = Checksums(sums, checksum(of_origin, {}), seen_checksum, guide)
-        return {FORMAT_KEY: FORMAT, ORIGIN_KEY: of_origin, CHECKSUMS_KEY: checksums.text()}
+        form = LIT_FORMAT if any(has_lit_parts) else FORMAT
+        return {FORMAT_KEY: form, ORIGIN_KEY: of_origin, CHECKSUMS_KEY: checksums.text()}
 
     write_streamed(Path(path), parts(), room=_room(basis, others, of_origin), texts=texts)
 
 
 def _room(basis: Basis, others: Sequence[ExrPart], of_origin: str) -> int:
     """Return an upper bound for the number of bytes before the first pixel of a basis file."""
-    scaled_encodings = [PlaneEncoding(scale=LARGEST_SCALE)] * len(PLANE_CHANNELS)
-    lights = [
-        (light.name, light_texts(light, scaled_encodings), basis.size[0]) for light in basis.lights
-    ]
+    scales = [LARGEST_SCALE] * len(PLANE_CHANNELS)
+    lights = [(light.name, light_texts(light, scales), basis.size[0]) for light in basis.lights]
     parts = [(part.name, part.attributes, part.size[0]) for part in others]
     checksums = Checksums(dict.fromkeys(basis.names, "0" * 8), *("0" * 8,) * 3)
     of_file = {FORMAT_KEY: FORMAT, ORIGIN_KEY: of_origin, CHECKSUMS_KEY: checksums.text()}
@@ -167,12 +176,30 @@ def _is_encoded(lights: int, size: tuple[int, int]) -> bool:
 def _encoded(basis: Basis) -> Basis:
     """Return `basis` with planes in the encoding of its file."""
     numbers = with_progress(range(len(basis.lights)), "lights")
-    of_lights = [encoded_planes_of(basis, k) for k in numbers]
-    images, noise, *indirect = zip(*of_lights, strict=True)
-    parts = None
-    if indirect:
-        parts = IndirectLight(*(EncodedPlanes(x, is_decoded_once=False) for x in indirect))
-    return replace(basis, planes=EncodedPlanes(images), noise=EncodedPlanes(noise), indirect=parts)
+    of_lights = (stored_planes_of(basis, k) for k in numbers)
+    sets = [list(planes) for planes in zip(*of_lights, strict=True)]
+    held = list[Planes]()
+    while sets:  # one is gone before the next is joined
+        held.append(_in_memory(sets.pop(0), basis.size, is_indirect=len(held) > 1))
+        if is_large(len(basis.lights), basis.size):
+            release_freed_memory()
+    indirect = IndirectLight(*held[2:]) if held[2:] else None
+    return replace(basis, planes=held[0], noise=held[1], indirect=indirect)
+
+
+def _in_memory(
+    planes: Sequence[EncodedPlane | LitPlane], size: tuple[int, int], *, is_indirect: bool
+) -> Planes:
+    """Return stored planes of a set as one: of many lights by their lit pixels, if these are few.
+
+    Walks over indirect light are rare, and need no copy in float32.
+    """
+    count, whole_bytes = len(planes), 6 * size[0] * size[1]  # in half floats
+    lit_bytes = sum(x.nbytes if isinstance(x, LitPlane) else whole_bytes for x in planes)
+    if count >= MIN_LIGHTS and not is_indirect and lit_bytes < count * whole_bytes / 2:
+        return LitPlanes([as_lit_plane(plane) for plane in planes], size)
+    whole = [as_encoded_plane(plane, size) for plane in planes]
+    return EncodedPlanes(whole, is_decoded_once=not is_indirect)
 
 
 def is_large(lights: int, size: tuple[int, int]) -> bool:
@@ -222,7 +249,8 @@ class _Parts:
         readers = with_progress(self.channel_readers, "lights")
         for light, texts, read in zip(lights, self.texts, readers, strict=True):
             channels = read()  # one light at a time, since together they may exceed memory
-            if not all(np.isfinite(channels[name]).all() for name in names):
+            its_names = channels if is_lit_part(channels) else names
+            if not all(np.isfinite(channels[name]).all() for name in its_names):
                 raise BasisError("holds values that are not finite: make it again")
             if checksums is not None:
                 its_text = checked_text(texts)
@@ -285,12 +313,11 @@ def leave_indirect(basis: Basis, path: Path) -> Basis:
         origin = read_record(Origin, strict_json(_head(p.texts for p in file.parts)[ORIGIN_KEY]))
     except (RowsUnsupportedError, OSError, BasisError, *_HEADER_ERRORS):
         return basis
-    if origin != basis.origin or any({p.size, p.display} != {basis.size} for p in parts):
+    if origin != basis.origin or any(picture_size(p) != basis.size for p in parts):
         return basis
     scales = [scales_of(p.texts) for p in parts]
     images, noise = (
-        FilePlanes(file, parts, PLANE_CHANNELS[k], [light_scales[k] for light_scales in scales])
-        for k in (2, 3)
+        FilePlanes(file, parts, k, [light_scales[k] for light_scales in scales]) for k in (2, 3)
     )
     return replace(basis, indirect=IndirectLight(images, noise))
 
@@ -306,7 +333,7 @@ def _read_large(path: Path) -> Basis | None:
     except (RowsUnsupportedError, OSError):
         return None
     light_parts = [p for p in file.parts if LIGHT_KEY in p.texts]
-    count, size = len(light_parts), light_parts[0].size if light_parts else (0, 0)
+    count, size = len(light_parts), light_parts[0].display if light_parts else (0, 0)
     stays_in_file = is_large(count, size)
     is_sparse = count >= MIN_LIGHTS and _float_bytes(count, size) > SPARSE_MIN_BYTES
     if not (stays_in_file or is_sparse):
@@ -337,7 +364,7 @@ def _read_by_lights(path: Path) -> list[ExrPart] | None:
 def _head(texts: Iterable[Mapping[str, str]]) -> Mapping[str, str]:
     """Return the attributes of the first part. Raises BasisError for another format."""
     head: Mapping[str, str] = next((part for part in texts if FORMAT_KEY in part), {})
-    if head.get(FORMAT_KEY) not in (FORMAT, OLD_FORMAT):
+    if head.get(FORMAT_KEY) not in FORMATS:
         mark = one_line(repr(head.get(FORMAT_KEY, "no such mark")))
         raise BasisError(
             f"is not a basis this version can read: expected {FORMAT!r}, found {mark}; "
@@ -348,29 +375,41 @@ def _head(texts: Iterable[Mapping[str, str]]) -> Mapping[str, str]:
 
 def _basis_of_parts(parts: Sequence[ExrPart], head: Mapping[str, str]) -> Basis:
     """Return the basis of EXR parts. Raises BasisError or one of _HEADER_ERRORS."""
-    light_parts = [p.in_display_window() for p in parts if LIGHT_KEY in p.attributes]
+    light_parts = [
+        p if is_lit_part(p.channels) else p.in_display_window()
+        for p in parts
+        if LIGHT_KEY in p.attributes
+    ]
     others = [p for p in parts if LIGHT_KEY not in p.attributes]
-    scales = [scales_of(p.attributes) for p in light_parts]
+    stored = cache(lambda k: planes_of_part(light_parts[k], scales_of(light_parts[k].attributes)))
 
     def planes(order: Sequence[int], number: int) -> Planes:
-        plane_scales = [scales[k][number] for k in order]
-        channels = list(zip((light_parts[k] for k in order), plane_scales, strict=True))
-        if _is_encoded(len(light_parts), light_parts[0].size):
-            stored = zip(
-                stored_channels(channels, PLANE_CHANNELS[number]), plane_scales, strict=True
-            )
-            is_direct = number < 2
-            if len(light_parts) >= MIN_LIGHTS and is_direct:
-                return LitPlanes([LitPlane.of(*x) for x in stored], light_parts[0].size)
-            return EncodedPlanes([encoded_plane(*x) for x in stored], is_decoded_once=is_direct)
-        return as_planes(stack_channels(channels, PLANE_CHANNELS[number]))
+        size = _common_size(light_parts)
+        of_lights = [stored(k)[number] for k in order]
+        is_direct = number < 2
+        if not _is_encoded(len(order), size):
+            return as_planes(np.stack([as_encoded_plane(x, size).decoded() for x in of_lights]))
+        if len(order) >= MIN_LIGHTS and is_direct:
+            return LitPlanes([as_lit_plane(x) for x in of_lights], size)
+        whole = [as_encoded_plane(x, size) for x in of_lights]
+        return EncodedPlanes(whole, is_decoded_once=is_direct)
 
     channel_readers = [partial(getattr, part, "channels") for part in light_parts]
-    has_indirect = all(p.channels.keys() >= INDIRECT_CHANNELS for p in light_parts)
+    has_indirect = all(has_indirect_channels(p.channels) for p in light_parts)
     texts = [p.attributes for p in light_parts]
     return _checked_basis(
         _Parts(head, texts, channel_readers, others, planes, has_indirect=has_indirect)
     )
+
+
+def _common_size(parts: Sequence[ExrPart]) -> tuple[int, int]:
+    """Return (height, width) of the planes of all lights. Raises BasisError if they differ."""
+    sizes = [picture_size(part) for part in parts]
+    for part, size in zip(parts, sizes, strict=True):
+        if size is None or size != sizes[0]:
+            raise BasisError(f"parts {parts[0].name!r} and {part.name!r} differ in size")
+    assert sizes[0] is not None
+    return sizes[0]
 
 
 def _basis_of_rows(file: RowFile, head: Mapping[str, str]) -> Basis | None:
@@ -379,8 +418,9 @@ def _basis_of_rows(file: RowFile, head: Mapping[str, str]) -> Basis | None:
     Raises the errors of `_basis_of_parts`.
     """
     light_parts = [p for p in file.parts if LIGHT_KEY in p.texts]
-    if any(
-        p.size != p.display or p.size != light_parts[0].size or not {*p.channels} >= LIGHT_CHANNELS
+    size = picture_size(light_parts[0])
+    if size is None or any(
+        picture_size(p) != size or not (is_lit_part(p.channels) or {*p.channels} >= LIGHT_CHANNELS)
         for p in light_parts
     ):
         return None
@@ -391,23 +431,21 @@ def _basis_of_rows(file: RowFile, head: Mapping[str, str]) -> Basis | None:
 
     def planes(order: Sequence[int], number: int) -> Planes:
         plane_scales = [scales[k][number] for k in order]
-        return FilePlanes(
-            file, [light_parts[k] for k in order], PLANE_CHANNELS[number], plane_scales
-        )
+        return FilePlanes(file, [light_parts[k] for k in order], number, plane_scales)
 
-    collector = LitCollector(light_parts[0].size) if len(light_parts) >= MIN_LIGHTS else None
+    collector = LitCollector(size) if len(light_parts) >= MIN_LIGHTS else None
 
     def collected(layout: PartLayout, scale: tuple[float, ...]) -> Channels:
         channels = file.channels(layout)
         if collector is not None:
             name = strict_json(layout.texts[LIGHT_KEY])["name"]
-            sets = zip(PLANE_CHANNELS[:2], scale, strict=False)
-            collector.add(name, [LitPlane.of([channels[c] for c in x], y) for x, y in sets])
+            planes = planes_of_part(ExrPart(name, channels, display=size), scale)[:2]
+            collector.add(name, [as_lit_plane(plane) for plane in planes])
         return channels
 
     channel_readers = [partial(collected, *x) for x in zip(light_parts, scales, strict=True)]
     others = [part(p) for p in file.parts if LIGHT_KEY not in p.texts]
-    has_indirect = all({*p.channels} >= INDIRECT_CHANNELS for p in light_parts)
+    has_indirect = all(has_indirect_channels(p.channels) for p in light_parts)
     texts = [p.texts for p in light_parts]
     basis = _checked_basis(
         _Parts(head, texts, channel_readers, others, planes, has_indirect=has_indirect)
@@ -479,9 +517,9 @@ def is_file_of(path: Path, basis: Basis) -> bool:
         return False
     light_parts = [part for part in file.parts if LIGHT_KEY in part.texts]
     others = [{*part.channels} for part in file.parts if LIGHT_KEY not in part.texts]
-    has_indirect = all({*part.channels} >= INDIRECT_CHANNELS for part in light_parts)
+    has_indirect = all(has_indirect_channels(part.channels) for part in light_parts)
     return (
-        (form, origin, size) == (FORMAT, basis.origin, basis.size)
+        (form != OLD_FORMAT, origin, size) == (True, basis.origin, basis.size)
         and has_indirect == (basis.indirect is not None)
         and [part.texts[LIGHT_KEY] for part in light_parts]
         == [light_texts(light, ())[LIGHT_KEY] for light in basis.lights]

@@ -14,22 +14,29 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-import numpy.typing as npt
 
 from lightpaint.arrays import Floats, Indices
 from lightpaint.basis.basis import Basis
 from lightpaint.basis.file.half_floats import (
     EncodedPlane,
     EncodedPlanes,
-    PlaneEncoding,
     encode_pair,
+    encoded_plane,
 )
+from lightpaint.basis.file.light_channels import (
+    PLANE_CHANNELS,
+    has_indirect_channels,
+    is_lit_part,
+)
+from lightpaint.basis.file.lit_parts import read_lit_planes
+from lightpaint.basis.file.lit_planes import LitPlane, LitPlanes
+from lightpaint.basis.file.noise_rounding import MANY_LIGHTS, round_to_noise
 from lightpaint.basis.lights import BasisLight, free_name
 from lightpaint.basis.planes import Planes
 from lightpaint.errors import BasisError
 from lightpaint.files import one_line
-from lightpaint.images import HALF_DIFFERENCE, Features, Objects
-from lightpaint.images.formats import Channels, ExrPart, rgb_channels
+from lightpaint.images import Features, Objects
+from lightpaint.images.formats import Channels, ExrPart, PartLayout, rgb_channels
 from lightpaint.storage.json_records import fields_of, read_record, strict_json
 
 VISIBLE_EMITTERS_PART = "emitters seen"
@@ -40,18 +47,6 @@ OBJECTS_PART, OBJECTS_KEY, NAMES_KEY = "objects", "lightpaint.objects", "lightpa
 EXTRA_PART, EXTRA_KEY = "extra samples", "lightpaint.extra"
 
 LIGHT_KEY, SCALE_KEY = "lightpaint.light", "lightpaint.scale"
-
-#: Channels of each light: its image and its noise.
-IMAGE_CHANNELS, NOISE_CHANNELS = (*"RGB",), (*(f"{HALF_DIFFERENCE}.{c}" for c in "RGB"),)
-LIGHT_CHANNELS = {*IMAGE_CHANNELS, *NOISE_CHANNELS}
-
-#: Channels of the indirect part of image and noise, if it is stored separately.
-INDIRECT_IMAGE_CHANNELS = (*(f"indirect.{c}" for c in "RGB"),)
-INDIRECT_NOISE_CHANNELS = (*(f"indirect_{HALF_DIFFERENCE}.{c}" for c in "RGB"),)
-INDIRECT_CHANNELS = {*INDIRECT_IMAGE_CHANNELS, *INDIRECT_NOISE_CHANNELS}
-
-#: Channels of all planes that a light may have.
-PLANE_CHANNELS = (IMAGE_CHANNELS, NOISE_CHANNELS, INDIRECT_IMAGE_CHANNELS, INDIRECT_NOISE_CHANNELS)
 
 #: Maximum number of extra samples of a pixel, up to which float32 holds integers exactly.
 MAX_EXTRA = 2**24
@@ -132,29 +127,33 @@ def plane_sets(basis: Basis) -> list[Planes]:
     return sets
 
 
-def encoded_planes_of(basis: Basis, k: int) -> list[EncodedPlane]:
-    """Return the planes of light k in their best encoding, in the order of `PLANE_CHANNELS`."""
+def stored_planes_of(basis: Basis, k: int) -> list[EncodedPlane | LitPlane]:
+    """Return the planes of light k as they are stored, in the order of `PLANE_CHANNELS`."""
     sets = plane_sets(basis)
-    if all(isinstance(planes, EncodedPlanes) for planes in sets):
-        return [planes.encoded(k) for planes in sets if isinstance(planes, EncodedPlanes)]
+    if all(isinstance(planes, EncodedPlanes | LitPlanes) for planes in sets):
+        return [x.stored(k) for x in sets if isinstance(x, EncodedPlanes | LitPlanes)]
     planes = [plane_set.plane(k) for plane_set in sets]
+    if len(basis.lights) >= MANY_LIGHTS and (rounded := round_to_noise(planes)) is not None:
+        return [*rounded]
     pairs = zip(planes[::2], planes[1::2], strict=True)
     return [encoded for pair in pairs for encoded in encode_pair(*pair)]
 
 
-def light_texts(light: BasisLight, encodings: Sequence[PlaneEncoding]) -> dict[str, str]:
-    """Return the text attributes for the part of a light."""
+def light_texts(light: BasisLight, scales: Sequence[float]) -> dict[str, str]:
+    """Return the text attributes for the part of a light. scales: of its planes."""
     data = fields_of(light, "is_fixed", "unit_flux", "identity", "is_outside_gamut", "lamp")
     if light.members == (light.name,):
         del data["members"]  # the default for a single emitter
     texts = {LIGHT_KEY: json.dumps(data, ensure_ascii=False)}
-    if any(encoding.scale != 1 for encoding in encodings):
-        texts[SCALE_KEY] = json.dumps([encoding.scale for encoding in encodings])
+    if any(scale != 1 for scale in scales):
+        texts[SCALE_KEY] = json.dumps([*scales])
     return texts
 
 
-def light_channels(planes: Sequence[EncodedPlane]) -> Channels:
-    """Return the channels of a light. planes: as `encoded_planes_of` returns them."""
+def all_channels(planes: Sequence[EncodedPlane]) -> Channels:
+    """Return the channels of a light with all pixels of its planes, in the order of
+    `PLANE_CHANNELS`.
+    """
     return {
         name: numbers
         for plane, names in zip(planes, PLANE_CHANNELS, strict=False)
@@ -182,33 +181,30 @@ def _is_scale(scale: object) -> bool:
     return type(scale) in (int, float) and LEAST_SCALE <= scale <= LARGEST_SCALE  # type: ignore[operator]
 
 
-def stack_channels(parts: Sequence[tuple[ExrPart, float]], names: Sequence[str]) -> Floats:
-    """Return the named channels of parts, each part multiplied by its scale, (n, h, w, 3)."""
-    channels_of_parts = stored_channels(parts, names)
-    stacked = np.empty((len(parts), *parts[0][0].size, 3), np.float32)
-    for image, channels, (_, scale) in zip(stacked, channels_of_parts, parts, strict=True):
-        for k, channel in enumerate(channels):
-            image[..., k] = channel
-        if scale != 1:
-            image *= np.float32(scale)
-    return stacked
-
-
-def stored_channels(
-    parts: Sequence[tuple[ExrPart, float]], names: Sequence[str]
-) -> list[list[npt.NDArray[Any]]]:
-    """Return the named channels of parts as they are stored, (h, w) each.
-
-    Raises BasisError if parts differ in size or lack one of the channels.
+def picture_size(part: ExrPart | PartLayout) -> tuple[int, int] | None:
+    """Return (height, width) of the planes in the part of a light; None if it is cropped, or has a
+    margin.
     """
-    first = parts[0][0]
-    for part, _ in parts:
-        if part.size != first.size:
-            raise BasisError(f"parts {first.name!r} and {part.name!r} differ in size")
-        for name in names:
-            if name not in part.channels:
-                raise BasisError(f"no channel {name} in part {part.name!r}")
-    return [[part.channels[name] for name in names] for part, _ in parts]
+    display = part.display or part.size
+    is_whole = part.size[1] == display[1] if is_lit_part(part.channels) else part.size == display
+    return display if is_whole else None
+
+
+def planes_of_part(part: ExrPart, scales: Sequence[float]) -> list[EncodedPlane | LitPlane]:
+    """Return the planes of a light as they are stored, in the order of `PLANE_CHANNELS`.
+
+    Raises BasisError if the part lacks channels, or is damaged.
+    """
+    if is_lit_part(part.channels):
+        return [*read_lit_planes(part.channels, scales, part.display or part.size)]
+    count = 4 if has_indirect_channels(part.channels) else 2
+    for name in (name for names in PLANE_CHANNELS[:count] for name in names):
+        if name not in part.channels:
+            raise BasisError(f"no channel {name} in part {part.name!r}")
+    return [
+        encoded_plane([part.channels[name] for name in names], scale)
+        for names, scale in zip(PLANE_CHANNELS[:count], scales, strict=False)
+    ]
 
 
 def other_parts(basis: Basis) -> Iterator[ExrPart]:

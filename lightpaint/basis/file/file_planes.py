@@ -13,12 +13,14 @@ from contextlib import suppress
 from functools import cached_property
 from threading import Lock
 from typing import ClassVar
-from weakref import ref
+from weakref import finalize, ref
 
 import numpy as np
 import numpy.typing as npt
 
 from lightpaint.arrays import Doubles, Floats, Indices
+from lightpaint.basis.file.light_channels import PLANE_CHANNELS, is_lit_part
+from lightpaint.basis.file.lit_rows import LitRows
 from lightpaint.basis.planes import MemoryPlanes, Planes, PlanesBase, as_slice, mix
 from lightpaint.images.formats import PartLayout, RowFile
 from lightpaint.threads import parallel_map
@@ -181,19 +183,20 @@ class _StripCache:
 class FilePlanes(RowPlanes):
     """Planes in parts of an OpenEXR file.
 
-    parts: one for each light, all of the same size. names: the channels of red, green and blue.
-    scales: factor for the stored numbers of each part.
+    parts: one for each light, with pictures of the same size. number: index of the planes into
+    `PLANE_CHANNELS`. scales: factor for the stored numbers of each part.
     """
 
     def __init__(
         self,
         file: RowFile,
         parts: Sequence[PartLayout],
-        names: Sequence[str],
+        number: int,
         scales: Sequence[float] | None = None,
     ) -> None:
-        self._file, self._parts, self._names = file, tuple(parts), tuple(names)
+        self._file, self._parts, self._number = file, tuple(parts), number
         self._scales = tuple(scales or (1.0 for _ in parts))
+        self._lit_rows: dict[int, LitRows] = {}
 
     @property
     def count(self) -> int:
@@ -203,12 +206,15 @@ class FilePlanes(RowPlanes):
     @property
     def size(self) -> tuple[int, int]:
         """(height, width) in pixels."""
-        return self._parts[0].size
+        return self._parts[0].display
 
     @property
     def is_noisy(self) -> bool:
         """True if most planes are stored in half floats, whose rounding their noise hides."""
-        halves = [part.channels[self._names[0]].itemsize == 2 for part in self._parts]
+        name = PLANE_CHANNELS[self._number][0]
+        halves = [
+            is_lit_part(part.channels) or part.channels[name].itemsize == 2 for part in self._parts
+        ]
         return 2 * sum(halves) > len(halves)
 
     @property
@@ -234,7 +240,14 @@ class FilePlanes(RowPlanes):
 
     def _read(self, i: int, top: int, bottom: int, into: Floats) -> None:
         """Read rows of light i into (3, bottom - top, w)."""
-        self._file.read_rows(self._parts[i], top, bottom, self._names, into)
+        part = self._parts[i]
+        if is_lit_part(part.channels):
+            if i not in self._lit_rows:
+                self._lit_rows[i] = LitRows.of(self._file, part)
+            self._lit_rows[i].read(self._file, part, slice(top, bottom), self._number, into)
+        else:
+            names = PLANE_CHANNELS[self._number]
+            self._file.read_rows(part, top, bottom, names, into)
         if self._scales[i] != 1:
             into *= np.float32(self._scales[i])
 
@@ -401,6 +414,35 @@ class TemporaryArray:
             if hasattr(os, "posix_fallocate"):  # or a full disk would kill the process later
                 os.posix_fallocate(file.fileno(), 0, 4 * int(np.prod(shape)))
             self.array = np.memmap(file, np.float32, "r+", shape=shape)  # keeps the file open
+            self._file = os.dup(file.fileno())
+        finalize(self, os.close, self._file)
+
+    def read(self, first: int, into: Floats) -> None:
+        """Read numbers from the one with index `first` on, in row-major order.
+
+        Calls of the system take less time than page faults in the mapped array, and leave no pages
+        in the memory of the process. into: contiguous float32.
+        """
+        part = into.reshape(-1).view(np.uint8).data
+        if not hasattr(os, "preadv"):
+            into.reshape(-1)[...] = self.array.reshape(-1)[first : first + into.size]
+            self.release()
+            return
+        begin = 4 * first
+        while part.nbytes and (count := os.preadv(self._file, [part], begin)):
+            part, begin = part[count:], begin + count
+
+    def write(self, first: int, numbers: Floats) -> None:
+        """Write numbers from the one with index `first` on, in row-major order."""
+        part = np.ascontiguousarray(numbers, np.float32).reshape(-1).view(np.uint8).data
+        if not hasattr(os, "pwrite"):
+            self.array.reshape(-1)[first : first + numbers.size] = numbers.reshape(-1)
+            self.release()
+            return
+        begin = 4 * first
+        while part.nbytes:
+            count = os.pwrite(self._file, part, begin)
+            part, begin = part[count:], begin + count
 
     def release(self) -> None:
         """Release the memory of the parts that were read or written; the file keeps their

@@ -81,10 +81,24 @@ class EncodedPlane:
     numbers: Sequence[npt.NDArray[Any]] | npt.NDArray[Any]
 
     @property
+    def scale(self) -> float:
+        """The power of two that multiplies stored numbers."""
+        return self.encoding.scale
+
+    @property
     def size(self) -> tuple[int, int]:
         """(height, width) in pixels."""
         height, width = self.numbers[0].shape
         return height, width
+
+    def decoded(self) -> npt.NDArray[np.float32]:
+        """Return its light, (h, w, 3)."""
+        light = np.empty((*self.size, 3), np.float32)
+        for k, channel in enumerate(self.numbers):
+            copy_as_singles(channel, light[..., k])
+        if self.scale != 1:
+            light *= np.float32(self.scale)
+        return light
 
 
 class EncodedPlanes(RowPlanes):
@@ -118,8 +132,8 @@ class EncodedPlanes(RowPlanes):
             return self._decoded.nbytes
         return sum(channel.nbytes for plane in self._stored for channel in plane.numbers)
 
-    def encoded(self, i: int) -> EncodedPlane:
-        """Return the plane of light i in its stored encoding."""
+    def stored(self, i: int) -> EncodedPlane:
+        """Return the plane of light i as it is stored."""
         with self._lock:
             plane = self._stored[i]
             if self._decoded is None:
@@ -227,8 +241,6 @@ def _clean_pixels(image: Floats, noise: Floats) -> Bools | None:
     """Return the pixels, (h, w), that have light but no noise, nor have their neighbours; None if
     there are none. image, noise: (3, h, w).
     """
-    from scipy.ndimage import binary_erosion
-
     is_clean = np.ones(image.shape[1:], bool)
     for light, grain in zip(image, noise, strict=True):
         is_clean &= np.abs(grain) <= np.float32(CLEAN) * np.abs(light)
@@ -236,9 +248,16 @@ def _clean_pixels(image: Floats, noise: Floats) -> Bools | None:
     is_clean &= red | green | blue
     if not is_clean.any():
         return None
+    inner = inner_pixels(is_clean)
+    return inner if inner.any() else None
+
+
+def inner_pixels(is_clean: Bools) -> Bools:
+    """Return the clean pixels, (h, w), whose neighbours within CLEAN_RADIUS are clean as well."""
+    from scipy.ndimage import binary_erosion
+
     side = 2 * CLEAN_RADIUS + 1
-    inner = binary_erosion(is_clean, np.ones((side, side)), border_value=1)
-    return np.asarray(inner) if inner.any() else None
+    return np.asarray(binary_erosion(is_clean, np.ones((side, side)), border_value=1))
 
 
 def _encode(plane: Floats, strips: Sequence[_Strip], exact: Bools | None = None) -> EncodedPlane:
@@ -247,7 +266,7 @@ def _encode(plane: Floats, strips: Sequence[_Strip], exact: Bools | None = None)
 
     exact: (h, w), pixels that must keep their values; None for none.
     """
-    for scale in dict.fromkeys((1.0, _scale_of(plane))):
+    for scale in dict.fromkeys((1.0, scale_of(plane))):
         encoding, numbers = PlaneEncoding(HALF, scale), np.zeros(plane.shape, HALF)
         for strip in strips:
             values = plane[:, strip.rows].reshape(-1)[strip.lit]
@@ -268,7 +287,7 @@ def _encode(plane: Floats, strips: Sequence[_Strip], exact: Bools | None = None)
     return EncodedPlane(PlaneEncoding(), plane)
 
 
-def _scale_of(plane: Floats) -> float:
+def scale_of(plane: Floats) -> float:
     """Return the power of two by which stored numbers are multiplied, so that the brightest is
     stored just below 2^BRIGHTEST.
     """

@@ -14,7 +14,7 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from lightpaint.arrays import Bools, Doubles, Floats, Indices, copy_as_singles
+from lightpaint.arrays import Bools, Doubles, Floats, Indices, copy_as_singles, release_freed_memory
 from lightpaint.basis.file.file_planes import RowPlanes
 from lightpaint.basis.planes import LitEntries
 from lightpaint.progress import with_progress
@@ -59,6 +59,12 @@ class LitPlane:
     def in_kind(self, kind: npt.DTypeLike) -> "LitPlane":
         """Return this plane with numbers of this kind."""
         return replace(self, numbers=self.numbers.astype(kind, copy=False))
+
+    def at(self, pixels: npt.NDArray[np.uint32]) -> "LitPlane":
+        """Return this plane with these lit pixels, which include its own."""
+        numbers = np.zeros((3, pixels.size), self.numbers.dtype)
+        numbers[:, np.searchsorted(pixels, self.pixels)] = self.numbers
+        return replace(self, pixels=pixels, numbers=numbers)
 
     def dense(self, pixels: int) -> npt.NDArray[np.float32]:
         """Return all pixels, (3, pixels), not yet multiplied by the scale."""
@@ -205,6 +211,18 @@ class LitPlanes(RowPlanes):
         """True if most planes are stored in half floats, whose rounding their noise hides."""
         return self._is_noisy
 
+    def stored(self, i: int) -> LitPlane:
+        """Return the plane of light i as it is stored."""
+        scale = float(self._scales[i])
+        if i in self._clean:
+            return LitPlane.of([*self._clean[i]], scale)
+        # One copy of all strips: there are many, of few lit pixels each.
+        of_strips = [strip.lit_of(i) for strip in self._lit]
+        lit = [x + np.uint32(y) for (x, _), y in zip(of_strips, self._begins, strict=True)]
+        return LitPlane(
+            np.concatenate(lit), np.concatenate([x for _, x in of_strips], axis=1), scale
+        )
+
     def lit_plane(self, i: int) -> tuple[slice | Indices, Floats]:
         """Return pixels of light i, outside of which it is black, and their light, (3, p)."""
         pixels: slice | Indices = slice(None)
@@ -340,4 +358,5 @@ class LitCollector:
         joined = []
         while sets:  # one is gone before the next is joined
             joined.append(LitPlanes(sets.pop(0), self._size))
+            release_freed_memory()
         return joined

@@ -33,9 +33,6 @@ if TYPE_CHECKING:
 #: Size of the sums of both halves, in bytes, up to which a film is traced whole; size of a band.
 WHOLE_MAX_BYTES, BAND_BYTES = 2**30, 2**28
 
-#: Size of the sums, in bytes, that are written to the file at a time.
-WRITE_BYTES = 2**24
-
 
 def _is_banded(scene: Scene) -> bool:
     """Return whether a one-pass render of `scene` keeps its sums in a file."""
@@ -173,7 +170,7 @@ class FileSums:
     """A float32 array, (2, planes, h, w, 3), initially zero, in a temporary file that is deleted
     with it.
 
-    Memory is released after each read and write. Raises SceneError if the disk is full.
+    Raises SceneError if the disk is full.
     """
 
     def __init__(self, shape: tuple[int, ...]) -> None:
@@ -194,29 +191,34 @@ class FileSums:
         """All sums, mapped from the file."""
         return self._file.array
 
-    def read(self, half: int, rows: range) -> Floats:
-        """Return a copy of some rows of one half, (planes, rows, w, 3)."""
+    def read(self, half: int, rows: range) -> Floats | None:
+        """Return a copy of some rows of one half, (planes, rows, w, 3); None if they are zero."""
         if not self._is_written[half, rows.start : rows.stop].any():
-            _, planes, _, width, _ = self.array.shape
-            return np.zeros((planes, len(rows), width, 3), np.float32)
-        block = np.array(self.array[half, :, rows.start : rows.stop])
-        self._file.release()
+            return None
+        return self._block(half, range(self.array.shape[1]), rows)
+
+    def _block(self, half: int, planes: range, rows: range) -> Floats:
+        block = np.empty((len(planes), len(rows), *self.array.shape[3:]), np.float32)
+        for plane, into in zip(planes, block, strict=True):
+            self._file.read(self._place(half, plane, rows), into)
         return block
+
+    def _place(self, half: int, plane: int, rows: range) -> int:
+        """Return the index of the first number of some rows, in row-major order."""
+        _, planes, height, width, channels = self.array.shape
+        return int(((half * planes + plane) * height + rows.start) * width * channels)
 
     def write(self, half: int, rows: range, sums: Floats) -> None:
         """Write some rows of one half, (planes, rows, w, 3)."""
         self._is_written[half, rows.start : rows.stop] = True
-        step = max(1, WRITE_BYTES // max(1, sums[0].nbytes))
-        for first in range(0, len(sums), step):
-            planes = slice(first, first + step)
-            self.array[half, planes, rows.start : rows.stop] = sums[planes]
-            self._file.release()
+        for plane, of_plane in enumerate(sums):
+            self._file.write(self._place(half, plane, rows), of_plane)
 
     def halves(self, planes: slice, rows: slice) -> list[Floats]:
         """Return a copy of the sums of both halves for some planes and rows."""
-        halves = [np.array(half[planes, rows]) for half in self.array]
-        self._file.release()
-        return halves
+        _, count, height, _, _ = self.array.shape
+        its_planes, its_rows = range(*planes.indices(count)), range(*rows.indices(height))
+        return [self._block(half, its_planes, its_rows) for half in (0, 1)]
 
 
 class SumSets:

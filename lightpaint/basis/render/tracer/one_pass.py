@@ -19,6 +19,7 @@ Import this module after setting a Dr.Jit variant, since its array types do not 
 
 # mypy: disable-error-code="no-untyped-def, no-untyped-call"
 
+import gc
 from collections.abc import Callable, Sequence
 from functools import partial
 from typing import Any
@@ -206,8 +207,10 @@ class Tracer:
                 planes.end_block()
 
     def close(self) -> None:
-        """Release the scene and everything that refers to it."""
+        """Release the scene and everything that refers to it, and memory that Dr.Jit keeps."""
         del self.loaded, self.light_of, self.guide, self._texels, self._planes
+        gc.collect()
+        dr.flush_malloc_cache()
 
     def _trace_rows(
         self, stream: int, planes: LightPlanes, rows: range, first: int, spp: int
