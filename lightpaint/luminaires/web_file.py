@@ -1,6 +1,6 @@
 """Reads the photometric web of a luminaire from a file of its maker: LM-63 or EULUMDAT.
 
-Files of ANSI/IES LM-63 (`.ies`) may be of 1986 to 2019, with photometry of type C; those of
+Files of ANSI/IES LM-63 (`.ies`) may be of 1986 to 2019, with photometry of type C; files of
 EULUMDAT end in `.ldt`.
 """
 
@@ -22,7 +22,7 @@ from lightpaint.validation import BRIGHTEST, parse_number
 
 #: Angles of a file at most, of gamma or of C-planes.
 MAX_ANGLES = 2000
-#: Numbers that are read at once at most: ten times those of the finest files.
+#: Numbers that are read at once at most: ten times the numbers of the finest files.
 MAX_VALUES = 2**20
 
 #: Names of photometric types.

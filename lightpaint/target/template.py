@@ -78,7 +78,7 @@ class Template:
 
     @property
     def looks(self) -> list[Floats]:
-        """The pictures that a painting may have started from, linear; that of template.png
+        """The pictures that a painting may have started from, linear; the picture of template.png
         first.
         """
         return [self.image] if self.clean is None else [self.clean, self.image]

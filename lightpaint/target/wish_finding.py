@@ -79,7 +79,7 @@ Encoding = Callable[[Floats], Floats]
 Wash = Callable[[Floats], Doubles]
 
 #: Values in which brushes mix, from linear light and back: editors of 8-bit pictures mix display
-#: values, those of EXR files mix light.
+#: values, editors of EXR files mix light.
 SPACES: tuple[tuple[Encoding, Encoding], ...] = (
     (encode_display, decode_display),
     (np.asarray, np.asarray),

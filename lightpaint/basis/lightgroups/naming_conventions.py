@@ -7,8 +7,8 @@ from dataclasses import dataclass
 #: Placeholder for the name of the light in a pattern.
 NAME_FIELD = "{name}"
 
-#: Names of the whole picture in most renderers, compared without regard to case; `image` is that
-#: of Blender's File Output node.
+#: Names of the whole picture in most renderers, compared without regard to case; `image` is the
+#: name in Blender's File Output node.
 BEAUTY_NAMES = (
     *("", "rgba", "rgb", "beauty", "combined", "image", "main", "color", "rgb_color", "ci", "c"),
 )

@@ -161,7 +161,7 @@ class Certificate:
     def with_objective(
         self, objective: Doubles, norm2: Doubles, *, error: RGB | None = None
     ) -> "Certificate":
-        """Return the certificate with this loss, (3,), and that of a black picture, (3,)."""
+        """Return the certificate with this loss, (3,), and the loss of a black picture, (3,)."""
         norm = np.where(norm2 > 0, norm2, 1)
         return replace(
             self,

@@ -91,7 +91,7 @@ class EmitterRequest:
         )
         found = white.flux_lm
         if self.per == "cd":
-            # A panel's intensity straight ahead is that of its flux by Lambert's law.
+            # A panel's intensity straight ahead is the intensity of its flux by Lambert's law.
             lambert = None if white.flux_lm is None else white.flux_lm / np.pi
             found = {"cd": white.luminous, "cd/m²": lambert}.get(white.luminous_unit)
         if not found:

@@ -288,7 +288,8 @@ class _Round:
     ) -> "_Round":
         """Make the squares, and solve for their optimum.
 
-        matrix: equations whose M stands for that of the squares: a step along the same gradient.
+        matrix: equations whose M stands for the matrix of the squares: a step along the same
+        gradient.
         """
         make = lit.pixels.curved_squares if is_curved else lit.pixels.squares
         image, weight = make(x, from_clipping=from_clipping)

@@ -1,8 +1,8 @@
 """Lamps whose emitters have a picture each, as in a basis of spectra; and the power of lamps: of
 each unknown that drives their emitters, and of lamps that stay.
 
-Constraints speak of lamps. So the unknowns are first those of lamps, with an emission in RGB; then
-each unknown moves the weights of the pictures of the lamp's emitters instead.
+Constraints speak of lamps. So the unknowns are first the unknowns of lamps, with an emission in
+RGB; then each unknown moves the weights of the pictures of the lamp's emitters instead.
 """
 
 from collections.abc import Mapping, Sequence

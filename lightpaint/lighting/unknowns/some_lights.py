@@ -19,7 +19,7 @@ from lightpaint.lighting.unknowns.reduction import Reduction
 class SomeLights:
     """A choice of knobs of a reduction, and the lights that they move.
 
-    whole: the reduction of all lights. places: those of the knobs, in ascending order.
+    whole: the reduction of all lights. places: the places of the knobs, in ascending order.
     """
 
     whole: Reduction
@@ -95,7 +95,7 @@ class SomeLights:
 
     def part_of(self, equations: NormalEquations) -> NormalEquations:
         """Return the terms of `equations`, of all lights, in the squares of these lights: without
-        those of the other lights, and those of one of each.
+        the terms of the other lights, and the terms of one of each.
         """
         lights, coupling = self.lights, equations.coupling
         return NormalEquations(

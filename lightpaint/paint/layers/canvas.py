@@ -172,7 +172,7 @@ class Canvas:
 
     @property
     def albedo(self) -> Floats | None:
-        """(h, w, 3), that of the surfaces, as pages have it; None where it is unknown."""
+        """(h, w, 3), the albedo of the surfaces, as pages have it; None where it is unknown."""
         return self._layers.albedo()
 
     @property

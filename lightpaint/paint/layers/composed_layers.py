@@ -125,11 +125,11 @@ class ComposedLayers:
         layers: Those after `steps`.
         stored: Their composition on this current look, if it is known: then pixels of layers are
             read when they are needed.
-        albedo: That of the view, for gradients of light on surfaces.
+        albedo: The albedo of the view, for gradients of light on surfaces.
 
     Attributes:
         target: Light and importance; `at_least` is None while no pixel is marked.
-        albedo: Returns that of the view.
+        albedo: Returns the albedo of the view.
     """
 
     def __init__(

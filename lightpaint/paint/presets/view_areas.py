@@ -179,7 +179,7 @@ def soft_spot(size: tuple[int, ...], x: float, y: float, radius: float) -> Mask:
 
 
 def _smoothed(values: Mask) -> Mask:
-    """Return values (h, w) without detail smaller than that of a small picture."""
+    """Return values (h, w) without detail smaller than the detail of a small picture."""
     height, width = values.shape
     factor = min(1.0, SMOOTH_SIDE / max(height, width))
     small = max(1, round(width * factor)), max(1, round(height * factor))

@@ -35,7 +35,7 @@ SIDE = 0.35
 #: Share of a side that has to be nearly as bright, to have a key of its own.
 LEAST_SIDE = 0.1
 
-#: Power of the mean by which the colour of light is told from that of surfaces (Finlayson and
+#: Power of the mean by which the colour of light is told from the colour of surfaces (Finlayson and
 #: Trezzi 2004): the higher, the more the brightest pixels count, which are of the palest surfaces.
 SHADES_POWER = 6.0
 

@@ -219,7 +219,7 @@ class LampRig:
     def why_not(self, name: str, values: Mapping[str, Any] | None = None) -> str:
         """Return why a light cannot be moved, in words that follow its name; "" if it can.
 
-        values: those of an added light.
+        values: the values of an added light.
         """
         scene = self.scene
         if scene.has_media:

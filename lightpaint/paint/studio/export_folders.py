@@ -10,7 +10,7 @@ from lightpaint.display_text import visible
 from lightpaint.errors import OutputError, PaintError
 from lightpaint.files import one_line
 
-#: Folders of named exports and of final renders, in that of the session.
+#: Folders of named exports and of final renders, in the folder of the session.
 EXPORTS, RENDERS = "exports", "renders"
 
 #: Longest name of an export, in bytes; a number and suffixes are added to it.

@@ -150,7 +150,7 @@ class FinalRenders:
 
         try:
             with suppress(StoppedError), cancellable(check):
-                # That of now, also if it is rendered only after others.
+                # The planes of now, also if it is rendered only after others.
                 subjects, snapshot, lighting = self._exact_answer(check)
                 self._wait_for_earlier(number, check)
                 with self._turn, MITSUBA.low_priority():

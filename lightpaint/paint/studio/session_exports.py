@@ -25,7 +25,7 @@ from lightpaint.report import CleanLooks, spoken_distance
 from lightpaint.scene import load_scene
 from lightpaint.target import texts_of, write_painting
 
-#: Folder of the report, in that of the session.
+#: Folder of the report, in the folder of the session.
 ANSWER_FOLDER = "answer"
 
 #: Exports that write the painting, and those that need one.

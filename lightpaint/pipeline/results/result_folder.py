@@ -36,7 +36,7 @@ REMEDY = Sentence(
     "name another folder (", Hint("folder"), "), or replace it (", Hint("force", True), ")"
 )
 
-#: The folder within that of the answer.
+#: The folder within the folder of the answer.
 PLANES_FOLDER = "planes"
 
 

@@ -238,7 +238,7 @@ class PoseSearch:
 
 
 class PoseRules:
-    """Rules about where lights may hang. paths: those of the search."""
+    """Rules about where lights may hang. paths: the loops of the search."""
 
     def __init__(self, paths: SearchPaths) -> None:
         self._paths = paths

@@ -160,7 +160,7 @@ class WishPart:
 def wish_parts(wishes: Sequence[Wish], objects: Objects | None) -> list[WishPart]:
     """Return the wishes, each layer of several after its wishes, and each group after its layers.
 
-    objects: those of the picture, by which parts of a layer are named.
+    objects: the objects of the picture, by which parts of a layer are named.
     """
     parts: list[WishPart] = []
     names = _names(wishes, objects)

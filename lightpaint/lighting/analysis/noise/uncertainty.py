@@ -257,8 +257,8 @@ def error_bars(
     None if the noise of the basis is unknown, which is not the same as none. After reweighting they
     are of the last linear problem.
 
-    Fixed or locked lights have an error of 0; that of lights which reach nothing is unknown. Noise
-    may have pushed a weight to 0 or to a limit: it has an interval on one side.
+    Fixed or locked lights have an error of 0; the error of lights which reach nothing is unknown.
+    Noise may have pushed a weight to 0 or to a limit: it has an interval on one side.
 
     Args:
         solution: From `solve`, `refine` or `correct_noise`.
