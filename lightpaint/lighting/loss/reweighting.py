@@ -8,8 +8,9 @@ decides the length of each step, and therefore never rises. Once it stops fallin
 stationary under the constraints, and for a convex loss it is the optimum.
 
 A sample of the pixels stands for all, preferring those that determine a light. Its optimum is near
-that of all pixels. A tilt then corrects its gradient: the tilted sample has the true gradient where
-this was measured, and its optimum is closer the more its curvature resembles the true one.
+the optimum of all pixels. A tilt then corrects its gradient: the tilted sample has the true
+gradient where this was measured, and its optimum is closer the more its curvature resembles the
+true one.
 """
 
 from collections.abc import Callable

@@ -13,8 +13,8 @@ suit images of any size (docs/image_lights.md has the measurements).
 
 A subject of two percent of a picture drowns in the other pixels: an answer that gets these right
 and leaves the subject grey has a smaller error than one that lifts it. People see the contrast
-between the two. So for each wish the ratio of its mean light to that of the rest shall be as
-painted:
+between the two. So for each wish the ratio of its mean light to the mean light of the rest shall be
+as painted:
 
     F += s Σ_k Σ_c A_kc² (P_o / O − P_r / R)²
 
@@ -70,7 +70,7 @@ PAINTED_REST = 0.5
 #: Largest share of a picture that a wish covers whose contrast counts: it is a subject.
 SUBJECT_SHARE = 0.5
 
-#: Light of a mean, relative to that of the picture, below which it has no contrast: black.
+#: Light of a mean, relative to the mean of the picture, below which it has no contrast: black.
 BLACK = 1e-3
 
 #: Strength of the pull to the current colours, of lights of which the painting asks for no other

@@ -20,7 +20,7 @@ from lightpaint.lighting.unknowns.knobs import Knob, Unknown
 
 
 def watts_of_unknowns(knobs: Sequence[Knob], lamps: Mapping[int, Lamp]) -> Doubles:
-    """Return the power, (k,), of each x at 1; 0 for those of lights of unknown power."""
+    """Return the power, (k,), of each x at 1; 0 for the power of lights of unknown power."""
     powers = list[float]()
     for knob in knobs:
         lamp = lamps.get(knob.lights[0]) if len(knob.lights) == 1 else None

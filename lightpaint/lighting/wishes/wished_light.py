@@ -272,7 +272,7 @@ def check_powers(reduction: Reduction, names: Sequence[str], purpose: str) -> No
         more = f" and {len(unknown) - 1} more" if len(unknown) > 1 else ""
         raise ConstraintError(
             f"{purpose} needs the power of each lamp, and the power of {unknown[0]!r}{more} is "
-            "unknown: add watts to its table in the lights file, or lock = true if it stays as it is"
+            "unknown: add watts to its table in the lights file, or lock = true if it is to stay"
         )
 
 

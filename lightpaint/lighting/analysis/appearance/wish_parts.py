@@ -82,7 +82,7 @@ class Washes:
     ) -> "Washes":
         """Return the washes of three pictures, (h, w, 3) linear each.
 
-        counts: (h, w), the pixels that count. transform: that of the display.
+        counts: (h, w), the pixels that count. transform: the transform of the display.
         """
         height, width = counts.shape
         factor = fitting_factor((height, width), -(-max(height, width) // MAX_SIDE))

@@ -55,8 +55,8 @@ READINGS, FEW_READINGS = 8, 3
 #: Fewest lights that count as many.
 MANY_LIGHTS = 64
 
-#: Amount of noise that is added, relative to that of the basis. A threshold answers less to noise
-#: that comes on top of other noise (docs/benchmarks.md has how often intervals hold).
+#: Amount of noise that is added, relative to the noise of the basis. A threshold answers less to
+#: noise that comes on top of other noise (docs/benchmarks.md has how often intervals hold).
 AMOUNT = 1.2
 
 #: Seed of the signs of the noise that is added.
@@ -74,8 +74,8 @@ SAFE_ERRORS, MIN_LEFT = 1.0, 1e-3
 class ReadingNoise:
     """The noise in the reading of a painting.
 
-    scatter: (n, 3), standard deviation of the weights by it. widening: ratio of an interval to that
-    of a standard deviation which is known.
+    scatter: (n, 3), standard deviation of the weights by it. widening: ratio of an interval to the
+    interval of a standard deviation which is known.
     """
 
     scatter: Doubles
