@@ -430,7 +430,7 @@ def spoken_deliveries(deliveries: Sequence[Delivery], told: str = "") -> str:
 
     told: sentences that stand before these; wishes whose shares they say are left out.
     Wishes that ask for nothing visible are left out, and of many the wishes of which most came.
-    Parts of a painting without layers are only told apart if one of them lacks something.
+    Parts of a painting without layers are only listed if one of them lacks something.
     """
     entries = [entry for entry in main_deliveries(deliveries) if entry.least is not None]
     if len(entries) == 1 and is_unnamed(entries[0]):

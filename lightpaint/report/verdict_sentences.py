@@ -385,7 +385,7 @@ def spoken_delta_e(appearance: Appearance, *, known: bool) -> str:
 
 
 def spoken_agreement(verification: Verification) -> str:
-    """Return that a render agrees, as much as it could have told."""
+    """Return that a render agrees, as far as it could have shown otherwise."""
     if not verification.is_blind:
         return "Rendered again: equal within noise"
     spp = verification.spp

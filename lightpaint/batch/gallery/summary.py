@@ -108,7 +108,7 @@ class PlaneRow:
 class ObserverRow:
     """The glare that an observer sees in a look.
 
-    name: of the observer and the case. ugr: None if it cannot be told.
+    name: of the observer and the case. ugr: None if it is unknown.
     """
 
     name: str

@@ -35,7 +35,7 @@ from lightpaint.colour.spectra.spectrum import (
     xyz_of_powers,
 )
 
-#: Largest distance from Planck's locus of a light whose rendering is told.
+#: Largest distance from Planck's locus of a light whose rendering is reported.
 LARGEST_DUV = 0.02
 
 #: Most mixes that are computed together, so that their 99 samples stay in the processor's cache.

@@ -96,7 +96,7 @@ class ConsoleLink:
 
     Nothing is sent before the first `show`. All methods may be called from any thread. What is
     shown last wins: a frame takes it whenever it is due. At the end a stream of sACN is terminated,
-    and receivers do what they are set to do then; nothing goes dark unless it is told to.
+    and receivers do what they are set to do then; nothing goes dark unless it receives that.
     """
 
     def __init__(

@@ -68,7 +68,7 @@ class EmitterRequest:
         nothing about this light.
         """
         level = self.amount
-        # What is said of a luminaire holds for each of a group.
+        # Keys of a luminaire hold for each of a group.
         count = len(light.members) if light.unit == FULL else 1
         if self.per != "Y":
             level *= count / self._amount_of_one(light, cd_per_unit)

@@ -310,8 +310,8 @@ class Painter(anywidget.AnyWidget):  # type: ignore[misc]
 
     Examples:
         >>> painter = lp.Painter(basis, target=target)
-        >>> told = []
-        >>> painter.observe(lambda change: told.append(change.new), "lighting")
+        >>> changes = []
+        >>> painter.observe(lambda change: changes.append(change.new), "lighting")
         >>> painter.constraints = lp.Constraints.of({"panel": {"lock": True}})
         >>> np.round(painter.solution.lighting.emission["panel"], 2).tolist()
         [4.0, 3.0, 2.0]

@@ -23,7 +23,7 @@ from lightpaint.paint.presets.lamp_roles import LampRoles, find_roles, light_sha
 from lightpaint.paint.presets.view_areas import Mask, ViewAreas
 from lightpaint.paint.store.history_steps import Pixels, Region, slices
 
-#: The area in which a layer asks for light where no lamps can be told apart.
+#: The area in which a layer asks for light where no lamps can be distinguished.
 Area = Literal["whole", "lit", "subject"]
 
 #: Least and most stops by which the light of lamps changes.

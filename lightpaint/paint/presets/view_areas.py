@@ -16,8 +16,8 @@ Mask = npt.NDArray[np.float32]
 #: parts.
 RANGE_STOPS = 2.0
 
-#: Pixels of the longer side of the picture in which illumination is told from surfaces: what is
-#: smaller is a surface's pattern.
+#: Pixels of the longer side of the picture in which illumination is separated from surfaces: what
+#: is smaller is a surface's pattern.
 SMOOTH_SIDE = 48
 
 #: Least albedo that illumination is divided by; darker surfaces tell nothing.

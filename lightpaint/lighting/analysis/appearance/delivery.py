@@ -56,7 +56,7 @@ NOISY_PICTURES, SEED = 8, 1
 #: Standard errors within which a share is not known to be too small.
 NOISE_ERRORS = 2.0
 
-#: The share from which too much came: it is then said as a ratio, and not in percent.
+#: The share from which too much came: it is then shown as a ratio, and not in percent.
 OVERDONE = 1.25
 
 

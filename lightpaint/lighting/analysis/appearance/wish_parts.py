@@ -185,8 +185,8 @@ def _joint_area(wishes: Sequence[Wish]) -> Floats:
 
 def _names(wishes: Sequence[Wish], objects: Objects | None) -> list[str]:
     """Return names that differ: `Strokes, vase` for a part of a layer; only the place, with a
-    capital, for a part of a painting without layers. Parts in one ninth of the picture are told
-    apart by what is in them, `Right (vase)`, or by numbers.
+    capital, for a part of a painting without layers. Parts in one ninth of the picture are
+    distinguished apart by what is in them, `Right (vase)`, or by numbers.
     """
     counts = Counter((wish.layer, wish.name) for wish in wishes)
     is_part = [counts[wish.layer, wish.name] > 1 for wish in wishes]

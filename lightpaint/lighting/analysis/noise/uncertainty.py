@@ -5,8 +5,8 @@ The two halves of the samples give two gradients of the objective at the solved 
 their difference, pixel by pixel, gives the covariance of the gradient's noise, and the inverse
 of M turns that into the covariance of the weights (docs/method.md, "How sure").
 
-In a picture that is all fireflies, power cannot be told from noise, and the light comes out too
-dim. At most half of M is removed as noise, since the rest would be noise itself. So the least
+In a picture that is all fireflies, power cannot be separated from noise, and the light comes out
+too dim. At most half of M is removed as noise, since the rest would be noise itself. So the least
 power of a light in a render without noise is estimated; the answer with that power tells how far
 the true one may be (docs/method.md, "How sure").
 

@@ -1,4 +1,4 @@
-/** Drawing of scopes on a canvas, whose size in pixels is that of their counts. */
+/** Drawing of scopes on a canvas, with a pixel for each count. */
 
 import { histogram, LEVELS, traceAlpha, vectorscope, waveform } from './scope_arithmetic.js';
 
@@ -46,7 +46,7 @@ function drawTraces(canvas, traces, inks) {
   put(canvas, image);
 }
 
-/** Draw bars of each code, luma behind the channels, whose inks add up. The highest bar but those of
+/** Draw bars of each code, luma behind the channels, whose inks add up. The highest bar but the bars of
  * black and white has the whole height. @param {HTMLCanvasElement} canvas
  * @param {Float32Array[]} counts */
 function drawHistogram(canvas, counts) {
