@@ -288,8 +288,8 @@ class Painter(anywidget.AnyWidget):  # type: ignore[misc]
         store: The file of the session; an existing session continues. A painter of this kernel that
             has the file open is closed. Without a file the session ends with the kernel.
         folder: Receives exports.
-        layers: A file of layers that replaces the layers of the session when it first begins with
-            it: `layers.exr` of an export, or an `.ora` of any program.
+        layers: A file whose layers replace the session's when the session first begins with them,
+            `layers.exr` of an export, or an `.ora` of any program.
         height: Height of the painter in screen pixels, at least 240.
         layout: The layout of the widget, as for every ipywidget.
         settings: Fields of `lp.Settings`, by name.

@@ -12,7 +12,7 @@ export const VECTOR_SIZE = 200;
 /** Height of a histogram in pixels, and the part of the pixels of its highest bar that fills it. */
 const HISTOGRAM_HEIGHT = 120;
 
-/** Colours of red, green, blue and luma, bright enough to be told apart on black. */
+/** Colours of red, green, blue and luma, bright enough to be distinguished on black. */
 const INKS = [
   [255, 90, 80],
   [90, 220, 110],
