@@ -88,11 +88,11 @@ def _why_no_sheet(scene: Scene) -> str:
 
 
 def recorded_places(scene: Scene) -> tuple[EmitterPlace, ...]:
-    """Return the places of a scene's emitters; those that moved or are new say so.
+    """Return the places of a scene's emitters, with a mark on each that moved or is new.
 
-    A relit scene is a plain scene: only the lighting in its folder knows the earlier places. It
-    counts for each light that hangs, points and opens as it says. A folder without a readable
-    lighting changes nothing.
+    The marks come from the lighting in the folder of a relit scene, which knows the earlier places.
+    A light whose place differs from the lighting's gets no mark, nor does any without a readable
+    lighting.
     """
     file = scene.path.parent / LIGHTING
     if not file.is_file():

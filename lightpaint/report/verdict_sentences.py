@@ -188,7 +188,7 @@ def spoken_whole(appearance: Appearance) -> str:
 def spoken_lack(appearance: Appearance, wish: Delivery) -> str:
     """Return sentences on a wish of which too little came: how much, why, and what may help.
 
-    Place, lights and reasons of the appearance are the place of the wish.
+    The place, lights and reasons of the appearance are about the wish alone.
     """
     if appearance.causes:
         return f"{spoken_delivery(wish)}, since {_spoken_causes(appearance)}."

@@ -57,7 +57,7 @@ MAX_ABOUT = 2**20
 class Template:
     """The look to paint over.
 
-    image: (h, w, 3) linear Rec.709, as rendered. transform: the transform of template.png. scene:
+    image: (h, w, 3) linear Rec.709, as rendered. transform: of template.png. scene:
     name of its file. content: its hash (see `Scene.content`). sensor: its id. albedo: (h, w, 3) in
     [0, 1], share of light that surfaces reflect diffusely; None if not rendered.
     clean: (h, w, 3), the denoised `image` as in template.png; None if that shows `image` itself.

@@ -105,8 +105,8 @@ def gather_planes(
 class BestPlanes:
     """The plane with the most samples that was found for each light; None where there is none.
 
-    identities: identities of the planes, in the order of the lights. cached: a basis of all of
-    them.
+    identities: hashes of the planes' contents, in the order of the lights. cached: a basis of all
+    of them.
     """
 
     def __init__(self, identities: Sequence[str], cached: Basis | None) -> None:

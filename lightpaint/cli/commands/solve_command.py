@@ -34,7 +34,7 @@ def solve(
 ) -> CommandOutcome:
     """Run `lightpaint solve SCENE|BASIS TARGET...` or `SCENE --target SENSOR=TARGET...`.
 
-    look_set: the set of looks, if there are several. frames: the frames of a shot to write, as
+    look_set: the set of looks, if there are several. frames: of a shot to write, as
     `parse_frames` reads them.
     """
     chosen_frames = [frames_to_write(job, frames) for job in jobs]

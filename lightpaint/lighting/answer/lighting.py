@@ -135,7 +135,7 @@ class LightSetting:
     @property
     def physical_emission(self) -> RGB:
         """Emission in the sense of `unit`: Mitsuba's projector gives a plane at distance 1 π times
-        its parameter. The number of a lamp's emitter has its colour.
+        its parameter. The value of a lamp's emitter has the emitter's colour.
         """
         emission = self.emission
         if self.part_of and self.lamp is not None:

@@ -19,7 +19,7 @@ from lightpaint.lighting.unknowns.reduction import Reduction
 class SomeLights:
     """A choice of knobs of a reduction, and the lights that they move.
 
-    whole: the reduction of all lights. places: the places of the knobs, in ascending order.
+    whole: the reduction of all lights. places: of the knobs, in ascending order.
     """
 
     whole: Reduction

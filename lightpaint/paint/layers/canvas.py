@@ -220,7 +220,7 @@ class Canvas:
         return self._layers.layer(number)
 
     def accent(self, number: int) -> float:
-        """Return the accent of a layer; 1 for a hidden one."""
+        """Return the accent of a layer, by which its paint counts more; 1 for a hidden one."""
         return self._layers.accent(number)
 
     def composition(self) -> StoredComposition:

@@ -125,7 +125,7 @@ class LampRoles:
         return np.asarray(np.where(self.amounts > 0, there / np.maximum(means, 1e-30), 0))
 
     def flatness(self, mask: Mask) -> float:
-        """Return 1 for an object all of whose surface looks one way, 0 for one that looks all."""
+        """Return the length of an object's mean lit normal: 1 if it is flat, 0 for a sphere."""
         return float(np.linalg.norm(self._lit_normal(mask)))
 
     @cached_property
@@ -228,9 +228,10 @@ class LampRoles:
         return found
 
     def pool(self, number: int, *, is_on_wall: bool = True) -> Bools:
-        """Return the lamp of one of the smallest pools of light, (n,), from 0; none beyond them.
+        """Select, (n,), the lamp with the smallest pool of light, or with the next ones.
 
-        is_on_wall: whether spots on a wall are among them.
+        number: from 0; beyond the last pool no lamp is selected. is_on_wall: whether spots on a
+        wall count.
         """
         found = [k for k in self._pools if is_on_wall or not self.is_on_wall[k]]
         return np.isin(np.arange(len(self.light)), found[number : number + 1])

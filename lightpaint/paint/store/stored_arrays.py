@@ -192,7 +192,7 @@ class StoredPatch(Patch):
 class StepAnswer:
     """The lighting after a step, as it was shown.
 
-    weights: emission (3,) by name of light, under the master dimmer. places: the places of lights,
+    weights: emission (3,) by name of light, under the master dimmer. places: of lights,
     as a text that is equal for equal places. picture: (h, w, 3) uint8, small, in display values.
     """
 

@@ -31,7 +31,7 @@ class LightPlanes:
     which `add` indexes in row-major order. is_shared: whether several paths may add to a pixel at
     the same time, in an order that then affects the last bits; otherwise each pixel has a single
     path, which adds in order. is_split: whether direct and indirect light have separate planes.
-    start: initial sums, in the form returned by `sums`; None for zeros. texels: the texels of
+    start: initial sums, in the form returned by `sums`; None for zeros. texels: of
     images; None if there are none.
 
     Float32 sums of many samples would lose what each of them adds. So the tracer calls `end_block`

@@ -244,7 +244,7 @@ class DeliveryReport:
 def measure_deliveries(solution: Solution, picture: Floats) -> DeliveryReport:
     """Measure how much of each wish came, in all views of `solution` together.
 
-    picture: the picture of the answer, in the shape of the joint basis.
+    picture: of the answer, in the shape of the joint basis.
     """
     basis, views = solution.basis, solution.problem.views
     parts = [

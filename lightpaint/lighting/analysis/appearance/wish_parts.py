@@ -82,7 +82,7 @@ class Washes:
     ) -> "Washes":
         """Return the washes of three pictures, (h, w, 3) linear each.
 
-        counts: (h, w), the pixels that count. transform: the transform of the display.
+        counts: (h, w), the pixels that count. transform: of the display.
         """
         height, width = counts.shape
         factor = fitting_factor((height, width), -(-max(height, width) // MAX_SIDE))
@@ -160,7 +160,7 @@ class WishPart:
 def wish_parts(wishes: Sequence[Wish], objects: Objects | None) -> list[WishPart]:
     """Return the wishes, each layer of several after its wishes, and each group after its layers.
 
-    objects: the objects of the picture, by which parts of a layer are named.
+    objects: of the picture, by which parts of a layer are named.
     """
     parts: list[WishPart] = []
     names = _names(wishes, objects)
