@@ -44,9 +44,11 @@ SPEECH = re.compile(r"(?<!cannot be )(?<!\.)\b(?:told|said|spoken)\b(?!:)")
 #: A word that stands twice, as a rename may leave it.
 TWICE = re.compile(r"\b([a-z]+) \1\b")
 
-#: Nouns of this house, and what says in a page what they are: italics, or a parenthesis behind.
+#: Nouns of this house, and what says in a page what they are: italics or quotes, or a colon or a
+#: parenthesis behind.
 HOUSE = {
-    word: re.compile(rf"\*{word}s?\*|\b{word}s? \(") for word in ("cap", "hat", "knob", "tether")
+    word: re.compile(rf"[*\"]{word}s?[*\"]|\b{word}s?(?: \(|: )")
+    for word in ("cap", "hat", "knob", "tether")
 }
 
 PACKAGE = [
@@ -86,7 +88,7 @@ def undefined(text: str) -> list[str]:
         word
         for word, use in uses.items()
         if use
-        and not HOUSE[word].match(plain, max(0, use.start() - (plain[use.start() - 1] == "*")))
+        and not HOUSE[word].match(plain, max(0, use.start() - (plain[use.start() - 1] in '*"')))
     ]
 
 
@@ -141,6 +143,12 @@ def test_notes_of_the_package_are_in_plain_english() -> None:
 @pytest.mark.parametrize("page", DOCUMENTS, ids=lambda path: path.name)
 def test_nouns_of_the_house_are_defined_where_they_are_used(page: Path) -> None:
     assert undefined(page.read_text("utf-8")) == []
+
+
+def test_modules_define_nouns_of_the_house_that_they_begin_with() -> None:
+    modules = [path for path in PACKAGE if path.suffix == ".py"]
+    first = {path: ast.get_docstring(ast.parse(path.read_text("utf-8"))) or "" for path in modules}
+    assert {path.name: x for path, text in first.items() if (x := undefined(text))} == {}
 
 
 def test_documents_are_read_in_a_day() -> None:

@@ -1,4 +1,4 @@
-"""An interior-point method, for problems with many caps, like the problem of a wall of LEDs.
+"""An interior-point method for many caps (upper limits of sums), as a wall of LEDs has them.
 
 Where Newton's step on all limits cycles, an active set changes by one limit at a time, and with a
 hundred caps that takes as many steps. This method goes through the inside of all limits in some
