@@ -71,7 +71,7 @@ class Numbers:
         return len(self._texts) - self._next
 
     def one(self, what: str) -> float:
-        """Return the next number, which is `what`."""
+        """Return the next number. what: its name in errors."""
         return float(self.several(1, what)[0])
 
     def whole(self, what: str, most: int) -> int:
@@ -93,7 +93,7 @@ class Numbers:
 
 
 def number(text: str, what: str) -> float:
-    """Return the number that a text is, which is `what`."""
+    """Return the number that a text is. what: its name in errors."""
     try:
         value = parse_number(text)
     except ValueError:

@@ -61,7 +61,7 @@ class GradientPixels:
 
     @property
     def bands(self) -> list[Region]:
-        """Bands of the mask."""
+        """The bounds of the mask in each row of tiles, in whole tiles."""
         return self._values[1].bands
 
     @property

@@ -69,7 +69,7 @@ class ViewAreas:
 
     @property
     def lit(self) -> Mask:
-        """The brighter half, more of it the brighter it is."""
+        """The brighter half of the picture, (h, w): from 0 at its middle brightness to 1."""
         return self._usable(np.clip(self._level / RANGE_STOPS, 0, 1))
 
     @property

@@ -207,7 +207,7 @@ def stops_darker(reference: LightTones, picture: LightTones) -> float:
 
 
 def gains_of(tint: Doubles) -> Doubles:
-    """Return the gains (3,), of luminance 1, of log2 gains."""
+    """Return 2 to the power of `tint`, (3,), scaled to a luminance of 1."""
     gains = 2.0**tint
     return np.asarray(gains / luminance(gains))
 
