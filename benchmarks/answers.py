@@ -1,4 +1,4 @@
-"""How long answers take, under the brush and exact ones, beside those of an earlier version.
+"""How long answers take, under the brush and exact ones, beside the times of an earlier version.
 
     python benchmarks/answers.py --before CHECKOUT [--scene gallery] [--resolution 640x360]
                                  [--spp 32] [--repeats 2]

@@ -5,7 +5,7 @@
 12 lights are the gallery's; larger numbers hang in a hall made for the purpose. Everything
 runs in one process with its kernels warm, in turns, and ratios are taken between neighbours
 in time. Seconds are the processor's, of all threads, so other work on the machine matters little;
-loading is not counted. Variance is that of a plane, averaged over pixels and
+loading is not counted. Variance is a plane's, averaged over pixels and
 channels, from the difference of two independent halves; "at equal time" divides by what the
 samples cost. Where there are many lights, only M of them, evenly spread over the list, are
 rendered alone, and their time is scaled to all.

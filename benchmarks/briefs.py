@@ -14,7 +14,7 @@ current look. The two are layers of the painting, or one flat painting with --fl
 Judged are, in this order: the mean ΔE2000 to the meant look; how much of the painted change of
 colour and of lightness came (with N, A, G = Lab of now, painted, got, on pictures blurred by 4
 pixels, Σ (A−N)(G−N) / Σ (A−N)² over a*b* or L*); the same of the worst zone in colour, and the
-worst case of it; harm, the largest amount by which the ΔE of a case exceeds that of changing
+worst case of it; harm, the largest amount by which the ΔE of a case exceeds the ΔE of changing
 nothing; and the greenest lamp with more than 3 % of the light: its Duv above the locus (in
 thousandths), beyond what it has now and what is painted.
 

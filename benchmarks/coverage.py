@@ -10,7 +10,7 @@ ten times as many. Printed is how often the intervals hold the truth, over light
 seeds: of channels that are on in truth, of those that are at a bound there, whose intervals have
 one side and hold it nearly always, of the channel that is on and held least, and of those that are
 on and told; the share of lights that "cannot be told"; and the median over channels that are on and
-told of the stated scatter over that of the seeds. Without the noise correction and with it.
+told of the stated scatter over the scatter of the seeds. Without the noise correction and with it.
 """
 
 import argparse
@@ -133,7 +133,7 @@ def measure(kind: str, folder: Path, *, seeds: int, spp: int) -> None:
 
 
 def scatter_ratio(solved: np.ndarray, stated: np.ndarray, untold: np.ndarray) -> float:
-    """Return the median over channels of the stated scatter over that of the weights.
+    """Return the median over channels of the stated scatter over the scatter of the weights.
 
     solved, stated: (seeds, n, 3); of a channel the median over seeds is stated. untold: (seeds, n).
     Channels count that are on in all seeds, within half their level, of lights that are told in

@@ -2,7 +2,8 @@
 
     python benchmarks/defaults.py --before CHECKOUT [--parts demo again unverified second ...]
 
-Seconds of the processor of whole processes, in turns with those of CHECKOUT, an earlier version.
+Seconds of the processor of whole processes, in turns with processes of CHECKOUT, an earlier
+version.
 
 - demo: `lightpaint demo` with nothing kept and no kernel compiled.
 - again: the same with the kernels of the first demo kept, the least of `--repeats`.

@@ -17,7 +17,7 @@ squares that no mix makes. Printed are, over bases of that many samples with oth
   the other one not; `wrong`: the number of headlines that do not call what can be met close, and
   do not say either that too few samples tell, of how many;
 - `render / prediction`: the mean light of plain Mitsuba renders of the relit scene, with samples
-  that nothing else has, over that of the prediction, with its standard error.
+  that nothing else has, over the light of the prediction, with its standard error.
 
 --quick tries two scenes with two seeds, to see that everything runs.
 """
@@ -299,7 +299,7 @@ def headline(answer: lp.Solution) -> str:
 def render_over_prediction(
     scene: lp.Scene, basis: lp.Basis, answer: lp.Solution, folder: Path, *, spp: int
 ) -> float:
-    """Return the mean light of a render by Mitsuba alone over that of the prediction."""
+    """Return the mean light of a render by Mitsuba alone over the light of the prediction."""
     import mitsuba as mi
 
     seed = basis.origin.seed

@@ -4,7 +4,7 @@
         [--emitter-samples 1,1 8,2 8,4] [--resolution 320x180] [--spp N] [--repeats K]
 
 Each pair is what the first vertex and later ones sample. All run in turns in one process, with one
-kernel, and are trained apart. Variance is that of a plane, averaged over pixels and
+kernel, and are trained apart. Variance is a plane's, averaged over pixels and
 channels, from the difference of two halves: the geometric mean over lights. Time is of the
 processor, without loading and training, which have a column of their own.
 """

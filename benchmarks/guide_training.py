@@ -4,7 +4,7 @@
         [--resolution 64x36] [--spp 16] [--training-spp 4 16 64] [--repeats K]
 
 Each number of training samples per pixel is compared with all training samples, which larger
-pictures have. All run in turns in one process, with one kernel. Variance is that of a plane,
+pictures have. All run in turns in one process, with one kernel. Variance is a plane's,
 averaged over pixels and channels, from the difference of two halves: the geometric mean over
 lights. Time is of the processor, without loading; the last column is variance times the sum of
 both times.

@@ -17,7 +17,7 @@ sky, for as much of the processor as basis and solve take together, and for four
 better of two step sizes, judged like the check, by a plain render.
 
 Before that it prints the processor's time of a basis relative to an ordinary render: of as many
-samples, and for the same noise, where that of the whole picture is the sum's of all planes.
+samples, and for the same noise, where the noise of the whole picture is the sum's of all planes.
 """
 
 import argparse
@@ -234,7 +234,7 @@ def times_of(folder: Path, material: str, sizes: list[str], spp: int) -> Iterato
 
 
 def noise_share(image: Floats, noise: Floats) -> float:
-    """Return the energy of noise relative to that of an image."""
+    """Return the energy of noise relative to the energy of an image."""
     return float((noise**2).sum() / (image**2).sum())
 
 

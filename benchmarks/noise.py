@@ -40,7 +40,8 @@ GALLERY = REPOSITORY / "scenes" / "gallery" / "scene.xml"
 SCENES = ("gallery", "hall64", "hall256")
 HALL_SIZE = {"width": 160, "height": 90}
 
-#: Samples of the long renders: so many that their own noise is far below that of what is measured.
+#: Samples of the long renders: so many that their own noise is far below the noise of what is
+#: measured.
 LONG_SPP = {"gallery": 768, "hall64": 1024, "hall256": 512}
 
 #: Seeds of the long render, and of the first one that is measured.

@@ -182,7 +182,7 @@ def print_page_opening(
     """Print how soon a page shows a session with so many layers, and all its pictures.
 
     opened: returns an open painter of a session file, as a context, in the browser of another one.
-    Its page is loaded again, in turns with that of the other count.
+    Its page is loaded again, in turns with the page of the other count.
     """
     print("loading the page of such a session again, ms of the clock until all pictures are there")
     with tempfile.TemporaryDirectory() as folder, ExitStack() as stack:

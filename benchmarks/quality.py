@@ -2,7 +2,7 @@
 
     python benchmarks/quality.py SCENE TARGET [--mask M.exr] [--reference 1/4x4096] [--csv FILE]
 
-The error of a light is that of the luminance of its weight, relative; "mean" weighs lights by
+The error of a light is the relative error of the luminance of its weight; "mean" weighs lights by
 their share of the picture's energy, "worst" is the largest of lights with 2 % of it or more.
 "picture" is the RMS of what the wrong weights change, relative to the picture, both without
 noise of their own.

@@ -6,7 +6,7 @@
 
 Draws halls (hall.py) of so many lights on so many pixels, in blocks of pixels where a basis could
 not hold them all. Each stage of each hall runs in a process of its own, which prints its processor
-seconds, without those of imports and of reading what it needs, and the largest resident memory of
+seconds, without imports and without reading what it needs, and the largest resident memory of
 that process. `command` is `lightpaint solve --literal --no-verify` as a whole. Prints a table, and
 the exponents p and q of seconds ~ lights^p · pixels^q with their standard errors.
 
@@ -18,7 +18,7 @@ keeps the halls and bases, where the next call finds them.
 
 A file of results keeps what was measured, and no stage in it is run again: so a table can be made
 in pieces, `--lights 12 --results table.jsonl`, then `--lights 64 --results table.jsonl`. With
-`--join`, nothing is run, and table and exponents are those of the file, as far as it goes.
+`--join`, nothing is run, and table and exponents come from the file, as far as it goes.
 """
 
 import argparse

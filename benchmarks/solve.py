@@ -6,7 +6,7 @@ First look: nothing is there yet; lightpaint renders its basis and solves. Secon
 same scene, a new painting; the basis is there. Adam optimises the same emissions against
 the same weighted squares through Mitsuba's `prb` integrator, starting from the current look,
 and is given the best of several step sizes. Both are judged by one reference: the objective
-under a basis of many more samples that neither has seen. Adam's time is that of the step at
+under a basis of many more samples that neither has seen. Adam's time is the time of the step at
 which it first reaches lightpaint's objective. Kernels are compiled before any clock starts.
 """
 

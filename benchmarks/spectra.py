@@ -3,7 +3,7 @@
     python benchmarks/spectra.py [--rounds 3] [--spp 256] [--resolution 1/2] [SCENE …]
 
 Bases: in RGB, and with spectra for lamps of one white emitter, and of four (red, green, blue,
-white), in turns in one process. "time" is that of the processor for equal samples, "noise" the
+white), in turns in one process. "time" is processor time for equal samples, "noise" the
 variance of the picture's luminance with some emitters, "equal noise" their product: what as little
 noise costs, all relative to RGB. Compilation and training are not counted.
 
@@ -166,7 +166,7 @@ def variance(estimate: Estimate) -> float:
 
 
 def print_verifications(scene: Scene, spp: int) -> None:
-    """Print the noise of verifications, relative to that of their bases."""
+    """Print the noise of verifications, relative to the noise of their bases."""
     lamp = lamp_of([*LEDS])
     basis = render_basis(with_lamps(scene, lamp), spp=spp, seed=2)
     print("verification   by the eye  by the lamps")

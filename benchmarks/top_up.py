@@ -4,12 +4,13 @@
 
 For each seed the gallery, at a quarter of its size, is solved twice: by a pilot and further samples
 where they are needed, until the largest error of a light is told to be as small as asked for, and
-by as many samples in all pixels. Errors are those of the lights against a long render, in luminance
-summed over the picture: the mean over lights by their share of it, and that of the worst light over
-what it does or, if that is more, 5 % of the picture's light. Times are seconds of the processor for
-render, solves and error bars, kernels compiled. `gain` is how many times less squared mean error
-the samples where they are needed have at equal time; `bias` is the largest mean error of a light
-over the seeds, in standard errors of that mean; `held`, how many of the intervals hold.
+by as many samples in all pixels. Errors are errors of the lights against a long render, in
+luminance summed over the picture: the mean over lights by their share of it, and the error of the
+worst light over what it does or, if that is more, 5 % of the picture's light. Times are seconds of
+the processor for render, solves and error bars, kernels compiled. `gain` is how many times less
+squared mean error the samples where they are needed have at equal time; `bias` is the largest mean
+error of a light over the seeds, in standard errors of that mean; `held`, how many of the intervals
+hold.
 """
 
 import argparse

@@ -106,7 +106,7 @@ class TargetError(LightpaintError):
 
 
 class SizeError(TargetError):
-    """A painting or mask whose size is not that of the basis."""
+    """A painting or mask whose size is not the size of the basis."""
 
 
 class ConstraintError(LightpaintError):
@@ -171,8 +171,8 @@ class AccessError(LightpaintError, OSError):
     __str__ = Exception.__str__
 
 
-#: Error numbers of refusals that a user can mend; others, like that of a file of ours which is
-#: missing, are faults of a program.
+#: Error numbers of refusals that a user can mend; others, like the error for a file of ours which
+#: is missing, are faults of a program.
 REFUSALS = {
     *(errno.ENAMETOOLONG, errno.ELOOP, errno.ENOTDIR, errno.EISDIR, errno.EINVAL),
     *(errno.EACCES, errno.EPERM, errno.EROFS, errno.ENOSPC, errno.EDQUOT, errno.EFBIG),

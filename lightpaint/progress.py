@@ -229,11 +229,11 @@ _STAGE: ContextVar[_Stage | None] = ContextVar("stage", default=None)
 def stage(
     label: str, progress: Progress | None = None, advice: Sentence = NO_ADVICE
 ) -> Iterator[None]:
-    """Report the loops of the work within as those of the stage `label`, if it lasts a second.
+    """Report the loops of the work within as loops of the stage `label`, if it lasts a second.
 
-    progress: receives the reports; by default that of the stage around this one, and nobody where
-    there is none. advice: how to skip or shorten the stage, like ` (report=False skips it)`, for
-    the remark on one of more than a minute.
+    progress: receives the reports; by default the receiver of the stage around this one, and nobody
+    where there is none. advice: how to skip or shorten the stage, like ` (report=False skips it)`,
+    for the remark on one of more than a minute.
     """
     outer = _STAGE.get()
     if progress is None and outer is None:

@@ -83,9 +83,10 @@ def parallel_map(
 ) -> list[Result]:
     """Return `work(job)` for each job, several at a time with BLAS on one thread; results in order.
 
-    Results are equal, bit for bit, to those of one job after the other. Of several errors that of
-    the first job is raised. A job may call this function itself. Cancelled work ends before the
-    next job. unit: the plural of jobs that take equally long, whose number is reported as progress.
+    Results are equal, bit for bit, to the results of one job after the other. Of several errors the
+    error of the first job is raised. A job may call this function itself. Cancelled work ends
+    before the next job. unit: the plural of jobs that take equally long, whose number is reported
+    as progress.
     """
     remaining_jobs = list(jobs)
     results: list[Any] = [None] * len(remaining_jobs)
@@ -193,8 +194,8 @@ _pools: dict[int, ThreadPoolExecutor] = {}
 def _pool() -> ThreadPoolExecutor:
     """Return the lasting pool of threads: starting threads takes longer than many a job.
 
-    There is one pool for each niceness: on Linux threads inherit that of the thread which starts
-    them.
+    There is one pool for each niceness: on Linux threads inherit the niceness of the thread which
+    starts them.
     """
     nice = os.getpriority(os.PRIO_PROCESS, 0) if hasattr(os, "getpriority") else 0
     if nice not in _pools:

@@ -17,23 +17,31 @@ from lightpaint.basis.cache.cache import MAX_BYTES
 from lightpaint.batch.cluster.cluster import LIMIT_FACTOR, MIN_LIMIT_S
 from lightpaint.batch.manifest.checks import SOLVE_STEPS
 from lightpaint.batch.manifest.entries import MAX_LOOKS
+from lightpaint.batch.manifest.file_names import MAX_VISITED
 from lightpaint.batch.manifest.keys import MAX_FRAMES
 from lightpaint.cli.commands.render_commands import template_lines
 from lightpaint.cli.options.parser import command_parser
+from lightpaint.colour.lamp import MAX_EMITTERS
 from lightpaint.dmx.network.console_link import PRIORITY
 from lightpaint.dmx.network.console_receiver import LOOPBACK, USUAL_PRIORITY
+from lightpaint.lighting.answer.lighting_file import MAX_BYTES as MAX_LIGHTING
 from lightpaint.lighting.constraints.light_constraints import LAMP_KELVINS
 from lightpaint.lighting.fit import DEFAULT_HOLD
+from lightpaint.paint.message_frames import MAX_CHARACTERS, MAX_VALUES
 from lightpaint.paint.server.address import DEFAULT_PORT
 from lightpaint.paint.server.client import MAX_QUEUED, MAX_QUEUED_BYTES
 from lightpaint.paint.server.http_server import MAX_UNAUTHENTICATED
 from lightpaint.paint.server.session_clients import MAX_PAGES
+from lightpaint.paint.subject_factory import MAX_PAGE_BYTES
 from lightpaint.photometry.measure import DEFAULT_ERROR
+from lightpaint.pipeline.job.settings import MAX_SUGGEST
 from lightpaint.scene.lights.light_choice import MAX_SEPARATE
+from lightpaint.scene.lights.lights_file import MAX_BYTES as MAX_LIGHTS_FILE
+from lightpaint.scene.limits import MAX_SPP
 from lightpaint.scene.quality_presets import PRESETS
 from lightpaint.scene.scene_reader import load_scene
 from lightpaint.target.template import PLAIN_FILES
-from lightpaint.validation import MAX_NAME
+from lightpaint.validation import MAX_LISTED, MAX_NAME, MAX_PRIMARIES
 
 ROOT = Path(__file__).parent.parent
 #: Of the root, the documentation and its tutorials.
@@ -303,6 +311,14 @@ def test_numbers_in_documents_are_those_of_the_code() -> None:
         f"{MAX_QUEUED} messages or {MAX_QUEUED_BYTES // 2**20} MiB of a page",
         f"A batch has {MAX_LOOKS:,} looks, beside {MAX_FRAMES:,} frames",
         f"a name has {MAX_NAME} characters",
+        f"mixes {MAX_PRIMARIES} primaries, a lamp has {MAX_EMITTERS} emitters",
+        f"`--suggest` takes {MAX_SUGGEST} lights, `--spp` {MAX_SPP:,} samples per pixel",
+        f"names {MAX_LISTED:,} lights, groups and patterns, in {MAX_LIGHTS_FILE // 2**20} MiB",
+        f"`lighting.json` {MAX_LIGHTING // 2**20} MiB",
+        f"lists {MAX_LISTED:,} sensors or paintings",
+        f"scans {MAX_VISITED:,} files",
+        f"texts of {MAX_CHARACTERS} characters and lists of {MAX_VALUES} values",
+        f"at most {MAX_PAGE_BYTES // 2**30} GiB in half floats",
     ):
         assert phrase in limits
     solving = text("solving.md")

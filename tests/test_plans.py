@@ -285,7 +285,7 @@ def test_a_limit_of_power_costs_the_picture_something_beside_the_lux(tmp_path: P
         (
             {"room.lights.toml": '[light."lamp*"]\nphotometry = "bare.ies"\n'},
             ("plan", "room.xml"),
-            "the least power needs the power of each lamp, and that of 'lamp0' and 3 more is "
+            "the least power needs the power of each lamp, and the power of 'lamp0' and 3 more is "
             "unknown: add watts",
         ),
         (

@@ -1,6 +1,12 @@
-"""Pages that somebody reads first are read once: short sentences, and no words that say nothing."""
+"""Pages that somebody reads first are read once: short sentences, and no words that say nothing.
 
+Docstrings and comments are in the same English: nouns are repeated, programs print and send.
+"""
+
+import ast
+import io
 import re
+import tokenize
 from pathlib import Path
 
 import pytest
@@ -12,6 +18,9 @@ PAGES = [path for path in DOCUMENTS if path.name not in LOOKED_UP]
 
 #: Most words of a sentence, and of the mean sentence of a page.
 MAX_WORDS, MAX_MEAN = 45, 22
+
+#: Most words of all documents together, as `split` counts them.
+MAX_ALL_WORDS = 65_500
 
 #: Words that a sentence says as much without.
 EMPTY = (
@@ -27,6 +36,60 @@ NO_ARTICLE = re.compile(
     r"(?<!there )(?<!There )(?<!where )\bis no "
     r"(?!longer|more|other|one|such|need|light\b|noise|reason)[a-z]+(?<!er)\b"
 )
+
+
+#: Speech of programs: they print, show and send. `cannot be told` is a label of answers.
+SPEECH = re.compile(r"(?<!cannot be )(?<!\.)\b(?:told|said|spoken)\b(?!:)")
+
+#: A word that stands twice, as a rename may leave it.
+TWICE = re.compile(r"\b([a-z]+) \1\b")
+
+#: Nouns of this house, and what says in a page what they are: italics or quotes, or a colon or a
+#: parenthesis behind.
+HOUSE = {
+    word: re.compile(rf"[*\"]{word}s?[*\"]|\b{word}s?(?: \(|: )")
+    for word in ("cap", "hat", "knob", "tether")
+}
+
+PACKAGE = [
+    path
+    for ending in ("py", "js")
+    for path in sorted((ROOT / "lightpaint").rglob(f"*.{ending}"))
+    if "vendor" not in path.parts
+]
+
+
+def notes(path: Path) -> str:
+    """Return the comments and docstrings of a module of Python or JavaScript."""
+    text = path.read_text("utf-8")
+    if path.suffix == ".js":
+        found = re.findall(r"/\*.*?\*/|(?<!:)//[^\n]*", text, re.DOTALL)
+    else:
+        tokens = tokenize.generate_tokens(io.StringIO(text).readline)
+        found = [token.string for token in tokens if token.type == tokenize.COMMENT]
+        found += [
+            ast.get_docstring(node) or ""
+            for node in ast.walk(ast.parse(text))
+            if isinstance(node, ast.Module | ast.ClassDef | ast.FunctionDef | ast.AsyncFunctionDef)
+        ]
+    return " ".join(re.sub(r"^#:? |\n *(?:#:?|\*) ", " ", " ".join(found)).split())
+
+
+def found_in(pattern: re.Pattern[str], text: str) -> list[str]:
+    """Return where a pattern is in a text, with some of what stands around it."""
+    return [text[max(0, x.start() - 40) : x.end() + 20] for x in pattern.finditer(text)]
+
+
+def undefined(text: str) -> list[str]:
+    """Return nouns of this house that a page uses before it says what they are."""
+    plain = " ".join(re.sub(r"```.*?```|`[^`]*`", "", text, flags=re.DOTALL).split())
+    uses = {word: re.search(rf"\b{word}(?:s|es)?\b", plain) for word in HOUSE}
+    return [
+        word
+        for word, use in uses.items()
+        if use
+        and not HOUSE[word].match(plain, max(0, use.start() - (plain[use.start() - 1] in '*"')))
+    ]
 
 
 def prose(text: str) -> list[str]:
@@ -68,7 +131,38 @@ def test_nouns_are_repeated(page: Path) -> None:
     assert re.findall(rf".{{40}}{PRONOUN.pattern}.{{20}}", text) == []
 
 
+def test_notes_of_the_package_are_in_plain_english() -> None:
+    """Comments and docstrings: nouns repeated, programs that print, no word twice."""
+    texts = {path: notes(path) for path in PACKAGE}
+    assert len(texts) > 400
+    for pattern in (PRONOUN, SPEECH, TWICE):
+        faults = {path.name: x for path, text in texts.items() if (x := found_in(pattern, text))}
+        assert faults == {}, pattern.pattern
+
+
+@pytest.mark.parametrize("page", DOCUMENTS, ids=lambda path: path.name)
+def test_nouns_of_the_house_are_defined_where_they_are_used(page: Path) -> None:
+    assert undefined(page.read_text("utf-8")) == []
+
+
+def test_modules_define_nouns_of_the_house_that_they_begin_with() -> None:
+    modules = [path for path in PACKAGE if path.suffix == ".py"]
+    first = {path: ast.get_docstring(ast.parse(path.read_text("utf-8"))) or "" for path in modules}
+    assert {path.name: x for path, text in first.items() if (x := undefined(text))} == {}
+
+
+def test_documents_are_read_in_a_day() -> None:
+    """All but the changelog, of security what is reported, and generated pages."""
+    read = [path for path in DOCUMENTS if path.name not in {"CHANGELOG.md", "SECURITY.md"}]
+    assert sum(len(path.read_text("utf-8").split()) for path in read) <= MAX_ALL_WORDS
+
+
 def test_the_checks_would_find_it() -> None:
+    assert found_in(SPEECH, "The page is told of it; its `x.spoken` cannot be told.") == [
+        "The page is told of it; its `x.spoke"
+    ]
+    assert TWICE.findall("It is too too_strong, too too strong.") == ["too"]
+    assert undefined("Finer hats add up. A *cap* is a limit; caps hold.") == ["hat"]
     assert PRONOUN.findall("The flux is that of the lamp, so that of two one is off.") == [
         "that of"
     ]

@@ -4,7 +4,7 @@ import inspect
 import re
 from typing import Any
 
-#: The heading of a list of fields; those of other lists, after which no field is described.
+#: The heading of a list of fields; headings of other lists, after which no field is described.
 _ATTRIBUTES, _OTHERS = "Attributes:", ("Raises:", "Examples:", "Args:", "Returns:")
 
 

@@ -25,7 +25,7 @@ from lightpaint.scene.lights.lights_file import SceneRequests
 from lightpaint.validation import check_shape
 from lightpaint.version import __version__
 
-#: Maximum number of samples per pixel, beyond that of any render.
+#: Maximum number of samples per pixel, beyond the number of any render.
 MAX_SAMPLES = 2**40
 
 #: Prefix of the method of light groups, before the name of the renderer.
@@ -119,9 +119,9 @@ class Basis(Shown):
         objects: The map of visible objects, or None.
         indirect: The indirect part of `planes` and `noise`, for denoising; None if it was not
             stored separately.
-        extra: (h, w), number of samples of each half beyond those of the origin, where a painting
-            needed them; None if there are none. The number in a pixel never depends on the light of
-            that pixel, so the images stay unbiased. Only needed to continue rendering.
+        extra: (h, w), number of samples of each half beyond the samples of the origin, where a
+            painting needed them; None if there are none. The number in a pixel never depends on the
+            light of that pixel, so the images stay unbiased. Only needed to continue rendering.
         source: Path of the file that it was read from or of the scene that it was rendered from,
             for display; not stored.
         sums: The undivided sums of both halves of the samples, (n or 2n, h, w, 3) float32 each,
@@ -261,7 +261,7 @@ class Basis(Shown):
         emitters_seen: Bools,
         former: Estimate | None = None,
     ) -> "Basis":
-        """Return a basis of the same lights on other pixels: some, or those of several views.
+        """Return a basis of the same lights on other pixels: some, or the pixels of several views.
 
         Parts that describe the pixels as one image are dropped. Parameters are the attributes.
         """

@@ -153,7 +153,8 @@ def stray_pixels(raw: Floats, half_difference: Floats, clean: Floats) -> npt.NDA
     """Return where a picture is bright by chance, (h, w).
 
     A light that one sample in ten finds is found by both samples of one pixel in a hundred. The two
-    halves of such a pixel agree, so its half difference shows no noise; those of its neighbours do.
+    halves of such a pixel agree, so its half difference shows no noise; the half differences of its
+    neighbours do.
 
     raw: (h, w, 3) linear, the mean of two halves. half_difference: half of their difference. clean:
     the picture, denoised. A stray pixel is brighter than its denoised form and than all of its

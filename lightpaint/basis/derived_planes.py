@@ -167,7 +167,7 @@ class BlockPlanes(RowPlanes):
     def _means(self, source_rows: Floats, top: int, bottom: int) -> npt.NDArray[np.float32]:
         """Return block rows `top` to `bottom` of one plane.
 
-        source_rows: its pixels, starting with those of `top`.
+        source_rows: its pixels, starting with the pixels of `top`.
         """
         first = top * self._side
         weight = self._weight[first : bottom * self._side]

@@ -91,7 +91,7 @@ class BasisLight:
 
 @dataclass(frozen=True)
 class Lights(Sequence[BasisLight]):
-    """The ordered table of lights, whose order is that of weights, planes and sums.
+    """The ordered table of lights, whose order is the order of weights, planes and sums.
 
     records: one record for each light. requests: constraints from the scene's lights file, which
     are not stored with the basis, since that file may change.

@@ -414,7 +414,8 @@ def block_of(planes: "Planes | PlanesBase") -> tuple[int, Any]:
     """Return the number of pixels whose light is multiplied at a time, and the type of products.
 
     Products of many lights take most of a solve, and half as long in float32. Their round-off, 10⁻⁷
-    to 10⁻⁶ of M, is far below that of half floats; sums over blocks are float64 all the same.
+    to 10⁻⁶ of M, is far below the round-off of half floats; sums over blocks are float64 all the
+    same.
     """
     if planes.count <= FEW_LIGHTS or not planes.is_noisy:
         return BLOCK_PIXELS, np.float64

@@ -133,7 +133,7 @@ class LightImage:
         return self.layout.image(np.where((self.index >= 0)[:, None], weights[self.index], 0))
 
     def mean(self, radiances: Doubles) -> Doubles:
-        """Return the mean over its domain, (3,). radiances: (n, 3), those of all lights."""
+        """Return the mean over its domain, (3,). radiances: (n, 3), the radiances of all lights."""
         found = self.index >= 0
         shares = self.shares[found]
         return np.asarray(shares @ radiances[self.index[found]] / shares.sum())
@@ -151,7 +151,7 @@ def light_images(lights: Sequence[NamedLight]) -> list[LightImage]:
     images = []
     for name, layout in layouts_of(name for light in lights for name in light.members).items():
         places = np.array([index.get(node_name(name, node), -1) for node in layout.nodes])
-        # A name like that of a texel may be that of a light in another renderer's file.
+        # A name like the name of a texel may be the name of a light in another renderer's file.
         plugins = {lights[k].plugin for k in places[places >= 0]}
         if len(plugins) == 1 and plugins <= DOMAINS.keys():
             images.append(LightImage(name, layout, places, domain_of(plugins.pop())))
@@ -167,12 +167,14 @@ def texel_lights(lights: Sequence[NamedLight]) -> Bools:
 
 
 def is_of_texels(name: str) -> bool:
-    """Return whether a name is that of a texel, or one that `joined_texels` gives to several."""
+    """Return whether a name is the name of a texel, or one that `joined_texels` gives to
+    several."""
     return TEXELS in name or bool(image_of(name))
 
 
 def joined_texels(names: Iterable[str]) -> list[str]:
-    """Return names for a sentence, in which `12 texels of sky` stand for those of one image."""
+    """Return names for a sentence, in which `12 texels of sky` stand for the texels of one
+    image."""
     texels: dict[str, list[str]] = {}
     for name in names:
         texels.setdefault(image_of(name) or f"\0{name}", []).append(name)

@@ -105,8 +105,8 @@ class SlotFilter:
 class Lamp:
     """A lamp of several emitters.
 
-    power_share: the largest power of all emitters together, relative to that of all at full; of
-    emitters of unknown power, the sum of their drives relative to their number.
+    power_share: the largest power of all emitters together, relative to the power of all at full;
+    of emitters of unknown power, the sum of their drives relative to their number.
     prefer: what to save, or use most, among mixes of the same colour.
     is_wheel: whether they are slots of a colour wheel, of which one shines at a time.
     least_rf: the fidelity index Rf that these mixes need, if they can reach it; else the highest
@@ -150,7 +150,7 @@ class Lamp:
 
     @cached_property
     def powers(self) -> Doubles:
-        """(e,), the power of each emitter at full, relative to that of all."""
+        """(e,), the power of each emitter at full, relative to the power of all."""
         watts = [x.watts for x in self.emitters]
         known = [w for w in watts if w is not None]
         powers = np.array(known if len(known) == len(watts) else [1.0] * len(watts))
@@ -162,7 +162,7 @@ class Lamp:
 
     def drives_for(self, emission: Doubles) -> Doubles:
         """Return the preferred drives (e,) that mix an emission (3,); of one that it cannot mix,
-        those of the nearest that it can. A wheel is at the slot of the closest colour.
+        the drives of the nearest that it can. A wheel is at the slot of the closest colour.
         """
         if self.is_wheel:
             return self._drives_on_wheel(emission)
@@ -215,8 +215,8 @@ class Lamp:
         return np.asarray(self.levels[:, None] * np.array(spectra, np.float64))
 
     def distances(self, color: Doubles) -> Doubles:
-        """Return how far a colour (3,) is from that of each emitter, (e,), in CIEDE2000 of a white
-        surface.
+        """Return how far a colour (3,) is from the colour of each emitter, (e,), in CIEDE2000 of a
+        white surface.
         """
         return np.asarray(ciede2000(self._looks, lab_of_lights(color)))
 
@@ -225,8 +225,8 @@ class Lamp:
         return lab_of_lights(self.columns)
 
     def slot_for(self, color: Doubles, slots: Bools | None = None) -> int:
-        """Return the place of the emitter whose colour is closest to a colour (3,); of black, that
-        of the brightest one.
+        """Return the place of the emitter whose colour is closest to a colour (3,); of black, the
+        place of the brightest one.
 
         slots: (e,), those to choose from, all by default.
         """
@@ -249,7 +249,7 @@ class Lamp:
         return len(_mixes_of(self).values(emission)) > 0
 
     def watts_for(self, emission: Doubles) -> float | None:
-        """Return the power at which it emits (3,); None if that of an emitter is unknown."""
+        """Return the power at which it emits (3,); None if the power of an emitter is unknown."""
         watts = [x.watts for x in self.emitters]
         known = [w for w in watts if w is not None]
         if len(known) < len(watts):
@@ -299,7 +299,7 @@ class Lamp:
         """Return drives (e,) and the factor of a colour (3,) that they mix: the largest, or of
         those whose Rf is enough.
 
-        Where no mix of the colour has that Rf, those of the best.
+        Where no mix of the colour has that Rf, the drives of the best.
         """
         most = self.brightest(color) or 1.0
         if self.least_rf is None or not self.searches_rendering:
@@ -331,8 +331,9 @@ class Lamp:
         return room
 
     def drive_errors(self, drives: Doubles, errors: Sequence[float | None]) -> list[float | None]:
-        """Return the standard error of each drive for those of the emission's channels; None for a
-        drive at 0 or at its largest, which small errors do not move, and where they are unknown.
+        """Return the standard error of each drive for the errors of the emission's channels; None
+        for a drive at 0 or at its largest, which small errors do not move, and where they are
+        unknown.
         """
         inside = (drives > ROUND_OFF) & (drives < self.most * (1 - ROUND_OFF))
         unknown: list[float | None] = [None] * len(drives)
@@ -379,7 +380,7 @@ class Lamp:
 
 
 def _hull(points: Doubles) -> Doubles:
-    """Return those of some points (k, 3) of which all others are mixes."""
+    """Return the hull of some points (k, 3) of which all others are mixes."""
     from scipy.spatial import ConvexHull
 
     if len(points) < 2:
@@ -448,7 +449,7 @@ class _Mixes:
 
 @lru_cache(256)
 def _mixes_of(lamp: Lamp) -> _Mixes:
-    """Return the corners of a lamp, which those of the same kind share."""
+    """Return the corners of a lamp, which lamps of the same kind share."""
     U, sizes, _ = np.linalg.svd(lamp.columns.T, full_matrices=False)
     basis = U[:, sizes > SINGULAR * sizes[0]]
     equations, most, right = basis.T @ lamp.columns.T, lamp.most, np.zeros(basis.shape[1])

@@ -38,7 +38,7 @@ SRGB_TOLERANCE = 2e-3
 def encode_display(image: Floats, *, stops: float = 0.0) -> Floats:
     """Return linear Rec.709, scaled by 2^stops and clipped, as sRGB-encoded values in [0, 1].
 
-    The transfer function is that of IEC 61966-2-1.
+    The transfer function is the function of IEC 61966-2-1.
     """
     linear = np.clip(image * 2.0**stops, 0, 1)
     curve = 1.055 * linear ** (1 / 2.4) - 0.055

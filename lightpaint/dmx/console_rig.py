@@ -48,7 +48,7 @@ class RigEmitter:
     """Light sources of one colour in a light, such as its red LEDs, which dim together.
 
     xy: chromaticity of CIE 1931. candela: luminous intensity at full, in the middle of the beam.
-    channels: places, among those of the fixture, of all channels that set it.
+    channels: places, among the channels of the fixture, of all channels that set it.
     curve: pairs of a share of what its channels control and the share of light that this gives,
     from (0, 0) to (1, 1), both rising; straight if there are none.
     watts: power at full, if known. spectrum: if it was measured.
@@ -94,10 +94,10 @@ def filter_drive(slot: str) -> str:
 class RigWheel:
     """The colour wheels of a light, one behind the other.
 
-    channels: their places among those of the fixture. slots: the combinations of their slots, with
-    one of each wheel. filters: of light that is mixed before it, what each combination is called
-    and lets through, the open one first; empty where combinations are the light's emitters, in
-    their order.
+    channels: their places among the channels of the fixture. slots: the combinations of their
+    slots, with one of each wheel. filters: of light that is mixed before it, what each combination
+    is called and lets through, the open one first; empty where combinations are the light's
+    emitters, in their order.
     """
 
     channels: tuple[int, ...]
@@ -162,9 +162,9 @@ class RigLight:
 class RigAxis:
     """An axis about which a channel turns a head.
 
-    name: pan or tilt. channel: its place among those of the fixture. axis: in the scene, of length
-    1, while all angles are 0; turns about it are right-handed. levels, degrees: the ends of the
-    channel's range, and the angles there.
+    name: pan or tilt. channel: its place among the channels of the fixture. axis: in the scene, of
+    length 1, while all angles are 0; turns about it are right-handed. levels, degrees: the ends of
+    the channel's range, and the angles there.
     """
 
     name: str

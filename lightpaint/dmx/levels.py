@@ -163,7 +163,7 @@ def encode_levels(rig: ConsoleRig, drives: Mapping[str, Drives]) -> dict[int, by
 
 
 def decode_levels(rig: ConsoleRig, universes: Mapping[int, bytes]) -> dict[str, dict[str, float]]:
-    """Return the drives of each light, by its name and those of its emitters, that levels mean.
+    """Return the drives of each light, by its name and the names of its emitters, that levels mean.
 
     universes: 512 bytes each; one that is missing is all at 0.
     """
@@ -327,8 +327,8 @@ def _read(universes: Mapping[int, bytes], fixture: RigFixture, channel: DmxChann
 
 
 def drives_of(lighting: Lighting) -> dict[str, Drives]:
-    """Return the drives of all lights that have emitters, with that of a colour wheel in front of
-    them.
+    """Return the drives of all lights that have emitters, with the drive of a colour wheel in front
+    of them.
     """
     return {
         light.name: {**light.drives, **_wheel_drive(light)}

@@ -66,7 +66,7 @@ class ShowNode:
 
 @dataclass(frozen=True)
 class NamedFixture:
-    """A fixture, and the name of its light, which those of its pixels begin with.
+    """A fixture, and the name of its light, which the names of its pixels begin with.
 
     data: as pymvr reads it. addresses: absolute ones, by the file's breaks; empty without any.
     """
@@ -127,13 +127,13 @@ def read_rig(
 
     Args:
         path: The MVR.
-        gdtf_folder: Folder with GDTF files, which replace those of the same name in the archive, or
+        gdtf_folder: Folder with GDTF files, which replace files of the same name in the archive, or
             complete them.
         zoom: Beam angle in degrees of all fixtures that have a zoom. None for what they rest at.
         pixels: Whether each beam with channels of its own becomes a light. Otherwise a fixture is
             one light.
-        usual_colors: Whether usual colours stand for those of emitters and filters that a file
-            lacks.
+        usual_colors: Whether usual colours stand for the colours of emitters and filters that a
+            file lacks.
 
     Raises:
         RigError: For a file that is not such a show, is damaged or too large; a missing GDTF, an
@@ -429,7 +429,7 @@ def _files_in(folder: Path) -> dict[str, Path]:
 
 
 def _models(nodes: Sequence[ShowNode], root: Element) -> Iterator[PlacedModel]:
-    """Yield the models of all objects; those of symbols, which may hold others, too."""
+    """Yield the models of all objects; the models of symbols, which may hold others, too."""
     symbols = {x.get("uuid"): x for x in root.iterfind("Scene/AUXData/Symdef")}
     for node in nodes:
         if node.element.tag in _OBJECTS:

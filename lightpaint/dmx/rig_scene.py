@@ -61,7 +61,7 @@ MESHES = "meshes"
 #: Formats of models that are read, which name no other files, and most triangles of all models.
 READ_FORMATS, MAX_TRIANGLES = (".glb",), 5_000_000
 
-#: From the axes of glTF, y up, to those of MVR, z up.
+#: From the axes of glTF, y up, to the axes of MVR, z up.
 Z_UP = np.array([[1.0, 0, 0, 0], [0, 0, -1, 0], [0, 1, 0, 0], [0, 0, 0, 1]])
 
 

@@ -44,7 +44,7 @@ class Picture:
     alpha: (h, w) float32; None if absent, or if an integer file is opaque everywhere.
     weight: (h, w) float32, the channel W of an EXR; in that case RGB is not unpremultiplied.
     stored: (h, w), True where the file has pixels; None if everywhere.
-    saturated: (h, w, 3), True where the light is that of `image` or brighter, because the file
+    saturated: (h, w, 3), True where the light is the light of `image` or brighter, because the file
     cannot hold a larger number or its layer `at_least` marks it.
     transform: the transform that decoded the numbers; None if the file holds light.
     codes: largest possible integer; None for floats.

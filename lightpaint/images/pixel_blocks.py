@@ -110,7 +110,7 @@ Size = tuple[int, int]
 #: mean.
 MAX_ADDED_SIDE = 8
 
-#: Most pixels of an image that is resampled: those of the largest film.
+#: Most pixels of an image that is resampled: the pixels of the largest film.
 MAX_RESIZED = 2**28
 
 

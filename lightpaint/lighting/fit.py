@@ -46,8 +46,8 @@ class Fit:
 
     Attributes:
         space: `linear`, or `display` to come closest in display values.
-        hold: Total weight of unpainted pixels, which are held to the current look, relative to that
-            of painted ones. 0 releases them.
+        hold: Total weight of unpainted pixels, which are held to the current look, relative to the
+            weight of painted ones. 0 releases them.
         colors: `free`, in display values within the hues that are white, painted or the lamps' own;
             `gentle`, to change a lamp's colour only as far as another is painted where it shines,
             and only to whites and painted colours; `white`, on Planck's locus between 2200 and
@@ -57,8 +57,8 @@ class Fit:
         method: `polished`, to a certified optimum, or `gauss-seidel`, the paper's iteration alone,
             which may run out of sweeps; the certificate of the answer then says that it has not
             converged.
-        transform: The view transform of a comparison in `display`; None for that of the painting
-            or, if it holds light, sRGB at a fitting exposure.
+        transform: The view transform of a comparison in `display`; None for the transform of the
+            painting or, if it holds light, sRGB at a fitting exposure.
         emitters: Whether pixels with a visible emitter count: `auto`, if alpha, mask or template
             mark them as painted; `count`, always, which holds the emitters themselves to their
             painted brightness; `skip`, never.
@@ -172,7 +172,7 @@ class Fit:
         if self.unpainted and self.hold:
             raise LightpaintError(
                 f"unpainted is {self.unpainted:g} and hold {self.hold:g}: expected one of them, "
-                "the weight of each pixel or that of all together"
+                "the weight of each pixel or the weight of all together"
             )
 
 

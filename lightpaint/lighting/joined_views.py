@@ -102,7 +102,7 @@ def check_same_lights(a: Basis, b: Basis) -> None:
             if (value := getattr(first, field)) != (other_value := getattr(second, field)):
                 raise BasisError(
                     f"light {first.name!r} has {_describe(field, value)} in the basis of "
-                    f"{a.origin.sensor} and {_describe(field, other_value)} in that of "
+                    f"{a.origin.sensor} and {_describe(field, other_value)} in the basis of "
                     f"{b.origin.sensor}: "
                     "make both of one scene as it is"
                 )

@@ -152,7 +152,7 @@ class LinearProblem:
         return equations if self.pull is None else equations + self.pull
 
     def with_reduction(self, reduction: Reduction) -> Self:
-        """Return this problem with that reduction, and the same `full`."""
+        """Return this problem with other constraints: another `reduction` of the same `full`."""
         return replace(self, reduction=reduction)  # type: ignore[type-var]
 
     def with_whites(self, reduction: Reduction) -> Self:

@@ -50,7 +50,7 @@ from lightpaint.target import Target
 #: Largest relative error of one rounding to float16 and to float32.
 HALF_ROUND_OFF, SINGLE_ROUND_OFF = 2.0**-11, 2.0**-24
 
-#: Roundings that may add up: those of the painting, the layers and the sum.
+#: Roundings that may add up: the roundings of the painting, the layers and the sum.
 ROUNDINGS = 4
 
 #: A light above this share of its current emission counts as on, however little it shows.
@@ -72,9 +72,9 @@ def remove_traces(
     is_constrained: (n,), lights with constraints, whose weights are kept.
 
     A weight is a trace if it is small, and its light in each pixel is below the round-off of the
-    other lights there, or of the picture's mean where there are none. Round-off is that of the
-    painting, `image`, or of the layers: float16 if all of these are. A basis with known noise keeps
-    its weights: noise is larger, and error bars show it.
+    other lights there, or of the picture's mean where there are none. Round-off is the round-off of
+    the painting, `image`, or of the layers: float16 if all of these are. A basis with known noise
+    keeps its weights: noise is larger, and error bars show it.
     """
     small = (weights > 0) & (weights <= MAX_TRACE) & ~(basis.is_fixed | is_constrained)[:, None]
     if basis.knows_noise or not small.any():
@@ -184,7 +184,8 @@ class Problem(LinearProblem):
     ) -> "Problem":
         """Make the problem of one view, or of several, with bases and targets in the same order.
 
-        Arguments are those of `solve`. `constraints` win over those of the scene's lights file.
+        Arguments are as in `solve`. `constraints` win over the constraints of the scene's lights
+        file.
         """
         bases = [basis] if isinstance(basis, Basis) else _bases(basis)
         targets = [target] if isinstance(target, Target) else _targets(target)
@@ -355,7 +356,7 @@ def expected_for(
 ) -> ExpectedLights | None:
     """Return the lights that paintings let one expect; None if `fit` leaves colours free.
 
-    own: (n, 3), weights with the colours that lights have. wash: returns that of the views, by
+    own: (n, 3), weights with the colours that lights have. wash: returns the wash of the views, by
     default a new one.
     """
     if fit.colors not in ("gentle", "white"):
@@ -375,7 +376,7 @@ def wash_fields(
 ) -> dict[str, Any]:
     """Return what a sketch lets one expect, and its terms of the loss, as fields of a problem.
 
-    Arguments are those of `expected_for`.
+    Arguments are as in `expected_for`.
     """
     none = vars(PaintTerms())
     reads_wishes = fit.reads_wishes(is_sketch=are_sketches(views))

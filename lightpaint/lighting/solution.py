@@ -102,7 +102,7 @@ class Solution(Shown):
         """The objective of `equations`, all channels together.
 
         After reweighting these are the last linear problem: compare gains of its solutions with
-        this, not with the objective in the certificate, which may be that of a display.
+        this, not with the objective in the certificate, which may be the objective of a display.
         """
         return float(self.equations.objective(self.weights).sum())
 
@@ -120,7 +120,8 @@ class Solution(Shown):
     def to_dataframe(self) -> Any:
         """Return the table of `Lighting.to_dataframe`, with the former emission of each light.
 
-        The solution of an `Analysis` has errors; that of `solve` has none, and NaN in their place.
+        The solution of an `Analysis` has errors; the solution of `solve` has none, and NaN in their
+        place.
 
         was_red, was_green, was_blue: its emission in the scene. stops: the change of its
         luminance, -inf for a light that is off now. Raises LightpaintError without pandas.
@@ -138,8 +139,8 @@ class Solution(Shown):
 
         M: (channel, light, other), ⟨Φ_i, Φ_j⟩. b: (channel, light), ⟨Φ_i, Ψ⟩. weights, current:
         (light, channel). Of one view also target, predicted: (y, x, channel), and importance:
-        (y, x); of several, `views` has those of each. Where the loss is not squares of light, M, b
-        and target are of the squares that stand for it at the answer. Raises LightpaintError
+        (y, x); of several, `views` has the arrays of each. Where the loss is not squares of light,
+        M, b and target are of the squares that stand for it at the answer. Raises LightpaintError
         without xarray.
         """
         lit, basis = ("light", "channel"), self.basis

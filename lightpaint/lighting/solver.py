@@ -103,8 +103,8 @@ def solve(
         basis: Of one view; or of several, for one lighting closest to all: pixels of all views
             count the same, and `views` of the solution has the answer to each.
         target: Of one view; or of several, in the same order.
-        constraints: Constraints on the lights; they override those of the scene's lights file,
-            which a rendered basis includes.
+        constraints: Constraints on the lights; they override the constraints of the scene's lights
+            file, which a rendered basis includes.
         start: Lighting to begin with (the current one by default). A good guess saves sweeps; the
             answer is the same, except for lights that reach no painted pixel, which keep the start.
         resize: Whether to resample a target of the same shape as the basis, but of another size.
@@ -248,7 +248,8 @@ def _blocks_of(problem: Problem) -> BinnedPixels | None:
 
 
 def solve_again(solution: Solution, problem: Problem) -> Solution:
-    """Solve `problem`, which differs from that of `solution` only in its constraints or equations.
+    """Solve `problem`, which differs from the problem of `solution` only in its constraints or
+    equations.
 
     After reweighting this is one more step of the last linear problem. Lights may reach less in it
     than in the loss, and it knows only the lights that were chosen.
@@ -265,7 +266,7 @@ def solve_again(solution: Solution, problem: Problem) -> Solution:
 
 
 def solve_tethered(solution: Solution, problem: Problem) -> Solution:
-    """Solve `problem`, which differs from that of `solution` only in its tether."""
+    """Solve `problem`, which differs from the problem of `solution` only in its tether."""
     if not problem.is_linear:
         return solve_again(solution, problem)
     return replace(
@@ -452,7 +453,8 @@ def _problem_of_blocks(problem: Problem, descent: Descent, blocks: BinnedPixels)
     """Return the problem of all pixels, with squares that stand for its loss at the answer of
     blocks.
 
-    Its corrected equations are those of the blocks with their prior: without most of the noise.
+    Its corrected equations are the equations of the blocks with their prior: without most of the
+    noise.
     """
     weights, lit = descent.reweighting.at, LitPixels.whole(problem.basis, problem.loss)
     return replace(

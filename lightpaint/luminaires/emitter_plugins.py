@@ -1,9 +1,9 @@
 """Emitters of Mitsuba with a photometric web: `ies`, a point, and `iesarea`, a flat shape.
 
 Both have the parameters of `web_of`, and an `intensity`, a colour by which the candela of the file
-are multiplied: (1, 1, 1), the default, is the luminaire at full. Their frame is that of a `spot`,
-which shines along z. Seen from the lamp along z, with y upwards, as in a picture of a camera there,
-C0 is to the right and C90 up.
+are multiplied: (1, 1, 1), the default, is the luminaire at full. Their frame is the frame of a
+`spot`, which shines along z. Seen from the lamp along z, with y upwards, as in a picture of a
+camera there, C0 is to the right and C90 up.
 
 Import this module after setting a Dr.Jit variant, since its base class does not exist before.
 """
@@ -46,8 +46,8 @@ class WebTable:
     """A web on the device, in directions of another frame.
 
     web: the web, whose candela are multiplied by `scale`. axes: (3, 3), the matrix from its frame
-    into that of the directions. What differs between luminaires is data, so that equal ones share a
-    kernel.
+    into the frame of the directions. What differs between luminaires is data, so that equal ones
+    share a kernel.
     """
 
     def __init__(self, web: PhotometricWeb, scale: float, axes: Doubles) -> None:

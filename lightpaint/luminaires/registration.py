@@ -13,7 +13,8 @@ _registered: set[str] = set()
 
 
 def can_have_luminaires(variant: str) -> bool:
-    """Return whether a variant of Mitsuba runs these emitters at full speed: those of Dr.Jit do."""
+    """Return whether a variant of Mitsuba runs these emitters at full speed: the variants of Dr.Jit
+    do."""
     return variant.endswith(("_rgb", "_spectral")) and not variant.startswith("scalar")
 
 
@@ -38,7 +39,7 @@ def register_luminaires() -> None:
     if module is None:
         importlib.import_module(_MODULE)
     else:
-        importlib.reload(module)  # its base class is that of the variant
+        importlib.reload(module)  # its base class is the class of the variant
     _registered.add(variant)
 
 

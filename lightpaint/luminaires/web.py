@@ -1,6 +1,6 @@
 """The photometric web of a luminaire: its luminous intensity in every direction.
 
-Angles are those of CIE's type C. Gamma is the angle from the nadir: 0 is straight down, 180
+Angles are as in CIE's type C. Gamma is the angle from the nadir: 0 is straight down, 180
 straight up. A C-plane is a half-plane that ends at the vertical axis. In the frame of a web the
 nadir is −z, C0 is +x and C90 is +y, as in the output of Radiance's ies2rad.
 
@@ -30,8 +30,8 @@ GRID_UNIT = 1e-3
 #: Intervals of an even grid at most: of gammas, and of C-planes.
 MAX_STEPS, MAX_PLANES = 1800, 720
 
-#: From the frame of a web (nadir −z, C0 +x, C90 +y) into that of an emitter that shines along z:
-#: seen along z with y upwards, +x is to the left, so that C0 is to the right and C90 up.
+#: From the frame of a web (nadir −z, C0 +x, C90 +y) into the frame of an emitter that shines along
+#: z: seen along z with y upwards, +x is to the left, so that C0 is to the right and C90 up.
 EMITTER_FROM_WEB = np.diag([-1.0, 1.0, -1.0])
 
 #: Error of a sum at most, relative to the web's largest intensity.
@@ -80,10 +80,10 @@ class PhotometricWeb:
     planes: (c,) rising degrees, [0] for a web that is the same in all of them, else from 0 to 360.
     table: (c, g) candela, after all factors of the file.
     stated_lumens: the flux that the file states: of the luminaire if it is absolute or tells the
-    efficiency, else of the lamps in it; None if unknown. of_lamps: whether it is that of the lamps.
-    watts: input power; None if unknown. tilt_factors: (2, k), angles by which the luminaire is
-    tilted, in degrees from hanging as it was measured, and factors of its light; None without.
-    unread: number of texts in the file after what it describes.
+    efficiency, else of the lamps in it; None if unknown. of_lamps: whether it is the efficiency of
+    the lamps. watts: input power; None if unknown. tilt_factors: (2, k), angles by which the
+    luminaire is tilted, in degrees from hanging as it was measured, and factors of its light; None
+    without. unread: number of texts in the file after what it describes.
     """
 
     name: str
@@ -314,7 +314,7 @@ def spots_of(web: PhotometricWeb) -> tuple[SpotPart, ...]:
 def _corners(x: Doubles, y: Doubles, slack: float) -> Indices:
     """Return the points of a polyline that suffice for an error of y of at most `slack`.
 
-    Those of Douglas and Peucker (1973), whose first and last points are kept.
+    The method of Douglas and Peucker (1973), whose first and last points are kept.
     """
     kept, open_ranges = {0, len(x) - 1}, [(0, len(x) - 1)]
     while open_ranges:

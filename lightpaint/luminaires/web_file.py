@@ -1,6 +1,6 @@
 """Reads the photometric web of a luminaire from a file of its maker: LM-63 or EULUMDAT.
 
-Files of ANSI/IES LM-63 (`.ies`) may be of 1986 to 2019, with photometry of type C; those of
+Files of ANSI/IES LM-63 (`.ies`) may be of 1986 to 2019, with photometry of type C; files of
 EULUMDAT end in `.ldt`.
 """
 
@@ -21,7 +21,7 @@ from lightpaint.validation import BRIGHTEST, parse_number
 
 #: Angles of a file at most, of gamma or of C-planes.
 MAX_ANGLES = 2000
-#: Numbers that are read at once at most: ten times those of the finest files.
+#: Numbers that are read at once at most: ten times the numbers of the finest files.
 MAX_VALUES = 2**20
 
 #: Names of photometric types.
@@ -70,7 +70,7 @@ class Numbers:
         return len(self._texts) - self._next
 
     def one(self, what: str) -> float:
-        """Return the next number, which is `what`."""
+        """Return the next number. what: its name in errors."""
         return float(self.several(1, what)[0])
 
     def whole(self, what: str, most: int) -> int:
@@ -92,7 +92,7 @@ class Numbers:
 
 
 def number(text: str, what: str) -> float:
-    """Return the number that a text is, which is `what`."""
+    """Return the number that a text is. what: its name in errors."""
     try:
         value = parse_number(text)
     except ValueError:

@@ -97,7 +97,7 @@ class SessionAccess:
     ) -> tuple[SessionSnapshot, Lighting]:
         """Return a snapshot and the last answer. Raises PaintError before there is a basis.
 
-        requests: replace those of the session, if given.
+        requests: replace the requests of the session, if given.
         """
         with self.lock:
             snapshot = self.session.snapshot(requests)

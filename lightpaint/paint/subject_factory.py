@@ -84,7 +84,7 @@ def make_subject(
 
     folder: by default one that is named after the source. check_lamps: is called with the names of
     emitters by light, as soon as they are known, and raises if these cannot be painted with. The
-    others are those of `Subject`. Raises LightpaintError if the source cannot be painted, or its
+    others are as in `Subject`. Raises LightpaintError if the source cannot be painted, or its
     lights cannot meet the constraints.
     """
     settings = settings or Settings()
@@ -199,7 +199,7 @@ def _check_constraints(
 
 
 def _check_named_lamps(source: SceneFile, check_lamps: CheckLamps) -> None:
-    """Check the lamps that the lights file of a scene names, before the scene is loaded; those of
+    """Check the lamps that the lights file of a scene names, before the scene is loaded; lamps of
     patterns are known only then.
     """
     file = lights_file_for(

@@ -55,7 +55,7 @@ class GlareObserver:
 class GlareReading:
     """The glare that an observer sees.
 
-    rating: the UGR; None if it cannot be told, for the `reason`. error: its standard error.
+    rating: the UGR; None if it is unknown, for the `reason`. error: its standard error.
     interval: half of its 95 % interval. background: L_b in cd/m². strongest: the source that
     counts most, "" without one; solid_angle: what it fills, in sr; share: its part of the sum.
     """

@@ -5,7 +5,8 @@ A radiance of 1 in all channels stands for u cd/m², so an irradiance (R, G, B) 
     E = u (0.2126 R + 0.7152 G + 0.0722 B) lx
 
 Values are estimates with noise. Two halves of the samples give the half difference of each point,
-which alone has one degree of freedom, so a point's error also counts those of its plane.
+which alone has one degree of freedom, so a point's error also counts the half differences of its
+plane.
 """
 
 import math
@@ -41,7 +42,8 @@ class PlaneReading:
 
     uniformity: the least point over the mean. least_bias: bound on how far the least point is
     expected to lie below the darkest point's true illuminance, since noise makes the minimum of
-    several points too low; that of the uniformity is `least_bias` / `mean`. points: their number.
+    several points too low; the bias of the uniformity is `least_bias` / `mean`. points: their
+    number.
     """
 
     mean: float
@@ -134,9 +136,9 @@ class Illuminance:
         """Return the standard errors of `of(weights)`, (p,) in lx.
 
         The error of a point is estimated from its own half difference and, with four times the
-        weight, from those of its plane: their root mean square or, if that is more, the root mean
-        square of their ratios to the light, times the light of the point. So points in a shadow,
-        which get the noise of indirect light alone, are not taken to be too certain.
+        weight, from the half differences of its plane: their root mean square or, if that is more,
+        the root mean square of their ratios to the light, times the light of the point. So points
+        in a shadow, which get the noise of indirect light alone, are not taken to be too certain.
         """
         values, halves = self.of(weights), self._mix(self.noise, weights)
         errors = np.zeros(len(values))

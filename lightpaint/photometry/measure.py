@@ -61,8 +61,8 @@ def measure_illuminance(
             the mean, or a plane with less than a thousandth of the light of the brightest, counts
             as one with that much.
         cd_per_unit: cd/m² of a radiance of 1 in the scene.
-        weights: Weights of the lights, (n, 3), with which errors are judged; by default those of
-            the scene as it is now.
+        weights: Weights of the lights, (n, 3), with which errors are judged; by default the weights
+            of the scene as it is now.
         seed: Any number >= 0; different seeds give independent measurements.
         use_cache: Whether measurements are cached as bases are.
         exact_spp: Whether a cached measurement with more samples than are needed is left alone, so

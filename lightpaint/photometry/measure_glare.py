@@ -1,4 +1,4 @@
-"""Measures what glare needs: the light that observers see directly, and that of all else.
+"""Measures what glare needs: the light that observers see directly, and the light of all else.
 
 Directions, sizes and luminances of the sources are found by rays from the eye to an even grid of
 places on each, without noise. What else reaches the eye is measured as illuminance on planes is,
@@ -54,8 +54,8 @@ def measure_glare(
         error: Largest half width of the 95 % interval of each background luminance, relative, with
             the lights of `weights`.
         cd_per_unit: cd/m² of a radiance of 1 in the scene.
-        weights: Weights of the lights, (n, 3), with which errors are judged; by default those of
-            the scene as it is now.
+        weights: Weights of the lights, (n, 3), with which errors are judged; by default the weights
+            of the scene as it is now.
         seed: Any number >= 0.
         use_cache: Whether measurements are cached as bases are.
         exact_spp: Whether a cached measurement with more samples than are needed is left alone, so
@@ -120,9 +120,9 @@ def _eye(observer: GlareObserver) -> MeasuringPlane:
 class _SeenLight:
     """Light of e loaded emitters as o observers see it, of each at an emission of 1.
 
-    emitters: those of the scene that each is; several for one that is split. radiance: (o, e, 3),
-    the mean over what is seen. irradiance: (o, e, 3), at the eye. solid_angle, spread, is_sizeless:
-    as in `GlareSources`.
+    emitters: emitters of the scene that each is; several for one that is split. radiance: (o, e,
+    3), the mean over what is seen. irradiance: (o, e, 3), at the eye. solid_angle, spread,
+    is_sizeless: as in `GlareSources`.
     """
 
     emitters: tuple[tuple[Emitter, ...], ...]
@@ -267,7 +267,8 @@ def _seen(
         [position_index(d, x.ahead, x.up) for d, x in zip(rays.directions, observers, strict=True)]
     )
     is_seen, has_area = np.asarray(light.any(axis=-1)), rays.density > 0
-    # The solid angle that each place stands for; a point with an opening has that of all of it.
+    # The solid angle that each place stands for; a point with an opening has the solid angle of all
+    # of it.
     angle = np.divide(1.0, rays.density, out=np.zeros_like(index), where=has_area & is_seen)
     angle += np.where(has_area | ~is_seen, 0.0, openings[..., None])
     solid_angle, mean = angle.mean(axis=2), light.mean(axis=2)

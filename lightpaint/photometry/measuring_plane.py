@@ -84,8 +84,8 @@ class Wishes:
 class PowerBudget:
     """A limit of electrical power: in watts, or in W/m² of the floor; None where not limited.
 
-    area: m² of the floor that power is divided by; None for that of the largest plane that faces
-    upwards.
+    area: m² of the floor that power is divided by; None for the area of the largest plane that
+    faces upwards.
     """
 
     watts: float | None = None
@@ -110,7 +110,7 @@ class MeasuringPlane:
     """Points on a plane or on surfaces, and the directions in which illuminance is measured there.
 
     Attributes:
-        name: Its name in the planes file, and that of its picture.
+        name: Its name in the planes file, and the name of its picture.
         points: (p, 3) in scene units, which are metres.
         normals: (p, 3), unit vectors.
         spacing: Distance of neighbours in metres; 0 for listed points.

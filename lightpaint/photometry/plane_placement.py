@@ -46,7 +46,7 @@ class PlaneRequest:
     where: the key in the file, for errors. shapes: ids of shapes whose upper sides are a floor.
     walls: ids of surfaces on which the points lie. corners: (3 or 4, 3). points: (p, 3). Exactly
     one of these four is given. normal: the direction in which illuminance is measured, if it is not
-    that of the plane. height, margin, grid: in metres.
+    the normal of the plane. height, margin, grid: in metres.
     """
 
     name: str

@@ -194,7 +194,7 @@ def _check_known(table: Any, known: Iterable[str], where: str, example: str) -> 
 def _request(name: str, table: Any, where: SourceKey, planes: Mapping[str, Any]) -> PlaneRequest:
     """Return a plane as its table describes it."""
     if not is_name(name):
-        raise SceneError(f"{where} cannot be the name of a file, as that of a plane's picture is")
+        raise SceneError(f"{where} cannot be the name of a file, as a plane's has to be")
     _check_known(table, PLANE_KEYS, where, 'shape = "floor"')
     places = [key for key in PLACES if key in table]
     if len(places) != 1:
@@ -285,7 +285,7 @@ def _number(
 def _wishes(
     name: str, table: Mapping[str, Any], where: SourceKey, planes: Mapping[str, Any]
 ) -> Wishes:
-    """Return the wishes of a plane; its own figures replace those of its preset."""
+    """Return the wishes of a plane; its own figures replace the figures of its preset."""
     preset = table.get("preset", "")
     if not isinstance(preset, str) or (preset and preset not in PRESETS):
         listing = with_similar_name(f"there are {', '.join(PRESETS)}", str(preset), [*PRESETS])

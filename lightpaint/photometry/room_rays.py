@@ -99,7 +99,7 @@ class RoomRays:
     ) -> tuple[Bools, Doubles, Doubles]:
         """Return which rays meet one of `shapes` face on, (k,), where, and its normals, (k, 3).
 
-        Rays pass all other surfaces, and those of `shapes` that are more than 60° from face on.
+        Rays pass all other surfaces, and parts of `shapes` that are more than 60° from face on.
         origins: (k, 3). direction: (3,), a unit vector.
         """
         places, normals = origins.astype(float), np.zeros(origins.shape)
@@ -120,7 +120,7 @@ class RoomRays:
         """Return the points, (k,), that see almost nothing but the back sides of surfaces.
 
         They look to the side of their normals, (k, 3). Surfaces that the camera, too, sees from
-        behind are those of a room modelled as a box.
+        behind are the surfaces of a room modelled as a box.
         """
         around = np.tile(_directions(DIRECTIONS), (len(points), 1))
         facing = np.repeat(normals, DIRECTIONS, axis=0)

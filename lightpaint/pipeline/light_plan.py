@@ -54,7 +54,7 @@ def plan_lighting(
     Args:
         scene: From `load_scene`. Its lights file gives each lamp's emitters, with their power.
         planes: Path of a planes file.
-        constraints: On lights; they override those of the lights file.
+        constraints: On lights; they override the constraints of the lights file.
         settings: Of these `error`, `seed`, `use_cache`, `cd_per_unit` and `watts` count.
         progress: Called with the progress of the work.
 

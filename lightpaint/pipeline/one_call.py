@@ -66,11 +66,12 @@ def paint_with_light(
         folder: Receives the results; with several views, each sensor has a folder of its own in it.
         basis: An existing basis, or another renderer's light groups; taken from the cache or
             rendered if not given. For several views a list, which is emptied to save memory.
-        constraints: Constraints on the lights; they override those of the scene's lights file.
-        rigging: Lights that may move, and lights to add; it overrides that of the scene's lights
+        constraints: Constraints on the lights; they override the constraints of the scene's lights
             file.
+        rigging: Lights that may move, and lights to add; it overrides the rigging of the scene's
+            lights file.
         mask: Picture of the importance of pixels, if `target` is a path. The next two are also
-            those of `read_target`.
+            as in `read_target`.
         layer: Layer of an EXR.
         find: Whether to look for a template beside the painting.
         sensor: Index or id, if `scene` is a path. The next four are also those of `load_scene`.

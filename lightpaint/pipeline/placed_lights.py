@@ -2,8 +2,8 @@
 suggests afterwards to turn a spot that misses the painting from where it hangs.
 
 A texel that is much brighter than its neighbours may stand for a smaller source, whose shadows are
-sharper. It gets finer texels in its place, whose pictures are rendered together with those of the
-texels around it, and everything is solved again; what gains nothing is left as it was.
+sharper. It gets finer texels in its place, whose pictures are rendered together with the pictures
+of the texels around it, and everything is solved again; what gains nothing is left as it was.
 """
 
 import math

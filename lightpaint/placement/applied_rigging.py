@@ -53,7 +53,7 @@ def rigged_lights(rigging: Rigging, scene: Scene) -> RiggedLights:
 def check_rigging(rigging: Rigging, scene: Scene) -> None:
     """Raise ConstraintError for names that no light or shape of `scene` has.
 
-    Those of pairs and surfaces count, too, whether or not a search would use them.
+    Names in pairs and surfaces count, too, whether or not a search would use them.
     """
     for name, table, where in rigging.lights:
         _matches(name, scene, where / next(iter(table)) if table else where)
@@ -199,7 +199,7 @@ def freedom_on(names: Sequence[str], scene: Scene, rigging: Rigging) -> Freedom:
 def _places_on(names: Any, scene: Scene, rigging: Rigging, where: SourceKey) -> dict[str, Any]:
     """Return rails and surfaces of these names as fields of a freedom.
 
-    A name is that of a table `[on.NAME]`, or else of shapes of the scene.
+    A name is the name of a table `[on.NAME]`, or else of shapes of the scene.
     """
     tables = {name: table for name, table, _ in rigging.on}
     rails, surfaces, clear = [], list[str](), list[float]()

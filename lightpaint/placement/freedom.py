@@ -207,7 +207,7 @@ def _angles(name: str, value: Any, least: float) -> tuple[float, float]:
 class FreeLight:
     """A light with its current site and its freedom.
 
-    places: where it may hang; those of `freedom` if that has no surfaces. sides: smallest and
+    places: where it may hang; the places of `freedom` if that has no surfaces. sides: smallest and
     largest side of a panel.
     """
 
@@ -252,7 +252,7 @@ class FreeLight:
     def stepped(self, site: Site, step: Doubles) -> Site:
         """Return the permitted pose nearest to `site` changed by `step`, (sum of dimensions,).
 
-        Units are those of the scene, AIM_UNIT, CONE_UNIT and BEAM_UNIT, or SIDE_UNIT.
+        Units are as in the scene, AIM_UNIT, CONE_UNIT and BEAM_UNIT, or SIDE_UNIT.
         """
         place, turn, cone = np.split(step, np.cumsum(self.dimensions(site))[:2])
         if len(place) and site.position is not None:

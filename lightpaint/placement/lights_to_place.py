@@ -349,7 +349,7 @@ def _first_direction(model: Emitter | None) -> Position:
 
 
 def _panel_sides(group: NewLights, model: Emitter | None, spread: float) -> tuple[float, float]:
-    """Return the smallest and largest side of new panels. spread: that of visible points."""
+    """Return the smallest and largest side of new panels. spread: of visible points."""
     if group.size is not None:
         return group.size
     if model is not None and model.unit_flux is not None:

@@ -80,14 +80,14 @@ def films_of(views: Sequence[tuple[Scene, Basis]]) -> tuple[list[Scene], list[Sc
 
 
 def on_small_film(scene: Scene, basis: Basis, pixels: int) -> Scene:
-    """Return `scene` on a film whose pixels are blocks of those of `basis`, `pixels` or fewer.
+    """Return `scene` on a film whose pixels are blocks of pixels of `basis`, `pixels` or fewer.
 
     Raises SceneError if the basis is of another film.
     """
     (height, width), (mine_h, mine_w) = scene.size, basis.size
     if whole_factor(scene.size, basis.size) is None:
         raise SceneError(
-            f"the basis is {mine_w}x{mine_h}, whose pixels are not blocks of those of the film "
+            f"the basis is {mine_w}x{mine_h}, whose pixels are not blocks of pixels of the film "
             f"of {scene.path}, {width}x{height}: make it again"
         )
     return _reduced_film(scene.reduced(f"{mine_w}x{mine_h}"), pixels)
@@ -227,7 +227,8 @@ def pull_with_more(solution: Solution, count: int) -> NormalEquations | None:
 def reduced_goal(problem: Problem, factor: int) -> tuple[Floats, Floats, Floats]:
     """Return the goal of a view, its importance and its noise on a film of blocks of pixels.
 
-    Goals and noise are means weighted with importance; importance is that of whole blocks.
+    Goals and noise are means weighted with importance; importance is the importance of whole
+    blocks.
     """
     squares = problem.squares
     importance = squares.weight.astype(np.float64)

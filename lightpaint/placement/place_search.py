@@ -98,8 +98,8 @@ def place(
             panel is a rectangle or disk; the search has it as a square of its area.
         new: Lights that may be added.
         pairs: Lights that stay mirror images of each other.
-        constraints: Constraints on the new lights, by their generated names; those of the solution
-            hold for the others.
+        constraints: Constraints on the new lights, by their generated names; constraints of the
+            solution hold for the others.
         seed: Of the paths and the trial places.
         progress: Receives progress.
         watch: Receives the trial poses, by the names of their lights.

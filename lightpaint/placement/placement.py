@@ -115,7 +115,7 @@ class Move:
         """The gain of a mirror image in words; "" for other lights."""
         if not self.mirrors:
             return ""
-        return f"the mirror image of {self.mirrors}, whose gain is that of both"
+        return f"the mirror image of {self.mirrors}, whose gain is for both"
 
     def __str__(self) -> str:
         done = []

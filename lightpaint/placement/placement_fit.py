@@ -103,8 +103,8 @@ class Ranking:
 class PlacementFit:
     """Goals on a small film, and the columns of all lights at their current places.
 
-    The loss is Σ D (r² − n²), where r is the residual and n its half difference: that of the goal,
-    as far as it is the current look, less the mix of those of the columns.
+    The loss is Σ D (r² − n²), where r is the residual and n its half difference: the loss of the
+    goal, as far as it is the current look, less the mix of the half differences of the columns.
 
     Looks that share places have separate weights, so they act as further channels: 3 for each look,
     which share the columns. So a search does not deal with looks. A look counts by its relative
@@ -143,7 +143,7 @@ class PlacementFit:
     def of_half(self, sign: int) -> "PlacementFit":
         """Return the fit to columns of one half of the basis's samples, 1 or -1.
 
-        Noise of a half has √2 times the deviation of that of both.
+        Noise of a half has √2 times the deviation of the noise of both.
         """
         fit, p = copy(self), self.pixels
         half = self.columns[:, p:, :3]
@@ -157,7 +157,7 @@ class PlacementFit:
         return fit
 
     def replaced(self, changed: Mapping[int, Floats]) -> Floats:
-        """Return the columns, with those of some lights replaced by (q, 3)."""
+        """Return the columns, with the columns of some lights replaced by (q, 3)."""
         return with_columns(self.columns, changed)
 
     def fitted(self, columns: Floats) -> Fitted:
@@ -306,9 +306,10 @@ def fit_of(
     """Return the fit of the last linear problem of each look on small films, one of each view.
 
     looks: solutions, and for each of their views its place among `bases`. new: lights whose
-    columns, behind those of the basis, are black as yet. constraints: on these alone, besides
-    those of the solutions that are for all lights. with_panels: whether panels move or are new,
-    whose columns also say what they hide. with_noise: whether columns have half differences.
+    columns, behind the lights of the basis, are black as yet. constraints: on these alone, besides
+    the constraints of the solutions that are for all lights. with_panels: whether panels move or
+    are new, whose columns also say what they hide. with_noise: whether columns have half
+    differences.
     """
     current = np.concatenate(
         [

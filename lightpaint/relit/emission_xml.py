@@ -104,7 +104,7 @@ class Changes:
         """Return changes of the child called `name`, which there must be.
 
         definition: its file, and the offset of its element there. If that is only referred to, and
-        others may share it, the changes are those of a copy in the place of the reference.
+        others may share it, the changes are changes of a copy in the place of the reference.
         """
         child = self._child_named(name)
         assert child is not None

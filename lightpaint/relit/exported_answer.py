@@ -312,7 +312,7 @@ class ExportFormat(ABC):
         needs_rig: Whether it needs the show whose fixtures the lights are.
         refers_to_maps: Whether its file refers to maps of image lights.
         keeps_lighting: Whether it gets the lighting as it is; in others, lights whose colours the
-            painting does not tell keep those of the scene.
+            painting does not tell keep the colours of the scene.
     """
 
     name: str

@@ -232,7 +232,7 @@ class TableFormat(ExportFormat):
         """Return the table of a lighting."""
 
     def of_scene(self, export: ExportContext) -> Writer:
-        """Return the writer of the table."""
+        """Return a function that makes the text of the table for the exported lighting."""
         return lambda: self.text_of(export.lighting)
 
     of_groups = of_scene

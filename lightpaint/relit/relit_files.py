@@ -71,7 +71,7 @@ def relit_files(
         is_root = edit.original == root
         target = path if is_root else path.parent / _place_of_include(edit.original, root)
         content, images = _edit(edit, target.parent, scene, path.stem)
-        # Mitsuba looks for images beside the scene, even for those of an included file.
+        # Mitsuba looks for images beside the scene, even for the images of an included file.
         contents |= {path.parent / name: image for name, image in images.items()}
         contents[target] = content
     originals = {file.resolve() for file in scene.originals}

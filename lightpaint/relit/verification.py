@@ -167,7 +167,8 @@ def largest_difference(
 ) -> float:
     """Return the largest of the differences in standard errors, to be compared with `limit`.
 
-    The extreme of many lights is larger than that of one, so their differences are scaled down.
+    The extreme of many lights is larger than the difference of one, so their differences are scaled
+    down.
     """
     lights = max(map(abs, z_lights.values()), default=0.0)
     lights *= limit / limit_of_tests(max(len(z_lights), 1), once=limit)
@@ -338,9 +339,9 @@ def light_tests(
 
     Let D_A and D_B be the differences between the two images' first and second halves, summed over
     blocks. Their noise is independent. The weights of a block, a_A = S_A⁻¹ L_A, are computed from
-    the first halves alone: C_A is the scatter of the pixels of D_A, S_A includes that of
+    the first halves alone: C_A is the scatter of the pixels of D_A, S_A includes the scatter of
     neighbouring blocks, and L_A is the picture of the light. They are applied to D_B, and
-    those of the second halves to D_A, which gives x = a_A·D_B and y = a_B·D_A:
+    the weights of the second halves to D_A, which gives x = a_A·D_B and y = a_B·D_A:
 
       t = Σ (x + y) / √(V + W),   V = Σ (a_A·C_B a_A + a_B·C_A a_B),   W = 2 Σ x y in [0, V]
 
@@ -496,11 +497,11 @@ def detection_power(
 ) -> dict[str, float]:
     """Return, for each light, the probability that a relative error in it is detected at `limit`.
 
-    It is that of the most sensitive test: the light's own, the sum of the picture, or the pattern
-    of blocks; so all three together have at least this power. For the sum, the most sensitive
-    channel counts, since all channels of a path share its noise. With an error d, a block's product
-    of halves has the mean d² and, besides the variance 4 S² of pure noise, 4 S d², where S is the
-    variance of the block's difference. The light's own noise is subtracted from d².
+    It is the probability of the most sensitive test: the light's own, the sum of the picture, or
+    the pattern of blocks; so all three together have at least this power. For the sum, the most
+    sensitive channel counts, since all channels of a path share its noise. With an error d, a
+    block's product of halves has the mean d² and, besides the variance 4 S² of pure noise, 4 S d²,
+    where S is the variance of the block's difference. The light's own noise is subtracted from d².
 
     predicted, verified: as in `compare`, of equal size. tests: tests of the same pair.
     """

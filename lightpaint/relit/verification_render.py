@@ -225,7 +225,7 @@ class VerificationBudget:
     """The size and the samples of a verification.
 
     scene: the relit scene on the film to render. spp: samples per pixel. share: its samples
-    relative to those of the basis. doublings: how often both may be doubled.
+    relative to the samples of the basis. doublings: how often both may be doubled.
     """
 
     scene: Scene

@@ -244,7 +244,7 @@ def _opening(text: bytes, element: Element) -> str:
 
 
 def _without(attributes_text: bytes, names: Collection[bytes]) -> bytes:
-    """Return the attributes of a tag, as they are written, without those of these names."""
+    """Return the attributes of a tag, as they are written, without attributes of these names."""
     return ATTRIBUTE.sub(lambda m: b"" if m[1] in names else m[0], attributes_text)
 
 

@@ -65,8 +65,8 @@ def page_reduction(basis: Basis, count: int, *, max_pixels: int = MAX_PIXELS) ->
 
 
 def cached_clean_planes(basis: Basis) -> DenoisedPlanes | None:
-    """Return denoised planes of a basis, made once: whole ones if they are kept, or those of a page
-    that shows all lights. None where it shows some, which are then denoised alone.
+    """Return denoised planes of a basis, made once: whole ones if they are kept, or the planes of a
+    page that shows all lights. None where it shows some, which are then denoised alone.
     """
     count = len(basis.lights)
     if count > ROWS_SHOWN + SPARE_ROWS:

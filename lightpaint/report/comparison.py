@@ -122,7 +122,7 @@ def _rms_difference(predicted: Floats, verified: Floats) -> float:
 def compose(tiles: list[Tile]) -> npt.NDArray[np.uint8]:
     """Draw tiles in a row on neutral grey, captions below. Returns (H, W, 3).
 
-    Pixels of the others are whole blocks of those of the largest tile.
+    Pixels of the others are whole blocks of the pixels of the largest tile.
     """
     height, width = max(tile.picture.shape[:2] for tile in tiles)
     zoom = max(1, min(-(-MIN_WIDTH // width), MAX_ENLARGED_HEIGHT // height))

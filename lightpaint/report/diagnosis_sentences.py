@@ -201,7 +201,7 @@ def spoken_cause(
 
     The gain is the mean ΔE without it or, if it is not known, the share of the error that the fit
     minimises. weaker: the words before the strength of a weaker hold. any_color: as in
-    `bound_sentences`. about: ` in Moonlight` if the share is that of one wish.
+    `bound_sentences`. about: ` in Moonlight` if the share is the share of one wish.
     """
     gain_text = spoken_gain(reason, about)
     if reason.is_joint:
@@ -429,8 +429,8 @@ def spoken_deliveries(deliveries: Sequence[Delivery], told: str = "") -> str:
     """Return how much of each wish came, one short sentence each; "" without wishes.
 
     told: sentences that stand before these; wishes whose shares they say are left out.
-    Wishes that ask for nothing visible are left out, and of many those of which most came. Parts of
-    a painting without layers are only told apart if one of them lacks something.
+    Wishes that ask for nothing visible are left out, and of many the wishes of which most came.
+    Parts of a painting without layers are only listed if one of them lacks something.
     """
     entries = [entry for entry in main_deliveries(deliveries) if entry.least is not None]
     if len(entries) == 1 and is_unnamed(entries[0]):

@@ -210,7 +210,7 @@ def spoken_preference(lights: Iterable[LightSetting]) -> str:
     )
 
 
-#: What is said of the highest Rf that was found.
+#: Sentences about the highest Rf that was found.
 OUT_OF_REACH = "is the most these emitters give at this colour"
 
 

@@ -48,7 +48,7 @@ def glare_sentences(readings: Mapping[str, GlareReading]) -> Iterator[str]:
             yield f"The UGR of {title} cannot be told: {reading.reason}."
         elif reading.rating >= LEAST_RATING and reading.is_of_unusual_size:
             yield (
-                f"The UGR of {title} is that of {reading.strongest}, which fills "
+                f"The UGR of {title} comes from {reading.strongest}, which fills "
                 f"{reading.solid_angle:.2g} sr: it is made for {LEAST_ANGLE:g} to "
                 f"{LARGEST_ANGLE:g} sr."
             )

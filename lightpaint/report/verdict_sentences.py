@@ -188,7 +188,7 @@ def spoken_whole(appearance: Appearance) -> str:
 def spoken_lack(appearance: Appearance, wish: Delivery) -> str:
     """Return sentences on a wish of which too little came: how much, why, and what may help.
 
-    Place, lights and reasons of the appearance are those of the wish.
+    The place, lights and reasons of the appearance are about the wish alone.
     """
     if appearance.causes:
         return f"{spoken_delivery(wish)}, since {_spoken_causes(appearance)}."
@@ -385,7 +385,7 @@ def spoken_delta_e(appearance: Appearance, *, known: bool) -> str:
 
 
 def spoken_agreement(verification: Verification) -> str:
-    """Return that a render agrees, as much as it could have told."""
+    """Return that a render agrees, as far as it could have shown otherwise."""
     if not verification.is_blind:
         return "Rendered again: equal within noise"
     spp = verification.spp

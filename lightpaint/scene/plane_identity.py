@@ -152,7 +152,7 @@ class SceneHasher:
 
 
 def combined_identity(unlit_content: str, *own: object) -> str:
-    """Return the identity of a plane from the hash of the unlit scene and those of the light."""
+    """Return the identity of a plane from the hash of the unlit scene and the hash of the light."""
     return _digest((unlit_content, *own))
 
 

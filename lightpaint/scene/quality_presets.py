@@ -35,7 +35,8 @@ PRESETS: dict[Quality, Preset] = {"preview": Preset(32, 2**15), "final": Preset(
 
 
 def on_film(scene: "Scene", quality: Quality | None, resolution: str | None) -> "Scene":
-    """Return `scene` on the film for its basis: at `resolution`, or else that of the preset.
+    """Return `scene` on the film for its basis: at `resolution`, or else the resolution of the
+    preset.
 
     Raises SceneError if the film cannot be reduced to that resolution.
     """

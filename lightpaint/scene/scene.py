@@ -230,12 +230,13 @@ class Scene(SceneFiles, Shown):
         return f"spectral{(observer.name, observer.sensitivities) if observer.is_camera else ''}"
 
     def _seen(self, content: str) -> str:
-        """Return a hash of the scene as that of the scene seen at its points, if it has any."""
+        """Return a hash of the scene as the hash of the scene seen at its points, if it has any."""
         return content if self.points is None else self.points.identify(content)
 
     @property
     def plane_of(self) -> Mapping[str, int]:
-        """Index of each emitter's light, by the emitter's name; of a lamp's, that of the first."""
+        """Index of each emitter's light, by the emitter's name; of a lamp's, the light of the
+        first."""
         lights = reversed([*enumerate(self.lights)])
         return {m.name: k for k, light in lights for m in light.members}
 
@@ -281,7 +282,7 @@ class Scene(SceneFiles, Shown):
 
     @property
     def size(self) -> tuple[int, int]:
-        """(height, width) of the picture in pixels: that of the film or its crop window."""
+        """(height, width) of the picture in pixels: the size of the film or its crop window."""
         width, height = self.film.pixels
         return height, width
 

@@ -92,11 +92,11 @@ def load_scene(
             or `path:max_depth=8`. It inherits max_depth, rr_depth and hide_emitters.
         split: Name or pattern → columns and rows, such as `(16, 8)`: a sky, an area light or a
             projector becomes an image of that many texels, each a light `NAME.xCOLUMN.yROW`; or a
-            text such as `16x8+x4.y3`, a sky of which a texel is split again. By default those of
-            the lights file, which this replaces.
+            text such as `16x8+x4.y3`, a sky of which a texel is split again. By default the splits
+            of the lights file, which this replaces.
         symmetric: Names or patterns of split lights whose images are equal to their mirror images,
             so that two texels, left and right, are one light, called like the left one. By default
-            those of the lights file, which this replaces.
+            the ones of the lights file, which this replaces.
         map_size: Columns and rows, such as `(1024, 512)`, at which `relight` writes the images of
             split lights; by default one pixel for each texel.
         lamps: Names or patterns of lights whose colour may lie outside Rec.709, besides those
@@ -170,7 +170,7 @@ def load_scene(
 def with_layout(scene: Scene, image: str, layout: TexelLayout) -> Scene:
     """Return a scene whose sky `image` has other texels, each a light that shows what it does now.
 
-    Its texels must have been lights of their own; those of a symmetric sky are one with their
+    Its texels must have been lights of their own; texels of a symmetric sky are one with their
     mirror images.
     """
     split = {**scene.split, image: layout}
@@ -206,8 +206,8 @@ def _with_colors_of_lamps(
 def _image_sizes(
     selection: LightsFile, split: Mapping[str, object] | None
 ) -> dict[str, GridSize | TexelLayout]:
-    """Return columns and rows, or layouts, of images by name of the light: `split`, or those of the
-    file.
+    """Return columns and rows, or layouts, of images by name of the light: `split`, or the sizes of
+    the file.
     """
     if split is None:
         return selection.requests.split
@@ -217,7 +217,8 @@ def _image_sizes(
 def _symmetric_images(
     selection: LightsFile, symmetric: Iterable[str] | None, sizes: Collection[str]
 ) -> list[str]:
-    """Return the names of symmetric images: `symmetric`, or those of the file that are split."""
+    """Return the names of symmetric images: `symmetric`, or the images of the file that are
+    split."""
     is_of_file = symmetric is None
     patterns = selection.requests.symmetric if symmetric is None else set(symmetric)
     names: set[str] = set()

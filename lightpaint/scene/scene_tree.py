@@ -186,7 +186,7 @@ class ParsedScene:
     ) -> Any:
         """Build an `mi.Scene` with emitter settings, by node.
 
-        films: replace those of their sensors; other sensors keep their films. bands: what they
+        films: replace the films of their sensors; other sensors keep their films. bands: what they
         record in place of RGB.
         """
         import mitsuba as mi
@@ -369,9 +369,9 @@ def _lift_merged(state: Any) -> None:
 def make_normals_reproducible(scene: Any) -> None:
     """Recompute normals on one thread, which always adds in the same order.
 
-    When Mitsuba loads a mesh without normals, several threads add up those of the faces around a
-    vertex in varying order, so renders would differ in their last bits between processes. Normals
-    from a file are kept, unless they equal the computed ones. scene: an `mi.Scene`.
+    When Mitsuba loads a mesh without normals, several threads add up the normals of the faces
+    around a vertex in varying order, so renders would differ in their last bits between processes.
+    Normals from a file are kept, unless they equal the computed ones. scene: an `mi.Scene`.
     """
     import mitsuba as mi
 

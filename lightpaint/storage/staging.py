@@ -68,8 +68,8 @@ def staged(folder: Path, gone: Iterable[Path] = ()) -> Iterator[Path]:
         gone: Files in it to delete when the new ones appear.
 
     Raises:
-        OutputError: For any error of the system. Its message, like those of all errors in the
-            block, names `folder` rather than the hidden folder.
+        OutputError: For any error of the system. Its message, like the messages of all errors in
+            the block, names `folder` rather than the hidden folder.
     """
     real = Path(os.path.realpath(folder))
     finish(folder)

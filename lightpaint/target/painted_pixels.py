@@ -3,9 +3,9 @@
 A file from a paint program was rounded to its format, and perhaps compressed; pixels that differ by
 more are paint. Faint paint counts less, so a soft brush leaves a soft importance.
 
-The rounding tolerance is that of 8 bits for all formats, because a file does not record the history
-of its pixels: GIMP writes half floats into a float EXR, and 16-bit PNGs from 8-bit layers, and
-profiles are converted back and forth. So a painting counts the same in every format.
+The rounding tolerance is the rounding of 8 bits for all formats, because a file does not record the
+history of its pixels: GIMP writes half floats into a float EXR, and 16-bit PNGs from 8-bit layers,
+and profiles are converted back and forth. So a painting counts the same in every format.
 """
 
 import io

@@ -56,7 +56,7 @@ MAX_ABOUT = 2**20
 class Template:
     """The look to paint over.
 
-    image: (h, w, 3) linear Rec.709, as rendered. transform: the transform of template.png. scene:
+    image: (h, w, 3) linear Rec.709, as rendered. transform: of template.png. scene:
     name of its file. content: its hash (see `Scene.content`). sensor: its id. albedo: (h, w, 3) in
     [0, 1], share of light that surfaces reflect diffusely; None if not rendered.
     clean: (h, w, 3), the denoised `image` as in template.png; None if that shows `image` itself.
@@ -77,7 +77,7 @@ class Template:
 
     @property
     def looks(self) -> list[Floats]:
-        """The pictures that a painting may have started from, linear; that of template.png
+        """The pictures that a painting may have started from, linear; the picture of template.png
         first.
         """
         return [self.image] if self.clean is None else [self.clean, self.image]

@@ -53,7 +53,7 @@ WITHIN = 0.7
 #: Light below which a ratio says little, relative to the mean of the look.
 DARK = 0.01
 
-#: Pixels, about, over which strokes are told apart; larger pictures are averaged. Coarser ones grow
+#: Pixels, about, over which strokes are separated; larger pictures are averaged. Coarser ones grow
 #: neighbouring pools of light together.
 MAX_PIXELS = 2**14
 
@@ -79,7 +79,7 @@ Encoding = Callable[[Floats], Floats]
 Wash = Callable[[Floats], Doubles]
 
 #: Values in which brushes mix, from linear light and back: editors of 8-bit pictures mix display
-#: values, those of EXR files mix light.
+#: values, editors of EXR files mix light.
 SPACES: tuple[tuple[Encoding, Encoding], ...] = (
     (encode_display, decode_display),
     (np.asarray, np.asarray),
@@ -91,7 +91,7 @@ COVERED, SAMPLES = 0.5, 2**14
 
 
 def find_wishes(target: Target, current_look: Floats) -> tuple[Wish, ...]:
-    """Return the wishes of a painting, the lowest first, with separate strokes told apart.
+    """Return the wishes of a painting, the lowest first, each stroke by itself.
 
     current_look: (h, w, 3) linear, the current look at the size of the target. The areas of all
     wishes together add up to at most 1 in each pixel.
@@ -106,7 +106,7 @@ def find_wishes(target: Target, current_look: Floats) -> tuple[Wish, ...]:
 def split_wishes(
     layers: Sequence[Wish], image: Floats, importance: Floats, current_look: Floats
 ) -> tuple[Wish, ...]:
-    """Return layers with their separate strokes told apart, the lowest first.
+    """Return layers with their separate strokes as wishes of their own, the lowest first.
 
     image, current_look: (h, w, 3) linear, painted and now; importance: (h, w).
     """
@@ -336,7 +336,7 @@ class _Brush:
         raise NotImplementedError
 
     def halves(self) -> Iterator[Doubles]:
-        """Yield the departures from strokes that fit one half of the changes, told apart by their
+        """Yield the departures from strokes that fit one half of the changes, separated by their
         directions.
         """
         lengths = np.sqrt(np.square(self.changes).sum(axis=0))

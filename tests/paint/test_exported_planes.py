@@ -100,5 +100,5 @@ def test_a_limit_of_power_alone_needs_no_planes(tmp_path: Path) -> None:
 
 def test_a_limit_of_power_needs_the_power_of_lamps(tmp_path: Path) -> None:
     path = write_room(tmp_path, lights=LIGHTS["bulb"])
-    with pytest.raises(ConstraintError, match="that of 'bulb' is unknown"):
+    with pytest.raises(ConstraintError, match="the power of 'bulb' is unknown"):
         make_subject(SceneFile(str(path)), tmp_path / "s", settings=Settings(watts=2.0)).prepare()

@@ -221,7 +221,7 @@ def test_a_pair_stays_a_mirror_image(tmp_path: Path) -> None:
     for tell in (str, spoken_change):
         assert "of what was missed" in tell(leader)
         assert "of what was missed" not in tell(image)
-        assert "the mirror image of left, whose gain is that of both" in tell(image)
+        assert "the mirror image of left, whose gain is for both" in tell(image)
 
 
 def test_mirrors() -> None:

@@ -255,7 +255,7 @@ def test_a_basis_of_a_smaller_film_and_names_that_are_taken(tmp_path: Path):
     other = basis.on_pixels(
         basis.images[:, :7], basis.half_differences[:, :7], basis.emitters_seen[:7]
     )
-    with pytest.raises(SceneError, match="not blocks of those of the film"):
+    with pytest.raises(SceneError, match="not blocks of pixels of the film"):
         suggest_lights(scene, other, solution, count=1)
 
 

@@ -2,7 +2,7 @@
 
     python docs/images/tutorials/sky.py
 
-Somebody paints a morning over a table at noon, and gets the sky for it. The brush is that of
+Somebody paints a morning over a table at noon, and gets the sky for it. The brush comes from
 targets/brush.py, on the template that lightpaint writes; the painting is written beside the
 tutorial. It prints what each command says. Two cores take about ten minutes, nearly all of it for
 the basis of 130 lights, which is kept where all bases are.

@@ -3,7 +3,7 @@
     python docs/images/tutorials/three_lights.py
 
 Somebody paints three pools of light in a gallery whose lamps do not reach there, and lets a search
-hang three spots. The brush is that of targets/brush.py, on the template that lightpaint writes; the
+hang three spots. The brush comes from targets/brush.py, on the template that lightpaint writes; the
 painting is written beside the tutorial. It prints what each command says. Two cores take about
 twelve minutes; the basis is kept where all bases are.
 """

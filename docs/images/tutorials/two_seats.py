@@ -2,7 +2,7 @@
 
     python docs/images/tutorials/two_seats.py
 
-Somebody paints dawn on a stage as it is seen from the balcony and from a box. The brush is that of
+Somebody paints dawn on a stage as it is seen from the balcony and from a box. The brush comes from
 targets/brush.py, on the templates that lightpaint writes; the paintings are written beside the
 tutorial. It prints what each command says. Two cores take about eight minutes, nearly all of it
 for the bases, which are kept where all bases are.

@@ -63,8 +63,8 @@ def obtain_basis(
     A plane serves every scene that has its identity (`Scene.light_identities`): if one lamp of a
     scene was moved, only that lamp is rendered. Its samples follow the same camera paths as in a
     render of all lights, but choose among fewer emitters. So the planes have the same means as
-    those of a complete render, but less noise, and such a lamp needs fewer samples: once it is as
-    clean, in relation to its light, as the others are on average, it counts as having as many.
+    the planes of a complete render, but less noise, and such a lamp needs fewer samples: once it is
+    as clean, in relation to its light, as the others are on average, it counts as having as many.
 
     time_s: seconds of rendering to add to the cached samples, instead of spp. If some lights have
     fewer samples than others, they get the time until they have caught up.
@@ -141,7 +141,7 @@ def _starting_planes(
     """Return the planes to which a render adds samples; None to start from scratch.
 
     cached: the basis of the scene in its current state. goal_spp: None for a time budget, whose
-    samples are added to any. The other arguments are those of `obtain_basis`.
+    samples are added to any. The other arguments are as in `obtain_basis`.
     """
     lacks_samples = goal_spp is None or cached is None or cached.origin.spp < goal_spp
     start = cached

@@ -105,7 +105,8 @@ def gather_planes(
 class BestPlanes:
     """The plane with the most samples that was found for each light; None where there is none.
 
-    identities: those of the planes, in the order of the lights. cached: a basis of all of them.
+    identities: hashes of the planes' contents, in the order of the lights. cached: a basis of all
+    of them.
     """
 
     def __init__(self, identities: Sequence[str], cached: Basis | None) -> None:
@@ -115,7 +116,7 @@ class BestPlanes:
         ]
 
     def take_from(self, other: Basis) -> None:
-        """Replace planes by those of `other` that have more samples."""
+        """Replace planes by the planes of `other` that have more samples."""
         self.planes = [
             _better_sampled(plane, other, identity)
             for plane, identity in zip(self.planes, self._identities, strict=True)

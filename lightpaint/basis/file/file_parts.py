@@ -59,8 +59,8 @@ CHECKSUMS_KEY = "lightpaint.checksums"
 
 @dataclass(frozen=True)
 class Checksums:
-    """The checksums of a basis. lights: by name, in the order of the lights. learned: that of the
-    guide table.
+    """The checksums of a basis. lights: by name, in the order of the lights. learned: the checksum
+    of the guide table.
     """
 
     lights: Mapping[str, str]
@@ -208,7 +208,7 @@ def planes_of_part(part: ExrPart, scales: Sequence[float]) -> list[EncodedPlane 
 
 
 def other_parts(basis: Basis) -> Iterator[ExrPart]:
-    """Yield all parts except those of the lights, beginning with the visible emitters."""
+    """Yield all parts except the parts of the lights, beginning with the visible emitters."""
     seen_channel = {"Y": basis.emitters_seen.astype(np.float16)}
     # OpenEXR requires unique part names, and a light may already have this one.
     yield ExrPart(free_name(VISIBLE_EMITTERS_PART, basis.names), seen_channel)

@@ -32,7 +32,7 @@ from lightpaint.basis.file.file_planes import RowPlanes
 HALF, FLOAT = np.dtype(np.float16), np.dtype(np.float32)
 
 #: Maximum ratio of rounding error to noise in a tile, root mean square, which adds 1/512 to the
-#: standard deviation; and the side of a tile in pixels: that of the blocks that are verified.
+#: standard deviation; and the side of a tile in pixels: as in the blocks that are verified.
 HIDDEN_SHARE, TILE = 1 / 16, 8
 
 #: Relative noise below which a pixel counts as clean when all neighbours within a radius do, which

@@ -45,7 +45,7 @@ class LitPlane:
     def of(cls, channels: Sequence[npt.NDArray[Any]], scale: float) -> "LitPlane":
         """Return the plane that has these stored channels, (h, w) each."""
         flat = [np.ascontiguousarray(channel).ravel() for channel in channels]
-        # Bits rather than numbers, of which halves are slow; all but that of the sign.
+        # Bits rather than numbers, of which halves are slow; all but the bit of the sign.
         bits = [channel.view(f"u{channel.itemsize}") for channel in flat]
         pixels = np.flatnonzero((bits[0] | bits[1] | bits[2]) << 1)
         numbers = np.stack([channel[pixels] for channel in flat])
@@ -78,7 +78,7 @@ class _LitStrip:
     """The lit pixels of all planes in some rows, plane by plane.
 
     lit: (m,) uint16 or uint32, their indices in the strip. numbers: (3, m). begins: (n + 1,), where
-    those of each plane begin. size: number of pixels of the strip.
+    the indices of each plane begin. size: number of pixels of the strip.
     """
 
     lit: npt.NDArray[Any]

@@ -37,7 +37,8 @@ MAX_MANIFEST_BYTES, MAX_OBJECT_NAME = 2**24, 1000
 #: Most mattes of a file: renderers write one of objects, one of materials and one of assets.
 MAX_MATTES = 64
 
-#: Most objects that are told apart, those that cover most pixels: painters get indices of 16 bits.
+#: Most objects that are distinguished, those that cover most pixels: painters get indices of 16
+#: bits.
 MAX_OBJECTS = 2**15 - 1
 
 #: Names of the four channels of a layer, in lower case.

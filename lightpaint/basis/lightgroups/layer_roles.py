@@ -47,7 +47,7 @@ class LayerChoice:
     the sum. whole: the same for a group whose name says that it contains all others, which the sum
     then confirms or not. versions: the same for groups whose name says that they show another layer
     differently, likewise. beauty: name of its layer; None if no layer has a known name for it.
-    has_pattern: whether the lights are those of a pattern, which may match the whole picture.
+    has_pattern: whether the lights are matched by a pattern, which may match the whole picture.
     """
 
     renderer: str

@@ -40,7 +40,7 @@ from lightpaint.sentences import Hint
 #: Name of the light that holds the missing part; underscores are added if a light has that name.
 REST_NAME = "rest"
 
-#: Share of the beauty in no group from which the user is told how to put lights into groups.
+#: Share of the beauty in no group from which a remark explains how to put lights into groups.
 MIN_MISSING_SHARE = 1e-3
 
 #: The unit of weights.
@@ -323,8 +323,8 @@ def missing_light(roles: Roles, holes: npt.NDArray[np.bool_]) -> MissingLight:
 
 
 def _setting(roles: Roles, of: Literal["group", "beauty", "ungrouped"]) -> str:
-    """Return where the renderer is told the group of a light, or to write the beauty, or which
-    light it writes into no group; "" if it is not known.
+    """Return the renderer's setting for the group of a light, its setting for writing the beauty,
+    or the light that it writes into no group; "" if it is not known.
     """
     convention = convention_of(roles.renderer)
     if convention is None:

@@ -7,8 +7,8 @@ from dataclasses import dataclass
 #: Placeholder for the name of the light in a pattern.
 NAME_FIELD = "{name}"
 
-#: Names of the whole picture in most renderers, compared without regard to case; `image` is that
-#: of Blender's File Output node.
+#: Names of the whole picture in most renderers, compared without regard to case; `image` is the
+#: name in Blender's File Output node.
 BEAUTY_NAMES = (
     *("", "rgba", "rgb", "beauty", "combined", "image", "main", "color", "rgb_color", "ci", "c"),
 )
@@ -25,7 +25,7 @@ OTHER_VERSION = re.compile(
     r"(?P<base>.*)[ _.](?P<version>denoised?|denoising|variance|mse|noisy|albedo|normal)", re.I
 )
 
-#: Where Blender is told the group of a light, and to write the whole picture.
+#: Blender's settings for the group of a light, and for writing the whole picture.
 CYCLES_GROUP = "Light Group in the properties of the object (under Shading) or of the world"
 CYCLES_UNGROUPED = "light that Fast GI Approximation of method Add adds (in the render properties)"
 CYCLES_BEAUTY = "Combined under Passes in the properties of the view layer"
@@ -46,8 +46,8 @@ class Convention:
     optional: layers, in lower case, that belong to the sum in some versions and settings.
     light: template for the name of a light.
     joint: what stands between a view layer and the rest of a name.
-    group_setting: where the renderer is told the group of a light.
-    beauty_setting: where it is told to write the whole picture beside the groups.
+    group_setting: the renderer's setting for the group of a light.
+    beauty_setting: its setting for writing the whole picture beside the groups.
     ungrouped: light that it writes into no group, and what leads to it.
     """
 

@@ -206,7 +206,7 @@ def _content(path: Path) -> RenderFile:
 
 
 def _is_exact(compression: str, image: Floats) -> bool:
-    """Return True if a compression that loses light of one kind of numbers keeps those of the
+    """Return True if a compression that loses light of one kind of numbers keeps the numbers of the
     image.
     """
     is_half = image.dtype == np.float16

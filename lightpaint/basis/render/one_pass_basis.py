@@ -32,7 +32,7 @@ def basis_of_sums(
     start: Basis | None,
     is_finished: bool = True,
 ) -> Basis:
-    """Return the one-pass basis of the rendered samples and those of `start`.
+    """Return the one-pass basis of the rendered samples and the samples of `start`.
 
     halves: undivided sums of the two halves of the samples, (n or 2n, h, w, 3), as returned by
     `LightPlanes.sums`; overwritten. seen: (h, w). half_spp: total samples per pixel of each half.

@@ -2,7 +2,7 @@
 
 A plane holds means of samples, so more samples in a pixel only reduce its noise. Both halves get
 equal numbers of samples in each pixel, so half their difference still estimates the noise of the
-mean. Extra samples are terms of a separate sequence, far from that of the uniform samples, so
+mean. Extra samples are terms of a separate sequence, far from the terms of the uniform samples, so
 either sequence can be continued independently of the other.
 """
 

@@ -17,13 +17,13 @@ from lightpaint.validation import whole
 #: machine does not save more often.
 KEEP_EVERY_S = 30.0
 
-#: Factor by which passes of a basis are shorter than those of a picture. A time budget is spent in
-#: whole passes, and Ctrl-C has to wait for the end of one.
+#: Factor by which passes of a basis are shorter than the passes of a picture. A time budget is
+#: spent in whole passes, and Ctrl-C has to wait for the end of one.
 PASS_DIVISOR = 4
 
-#: Samples of a pixel and half whose light is summed before it is added to that of earlier ones. A
-#: float32 sum of n samples rounds to n 2⁻²⁴ of their mean, and a path adds its light in many small
-#: parts: of 2¹⁷ samples, several percent of some lights would be lost.
+#: Samples of a pixel and half whose light is summed before it is added to the sum of earlier ones.
+#: A float32 sum of n samples rounds to n 2⁻²⁴ of their mean, and a path adds its light in many
+#: small parts: of 2¹⁷ samples, several percent of some lights would be lost.
 BLOCK_SPP = 2**10
 
 #: A render that may stop early takes at least this share of its samples and this many per pixel,

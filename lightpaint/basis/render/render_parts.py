@@ -2,8 +2,8 @@
 
 A part is some rows of the picture or, if each light is rendered separately, a pass of one light.
 The parts follow from scene and samples alone, and the samples of a pixel are added in a fixed
-order. So the basis equals that of `render_basis` bit by bit, whichever process renders which part,
-in any order, and however often one fails.
+order. So the basis equals the basis of `render_basis` bit by bit, whichever process renders which
+part, in any order, and however often one fails.
 """
 
 import gc

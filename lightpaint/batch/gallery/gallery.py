@@ -1,6 +1,6 @@
 """The gallery: index.html, a self-contained page of all looks, and contact.png, a contact sheet.
 
-It shows the looks of a batch, or those of one `solve` command without a manifest.
+It shows the looks of a batch, or the looks of one `solve` command without a manifest.
 
 A mixer uses small planes of its basis, which are kept beside the looks and shared by all of them,
 so that it works when the basis is gone.

@@ -36,7 +36,7 @@ from lightpaint.version import __version__
 #: compared as large as a window, else NARROW; and the quality of its JPEG.
 WIDE, WIDE_LOOKS, NARROW, QUALITY = 960, 64, 320, 82
 
-#: Columns of summary.csv before those of the lights.
+#: Columns of summary.csv before the columns of the lights.
 COLUMNS = (
     "look",
     "sensor",
@@ -107,7 +107,7 @@ class PlaneRow:
 class ObserverRow:
     """The glare that an observer sees in a look.
 
-    name: of the observer and the case. ugr: None if it cannot be told.
+    name: of the observer and the case. ugr: None if it is unknown.
     """
 
     name: str
@@ -301,7 +301,7 @@ def missed_planes(report: Mapping[str, Any]) -> tuple[str, ...]:
 
 
 def watts_of_answer(folder: Path) -> float | None:
-    """Return the power of all lamps of an answer in a folder; None if that of one is unknown.
+    """Return the power of all lamps of an answer in a folder; None if the power of one is unknown.
 
     Lights of unknown emitters, such as a sky, are no lamps.
     """

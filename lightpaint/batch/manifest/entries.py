@@ -1,4 +1,4 @@
-"""All looks of a manifest: those of its tables, expanded, and the frames of its sequences."""
+"""All looks of a manifest: the looks of its tables, expanded, and the frames of its sequences."""
 
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
@@ -51,10 +51,10 @@ class LookEntry:
 
     name: of its folder. label: its name in errors. scenes, basis: to light. paintings: one for
     each view; none if a lighting is given. variation: its word, if it varies another look, which
-    is `varied_look`. shares_places: whether its lights hang where those of other looks do. places:
-    file with the places of lights that may move; set once its scene is read. lighting: a file with
-    the lighting. combined_looks: names of the looks whose lightings it combines; share, space:
-    between two of them. want: steps.
+    is `varied_look`. shares_places: whether its lights hang where the lights of other looks do.
+    places: file with the places of lights that may move; set once its scene is read. lighting: a
+    file with the lighting. combined_looks: names of the looks whose lightings it combines; share,
+    space: between two of them. want: steps.
     """
 
     name: str

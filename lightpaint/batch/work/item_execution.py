@@ -287,7 +287,7 @@ def _answer_by_sums(job: Job, basis: Basis) -> None:
 def publish_solved_lights(
     job: Job, lights: Lights, sums: Sums, *, scene_identity: str, spp: int
 ) -> None:
-    """Solve, and write the lighting. The other parameters are those of `summed_problem`."""
+    """Solve, and write the lighting. The other parameters are as in `summed_problem`."""
     problem = summed_problem(
         lights,
         job.views[0].target.name,

@@ -139,7 +139,7 @@ def _write(file: Path, *, is_compressed: bool = False, **arrays: Any) -> None:
 class PassRenderer:
     """A renderer of passes of one relit scene, which stays loaded until `close`.
 
-    The sums of all ranges of passes equal those of one render to the last bit.
+    The sums of all ranges of passes equal the sums of one render to the last bit.
     """
 
     def __init__(self, scene: Scene, final: Final) -> None:
@@ -249,6 +249,6 @@ class WorkerCache:
         self._targets = {}
 
     def keep_only(self, keys: Collection[str]) -> None:
-        """Release all bases but those of these keys."""
+        """Release all bases but the bases of these keys."""
         self._bases = {key: basis for key, basis in self._bases.items() if key in keys}
         self._sources = {k: x for k, x in self._sources.items() if key_of_basis(x) in keys}

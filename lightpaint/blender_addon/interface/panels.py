@@ -16,7 +16,7 @@ MAX_REASONS = 8
 #: Words about a file without a name.
 UNSAVED_TEXT = "save this file to keep what you paint"
 
-#: Words about a preview that nothing else is said about.
+#: The label of a preview without a message of its own.
 PREVIEW_TEXT = "the lamps show a preview: apply or discard it"
 
 #: Height of a line of a sentence, in buttons.

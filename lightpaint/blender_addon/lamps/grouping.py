@@ -20,7 +20,7 @@ MAX_CHANNEL_BYTES = 63
 #: Bytes of a light group's name that are enough for anyone.
 MAX_GROUP_BYTES = 40
 
-#: Bytes below which no two names can be told apart.
+#: Bytes below which names cannot be distinguished.
 MIN_GROUP_BYTES = 8
 
 

@@ -59,7 +59,10 @@ def place_names(groups):
 
 
 def named_places(data, names):
-    """Return the places of each group again; None if one of them is no longer there."""
+    """Find the lamps, materials and worlds of each group in a file; None if one is missing.
+
+    names: of each, its group, the list of `data` that has it, its name and its slot.
+    """
     groups = {}
     for group, kind, owner_name, slot in names:
         owner = getattr(data, kind).get(owner_name)

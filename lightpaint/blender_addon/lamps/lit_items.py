@@ -317,7 +317,7 @@ def reaching_nodes(tree):
             continue
         reached.append(node)
         waiting += [link.from_node for socket in node.inputs for link in socket.links]
-    # Their order shall be that of the tree, whatever was connected first.
+    # Their order shall be the order of the tree, whatever was connected first.
     return [node for node in tree.nodes if node in reached]
 
 

@@ -172,7 +172,8 @@ def client_frame(code, data):
     else:
         length = struct.pack(">BQ", 0x80 | 127, len(data))
     mask = os.urandom(4)
-    # The exclusive or of two integers is a hundred times as fast as that of their bytes.
+    # The exclusive or of two integers is a hundred times as fast as the exclusive or of their
+    # bytes.
     repeated = (mask * (len(data) // 4 + 1))[: len(data)]
     masked = int.from_bytes(data, "big") ^ int.from_bytes(repeated, "big")
     return bytes([0x80 | code]) + length + mask + masked.to_bytes(len(data), "big")

@@ -14,7 +14,7 @@ PROTOCOL_VERSION = 3
 #: Largest side of an array in a message, as the painter has it.
 MAX_SIDE = 2**16
 
-#: Sentences while the lights change, and until the painter has said how close they come.
+#: Sentences while the lights change, and until the painter has sent how close they come.
 LIVE_TEXT, ANALYSING_TEXT = "the lamps follow the brush", "the lamps are set; analysing"
 
 #: Types of numbers in buffers: their letter for `struct`, and their size in bytes.
@@ -87,9 +87,9 @@ class SessionLook:
 class PainterState:
     """State of a session, as far as an observer knows it.
 
-    closing: why the painter has closed the connection, if it said so. factors: multipliers of the
-    current answer by name of light group; 1 is the light as rendered. drives: of the emitters of
-    light groups that have some, by both names, under the master dimmer.
+    closing: why the painter has closed the connection, if it gave a reason. factors: multipliers of
+    the current answer by name of light group; 1 is the light as rendered. drives: of the emitters
+    of light groups that have some, by both names, under the master dimmer.
     """
 
     lights: list = field(default_factory=list)

@@ -23,7 +23,7 @@ WRITER_FILE = Path(__file__).parent.parent / "PROGRAM"
 #: Lines of its errors that are kept.
 MAX_LINES = 200
 
-#: Variables by which Blender's own Python would disturb that of lightpaint.
+#: Variables by which Blender's own Python would disturb the Python of lightpaint.
 BLENDER_VARIABLES = ("PYTHONPATH", "PYTHONHOME", "PYTHONSTARTUP", "LD_PRELOAD")
 
 #: Blender's views that lightpaint has its own curve for, if OpenColorIO is not installed with it.

@@ -99,7 +99,8 @@ def copy_folder(source, target):
 
 
 def move_image_paths(source, target):
-    """Make images that were opened from a folder be those of its copy, with what is painted."""
+    """Make images that were opened from a folder be the images of its copy, with what is
+    painted."""
     for image in bpy.data.images:
         path = Path(bpy.path.abspath(image.filepath_raw))
         if image.library is None and path.is_relative_to(source):

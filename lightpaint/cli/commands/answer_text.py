@@ -206,7 +206,7 @@ def undetermined_remark(look: Look) -> str:
 
 
 def _spoken(names: Sequence[str]) -> str:
-    """Return names of lights, those of an image by their number."""
+    """Return names of lights, texels of an image by their number."""
     return some_names(joined_texels(names))
 
 
@@ -313,7 +313,7 @@ def _stops(current_luminance: float, answer_luminance: float) -> str:
 
 
 def _color(look: Look, light: LightSetting) -> str | None:
-    """Return the colour of a light's swatch; that of its factor if its own is unknown."""
+    """Return the colour of a light's swatch; the colour of its factor if its own is unknown."""
     if light.is_fixed or light.is_partly_reached:
         return None
     return look.lighting.photometry(light).hex or rgb_to_hex(np.array(light.emission))

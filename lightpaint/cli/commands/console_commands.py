@@ -171,7 +171,7 @@ def read_rig_file(rig: RigFile) -> ConsoleRig:
     """Return a rig. Raises RigError for anything else than an MVR with fixtures."""
     from lightpaint.dmx import read_rig
 
-    # The colours of lights are those of the scene and its lights file.
+    # The colours of lights are as in the scene and its lights file.
     return read_rig(rig.path, gdtf_folder=rig.gdtf, pixels=rig.pixels, usual_colors=True)
 
 
@@ -183,7 +183,7 @@ def read_answer(path: Path) -> tuple[Lighting, RigDrives]:
     drives = drives_of(lighting)
     if not drives:
         raise LightingError(
-            f"{path} has no drives: none of its lights has emitters, as those of a scene that was "
+            f"{path} has no drives: none of its lights has emitters, as in a scene that was "
             "made from a rig"
         )
     return lighting, drives
@@ -220,7 +220,8 @@ def send(
 
 
 def _universes_of(rig: ConsoleRig, sending: Sending) -> dict[int, int]:
-    """Return the universes of the network by those of the rig; without a target those of sACN."""
+    """Return the universes of the network by the universes of the rig; without a target the
+    universes of sACN."""
     protocol = PROTOCOLS["sacn"] if sending.target is None else sending.target.protocol
     return network_universes(rig, protocol, sending.universes)
 
@@ -350,7 +351,7 @@ def listen(
 class ConsoleMonitor:
     """The contents of a receiver, printed as they change.
 
-    universes: of the network, by those of the rig. Without a rig it shows channels.
+    universes: of the network, by the universes of the rig. Without a rig it shows channels.
     """
 
     def __init__(
@@ -407,8 +408,8 @@ class ConsoleMonitor:
         }
 
     def _light_texts(self) -> dict[str, str]:
-        """Return the drives of each light, with the address of its fixture; of a colour wheel that
-        of the slot which shines.
+        """Return the drives of each light, with the address of its fixture; of a colour wheel the
+        drive of the slot which shines.
         """
         assert self._rig is not None
         owners = self._rig.owners

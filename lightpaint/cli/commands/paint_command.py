@@ -181,7 +181,7 @@ def _announce(server: "Server", name: str, folder: Path, *, is_reachable: bool) 
 
 
 def _print_lines(text: str) -> None:
-    """Print a message of the server; that of a bug has many lines."""
+    """Print a message of the server; the message of a bug has many lines."""
     lines_of_text = text.rstrip().split("\n")
     for line in lines_of_text if len(lines_of_text) > 1 else [text]:
         terminal.say(line)
@@ -207,7 +207,8 @@ def command_for_paintings(
 ) -> str:
     """Return the command that gives the same answer to exported paintings as their session.
 
-    paintings: paths by sensor, "" for that of the only view. source, options: those of the painter.
+    paintings: paths by sensor, "" for the painting of the only view. source, options: the options
+    of the painter.
     """
     words = ["lightpaint solve", quote(source)]
     for sensor, path in paintings.items():

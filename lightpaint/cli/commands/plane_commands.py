@@ -142,7 +142,7 @@ def _lit_scene(
 
 
 def _weights(scene: Scene, emission: Mapping[str, RGB] | None) -> Doubles:
-    """Return the weights of the lights, (n, 3): those of a lighting, or the current ones."""
+    """Return the weights of the lights, (n, 3): the weights of a lighting, or the current ones."""
     lights = basis_lights(scene)
     if emission is None:
         return lights.current_weights

@@ -117,7 +117,7 @@ def export(
 
 
 def _light_groups(groups: GroupsFile | None, answer: Lighting) -> LightGroups | None:
-    """Return the light groups, of a shot those of its first frame."""
+    """Return the light groups, of a shot the groups of its first frame."""
     if groups is None:
         return None
     if not is_pattern(groups.path):

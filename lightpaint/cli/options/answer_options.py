@@ -38,7 +38,7 @@ def add_paintings(parser: argparse.ArgumentParser) -> None:
         "template; give one for all targets, or one for each, in order",
     )
     parser.add_argument("--layer", metavar="NAME", help="layer, part or view to read from an EXR")
-    default = "that of the template or the picture, else"
+    default = "the view of the template or the picture, else"
     add_view_transform(parser, f"{default} srgb", f"{default} 0")
     _add_template(parser)
     parser.add_argument(
@@ -242,7 +242,7 @@ def _repeated(group: argparse._ArgumentGroup, dests: Mapping[str, str]) -> AddOp
 
 
 def add_constraints(parser: argparse.ArgumentParser) -> None:
-    """Add the constraints on lights, which override those of the lights file."""
+    """Add the constraints on lights, which override the constraints of the lights file."""
     group = parser.add_argument_group(
         "constraints",
         "NAME is a light, a group or a pattern; all options may be repeated. LEVEL is a "
@@ -343,7 +343,7 @@ def _add_preferences(group: argparse._ArgumentGroup) -> None:
         type=arguments.number(may_be_zero=True),
         default=0.0,
         metavar="STRENGTH",
-        help="stay near the current lighting, or that of --start, with this strength relative to "
+        help="stay near the current lighting, or --start, with this strength relative to "
         "the paint, like 0.1 (default: %(default)s)",
     )
     group.add_argument(

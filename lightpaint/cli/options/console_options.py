@@ -34,8 +34,8 @@ class RigFile:
 class Sending:
     """A target, how to send to it, and until when.
 
-    target: None to send nothing. universes: of the network by those of the rig, for some.
-    priority: None for that of the link.
+    target: None to send nothing. universes: of the network by the universes of the rig, for some.
+    priority: None for the priority of the link.
     """
 
     target: ConsoleTarget | None
@@ -166,7 +166,7 @@ def add_send(parser: argparse.ArgumentParser) -> None:
         "--dump",
         type=Path,
         metavar="dmx.csv|dmx.json",
-        help="write the levels of all channels into a table, or with those of whole universes into "
+        help="write the levels of all channels into a table, or with whole universes into "
         "a JSON file",
     )
     parser.add_argument(
@@ -217,7 +217,7 @@ def add_listen(parser: argparse.ArgumentParser) -> None:
         "--port",
         type=arguments.at_least(1, maximum=65535),
         metavar="N",
-        help="port to listen at (default: that of the protocol)",
+        help="port to listen at (default: the protocol's)",
     )
     _add_interface(
         parser,

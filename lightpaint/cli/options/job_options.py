@@ -143,7 +143,7 @@ def _scenes_of_views(options: Namespace) -> tuple[SceneFile, ...]:
 
 
 def _folder_of_views(options: Namespace, paths: Sequence[str]) -> Path:
-    """Return the folder for the answer to the views at `paths`, below that of variations."""
+    """Return the folder for the answer to the views at `paths`, below the folder of variations."""
     folder = Path(options.output or Path(paths[0]).stem)
     if options.output and options.variations:
         folder /= Path(paths[0]).stem
@@ -234,7 +234,7 @@ def folders_of(output: Path | None, names: Sequence[str]) -> list[Path]:
             raise OutputError(f"{one_line(repr(name))} cannot be the name of a folder: {advice}")
     if repeated := sorted({name for name in names if names.count(name) > 1}):
         raise OutputError(
-            f"results would overwrite each other in {some_names(repeated)}: run those of one name "
+            f"results would overwrite each other in {some_names(repeated)}: run equal names "
             "separately, each with its own -o"
         )
     return [(output or Path()) / name for name in names]

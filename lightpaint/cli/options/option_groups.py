@@ -114,14 +114,14 @@ def add_split(parser: argparse.ArgumentParser) -> None:
         metavar="sky=16x8",
         help="split a light (envmap, constant, area or projector) into an image of 16 by 8 texels, "
         "each a light sky.xCOLUMN.yROW; window_*=4x4 splits all of them; sky=16x8+x4.y3 splits "
-        "a texel of a sky again; --split none for no images (default: those of the lights file)",
+        "a texel of a sky again; --split none for no images (default: as in the lights file)",
     )
     parser.add_argument(
         "--symmetric",
         action="append",
         metavar="sky",
         help="make the image of a split light equal to its mirror image, left and right (default: "
-        "those of the lights file)",
+        "as in the lights file)",
     )
 
 
@@ -188,7 +188,7 @@ def add_rig_reading(parser: argparse.ArgumentParser, *, has_zoom: bool) -> None:
     parser.add_argument(
         "--gdtf",
         metavar="FOLDER",
-        help="folder with GDTF files, which come before those of the show with the same names",
+        help="folder with GDTF files, which come before files of the show with the same names",
     )
     if has_zoom:
         parser.add_argument(
@@ -216,7 +216,7 @@ def add_server(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--layers",
         metavar="FILE",
-        help="replace the layers by those of this file: layers.exr of an export, or an .ora of any "
+        help="replace the layers by this file: layers.exr of an export, or an .ora of any "
         "program (a step that can be undone)",
     )
     parser.add_argument(
@@ -317,8 +317,8 @@ def _parser_of(option: Option, check: Check) -> Callable[[str], Any]:
     return str
 
 
-#: Options that no field of a record declares, by theme; those of further groups of a parser keep
-#: their group.
+#: Options that no field of a record declares, by theme; the options of further groups of a parser
+#: keep their group.
 OTHER_OPTIONS: dict[Theme, str] = {
     "Painting": "--target --mask --layer --template --no-template --paint --view --exposure "
     "--layers",

@@ -135,7 +135,7 @@ def _measure(parser: argparse.ArgumentParser) -> None:
     )
     add_lights(parser)
     add_split(parser)
-    add_fields(parser, Settings, "cd_per_unit", default="that of the lights file")
+    add_fields(parser, Settings, "cd_per_unit", default="as in the lights file")
     add_fields(parser, Settings, "spp", default="as many as --error needs")
     _add_measuring_error(parser)
     add_fields(parser, Settings, "seed", "use_cache")
@@ -295,7 +295,7 @@ def _export(parser: argparse.ArgumentParser) -> None:
     add_positions(parser, purpose="for cues: ")
     add_map_size(parser)
     add_view(parser)
-    add_output(parser, "DIR", "folder for the files (default: that of lighting.json)")
+    add_output(parser, "DIR", "folder for the files (default: the folder of lighting.json)")
     add_fields(parser, Settings, "force")
 
 
@@ -391,7 +391,7 @@ def _cache(parser: argparse.ArgumentParser) -> None:
         nargs="?",
         choices=("list", "drop", "clear"),
         default="list",
-        help="list the bases, drop those of NAME, or clear them all (default: %(default)s)",
+        help="list the bases, drop the bases of NAME, or clear them all (default: %(default)s)",
     )
     parser.add_argument(
         "names",

@@ -74,7 +74,7 @@ def scene_of(options: Namespace, *, is_to_solve: bool = True, **fields: Any) -> 
 
 
 def _split_of(options: Namespace) -> dict[str, str] | None:
-    """Return the sizes of images by name of the light; None for those of the lights file."""
+    """Return the sizes of images by name of the light; None for the sizes of the lights file."""
     if options.split is None:
         return None
     return {name: size for name, size in options.split if name}

@@ -35,13 +35,13 @@ from lightpaint.colour.spectra.spectrum import (
     xyz_of_powers,
 )
 
-#: Largest distance from Planck's locus of a light whose rendering is told.
+#: Largest distance from Planck's locus of a light whose rendering is reported.
 LARGEST_DUV = 0.02
 
 #: Most mixes that are computed together, so that their 99 samples stay in the processor's cache.
 TOGETHER = 256
 
-#: What Rf of a mix may lack of that of its own spectrum: TM-30 sees the colours of mixes that are
+#: What Rf of a mix may lack of the Rf of its own spectrum: TM-30 sees the colours of mixes that are
 #: equal on 5 nm a few kelvin apart.
 MARGIN = 0.05
 
@@ -245,7 +245,7 @@ def best_mix(corners: Doubles, rf: Fidelity) -> Doubles:
 
 def cheapest_mix(corners: Doubles, costs: Doubles, rf: Fidelity, least: float) -> Doubles:
     """Return the drives (e,) of the least cost that is found between corners (k, e), with an Rf of
-    at least `least`; if none reach it, those of the best Rf.
+    at least `least`; if none reach it, the mixes of the best Rf.
 
     costs: (e,), of each emitter at full.
     """

@@ -116,7 +116,7 @@ def _observer() -> Doubles:
 def gdtf_and_emitter(name: str) -> tuple[str, str] | None:
     """Return the file and the emitter that a name like `spot.gdtf:Red` means; None for others.
 
-    The emitter is "" where the name is that of a file alone.
+    The emitter is "" where the name is the name of a file alone.
     """
     match = _NAME.fullmatch(name.strip())
     return None if match is None else (match[1], (match[2] or "").strip())
@@ -162,7 +162,7 @@ def _points_of(emitter: Element, path: Path) -> Iterator[tuple[float, float]]:
 
 
 def file_of_spectrum(name: str) -> str | None:
-    """Return the file in which a spectrum of this name is; None for that of a light."""
+    """Return the file in which a spectrum of this name is; None for the spectrum of a light."""
     if found := gdtf_and_emitter(name):
         return found[0]
     return name if Path(name).suffix.lower() in (*TABLES, *TM27) else None

@@ -47,7 +47,7 @@ CLEAR = 0.9
 #: Least share of light of two slots together, and the CIEDE2000 below which colours are alike.
 DARKEST, ALIKE = 0.005, 2.0
 
-#: Combinations of slots up to which those of several wheels count.
+#: Combinations of slots up to which combinations of several wheels count.
 MAX_COMBINATIONS = 2**12
 
 #: PhysicalFrom and PhysicalTo of a set that does not say how far a wheel is from a slot.
@@ -118,7 +118,7 @@ class SlotCombination:
 def slot_combinations(
     wheels: Sequence[Sequence[SlotColour]], kelvin: float
 ) -> list[SlotCombination]:
-    """Return the combinations of slots of wheels, of which those of a single wheel come first.
+    """Return the combinations of slots of wheels, of which the slots of a single wheel come first.
 
     Transmissions multiply. Of the others, the brightest remain whose colour no brighter one has;
     of very many combinations, none. kelvin: of the lamp. The open slot of a wheel is its brightest.
@@ -224,7 +224,7 @@ def _seated(
     """Return the levels at which a slot stands in the beam; None if it does not.
 
     Of several sets with its number the one of its name counts, then the first. A set whose name is
-    that of two slots shows both, and so does one that says it is not at the middle of its slot.
+    the name of two slots shows both, and so does one that says it is not at the middle of its slot.
     """
     name, own = _plain(element), [x for x in sets if x.number == number]
     known = {_plain(x) for x in elements} | {x.name.casefold().strip() for x in sets}

@@ -254,7 +254,7 @@ def primaries_of(space: ColourSpace) -> list[EmitterColour]:
 
 
 def colour_space(name: str | None, main: Sequence[Element], more: Sequence[Element]) -> ColourSpace:
-    """Return the space in which a channel names colours, that of Rec.709 if the file has none.
+    """Return the space in which a channel names colours, the space of Rec.709 if the file has none.
 
     name: that the channel gives, of one of `more`. main: the space of the file, if it has one.
     """

@@ -23,8 +23,8 @@ _UNLIT = ("None", "Glow")
 class Placed:
     """A geometry in its place.
 
-    name: its own, with those of the references that lead to it. source: name by which channels
-    refer to it. matrix: from its axes to those of the fixture, (4, 4), column vectors in metres.
+    name: its own, with the names of the references that lead to it. source: name by which channels
+    refer to it. matrix: from its axes to the axes of the fixture, (4, 4), column vectors in metres.
     ancestry: places, in the list of all geometries, of those it hangs on, from the first to itself.
     beam: pygdtf's beam, if it is one that lights. given: attributes that the file gives of that.
     offsets: what references add to offsets of channels, by break. overwrite: the break, and what is

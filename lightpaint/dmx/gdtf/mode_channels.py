@@ -192,7 +192,7 @@ def dmx_value(text: str, byte_count: int, *, is_shifted: bool = False) -> int:
 def curve_of(function: ChannelFunction, highest: int, profiles: Mapping[str, Element]) -> Curve:
     """Return how a channel's levels become shares of what a function does; empty if that is equal.
 
-    highest: level of the channel. profiles: those of the type, by name.
+    highest: level of the channel. profiles: of the type, by name.
     """
     shares = np.linspace(0.0, 1.0, CURVE_POINTS)
     values = _profile(profiles.get(function.element.get("DMXProfile", "")), shares)

@@ -1,7 +1,7 @@
 """The lights of a mode: which channels set them, how bright they are, in which colours.
 
-A channel acts on its geometry and on all that hangs on that. A beam's emitters are those of the
-nearest geometry above it which has channels for a colour; its dimmers are all above it.
+A channel acts on its geometry and on all that hangs on that. A beam's emitters are the emitters of
+the nearest geometry above it which has channels for a colour; its dimmers are all above it.
 """
 
 import re
@@ -383,7 +383,7 @@ class ModeReader:
         return round((curve[-1][0] if curve else 1.0) * self.dmx[place].highest)
 
     def _set_curve(self, place: int, pattern: re.Pattern[str]) -> ChannelFunction:
-        """Set the curve of a channel to that of its function, and return the function."""
+        """Set the curve of a channel to the curve of its function, and return the function."""
         channel = self.channels[place]
         function = next(
             channel.function(x.attribute)
@@ -587,7 +587,7 @@ class ModeReader:
         """Return candelas at full by beam and emitter, and where they come from.
 
         What was measured of emitters is taken if it is more than a candela, and its flux agrees
-        with that of the beams; else the flux of the beams, in the luminances of the emitters. A
+        with the flux of the beams; else the flux of the beams, in the luminances of the emitters. A
         measurement holds where the zoom rests: in a wider beam the same flux has fewer candelas.
         """
         by_beam = {beam.node: [x for x, _ in self._colours(beam)] for beam in self.beams}

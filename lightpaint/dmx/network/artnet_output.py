@@ -1,4 +1,4 @@
-"""Levels as Art-Net 4, by the library `pyartnet`, whose node sends when it is told to."""
+"""Levels as Art-Net 4, by the library `pyartnet`, whose node sends on request."""
 
 import asyncio
 import socket

@@ -34,7 +34,7 @@ KEEP_ALIVE_S = 0.8
 #: The source of sACN, as consoles show it.
 SOURCE_NAME = "lightpaint"
 
-#: Below that of consoles, 100: what they send wins.
+#: Below the priority of consoles, 100: what they send wins.
 PRIORITY = 90
 
 #: Highest priority of sACN.
@@ -96,7 +96,7 @@ class ConsoleLink:
 
     Nothing is sent before the first `show`. All methods may be called from any thread. What is
     shown last wins: a frame takes it whenever it is due. At the end a stream of sACN is terminated,
-    and receivers do what they are set to do then; nothing goes dark unless it is told to.
+    and receivers do what they are set to do then; nothing goes dark unless it receives that.
     """
 
     def __init__(
@@ -109,7 +109,7 @@ class ConsoleLink:
         priority: int,
         fps: float,
     ) -> None:
-        """Start the thread. universes: of the network, by those of the rig."""
+        """Start the thread. universes: of the network, by the universes of the rig."""
         self.target, self.universes = target, dict(universes)
         self._rig, self._output, self._priority = rig, output, priority
         self._frame_s, self._schedule = 1 / fps, SendSchedule()
@@ -136,10 +136,10 @@ class ConsoleLink:
     ) -> Self:
         """Return a link to a target, like `sacn://127.0.0.1`; nothing is sent yet.
 
-        universes: of the network by those of the rig, for those that differ. priority: of sACN, 0
-        to 200; Art-Net has none. fps: frames in a second. interface: IPv4 address of this machine
-        to send from, "" for any. Raises ConsoleError for a host, a universe or an interface that
-        does not exist, and without the library of the protocol.
+        universes: of the network by the universes of the rig, for those that differ. priority: of
+        sACN, 0 to 200; Art-Net has none. fps: frames in a second. interface: IPv4 address of this
+        machine to send from, "" for any. Raises ConsoleError for a host, a universe or an interface
+        that does not exist, and without the library of the protocol.
         """
         target = parse_target(target) if isinstance(target, str) else target
         numbers = network_universes(rig, target.protocol, universes)

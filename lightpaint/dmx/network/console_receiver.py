@@ -22,7 +22,7 @@ ARTDMX_START = b"Art-Net\x00\x00\x50"
 #: Bytes before the levels, and the smallest version.
 ARTDMX_HEADER, ARTNET_VERSION = 18, 14
 
-#: Priority where the protocol has none: that of sACN by default.
+#: Priority where the protocol has none: the priority of sACN by default.
 USUAL_PRIORITY = 100
 
 #: The address of this machine for its own programs alone.

@@ -118,7 +118,7 @@ def network_universes(
 
     The first one of a rig is the first one of the protocol, which is 0 for Art-Net.
 
-    given: universes of the network by those of the rig, for some. Raises ConsoleError for a
+    given: universes of the network by the universes of the rig, for some. Raises ConsoleError for a
     universe that the rig or the protocol does not have, and for two that would become one.
     """
     given = given or {}

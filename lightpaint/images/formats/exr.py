@@ -38,7 +38,7 @@ SAMPLE_STEP, MIN_SAMPLE_BYTES, MAX_PACKED_SHARE = 16, 2**16, 0.6
 
 #: Largest relative error of lossy compressions, as a share of the brightest value in the block of
 #: pixels that is compressed at once: measured on smooth, noisy and sparse images, of which 2e-4 of
-#: all light lies beyond. That of DWA is for its default level, to which it is proportional.
+#: all light lies beyond. The figure of DWA is for its default level, to which it is proportional.
 COMPRESSION_LOSS = {
     **{"PXR24": 2.0**-16, "B44": 0.04, "B44A": 0.04},
     **{"DWAA": 0.02, "DWAB": 0.02, "LJ2K": 0.02},

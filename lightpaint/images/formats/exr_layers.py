@@ -178,7 +178,8 @@ def _layer_name(part: ExrPart, prefix: str, *, several: bool) -> str:
 
 
 def _views(layer: ExrLayer) -> list[str]:
-    """Return the view names of the layer: that of its part, or the first of a multi-view part."""
+    """Return the view names of the layer: the view of its part, or the first of a multi-view
+    part."""
     if layer.prefix:
         return []
     return [v for v in (layer.part.attributes.get("view"), *layer.part.views[:1]) if v]
@@ -209,7 +210,7 @@ def _in_rec709(image: Floats, primaries: tuple[float, ...] | None) -> Floats:
 def primaries_of(part: ExrPart) -> tuple[float, ...] | None:
     """Return the primaries that a part declares, as numbers or by name; None for Rec.709.
 
-    Raises ImageError, without naming the file, if the name is not that of a known linear space.
+    Raises ImageError, without naming the file, if the name is not the name of a known linear space.
     """
     if part.primaries is not None:
         return None if is_rec709(part.primaries) else part.primaries

@@ -134,7 +134,7 @@ def write_png(
 def png_size(head: bytes) -> tuple[int, int]:
     """Return the (height, width) that the head of a PNG declares.
 
-    Raises ImageError, without naming the file, if `head` is not that of a PNG.
+    Raises ImageError, without naming the file, if `head` is not the head of a PNG.
     """
     if len(head) < PNG_HEAD or not head.startswith(b"\x89PNG\r\n\x1a\n"):
         raise ImageError("is damaged: it does not begin like a PNG")
@@ -146,7 +146,7 @@ def longest_png(head: bytes) -> int:
     """Return the largest plausible size in bytes of a PNG that starts with `head`.
 
     It is the size of its uncompressed pixels, plus space for profiles, texts and a thumbnail.
-    Raises ImageError, without naming the file, if `head` is not that of a PNG.
+    Raises ImageError, without naming the file, if `head` is not the head of a PNG.
     """
     height, width = png_size(head)
     bits, colour = struct.unpack_from(">BB", head, 24)

@@ -1,4 +1,6 @@
-"""The exact optimum by its active set: which bounds and caps hold it, and Newton on the rest."""
+"""The exact optimum by its active set: the bounds and caps (limits of sums) that hold it.
+
+Newton's method finds the rest."""
 
 from dataclasses import dataclass
 

@@ -7,8 +7,9 @@ and may cycle. The caller certifies the result, so a failure costs nothing but t
 It solves several problems together: for few lights numpy's calls cost more than the arithmetic in
 them, and three channels in one call cost hardly more than one.
 
-Under caps each step also guesses anew which caps hold: it holds a cap that is exceeded and releases
-one that would have to push outwards. The steps may violate caps on their way.
+Under caps (upper limits of sums) each step also guesses anew which caps hold: it holds a cap that
+is exceeded and releases one that would have to push outwards. The steps may violate caps on their
+way.
 
 Two lights at one place make M singular: light moved from one to the other changes no picture. A
 solver's steps in such a direction are round-off divided by round-off, which differs between

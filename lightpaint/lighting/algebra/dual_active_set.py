@@ -4,8 +4,8 @@ The method of Goldfarb and Idnani (Mathematical Programming 27, 1983). Its point
 some of the bounds and sums, whose multipliers have the right sign; the limit that such a point
 misses most is added, and others leave whose multipliers come to 0 on the way. Each such step raises
 the objective, so that steps end. Of thousands of sums few hold: those that a point misses join
-later (Kelley's cutting planes), and so do caps. An answer to a similar problem says with which
-limits to begin, so that few change; without one, an interior-point method guesses them.
+later (Kelley's cutting planes), and so do caps (quadratic.py). An answer to a similar problem says
+with which limits to begin, so that few change; without one, an interior-point method guesses them.
 
 Where many mixes are equal, M is singular. A pull to where x was makes the optimum single, and is
 repeated until it pulls no longer (the proximal-point method; Rockafellar, SIAM Journal on Control

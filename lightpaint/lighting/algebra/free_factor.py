@@ -15,8 +15,8 @@ from lightpaint.lighting.algebra.quadratic import Quadratic, kkt_residual
 from lightpaint.lighting.algebra.symmetric_matrices import large_libraries
 from lightpaint.progress import cancellation_check
 
-#: Unknowns that may differ from those of the factor, as a share of these: with more, a new factor
-#: is as quick.
+#: Unknowns that may differ from the unknowns of the factor, as a share of these: with more, a new
+#: factor is as quick.
 MAX_CHANGED_SHARE = 1 / 6
 
 #: Columns to keep beside a factor, as a share of its unknowns.
@@ -124,8 +124,8 @@ class FreeFactor:
     def _columns_beside(self, unknowns: Indices) -> tuple["_SolvedColumns", Indices]:
         """Return the solved columns of these unknowns among others, and their places there.
 
-        From step to step nearly the same unknowns differ from those of the factor, so that few
-        columns are new.
+        From step to step nearly the same unknowns differ from the unknowns of the factor, so that
+        few columns are new.
         """
         kept = self._beside
         new = [x for x in unknowns.tolist() if x not in kept.places]
@@ -162,7 +162,7 @@ class _SolvedColumns:
         return cls({}, np.zeros((rows, 0), order="F"), np.zeros((0, 0)))
 
     def joined(self, unknowns: list[int], solved: Doubles) -> "_SolvedColumns":
-        """Return these columns and those of further unknowns, (r, k)."""
+        """Return these columns and the columns of further unknowns, (r, k)."""
         across = self.solved.T @ solved
         products = np.block([[self.products, across], [across.T, solved.T @ solved]])
         places = {**self.places, **{x: len(self.places) + k for k, x in enumerate(unknowns)}}

@@ -1,4 +1,4 @@
-"""Projected Gauss–Seidel (Schoeneman et al. 1993, Eq 6), between bounds and under caps."""
+"""Projected Gauss–Seidel (Schoeneman et al. 1993, Eq 6), with bounds and caps (limits of sums)."""
 
 import numpy as np
 

@@ -1,4 +1,4 @@
-"""An interior-point method, for problems with many caps, like those of a wall of LEDs.
+"""An interior-point method for many caps (upper limits of sums), as a wall of LEDs has them.
 
 Where Newton's step on all limits cycles, an active set changes by one limit at a time, and with a
 hundred caps that takes as many steps. This method goes through the inside of all limits in some
@@ -18,8 +18,8 @@ from lightpaint.lighting.algebra.quadratic import Quadratic
 from lightpaint.lighting.algebra.symmetric_matrices import large_libraries
 from lightpaint.progress import cancellation_check
 
-#: Largest number of steps; complementarity that ends them, relative to that of the start; and the
-#: share of the way to the first limit that a step goes.
+#: Largest number of steps; complementarity that ends them, relative to the complementarity of the
+#: start; and the share of the way to the first limit that a step goes.
 MAX_STEPS, CLOSE, STEP_SHARE = 40, 1e-14, 0.995
 
 #: Multipliers, relative to the gradient, that say that nothing satisfies all limits.
@@ -48,7 +48,7 @@ def interior_point(q: Quadratic, start: Doubles, *, close: float = CLOSE) -> Nea
     unknown or a sum is fixed.
 
     Unknowns that change nothing are drawn to `start`, (n,). close: the complementarity that ends
-    steps, relative to that of the start.
+    steps, relative to the complementarity of the start.
     """
     limits = _Limits(q)
     if not len(limits.h) or (q.lower >= q.upper).any() or (q.cap_lower >= q.cap_upper).any():

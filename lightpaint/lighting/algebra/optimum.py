@@ -1,4 +1,4 @@
-"""The optimum of a convex quadratic between bounds and under caps, with its certificate."""
+"""The optimum of a convex quadratic between bounds and under caps (upper limits of sums)."""
 
 from collections.abc import Iterable
 from dataclasses import dataclass

@@ -2,12 +2,13 @@
 
     minimise ½ xᵀM x − bᵀx    with    lower ≤ x ≤ upper    and    R x ≥ r
 
-Unlike caps, the sums may share unknowns and have coefficients of either sign, and there may be
-thousands, few of which hold. The method of multipliers (Hestenes 1969, Powell 1969; for
-inequalities Rockafellar, SIAM Journal on Control 12, 1974) solves problems without requirements: a
-penalty draws x to the sums that it misses, and their multipliers, updated each time, replace it.
-At its end the multipliers prove the optimum as those of bounds do. It serves where an active set
-(dual_active_set.py), which is far quicker, does not end, and where nothing meets all sums.
+Unlike caps (quadratic.py), the sums may share unknowns and have coefficients of either sign, and
+there may be thousands, few of which hold. The method of multipliers (Hestenes 1969, Powell 1969;
+for inequalities Rockafellar, SIAM Journal on Control 12, 1974) solves problems without
+requirements: a penalty draws x to the sums that it misses, and their multipliers, updated each
+time, replace it. At its end the multipliers prove the optimum as the multipliers of bounds do. It
+serves where an active set (dual_active_set.py), which is far quicker, does not end, and where
+nothing meets all sums.
 """
 
 from collections.abc import Iterable, Sequence

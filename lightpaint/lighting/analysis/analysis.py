@@ -116,7 +116,7 @@ def indistinguishable(
 
 
 def _alike_groups(cosines: Doubles, lit: Bools, alike: float) -> list[list[int]]:
-    """Return the lights that reach something, in groups with images like that of the first."""
+    """Return the lights that reach something, in groups with images like the image of the first."""
     # In the channel where two images differ most; images of other channels differ altogether.
     least = np.where(lit[:, :, None], cosines, np.inf).min(axis=0)
     is_alike = least > 1 - alike

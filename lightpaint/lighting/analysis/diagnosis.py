@@ -232,7 +232,7 @@ def diagnose(solution: Solution) -> Diagnosis:
     noise, painting_noise = (
         min(power, out_of_reach) for power in (energies.noise, grain_power(solution, unreachable))
     )
-    # The visible noise is that of both.
+    # The visible noise is the noise of both.
     painting_noise = max(painting_noise - noise, 0.0)
     lacking = out_of_reach - noise - painting_noise
     compromise = min(_compromise(solution), total - out_of_reach)
@@ -266,7 +266,7 @@ def _relative_error(solution: Solution, total: float, norm2: float) -> float:
 
 
 def _compromise(solution: Solution) -> float:
-    """Return the excess of this view's energy over that of the best lighting for it alone.
+    """Return the excess of this view's energy over the energy with the best lighting for it alone.
 
     After reweighting, both are of the same squares: the loss itself has another scale.
     """

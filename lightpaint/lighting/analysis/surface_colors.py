@@ -1,7 +1,7 @@
 """Colours of objects under a lighting with spectra, and by daylight.
 
 Two lights that are white alike show a surface in different colours (metamerism). The light on an
-object is that of the lamps in their shares there, each with its spectrum.
+object is the light of the lamps in their shares there, each with its spectrum.
 """
 
 from collections.abc import Mapping

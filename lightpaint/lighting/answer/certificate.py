@@ -163,7 +163,7 @@ class Certificate:
     def with_objective(
         self, objective: Doubles, norm2: Doubles, *, error: RGB | None = None
     ) -> "Certificate":
-        """Return the certificate with this loss, (3,), and that of a black picture, (3,).
+        """Return the certificate with this loss, (3,), and the loss of a black picture, (3,).
 
         Raises LightingError for arrays of other shapes.
         """

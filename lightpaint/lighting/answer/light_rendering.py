@@ -20,7 +20,7 @@ class LightRendering:
 
     color: how it renders colours; None for a light that is off, or far from white. best_rf: the
     highest Rf that was found among mixes of the same colour, of the first lamps. lm_per_w: None if
-    lumens or watts are unknown. watts: its power; None if that of an emitter is unknown.
+    lumens or watts are unknown. watts: its power; None if the power of an emitter is unknown.
     wanted_rf: the least Rf that was asked for; 100 for the best. plain_rf, plain_watts: of the mix
     of the same colour that it would have without that; with spectra of the one that was solved for,
     if another was chosen since. held_mix_change: as in `LightSetting`.
@@ -37,7 +37,8 @@ class LightRendering:
 
 
 def renderings_of(lighting: Lighting) -> dict[str, LightRendering]:
-    """Return those of each lamp that is on and whose spectra are known, by its name."""
+    """Return the colour rendering of each lamp that is on and whose spectra are known, by its
+    name."""
     lamps = [x for x in lighting.of_lamps().lights if x.powers is not None and x.powers.any()]
     return {
         light.name: _rendering(lighting, light, is_searched=k < SEARCHED_LAMPS)
@@ -75,6 +76,6 @@ def _rendering(lighting: Lighting, light: LightSetting, *, is_searched: bool) ->
 
 
 def _watts(lamp: Lamp, drives: Doubles) -> float | None:
-    """Return the power of drives (e,); None if that of an emitter is unknown."""
+    """Return the power of drives (e,); None if the power of an emitter is unknown."""
     known = [x.watts for x in lamp.emitters if x.watts is not None]
     return float(drives @ np.array(known)) if len(known) == len(lamp.emitters) else None

@@ -135,7 +135,7 @@ class LightSetting:
     @property
     def physical_emission(self) -> RGB:
         """Emission in the sense of `unit`: Mitsuba's projector gives a plane at distance 1 π times
-        its parameter. That of a lamp's emitter has its colour.
+        its parameter. The value of a lamp's emitter has the emitter's colour.
         """
         emission = self.emission
         if self.part_of and self.lamp is not None:
@@ -151,7 +151,7 @@ class LightSetting:
 
         It has no constraint and no error bars. What the basis cannot tell of it stays: channels
         that reach nothing, too few samples. weight: by default the same numbers. A lamp whose
-        drives were the answer gets those of the nearest emission that it can mix.
+        drives were the answer gets the drives of the nearest emission that it can mix.
         """
         if self.mix is not None and self.lamp is not None:
             return self.with_mix(self.lamp.drives_for(np.array(emission)))
@@ -184,8 +184,8 @@ class LightSetting:
     def drives(self) -> Mapping[str, float]:
         """The drive of each of its emitters, 0 to 1, by name; empty without a lamp of emitters.
 
-        Those of its file, if somebody chose another mix there. Of an emission that they cannot mix,
-        those of the nearest that they can.
+        The drives of its file, if somebody chose another mix there. Of an emission that they cannot
+        mix, the drives of the nearest that they can.
         """
         if self.lamp is None:
             return {}
@@ -209,7 +209,7 @@ class LightSetting:
 
     @property
     def watts(self) -> float | None:
-        """Power of its emitters; None if that of one is unknown."""
+        """Power of its emitters; None if the power of one is unknown."""
         known = [] if self.lamp is None else [x.watts for x in self.lamp.emitters]
         if not known or None in known:
             return None
@@ -279,7 +279,8 @@ class Lighting(Shown, Mapping[str, LightSetting]):
             `relight` needs; none without a scene.
         up: The direction in the scene that is up, for pan and tilt.
         animation: The lights at painted frames of a shot over which they change, at least two, in
-            order; none for lights that stay the same. `lights` are then those of the first key.
+            order; none for lights that stay the same. `lights` are then the lights of the first
+            key.
         observer: What saw its picture, if that was rendered with spectra.
 
     Examples:
@@ -482,7 +483,7 @@ class Lighting(Shown, Mapping[str, LightSetting]):
         mixed_emissions: Mapping[int, RGB] | None = None,
         **fields: Any,
     ) -> "Lighting":
-        """Make a lighting of weights (n, 3) in the order of `lights`, which may be those of a
+        """Make a lighting of weights (n, 3) in the order of `lights`, which may be the lights of a
         basis.
 
         labels: for each light its `constraint` and whether this `is_active`. reached: (n, 3).
@@ -517,7 +518,7 @@ class Lighting(Shown, Mapping[str, LightSetting]):
         return cls.of_weights(basis, basis.current_weights)
 
     def weights_for(self, lights: Basis | Lights) -> Doubles:
-        """Return weights (n, 3) in the order of `lights`, which may be those of a basis.
+        """Return weights (n, 3) in the order of `lights`, which may be the lights of a basis.
 
         Raises LightingError if the two do not name the same lights.
         """

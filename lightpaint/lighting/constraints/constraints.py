@@ -82,7 +82,7 @@ class LightConstraint:
     ends of a range of white, the LEDs of a fixture; None if any colour will do.
     whites: the range of white that it keeps to, if there is one.
     emitters: the emitters that mix its light, of which each dims between bounds. power_share: their
-    largest power together, relative to that of all at full. wheel: whether they are slots of a
+    largest power together, relative to the power of all at full. wheel: whether they are slots of a
     colour wheel, one of which shines at a time; or the name of the slot at which it stays.
     least_rf: the fidelity index Rf that their mix needs. slots: of a colour wheel in front of
     emitters that mix, the first of which it has unless another is chosen.
@@ -312,7 +312,7 @@ class Constraints:
     def and_then(self, others: "Constraints") -> "Constraints":
         """Return these constraints with `others`, which replace contradictory ones.
 
-        Ties in `others` replace those of the same lights.
+        Ties in `others` replace ties of the same lights.
 
         A constraint in both occurs once: `a.and_then(a.and_then(b)) == a.and_then(b)`.
         """

@@ -68,7 +68,7 @@ class EmitterRequest:
         nothing about this light.
         """
         level = self.amount
-        # What is said of a luminaire holds for each of a group.
+        # Keys of a luminaire hold for each of a group.
         count = len(light.members) if light.unit == FULL else 1
         if self.per != "Y":
             level *= count / self._amount_of_one(light, cd_per_unit)
@@ -91,7 +91,7 @@ class EmitterRequest:
         )
         found = white.flux_lm
         if self.per == "cd":
-            # A panel's intensity straight ahead is that of its flux by Lambert's law.
+            # A panel's intensity straight ahead is the intensity of its flux by Lambert's law.
             lambert = None if white.flux_lm is None else white.flux_lm / np.pi
             found = {"cd": white.luminous, "cd/m²": lambert}.get(white.luminous_unit)
         if not found:

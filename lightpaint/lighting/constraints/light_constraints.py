@@ -175,7 +175,8 @@ def _is_meant(light: str, name: str) -> bool:
 
 
 def start_weights(start: Mapping[str, RGB], lights: Sequence[BasisLight]) -> Doubles:
-    """Return the weights (n, 3) that a solve starts from: those of the scene for other lights.
+    """Return the weights (n, 3) that a solve starts from: the weights of the scene for other
+    lights.
 
     start: emissions by name. Raises ConstraintError for a light that is not there, or is fixed.
     """
@@ -202,8 +203,8 @@ def held_at_start(basis: Basis, start: Mapping[str, RGB]) -> Basis:
 
 
 def painted_whites(emission: Doubles) -> WhiteLimits:
-    """Return the ranges of lights that are painted as emission (n, 3): that of usual lamps, and as
-    far as bluer or warmer whites are painted.
+    """Return the ranges of lights that are painted as emission (n, 3): the range of usual lamps,
+    and as far as bluer or warmer whites are painted.
     """
     return tuple(_painted_white(color) for color in emission)
 

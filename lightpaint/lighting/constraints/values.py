@@ -254,7 +254,7 @@ def parse_preference(value: Any, where: SourceKey) -> Preference | None:
 
 
 def parse_power_share(table: Mapping[str, Any], where: SourceKey) -> float | None:
-    """Return the largest power of a lamp's emitters, relative to that of all at full."""
+    """Return the largest power of a lamp's emitters, relative to the power of all at full."""
     value = table.get("power_share")
     if value is not None and not (is_number(value) and 0 < value <= 1):
         raise ConstraintError(

@@ -1,9 +1,9 @@
 """The answer under the moving brush, solved between two frames of a display.
 
-In linear light the equations follow the brush tile by tile (Eq 7-9), and the answer is that of
-`solve` without the noise correction. Painted pixels and the rest have separate sums: a hold weighs
-the rest by the amount of paint, so that a stroke changes the weight of every other pixel, but none
-of their sums.
+In linear light the equations follow the brush tile by tile (Eq 7-9), and the answer is the answer
+of `solve` without the noise correction. Painted pixels and the rest have separate sums: a hold
+weighs the rest by the amount of paint, so that a stroke changes the weight of every other pixel,
+but none of their sums.
 
 In display space every answer changes the weight of every pixel. There the picture is averaged to
 a few thousand pixels, and one round from the last answer follows the brush; the answer of all

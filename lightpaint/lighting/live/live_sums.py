@@ -24,7 +24,7 @@ from lightpaint.lighting.normal_equations import NormalEquations
 from lightpaint.target import Wish
 from lightpaint.threads import one_thread, parallel_map
 
-#: Maximum number of pixels of an averaged picture in display space: those of one strip.
+#: Maximum number of pixels of an averaged picture in display space: the pixels of one strip.
 MAX_FILM_PIXELS = STRIP_PIXELS
 
 #: Round-off, in float32, of an importance and its complement, whose sum is 1.
@@ -282,7 +282,7 @@ class Films:
         pull: NormalEquations | None,
         project: Callable[[Doubles], Doubles],
     ) -> Doubles:
-        """Improve weights (n, 3) by one round of reweighting; the loss is that of the best
+        """Improve weights (n, 3) by one round of reweighting; the loss is the loss of the best
         start, or less.
 
         The round is one of `reweighting.rounds`, but in float32, and with a step that is halved a

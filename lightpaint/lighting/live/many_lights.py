@@ -197,9 +197,9 @@ class ManyLights:
         """Improve weights (n, 3) by a round of reweighting for some lights, from the best start.
 
         rows: (3, n, p) float32, the light of each pixel. project: moves weights of the lights of a
-        reduction onto its constraints. The other arguments are those of `Films.improve`. Returns
-        the reduction with which to go on, and the weights, whose loss is that of the best start, or
-        less.
+        reduction onto its constraints. The other arguments are as in `Films.improve`. Returns
+        the reduction with which to go on, and the weights, whose loss is the loss of the best
+        start, or less.
         """
         start, picture, value, pull_gradient = _best_start(rows, pixels, starts, pull)
         image, weight = pixels.squares(picture, from_clipping=False)

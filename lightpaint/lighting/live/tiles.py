@@ -1,7 +1,7 @@
 """Normal equations that follow the brush (Schoeneman et al. 1993, Eq 7, 8, 9).
 
 The picture is cut into tiles, and M, b and ‖Ψ‖² are sums over them. A stroke makes some tiles
-dirty, and their sums are formed anew: its cost is that of the tiles it touches. Nothing is ever
+dirty, and their sums are formed anew: its cost is the cost of the tiles it touches. Nothing is ever
 subtracted, so that nothing drifts: undoing a stroke restores the same bits, and an updated problem
 equals the one built from scratch bit for bit.
 """
@@ -115,7 +115,8 @@ class TiledEquations:
     def update_as_complement(
         self, region: tuple[slice, slice], whole: Doubles, painted: "TiledEquations", w: Doubles
     ) -> None:
-        """Update the sums where importance is 1 less that of `painted`, without reading pixels.
+        """Update the sums where importance is 1 less the importance of `painted`, without reading
+        pixels.
 
         whole: the `base` at importance 1. painted: of the same images. w: (n, 3), the weights of
         which the target is the sum.

@@ -59,9 +59,9 @@ class Wash:
 
     rows: (3, n, p), Φ. painted, look: (3, p), linear. importance: (p,), the share of a block that
     is painted. counts: (p,), the number of its pixels that count. wishes: (k, p), the share of a
-    block that each wish covers; exact: (p,), that of wishes whose colours were given as numbers.
-    places: (k, p), the number of the separate place of each wish to which a block belongs, and 0
-    for none.
+    block that each wish covers; exact: (p,), the cover of wishes whose colours were given as
+    numbers. places: (k, p), the number of the separate place of each wish to which a block belongs,
+    and 0 for none.
     """
 
     rows: Floats
@@ -217,7 +217,7 @@ class NoisyBlocks:
     def disturbed(self, rng: np.random.Generator, amount: float = 1.0) -> Wash:
         """Return the wash with more noise: in each block, its half difference of either sign.
 
-        amount: of this noise, relative to that of the basis.
+        amount: of this noise, relative to the noise of the basis.
         """
         signs = rng.choice(np.array([-amount, amount], np.float32), self.blocks.importance.shape)
         return replace(

@@ -217,8 +217,8 @@ def unpainted_weight_of(views: Views, fit: Fit) -> float:
 def unpainted_weight(painted: float, rest: float, fit: Fit) -> float:
     """Return the weight of each unpainted pixel, h Σ D / Σ (1 − D) for hold h.
 
-    painted, rest: Σ D and Σ (1 − D). It is at most that of a painted pixel, so that a small rest
-    does not outweigh the painting.
+    painted, rest: Σ D and Σ (1 − D). It is at most the weight of a painted pixel, so that a small
+    rest does not outweigh the painting.
     """
     if fit.unpainted or not fit.hold:
         return fit.unpainted

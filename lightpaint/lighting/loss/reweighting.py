@@ -8,8 +8,9 @@ decides the length of each step, and therefore never rises. Once it stops fallin
 stationary under the constraints, and for a convex loss it is the optimum.
 
 A sample of the pixels stands for all, preferring those that determine a light. Its optimum is near
-that of all pixels. A tilt then corrects its gradient: the tilted sample has the true gradient where
-this was measured, and its optimum is closer the more its curvature resembles the true one.
+the optimum of all pixels. A tilt then corrects its gradient: the tilted sample has the true
+gradient where this was measured, and its optimum is closer the more its curvature resembles the
+true one.
 """
 
 from collections.abc import Callable
@@ -288,7 +289,8 @@ class _Round:
     ) -> "_Round":
         """Make the squares, and solve for their optimum.
 
-        matrix: equations whose M stands for that of the squares: a step along the same gradient.
+        matrix: equations whose M stands for the matrix of the squares: a step along the same
+        gradient.
         """
         make = lit.pixels.curved_squares if is_curved else lit.pixels.squares
         image, weight = make(x, from_clipping=from_clipping)

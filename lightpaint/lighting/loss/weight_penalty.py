@@ -13,8 +13,8 @@ suit images of any size (docs/image_lights.md has the measurements).
 
 A subject of two percent of a picture drowns in the other pixels: an answer that gets these right
 and leaves the subject grey has a smaller error than one that lifts it. People see the contrast
-between the two. So for each wish the ratio of its mean light to that of the rest shall be as
-painted:
+between the two. So for each wish the ratio of its mean light to the mean light of the rest shall be
+as painted:
 
     F += s Σ_k Σ_c A_kc² (P_o / O − P_r / R)²
 
@@ -70,7 +70,7 @@ PAINTED_REST = 0.5
 #: Largest share of a picture that a wish covers whose contrast counts: it is a subject.
 SUBJECT_SHARE = 0.5
 
-#: Light of a mean, relative to that of the picture, below which it has no contrast: black.
+#: Light of a mean, relative to the mean of the picture, below which it has no contrast: black.
 BLACK = 1e-3
 
 #: Strength of the pull to the current colours, of lights of which the painting asks for no other
@@ -78,8 +78,8 @@ BLACK = 1e-3
 #: counts as an error, scaled by the share of painted pixels.
 COLOR_PULL, CLEAR_PULL = 1.5, 0.01
 
-#: Price of what each light by itself does to unpainted pixels, relative to that of what all lights
-#: together do: the hold.
+#: Price of what each light by itself does to unpainted pixels, relative to the price of what all
+#: lights together do: the hold.
 RESTRAINT = 0.25
 
 #: Approximate number of blocks of pixels over which that price is summed.
@@ -395,8 +395,8 @@ def image_prior(
 
     For radiances f of an image, energy E of the picture of an even white one and current chroma c,
     it is E times the mean of s |∇f|² + IMAGE_COLOR |f − Y(f) c|² + IMAGE_STAYING (f − f₀)² over the
-    image, on which lengths are such that its area is 4π; s is SMOOTHNESS times that of the domain.
-    Where the painting asks for other colours, IMAGE_COLOR is smaller.
+    image, on which lengths are such that its area is 4π; s is SMOOTHNESS times the area of the
+    domain. Where the painting asks for other colours, IMAGE_COLOR is smaller.
     """
     images, strength = light_images(lights), fit.brightness * painted_share
     if not images or strength <= 0:
@@ -406,7 +406,7 @@ def image_prior(
     for image in images:
         found = image.index >= 0
         in_image, areas = image.index[found], image.shares[found]
-        # Texels of a symmetric image share a light, whose picture is that of both.
+        # Texels of a symmetric image share a light, whose picture is the picture of both.
         amplitudes = np.sqrt(power[in_image]) / np.bincount(in_image)[in_image, None]
         # Pictures of texels overlap, so the energy of their sum is about this.
         energy = strength * amplitudes.sum(axis=0) ** 2

@@ -37,11 +37,11 @@ OUTLIER_SHARE = 0.05
 WHITE_MARGIN = 0.004
 
 #: Largest distance from painted colours: painted hues are that inexact. The allowed distance is
-#: twice that of the paint itself from whites, so that white paint means white.
+#: twice the distance of the paint itself from whites, so that white paint means white.
 PAINTED_MARGIN = 0.01
 
-#: Distance from whites of all temperatures that a colour may have, relative to that of the paint:
-#: large, so that only paint that is a white of any temperature is taken for one.
+#: Distance from whites of all temperatures that a colour may have, relative to the distance of the
+#: paint: large, so that only paint that is a white of any temperature is taken for one.
 PAINTED_FACTOR = 10
 
 #: Change towards cooler whites that a lamp may make, relative to the change that is painted where
@@ -204,8 +204,8 @@ class Gamuts:
         self._gamuts, self._needed = {}, None
 
     def lights_outside(self, weights: Doubles, lights: Indices) -> list[int]:
-        """Return those of some lights, (m,), whose colours in weights (n, 3) are outside their
-        gamuts.
+        """Return the ones among some lights, (m,), whose colours in weights (n, 3) are outside
+        their gamuts.
         """
         colors = weights[lights]
         room = np.einsum("mkc,mc->mk", self._sides[lights], colors)
@@ -228,8 +228,8 @@ class GamutsOfSome(Gamuts):
         self._whole.refresh()
 
     def lights_outside(self, weights: Doubles, lights: Indices) -> list[int]:
-        """Return those of some lights, (k,), whose colours in weights (m, 3) are outside their
-        gamuts.
+        """Return the ones among some lights, (k,), whose colours in weights (m, 3) are outside
+        their gamuts.
         """
         in_whole = np.zeros((len(self._whole), 3))
         in_whole[self._lights] = weights

@@ -314,7 +314,7 @@ def white_lamp_knob(k: int, light: BasisLight, constraint: LightConstraint, lamp
     """Make the knob of a lamp of emitters that keeps to a range of white.
 
     What a lamp can mix is convex: between two whites it is at least as bright as the line between
-    those of its brightest mixes.
+    the luminances of its brightest mixes.
     """
     whites = constraint.whites
     assert whites is not None

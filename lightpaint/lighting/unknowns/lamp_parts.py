@@ -1,8 +1,8 @@
 """Lamps whose emitters have a picture each, as in a basis of spectra; and the power of lamps: of
 each unknown that drives their emitters, and of lamps that stay.
 
-Constraints speak of lamps. So the unknowns are first those of lamps, with an emission in RGB; then
-each unknown moves the weights of the pictures of the lamp's emitters instead.
+Constraints speak of lamps. So the unknowns are first the unknowns of lamps, with an emission in
+RGB; then each unknown moves the weights of the pictures of the lamp's emitters instead.
 """
 
 from collections.abc import Mapping, Sequence
@@ -20,7 +20,7 @@ from lightpaint.lighting.unknowns.knobs import Knob, Unknown
 
 
 def watts_of_unknowns(knobs: Sequence[Knob], lamps: Mapping[int, Lamp]) -> Doubles:
-    """Return the power, (k,), of each x at 1; 0 for those of lights of unknown power."""
+    """Return the power, (k,), of each x at 1; 0 for the power of lights of unknown power."""
     powers = list[float]()
     for knob in knobs:
         lamp = lamps.get(knob.lights[0]) if len(knob.lights) == 1 else None

@@ -6,8 +6,8 @@ colour move in each channel by itself, by its own matrix; one with drives at bou
 those that are free, in a small system of all such lights, a Schur complement. The drives then are
 those whose emission comes nearest to the new one (emission_mixes.py).
 
-No step raises the objective. They end at a certificate in the drives, as those of other problems
-do, or are given up.
+No step raises the objective. They end at a certificate in the drives, as the solves of other
+problems do, or are given up.
 """
 
 from collections.abc import Sequence
@@ -124,7 +124,7 @@ class _Steps:
     """The steps of one problem, scaled to a unit diagonal of each M_c.
 
     root: (n, 3), the factor of an emission; 0 for a light that reaches nothing. M: (3, n, n); b:
-    (n, 3); coupling: (n, 3, 3). columns: of each group, (k, u, 3 l). power: (k,), that of each
+    (n, 3); coupling: (n, 3, 3). columns: of each group, (k, u, 3 l). power: (k,), the power of each
     unknown at 1. can_be_whole: of each group, (k,), whether a light may have any emission, and no
     coupling joins its channels.
     """
@@ -218,8 +218,8 @@ class _Steps:
         return self._lower_point(point, turns), systems
 
     def _likely_free(self, point: _Point, free: Bools) -> Bools:
-        """Return the free unknowns, (k,), less those of lamps that each lamp by itself, with all
-        others as they are, would leave at their bounds.
+        """Return the free unknowns, (k,), less the unknowns of lamps that each lamp by itself, with
+        all others as they are, would leave at their bounds.
         """
         at_low, at_high = point.x <= self.lights.lower, point.x >= self.lights.upper
         likely = free.copy()
@@ -349,7 +349,7 @@ class _Steps:
 
     def _split(self, free: Bools) -> tuple[Bools, Bools]:
         """Return the lights, (n,), whose free unknowns give any emission, and unknowns, (k,), that
-        make up those of the others.
+        make up the unknowns of the others.
         """
         is_whole, chosen = np.zeros(len(self.root), bool), np.zeros(free.size, bool)
         for group, columns, can_be_whole in zip(

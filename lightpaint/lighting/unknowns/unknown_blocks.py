@@ -45,7 +45,7 @@ class Entries:
         return np.ix_(self.columns, other.columns)
 
     def between(self, M: Doubles, other: "Entries") -> Doubles:
-        """Return C_cᵀ M C_d, (j, j'), of a matrix (n, n) between this channel and that of
+        """Return C_cᵀ M C_d, (j, j'), of a matrix (n, n) between this channel and the channel of
         `other`.
         """
         rows, columns = _as_range(self.lights), _as_range(other.lights)
@@ -55,7 +55,7 @@ class Entries:
             part = part * self.values[:, None]
         if not other.are_ones:
             part = part * other.values
-        # Most columns are of one light: the sum over those of several is a short one.
+        # Most columns are of one light: the sum over the columns of several is a short one.
         if self.lights.size > self.columns.size:
             part = np.add.reduceat(part, self.first, 0)
         if other.lights.size > other.columns.size:

@@ -1,12 +1,12 @@
 """Lights that keep to a range of white or to a gamut, and the neighbouring colours that each mixes.
 
-The whites of a range lie on a curve, so that the mixes of all of them are not a convex set. Those
-of two neighbours are. Each step solves such a convex problem, certified as any other, and finds the
-lights that would gain by other neighbours: those at the end of theirs that would go on from there,
-those that are off and would be on with another white, and at last single lights that would be
-better with a white elsewhere in their range. Wide windows over many whites, which get narrower,
-lead near the end quickly. No step between neighbours raises the objective, and in the end none
-lowers it.
+The whites of a range lie on a curve, so that the mixes of all of them are not a convex set. The
+mixes of two neighbours are. Each step solves such a convex problem, certified as any other, and
+finds the lights that would gain by other neighbours: those at the end of theirs that would go on
+from there, those that are off and would be on with another white, and at last single lights that
+would be better with a white elsewhere in their range. Wide windows over many whites, which get
+narrower, lead near the end quickly. No step between neighbours raises the objective, and in the end
+none lowers it.
 
 A gamut is a polygon of many corners, and many mixes of them give the same colour. Exact answers of
 few lights use all corners. Under the moving brush, and with many lights, each light mixes the
@@ -59,7 +59,7 @@ class _WhiteLights:
     """Lights that share a range of white. knobs: (k,), places in the reduction; lights: (k,).
 
     least: (k, 1), most: (k, m), limits of their luminances in the m whites. unit: (m,), the
-    luminance of an unknown of 1, which is that of the brightest mix of a lamp of emitters.
+    luminance of an unknown of 1, which is the luminance of the brightest mix of a lamp of emitters.
     """
 
     whites: WhiteRange
@@ -375,7 +375,8 @@ def _solve_from_last(
     method: Method,
     last: LastMultipliers | None,
 ) -> ReducedOptimum:
-    """Solve from the last multipliers, if there are any, and keep those of this optimum."""
+    """Solve from the last multipliers, if there are any, and keep the multipliers of this
+    optimum."""
     if last is None:
         return solve_reduced(equations, reduction, start, method=method)
     options: dict[str, Any] = {"required": last.required, "close": last.close, "method": method}

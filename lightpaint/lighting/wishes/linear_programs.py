@@ -92,7 +92,8 @@ def shares_given_up(wished: WishedLight, reduction: Reduction) -> Doubles:
 
 
 def power_of(reduction: Reduction, x: Doubles) -> float:
-    """Return the power in watts at unknowns x, (k,), with that of lamps that stay as they are."""
+    """Return the power in watts at unknowns x, (k,), with the power of lamps that stay as they
+    are."""
     with_knobs = {light for knob in reduction.knobs for light in knob.lights}
     fixed = {k: lamp for k, lamp in reduction.lamps.items() if k not in with_knobs}
     watts = watts_of_unknowns(reduction.knobs, reduction.lamps)

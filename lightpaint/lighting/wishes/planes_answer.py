@@ -46,10 +46,10 @@ class WishOutcome:
 class PlanesAnswer:
     """A lighting on measuring planes.
 
-    outcomes: of all wishes. watts: the power of all lamps; None if that of one is unknown.
+    outcomes: of all wishes. watts: the power of all lamps; None if the power of one is unknown.
     floor_m2: the area that it is divided by; 0 without one. all_at_full: whether no lamp could give
     more. lamps: their number, without those that stay as they are. cost_delta_e: the mean CIEDE2000
-    to the painting beyond that of an answer without wishes; None without a painting.
+    to the painting beyond the distance of an answer without wishes; None without a painting.
     budget_delta_e: the same beyond one whose power is not limited, where the limit binds. glare:
     that observers see; None if it was not measured. are_ignored: whether the answer was found
     without the wishes.
@@ -121,7 +121,7 @@ def planes_answer(
     """Return what weights (n, 3) give.
 
     reduction: of the lights. prices: of each wish, (w,), in watts per unit; see `WishOutcome`.
-    glare: of all lights, as measured. The others are those of `PlanesAnswer`.
+    glare: of all lights, as measured. The others are as in `PlanesAnswer`.
     """
     watts = _power(reduction, wished, weights)
     sums = np.einsum("mnc,nc->m", wished.requirements.rows, weights)
@@ -166,7 +166,7 @@ def _reached(
 
 
 def _power(reduction: Reduction, wished: WishedLight, weights: Doubles) -> float | None:
-    """Return the power of all lamps in watts; None if that of one is unknown."""
+    """Return the power of all lamps in watts; None if the power of one is unknown."""
     try:
         check_powers(reduction, wished.illuminance.lights.names, "")
     except ConstraintError:

@@ -40,7 +40,7 @@ class LightWish:
 
     plane: its name; "" for power. asked: in lx, watts, or a share. to: the other plane of a ratio.
     rows: its rows of the requirements. size: what its rows miss if nothing of it is met. case: the
-    case in which it holds; "" for that of the scene.
+    case in which it holds; "" for the case of the scene.
     """
 
     kind: Kind
@@ -88,7 +88,7 @@ class LitCase:
         return cls("", np.zeros(0, np.intp), lights.current_weights[:0])
 
     def applied_to(self, weights: Doubles) -> Doubles:
-        """Return weights (n, 3) with those of this case."""
+        """Return weights (n, 3) with the weights of this case."""
         weights = weights.copy()
         weights[self.lights] = self.weights
         return weights
@@ -119,7 +119,7 @@ class WishedLight:
         return slack
 
     def multipliers_of(self, required: Doubles) -> Doubles:
-        """Return the multiplier of each wish, (w,), of those of the rows, (m,)."""
+        """Return the multiplier of each wish, (w,), of the multipliers of the rows, (m,)."""
         return np.array([float(required[wish.rows].sum()) for wish in self.wishes])
 
 
@@ -221,7 +221,7 @@ class _Rows:
     ) -> None:
         """Add the rows (r, n, 3) of a wish in the case, each of which reaches `least`."""
         count, case = len(rows), self.case
-        # The light of the case is not that of the answer.
+        # The light of the case is not the light of the answer.
         given = np.einsum("rlc,lc->r", rows[:, case.lights], case.weights)
         rows = rows.copy()
         rows[:, case.lights] = 0
@@ -240,8 +240,8 @@ class _Rows:
 
 
 def brightest(reduction: Reduction, illuminance: Illuminance) -> Doubles:
-    """Return the weights (n, 3) of all lights at full; those of the scene where nothing limits
-    them.
+    """Return the weights (n, 3) of all lights at full; the weights of the scene where nothing
+    limits them.
     """
     _, high = reduction.weight_ranges
     return np.where(np.isfinite(high), high, illuminance.lights.current_weights)
@@ -271,8 +271,8 @@ def check_powers(reduction: Reduction, names: Sequence[str], purpose: str) -> No
     if unknown:
         more = f" and {len(unknown) - 1} more" if len(unknown) > 1 else ""
         raise ConstraintError(
-            f"{purpose} needs the power of each lamp, and that of {unknown[0]!r}{more} is unknown: "
-            "add watts to its table in the lights file, or lock = true if it stays as it is"
+            f"{purpose} needs the power of each lamp, and the power of {unknown[0]!r}{more} is "
+            "unknown: add watts to its table in the lights file, or lock = true if it is to stay"
         )
 
 

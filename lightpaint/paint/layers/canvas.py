@@ -172,7 +172,7 @@ class Canvas:
 
     @property
     def albedo(self) -> Floats | None:
-        """(h, w, 3), that of the surfaces, as pages have it; None where it is unknown."""
+        """(h, w, 3), the albedo of the surfaces, as pages have it; None where it is unknown."""
         return self._layers.albedo()
 
     @property
@@ -220,7 +220,7 @@ class Canvas:
         return self._layers.layer(number)
 
     def accent(self, number: int) -> float:
-        """Return the accent of a layer; 1 for a hidden one."""
+        """Return the accent of a layer, by which its paint counts more; 1 for a hidden one."""
         return self._layers.accent(number)
 
     def composition(self) -> StoredComposition:

@@ -125,11 +125,11 @@ class ComposedLayers:
         layers: Those after `steps`.
         stored: Their composition on this current look, if it is known: then pixels of layers are
             read when they are needed.
-        albedo: That of the view, for gradients of light on surfaces.
+        albedo: The albedo of the view, for gradients of light on surfaces.
 
     Attributes:
         target: Light and importance; `at_least` is None while no pixel is marked.
-        albedo: Returns that of the view.
+        albedo: Returns the albedo of the view.
     """
 
     def __init__(
@@ -179,7 +179,7 @@ class ComposedLayers:
         return self._pixels[number]
 
     def accent(self, number: int) -> float:
-        """Return the accent of a layer; 1 for a hidden one."""
+        """Return the accent of a layer, by which its paint counts more; 1 for a hidden one."""
         return next((shown.accent for shown in self._shown if shown.layer.id == number), 1.0)
 
     def loaded_wishes(self, side: int) -> tuple[Wish, ...]:
@@ -351,7 +351,7 @@ def accent(part: float) -> float:
 
 
 def accents(layers: Sequence[tuple[Layer, LayerPixels | GradientPixels]]) -> list[float]:
-    """Return the accent of each visible layer, in one view.
+    """Return the accent, by which its paint counts more, of each visible layer in one view.
 
     It depends on their coverage alone, and not on when they were made.
     """

@@ -42,7 +42,7 @@ AlbedoSource = Callable[[], Floats | None]
 
 
 class GradientPixels:
-    """The pixels of a gradient within its mask, which `compose` uses as those of a layer."""
+    """The pixels of a gradient within its mask, which `compose` uses as the pixels of a layer."""
 
     def __init__(self, gradient: Gradient, mask: LayerPixels, albedo: AlbedoSource) -> None:
         self._values = gradient, mask, albedo
@@ -61,7 +61,7 @@ class GradientPixels:
 
     @property
     def bands(self) -> list[Region]:
-        """Bands of the mask."""
+        """The bounds of the mask in each row of tiles, in whole tiles."""
         return self._values[1].bands
 
     @property
@@ -226,7 +226,8 @@ def _counts_nowhere(layer: Layer, below: _Array, accent: float) -> bool:
 
 
 def _replace(layer: Layer, pixels: Pixels, below: Pixels, counts: _Array) -> Pixels:
-    """Return the pixels with those of a `pixels` layer, where it is painted. counts: of all."""
+    """Return the pixels with the pixels of a `pixels` layer, where it is painted. counts: of
+    all."""
     painted = pixels.importance > 0
     image = pixels.image
     if layer.strength != 1:

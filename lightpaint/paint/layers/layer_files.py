@@ -122,8 +122,8 @@ def _kinds(rows: Mapping[str, _Plane]) -> dict[str, np.dtype[Any]]:
 def _exr_names(layers: Sequence[Layer]) -> dict[int, str]:
     """Return the names of layers in an EXR, by id: a number, the name of the group, and their own.
 
-    The topmost has 01: an EXR has no order but that of names, and Krita puts the first on top. No
-    dot separates a group from its layers, since Krita puts such groups below everything.
+    The topmost has 01: an EXR has no order but the order of names, and Krita puts the first on top.
+    No dot separates a group from its layers, since Krita puts such groups below everything.
     """
     groups = {layer.id: f"{layer.name}/" for layer in layers if layer.kind == "group"}
     return {

@@ -298,7 +298,8 @@ def relative(region: Region, origin: Region) -> Region:
 
 
 def _is_black(image: npt.NDArray[np.float32]) -> bool:
-    """Return whether a picture is known to be black, as that of a mask, without looking at it."""
+    """Return whether a picture is known to be black, as the picture of a mask, without looking at
+    it."""
     return not any(image.strides) and not image[:1, :1].any()
 
 

@@ -150,7 +150,7 @@ PAINTING = Layer(PAINTING_ID, "pixels", "Painting")
 
 @dataclass(frozen=True)
 class LayerStack:
-    """Layers, the lowest first; those of a group lie directly below it."""
+    """Layers, the lowest first; the layers of a group lie directly below it."""
 
     layers: tuple[Layer, ...] = (PAINTING,)
 

@@ -283,20 +283,20 @@ class Painter(anywidget.AnyWidget):  # type: ignore[misc]
             of a scene. For several views under one lighting, a list of bases or of scenes.
         target: The initial painting; for several views a list.
         constraints: Constraints on the lights, in addition to those set in the painter.
-        transform: The view transform to paint through; by default that of the target, if it has
-            one. The scene determines open parts.
+        transform: The view transform to paint through; by default the transform of the target, if
+            it has one. The scene determines open parts.
         store: The file of the session; an existing session continues. A painter of this kernel that
             has the file open is closed. Without a file the session ends with the kernel.
         folder: Receives exports.
-        layers: A file of layers that replaces those of the session when it first begins with it:
+        layers: A file whose layers replace the session's when the session first begins with them,
             `layers.exr` of an export, or an `.ora` of any program.
         height: Height of the painter in screen pixels, at least 240.
         layout: The layout of the widget, as for every ipywidget.
         settings: Fields of `lp.Settings`, by name.
 
     Attributes:
-        target: The painting, a `Target`; None if nothing is painted. With several views, that of
-            the first.
+        target: The painting, a `Target`; None if nothing is painted. With several views, the
+            painting of the first.
         targets: The paintings of all views, in order.
         lighting: The `Lighting` that answers it. Setting it locks every light there.
         constraints: The `Constraints` set in the painter. Like `lighting`, None until the first
@@ -310,8 +310,8 @@ class Painter(anywidget.AnyWidget):  # type: ignore[misc]
 
     Examples:
         >>> painter = lp.Painter(basis, target=target)
-        >>> told = []
-        >>> painter.observe(lambda change: told.append(change.new), "lighting")
+        >>> changes = []
+        >>> painter.observe(lambda change: changes.append(change.new), "lighting")
         >>> painter.constraints = lp.Constraints.of({"panel": {"lock": True}})
         >>> np.round(painter.solution.lighting.emission["panel"], 2).tolist()
         [4.0, 3.0, 2.0]

@@ -51,7 +51,8 @@ NEARLY = 0.6
 ALIKE = 0.75
 
 #: Least share of the picture over which the light of a part of a sky is taken to spread, since its
-#: brightest spots are reflections; and that of a lamp in view, whose brightest spots surround it.
+#: brightest spots are reflections; and the light of a lamp in view, whose brightest spots surround
+#: it.
 IMAGE_COVERAGE, SEEN_COVERAGE = 0.35, 0.1
 
 #: Place, -1 to 1, of a part of a sky for each unit by which it lights from a side.
@@ -124,7 +125,7 @@ class LampRoles:
         return np.asarray(np.where(self.amounts > 0, there / np.maximum(means, 1e-30), 0))
 
     def flatness(self, mask: Mask) -> float:
-        """Return 1 for an object all of whose surface looks one way, 0 for one that looks all."""
+        """Return the length of an object's mean lit normal: 1 if it is flat, 0 for a sphere."""
         return float(np.linalg.norm(self._lit_normal(mask)))
 
     @cached_property
@@ -159,12 +160,12 @@ class LampRoles:
 
     @cached_property
     def is_on_wall(self) -> Bools:
-        """(n,) lamps that light one wall and nothing else, as those of a backdrop."""
+        """(n,) lamps that light one wall and nothing else, as the lamps of a backdrop."""
         return np.array([self._is_on_wall(x) for x in self.light], bool)
 
     @cached_property
     def is_wash(self) -> Bools:
-        """(n,) lamps that light one wall widely, as those of a cyclorama."""
+        """(n,) lamps that light one wall widely, as the lamps of a cyclorama."""
         return self.is_on_wall & (self.coverage >= WALL_SHARE)
 
     @cached_property
@@ -227,9 +228,10 @@ class LampRoles:
         return found
 
     def pool(self, number: int, *, is_on_wall: bool = True) -> Bools:
-        """Return the lamp of one of the smallest pools of light, (n,), from 0; none beyond them.
+        """Select, (n,), the lamp with the smallest pool of light, or with the next ones.
 
-        is_on_wall: whether spots on a wall are among them.
+        number: from 0; beyond the last pool no lamp is selected. is_on_wall: whether spots on a
+        wall count.
         """
         found = [k for k in self._pools if is_on_wall or not self.is_on_wall[k]]
         return np.isin(np.arange(len(self.light)), found[number : number + 1])
@@ -305,7 +307,8 @@ class LampRoles:
         return np.where(self.is_image, FROM_SIDE * self.sides, self.middles)
 
     def level(self, lamps: Bools) -> float:
-        """Return the light of lamps where they shine, relative to that of the brighter half."""
+        """Return the light of lamps where they shine, relative to the light of the brighter
+        half."""
         light = self.light[lamps].sum(axis=0)
         covered = _coverage(light)
         if covered and self.is_image is not None and self.is_image[lamps].all():

@@ -23,7 +23,7 @@ from lightpaint.paint.presets.lamp_roles import LampRoles, find_roles, light_sha
 from lightpaint.paint.presets.view_areas import Mask, ViewAreas
 from lightpaint.paint.store.history_steps import Pixels, Region, slices
 
-#: The area in which a layer asks for light where no lamps can be told apart.
+#: The area in which a layer asks for light where no lamps can be distinguished.
 Area = Literal["whole", "lit", "subject"]
 
 #: Least and most stops by which the light of lamps changes.
@@ -37,9 +37,9 @@ MASK_STEPS = 4096
 class LampRequest:
     """A layer of a preset: what the light of some lamps becomes.
 
-    level: light where these lamps shine, relative to that of the brighter half of the picture now.
-    kelvin: their white; None to keep their colours. lamps: those; None for all that no other layer
-    is about. area: where it is asked for if a view has one lamp.
+    level: light where these lamps shine, relative to the light of the brighter half of the picture
+    now. kelvin: their white; None to keep their colours. lamps: those; None for all that no other
+    layer is about. area: where it is asked for if a view has one lamp.
     """
 
     name: str
@@ -229,7 +229,7 @@ def layers_of(
 
 
 def masks_of(groups: Sequence[LampGroup], rest: LampGroup, shares: Sequence[Mask]) -> list[Mask]:
-    """Return the masks (h, w) of the layers of groups, without that of `rest`.
+    """Return the masks (h, w) of the layers of groups, without the mask of `rest`.
 
     shares: of the current light of each pixel, by group. Each layer changes what the lower ones
     left, so the share is taken of that: then the light of every group changes by its own gain.

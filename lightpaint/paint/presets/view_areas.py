@@ -16,8 +16,8 @@ Mask = npt.NDArray[np.float32]
 #: parts.
 RANGE_STOPS = 2.0
 
-#: Pixels of the longer side of the picture in which illumination is told from surfaces: what is
-#: smaller is a surface's pattern.
+#: Pixels of the longer side of the picture in which illumination is separated from surfaces: what
+#: is smaller is a surface's pattern.
 SMOOTH_SIDE = 48
 
 #: Least albedo that illumination is divided by; darker surfaces tell nothing.
@@ -69,7 +69,7 @@ class ViewAreas:
 
     @property
     def lit(self) -> Mask:
-        """The brighter half, more of it the brighter it is."""
+        """The brighter half of the picture, (h, w): from 0 at its middle brightness to 1."""
         return self._usable(np.clip(self._level / RANGE_STOPS, 0, 1))
 
     @property
@@ -179,7 +179,7 @@ def soft_spot(size: tuple[int, ...], x: float, y: float, radius: float) -> Mask:
 
 
 def _smoothed(values: Mask) -> Mask:
-    """Return values (h, w) without detail smaller than that of a small picture."""
+    """Return values (h, w) without detail smaller than the detail of a small picture."""
     height, width = values.shape
     factor = min(1.0, SMOOTH_SIDE / max(height, width))
     small = max(1, round(width * factor)), max(1, round(height * factor))

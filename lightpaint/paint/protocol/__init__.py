@@ -5,7 +5,7 @@
 included. Colours are linear Rec.709.
 
 Pictures are fetched, and not sent: `resources` of `state` and of later messages say which there
-are, those of views but the first as `plane/3@1`.
+are, the pictures of views but the first as `plane/3@1`.
 """
 
 from lightpaint.paint.protocol.answer_parts import (

@@ -143,10 +143,10 @@ class PlaneLight:
 class PlanesReading:
     """The illuminance on measuring planes under an answer and the master dimmer.
 
-    planes: in the order of the state. watts: power of all lamps; null if that of one is unknown.
-    power: the limit of it; null for none. is_required: whether answers have to meet the wishes, as
-    far as they can be met. is_old: whether lights have been moved, added or removed since the
-    planes were measured.
+    planes: in the order of the state. watts: power of all lamps; null if the power of one is
+    unknown. power: the limit of it; null for none. is_required: whether answers have to meet the
+    wishes, as far as they can be met. is_old: whether lights have been moved, added or removed
+    since the planes were measured.
     """
 
     planes: tuple[PlaneLight, ...]

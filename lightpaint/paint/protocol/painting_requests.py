@@ -304,8 +304,8 @@ class Propose(Request, kind="propose"):
     """Propose a lighting to the painter: it becomes a look with each light locked at the proposed
     level, and replaces an earlier proposal of that name. Answered by `looks`.
 
-    lights: emission by name of light; other lights keep that of the current answer. name: of the
-    proposal.
+    lights: emission by name of light; other lights keep the emission of the current answer. name:
+    of the proposal.
     """
 
     name: str

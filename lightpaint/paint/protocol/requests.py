@@ -12,7 +12,7 @@ from typing import Any, Literal
 
 from lightpaint.paint.protocol.base import Request
 
-#: Version of this protocol; a page of another version is told to reload.
+#: Version of this protocol; a page of another version has to reload.
 VERSION = 3
 
 #: Widths of final renders in pixels, and their maximum samples per pixel.

@@ -224,7 +224,7 @@ BAND_AREAS = tuple(
 def of_another_place(areas: Sequence[LightArea], max_stops: float) -> tuple[LightArea, ...]:
     """Return areas that are compared with another place, by brightness alone and up to some stops.
 
-    Their colours there are those of other floors and ceilings.
+    Their colours there are as on other floors and ceilings.
     """
     return tuple(replace(area, has_color=False, max_stops=max_stops) for area in areas)
 
@@ -373,7 +373,7 @@ def _open_likeness(
     """Put the group of layers on top which makes a picture look like a reference of a name.
 
     Returns what changes, and the name of the step, which says what was found. The layers are found
-    in one view. Those of pairs apply there, others in all views.
+    in one view. Layers of pairs apply there, others in all views.
     """
     view, part = request.view, None
     if request.areas != "pairs":

@@ -60,7 +60,7 @@ SEEN_STOPS, SEEN_TINT = 0.08, 0.04
 #: light; and the least contrast of such a reference, in stops.
 POOL_SHARE, POOL_STOPS = 0.3, 2.5
 
-#: Stops of red over blue from which on light is that of a flame, and so a pool.
+#: Stops of red over blue from which on light is the light of a flame, and so a pool.
 FLAME_WARMTH = 4.0
 
 #: Weight of contrast in the distance of lights: it is as much of a place's corners as of its light.
@@ -86,7 +86,8 @@ HIGHLIGHTS = 0.95
 #: Least distance from the middle, -1 to 1, at which a lamp belongs to one side of a picture.
 SIDE = 0.1
 
-#: Most by which the light of a side becomes brighter or darker, to be like that of the other side.
+#: Most by which the light of a side becomes brighter or darker, to be like the light of the other
+#: side.
 MOST_BALANCE = 4.0
 
 #: Share of the stops from fill to key at which the light of a backdrop lies, which stands for a
@@ -100,7 +101,7 @@ class LightMatch:
 
     key_stops, fill_stops: by which the light of the key and of all other lamps changes. key_tints:
     log2 gains (3,) of the channels of the key; two if it differs from left to right. fill_tint:
-    (3,), that of the other lamps.
+    (3,), the tint of the other lamps.
     """
 
     key_stops: float
@@ -156,7 +157,7 @@ def match_light(
 ) -> LightMatch:
     """Return the changes of key and fill that give a picture, as it is now, a reference's light.
 
-    Contrast and whites are those of the reference, but a picture of much the same light asks for no
+    Contrast and whites are as in the reference, but a picture of much the same light asks for no
     more than what differs. Lit parts stay as bright as they are.
     """
     other = _otherness(reference, picture)
@@ -186,7 +187,8 @@ def light_distance(reference: LightTones, picture: LightTones) -> float:
     """Return how far the light of a picture, without its surfaces, is from a reference's, in stops.
 
     The mean of the differences in contrast, which counts half, in the warmth of lit parts and in
-    that of shadows; in the colours of both sides instead of these if a reference has a key of each.
+    the warmth of shadows; in the colours of both sides instead of these if a reference has a key of
+    each.
     """
     parts = [CONTRAST_WEIGHT * (contrast_of_light(reference) - picture.contrast)]
     if has_two_keys(reference):
@@ -205,7 +207,7 @@ def stops_darker(reference: LightTones, picture: LightTones) -> float:
 
 
 def gains_of(tint: Doubles) -> Doubles:
-    """Return the gains (3,), of luminance 1, of log2 gains."""
+    """Return 2 to the power of `tint`, (3,), scaled to a luminance of 1."""
     gains = 2.0**tint
     return np.asarray(gains / luminance(gains))
 
@@ -312,7 +314,7 @@ def find_light(
 
 
 def distance_of(canvas: Canvas, reference: LightTones, light: Floats, known: Bools) -> float:
-    """Return how far the light of a picture, (h, w, 3) linear, is from that of a reference."""
+    """Return how far the light of a picture, (h, w, 3) linear, is from the light of a reference."""
     return light_distance(reference, Tones(without_surfaces(canvas, light), known).light_tones)
 
 

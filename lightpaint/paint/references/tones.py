@@ -23,7 +23,7 @@ QUANTILES = (0.1, 0.25, 0.5, 0.75, 0.95, 0.97)
 #: Quantiles of luminance from which on parts are the brightest, and up to which they are dark.
 LIT_QUANTILE, DARK_QUANTILE = 0.88, 0.35
 
-#: Height and width of the small picture by whose edges two places are told apart.
+#: Height and width of the small picture by whose edges two places are distinguished.
 DETAIL_SIZE = (24, 36)
 
 #: Stops below the highlights down to which a part is nearly as bright.
@@ -35,8 +35,9 @@ SIDE = 0.35
 #: Share of a side that has to be nearly as bright, to have a key of its own.
 LEAST_SIDE = 0.1
 
-#: Power of the mean by which the colour of light is told from that of surfaces (Finlayson and
-#: Trezzi 2004): the higher, the more the brightest pixels count, which are of the palest surfaces.
+#: Power of the mean by which the colour of light is separated from the colour of surfaces
+#: (Finlayson and Trezzi 2004): the higher, the more the brightest pixels count, which are of the
+#: palest surfaces.
 SHADES_POWER = 6.0
 
 Weights = npt.NDArray[np.floating]

@@ -219,7 +219,7 @@ class LampRig:
     def why_not(self, name: str, values: Mapping[str, Any] | None = None) -> str:
         """Return why a light cannot be moved, in words that follow its name; "" if it can.
 
-        values: those of an added light.
+        values: of an added light.
         """
         scene = self.scene
         if scene.has_media:
@@ -380,7 +380,7 @@ class LampRig:
     # What pages draw
 
     def state(self, placed: Placed) -> Rig:
-        """Return the places of all lights, for pages. The rig is open."""
+        """Return the places of all lights, for pages. Needs an open rig."""
         names = (*(light.name for light in self.scene.lights), *added_names(placed))
         places = tuple(self._known_place(name, placed.get(name, {})) for name in names)
         cameras = self.cameras

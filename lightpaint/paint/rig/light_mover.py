@@ -53,7 +53,8 @@ from lightpaint.paint.store.history_steps import name_in_view
 from lightpaint.scene import NewEmitter, Pose
 from lightpaint.scene.properties.site import Site
 
-#: Luminance of a spot that is aimed well, relative to that of a lamp without a cone at its place.
+#: Luminance of a spot that is aimed well, relative to the luminance of a lamp without a cone at its
+#: place.
 AIMED_SHARE = 0.3
 
 #: Largest distance of a light, as a part of the way to the next surface; and least distance of that
@@ -230,7 +231,7 @@ class LightMover:
         return self._offer(session, [name], is_dragged=False)
 
     def offer_all(self, session: Session) -> None:
-        """Offer the pictures of all moved lights, after those of the bases without moves.
+        """Offer the pictures of all moved lights, after the pictures of the bases without moves.
 
         This publishes nothing, since the state that follows lists all pictures.
         """

@@ -114,7 +114,7 @@ class LookComparison:
         self._work.stop()
 
     def handle(self, message: CompareLooks) -> list[Message]:
-        """Start to show looks, instead of those of the last request. Raises PaintError."""
+        """Start to show looks, instead of the looks of the last request. Raises PaintError."""
         self._looks = {number: self._access.looks.lighting(number) for number in message.looks}
         kept = {name for k in self._looks for name in (f"{PLAIN}{k}", f"{CLEAN}{k}")}
         for name in [x for x in self._offered if x.partition("@")[0] not in kept]:

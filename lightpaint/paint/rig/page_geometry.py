@@ -58,8 +58,8 @@ def camera_of(scene: Scene, loaded: Any) -> Camera | None:
     off = np.linalg.norm(np.cross(origin - eye, direction), axis=1)
     if (off > STRAIGHT * max(float(np.linalg.norm(origin - eye, axis=1).max()), STRAIGHT)).any():
         return None
-    # The rays to the corners end at those of a parallelogram, which need not face the middle ray:
-    # the picture may be a part of the film, or the lens shifted.
+    # The rays to the corners end at the corners of a parallelogram, which need not face the middle
+    # ray: the picture may be a part of the film, or the lens shifted.
     others = np.stack([direction[1], direction[2], -direction[3]], axis=1)
     if abs(np.linalg.det(others)) < STRAIGHT**3:
         return None
@@ -169,15 +169,15 @@ def _rows(vectors: Any) -> Doubles:
 #: Most outlines of a plan, the largest, and most corners of each.
 MAX_OUTLINES, MAX_CORNERS = 200, 32
 
-#: Part of the plan from which an object encloses the room: its outline is that of the room.
+#: Part of the plan from which an object encloses the room: its outline is the outline of the room.
 ENCLOSING_SHARE = 0.6
 
 #: Parts of the room's height: what hangs above the first is left out, such as a ceiling; so is what
 #: is thinner than the second and larger than a part of the plan, such as another room's floor.
 MAX_LOWEST, MIN_THICKNESS, MAX_THIN_SHARE = 0.6, 0.03, 0.05
 
-#: Most parts of one mesh that have an outline each; more have one together, and so have those of a
-#: mesh of more faces than these.
+#: Most parts of one mesh that have an outline each; more have one together, and so have the parts
+#: of a mesh of more faces than these.
 MAX_PARTS, MAX_SPLIT_FACES = 24, 200_000
 
 #: Points along each side of a grid over a surface that has no vertices.

@@ -175,7 +175,8 @@ class _Spreading:
         return others
 
     def __call__(self, indirect: Floats, direct: Any) -> npt.NDArray[np.float32]:
-        """Return the light of pixels, (3 · pixels,): the direct light and that of the cells around.
+        """Return the light of pixels, (3 · pixels,): the direct light and the light of the cells
+        around.
 
         indirect: of the cells, (rows, columns, 3). direct: of the pixels, as Dr.Jit has it.
         """
@@ -189,7 +190,7 @@ class _Spreading:
 
 
 def _add_spread(table: Any, cells: Any, weights: Any, albedo: Any, direct: Any) -> Any:
-    """Add to the light of pixels that of the cells around each. table: theirs, over albedo."""
+    """Add to the light of pixels the light of the cells around each. table: theirs, over albedo."""
     import drjit as dr
     import mitsuba as mi
 

@@ -49,7 +49,7 @@ class Socket(Protocol):
 class IncomingMessage:
     """A message of a page, or the reason why it is invalid.
 
-    replies: its number, and those of live paint that it has replaced. size: in bytes.
+    replies: its number, and the numbers of live paint that it has replaced. size: in bytes.
     """
 
     replies: list[int] = field(default_factory=list)

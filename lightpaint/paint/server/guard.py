@@ -125,7 +125,7 @@ class Guard:
         hosts, origins = _header(scope, b"host"), _header(scope, b"origin")
         if len(hosts) != 1 or not self._is_own_host(hosts[0]):
             return "this server is called otherwise"
-        # The port may differ through a tunnel, but has to equal that of the page.
+        # The port may differ through a tunnel, but has to equal the port of the page.
         if (is_socket and not origins) or any(x != f"http://{hosts[0]}" for x in origins):
             return "this comes from a page of another server"
         return None

@@ -62,7 +62,7 @@ class LiveAnswer:
     lights_of: returns the lights under given requests.
 
     Attributes:
-        requests: In effect now, including those of a slider that still moves.
+        requests: In effect now, including requests of a slider that still moves.
         before_slider: Those before the slider moved; None while none moves.
         weights: (n, 3), the last answer.
         mixed_emissions: The emissions that lamps with colour wheels had in it before these came to
@@ -104,7 +104,7 @@ class LiveAnswer:
 
     @property
     def requests_at_rest(self) -> SessionRequests:
-        """The requests without those of a slider that still moves."""
+        """The requests without the requests of a slider that still moves."""
         return self.before_slider or self.requests
 
     @property
@@ -129,7 +129,7 @@ class LiveAnswer:
         return (requests or self.requests).settings(self._settings)
 
     def constraints(self, requests: SessionRequests | None = None) -> Constraints:
-        """Return the constraints of requests, combined with those of the scene."""
+        """Return the constraints of requests, combined with the constraints of the scene."""
         requests = requests or self.requests
         constraints = self._base_constraints.and_then(requests.constraints())
         wishes = self._wishes_under(requests)
@@ -165,7 +165,7 @@ class LiveAnswer:
 
     @property
     def basis(self) -> Basis:
-        """Basis of the first view; its lights are those of all views."""
+        """Basis of the first view; its lights are the lights of all views."""
         return self._basis
 
     def check(self, requests: SessionRequests) -> None:
@@ -259,7 +259,7 @@ class LiveAnswer:
 
 
 def weights_by_name(weights: Doubles, names: Sequence[str], lights: Lights) -> Doubles:
-    """Return weights (n, 3) of `lights` from those of lights with these names.
+    """Return weights (n, 3) of `lights` from the weights of lights with these names.
 
     Other lights start at their current emission.
     """

@@ -117,7 +117,7 @@ class LookLibrary:
         return LookLighting(_requests(look).placed, emissions)
 
     def load(self, message: LoadLook) -> list[Message]:
-        """Continue from a look."""
+        """Replace painting, requests and places by a look's, as a step of undo."""
         look = self._find(message.look)
         paintings = dict(enumerate(self._paintings(look)))
         requests = _requests(look)

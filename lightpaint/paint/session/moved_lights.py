@@ -104,7 +104,8 @@ class MovedLights:
     def renew(
         self, names: Sequence[str], placed: Placed, views: Canvases, live_answer: LiveAnswer
     ) -> None:
-        """Give `views` the planes of `placed`, of which those of the named lights were replaced."""
+        """Give `views` the planes of `placed`, of which the planes of the named lights were
+        replaced."""
         if not names:
             return
         bases = self._source.bases(self.bases, placed)

@@ -38,7 +38,7 @@ MAX_OPENING_VALUES = 2**25
 class PictureTable:
     """Pictures by name, each with a generation number, made when they are first fetched.
 
-    Updated in place. Names are those of the protocol: `plane/3`, `lut/agx`, `painting`, and of a
+    Updated in place. Names are as in the protocol: `plane/3`, `lut/agx`, `painting`, and of a
     view that is not the first `painting@1`.
     """
 

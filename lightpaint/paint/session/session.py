@@ -5,9 +5,9 @@ thread, and renders nothing. Its history is a list of steps, each with the state
 requests and answer follow from them alone, so that undoing, loading and painting in another order
 lead to the same bits.
 
-One lighting answers the paintings of all its views. While a brush is down the answer is that of
-`LiveAnswer`; `accept_solution` takes the exact one, which is what `lightpaint solve` finds for the
-exported paintings.
+One lighting answers the paintings of all its views. While a brush is down the answer is the answer
+of `LiveAnswer`; `accept_solution` takes the exact one, which is what `lightpaint solve` finds for
+the exported paintings.
 """
 
 from collections.abc import Mapping, Sequence
@@ -123,7 +123,7 @@ class Session:
 
     @property
     def basis(self) -> Basis:
-        """Basis of the first view; its lights are those of all views."""
+        """Basis of the first view; its lights are the lights of all views."""
         return self.views[0].basis
 
     @property

@@ -249,8 +249,8 @@ class Judgement:
 def judge(analyses: Sequence[Analysis], painted: Sequence[int]) -> Judgement:
     """Return the headline, the limiting constraints, and the certainty and lock of each light.
 
-    painted: the view of each analysis. The headline is that of the view with the largest error, of
-    those that lack a wish if there are any.
+    painted: the view of each analysis. The headline is the headline of the view with the largest
+    error, of those that lack a wish if there are any.
     """
     solution = analyses[0].solution
     errors = spoken_errors(analyses[0].uncertainty, len(solution.basis.names))
@@ -441,7 +441,7 @@ def advice(appearance: Appearance) -> Advice | None:
     if cause.kind == "hold" and not _helps_to_loosen(appearance, cause):
         return Advice("light", (), None, None)
     kind, names = cause.kind, tuple(cause.names)
-    # The gain of a part of the paint is not that of the preview, which is about all of it.
+    # The gain of a part of the paint is not the gain of the preview, which is about all of it.
     is_of_all = not appearance.reasons_wish
     if kind != "hold":
         gain = cause.share if is_of_all and not cause.is_joint else None

@@ -160,7 +160,10 @@ class WishesInEffect:
         return cls(planes, reduction, wished, requirements)
 
     def reading(self, weights: Doubles, place_key: str) -> PlanesReading:
-        """Return what weights (n, 3) give. place_key: of the places of the lights now."""
+        """Return the lux on all planes and the power under weights (n, 3), and missed wishes.
+
+        place_key: identifies the present places of the lights.
+        """
         answer = planes_answer(self.wished, self.reduction, weights, floor_m2=self.planes.floor_m2)
         measured = self.planes.illuminance
         lux = {case: measured.of(lit) for case, lit in answer.weights_by_case.items()}

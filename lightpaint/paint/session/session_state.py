@@ -44,7 +44,7 @@ from lightpaint.paint.store.history_steps import name_in_view
 #: Pixels of the longer side of a reference's light, of which a page picks paint.
 LIGHT_SIDE = 400
 
-#: Width in pixels of a map whose proportions are told.
+#: Width in pixels of a map by which its proportions are given.
 ASPECT_PIXELS = 2**12
 
 

@@ -15,7 +15,7 @@ from lightpaint.lighting import Constraints, tables_by_light, tied_lights
 from lightpaint.pipeline.job.settings import Settings
 from lightpaint.validation import is_amount, is_number
 
-#: Settings of the answer: those of its fit, and those of all lights together.
+#: Settings of the answer: the settings of its fit, and the settings of all lights together.
 FIT_KEYS = ("hold", "space", "colors", "literal")
 ALL_LIGHTS_KEYS = ("prefer_current", "near", "sparse")
 
@@ -57,8 +57,8 @@ class SessionRequests:
     master: factor of all lights but fixed ones, applied to the answer.
     earlier: constraints of held lights, by name, which apply again once they are released.
     kept: names of the lights that are locked only since they were moved.
-    start: emissions by name of light, set by hand, that the solve starts from; none for those of
-    the scene.
+    start: emissions by name of light, set by hand, that the solve starts from; none for the
+    emissions of the scene.
     """
 
     lights: Mapping[str, Mapping[str, Any]] = field(default_factory=dict)
@@ -162,7 +162,7 @@ class SessionRequests:
 
     def with_earlier(self, earlier: Mapping[str, Mapping[str, Any]]) -> "SessionRequests":
         """Return these requests with other constraints that apply to held lights once they are
-        released, by name. Those of other lights are left out.
+        released, by name. Constraints on other lights are left out.
         """
         return self._with_earlier({**self.earlier, **earlier})
 
@@ -222,7 +222,7 @@ class SessionRequests:
         return replace(self, master=float(level))
 
     def output(self, weights: Doubles, is_fixed: Bools) -> Doubles:
-        """Return the weights that lights shine at, (n, 3), from those of the answer."""
+        """Return the weights that lights shine at, (n, 3), from the weights of the answer."""
         return np.where(is_fixed[:, None], weights, self.master * weights)
 
     def with_values(self, values: Mapping[str, Any]) -> "SessionRequests":
@@ -243,7 +243,8 @@ class SessionRequests:
     def from_constraints(
         cls, constraints: Constraints, lights: Sequence[BasisLight], values: Mapping[str, Any]
     ) -> "SessionRequests":
-        """Return requests equal to constraints on these lights, and those of `values` in FIT_KEYS.
+        """Return requests equal to constraints on these lights, and the settings of `values` in
+        FIT_KEYS.
 
         Raises ConstraintError for lights that do not exist, PaintError for constraints that a
         session cannot express.

@@ -111,7 +111,8 @@ def _composition_rows(
 
 
 def _store_compositions(database: sqlite3.Connection, *, rows: Sequence[CompositionRow]) -> None:
-    """Replace the compositions by those of all views. Where that fails, nothing is lost."""
+    """Replace the compositions by the compositions of all views. Where that fails, nothing is
+    lost."""
     with suppress(sqlite3.Error), transaction(database):
         database.execute(_COMPOSITION_TABLE)
         database.execute("DELETE FROM composition")

@@ -49,7 +49,7 @@ def insert_step(
     blobs: tuple[bytes, bytes] | None,
     last_kept: int,
 ) -> None:
-    """Write a step after that of the id `last_kept`; later ones are cut off.
+    """Write a step after the step of the id `last_kept`; later ones are cut off.
 
     blobs: its pixels before, and their change; None without any.
     """
@@ -99,7 +99,7 @@ def read_position(database: sqlite3.Connection) -> int | None:
 def insert_look(
     database: sqlite3.Connection, *, number: int, fields: str, arrays: PackedArrays | None
 ) -> None:
-    """Write a look in the place of that of its number. arrays: None to keep those it has."""
+    """Write a look in the place of the look of its number. arrays: None to keep those it has."""
     database.execute("INSERT OR REPLACE INTO look VALUES (?, ?)", (number, fields))
     if arrays is not None:
         database.execute("DELETE FROM look_array WHERE look = ?", (number,))
@@ -192,7 +192,7 @@ class StoredPatch(Patch):
 class StepAnswer:
     """The lighting after a step, as it was shown.
 
-    weights: emission (3,) by name of light, under the master dimmer. places: the places of lights,
+    weights: emission (3,) by name of light, under the master dimmer. places: of lights,
     as a text that is equal for equal places. picture: (h, w, 3) uint8, small, in display values.
     """
 

@@ -116,7 +116,7 @@ class BackgroundJobs:
     ) -> str:
         """Return the command that solves exported paintings to the same answer; "" if none.
 
-        folder: with these paintings; by default that of the session.
+        folder: with these paintings; by default the folder of the session.
         """
         subject = self._subjects[0]
         folder = folder or subject.folder
@@ -208,7 +208,8 @@ class BackgroundJobs:
         self._publisher.publish(result)
 
     def _export_folder(self, name: str) -> AbstractContextManager[Path]:
-        """Return a new folder for the files of an export; without a name that of the session."""
+        """Return a new folder for the files of an export; without a name the name of the
+        session."""
         session_folder = self._subjects[0].folder
         return new_folder(session_folder / EXPORTS, name) if name else nullcontext(session_folder)
 

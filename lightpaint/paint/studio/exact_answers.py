@@ -71,7 +71,7 @@ class ExactAnswers:
         self.run, self.stop, self.notify = self._loop.run, self._loop.stop, self._loop.notify
 
     def findings_of(self, session: Session) -> Findings:
-        """Return the findings about the current answer, those of the analysis if there is one."""
+        """Return the findings about the current answer, from its analysis if there is one."""
         last = self._last
         if last is not None and last.version == session.version:
             return last.findings

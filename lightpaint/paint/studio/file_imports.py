@@ -77,7 +77,8 @@ class ReceivedFile:
 
 
 def begin_with_layers(session: Session, path: Path) -> bool:
-    """Replace the layers by those of a file, as a step, unless the session has done that before.
+    """Replace the layers by the layers of a file, as a step, unless the session has done that
+    before.
 
     Returns whether it was done now. Raises LightpaintError for a file without usable layers.
     """

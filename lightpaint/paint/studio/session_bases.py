@@ -66,7 +66,7 @@ class _ViewPlanes:
         return self.basis.planes is basis.planes
 
     def scaled_to(self, basis: Basis) -> DenoisedPlanes:
-        """Return planes that stand in until those of `basis` are denoised."""
+        """Return planes that stand in until the planes of `basis` are denoised."""
         return self.planes if self.matches(basis) else self.planes.scaled_as(basis)
 
 
@@ -93,7 +93,7 @@ class PlaneDenoiser:
         current_looks = []
         for k, basis in enumerate(bases):
             factor = page_reduction(basis, len(basis.lights))
-            # Those of many lights are looked for while the page can be used already.
+            # Planes of many lights are looked for while the page can be used already.
             is_looked_for = self._use_cache and not opens_plain(basis)
             cached = read_denoised_planes(basis, factor=factor) if is_looked_for else None
             if cached is None:
@@ -132,7 +132,7 @@ class PlaneDenoiser:
     def denoise(self, session: Session) -> None:
         """Denoise the planes that are missing, one view after the other.
 
-        Of moved lights they are those of before, which undo brings back.
+        Of moved lights they are the planes of before, which undo brings back.
         """
         for view, basis in zip(session.views, session.bases, strict=True):
             planes_of_view = self._by_view.get(view.view)

@@ -42,7 +42,7 @@ from lightpaint.scene import load_scene
 from lightpaint.scene.runtime.render_lock import MITSUBA
 from lightpaint.target import texts_of, write_painting
 
-#: Folders of named exports and of final renders, in that of the session.
+#: Folders of named exports and of final renders, in the folder of the session.
 EXPORTS, RENDERS = "exports", "renders"
 
 #: Longest name of an export, in bytes; a number and suffixes are added to it.
@@ -51,7 +51,7 @@ MAX_NAME_BYTES = 160
 #: Characters that a name of a folder cannot have on some system.
 _FORBIDDEN = re.compile(r'[/\\:*?"<>|]')
 
-#: Folder of the report, in that of the session.
+#: Folder of the report, in the folder of the session.
 ANSWER_FOLDER = "answer"
 
 #: Exports that write the painting, and those that need one.

@@ -227,7 +227,7 @@ class Studio:
             return SessionState(**fields, **self._state_fields(session), **session.edit_state)
 
     def _state_fields(self, session: Session) -> dict[str, Any]:
-        """Return fields of the state, including those of background jobs."""
+        """Return fields of the state, including fields of background jobs."""
         painted = [view.name for view in session.views if view.is_painted]
         sensors = [""] if len(session.views) == 1 else painted
         return {

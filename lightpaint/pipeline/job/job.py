@@ -110,11 +110,12 @@ class Job:
         basis: Existing basis, of several views a tuple with one for each; taken from the cache or
             rendered if not given. With another renderer's light groups `folder` also receives files
             for other programs.
-        constraints: Constraints on the lights; they override those of the scene's lights file.
+        constraints: Constraints on the lights; they override the constraints of the scene's lights
+            file.
         settings: Settings of the solve.
         by_sensor: True to write the pictures to a folder for each sensor, as with several views.
-        rigging: Lights that may move, and lights to add; needs a scene. It overrides that of the
-            scene's lights file.
+        rigging: Lights that may move, and lights to add; needs a scene. It overrides the rigging of
+            the scene's lights file.
         placement: Places found earlier for several looks; then there is no search.
         sequence: The frames of the shot whose light groups are in `basis`.
         views: Set on creation: the views, each with what it needs.
@@ -222,7 +223,8 @@ class Job:
         self._set(remarks=tuple(self._remarks(targets, scenes)))
 
     def _lights(self, scenes: Sequence[Scene], bases: Sequence[Basis]) -> Lights:
-        """Return the lights of the answer: those of scene or basis, and those of given places."""
+        """Return the lights of the answer: the lights of scene or basis, and lights of given
+        places."""
         if self.placement is not None:
             return basis_lights(content(self.placement).hung_in(scenes).scene)
         return bases[0].lights if bases else basis_lights(scenes[0])
@@ -373,7 +375,7 @@ def names_of_views(
 ) -> list[str]:
     """Return the name of each view, after which its folder is named: its sensor, or its file.
 
-    groups: the light groups of the bases, if they are those of another renderer.
+    groups: the light groups of the bases, if they are the groups of another renderer.
     """
     if scenes:
         return view_names(scenes)
@@ -432,7 +434,7 @@ def _painted_view(
 
 
 def _resolution(scene: Scene, target: Target, settings: Settings) -> str | None:
-    """Return the resolution in the settings, else that of a smaller painted template."""
+    """Return the resolution in the settings, else the resolution of a smaller painted template."""
     if settings.quality is not None or settings.resolution is not None or settings.resize:
         return settings.resolution
     factor = whole_factor(scene.size, target.size)
@@ -446,7 +448,7 @@ def check_target(target: object) -> None:
 
 
 def check_same_picture(target: Target, scene: Scene) -> None:
-    """Raise TargetError if the painting's sensor is not that of `scene`."""
+    """Raise TargetError if the painting's sensor is not the sensor of `scene`."""
     sensor = scene.sensor_names[scene.sensor]
     if target.sensor not in ("", sensor):
         raise TargetError(

@@ -27,7 +27,7 @@ class Settings(Fit):
     """The settings of a solve.
 
     Attributes:
-        space: `linear` or `display`; None decides by the painting. It and the next six are those of
+        space: `linear` or `display`; None decides by the painting. It and the next six are as in
             `Fit`.
         hold: Weight of all unpainted pixels relative to all painted ones; None decides by the
             painting.
@@ -36,8 +36,8 @@ class Settings(Fit):
         literal: True to fit the target exactly as given and leave noise in the equations, unless
             another setting says otherwise.
         method: `polished`, to a certified optimum, or `gauss-seidel`, the paper's sweeps alone.
-        transform: View transform of `space`; None for that of the painting or, if it holds light,
-            sRGB at a metered exposure.
+        transform: View transform of `space`; None for the transform of the painting or, if it holds
+            light, sRGB at a metered exposure.
         emitters: Whether pixels in which the camera sees an emitter count, as in `Fit`.
         resize: Whether to resample a target of another size.
         spp: Samples per pixel of the basis, and upper limit for the verification.
@@ -69,7 +69,7 @@ class Settings(Fit):
         cd_per_unit: cd/m² that a radiance of 1 stands for, for luminous quantities in the results.
         planes: Path of a planes file, with wishes for illuminance: the answer meets
             these, and comes as close to the painting as it then can. Needs a scene.
-        watts: Largest power of all lamps together, in place of that of the planes file.
+        watts: Largest power of all lamps together, in place of the limit of the planes file.
         ignore_wishes: Whether only the painting counts: planes are measured and reported, and
             neither their wishes nor limits of power bind the answer.
         verify: Whether to render the relit scene and compare it with the prediction, with at most
@@ -283,7 +283,7 @@ class Settings(Fit):
         Option(
             "--watts W",
             "largest power of all lamps together, whose emitters have watts in the lights file",
-            default="no limit, or that of the planes file",
+            default="no limit, or the limit of the planes file",
             theme="Lights",
         ),
     ] = None

@@ -108,7 +108,7 @@ class SceneFile(ReadOnce):
 
     @property
     def read_files(self) -> tuple[Path, ...]:
-        """All files of the scene, and that of its observer."""
+        """All files of the scene, and the file of its observer."""
         observers = [] if self.observer is None else [Path(self.observer)]
         return (*self.content.read_files, *observers)
 
@@ -250,9 +250,9 @@ def observer_of(path: str | None) -> Observer:
 def spectral_scene(scene: Scene, constraints: Constraints, observer: Observer = EYE) -> Scene:
     """Return a scene with a light for each emitter of its lamps, as the observer sees it.
 
-    One that has them already, which looks of a batch share, has to have those of `constraints`.
-    Raises SceneError if a light that is adjusted has no emitters with spectra, or the scene cannot
-    be rendered with them.
+    One that has them already, which looks of a batch share, has to have the spectra of
+    `constraints`. Raises SceneError if a light that is adjusted has no emitters with spectra, or
+    the scene cannot be rendered with them.
     """
     if scene.is_spectral:
         _check_same_emitters(scene, constraints)
@@ -262,7 +262,8 @@ def spectral_scene(scene: Scene, constraints: Constraints, observer: Observer = 
 
 
 def _check_same_emitters(scene: Scene, constraints: Constraints) -> None:
-    """Raise SceneError if constraints give lamps other spectra than those of a spectral scene."""
+    """Raise SceneError if constraints give lamps other spectra than the spectra of a spectral
+    scene."""
     lights = WholeLamps.of(basis_lights(scene)).lights
     lamps = lamps_by_name(constraints, lights)
     expected = {
@@ -271,7 +272,7 @@ def _check_same_emitters(scene: Scene, constraints: Constraints) -> None:
     rendered = {x.name: x.spectrum for x in scene.lights if not x.is_fixed}
     if changed := sorted(k for k in rendered if rendered[k] != expected.get(k)):
         raise SceneError(
-            f"the emitters of a lamp, like {changed[0]!r}, are those of the lights file, which "
+            f"the emitters of a lamp, like {changed[0]!r}, come from the lights file, which "
             "looks with spectra share: give them there, and not for one look"
         )
 

@@ -44,7 +44,7 @@ REMEDY = Sentence(
     "name another folder (", Hint("folder"), "), or replace it (", Hint("force", True), ")"
 )
 
-#: The folder within that of the answer.
+#: The folder within the folder of the answer.
 PLANES_FOLDER = "planes"
 
 #: Files of every answer; a scene may add files that it includes, light groups those for other

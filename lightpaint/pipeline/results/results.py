@@ -221,7 +221,7 @@ def write_report(
     """Write the pictures and the report page, denoised, and their numbers.
 
     These are comparison.png, report.html and report.json. relit: the relit scene where its files
-    are now; by default that of `look`. is_shown: False to write only the numbers.
+    are now; by default the scene of `look`. is_shown: False to write only the numbers.
     """
     relit = relit or look.relit
     answer = _reported_answer(look, command)

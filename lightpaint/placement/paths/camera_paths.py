@@ -26,7 +26,8 @@ from lightpaint.scene import Scene
 #: without Russian roulette, and the light beyond is a thousandth even in a bright room.
 MOST_VERTICES = 16
 
-#: Radius of a region, relative to that of the panel in its middle, and number of kept regions.
+#: Radius of a region, relative to the radius of the panel in its middle, and number of kept
+#: regions.
 REACH, KEPT = 2.0, 4
 
 #: Segments that are tested at once, so that they stay in a processor's cache.
@@ -204,7 +205,8 @@ def _camera_rays(
 
 
 def _floats(rows: Iterable[Floats]) -> list[Any]:
-    """Return each row, (n,), as an `mi.Float` that kernels read like those of Dr.Jit's own."""
+    """Return each row, (n,), as an `mi.Float` that kernels read like the numbers of Dr.Jit's
+    own."""
     import mitsuba as mi
 
     return [mi.Float(aligned(row, np.float32)) for row in rows]

@@ -304,7 +304,7 @@ class FrozenPaths:
 
 @dataclass(frozen=True)
 class SharedVertices(Vertices):
-    """Vertices, one of each cell, whose light those of all paths in the cell take.
+    """Vertices, one of each cell, whose light the vertices of all paths in the cell take.
 
     pixels: none of its own, 0 for each. paths: the vertices of all paths. cells: (p,), of each of
     these.
@@ -385,7 +385,7 @@ class PathSums:
     """Sums of the light of one site at a time over the vertices of each pixel.
 
     paths: have these vertices, and stay loaded. pixel_count: of the picture that the vertices'
-    pixels are indices into; by default that of the paths.
+    pixels are indices into; by default the pixels of the paths.
     """
 
     def __init__(

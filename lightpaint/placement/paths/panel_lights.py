@@ -130,7 +130,7 @@ def _half_sides(scene: Scene, emitter: int) -> tuple[Position, Position] | None:
 
 
 def without_panels(scene: Scene, names: Collection[str]) -> Scene:
-    """Return the scene without those of the lights `names` that are panels, and their shapes.
+    """Return the scene without the ones among the lights `names` that are panels, and their shapes.
 
     Paths along which a panel is tried elsewhere must not meet it where it hangs now.
     """

@@ -52,7 +52,7 @@ class LightOrigin:
 
     @classmethod
     def of(cls, site: Site) -> "LightOrigin":
-        """Return the origin of a site; that of a spot shines in all directions."""
+        """Return the origin of a site; the origin of a spot shines in all directions."""
         if site.position is None:
             return cls((0, 0, 0), site.direction or (0, 0, 1), _SUN)
         if isinstance(site, PanelSite):

@@ -32,7 +32,8 @@ NOTHING = 1e-4
 #: factor by which a spread of three fits may be too small.
 FEW_FITS = 1.3213
 
-#: Steps of a fit along other paths, and their initial differences, relative to those of a search.
+#: Steps of a fit along other paths, and their initial differences, relative to the differences of a
+#: search.
 REFIT_STEPS, REFIT_SHARE = 3, 0.5
 
 
@@ -169,7 +170,8 @@ class PlacementJudge:
         return self._steps.descend(slid, at, REFIT_STEPS, first_share=REFIT_SHARE)
 
     def worthwhile(self, start: Arrangement, best: Arrangement) -> Found:
-        """Return `best` with its worthwhile changes alone. Its first movables are those of `start`.
+        """Return `best` with its worthwhile changes alone. Its first movables are the movables of
+        `start`.
 
         The change with the least gain goes first, since others may take over what it did.
         """

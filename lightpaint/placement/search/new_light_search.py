@@ -54,7 +54,7 @@ class NewLightSearch:
 
     Args:
         search: Of poses.
-        slots: New lights that may be added; those of one group are alike.
+        slots: New lights that may be added; the slots of one group are alike.
         judge: Judges the gain of each.
     """
 
@@ -241,8 +241,8 @@ def _between(first: Site, second: Site, share: float) -> Site:
     return replace(site, direction=(x, y, z))
 
 
-#: Seconds at the usual pace, that of two idle processors, on a film of PIXELS: for one light and
-#: round; for a new light and start; for the last steps and the judgement of one light.
+#: Seconds at the usual pace, the pace of two idle processors, on a film of PIXELS: for one light
+#: and round; for a new light and start; for the last steps and the judgement of one light.
 LIGHT_S, NEW_LIGHT_S, END_S = 3.5, 12.0, 4.0
 
 #: Seconds to trace the paths and compile kernels.

@@ -123,9 +123,10 @@ class PoseSearch:
     def candidates(
         self, others: Arrangement, movables: Sequence[Movable]
     ) -> dict[int, list[tuple[Site, Fitted]]]:
-        """Return the most promising poses of lights that are not in `others`, the best first.
+        """Return the most promising poses of each light that is not in `others`, the best first.
 
-        By the place of each in `movables`, a few of them all together, with the best lighting.
+        The keys are indices into `movables`. Each pose has its fit: the best lighting with the
+        light there. Of all lights together only a few poses are compared.
         """
         ranking = self.fit.ranking(others.fitted)
         direct = PoseCandidates(self.paths.rank, ranking)
@@ -238,7 +239,7 @@ class PoseSearch:
 
 
 class PoseRules:
-    """Rules about where lights may hang. paths: those of the search."""
+    """Rules about where lights may hang. paths: the loops of the search."""
 
     def __init__(self, paths: SearchPaths) -> None:
         self._paths = paths

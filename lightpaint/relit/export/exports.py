@@ -279,7 +279,7 @@ def blender_script(groups: LightGroups, lighting: Lighting) -> str:
 def render_identity(groups: LightGroups) -> str:
     """Return the identity of the render that multipliers belong to.
 
-    Frames of a shot are one render of one scene, whichever is solved for: theirs is that of the
+    Frames of a shot are one render of one scene, whichever is solved for: theirs is the hash of the
     files of the first.
     """
     if groups.sequence is None:

@@ -4,9 +4,9 @@ Lamps of emitters have the drive and the level of each of these instead of DMX v
 and blue.
 
 The list is independent of programs and displays: emissions are linear Rec.709 in the scene's own
-unit, that of a projector as the irradiance of a plane at distance 1. DMX values, 0 to 255, are for
-fixtures with linear response: the colour with its brightest channel at full, and a dimmer. The
-fixture with the brightest channel among those with the same unit has its dimmer at full.
+unit, the emission of a projector as the irradiance of a plane at distance 1. DMX values, 0 to 255,
+are for fixtures with linear response: the colour with its brightest channel at full, and a dimmer.
+The fixture with the brightest channel among those with the same unit has its dimmer at full.
 """
 
 import csv
@@ -263,8 +263,8 @@ def fixtures_csv(lighting: Lighting) -> str:
 
 
 def _cells_of(fixture: Fixture, emitters: Sequence[str], *, has_wheels: bool) -> list[str]:
-    """Return the cells of a fixture's line. emitters: names of those of all fixtures. has_wheels:
-    whether one of these has a colour wheel.
+    """Return the cells of a fixture's line. emitters: names of the emitters of all fixtures.
+    has_wheels: whether one of these has a colour wheel.
     """
     record = asdict(fixture)
     by_name = {x["name"]: x for x in record.pop("drives")}

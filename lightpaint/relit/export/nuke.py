@@ -2,9 +2,10 @@
 the lights of an answer.
 
 A `.nk` file is Tcl: each node takes its inputs from a stack, top one first, and pushes itself.
-Foreign names are quoted for that parser. Nuke evaluates some knobs once more: in file names and
-labels it substitutes Tcl in brackets, and in file names also the frame number and the view. How to
-quote these is not documented, so the script contains nothing that would be substituted.
+Foreign names are quoted for that parser. Nuke evaluates some knobs (fields of a node) once more: in
+file names and labels it substitutes Tcl in brackets, and in file names also the frame number and
+the view. How to quote these is not documented, so the script contains nothing that would be
+substituted.
 
 Lights are nodes of the classic 3-D system. Nuke's axes have y up, and its lights shine along their
 -z. `rot_order ZXY` turns about z, then x, then y, so a rotation without z aims a light with its x

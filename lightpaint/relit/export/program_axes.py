@@ -1,6 +1,6 @@
 """Places of moved and new lights, and maps of skies, in the axes of other programs.
 
-Lights shine along -z there. Mitsuba's environment maps have pixels at the poles; those of other
+Lights shine along -z there. Mitsuba's environment maps have pixels at the poles; the maps of other
 programs have their outermost rows half a pixel away, which matters for a map of eight rows. So the
 exported map, of latitude and longitude, is a finer one for the convention of OpenEXR: the top row
 is next to +y, the middle of the map looks along +z, and its left half has +x. The scene's up axis
@@ -141,7 +141,7 @@ def map_axes(up: Position) -> Doubles:
 
 
 def blender_axes(up: Position) -> Doubles:
-    """Return the rotation from the scene's axes to those of Blender's environment textures."""
+    """Return the rotation from the scene's axes to the axes of Blender's environment textures."""
     return np.asarray(_TO_BLENDER @ map_axes(up))
 
 

@@ -71,8 +71,8 @@ class LevelRow:
     emitter: which it sets; `dimmer`, the name of a filter, x or y of a chromaticity, `kelvin` or
     `wheel` for one that sets several; pan or tilt of a head that is aimed, by the first light on
     it. drive: of the emitter, 0 to 1; None for several. universe: as the network numbers it.
-    channels: 1 to 512, that of the coarse byte first. value: of all bytes. An emitter without a
-    channel of its own has a row for its drive alone; of a wheel only the slot that is on.
+    channels: 1 to 512, the channel of the coarse byte first. value: of all bytes. An emitter
+    without a channel of its own has a row for its drive alone; of a wheel only the slot that is on.
     """
 
     fixture_id: str
@@ -90,7 +90,7 @@ DIMMER, KELVIN, WHEEL = "dimmer", "kelvin", "wheel"
 
 
 def light_channels(light: RigLight) -> list[tuple[str, int]]:
-    """Return what a light sets, and the place of the channel among those of its fixture."""
+    """Return what a light sets, and the place of the channel among the channels of its fixture."""
     if not light.is_controlled:
         return []
     return [
@@ -104,7 +104,8 @@ def light_channels(light: RigLight) -> list[tuple[str, int]]:
 
 
 def level_rows(rig: ConsoleRig, drives: RigDrives, universes: Mapping[int, int]) -> list[LevelRow]:
-    """Return a row for each channel that drives set. universes: of the network by those of the rig.
+    """Return a row for each channel that drives set. universes: of the network by the universes of
+    the rig.
 
     All other channels of a fixture are at rest.
     """

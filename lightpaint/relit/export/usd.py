@@ -366,7 +366,7 @@ class UsdPlaces:
         if not self._conversion.is_known:
             return False
         world = np.eye(4)
-        # The rows of a transform are the axes, here those of the map.
+        # The rows of a transform are the axes, here the axes of the map.
         world[:3, :3] = axes @ self._conversion.rotation.T
         _write_transform(prim, *self._local(path, world))
         return True

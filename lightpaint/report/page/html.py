@@ -24,7 +24,8 @@ TEMPLATES = "report/page/templates"
 def html(template: str, /, **values: Any) -> Markup:
     """Return a template with its values, which are escaped unless they are Markup.
 
-    template: its name among those of the report, or its path below the package, without `.html`.
+    template: its name among the templates of the report, or its path below the package, without
+    `.html`.
     """
     return Markup(_environment().get_template(f"{template}.html").render(values))
 

@@ -266,8 +266,8 @@ def _rows(
 def _thumbnails_of_rows(
     basis: Basis, lighting: Lighting, *, is_clean: bool
 ) -> Mapping[int, Thumbnail]:
-    """Return the pictures of the rows, by the number of the light: of many lights those of folded
-    rows are not denoised, and of hundreds these rows have none.
+    """Return the pictures of the rows, by the number of the light: of many lights pictures of
+    folded rows are not denoised, and of hundreds these rows have none.
     """
     count = len(basis.lights)
     if count <= ROWS_SHOWN + SPARE_ROWS:

@@ -376,7 +376,7 @@ def _maps(
 
 
 def _ignored_map(diagnosis: Diagnosis, limit: float) -> Markup:
-    """Return the figure of the error that does not count. limit: that of the scale."""
+    """Return the figure of the error that does not count. limit: of the scale."""
     colours = by_bands(lambda x: to_8_bit(diverging(-x / limit)), diagnosis.ignored_map)
     return figure(
         PagePicture("Not counted", "False-colour map of what does not count.", colours),

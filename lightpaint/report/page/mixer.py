@@ -89,7 +89,8 @@ class JointLights:
         return [np.where(is_its, x, 0) for x in (answer / level, current)]
 
     def data(self, basis: Basis, lighting: Lighting) -> dict[str, Any]:
-        """Return its record for the page. `columns` and `places` are those of its map, if any."""
+        """Return its record for the page. `columns` and `places` are the columns of its map, if
+        any."""
         answer, current = lighting.weights_for(basis), basis.current_weights
         image = self.image if self.image is not None and self.image.is_whole else None
 

@@ -270,7 +270,7 @@ def _exposure(transform: ViewTransform, predicted: Floats, origin: str) -> str:
 
 
 def planes_section(answer: PlanesAnswer | None) -> Markup:
-    """Return the table of planes, what is said of it, and false colours; nothing without planes."""
+    """Return the table of planes, sentences about it, and false colours; nothing without planes."""
     if answer is None:
         return Markup("")
     return html(

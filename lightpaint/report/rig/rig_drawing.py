@@ -365,7 +365,7 @@ def plan_and_elevation(
 ) -> list[Panel]:
     """Return plan and elevation on one scale, `width` pixels wide or less.
 
-    row: the most height of each beside the other; None for one below the other.
+    row: largest height of the two side by side; None to draw them below each other.
     """
     forward = _forward_direction(geometry, up)
     left = np.cross(up, forward)

@@ -69,7 +69,8 @@ class Emitter:
 
     @property
     def is_outside_gamut(self) -> bool:
-        """True if its colour is outside Rec.709, as those of LEDs are: some channel is negative."""
+        """True if its colour is outside Rec.709, as the colours of LEDs are: some channel is
+        negative."""
         return min(self.emission) < 0 < float(luminance(np.array(self.emission)))
 
     @property
@@ -210,7 +211,7 @@ def flux_of_unit(emitter: Any, plugin: str, kind: EmissionKind | None) -> float 
     squares = axes.T @ axes
     texture = np.array(parameters["texture.value"]) if "texture.value" in parameters else None
     # A sheared or stretched cone, or one with a texture, has no closed form. The tolerances are
-    # those of Mitsuba's float32.
+    # the tolerances of Mitsuba's float32.
     is_cone = np.allclose(squares, squares[0, 0] * np.eye(3), atol=1e-4 * squares[0, 0])
     if texture is None or not is_cone or np.ptp(texture) > 1e-6:
         return None

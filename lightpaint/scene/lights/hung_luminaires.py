@@ -268,7 +268,8 @@ def _become_luminaire(
 
 
 def _level(parsed: ParsedScene, node: int) -> tuple[float, ...]:
-    """Return the level at which a luminaire is in the scene: that of one, else full, or off."""
+    """Return the level at which a luminaire is in the scene: the level of one, else full, or
+    off."""
     import mitsuba as mi
 
     props = parsed.state.nodes[node].props

@@ -218,7 +218,7 @@ def texel_image(radiances: Mapping[Texel, RGB]) -> Floats:
 def with_texels(
     settings: Mapping[str, EmitterSetting], emitters: Sequence[Emitter], *, evenly: bool = False
 ) -> dict[int, EmitterSetting]:
-    """Return settings by node; those of texels become one setting with an image.
+    """Return settings by node; the settings of texels become one setting with an image.
 
     settings: by name of the emitter. Texels without a setting keep their radiance; an image of
     which no texel has one stays as authored. evenly: whether the images of all texels, also these,
@@ -309,7 +309,7 @@ def shown_image(
     """Return what a bitmap shows on texture coordinates from 0 to 1, (h, w, 3).
 
     image: its pixels. size: least columns and rows of the result. to_uv: (4, 4), from these
-    coordinates to those of the bitmap. filter_type, wrap_mode: as Mitsuba names them.
+    coordinates to the coordinates of the bitmap. filter_type, wrap_mode: as Mitsuba names them.
     """
     height, width = image.shape[:2]
     # As many places as the bitmap has pixels there: its own pixels, if nothing is transformed.

@@ -28,7 +28,7 @@ CONSTRAINTS = (
 )
 #: Older key for `prefer_current`, as in `prefer = { current = 0.01 }`.
 OLDER = ("prefer",)
-#: Keys of permitted moves, and those of a light in `[light.NAME]`.
+#: Keys of permitted moves, and the keys of a light in `[light.NAME]`.
 RIGGING, MOVES = ("on", "new", "pair"), ("move", "aim", "cone", "beam")
 #: Key of a light in `[light.NAME]` for the size of its image.
 SPLIT = "split"

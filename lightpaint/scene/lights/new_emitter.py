@@ -210,7 +210,7 @@ def places_of(
 ) -> tuple[EmitterPlace, ...]:
     """Return the places of the emitters that have a position or a direction.
 
-    added: those of them that are in no file. old_sites: by name, before they were moved.
+    added: the ones among them that are in no file. old_sites: by name, before they were moved.
     """
     new_emitters = {x.name: x for x in added}
     places = []

@@ -191,7 +191,7 @@ class Film:
     def load(self, bands: Bands | None = None) -> Any:
         """Create a Mitsuba film with a box filter and float32 pixels, covering all blocks.
 
-        Its pixels are RGB or, in a spectral variant, those of `bands`.
+        Its pixels are RGB or, in a spectral variant, the channels of `bands`.
         """
         import mitsuba as mi
 
@@ -240,7 +240,7 @@ def check_resolution(resolution: str) -> re.Match[str]:
 def reduction(film: Film, resolution: str) -> int:
     """Return the reduction factor for a `resolution` such as `1/4` or `320x180`.
 
-    A size is that of the picture. Raises SceneError if no square blocks result in that size.
+    A size is the size of the picture. Raises SceneError if no square blocks result in that size.
     """
     match = check_resolution(resolution)
     part, width, height = (int(number or 0) for number in match.groups())

@@ -1,7 +1,7 @@
 """Gives Dr.Jit an LLVM that works, in whatever order a script imports lightpaint and Mitsuba.
 
-Dr.Jit takes the LLVM that it finds first, once, when it is imported, and that of the system may be
-too old. A script whose imports are in order of the alphabet imports lightpaint first: then the
+Dr.Jit takes the LLVM that it finds first, once, when it is imported, and the LLVM of the system may
+be too old. A script whose imports are in order of the alphabet imports lightpaint first: then the
 right one is chosen just before Dr.Jit is loaded, and nothing is loaded until then.
 """
 

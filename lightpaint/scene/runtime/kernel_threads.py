@@ -26,7 +26,7 @@ def limit_threads(count: int | None) -> None:
 def kernels(threads: int | None = None) -> Iterator[None]:
     """Limit the number of threads for kernels within the block.
 
-    threads: a limit in addition to that of the process.
+    threads: a limit in addition to the limit of the process.
     """
     limit = min((x for x in (_limit, threads) if x is not None), default=None)
     if limit is None:

@@ -100,7 +100,7 @@ def check_plugins(state: Any, resolver: Any) -> None:
 
 
 def _in_use(state: Any) -> Iterator[Any]:
-    """Yield the nodes that objects will be built from, which excludes those of a replaced
+    """Yield the nodes that objects will be built from, which excludes the nodes of a replaced
     integrator.
     """
     import mitsuba as mi

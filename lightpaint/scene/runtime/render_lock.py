@@ -1,9 +1,9 @@
 """A lock that gives Mitsuba to one thread at a time.
 
 Threads that used it at the same time would corrupt each other's results: what Dr.Jit records
-involves all materials and lights of the process, even those of a scene that another thread is still
-loading. So threads take turns at loading and tracing, and work in pieces. Between pieces,
-low-priority threads let others go first.
+involves all materials and lights of the process, even the materials and lights of a scene that
+another thread is still loading. So threads take turns at loading and tracing, and work in pieces.
+Between pieces, low-priority threads let others go first.
 """
 
 from collections import deque

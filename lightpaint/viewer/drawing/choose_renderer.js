@@ -9,7 +9,7 @@ import { GlView } from './gl.js';
 import { DEFAULTS } from './view.js';
 
 /** @typedef {import("./view.js").PictureView} PictureView */
-/** planeSize: height and width of planes, by default those of the picture; onRestored: all is to be
+/** planeSize: height and width of planes, by default as the picture; onRestored: all is to be
  * set again. @typedef {{planeSize?: [number, number], onRestored?: () => void}} ViewOptions */
 
 /** Frame time in milliseconds below which no comparison is needed. */

@@ -97,7 +97,7 @@ export class GlView {
     return String(this.planeSize) !== String(this.size);
   }
 
-  /** Return the textures of pictures: those of the planes, if these are as large. */
+  /** Return the textures of pictures: of the planes, if these are as large. */
   pictureTextures() {
     return this.isReduced ? new Textures(this.gl, this.size) : this.planes.textures;
   }

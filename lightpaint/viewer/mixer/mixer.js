@@ -16,7 +16,7 @@ import { createElement, createSlider, followDrag } from './page_elements.js';
 /** @typedef {import("./mixer_data.js").Data} Data */
 /** @typedef {import("../drawing/colour.js").RGB} RGB */
 
-/** A look from which a mixer begins. start: returns its data from those of its basis.
+/** A look from which a mixer begins. start: returns its data from the data of its basis.
  * @typedef {{start: (data: Data) => Data}} Look */
 
 /** Width of a light's picture in its row, and the share of its pixels that are at most white. */

@@ -9,7 +9,7 @@ import { inflate, unpack } from './packed_picture.js';
 /** @typedef {import("../drawing/colour.js").RGB} RGB */
 
 /** Lights that share a row, such as the texels of an image. levels: brightness in each look. answer,
- * present: the emission of each of them at the level 1, by name, which two planes show, behind those
+ * present: the emission of each of them at the level 1, by name, which two planes show, behind the planes
  * of single lights. columns: of the map that these make; 0 for none. places: which of them each
  * place of the map is, row by row. members: instead of these emissions and planes, the indices of
  * lights that have their own.

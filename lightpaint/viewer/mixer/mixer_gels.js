@@ -50,7 +50,7 @@ const ownWhite = ({ light }) => (luminance(light.present) > 0 ? light.present : 
 function setGel(row, gel) {
   const white = ownWhite(row);
   const last = filters.get(row);
-  // A colour that was chosen since is no filter's.
+  // A colour that was chosen since does not come from a filter.
   const isLast = last !== undefined && isSameHue(last.hue, row.rgb);
   const open = luminance(row.rgb) / luminance(white) / (isLast ? last.passed : 1);
   const hue = gel ? filtered(gel, white) : white;

@@ -180,7 +180,7 @@ def test_power_of_which_nothing_is_known_is_not_limited(make_basis):
     desk = _plane("desk", 4, mean=100.0)
     basis, _, illuminance = _case(make_basis, [desk])
     reduction = reduce_to(Constraints(), basis.lights)
-    with pytest.raises(ConstraintError, match="that of 'light 0' and 3 more is unknown"):
+    with pytest.raises(ConstraintError, match="the power of 'light 0' and 3 more is unknown"):
         wished_light(illuminance, PowerBudget(watts=100.0), reduction)
 
 

@@ -31,7 +31,7 @@ class LightPlanes:
     which `add` indexes in row-major order. is_shared: whether several paths may add to a pixel at
     the same time, in an order that then affects the last bits; otherwise each pixel has a single
     path, which adds in order. is_split: whether direct and indirect light have separate planes.
-    start: initial sums, in the form returned by `sums`; None for zeros. texels: the texels of
+    start: initial sums, in the form returned by `sums`; None for zeros. texels: of
     images; None if there are none.
 
     Float32 sums of many samples would lose what each of them adds. So the tracer calls `end_block`
@@ -116,7 +116,7 @@ class LightPlanes:
         dr.sync_thread()
 
     def end_block(self) -> None:
-        """Add the sums to those of ended blocks, after `evaluate`, and begin a new block."""
+        """Add the sums to the sums of ended blocks, after `evaluate`, and begin a new block."""
         self._ended = self._sums if self._ended is None else self._ended + self._sums
         self._sums = dr.zeros(mi.Float, dr.width(self._ended))
         self.evaluate()
@@ -208,7 +208,7 @@ class SpectralPlanes(LightPlanes):
     def add(self, pixel, emitter, value, direction, uv, bounces, active):
         """Add light to the planes of all emitters of the lamp that `emitter` belongs to.
 
-        value: `PowerByWavelength`. The other parameters are those of `LightPlanes`.
+        value: `PowerByWavelength`. The other parameters are as in `LightPlanes`.
         """
         active = mi.Bool(active)
         for packet in value.packets:

@@ -181,7 +181,7 @@ def trace_paths(view, sampler, numbers, guide, planes, rules, pixel, place, term
     """Trace one path from the camera, or from a measuring point, for each pixel, and add its light
     to `planes`.
 
-    term: number of the sample. The other parameters are those of `trace_samples`.
+    term: number of the sample. The other parameters are as in `trace_samples`.
     """
     scene, waves = view.scene, view.paths.along(numbers, term)
     if dr.hint(view.points is None, mode="scalar"):

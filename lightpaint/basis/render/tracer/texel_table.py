@@ -1,6 +1,6 @@
 """Tables on the device that divide the light of an image among its texels.
 
-The texels of a sky may be split again, into those of finer grids.
+The texels of a sky may be split again, into texels of finer grids.
 
 Import this module after setting a Dr.Jit variant, since its array types do not exist before.
 """

@@ -152,7 +152,7 @@ def each_bsdf_value(waves, bsdf, si, wo, active):
 def each_bsdf_sample(waves, bsdf, si, lobe, direction, active):
     """Return a BSDF sample, and its weight for each packet.
 
-    The direction is that of the first packet: no surface chooses it by the wavelength.
+    The direction is the direction of the first packet: no surface chooses it by the wavelength.
     """
     sampled = [
         bsdf.sample(mi.BSDFContext(), waves.at(si, k), lobe, direction, active)

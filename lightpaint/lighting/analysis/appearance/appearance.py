@@ -85,7 +85,7 @@ class Appearance:
         local_lights: Lights that reach that place, the strongest first; if it is too bright, the
             lights that make it so.
         has_strong_light: Whether one of them contributes much there.
-        held_lights: Those of them that constraints hold back.
+        held_lights: The ones among them that constraints hold back.
         area_lights: The lights of the paint in question, and what else they light; None if not
             computed, or if all of the picture is painted.
         reasons: Constraints, holds and other views that keep the lights from the painting, the
@@ -197,8 +197,8 @@ class Appearance:
 
     @property
     def noise_shares(self) -> dict[str, float]:
-        """The share of ΔE that render noise explains, and that of the painting's noise in the error
-        of the fit.
+        """The share of ΔE that render noise explains, and the share of the painting's noise in the
+        error of the fit.
         """
         noise = self.noise / self.delta_e if self.delta_e > 0 else 0.0
         return {"noise": noise, "painting_noise": self.error_shares.get("painting_noise", 0.0)}

@@ -203,7 +203,7 @@ def compensating_lights(solution: Solution) -> tuple[str, ...]:
 
     Where nothing is painted they would have to be darker, and the paint would not: it asks for more
     of them, or does not see them. Lights with constraints of their own are left out. solution: of
-    one view; if it is part of one of several views, the paint is that of all of them.
+    one view; if it is part of one of several views, the paint is the paint of all of them.
     """
     whole = solution.whole or solution
     problem, weights = whole.problem, whole.weights

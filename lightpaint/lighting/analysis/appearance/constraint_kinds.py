@@ -14,7 +14,7 @@ ConstraintKind = Literal[
     "off", "lock", "limits", "colour", "tie", "sparse", "prefer_current", "near", "planes"
 ]
 
-#: Those of all lights together.
+#: The constraints on all lights together.
 ALL_LIGHTS_KINDS: tuple[ConstraintKind, ...] = ("sparse", "prefer_current", "near", "planes")
 
 #: Kinds of constraints on single lights.

@@ -40,7 +40,8 @@ from lightpaint.target import Target, find_wishes
 #: ΔE of a visible change: if a wish changes brightness by less, it asks for none.
 MIN_ASKED = 2.0
 
-#: Luminance, relative to white, below which the colour of light fades to grey: that of L* 4.
+#: Luminance, relative to white, below which the colour of light fades to grey: the luminance of L*
+#: 4.
 DARK = 0.0044
 
 #: Share of the lit paint from which a wish is nearly all of it.
@@ -55,7 +56,7 @@ NOISY_PICTURES, SEED = 8, 1
 #: Standard errors within which a share is not known to be too small.
 NOISE_ERRORS = 2.0
 
-#: The share from which too much came: it is then said as a ratio, and not in percent.
+#: The share from which too much came: it is then shown as a ratio, and not in percent.
 OVERDONE = 1.25
 
 
@@ -243,7 +244,7 @@ class DeliveryReport:
 def measure_deliveries(solution: Solution, picture: Floats) -> DeliveryReport:
     """Measure how much of each wish came, in all views of `solution` together.
 
-    picture: that of the answer, in the shape of the joint basis.
+    picture: of the answer, in the shape of the joint basis.
     """
     basis, views = solution.basis, solution.problem.views
     parts = [

@@ -94,8 +94,8 @@ class PaintComparison:
     def share_removed(self, before: Floats, after: Floats) -> float:
         """Return the share of the error of a whole picture that another does not have.
 
-        before, after: (H, W, 3) linear. Errors are those of the fit, with importance. Negative if
-        the error grows; 0 without an error before.
+        before, after: (H, W, 3) linear. Errors are the errors of the fit, with importance. Negative
+        if the error grows; 0 without an error before.
         """
         now, then = (self.mean(self.fit_errors(self.pixels(x))) for x in (before, after))
         return 1 - then / now if now > 0 else 0.0

@@ -172,7 +172,8 @@ def _comparison(solution: Solution, area: Floats | None) -> PaintComparison:
 def _measure(
     solution: Solution, sample: PixelSample, look: PaintComparison, reason: Reason
 ) -> Reason | None:
-    """Measure the effect of removing a reason, of a hold that of a weaker one, with all pixels.
+    """Measure the effect of removing a reason, of a hold the effect of a weaker one, with all
+    pixels.
 
     look: the comparison with the paint in question. Return None if it is too small.
     """
@@ -223,7 +224,7 @@ class _Effect:
 
 
 def _effect(solution: Solution, look: PaintComparison, weights: Doubles) -> _Effect:
-    """Return the effect of weights (n, 3) in place of those of `solution`, with all pixels.
+    """Return the effect of weights (n, 3) in place of the weights of `solution`, with all pixels.
 
     look: the comparison with the paint in question, whose error the share is of; mean ΔE is over
     all paint.
@@ -261,7 +262,7 @@ def _constraint_reasons(sample: PixelSample) -> list[Reason]:
         chosen, gained = lights, whole
         units = by_light.units(lights)
         likely = sorted(units, key=lambda unit: -float(sample.pull[unit].max()))
-        # One by one, beginning with those of the largest effect.
+        # One by one, beginning with the units of the largest effect.
         alone = [(sample.share_without(kind, unit), unit) for unit in likely[: 2 * MAX_FEW_LIGHTS]]
         best = [unit for _, unit in sorted(alone, key=lambda gain: -gain[0])]
         for count in range(1, min(MAX_FEW_LIGHTS, len(units) - 1) + 1):
@@ -297,7 +298,8 @@ def _joint_reasons(sample: PixelSample, everything: float) -> tuple[Reason, ...]
 def _find_loosening(
     solution: Solution, sample: PixelSample, look: PaintComparison, full_gain: float
 ) -> Loosening:
-    """Find and measure the strongest hold with `LOOSENED_SHARE` of `full_gain`, that of none."""
+    """Find and measure the strongest hold with `LOOSENED_SHARE` of `full_gain`, the gain of
+    none."""
     hold = _weaker_hold(sample, LOOSENED_SHARE * full_gain)
     weights = (
         sample.solve((), sample.other_views, hold=hold)
@@ -347,7 +349,7 @@ def released_weights(
     problem = (solution.whole or solution).problem
     if is_large(problem.basis.size):  # and no other analysis runs meanwhile
         problem.squares.release()
-    # All constraints, also those of the bases' scenes, are among those of the problem.
+    # All constraints, also those of the bases' scenes, are among the constraints of the problem.
     bases = [basis.with_requests(type(basis.requests)()) for basis in problem.views.bases]
     released = Problem.of(
         bases,

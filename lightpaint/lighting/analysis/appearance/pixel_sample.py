@@ -268,7 +268,7 @@ def _cropped(image: Floats, counts: Doubles) -> Floats:
 
 
 def _with_wishes(target: Target, basis: Basis) -> Target:
-    """Return the target with its wishes told apart, which takes pixels at their places."""
+    """Return the target with its wishes separated, which takes pixels at their places."""
     found = find_wishes(target, basis.current_look)
     return replace(target, wishes=tuple(replace(wish, has_strokes=False) for wish in found))
 

@@ -82,7 +82,7 @@ class Washes:
     ) -> "Washes":
         """Return the washes of three pictures, (h, w, 3) linear each.
 
-        counts: (h, w), the pixels that count. transform: that of the display.
+        counts: (h, w), the pixels that count. transform: of the display.
         """
         height, width = counts.shape
         factor = fitting_factor((height, width), -(-max(height, width) // MAX_SIDE))
@@ -160,7 +160,7 @@ class WishPart:
 def wish_parts(wishes: Sequence[Wish], objects: Objects | None) -> list[WishPart]:
     """Return the wishes, each layer of several after its wishes, and each group after its layers.
 
-    objects: those of the picture, by which parts of a layer are named.
+    objects: of the picture, by which parts of a layer are named.
     """
     parts: list[WishPart] = []
     names = _names(wishes, objects)
@@ -185,8 +185,8 @@ def _joint_area(wishes: Sequence[Wish]) -> Floats:
 
 def _names(wishes: Sequence[Wish], objects: Objects | None) -> list[str]:
     """Return names that differ: `Strokes, vase` for a part of a layer; only the place, with a
-    capital, for a part of a painting without layers. Parts in one ninth of the picture are told
-    apart by what is in them, `Right (vase)`, or by numbers.
+    capital, for a part of a painting without layers. Parts in one ninth of the picture are
+    distinguished apart by what is in them, `Right (vase)`, or by numbers.
     """
     counts = Counter((wish.layer, wish.name) for wish in wishes)
     is_part = [counts[wish.layer, wish.name] > 1 for wish in wishes]

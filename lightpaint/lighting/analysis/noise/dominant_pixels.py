@@ -22,11 +22,11 @@ TWO_PATHS = 0.5
 #: Standard errors on either side of a 95 % interval.
 NORMAL_95 = 1.96
 
-#: Ratios of 95 % intervals of Student's t to those of a normal distribution, for 1, 2, … degrees of
-#: freedom.
+#: Ratios of 95 % intervals of Student's t to the intervals of a normal distribution, for 1, 2, …
+#: degrees of freedom.
 T_RATIOS = (6.483, 2.195, 1.624, 1.416, 1.312)
 
-#: Largest variance of a pixel among few, relative to that of the others.
+#: Largest variance of a pixel among few, relative to the variance of the others.
 MAX_UNLIKE = 4.0
 
 
@@ -99,7 +99,7 @@ class Peaks:
 
 
 def t_ratios(freedom: Doubles) -> Doubles:
-    """Return ratios of 95 % intervals of Student's t to those of a normal distribution.
+    """Return ratios of 95 % intervals of Student's t to the intervals of a normal distribution.
 
     freedom: degrees of freedom, of any shape; NaN where nothing is uncertain. Below one it counts
     as one.

@@ -46,7 +46,7 @@ from lightpaint.threads import one_thread, parallel_map
 #: the estimate is itself noise, and the rest of M would soon be indefinite.
 MAX_NOISE_SHARE = 0.5
 
-#: Least noise of a painting that counts, relative to that of the prediction.
+#: Least noise of a painting that counts, relative to the noise of the prediction.
 MIN_PAINTING_NOISE = 0.02
 
 #: Parts of the pixels that are summed in parallel.
@@ -64,7 +64,7 @@ def own_share(problem: Problem, removed: float | None) -> float:
     """Return the share of a pixel's own value in the factors of a problem, 0 to UNCORRECTED.
 
     It is in proportion to the noise power that the equations contain. removed: the share of it that
-    they do not, by default that of the solved ones. A render of the mix has noise of its own,
+    they do not, by default the share in the solved ones. A render of the mix has noise of its own,
     independent of the basis.
     """
     refinement = problem.refinement
@@ -77,7 +77,7 @@ class Noise:
     """Sums over pixels of products of half differences, per channel.
 
     power: (3, n, n), N_ij = Σ D h_i h_j, the part of M that is noise. target_noise: (3, n), the
-    mean error of b: noise of the current look, where this is a goal, and that of squares which
+    mean error of b: noise of the current look, where this is a goal, and the noise of squares which
     follow from noisy light (residuals.py).
     doubt: (3, n), an estimate of the error that may be left in target_noise.
     gradient: (3, n, 3, n), covariance of the gradient. objective_error, objective_noise: as in
@@ -98,7 +98,7 @@ class Noise:
 
     @property
     def widening(self) -> Doubles:
-        """(n, 3), ratios of an interval to that of a variance which is known.
+        """(n, 3), ratios of an interval to the interval of a variance which is known.
 
         1 where `hidden` includes that already.
         """
@@ -125,7 +125,7 @@ def noise_sums(solution: Solution, *, removed: float | None = None) -> Noise:
     """Sum over the pixels that count in one pass, by parts in parallel.
 
     removed: the share of the noise's power that the equations whose gradient it is do not have; by
-    default that of the solution.
+    default the share in the solution.
     """
     weights, pixels = solution.weights, NoisyPixels.of(solution, removed=removed)
     counted, weight, residuals = pixels.counted, pixels.weight, pixels.residuals
@@ -171,8 +171,9 @@ def painting_covariance(solution: Solution) -> Doubles | None:
     """Return the covariance of the gradient by noise of the painting, (3, n, 3, n); None where it
     has next to none.
 
-    A render that serves as a painting has noise τ, which makes δg = Σ D Φ τ. Its variance is that
-    of the residual from pixel to pixel, less that of the prediction (residuals.py).
+    A render that serves as a painting has noise τ, which makes δg = Σ D Φ τ. Its variance is the
+    variance of the residual from pixel to pixel, less the variance of the prediction
+    (residuals.py).
     """
     pixels, is_coupled = NoisyPixels.of(solution), _is_coupled(solution)
     size, n = solution.basis.size, len(solution.weights)
@@ -195,7 +196,7 @@ def painting_covariance(solution: Solution) -> Doubles | None:
         lit = pixels.planes.pixels(part)
         rows = [lit[..., c] * roots[part, c].astype(kind) for c in range(3)]
         for c, d in [(k, k) for k in range(3)] + [(0, 1), (0, 2), (1, 2)] * is_coupled:
-            # Its noise, too, is that of paths, which carry all channels.
+            # Its noise, too, is the noise of paths, which carry all channels.
             product = rows[c] @ rows[d].T
             covariance[c, :, d] += product
             if c != d:
@@ -384,7 +385,7 @@ def pseudo_inverse(M: Doubles) -> Doubles:
 
 def _roots(M: Doubles) -> tuple[Doubles, Doubles]:
     """Return R with R Rᵀ = M and its pseudo-inverse, without the directions that change nothing."""
-    # Less the power of its noise, that of a very dim light may be negative.
+    # Less the power of its noise, the power of a very dim light may be negative.
     scale = np.sqrt(np.maximum(np.diag(M), 0))
     safe = np.where(scale > 0, scale, 1)
     scaled = M / safe[:, None] / safe

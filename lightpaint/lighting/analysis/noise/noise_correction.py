@@ -6,8 +6,8 @@ both and changes the sums little. It is linear and the same for both halves, so 
 is the sum of averaged half differences.
 
 The weight of the average in a pixel follows from the noise of all lights together and from the
-change beyond it: t = V / (V + B), as for pictures. So with more samples the sums converge to those
-of the basis, and reflections or caustics are kept once they are clean.
+change beyond it: t = V / (V + B), as for pictures. So with more samples the sums converge to the
+sums of the basis, and reflections or caustics are kept once they are clean.
 """
 
 from collections.abc import Sequence

@@ -205,7 +205,8 @@ class _Steadied:
     """A picture and its steadier light, (3, p) each.
 
     steady: the steadier light. distance: of the picture from it. noise: half differences of the
-    picture. noise_left: those of the light between both that the steadier light does not average.
+    picture. noise_left: the half differences of the light between both that the steadier light does
+    not average.
     """
 
     steady: Doubles
@@ -246,7 +247,8 @@ class _Tangent:
         return self.at([np.zeros(1) for _ in self.pictures])
 
     def along(self, changes: list[Doubles]) -> Doubles:
-        """Return the change of the tangent, (3, p), with those of the pictures, (3, p) each."""
+        """Return the change of the tangent, (3, p), with the changes of the pictures, (3, p)
+        each."""
         size = np.max([np.abs(x).max(axis=0) for x in changes], axis=0)
         step = STEP * np.abs(self.light.steady).max(axis=0) / np.where(size > 0, size, 1)
         above, below = (self.at([sign * step * x for x in changes]) for sign in (1, -1))

@@ -5,8 +5,8 @@ The two halves of the samples give two gradients of the objective at the solved 
 their difference, pixel by pixel, gives the covariance of the gradient's noise, and the inverse
 of M turns that into the covariance of the weights (docs/method.md, "How sure").
 
-In a picture that is all fireflies, power cannot be told from noise, and the light comes out too
-dim. At most half of M is removed as noise, since the rest would be noise itself. So the least
+In a picture that is all fireflies, power cannot be separated from noise, and the light comes out
+too dim. At most half of M is removed as noise, since the rest would be noise itself. So the least
 power of a light in a render without noise is estimated; the answer with that power tells how far
 the true one may be (docs/method.md, "How sure").
 
@@ -55,8 +55,8 @@ READINGS, FEW_READINGS = 8, 3
 #: Fewest lights that count as many.
 MANY_LIGHTS = 64
 
-#: Amount of noise that is added, relative to that of the basis. A threshold answers less to noise
-#: that comes on top of other noise (docs/benchmarks.md has how often intervals hold).
+#: Amount of noise that is added, relative to the noise of the basis. A threshold answers less to
+#: noise that comes on top of other noise (docs/benchmarks.md has how often intervals hold).
 AMOUNT = 1.2
 
 #: Seed of the signs of the noise that is added.
@@ -77,8 +77,8 @@ OWN = 1 - 1e-6
 class ReadingNoise:
     """The noise in the reading of a painting.
 
-    scatter: (n, 3), standard deviation of the weights by it. widening: ratio of an interval to that
-    of a standard deviation which is known.
+    scatter: (n, 3), standard deviation of the weights by it. widening: ratio of an interval to the
+    interval of a standard deviation which is known.
     """
 
     scatter: Doubles
@@ -275,8 +275,8 @@ def error_bars(
     None if the noise of the basis is unknown, which is not the same as none. After reweighting they
     are of the last linear problem.
 
-    Fixed or locked lights have an error of 0; that of lights which reach nothing is unknown. Noise
-    may have pushed a weight to 0 or to a limit: it has an interval on one side.
+    Fixed or locked lights have an error of 0; the error of lights which reach nothing is unknown.
+    Noise may have pushed a weight to 0 or to a limit: it has an interval on one side.
 
     Args:
         solution: From `solve`, `refine` or `correct_noise`.

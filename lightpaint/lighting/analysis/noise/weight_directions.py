@@ -210,7 +210,7 @@ def all_columns(solution: Solution) -> Doubles:
     columns = np.zeros((3, len(scalar), 3, lights.size))
     for k, light in enumerate(lights):
         for c in range(3):
-            # With one weight for all channels, the unknown is that of the first channel.
+            # With one weight for all channels, the unknown is the unknown of the first channel.
             columns[c, light, 0 if scalar[light] else c, k] = lit[light, c]
     return columns.reshape(3 * len(scalar), -1)
 
@@ -314,7 +314,7 @@ class WeightSpread:
         """Return the spread of lights that may be noise alone, and of others.
 
         weak: the spread where such lights have as little power as they may. doubts: (n, 3), 0 to 1.
-        The expected excess is that of these equations.
+        The expected excess is the excess with these equations.
         """
         inside, below, above = (
             np.sqrt((1 - doubts) * np.square(x) + doubts * np.square(y))
@@ -326,7 +326,7 @@ class WeightSpread:
 class WeightResponse:
     """The response of the weights to noise of the gradient.
 
-    The work on the equations serves the noise of the basis and that of the painting.
+    The work on the equations serves the noise of the basis and the noise of the painting.
     """
 
     def __init__(
@@ -491,7 +491,7 @@ class BlockResponse:
         k), over all that noise may move.
 
         C: (k, k), covariance of the noise of the gradient. Noise moves the free directions, and
-        those of bounds that noise alone may have activated.
+        the directions of bounds that noise alone may have activated.
         """
         ends, moved, inverse = self._inverse_of_moved(C)
         return ends, moved.effect(np.ascontiguousarray(moved.effect(inverse).T))

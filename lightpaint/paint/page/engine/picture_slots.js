@@ -12,7 +12,7 @@ import { nameInView } from './message_frames.js';
  *   lookPictures: (number | null)[] | null, lookMixes?: RGB[][] | null, master?: number}} Display
  */
 
-/** Number of looks that are compared at a time. Their pictures are planes behind those of lights. */
+/** Number of looks that are compared at a time. Their pictures are planes behind the lights' planes. */
 export const COMPARED_COUNT = 4;
 
 /** Pictures that a page always shows or uses, by name. */

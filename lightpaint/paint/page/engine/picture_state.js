@@ -102,7 +102,7 @@ export class PictureState {
     return master === 1 ? weights : weights.map((x, i) => (isFixed(i) ? x : master * x));
   }
 
-  /** Return weights for all planes of the view, from those of the lights and maybe of compared
+  /** Return weights for all planes of the view, from the weights of the lights and maybe of compared
    * looks; null for weights of other lights.
    * @param {ArrayLike<number>} weights */
   forPlanes(weights) {

@@ -206,7 +206,7 @@ export class SessionMirror extends PictureState {
       this.isReady = true;
       this.redraw([canvas.wholeRegion]);
     } catch (error) {
-      // A page without the session has been told so already.
+      // A page without the session knows that already.
       if (this.loader.isPaused) return;
       this.emit('trouble', { text: error instanceof Error ? error.message : String(error) });
     }

@@ -25,7 +25,7 @@ import { t } from '../language/language.js';
  * @property {<K extends keyof HostEvents>(kind: K, listener: (message: HostEvents[K]) => void) => void} on
  * @property {(name: string) => Promise<Picture>} fetch
  * @property {() => void} close
- * @property {() => Promise<void>} [gate] is waited for by what is said after strokes
+ * @property {() => Promise<void>} [gate] is waited for before messages that follow strokes
  */
 
 /** Messages to a page: from the session, and from its host about the connection.

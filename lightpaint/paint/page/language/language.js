@@ -12,7 +12,7 @@ import { LANGUAGES } from './languages.js';
 /** Where the browser keeps the chosen language. */
 const LANGUAGE_KEY = 'lightpaint.language';
 
-/** The code of the language that the page has: the chosen one, else that of the browser, else English. */
+/** The code of the language that the page has: the chosen one, else the browser's, else English. */
 export const language = chooseLanguage();
 
 const translation = LANGUAGES[language];

@@ -123,7 +123,7 @@ export function PointerStatus({ ui }) {
     )}</p>`;
 }
 
-/** Return the share of each light, and of each image that of all its texels.
+/** Return the share of each light, and of each image the sum over its texels.
  * @param {Ui} ui @param {number[]} shares */
 function sharesByName(ui, shares) {
   /** @type {Map<unknown, {key: string, name: string, share: number}>} */

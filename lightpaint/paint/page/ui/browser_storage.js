@@ -119,7 +119,7 @@ const STORED_FIELDS = [
   'size',
 ];
 
-/** Store the tool settings and the recent colours, merged with those of other open painters.
+/** Store the tool settings and the recent colours, merged with what other open painters stored.
  * @param {Ui} ui */
 function storedFields({
   colour,

@@ -93,7 +93,7 @@ const MAX_WHITE_DUV = 20;
  * @param {number[]} rgb linear, the exposure included @returns {string} */
 export const lightText = (rgb) => describeLight(rgb, luminance(rgb));
 
-/** Return paint as text, as in its panel: its stops are those of its largest channel.
+/** Return paint as text, as in its panel: its stops are its largest channel's.
  * @param {number[]} rgb linear, the exposure included @returns {string} */
 export const paintText = (rgb) => describeLight(rgb, Math.max(...rgb));
 

@@ -76,7 +76,7 @@ export function handleKey(event, app) {
   event.preventDefault();
 }
 
-/** Return whether a key that is pressed in a field is that of a command. Saving a look commits the
+/** Return whether a key that is pressed in a field belongs to a command. Saving a look commits the
  * text first; undo and redo work without uncommitted text.
  * @param {KeyboardEvent} event @param {CommandKey | undefined} shortcut */
 function worksInField(event, shortcut) {

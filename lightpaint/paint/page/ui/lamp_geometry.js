@@ -42,7 +42,7 @@ function coefficients(a, b, c, v) {
 
 /**
  * Return a point's place in pixels of the picture, and whether it is in front of the camera. For a
- * point behind it, the place is that of the opposite direction.
+ * point behind it, the place belongs to the opposite direction.
  * @param {Camera} camera @param {number[]} point @returns {{x: number, y: number, isAhead: boolean}}
  */
 export function project(camera, point) {
@@ -171,7 +171,7 @@ export function onRail([start, end], point) {
   return add(start, axis, Math.min(1, Math.max(0, share)));
 }
 
-/** Return the point of a rail at which one coordinate has a value between those of its ends; null if
+/** Return the point of a rail at which one coordinate has a value between its ends; null if
  * that coordinate is the same all along. @param {number[][]} rail both ends @param {number} c
  * @param {number} value @returns {Vector | null} */
 export function onRailAt([start, end], c, value) {

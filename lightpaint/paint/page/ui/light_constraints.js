@@ -182,7 +182,7 @@ function LevelLimits({ light, app, constraints, isImage = false, set: constrain 
     });
     constrain({ ...constraints, limits: Object.fromEntries(convertedLimits) });
   };
-  // A share is that of each texel, so that no single level is equal to it.
+  // A share belongs to each texel, so that no single level is equal to it.
   const isUnitSet = isImage && levels.length > 0;
   const units = unitsOf(light).filter(({ value }) => !isUnitSet || value === unit);
   return html`<div class="ask-fields is-levels">

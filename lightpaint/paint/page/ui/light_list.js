@@ -164,7 +164,7 @@ function Group({ name, ui, app, members, isMany }) {
   const share = members.reduce((sum, k) => sum + (ui.lightAnswers[k]?.share ?? 0), 0);
   const isSolo = members.every((k) => ui.solo.includes(k));
   const solo = ui.solo.filter((k) => !members.includes(k));
-  // Emitters of a lamp, whose light is that of all of them together.
+  // Emitters of a lamp, which share one light.
   const rendering = ui.lights[members[0]].lamp && ui.lightAnswers[members[0]]?.rendering;
   return html`<div class="light-group" role="group" aria-label=${name}>
     <div class="group-head">

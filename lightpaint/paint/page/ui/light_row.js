@@ -19,7 +19,7 @@ import {
 import { Thumbnail } from './thumbnail.js';
 import { t } from '../language/language.js';
 
-/** Share of the picture's light from which a lamp's tint is named: nobody sees that of a dimmer one.
+/** Share of the picture's light from which a lamp's tint is named: nobody sees the tint of a dimmer one.
  * A share that is shown as 3 % is less. */
 const MIN_TINT_SHARE = 0.035;
 

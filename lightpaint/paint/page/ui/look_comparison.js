@@ -1,6 +1,6 @@
 /**
  * Two to four looks side by side. A look whose lights hang as they do now is a mix of their planes;
- * of any other the session makes a picture, which counts as a plane behind those of the lights.
+ * of any other the session makes a picture, which counts as a plane behind the lights' planes.
  */
 
 import { nameInView } from '../engine/message_frames.js';
@@ -62,7 +62,7 @@ export function showsElsewhere(ui, kind) {
 export const isPending = (ui, look) =>
   isElsewhere(ui, look) && !(nameInView(`look_clean/${look.id}`, ui.view) in ui.resources);
 
-/** Return the pictures of a session without those of looks that are not compared any more.
+/** Return the pictures of a session without looks that are not compared any more.
  * @param {Ui["resources"]} resources @param {number[]} ids of the compared looks */
 export function withoutLooks(resources, ids) {
   const isKept = (/** @type {string} */ name) => {

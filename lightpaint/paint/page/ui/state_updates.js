@@ -154,7 +154,7 @@ function transformDisplay(transform) {
 }
 
 /**
- * Take an exact answer. Its sentences follow later; until then those of the last answer stay.
+ * Take an exact answer. Its sentences follow later; until then the last sentences stay.
  * @param {any} answer @param {Ui} previous @returns {Partial<Ui>}
  */
 function answerFields(answer, previous) {

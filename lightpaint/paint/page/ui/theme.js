@@ -1,4 +1,4 @@
-/** The dark and the light theme: that of the system or of the notebook, or the one that was chosen. */
+/** The dark and the light theme: as the system or the notebook has it, or as chosen. */
 
 /** @typedef {import("./ui_state.js").UiStore} UiStore */
 /** @typedef {"system" | "dark" | "light"} Theme */

@@ -54,11 +54,11 @@ import { initialSelection } from './selection/selection_settings.js';
  *   & BaseUi} Ui
  *
  * @typedef {object} BaseUi
- * @property {boolean} ready whether the session has said what there is
+ * @property {boolean} ready whether the session has sent what there is
  * @property {string} waitReason why there is nothing yet, if something went wrong
  * @property {boolean} isExporting files
  * @property {Progress | null} exportProgress how far the export is, if it takes long
- * @property {any} state as the session said it last, of the view that is shown
+ * @property {any} state as the session sent it last, of the view that is shown
  * @property {number} version how often the session had changed, as its last message says
  * @property {number} view that is shown
  * @property {{name: string, size: [number, number]}[]} views of the session
@@ -78,7 +78,7 @@ import { initialSelection } from './selection/selection_settings.js';
  * @property {boolean} isLive the last answer is the quick one, of a stroke in progress
  * @property {boolean} isJudgementCurrent whether the statements on the answer are on the last one
  * @property {Record<string, Constraints>} constraints
- * @property {Record<string, Constraints>} earlier those of held lights from before they were held
+ * @property {Record<string, Constraints>} earlier constraints of held lights from before they were held
  * @property {boolean} isStarted whether the solve starts from lamps that were set by hand
  * @property {string[]} kept names of lights that are held only since they were moved
  * @property {string[][]} ties
@@ -138,12 +138,12 @@ import { initialSelection } from './selection/selection_settings.js';
  * @property {File | null} layerFile that somebody imports, while it is asked where to
  * @property {string} layerNote what has happened to a layer by key, for screen readers
  * @property {Record<string, number>} resources
- * @property {boolean} hint whether somebody still has to be told what to do
+ * @property {boolean} hint whether somebody still needs instructions
  * @property {Tool} tool
  * @property {number} size
  * @property {number} hardness
  * @property {number} flow
- * @property {number} fillFlow that of Fill
+ * @property {number} fillFlow the flow of Fill
  * @property {number} importance
  * @property {"light" | "colour"} paintMode
  * @property {"spot" | "object" | "selection"} adjustedArea what a drag adjusts

@@ -74,7 +74,7 @@ class ImageDomain(ABC):
         """Yield the neighbours in an image.
 
         The sum of stiffness times squared difference is the mean of |∇f|² over the domain, in
-        units of length in which the area is that of the unit sphere, 4π.
+        units of length in which the area is the area of the unit sphere, 4π.
         """
 
     @abstractmethod
@@ -260,8 +260,8 @@ class FlatDomain(ImageDomain):
 class Wall(FlatDomain):
     """A surface with texture coordinates, which shines as an `area` light.
 
-    The second coordinate of a rectangle increases upwards, that of a mesh downwards, as its images
-    are painted.
+    The second coordinate of a rectangle increases upwards, the coordinate of a mesh downwards, as
+    its images are painted.
     """
 
     noun: ClassVar[str] = "the image of an area light"
@@ -288,7 +288,7 @@ class Slide(FlatDomain):
 def _resampled(image: Floats, size: GridSize, weights: Callable[[int, int], Doubles]) -> Doubles:
     """Return an image (h, w, 3) at another size, (rows, columns, 3).
 
-    weights: returns those of some pixels in a row at some places, (places, pixels).
+    weights: returns the weights of some pixels in a row at some places, (places, pixels).
     """
     columns, rows = size
     height, width = image.shape[:2]

@@ -48,7 +48,7 @@ class TexelLayout:
     """The texels of an image.
 
     size: columns and rows of the coarsest grid. splits: texels that are split again, coarse ones
-    before finer ones; only those of a sky can be.
+    before finer ones; only texels of a sky can be.
     """
 
     size: GridSize
@@ -151,7 +151,7 @@ class TexelLayout:
         return values if np.allclose(self.image(values), image, rtol=1e-3, atol=0) else None
 
     def texel_at(self, place: Node) -> Node:
-        """Return the texel at a place of a grid: that of the grid, or of a finer one."""
+        """Return the texel at a place of a grid: the texel of the grid, or of a finer one."""
         while place not in self.number_of:
             level, column, row = place
             place = level + 1, RATIO * column + 1, RATIO * row
@@ -212,7 +212,8 @@ class TexelLayout:
 
     @cached_property
     def finer_under(self) -> dict[Node, list[Node]]:
-        """The finer texels that take a part of a hat, by its texel, for those of which some do."""
+        """The finer texels that take a part of a hat, by its texel, for the texels of which some
+        do."""
         found: dict[Node, list[Node]] = {}
         for finer in self.nodes:
             for node in self._below(finer) if finer[0] else ():
@@ -289,7 +290,7 @@ class Texel:
 
     @property
     def name(self) -> str:
-        """Its name as a light: those of its image, its column and its row."""
+        """Its name as a light: the names of its image, its column and its row."""
         return node_name(self.image, self.node)
 
     @property

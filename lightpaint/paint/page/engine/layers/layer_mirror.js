@@ -26,7 +26,7 @@ export class LayerMirror {
     this.listener = listener;
     /** The layers, the lowest first, as the page shows them. @type {Layer[]} */
     this.list = [PAINTING];
-    /** What the session has said last. @type {LayerList | null} */
+    /** The last list that the session has sent. @type {LayerList | null} */
     this.known = null;
     /** @type {Map<number, number>} */
     this.accents = new Map();

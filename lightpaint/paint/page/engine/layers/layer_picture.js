@@ -136,7 +136,7 @@ export class LayerPicture {
     this.base = { image: this.image.slice(), importance: this.importance.slice(), count, state };
   }
 
-  /** Whether the captured composition is still that of the lowest layers. */
+  /** Whether the captured composition still has the lowest layers. */
   get isBaseCurrent() {
     return this.base !== null && this.stateBelow(this.base.count) === this.base.state;
   }

@@ -79,7 +79,7 @@ function insideSpans(corners, y) {
   return spans;
 }
 
-/** Add the coverage of a span to that of a row's pixels, as changes from each to the next.
+/** Add the coverage of a span to the coverage of a row's pixels, as changes from each to the next.
  * @param {Float64Array} changes @param {number} from @param {number} to @param {number} width */
 function addSpan(changes, from, to, width) {
   addEdge(changes, Math.min(width, Math.max(0, from)), 1);

@@ -23,7 +23,7 @@ export class SelectionMirror {
     this.size = [1, 1];
     /** Index of the current view. */
     this.view = 0;
-    /** What the session has said last. @type {SelectionInfo | null} */
+    /** The last selection that the session has sent. @type {SelectionInfo | null} */
     this.known = null;
     /** Revision of the session's selection that the page has. @type {number | null} */
     this.revision = null;

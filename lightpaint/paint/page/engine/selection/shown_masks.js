@@ -1,4 +1,4 @@
-/** Masks by what a picture shows: colours like that of a place, a range of brightness, a light. */
+/** Masks by what a picture shows: colours like the colour of a place, a range of brightness, a light. */
 import { luminance } from '../../../../viewer/drawing/colour.js';
 import { VALUES } from '../../../../viewer/drawing/half_floats.js';
 import { decodeSrgb } from '../../../../viewer/drawing/view_transform.js';
@@ -65,7 +65,7 @@ export function brightnessMask(codes, low, high) {
   return mask;
 }
 
-/** Return how far a light lights each place: the light that arrives there, relative to that of a
+/** Return how far a light lights each place: the light that arrives there, relative to the light of a
  * typical lit place. @param {Uint16Array} plane (h, w, 3) halves
  * @param {Uint16Array | null} albedo (h, w, 3) halves @returns {Uint8Array} */
 export function lightMask(plane, albedo) {

@@ -1,4 +1,4 @@
-/** The name of an export, which becomes that of its folder. */
+/** The name of an export, which its folder has, too. */
 
 import { html } from '../../vendor/preact.js';
 import { currentLook } from '../look_actions.js';
@@ -9,7 +9,7 @@ import { t } from '../../language/language.js';
 /** Characters of the longest name of an export. */
 const MAX_LENGTH = 80;
 
-/** Return a name for an export of the answer: that of the look which equals it, or of the scene.
+/** Return a name for an export of the answer: the name of the look which equals it, or of the scene.
  * @param {Ui} ui @returns {string} */
 export function suggestedName(ui) {
   const current = currentLook(ui);

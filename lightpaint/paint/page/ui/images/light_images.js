@@ -34,7 +34,7 @@ export function imageOf(images, light) {
 /** @type {WeakMap<number[][], Map<number, number>>} */
 const sums = new WeakMap();
 
-/** Return the part of an image that each of its lights covers: the sum of those of its places, of
+/** Return the part of an image that each of its lights covers: the sum over its places, of
  * which there are many where some texels are finer. @param {LightImage} image
  * @returns {Map<number, number>} */
 export function coverage({ places, shares }) {

@@ -20,7 +20,7 @@ const LAMP_MIXERS = [
   { value: 'gel', label: t('Gel'), tip: t('Colour filters by number') },
 ];
 
-/** Controls for the colour of some lamps, which keep their levels; they begin at that of the first.
+/** Controls for the colour of some lamps, which keep their levels; they begin at the first one's.
  * @param {{ui: Ui, app: App, lights: number[]}} props */
 export function LampColour({ ui, app, lights }) {
   const { lampMixer: mixer } = ui;

@@ -152,7 +152,7 @@ export class ManyLights {
 
   /** Set the constraints on lights, by name. @param {Record<string, Constraints>} constraints
    * @param {string} label @param {boolean} [isFinal]
-   * @param {Record<string, Constraints>} [earlier] those of held lights, for when they are released */
+   * @param {Record<string, Constraints>} [earlier] constraints of held lights, for when they are released */
   async constrain(constraints, label, isFinal = true, earlier = {}) {
     const { session, store } = this;
     const pending = store.value.lights.flatMap(({ name }, k) =>
@@ -225,7 +225,7 @@ export class ManyLights {
   }
 }
 
-/** Return those of some lights that can be set. @param {Ui} ui @param {number[]} lights */
+/** Return the ones of some lights that can be set. @param {Ui} ui @param {number[]} lights */
 export const adjustableLights = (ui, lights) => lights.filter((k) => !ui.lights[k].is_fixed);
 
 /** Return those whose colour can be set: tied lights keep theirs. @param {Ui} ui

@@ -47,7 +47,7 @@ function Bar({ share, isColour = false }) {
 /** Return a delivered share in whole percent; 0 if it went the other way. @param {number} share */
 export const percentOf = (share) => Math.max(Math.round(100 * share), 0);
 
-/** Return the shares that something was asked of, first that of brightness. @param {Shares} shares */
+/** Return the shares that something was asked of, brightness first. @param {Shares} shares */
 export const knownShares = ({ brightness, color }) =>
   [brightness, color].filter((share) => share !== null);
 

@@ -17,7 +17,7 @@ export const DOT_RADIUS = 6;
 const cellsOfViews = new WeakMap();
 
 /** Return the cells that a view shows in the order in which they are drawn: planes of fine grids, such
- * as desks, over those of wide ones, such as floors, and listed points over all. @param {PlanesInfo} info
+ * as desks, over the cells of wide ones, such as floors, and listed points over all. @param {PlanesInfo} info
  * @param {number} view @returns {PlaneCell[]} none if its camera is not a pinhole */
 export function cellsInView(info, view) {
   const known = cellsOfViews.get(info) ?? [];

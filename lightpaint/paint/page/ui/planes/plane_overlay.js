@@ -90,7 +90,7 @@ export function PlanesOverlay({ ui, panes }) {
     ui.view,
     Object.values(pane ?? {}).join(' '),
   ]);
-  // Its numbers are those of the panel and of the line below the pictures.
+  // It has the numbers of the panel and of the line below the pictures.
   return html`<canvas class="plane-overlay" ref=${ref} hidden=${!cells.length} aria-hidden="true"></canvas>`;
 }
 

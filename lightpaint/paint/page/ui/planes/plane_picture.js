@@ -5,7 +5,7 @@ import { t } from '../../language/language.js';
 
 /** @typedef {import("../../engine/messages.js").MeasuredPlane} MeasuredPlane */
 
-/** Colours from little to much light, those of the pictures in reports: they also differ in lightness,
+/** Colours from little to much light, as in the pictures of reports: they also differ in lightness,
  * for those who see few colours. */
 const COLOURS = [
   [38, 14, 74],

@@ -1,4 +1,4 @@
-/** Drawing of scopes on a canvas, whose size in pixels is that of their counts. */
+/** Drawing of scopes on a canvas, with a pixel for each count. */
 
 import { histogram, LEVELS, traceAlpha, vectorscope, waveform } from './scope_arithmetic.js';
 
@@ -12,7 +12,7 @@ export const VECTOR_SIZE = 200;
 /** Height of a histogram in pixels, and the part of the pixels of its highest bar that fills it. */
 const HISTOGRAM_HEIGHT = 120;
 
-/** Colours of red, green, blue and luma, bright enough to be told apart on black. */
+/** Colours of red, green, blue and luma, bright enough to be distinguished on black. */
 const INKS = [
   [255, 90, 80],
   [90, 220, 110],
@@ -46,7 +46,7 @@ function drawTraces(canvas, traces, inks) {
   put(canvas, image);
 }
 
-/** Draw bars of each code, luma behind the channels, whose inks add up. The highest bar but those of
+/** Draw bars of each code, luma behind the channels, whose inks add up. The highest bar but the bars of
  * black and white has the whole height. @param {HTMLCanvasElement} canvas
  * @param {Float32Array[]} counts */
 function drawHistogram(canvas, counts) {
