@@ -345,7 +345,9 @@ def room_of_scene(path: Path, folder: Path) -> Room:
 
 def _scene_tags(text: bytes) -> list[bytes]:
     """Return the names of the elements of a scene. text: UTF-8. Raises ValueError for other XML."""
-    names, open_names, roots = [], [], []
+    names: list[bytes] = []
+    open_names: list[bytes] = []
+    roots = []
     for token in markup(text):
         if (name := token["tag"]) is not None:
             names.append(name)
