@@ -29,9 +29,10 @@ from lightpaint.basis.file.basis_file import write_basis
 from lightpaint.basis.lights import BasisLight
 from lightpaint.batch.cluster.cluster import Cluster
 from lightpaint.batch.distributed_work import PartwiseRender
-from lightpaint.batch.engine import Engine, InProcess, RunOptions
+from lightpaint.batch.engine import Engine, InProcess
 from lightpaint.batch.plan.planner import plan_batch
 from lightpaint.batch.run import run_batch
+from lightpaint.batch.run_options import RunOptions
 from lightpaint.batch.work.work_items import SceneFilm, Task
 from lightpaint.batch.work.worker_storage import WorkerCache
 from lightpaint.images.formats.exr import write_rgb

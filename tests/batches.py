@@ -91,9 +91,9 @@ def contents(folder: Path) -> dict[str, bytes]:
 
 def run_whole_batch(manifest: str, folder: str, workers: int = 1) -> None:
     """Do what is left of a batch, as a process of its own may."""
-    from lightpaint.batch.engine import RunOptions
     from lightpaint.batch.plan.planner import plan_batch
     from lightpaint.batch.run import run_batch
+    from lightpaint.batch.run_options import RunOptions
 
     run_batch(plan_batch(manifest, folder), RunOptions(workers))
 

@@ -5,7 +5,6 @@ from typing import TYPE_CHECKING
 from lightpaint.lazy_names import lazy_names
 
 if TYPE_CHECKING:
-    from lightpaint.batch.engine import RunOptions as RunOptions
     from lightpaint.batch.gallery.gallery import counts_text as counts_text
     from lightpaint.batch.gallery.gallery import entry_of as entry_of
     from lightpaint.batch.gallery.gallery import write_solve_gallery as write_solve_gallery
@@ -25,6 +24,7 @@ if TYPE_CHECKING:
     from lightpaint.batch.plan.planner import plan_batch as plan_batch
     from lightpaint.batch.run import BatchOutcome as BatchOutcome
     from lightpaint.batch.run import run_batch as run_batch
+    from lightpaint.batch.run_options import RunOptions as RunOptions
     from lightpaint.batch.work.derived_looks import publish_shifted as publish_shifted
     from lightpaint.batch.work.derived_looks import shifted_folders as shifted_folders
     from lightpaint.batch.work.derived_looks import variation_folder as variation_folder

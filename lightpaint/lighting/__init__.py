@@ -5,7 +5,7 @@ from typing import TYPE_CHECKING
 from lightpaint.lazy_names import lazy_names
 
 if TYPE_CHECKING:
-    from lightpaint.lighting.algebra.optimum import Method as Method
+    from lightpaint.lighting.algebra.method import Method as Method
     from lightpaint.lighting.algebra.optimum import minimise as minimise
     from lightpaint.lighting.analysis.analysis import Analysis as Analysis
     from lightpaint.lighting.analysis.analysis import analyse as analyse

@@ -20,7 +20,7 @@ from command import run, succeed
 from nightly import nightly
 
 from lightpaint.batch import engine
-from lightpaint.batch.engine import Processes, RunOptions
+from lightpaint.batch.engine import Processes
 from lightpaint.batch.gallery.gallery import contact_sheet, gallery_page
 from lightpaint.batch.gallery.summary import LightRow, SummaryRow, summary_csv
 from lightpaint.batch.manifest.file_names import FILES, is_reserved
@@ -28,6 +28,7 @@ from lightpaint.batch.manifest.keys import as_key
 from lightpaint.batch.manifest.manifest import read_manifest
 from lightpaint.batch.plan.planner import plan_batch
 from lightpaint.batch.run import _Run, run_batch
+from lightpaint.batch.run_options import RunOptions
 from lightpaint.batch.work import item_execution
 from lightpaint.batch.work.work_items import ItemResult, Task
 from lightpaint.errors import BatchError, OutputError

@@ -22,9 +22,9 @@ from lightpaint.basis.file import basis_file
 from lightpaint.basis.render import banded_film, basis_render
 from lightpaint.basis.render import render_parts as parts_module
 from lightpaint.batch.cluster.cluster import Cluster
-from lightpaint.batch.engine import RunOptions
 from lightpaint.batch.plan.planner import plan_batch
 from lightpaint.batch.run import BatchOutcome, run_batch
+from lightpaint.batch.run_options import RunOptions
 from lightpaint.images.formats.exr import write_rgb
 from lightpaint.scene import scene_render
 from lightpaint.scene.runtime.kernel_threads import limit_threads

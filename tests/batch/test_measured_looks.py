@@ -13,7 +13,6 @@ from renderer import LIGHTS, write_room
 from lightpaint.basis.cache.cached_render import obtain_basis
 from lightpaint.basis.file.basis_file import write_basis
 from lightpaint.batch.cluster.parcels import FileHashes, ParcelStore, pack, pieces
-from lightpaint.batch.engine import RunOptions
 from lightpaint.batch.gallery.summary import (
     LightRow,
     ObserverRow,
@@ -26,6 +25,7 @@ from lightpaint.batch.gallery.summary import (
 from lightpaint.batch.plan.plan import estimate
 from lightpaint.batch.plan.planner import plan_batch
 from lightpaint.batch.run import run_batch
+from lightpaint.batch.run_options import RunOptions
 from lightpaint.batch.work.item_execution import run_item
 from lightpaint.batch.work.worker_storage import WorkerCache
 from lightpaint.errors import BatchError

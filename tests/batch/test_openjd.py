@@ -59,9 +59,9 @@ def test_its_commands_done_one_by_one_leave_what_one_batch_leaves(folder: Path) 
 
 
 def test_those_that_share_a_folder_keep_others_out(folder: Path) -> None:
-    from lightpaint.batch.engine import RunOptions
     from lightpaint.batch.plan.planner import plan_batch
     from lightpaint.batch.run import run_batch
+    from lightpaint.batch.run_options import RunOptions
     from lightpaint.errors import OutputError
 
     planned, remarks = plan_batch(folder / "looks.toml", folder / "out"), []

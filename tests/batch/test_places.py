@@ -10,9 +10,9 @@ import pytest
 from renderer import write_room
 
 import lightpaint as lp
-from lightpaint.batch.engine import RunOptions
 from lightpaint.batch.plan.planner import plan_batch
 from lightpaint.batch.run import run_batch
+from lightpaint.batch.run_options import RunOptions
 from lightpaint.errors import BatchError
 from lightpaint.images.formats.exr import write_rgb
 from lightpaint.lighting.answer.lighting_file import read_lighting

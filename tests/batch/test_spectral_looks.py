@@ -10,12 +10,12 @@ import numpy as np
 import pytest
 from spectral_room import DRIVES, PEAKS, paint_spectral_room, write_spectral_room
 
-from lightpaint.batch.engine import RunOptions
 from lightpaint.batch.gallery.summary import SummaryRow, lights_of_answer, summary_csv
 from lightpaint.batch.manifest.keys import shift
 from lightpaint.batch.manifest.sequence import interpolate
 from lightpaint.batch.plan.planner import plan_batch
 from lightpaint.batch.run import run_batch
+from lightpaint.batch.run_options import RunOptions
 from lightpaint.colour.color import luminance
 from lightpaint.colour.lamp import Lamp, LampEmitter
 from lightpaint.colour.spectra.spectrum import rgb_of_powers, spectrum_of

@@ -8,7 +8,7 @@ from typing import Annotated, Any, Literal
 
 import pytest
 
-from lightpaint.batch.engine import RunOptions
+from lightpaint.batch.run_options import RunOptions
 from lightpaint.cli.options.option_groups import add_fields
 from lightpaint.cli.options.parser import command_parser
 from lightpaint.cli.output.vocabulary import OPTIONS, RECORDS, SPELLINGS

@@ -11,7 +11,7 @@ import pytest
 from package_source import statements, tree_of
 
 import lightpaint
-from lightpaint.batch.engine import RunOptions
+from lightpaint.batch.run_options import RunOptions
 from lightpaint.cli.options.parser import command_parser
 from lightpaint.cli.options.source_options import LOADING
 from lightpaint.cli.output.vocabulary import BY_OPTION, OPTIONS, SPELLINGS, spoken

@@ -411,7 +411,7 @@ COMMANDS = {
     "measure": Command(
         "measure the illuminance on planes of a scene, in lux",
         _measure,
-        "measure_command",
+        "plane_commands",
         "photometry",
     ),
     "template": Command(
@@ -421,7 +421,7 @@ COMMANDS = {
         "targets",
     ),
     "solve": Command(
-        "find the lighting that comes closest to a painting", _solve, "solve_command", "solving"
+        "find the lighting that comes closest to a painting", _solve, "render_commands", "solving"
     ),
     "paint": Command(
         "paint in the browser, and see the closest lighting as you paint",
@@ -432,7 +432,7 @@ COMMANDS = {
     "plan": Command(
         "find the least power that meets the wishes for measuring planes",
         _plan,
-        "plan_command",
+        "plane_commands",
         "photometry",
     ),
     "batch": Command(
@@ -448,7 +448,7 @@ COMMANDS = {
         "formats",
     ),
     "rig": Command(
-        "make a scene and a lights file of the fixtures of a show", _rig, "rig_command", "rigs"
+        "make a scene and a lights file of the fixtures of a show", _rig, "console_commands", "rigs"
     ),
     "send": Command(
         "send the levels of a lighting to a console, or print them",
@@ -478,12 +478,12 @@ COMMANDS = {
         "solving",
     ),
     "cache": Command(
-        "list or delete the bases that earlier runs kept", _cache, "maintenance", "solving"
+        "list or delete the bases that earlier runs kept", _cache, "program_commands", "solving"
     ),
     "doctor": Command(
         "check what works on this machine and what to install",
         add_variant,
-        "maintenance",
+        "program_commands",
         "install",
     ),
 }

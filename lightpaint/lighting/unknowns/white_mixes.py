@@ -24,7 +24,7 @@ import numpy as np
 
 from lightpaint.arrays import Doubles, Indices
 from lightpaint.colour import ColorHull, Lamp, WhiteRange
-from lightpaint.lighting.algebra.optimum import Method
+from lightpaint.lighting.algebra.method import Method
 from lightpaint.lighting.normal_equations import NormalEquations
 from lightpaint.lighting.unknowns.knobs import Knob, brightest_whites
 from lightpaint.lighting.unknowns.reduced_problem import ReducedOptimum, solve_reduced
