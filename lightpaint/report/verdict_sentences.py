@@ -27,6 +27,7 @@ from lightpaint.report.diagnosis_sentences import (
     SPILL_ADVICE,
     is_one_painting,
     named_worst_wish,
+    spoken_came,
     spoken_deliveries,
     spoken_delivery,
     spoken_mean_shares,
@@ -168,21 +169,28 @@ def _wish_headline(appearance: Appearance, wish: Delivery) -> str:
     """
     if is_one_painting(appearance.deliveries):
         return f"{spoken_whole(appearance)} {spoken_lack(appearance, wish)}"
-    newest = spoken_newest(appearance)
-    if appearance.is_nearly_equal:
-        whole = "On the whole it is close."
-    else:
-        progress = spoken_progress(appearance.progress)
-        whole = f"On the whole: {progress[:1].lower()}{progress[1:]}."
+    newest, whole = spoken_newest(appearance), spoken_on_the_whole(appearance)
     return " ".join(filter(None, [spoken_lack(appearance, wish), newest, whole]))
+
+
+def spoken_on_the_whole(appearance: Appearance) -> str:
+    """Return `On the whole: about half way.`, after the shares of wishes; "" if there is only one,
+    and it is not close.
+    """
+    if appearance.is_nearly_equal:
+        return "On the whole it is close."
+    if len(main_deliveries(appearance.deliveries)) == 1:
+        return ""
+    progress = spoken_progress(appearance.progress)
+    return f"On the whole: {progress[:1].lower()}{progress[1:]}."
 
 
 def spoken_whole(appearance: Appearance) -> str:
     """Return a sentence on how much of all that was painted came."""
-    is_nearly = appearance.is_nearly_equal
-    progress = "Close on the whole" if is_nearly else spoken_progress(appearance.progress)
+    if not appearance.is_nearly_equal:
+        return f"{spoken_came(appearance)}."
     shares = spoken_mean_shares(appearance.deliveries)
-    return f"{progress}: {shares}." if shares else f"{progress}."
+    return f"Close on the whole: {shares}." if shares else "Close on the whole."
 
 
 def spoken_lack(appearance: Appearance, wish: Delivery) -> str:

@@ -6,9 +6,9 @@ the rest by the amount of paint, so that a stroke changes the weight of every ot
 of their sums.
 
 In display space, and where paint means "at least this bright", every answer changes the weight of
-every pixel. There the picture is averaged to a few thousand pixels, and one round from the last answer follows the brush; the answer of all
-pixels comes when the brush is lifted. Of more than `MANY_LIGHTS` a round moves some at a time
-(many_lights.py), in linear light, too.
+every pixel. There the picture is averaged to a few thousand pixels, and one round from the last
+answer follows the brush; the answer of all pixels comes when the brush is lifted. Of more than
+`MANY_LIGHTS` a round moves some at a time (many_lights.py), in linear light, too.
 
 Only painted views count. Each has its own sums, so that a stroke costs no more than with a single
 view.
