@@ -26,6 +26,7 @@ from lightpaint.report.diagnosis_sentences import (
     SAMPLES_ADVICE,
     SPILL_ADVICE,
     is_one_painting,
+    lacks_only_wish,
     named_worst_wish,
     spoken_came,
     spoken_deliveries,
@@ -107,10 +108,9 @@ def verdict(
         (start := headline(appearance)),
         f"{spoken_delta_e(appearance, known=bool(predicted.half_difference.any()))}.",
     ]
-    is_told = named_worst_wish(appearance) is not None  # by the headline
-    if (deliveries := spoken_deliveries(appearance.deliveries, start)) and not (
-        is_told and len(main_deliveries(appearance.deliveries)) == 1
-    ):
+    is_only = len(main_deliveries(appearance.deliveries)) == 1
+    is_told = is_only and (shares := spoken_mean_shares(appearance.deliveries)) and shares in start
+    if (deliveries := spoken_deliveries(appearance.deliveries, start)) and not is_told:
         sentences.append(deliveries)
     if not solution.certificate.converged:
         sentences.append("The solve stopped before it converged.")
@@ -222,6 +222,11 @@ def _paint_headline(appearance: Appearance) -> str:
         return _wish_headline(appearance, wish)
     if appearance.place is None:
         return f"{_headline_start(appearance)}: too much of what was painted is out of reach."
+    if lacks_only_wish(appearance) and not appearance.is_nearly_equal:
+        missing = spoken_missing(appearance)
+        text = f"{missing[0].upper()}{missing[1:]} is missing: {spoken_reason(appearance)}."
+        advice = f" {ALONE_ADVICE}" if appearance.lacks_light_of_its_own else ""
+        return f"{spoken_came(appearance)}. {text}{advice}"
     if appearance.is_far:
         where = spoken_where(appearance.place)
         change = spoken_difference(appearance.place.painted, appearance.place.reached)

@@ -258,6 +258,31 @@ def test_a_headline_says_no_share_but_those_that_came(shares: Any, delta_e: floa
     )
 
 
+def test_an_only_wish_that_no_light_brings_is_first_said_to_be_out_of_reach():
+    """A wall that all lamps of a room light together, in the page and in the terminal."""
+    wall = Delivery("Back wall, +1.0 stops, warmer", 0.27, 0.33, layers=(1,), kind="layer")
+    for delta_e in (15.0, 9.0):  # far, and part of the way
+        appearance = Appearance(
+            delta_e,
+            0.0,
+            21.0,
+            PLACE,
+            reasons=(replace(HOLD, share=1.0),),
+            area_lights=SHARED,
+            deliveries=(wall,),
+        )
+        expected = (
+            "Out of reach (brightness 27 %, colour 33 % came). Brighter light on the floor is "
+            "missing: no light reaches it alone; sky and skylight light the plinths, too. Add a "
+            "light for it, or paint the rest as well."
+        )
+        assert sketch_headline(appearance) == expected
+        assert headline(appearance) == expected
+    # With a light of its own it is the hold that keeps it.
+    own = replace(appearance, area_lights=OWN)
+    assert sketch_headline(own).startswith("Part of the way: brightness 27 %, colour 33 %. ")
+
+
 def test_what_came_is_said_in_one_measure():
     """Page, terminal and report say it in the same words."""
     wishes = (Delivery("Painting", 0.93, 0.95),)

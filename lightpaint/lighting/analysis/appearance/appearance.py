@@ -160,6 +160,17 @@ class Appearance:
         return painted >= DARKER * reached
 
     @property
+    def needs_another_light(self) -> bool:
+        """True if a wish is missed because every light that reaches it lights the rest, too, or
+        because no light that there is can bring it.
+        """
+        if self.worst_wish is None or self.is_hidden_by_noise:
+            return False
+        if self.causes and self.causes[0].kind == "hold":
+            return self.lacks_light_of_its_own
+        return not self.causes and (self.is_out_of_reach or self.lacks_light_of_its_own)
+
+    @property
     def limit_groups(self) -> tuple[LimitGroup, ...]:
         """The groups of these reasons: `hold`, `colors`, `constraints` or `views`."""
         return tuple(dict.fromkeys(reason.group for reason in self.causes))
