@@ -54,7 +54,7 @@ from lightpaint.threads import one_thread
 
 #: Answers under a moving brush for each time that wishes and gamuts are found anew: from one move
 #: to the next they hardly change.
-ANSWERS_PER_READING = 4
+ANSWERS_PER_READING = 8
 
 #: Largest miss of a requirement under the brush, relative to its size: none that shows.
 MET_UNDER_BRUSH = 1e-5
