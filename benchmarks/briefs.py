@@ -2,7 +2,7 @@
 
     python benchmarks/briefs.py [--scenes gallery stage table cornell] [--cases 12] [--first 0]
                                 [--settings default own free ...]
-                                [--flat] [--presets] [--sculptures]
+                                [--flat] [--presets] [--sculptures] [--wall]
 
 A brief means a lighting: two to five accent lamps go to 2700 to 3500 K and up by 0.3 to 1.5 stops,
 all others to 6500 to 11,000 K and down by 0.5 to 2.5 stops; in a third of the cases there are no
@@ -22,14 +22,17 @@ thousandths), beyond what it has now and what is painted.
 --sculptures for the three sculptures of the gallery, bright and warm in a cool dark room, beside
 the lighting that somebody set by hand for it.
 
-docs/benchmarks.md reports cases 36 to 47; those before chose the constants.
+--wall asks for one warm wall of the gallery, all else as it is, with weaker and weaker holds, and
+beside it shows lightings that were set by hand for it.
+
+docs/benchmarks.md reports cases 48 to 59; those before chose the constants.
 """
 
 import argparse
 import time
 from collections.abc import Iterator, Sequence
 from contextlib import suppress
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
@@ -59,6 +62,9 @@ BLUR = 4 / 160
 
 #: Mean change of a zone, in ΔE of a*b* or L*, below which nothing of that kind was asked for.
 ASKED = 2.0
+
+#: Holds of unpainted parts for the warm wall; 4 is the default.
+WALL_HOLDS = (4, 2, 1, 0.5)
 
 #: Share of the light of an answer above which a lamp's colour counts.
 VISIBLE_SHARE = 0.03
@@ -131,13 +137,18 @@ def main() -> None:
     parser.add_argument("--flat", action="store_true", help="one painting without layers")
     parser.add_argument("--presets", action="store_true", help="presets instead of briefs")
     parser.add_argument("--sculptures", action="store_true", help="of the gallery, instead")
+    parser.add_argument("--wall", action="store_true", help="of the gallery, instead")
     options = parser.parse_args()
-    for name in options.scenes if not options.sculptures else ["gallery"]:
+    is_of_gallery = options.sculptures or options.wall
+    for name in options.scenes if not is_of_gallery else ["gallery"]:
         scene = lp.load_scene(SCENES / name / "scene.xml").reduced(SIZES[name])
         basis = obtain_basis(scene, spp=SPP)
         print(f"\n{name} {SIZES[name]}, {SPP} spp")
         if options.sculptures:
             show_sculptures(basis, options.settings)
+            continue
+        if options.wall:
+            show_wall(basis)
             continue
         numbers = range(options.first, options.first + options.cases)
         briefs = (
@@ -390,6 +401,48 @@ def show_sculptures(basis: lp.Basis, settings: Sequence[str]) -> None:
         inside, outside = lab[subject].mean(axis=0), lab[~subject].mean(axis=0)
         light, _, blue = inside - outside
         print(f"{name:24s}{brief.error(image):6.2f}{light:12.1f}{blue:10.1f}{outside[2]:16.1f}")
+
+
+#: Changes of lamps of the gallery by hand, in stops and mireds, that make its back wall warm.
+WALL_BY_HAND: dict[str, dict[str, tuple[float, float]]] = {
+    "one spot": {"spot_field": (2, 150)},
+    "and the sky": {"spot_field": (2, 150), "sky": (0.5, 60)},
+    "others less": {
+        "spot_field": (2, 150),
+        "sky": (0.7, 100),
+        "sun": (-1, 0),
+        "skylight": (-0.4, -30),
+    },
+    "the sky alone": {"sky": (1, 100)},
+}
+
+
+def show_wall(basis: lp.Basis) -> None:
+    """Print answers to a warm back wall, a stop brighter, and lightings that were set by hand."""
+    assert basis.objects is not None
+    current, wall = basis.mix(basis.current_weights), basis.objects.mask("back_wall")
+    painted = np.where(wall[..., None], current * 2 * warmer(120), current)
+    zones, masks = [wall, ~wall], [wall.astype(float), np.zeros(basis.size)]
+    whole = brief_of(basis, current, painted, painted, zones, masks)
+    target = replace(
+        whole.target, importance=wall.astype(np.float32), wishes=whole.target.wishes[:1]
+    )
+    brief = replace(whole, target=target)
+    print(f"{'':16s}{'light':>7s}{'colour':>8s}{'ΔE of the wall':>16s}{'of the rest':>13s}")
+    rows = [("nothing", current)]
+    rows += [(f"hold {h:g}", basis.mix(weights(basis, target, {"hold": h}))) for h in WALL_HOLDS]
+    for name, changes in WALL_BY_HAND.items():
+        by_hand = basis.current_weights.copy()
+        for lamp, (stops, mired) in changes.items():
+            by_hand[basis.names.index(lamp)] *= 2**stops * warmer(mired)
+        rows.append((name, basis.mix(by_hand)))
+    for name, image in rows:
+        colour, light = brief.delivered(image, wall)
+        off = delta_e(brief.shown(image), brief.shown(painted))
+        print(
+            f"{name:16s}{100 * light:7.0f}{100 * colour:8.0f}{off[wall].mean():16.1f}"
+            f"{off[~wall].mean():13.1f}"
+        )
 
 
 def lab_pixels(light: np.ndarray) -> np.ndarray:

@@ -30,9 +30,10 @@ if TYPE_CHECKING:
     from lightpaint.report.diagnosis_sentences import named_worst_wish as named_worst_wish
     from lightpaint.report.diagnosis_sentences import partly_reached as partly_reached
     from lightpaint.report.diagnosis_sentences import spoken_about as spoken_about
+    from lightpaint.report.diagnosis_sentences import spoken_came as spoken_came
     from lightpaint.report.diagnosis_sentences import spoken_cause as spoken_cause
-    from lightpaint.report.diagnosis_sentences import spoken_deliveries as spoken_deliveries
     from lightpaint.report.diagnosis_sentences import spoken_errors as spoken_errors
+    from lightpaint.report.diagnosis_sentences import spoken_mean_shares as spoken_mean_shares
     from lightpaint.report.diagnosis_sentences import spoken_newest as spoken_newest
     from lightpaint.report.diagnosis_sentences import spoken_shares as spoken_shares
     from lightpaint.report.diagnosis_sentences import uncertainty_sentence as uncertainty_sentence
@@ -65,6 +66,7 @@ if TYPE_CHECKING:
     from lightpaint.report.phrases import spoken_amount as spoken_amount
     from lightpaint.report.phrases import spoken_changed as spoken_changed
     from lightpaint.report.phrases import spoken_drives as spoken_drives
+    from lightpaint.report.phrases import spoken_elsewhere as spoken_elsewhere
     from lightpaint.report.phrases import spoken_lamp as spoken_lamp
     from lightpaint.report.phrases import spoken_part as spoken_part
     from lightpaint.report.phrases import spoken_percent as spoken_percent
@@ -94,6 +96,7 @@ if TYPE_CHECKING:
     from lightpaint.report.verdict_sentences import spoken_distance as spoken_distance
     from lightpaint.report.verdict_sentences import spoken_lack as spoken_lack
     from lightpaint.report.verdict_sentences import spoken_missing as spoken_missing
+    from lightpaint.report.verdict_sentences import spoken_on_the_whole as spoken_on_the_whole
     from lightpaint.report.verdict_sentences import spoken_reason as spoken_reason
     from lightpaint.report.verdict_sentences import spoken_whole as spoken_whole
     from lightpaint.report.verdict_sentences import verdict as verdict

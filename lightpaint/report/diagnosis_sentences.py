@@ -34,11 +34,13 @@ from lightpaint.report.measures import (
 )
 from lightpaint.report.phrases import (
     CHANNELS,
+    NO_CLOSER_TEXT,
     spoken_changed,
     spoken_lights,
     spoken_percent,
     spoken_percents,
     spoken_place,
+    spoken_progress,
 )
 from lightpaint.sentences import Hint, Sentence, Word
 
@@ -456,9 +458,31 @@ def spoken_mean_shares(deliveries: Sequence[Delivery]) -> str:
     """Return how much of all wishes came, `brightness 95 %, colour 52 %`; "" if none asks for
     anything visible.
     """
+    entries = [entry for entry in main_deliveries(deliveries) if entry.least is not None]
+    if len(entries) == 1:
+        return entries[0].spoken_shares
     shares = mean_shares(deliveries)
     named = (("brightness", shares.brightness), ("colour", shares.color))
     return ", ".join(f"{part} {spoken_share(x)}" for part, x in named if x is not None)
+
+
+def spoken_came(appearance: Appearance) -> str:
+    """Return how much of all wishes came, `Most of the way: brightness 98 %, colour 67 %`; as a
+    share of ΔE, `Most of the way (70 %)`, if none asks for anything visible. Of an only wish that
+    no light can bring, `Out of reach (8 % came)`.
+    """
+    far, shares = spoken_progress(appearance.progress), spoken_mean_shares(appearance.deliveries)
+    if far == NO_CLOSER_TEXT:
+        return far
+    if lacks_only_wish(appearance):
+        return f"Out of reach ({shares} came)"
+    return f"{far}: {shares}" if shares else f"{far} ({spoken_percent(appearance.progress)})"
+
+
+def lacks_only_wish(appearance: Appearance) -> bool:
+    """Return whether the painting has one wish, and no light can bring it."""
+    is_only = len(main_deliveries(appearance.deliveries)) == 1
+    return is_only and appearance.needs_another_light and not appearance.is_worse
 
 
 def is_one_painting(deliveries: Sequence[Delivery]) -> bool:

@@ -26,7 +26,9 @@ from lightpaint.report.diagnosis_sentences import (
     SAMPLES_ADVICE,
     SPILL_ADVICE,
     is_one_painting,
+    lacks_only_wish,
     named_worst_wish,
+    spoken_came,
     spoken_deliveries,
     spoken_delivery,
     spoken_mean_shares,
@@ -106,10 +108,9 @@ def verdict(
         (start := headline(appearance)),
         f"{spoken_delta_e(appearance, known=bool(predicted.half_difference.any()))}.",
     ]
-    is_told = named_worst_wish(appearance) is not None  # by the headline
-    if (deliveries := spoken_deliveries(appearance.deliveries, start)) and not (
-        is_told and len(main_deliveries(appearance.deliveries)) == 1
-    ):
+    is_only = len(main_deliveries(appearance.deliveries)) == 1
+    is_told = is_only and (shares := spoken_mean_shares(appearance.deliveries)) and shares in start
+    if (deliveries := spoken_deliveries(appearance.deliveries, start)) and not is_told:
         sentences.append(deliveries)
     if not solution.certificate.converged:
         sentences.append("The solve stopped before it converged.")
@@ -168,21 +169,28 @@ def _wish_headline(appearance: Appearance, wish: Delivery) -> str:
     """
     if is_one_painting(appearance.deliveries):
         return f"{spoken_whole(appearance)} {spoken_lack(appearance, wish)}"
-    newest = spoken_newest(appearance)
-    if appearance.is_nearly_equal:
-        whole = "On the whole it is close."
-    else:
-        progress = spoken_progress(appearance.progress)
-        whole = f"On the whole: {progress[:1].lower()}{progress[1:]}."
+    newest, whole = spoken_newest(appearance), spoken_on_the_whole(appearance)
     return " ".join(filter(None, [spoken_lack(appearance, wish), newest, whole]))
+
+
+def spoken_on_the_whole(appearance: Appearance) -> str:
+    """Return `On the whole: about half way.`, after the shares of wishes; "" if there is only one,
+    and it is not close.
+    """
+    if appearance.is_nearly_equal:
+        return "On the whole it is close."
+    if len(main_deliveries(appearance.deliveries)) == 1:
+        return ""
+    progress = spoken_progress(appearance.progress)
+    return f"On the whole: {progress[:1].lower()}{progress[1:]}."
 
 
 def spoken_whole(appearance: Appearance) -> str:
     """Return a sentence on how much of all that was painted came."""
-    is_nearly = appearance.is_nearly_equal
-    progress = "Close on the whole" if is_nearly else spoken_progress(appearance.progress)
+    if not appearance.is_nearly_equal:
+        return f"{spoken_came(appearance)}."
     shares = spoken_mean_shares(appearance.deliveries)
-    return f"{progress}: {shares}." if shares else f"{progress}."
+    return f"Close on the whole: {shares}." if shares else "Close on the whole."
 
 
 def spoken_lack(appearance: Appearance, wish: Delivery) -> str:
@@ -214,6 +222,11 @@ def _paint_headline(appearance: Appearance) -> str:
         return _wish_headline(appearance, wish)
     if appearance.place is None:
         return f"{_headline_start(appearance)}: too much of what was painted is out of reach."
+    if lacks_only_wish(appearance) and not appearance.is_nearly_equal:
+        missing = spoken_missing(appearance)
+        text = f"{missing[0].upper()}{missing[1:]} is missing: {spoken_reason(appearance)}."
+        advice = f" {ALONE_ADVICE}" if appearance.lacks_light_of_its_own else ""
+        return f"{spoken_came(appearance)}. {text}{advice}"
     if appearance.is_far:
         where = spoken_where(appearance.place)
         change = spoken_difference(appearance.place.painted, appearance.place.reached)

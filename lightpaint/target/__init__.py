@@ -24,6 +24,7 @@ if TYPE_CHECKING:
     from lightpaint.target.template import texts_of as texts_of
     from lightpaint.target.template import write_look as write_look
     from lightpaint.target.template import write_template as write_template
+    from lightpaint.target.wish_finding import extend_marked as extend_marked
     from lightpaint.target.wish_finding import extend_saturated as extend_saturated
     from lightpaint.target.wish_finding import find_wishes as find_wishes
     from lightpaint.target.wish_finding import number_places as number_places

@@ -415,22 +415,39 @@ class _Gain(_Brush):
 def extend_saturated(target: Target, current_look: Floats) -> Floats:
     """Return the painting, (h, w, 3) linear, with what its saturated values ask for at least.
 
-    current_look: (h, w, 3) linear, the current look at the size of the target. A value at the top
-    of its range becomes the look times the median ratio of painting to look of the other pixels of
-    its layer, where that is brighter; without layers, of all paint.
+    current_look: (h, w, 3) linear, the current look at the size of the target. Paint that lies over
+    no look stays as it is. See `extend_marked`.
     """
-    if target.at_least is None or not target.at_least.any() or not target.over_look:
+    if target.at_least is None or not target.over_look:
         return target.image
+    return extend_marked(
+        target.image, target.importance, target.at_least, target.wishes, current_look
+    )
+
+
+def extend_marked(
+    image: Floats,
+    importance: Floats,
+    at_least: Bools,
+    layers: Sequence[Wish],
+    current_look: Floats,
+) -> Floats:
+    """Return an image, (h, w, 3) linear, with what its values at the top of their range ask for.
+
+    Such a value becomes the look times the median ratio of painting to look of the other pixels of
+    its layer, where that is brighter; without layers, of all paint.
+
+    importance: (h, w). at_least: (h, w, 3), where the values are. current_look: (h, w, 3) linear.
+    """
     dark = DARK * float(np.mean(current_look))
-    if not dark > 0:
-        return target.image
-    image, painted = target.image.copy(), target.importance > 0
-    layers = [painted & (wish.area > COVERED) for wish in target.wishes] or [painted]
-    for own in layers:
-        usual = _median_ratio(target.image, current_look, own & ~target.at_least.any(-1), dark)
-        lifted = np.maximum(image, (current_look * usual).astype(np.float32))
-        image = np.where(own[..., None] & target.at_least, lifted, image)
-    return image
+    if not at_least.any() or not dark > 0:
+        return image
+    extended, painted = image.copy(), importance > 0
+    for own in [painted & (wish.area > COVERED) for wish in layers] or [painted]:
+        usual = _median_ratio(image, current_look, own & ~at_least.any(-1), dark)
+        lifted = np.maximum(extended, (current_look * usual).astype(np.float32))
+        extended = np.where(own[..., None] & at_least, lifted, extended)
+    return extended
 
 
 def _median_ratio(image: Floats, look: Floats, pixels: Bools, dark: float) -> Floats:

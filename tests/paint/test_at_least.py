@@ -13,6 +13,7 @@ from nightly import examples
 import lightpaint as lp
 from lightpaint.basis.basis import Origin
 from lightpaint.basis.lights import BasisLight
+from lightpaint.colour.color_difference import delta_e
 from lightpaint.images.formats.exr import ExrPart, write_parts
 from lightpaint.paint import protocol
 from lightpaint.paint.notebook import widget_arguments
@@ -106,6 +107,73 @@ def test_the_answer_is_that_of_the_file(basis: lp.Basis):
     literal = lp.solve(basis, replace(target, at_least=None), **LINEAR).weights
     assert np.abs(literal / expected - 1).max() > 0.05
     np.testing.assert_allclose(expected[0], [1.5, 1.2, 1.0], rtol=1e-4)
+
+
+#: Largest mean ΔE between an answer under the brush and the exact one, as for presets.
+SAME = 0.5
+
+STOPS = st.floats(-1.5, 2)
+
+
+def _over_look(basis: lp.Basis, stops: np.ndarray, transform: lp.ViewTransform) -> lp.Target:
+    """What 8 bits hold of the look, changed by so many stops of each channel on either half."""
+    factors = np.repeat(2.0 ** stops.reshape(1, 2, 3), SIZE[1] // 2, axis=1)
+    codes = np.round(255 * np.clip(transform.encode(basis.current_look * factors), 0, 1)) / 255
+    return lp.Target(
+        "wash",
+        transform.decode(codes).astype(np.float32),
+        np.ones(SIZE, np.float32),
+        everything=False,
+        at_least=codes >= 1,
+        transform=transform,
+        through_view=True,
+        over_look=True,
+    )
+
+
+def _live_and_exact(basis: lp.Basis, target: lp.Target, settings: Settings) -> tuple[Any, Any]:
+    """The pictures of both answers of a session, as the display of the painting shows them."""
+    transform = target.transform or lp.ViewTransform()
+    store = MemoryStore(Identity.of([basis]))
+    session = Session([basis], [basis.current_look], store, settings=settings, transform=transform)
+    _set(session, target)
+    for _ in range(8):
+        session.live_answer.solve()
+    solution = session.snapshot().solution()
+    assert solution is not None
+    return tuple(
+        transform.decode(transform.encode(basis.mix(x))) * 2**transform.stops
+        for x in (session.weights, solution.weights)
+    )
+
+
+@settings(max_examples=examples(15, 60), deadline=None)
+@given(st.lists(STOPS, min_size=6, max_size=6), st.sampled_from([None, "linear"]))
+def test_live_and_exact_answers_to_clipped_paint_are_one_picture(stops: Any, space: Any):
+    basis = _basis()
+    target = _over_look(basis, np.array(stops), lp.ViewTransform("srgb", 0.0))
+    live, exact = _live_and_exact(basis, target, Settings(space=space))
+    assert delta_e(live, exact).mean() <= SAME
+
+
+@pytest.mark.parametrize("space", [None, "linear"])
+def test_the_answer_under_the_brush_may_be_brighter_than_eight_bits(basis: lp.Basis, space: Any):
+    """Two stops up end at white on most of the picture, and are two stops of the lamps all the
+    same."""
+    target = _over_look(basis, np.full(6, 2.0), lp.ViewTransform("srgb", 0.0))
+    assert target.at_least is not None
+    assert target.at_least.mean() > 0.2
+    session = Session(
+        [basis],
+        [basis.current_look],
+        MemoryStore(Identity.of([basis])),
+        settings=Settings(space=space),
+        transform=lp.ViewTransform("srgb", 0.0),
+    )
+    _set(session, target)
+    for _ in range(8):
+        session.live_answer.solve()
+    np.testing.assert_allclose(session.weights, 4 * basis.current_weights, rtol=0.1)
 
 
 def test_paint_means_what_it_says_and_what_it_leaves_means_what_it_did(basis: lp.Basis):

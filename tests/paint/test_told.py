@@ -1,15 +1,18 @@
 """What a page is told while somebody paints."""
 
+import re
 from dataclasses import replace
 from typing import Any
 
 import numpy as np
 import pytest
+from hypothesis import given
+from hypothesis import strategies as st
 
 import lightpaint as lp
 from lightpaint.lighting.analysis.appearance.appearance import Appearance
 from lightpaint.lighting.analysis.appearance.area_lights import AreaLights
-from lightpaint.lighting.analysis.appearance.delivery import Delivery
+from lightpaint.lighting.analysis.appearance.delivery import Delivery, spoken_share
 from lightpaint.lighting.analysis.appearance.limiting_reasons import Loosening, Reason
 from lightpaint.lighting.analysis.appearance.unpainted_change import UnpaintedChange
 from lightpaint.lighting.analysis.diagnosis import Place
@@ -25,7 +28,11 @@ from lightpaint.paint.session.session_messages import (
     unpainted_text,
     why_not_closer,
 )
-from lightpaint.report.diagnosis_sentences import spoken_about, spoken_cause
+from lightpaint.report.diagnosis_sentences import (
+    spoken_about,
+    spoken_cause,
+    spoken_mean_shares,
+)
 from lightpaint.report.verdict_sentences import headline
 
 OFF, HOLD = Reason("off", ("annex_window",), 0.57), Reason("hold", (), 0.5)
@@ -191,8 +198,8 @@ def test_advice_comes_before_what_may_be_cut_off():
     text = sketch_headline(appearance)
     assert text == (
         "Vase, +1.4 stops, warmer: out of reach (brightness 69 %, colour 47 % came), since spot "
-        "lights the plinths, too. More importance, or lights that move, may help. Most of "
-        "the way (69 %)."
+        "lights the plinths, too. More importance, or lights that move, may help. On the whole: "
+        "most of the way."
     )
     # Parts of one painting, which nobody named: first what came.
     parts = [replace(x, layers=(1,), kind="wish") for x in (vase, room)]
@@ -209,7 +216,7 @@ def test_a_sketch_speaks_of_the_wish_that_lacks_most():
         "Moonlight: brightness 98 %, colour 43 %, since lights keep their colours. The "
         "settings allow any colour. Rim: 95 %."
     )
-    assert sketch_headline(appearance) == f"{text} Most of the way (70 %)."
+    assert sketch_headline(appearance) == f"{text} On the whole: about half way."
     # A warning goes first.
     worse = replace(appearance, delta_e=23.0)
     assert sketch_headline(worse) == (
@@ -217,8 +224,9 @@ def test_a_sketch_speaks_of_the_wish_that_lacks_most():
     )
     # A painting without names says where light is missing, and how much came.
     alone = replace(appearance, deliveries=(replace(moon, name="Painting", kind="layer"),))
-    assert sketch_headline(alone).endswith(
-        "The settings allow any colour. Brightness 98 %, colour 43 % of what was asked for came."
+    assert sketch_headline(alone) == (
+        "About half way: brightness 98 %, colour 43 %. Brighter light on the floor is missing: "
+        "lights keep their colours. The settings allow any colour."
     )
     # The gain of one wish is not that of the preview.
     assert advice(appearance) == Advice("colors", (), gain=0.5, hold=None)
@@ -227,6 +235,67 @@ def test_a_sketch_speaks_of_the_wish_that_lacks_most():
     assert spoken_cause(COLORS, about=spoken_about(of_part)).endswith(
         "would remove 50 % of the difference in Moonlight."
     )
+
+
+SHARES = st.floats(0, 1.2)
+
+
+@given(st.lists(st.tuples(SHARES, SHARES), min_size=1, max_size=4), st.floats(3.5, 9))
+def test_a_headline_says_no_share_but_those_that_came(shares: Any, delta_e: float):
+    """Three sculptures of which 93 and 95 % came were "About half way (53 %)"."""
+    wishes = tuple(
+        Delivery(f"Layer {k}", a, b, layers=(k,), kind="layer") for k, (a, b) in enumerate(shares)
+    )
+    appearance = Appearance(delta_e, 0.0, 16.0, PLACE, local_lights=("lamp",), deliveries=wishes)
+    means = spoken_mean_shares(wishes)
+    came = {f"{spoken_share(x)}" for pair in shares for x in pair}
+    for text in (sketch_headline(appearance), headline(appearance)):
+        said = set(re.findall(r"\d+ %", text))
+        assert said <= came | set(re.findall(r"\d+ %", means)), text
+    # The words are those of the share that is less.
+    assert appearance.progress == pytest.approx(
+        min(np.mean([min(x[k], 1) for x in shares]) for k in (0, 1))
+    )
+
+
+def test_an_only_wish_that_no_light_brings_is_first_said_to_be_out_of_reach():
+    """A wall that all lamps of a room light together, in the page and in the terminal."""
+    wall = Delivery("Back wall, +1.0 stops, warmer", 0.27, 0.33, layers=(1,), kind="layer")
+    for delta_e in (15.0, 9.0):  # far, and part of the way
+        appearance = Appearance(
+            delta_e,
+            0.0,
+            21.0,
+            PLACE,
+            reasons=(replace(HOLD, share=1.0),),
+            area_lights=SHARED,
+            deliveries=(wall,),
+        )
+        expected = (
+            "Out of reach (brightness 27 %, colour 33 % came). Brighter light on the floor is "
+            "missing: no light reaches it alone; sky and skylight light the plinths, too. Add a "
+            "light for it, or paint the rest as well."
+        )
+        assert sketch_headline(appearance) == expected
+        assert headline(appearance) == expected
+    # With a light of its own it is the hold that keeps it.
+    own = replace(appearance, area_lights=OWN)
+    assert sketch_headline(own).startswith("Part of the way: brightness 27 %, colour 33 %. ")
+
+
+def test_what_came_is_said_in_one_measure():
+    """Page, terminal and report say it in the same words."""
+    wishes = (Delivery("Painting", 0.93, 0.95),)
+    appearance = Appearance(7.5, 0.0, 16.0, PLACE, local_lights=("lamp",), deliveries=wishes)
+    assert sketch_headline(appearance).startswith("Nearly there: brightness 93 %, colour 95 %. ")
+    assert headline(appearance).startswith("Nearly there, but ")
+    # The mean over a picture may be far off all the same: that is no share of what was asked.
+    far = replace(appearance, delta_e=17.0)
+    assert not far.is_worse
+    assert sketch_headline(far).startswith("Nearly there: brightness 93 %, colour 95 %. ")
+    # Of nothing visible there is no share.
+    faint = replace(appearance, deliveries=(Delivery("Painting", None, None),))
+    assert sketch_headline(faint).startswith("About half way (53 %). ")
 
 
 def test_a_view_that_lacks_a_wish_goes_first(make_basis: Any):

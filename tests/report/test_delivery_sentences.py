@@ -46,7 +46,7 @@ def _seen(delta_e: float, *deliveries: Delivery, **fields: Any) -> Appearance:
             _seen(5.0, LANTERN, RIM, local_lights=("sun",), reasons_wish="Lantern"),
             "Lantern: out of reach (8 % came), since sun would light too much else. "
             "More importance, or lights that move, may help. Rim: 95 %. "
-            "On the whole: most of the way.",
+            "On the whole: about half way.",
         ),
         (
             _seen(
@@ -58,8 +58,8 @@ def _seen(delta_e: float, *deliveries: Delivery, **fields: Any) -> Appearance:
                 reasons_wish="Lantern",
             ),
             "Lantern: out of reach (8 % came), since spot lights the big plinth, too. More "
-            "importance, or lights that move, may help. Rim: 95 %. On the whole: most of "
-            "the way.",
+            "importance, or lights that move, may help. Rim: 95 %. On the whole: about "
+            "half way.",
         ),
         (
             _seen(
@@ -72,7 +72,7 @@ def _seen(delta_e: float, *deliveries: Delivery, **fields: Any) -> Appearance:
                 reasons_wish="Lantern",
             ),
             "Lantern: 8 %, since no light reaches it alone; sun and sky light the rest, too. "
-            "Rim: 95 %. On the whole: most of the way.",
+            "Rim: 95 %. On the whole: about half way.",
         ),
         (
             _seen(
@@ -85,7 +85,7 @@ def _seen(delta_e: float, *deliveries: Delivery, **fields: Any) -> Appearance:
             ),
             "Lantern: out of reach (8 % came), since no light reaches it alone; sky lights the "
             "floor, too. Add a light for it, or paint the rest as well. Rim: 95 %. On the whole: "
-            "most of the way.",
+            "about half way.",
         ),
         # Where shadow is missing, nothing has to reach it.
         (
@@ -99,7 +99,7 @@ def _seen(delta_e: float, *deliveries: Delivery, **fields: Any) -> Appearance:
                 reasons_wish="Lantern",
             ),
             "Lantern: out of reach in colour (30 % came), since sky lights the floor, too. More "
-            "importance, or lights that move, may help. Rim: 95 %. On the whole: most of the "
+            "importance, or lights that move, may help. Rim: 95 %. On the whole: part of the "
             "way.",
         ),
         # Of one painting, whose parts nobody named, the whole goes first.
@@ -116,7 +116,7 @@ def _seen(delta_e: float, *deliveries: Delivery, **fields: Any) -> Appearance:
         ),
         (
             _seen(5.0, LANTERN, RIM, reasons=(Reason("lock", ("lamp",)),)),
-            "Lantern: 8 %, since lamp is locked. Rim: 95 %. On the whole: most of the way.",
+            "Lantern: 8 %, since lamp is locked. Rim: 95 %. On the whole: about half way.",
         ),
         (
             _seen(2.0, replace(MOON, color=0.7), local_lights=("sun", "sky")),

@@ -5,18 +5,21 @@ of `solve` without the noise correction. Painted pixels and the rest have separa
 weighs the rest by the amount of paint, so that a stroke changes the weight of every other pixel,
 but none of their sums.
 
-In display space every answer changes the weight of every pixel. There the picture is averaged to
-a few thousand pixels, and one round from the last answer follows the brush; the answer of all
-pixels comes when the brush is lifted. Of more than `MANY_LIGHTS` a round moves some at a time
-(many_lights.py), in linear light, too.
+In display space, and where paint means "at least this bright", every answer changes the weight of
+every pixel. There the picture is averaged to a few thousand pixels, and one round from the last
+answer follows the brush; the answer of all pixels comes when the brush is lifted. Of more than
+`MANY_LIGHTS` a round moves some at a time (many_lights.py), in linear light, too.
 
 Only painted views count. Each has its own sums, so that a stroke costs no more than with a single
 view.
 """
 
 from collections.abc import Mapping, Sequence
+from dataclasses import replace
 from functools import partial, reduce
 from operator import add
+
+import numpy as np
 
 from lightpaint.arrays import RGB, Doubles
 from lightpaint.basis import Basis, texel_lights
@@ -51,7 +54,7 @@ from lightpaint.threads import one_thread
 
 #: Answers under a moving brush for each time that wishes and gamuts are found anew: from one move
 #: to the next they hardly change.
-ANSWERS_PER_READING = 4
+ANSWERS_PER_READING = 8
 
 #: Largest miss of a requirement under the brush, relative to its size: none that shows.
 MET_UNDER_BRUSH = 1e-5
@@ -152,8 +155,11 @@ class LiveSolver:
 
     @property
     def _has_tiles(self) -> bool:
-        """True if sums over tiles follow the brush; of many lights they would be too large."""
-        return self.mode == "linear" and not self._are_many
+        """True if sums over tiles follow the brush: of many lights they would be too large, and
+        where brighter than the painting is as good, none suffice.
+        """
+        has_marks = any(view.has_marks for view in self._views)
+        return self.mode == "linear" and not self._are_many and not has_marks
 
     @one_thread()
     def answer(
@@ -257,18 +263,22 @@ class LiveSolver:
     def _wash(self, views: tuple[LiveView, ...]) -> Wash:
         """Return the paintings and their lights, averaged over the films; once for a reading."""
         if self._washed is None:
-            self._washed = self._joint_films(views).wash([view.layers for view in views])
+            layers = [view.layers for view in views]
+            self._washed = self._joint_films(views).wash(layers, is_sketch=self._is_sketch)
         return self._washed
 
     def _painted_light(self, views: tuple[LiveView, ...]) -> PaintedLight:
-        """Sample the painted blocks, small wishes as well as what is around them."""
-        wash = self._wash(views)
-        blocks, weight = wash.sample(GAMUT_BLOCKS, GAMUT_WISH_BLOCKS)
+        """Sample the painted blocks, small wishes as well as what is around them, but for those
+        that mean "at least": their colour is where a range ended.
+        """
+        wash, films = self._wash(views), self._joint_films(views)
+        counted = replace(wash, importance=np.where(films.has_mark, 0, wash.importance))
+        blocks, weight = counted.sample(GAMUT_BLOCKS, GAMUT_WISH_BLOCKS)
         return PaintedLight(
             wash.rows[:, :, blocks].transpose(1, 2, 0),
             wash.painted[:, blocks].T,
             weight,
-            self._joint_films(views).albedo[:, blocks].T,
+            films.albedo[:, blocks].T,
         )
 
     def _follow_gamuts(self, views: tuple[LiveView, ...]) -> None:

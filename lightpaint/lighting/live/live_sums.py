@@ -6,7 +6,7 @@ from math import ceil
 
 import numpy as np
 
-from lightpaint.arrays import Doubles, Floats, Slices
+from lightpaint.arrays import Bools, Doubles, Floats, Slices
 from lightpaint.basis import Basis
 from lightpaint.colour import ViewTransform
 from lightpaint.images import block_mean, block_sums, enlarged
@@ -21,7 +21,7 @@ from lightpaint.lighting.loss.loss import STRIP_PIXELS
 from lightpaint.lighting.loss.painting_loss import PaintedPixels, join_pixels
 from lightpaint.lighting.loss.reweighting import interpolate
 from lightpaint.lighting.normal_equations import NormalEquations
-from lightpaint.target import Wish
+from lightpaint.target import Wish, extend_marked
 from lightpaint.threads import one_thread, parallel_map
 
 #: Maximum number of pixels of an averaged picture in display space: the pixels of one strip.
@@ -32,6 +32,9 @@ IMPORTANCE_ROUND_OFF = 1e-6
 
 #: Returns the wishes of a painting's layers, with areas averaged over blocks of this side.
 LayerWishes = Callable[[int], Sequence[Wish]]
+
+#: Returns where brighter than the painting is as good, (h, w, 3); None for nowhere.
+AtLeast = Callable[[], Bools | None]
 
 #: Shares of a step to try in display space. An answer is one step from the last one.
 STEP_SHARES = (1.0, 0.5, 0.25)
@@ -110,14 +113,24 @@ class PaintedTiles:
 
 
 class SmallFilm:
-    """The picture averaged to `max_pixels`, and the paint of each by its importance."""
+    """The picture averaged to `max_pixels`, and the paint of each by its importance.
+
+    at_least: returns where brighter than the painting is as good. An average is such paint if more
+    than half of the importance in it is.
+    """
 
     def __init__(
-        self, basis: Basis, image: Floats, importance: Floats, max_pixels: int = MAX_FILM_PIXELS
+        self,
+        basis: Basis,
+        image: Floats,
+        importance: Floats,
+        max_pixels: int = MAX_FILM_PIXELS,
+        at_least: AtLeast = lambda: None,
     ) -> None:
         height, width = importance.shape
         self._side = side = max(1, ceil((height * width / max_pixels) ** 0.5))
         self._image, self._importance, self._seen = image, importance, basis.emitters_seen
+        self._at_least, self._marks = at_least, np.zeros((3, 0), bool)
         rows, columns = -(-height // side), -(-width // side)
         self._size = rows, columns
         # Emitters do not count in a block that shows anything else.
@@ -196,6 +209,12 @@ class SmallFilm:
             seen = self._seen_painted.reshape(3, *self._size)[:, rows, columns]
             planes = np.ascontiguousarray(painted).reshape(3, -1)
             seen[...] = self._transform.encode_planes(planes).reshape(seen.shape)
+        if (at_least := self._at_least()) is not None:
+            if not self._marks.size:
+                self._marks = np.zeros(self._painted.shape, bool)
+            marked = block_sums(at_least[pixels] * a[..., None], side)
+            marks = self._marks.reshape(3, *self._size)[:, rows, columns]
+            marks[...] = (marked > 0.5 * total[..., None]).transpose(2, 0, 1)
 
     def set_transform(self, transform: ViewTransform | None) -> None:
         """Set the view transform of the comparison; None keeps the last one."""
@@ -211,20 +230,29 @@ class SmallFilm:
         mixed = np.stack([w @ rows for w, rows in zip(weights.T, self.rows, strict=True)], axis=-1)
         return np.asarray(mixed.reshape(*self._size, 3), np.float32)
 
-    def wash(self, layers: LayerWishes) -> Wash:
+    def wash(self, layers: LayerWishes, *, is_sketch: bool) -> Wash:
         """Return the paint, the look under it and the light of each lamp, averaged.
 
-        layers: returns the wishes of its layers, averaged over blocks of a side.
+        layers: returns the wishes of its layers, averaged over blocks of a side. is_sketch: whether
+        the paint lies over the look.
         """
         counts = self._counts
         importance = np.minimum(self._a / np.where(counts > 0, counts, 1), 1)
         painted, look = (x.T.reshape(*self._size, 3) for x in (self._painted, self._current))
         small_importance = importance.reshape(self._size)
         wishes = layers(self._side)
+        if is_sketch and self._marks.any():
+            marks = self._marks.T.reshape(*self._size, 3)
+            painted = extend_marked(painted, small_importance, marks, wishes, look)
         shares = wish_shares(wishes, painted, small_importance, look)
         exact, places = exact_share(wishes, self._size), wish_places(shares, self._size)
-        light = self.rows, self._painted, self._current
+        light = self.rows, painted.reshape(-1, 3).T, self._current
         return Wash(*light, importance, counts, shares, exact, places)
+
+    @property
+    def has_mark(self) -> Bools:
+        """Blocks in which brighter than the painting is as good in any channel, (p,)."""
+        return self._marks.any(axis=0) if self._marks.size else np.zeros(self._a.shape, bool)
 
     @cached_property
     def _counts(self) -> Doubles:
@@ -237,7 +265,8 @@ class SmallFilm:
         weight = self._a + rest
         share = np.where(weight > 0, rest / np.where(weight > 0, weight, 1), 0)
         seen = None if transform is None else (self._seen_painted, self._seen_current)
-        return PaintedPixels(self._painted, weight, share, self._current, None, transform, seen)
+        marks = self._marks if self._marks.any() else None
+        return PaintedPixels(self._painted, weight, share, self._current, marks, transform, seen)
 
 
 class Films:
@@ -263,11 +292,20 @@ class Films:
         """The albedo of all blocks, (3, p)."""
         return np.concatenate([film.albedo for film in self._films], axis=1)
 
-    def wash(self, layers: Sequence[LayerWishes]) -> Wash:
-        """Return the washes of all views behind each other. layers: of each, as for `SmallFilm`."""
+    @property
+    def has_mark(self) -> Bools:
+        """See `SmallFilm.has_mark`, of all blocks, (p,)."""
+        return np.concatenate([film.has_mark for film in self._films])
+
+    def wash(self, layers: Sequence[LayerWishes], *, is_sketch: bool) -> Wash:
+        """Return the washes of all views behind each other.
+
+        layers: of each, and is_sketch: as for `SmallFilm.wash`.
+        """
         with one_thread():
             pairs = zip(self._films, layers, strict=True)
-            return Wash.joined([film.wash(wishes) for film, wishes in pairs])
+            washes = [film.wash(wishes, is_sketch=is_sketch) for film, wishes in pairs]
+            return Wash.joined(washes)
 
     def pixels(self, rest_weight: float, transform: ViewTransform | None) -> PaintedPixels:
         """Return the loss of all pixels, as `SmallFilm.pixels` does."""

@@ -10,6 +10,7 @@ from lightpaint.colour import ViewTransform
 from lightpaint.lighting.constraints.light_constraints import held_at_start
 from lightpaint.lighting.live.live_sums import (
     MAX_FILM_PIXELS,
+    AtLeast,
     LayerWishes,
     PaintedTiles,
     SmallFilm,
@@ -28,7 +29,8 @@ class LiveView:
     """A view whose painting changes under a brush, updated in place.
 
     image: (h, w, 3) linear; importance: (h, w). Painters write to these arrays, and then call
-    `update`. layers: returns the wishes of its layers; by default, it has none.
+    `update`. layers: returns the wishes of its layers; by default, it has none. at_least: returns
+    where brighter than the painting is as good, (h, w, 3); None for nowhere.
     """
 
     def __init__(
@@ -37,10 +39,11 @@ class LiveView:
         image: Floats,
         importance: Floats,
         layers: LayerWishes = lambda _side: (),
+        at_least: AtLeast = lambda: None,
     ) -> None:
         self._own_basis, self._start = basis, dict[str, RGB]()
         self.basis, self._image, self._importance = basis, image, importance
-        self.layers = layers
+        self.layers, self._at_least = layers, at_least
         self._counted = importance.copy()
         self._dark = dark_threshold(basis.current_look, basis.emitters_seen)
         self._transform: ViewTransform | None = None
@@ -59,6 +62,12 @@ class LiveView:
     def is_painted(self) -> bool:
         """True if anything is painted."""
         return bool(self._sums[..., 0].any())
+
+    @property
+    def has_marks(self) -> bool:
+        """True if brighter than the painting is as good anywhere: then no sums suffice."""
+        at_least = self._at_least()
+        return at_least is not None and bool(at_least.any())
 
     @property
     def pixels(self) -> int:
@@ -108,7 +117,9 @@ class LiveView:
     def film(self, transform: ViewTransform | None, max_pixels: int = MAX_FILM_PIXELS) -> SmallFilm:
         """Return the picture in display space, of `max_pixels` at most."""
         if self._display is None:
-            self._display = SmallFilm(self.basis, self._image, self._counted, max_pixels)
+            self._display = SmallFilm(
+                self.basis, self._image, self._counted, max_pixels, self._at_least
+            )
             self._display.set_transform(transform)
         return self._display
 

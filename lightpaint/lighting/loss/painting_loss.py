@@ -273,8 +273,14 @@ class PaintedPixels(PixelLoss):
 
 
 def join_pixels(parts: Sequence[PaintedPixels]) -> PaintedPixels:
-    """Join pixels of several pictures into one set, where brighter is nowhere as good."""
+    """Join pixels of several pictures into one set."""
     first = parts[0]
+    marks = [part.at_least for part in parts]
+    at_least = None
+    if any(mark is not None for mark in marks):
+        nowhere = [np.zeros(part.painted.shape, bool) for part in parts]
+        pairs = zip(marks, nowhere, strict=True)
+        at_least = np.concatenate([n if mark is None else mark for mark, n in pairs], axis=1)
 
     def concatenate(read: Callable[[PaintedPixels], Floats]) -> Doubles:
         return np.concatenate([read(part) for part in parts], axis=-1, dtype=np.float64)
@@ -284,7 +290,7 @@ def join_pixels(parts: Sequence[PaintedPixels]) -> PaintedPixels:
         concatenate(lambda part: part.importance),
         concatenate(lambda part: part.share),
         concatenate(lambda part: part.current),
-        None,
+        at_least,
         first.transform,
         (
             concatenate(lambda part: part._shown_painting),

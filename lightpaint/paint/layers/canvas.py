@@ -139,13 +139,23 @@ class Canvas:
         self.selection = LayerPixels.replayed(self.basis.size, masks)
         albedo = _albedo_source(self.basis)
         self._layers = ComposedLayers(self.view, current, layers, steps, stored, albedo)
-        self.live = LiveView(self.basis, self.image, self.importance, self._layers.loaded_wishes)
+        self.live = self._live_view()
+
+    def _live_view(self) -> LiveView:
+        """Return the sums that follow the target."""
+        return LiveView(
+            self.basis,
+            self.image,
+            self.importance,
+            self._layers.loaded_wishes,
+            lambda: self.painting.at_least,
+        )
 
     def improve(self, basis: Basis, current: Floats) -> None:
         """Replace the basis by one of more samples; open strokes stay open."""
         self.basis = basis
         self._layers.replace_current(current, _albedo_source(basis))
-        self.live = LiveView(basis, self.image, self.importance, self._layers.loaded_wishes)
+        self.live = self._live_view()
 
     def rebuild(self, layers: LayerStack, steps: Sequence[Step]) -> None:
         """Continue with the layers after these steps; open strokes are dropped."""
@@ -155,7 +165,7 @@ class Canvas:
     def replace_lights(self, basis: Basis) -> None:
         """Continue with a basis of other lights."""
         self.basis = basis
-        self.live = LiveView(basis, self.image, self.importance, self._layers.loaded_wishes)
+        self.live = self._live_view()
 
     def replace_planes(self, basis: Basis, lights: Collection[int]) -> None:
         """Continue with a basis in which the planes of some lights, by number, were replaced.

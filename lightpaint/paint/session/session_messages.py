@@ -30,6 +30,7 @@ from lightpaint.lighting import (
     UnpaintedChange,
     color_of_emitter,
     in_own_color,
+    main_deliveries,
     merge_views,
 )
 from lightpaint.paint.layers.canvases import Canvases
@@ -64,16 +65,18 @@ from lightpaint.report import (
     is_one_painting,
     named_worst_wish,
     spoken_amount,
+    spoken_came,
     spoken_changed,
-    spoken_deliveries,
+    spoken_elsewhere,
     spoken_errors,
     spoken_lack,
+    spoken_mean_shares,
     spoken_missing,
     spoken_newest,
+    spoken_on_the_whole,
     spoken_part,
     spoken_percent,
     spoken_place,
-    spoken_progress,
     spoken_reason,
     spoken_shares,
     spoken_whole,
@@ -356,9 +359,11 @@ def sketch_headline(appearance: Appearance) -> str:
     # One reason at a time: the next one appears once this is resolved.
     first = replace(appearance, reasons=appearance.causes[:1])
     missing = spoken_missing(appearance)
-    shares = "" if appearance.worst_wish is None else spoken_deliveries(appearance.deliveries)
     text = f"{missing[0].upper()}{missing[1:]} is missing: {spoken_reason(first)}."
-    return " ".join(filter(None, [f"{phrase}.", text, _advice_text(appearance), shares]))
+    newest = "" if is_one_painting(appearance.deliveries) else spoken_newest(appearance)
+    if len(main_deliveries(appearance.deliveries)) == 1:  # which the phrase is about
+        newest = ""
+    return " ".join(filter(None, [f"{phrase}.", text, _advice_text(appearance), newest]))
 
 
 def _wish_text(appearance: Appearance, wish: Delivery, phrase: str) -> str:
@@ -373,9 +378,12 @@ def _wish_text(appearance: Appearance, wish: Delivery, phrase: str) -> str:
     sentences = [lack, _advice_text(appearance) if appearance.causes else ""]
     if is_one_painting(appearance.deliveries):
         sentences.insert(0, f"{phrase}." if is_warning else spoken_whole(appearance))
+    elif is_warning:
+        sentences = [f"{phrase}.", *sentences, spoken_newest(appearance)]
     else:
-        sentences.append(spoken_newest(appearance))
-        sentences.insert(0 if is_warning else len(sentences), f"{phrase}.")
+        rest = appearance.unpainted_change if appearance.changes_unpainted else None
+        whole = spoken_on_the_whole(appearance)
+        sentences += [spoken_newest(appearance), whole, spoken_elsewhere(rest)]
     return " ".join(filter(None, sentences))
 
 
@@ -386,19 +394,19 @@ def _advice_text(appearance: Appearance) -> str:
 
 
 def _progress_phrase(appearance: Appearance) -> str:
-    """Return `About half way (50 %), and changes the annex by ΔE 12`.
+    """Return `Most of the way: brightness 98 %, colour 67 %, and changes the annex by ΔE 12`.
 
     There is no praise if the rest has changed by more than the paint has come closer.
     """
     rest = appearance.unpainted_change if appearance.changes_unpainted else None
-    far = spoken_progress(appearance.progress)
-    if far == NO_CLOSER_TEXT:
-        phrase = WORSE_TEXT if appearance.is_worse else far
+    phrase = spoken_came(appearance)
+    if phrase == NO_CLOSER_TEXT:
+        phrase = WORSE_TEXT if appearance.is_worse else phrase
     elif rest is not None and appearance.is_at_cost:
         cost = f"{spoken_part(rest)} (ΔE {spoken_amount(rest.worst)})"
-        return f"{spoken_percent(appearance.progress)} of the way, at the cost of {cost}"
-    else:
-        phrase = f"{far} ({spoken_percent(appearance.progress)})"
+        shares = spoken_mean_shares(appearance.deliveries)
+        came = shares or f"{spoken_percent(appearance.progress)} of the way"
+        return f"{came[0].upper()}{came[1:]}, at the cost of {cost}"
     return phrase if rest is None else f"{phrase}, and changes {spoken_changed(rest)}"
 
 

@@ -21,8 +21,11 @@ from lightpaint.lighting.analysis.appearance.area_lights import (
     lights_of_area,
 )
 from lightpaint.lighting.analysis.appearance.delivery import (
+    MIN_DELIVERED,
     Delivery,
     DeliveryReport,
+    main_deliveries,
+    mean_shares,
     measure_deliveries,
     worst_delivery,
 )
@@ -157,6 +160,17 @@ class Appearance:
         return painted >= DARKER * reached
 
     @property
+    def needs_another_light(self) -> bool:
+        """True if a wish is missed because every light that reaches it lights the rest, too, or
+        because no light that there is can bring it.
+        """
+        if self.worst_wish is None or self.is_hidden_by_noise:
+            return False
+        if self.causes and self.causes[0].kind == "hold":
+            return self.lacks_light_of_its_own
+        return not self.causes and (self.is_out_of_reach or self.lacks_light_of_its_own)
+
+    @property
     def limit_groups(self) -> tuple[LimitGroup, ...]:
         """The groups of these reasons: `hold`, `colors`, `constraints` or `views`."""
         return tuple(dict.fromkeys(reason.group for reason in self.causes))
@@ -230,8 +244,10 @@ class Appearance:
 
     @property
     def is_worse(self) -> bool:
-        """True if the current scene is closer to the paint, by the numbers that reports give."""
-        return round(self.delta_e, 1) > round(self.requested_change, 1)
+        """True if the current scene is closer to the paint, by the numbers that reports give, and
+        not all of the wishes came.
+        """
+        return round(self.delta_e, 1) > round(self.requested_change, 1) and not self.has_come
 
     @property
     def share_met(self) -> float:
@@ -242,18 +258,32 @@ class Appearance:
 
     @property
     def progress(self) -> float:
-        """Achieved share of the requested change by the lighting itself, without its noise.
+        """Share that came of what was asked for, from 0 to 1: the smaller of the `mean_shares` of
+        brightness and of colour.
 
-        0 if the current scene is closer.
+        Where no wish asks for anything visible, that of the requested ΔE, without noise. 0 if the
+        current scene is closer.
         """
+        known = [x for x in mean_shares(self.deliveries) if x is not None]
+        if known and not self.is_worse:
+            return min(known)
         if self.requested_change > 0 and not self.is_worse:
             return min(max(1 - self.error / self.requested_change, 0.0), 1.0)
         return self.share_met
 
     @property
     def is_in_vain(self) -> bool:
-        """True if hardly any of the requested change was achieved."""
-        return self.error > max(INVISIBLE, (1 - MIN_CHANGE) * self.requested_change)
+        """True if hardly any of the requested change was achieved, and not all of the wishes
+        came.
+        """
+        is_as_before = self.error > max(INVISIBLE, (1 - MIN_CHANGE) * self.requested_change)
+        return is_as_before and not self.has_come
+
+    @property
+    def has_come(self) -> bool:
+        """True if three quarters or more came of each wish that asks for something visible."""
+        known = [x.least for x in main_deliveries(self.deliveries) if x.least is not None]
+        return min(known, default=0.0) >= MIN_DELIVERED
 
     @property
     def worst_wish(self) -> Delivery | None:
