@@ -205,6 +205,36 @@ def test_each_place_of_a_wish_stands_out(make_basis: Any, monkeypatch: pytest.Mo
     assert of_each > least() + 0.05
 
 
+def test_light_beyond_white_counts_as_white(make_basis: Any) -> None:
+    """Half of the subject is a highlight of eight times white, the other half a tenth of white.
+
+    What the other half lacks is 10 % of the mean that is seen, and 1 % of that of all light.
+    """
+    pools = [~subject(), subject(), subject()]
+    pools[1], pools[2] = pools[1].copy(), pools[2].copy()
+    pools[1][12:], pools[2][:12] = False, False
+    basis = make_basis(
+        images=np.array(pools, float)[..., None] * np.ones(3), emission=[(0.1,) * 3] * 3
+    )
+    target = painting(basis, basis.mix(np.array([[0.1], [8.0], [0.1]]) * np.ones(3)))
+    wash = Wash.of(basis, target)
+    for transform, share in ((target.transform, 0.1 / 1.1), (None, 0.1 / 8.1)):
+        rows = ContrastRows.of(wash, transform)
+        own = rows.contrast[0, 0, 1:]
+        np.testing.assert_allclose(own[1] * 0.1 / (own @ [8.0, 0.1]), share, rtol=1e-5)
+
+
+def test_texels_have_the_contrast_of_a_brush(make_basis: Any) -> None:
+    """As far as a subject is lit by them: a spot of texels gives a quarter of its light here."""
+    basis = room(make_basis)
+    image = basis.current_look * np.where(subject()[..., None], 2.0, 0.5)
+    wash = Wash.of(basis, painting(basis, image))
+    weights = np.array([[0.3] * 3, [0.1] * 3])
+    for texels, share in (([False, False], 0.0), ([False, True], 0.25), ([True, True], 1.0)):
+        rows = ContrastRows.of(wash, None, weights * np.array(texels)[:, None])
+        np.testing.assert_allclose(rows.exact, [1 - share], atol=1e-6)  # .1 / (.3 + .1)
+
+
 def test_an_unpainted_rest_has_no_contrast(make_basis: Any) -> None:
     basis = room(make_basis)
     target = lp.Target(
