@@ -395,7 +395,8 @@ def terms_of_wash(wash: Wash, views: Views, fit: Fit, own: Doubles) -> PaintTerm
     """
     importance = sum(float(x.importance.sum(dtype=np.float64)) for x in views.targets)
     unpainted = unpainted_weight_of(views, fit)
-    return PaintTerms.of(wash, fit, own, importance=importance, unpainted=unpainted)
+    texels = texel_lights(views.bases[0].lights)
+    return PaintTerms.of(wash, fit, own, importance=importance, unpainted=unpainted, texels=texels)
 
 
 def are_sketches(views: Views) -> bool:

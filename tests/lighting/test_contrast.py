@@ -205,6 +205,71 @@ def test_each_place_of_a_wish_stands_out(make_basis: Any, monkeypatch: pytest.Mo
     assert of_each > least() + 0.05
 
 
+def test_light_beyond_white_counts_as_white(make_basis: Any) -> None:
+    """Half of the subject is a highlight of eight times white, the other half a tenth of white.
+
+    What the other half lacks is 10 % of the mean that is seen, and 1 % of that of all light.
+    """
+    pools = [~subject(), subject(), subject()]
+    pools[1], pools[2] = pools[1].copy(), pools[2].copy()
+    pools[1][12:], pools[2][:12] = False, False
+    basis = make_basis(
+        images=np.array(pools, float)[..., None] * np.ones(3), emission=[(0.1,) * 3] * 3
+    )
+    target = painting(basis, basis.mix(np.array([[0.1], [8.0], [0.1]]) * np.ones(3)))
+    wash = Wash.of(basis, target)
+    for transform, share in ((target.transform, 0.1 / 1.1), (None, 0.1 / 8.1)):
+        rows = ContrastRows.of(wash, transform)
+        own = rows.contrast[0, 0, 1:]
+        np.testing.assert_allclose(own[1] * 0.1 / (own @ [8.0, 0.1]), share, rtol=1e-5)
+
+
+def test_texels_have_the_contrast_of_a_brush(make_basis: Any) -> None:
+    """As far as a subject is lit by them: a spot of texels gives a quarter of its light here."""
+    basis = room(make_basis)
+    image = basis.current_look * np.where(subject()[..., None], 2.0, 0.5)
+    wash = Wash.of(basis, painting(basis, image))
+    weights = np.array([[0.3] * 3, [0.1] * 3])
+    for texels, share in (([False, False], 0.0), ([False, True], 0.25), ([True, True], 1.0)):
+        rows = ContrastRows.of(wash, None, weights * np.array(texels)[:, None])
+        np.testing.assert_allclose(rows.exact, [1 - share], atol=1e-6)  # .1 / (.3 + .1)
+
+
+def test_a_flame_is_no_wish_for_the_light_on_its_lantern() -> None:
+    """A quarter of the second block, and half of the third, are emitters in view."""
+    counted = np.array([[1, 0.75, 0.5, 0]])
+    areas = {"flame": [0, 0.25, 0.5, 1], "both": [0, 0.625, 1, 1], "beside": [1, 0, 0, 0]}
+    wishes = [Wish(name, np.array([area], np.float32)) for name, area in areas.items()]
+    found = [x.area[0].tolist() for x in expected_lights.counted_wishes(wishes, counted)]
+    assert found == [[0, 0, 0, 0], [0, 0.5, 1, 0], [1, 0, 0, 0]]
+
+
+def test_a_locked_lamp_in_view_does_not_light_up_the_room(make_basis: Any) -> None:
+    """Its flame was painted brighter, and the lantern around it darker, as the room."""
+    flame = np.zeros((120, 160), bool)
+    flame[60:62, 81:83] = True
+    y, x = np.mgrid[:120, :160]
+    glow = np.exp(-np.hypot(y - 60.5, x - 81.5) / 4)
+    images = np.array([np.where(flame, 0.0, 1.0), np.where(flame, 50.0, glow)])
+    basis = make_basis(
+        images=images[..., None] * np.ones(3),
+        emission=[(0.3,) * 3, (0.3,) * 3],
+    )
+    basis = replace(basis, emitters_seen=flame)
+    image = basis.current_look * np.where(flame, 4.0, 0.2)[..., None]
+    areas = (~flame).astype(np.float32), flame.astype(np.float32)
+    wishes = tuple(Wish(k, v) for k, v in zip(("room", "flame"), areas, strict=True))
+    target = replace(
+        painting(room(make_basis), np.ones((H, W, 3))),
+        image=image.astype(np.float32),
+        importance=np.ones(flame.shape, np.float32),
+        wishes=wishes,
+    )
+    constraints = lp.Constraints.of({"light 1": {"lock": [2.4] * 3}})
+    weights = lp.solve(basis, target, constraints=constraints).weights
+    assert weights[0].max() < 0.1  # it was painted at 0.06
+
+
 def test_an_unpainted_rest_has_no_contrast(make_basis: Any) -> None:
     basis = room(make_basis)
     target = lp.Target(

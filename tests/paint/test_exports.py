@@ -42,7 +42,7 @@ def test_a_verifying_render_writes_nothing_beside_the_scene(tmp_path: Path) -> N
     assert all(files == files_before for files in progress_seen)
     # It may end when it can tell, before all four samples.
     assert re.match(
-        r"Rendered again with \d samples per pixel: nothing found against it \(", verdict
+        r"Rendered again with \d samples per pixel: nothing found against it\.$", verdict
     )
     np.testing.assert_allclose(picture.mean(), 2 * basis.current_look.mean(), rtol=0.1)  # noise
 

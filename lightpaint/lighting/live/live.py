@@ -316,10 +316,12 @@ class LiveSolver:
         # The total importance, relative to the number of pixels.
         total = sum(float(view.counts[0]) for view in views)
         share = total / sum(view.pixels for view in views)
-        terms = PaintTerms()
+        terms, texels = PaintTerms(), texel_lights(lights)
         if self._fit.reads_wishes(is_sketch=self._is_sketch):
             wash, own = self._wash(views), self._reference
-            terms = PaintTerms.of(wash, self._fit, own, importance=total, unpainted=unpainted)
+            terms = PaintTerms.of(
+                wash, self._fit, own, importance=total, unpainted=unpainted, texels=texels
+            )
         return joint_pull(
             lights,
             power,
@@ -328,7 +330,7 @@ class LiveSolver:
             self._constraints,
             terms,
             painted_share=share,
-            keeps_color=self._reduction.is_free & power.any(axis=1) & ~texel_lights(lights),
+            keeps_color=self._reduction.is_free & power.any(axis=1) & ~texels,
         )
 
     def _joint_films(self, views: tuple[LiveView, ...]) -> Films:

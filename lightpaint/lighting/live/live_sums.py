@@ -13,6 +13,7 @@ from lightpaint.images import block_mean, block_sums, enlarged
 from lightpaint.lighting.live.tiles import MAX_CHEAP_LIGHTS, TiledEquations
 from lightpaint.lighting.loss.expected_lights import (
     Wash,
+    counted_wishes,
     exact_share,
     wish_places,
     wish_shares,
@@ -240,7 +241,7 @@ class SmallFilm:
         importance = np.minimum(self._a / np.where(counts > 0, counts, 1), 1)
         painted, look = (x.T.reshape(*self._size, 3) for x in (self._painted, self._current))
         small_importance = importance.reshape(self._size)
-        wishes = layers(self._side)
+        wishes = counted_wishes(layers(self._side), self._counted_share)
         if is_sketch and self._marks.any():
             marks = self._marks.T.reshape(*self._size, 3)
             painted = extend_marked(painted, small_importance, marks, wishes, look)
@@ -258,6 +259,12 @@ class SmallFilm:
     def _counts(self) -> Doubles:
         """Number of pixels in each block without emitters, (p,)."""
         return block_sums((~self._seen).astype(np.float64), self._side).ravel()
+
+    @cached_property
+    def _counted_share(self) -> Doubles:
+        """Share of the pixels of each block without emitters, (h', w')."""
+        pixels = block_sums(np.ones(self._seen.shape), self._side)
+        return np.asarray(self._counts.reshape(self._size) / pixels)
 
     def pixels(self, rest_weight: float, transform: ViewTransform | None) -> PaintedPixels:
         """Return the loss of these pixels; an average counts as much as all pixels in it."""

@@ -173,6 +173,7 @@ class PaintedBlocks:
             replace(wish, area=(block_sums(wish.area, side) / pixels).astype(np.float32))
             for wish in target.wishes
         ]
+        layers = counted_wishes(layers, counts / pixels)
         return cls(
             light_rows(basis.planes, counted, side), painted, look, importance, counts, layers
         )
@@ -271,6 +272,21 @@ def wish_shares(
     whole = Wish("painting", importance.astype(np.float32), has_strokes=True)
     wishes = split_wishes(layers or [whole], painted, importance, look)
     return np.array([wish.area.ravel() for wish in wishes], np.float64)
+
+
+def counted_wishes(wishes: Sequence[Wish], counted: Doubles) -> list[Wish]:
+    """Return wishes whose areas are shares of the pixels of a block that count.
+
+    counted: (h, w), the share of a block without emitters in view. An area that fits on the
+    emitters lies there: a flame in a lantern is not a wish for the light on the lantern.
+    """
+    if counted.min(initial=1) == 1:
+        return list(wishes)
+    known = np.where(counted > 0, counted, 1)
+    return [
+        replace(wish, area=(np.maximum(wish.area - (1 - counted), 0) / known).astype(np.float32))
+        for wish in wishes
+    ]
 
 
 def wish_places(shares: Doubles, size: tuple[int, int]) -> Indices:

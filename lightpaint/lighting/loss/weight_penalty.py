@@ -23,6 +23,9 @@ A the change of a display value with a relative change of light there. It is a q
 weights. The paper weighs surfaces so that large unpainted ones do not overwhelm small painted ones;
 this does the same between painted ones.
 
+Light beyond the white of the display counts as white: a highlight of four times white looks as one
+of twice white does, and a mean of both would hide what the rest of a subject lacks.
+
 A wish may be about several places, as three sculptures are. Then each counts by itself: in their
 mean, one that is very bright would stand for all.
 
@@ -31,6 +34,9 @@ stronger a contrast to it. A subject that cannot be lifted, as under a locked la
 such a rest down instead, so the light of the rest shall come as painted, too:
 
     F += s' Σ_k Σ_c A_kc² (P_r / R − 1)²
+
+Texels of an image could meet any contrast by a patchwork of odd colours. So as far as the light of
+a wish comes from texels, its contrast stays that of a brush.
 """
 
 from dataclasses import dataclass
@@ -111,7 +117,8 @@ class ContrastRows:
 
     contrast: (k, 3, n), A_o (ō_i / O − r̄_i / R), which shall be 0. rest: (k, 3, n), A_r r̄_i / R,
     whose sum over the lights shall be A_r, (k, 3), `rest_goal`. exact: (k,), the share of the rest
-    that was adjusted by a number. share: (k,), of all contrasts; each wish has the same.
+    that was adjusted by a number, without what texels light. share: (k,), of all contrasts;
+    each wish has the same.
     """
 
     contrast: Doubles
@@ -122,8 +129,14 @@ class ContrastRows:
 
     @classmethod
     @one_thread()
-    def of(cls, wash: Wash, transform: ViewTransform | None) -> Self:
-        """Make the rows of a painting. transform: of the loss; None for linear light."""
+    def of(
+        cls, wash: Wash, transform: ViewTransform | None, texel_weights: Doubles | None = None
+    ) -> Self:
+        """Make the rows of a painting.
+
+        transform: of the loss; None for linear light. texel_weights: (n, 3), weights of the look,
+        0 for all lights but texels; None without any.
+        """
         n = wash.rows.shape[1]
         goal = np.where(wash.importance > 0, wash.painted, wash.look)
         total = float(wash.counts.sum())
@@ -133,10 +146,14 @@ class ContrastRows:
             none = np.zeros((0, 3, n))
             return cls(none, none, np.zeros((0, 3)), np.zeros(0), np.zeros(0))
         shares = np.array([x for parts in found for pair in parts for x in pair])  # (2 k, p)
+        if transform is not None:
+            shares = shares * seen_share(goal, transform)
+            shares /= shares.sum(axis=1, keepdims=True)
         black = BLACK * float(np.average(goal.mean(axis=0), weights=wash.counts))
         inside, outside = (shares @ goal.T).reshape(-1, 2, 3).transpose(1, 0, 2)  # (k, 3) each
         # (k, 3, n) each
         own, rest = wash.light_sums(shares).reshape(3, n, -1, 2).transpose(3, 2, 0, 1)
+        by_lamps = 1 - _texel_share(own, shares[::2] @ wash.look.T, texel_weights)
         is_lit = (inside > black) & (outside > black)
         own, rest = (
             x / np.where(is_lit, mean, 1)[..., None] for x, mean in ((own, inside), (rest, outside))
@@ -152,7 +169,7 @@ class ContrastRows:
             amplitude[..., None] * (own - rest),
             rest_amplitude[..., None] * rest,
             rest_amplitude,
-            shares[1::2] @ exact,
+            shares[1::2] @ exact * by_lamps,
             np.array([1 / len(found) / len(parts) for parts in found for _ in parts]),
         )
 
@@ -189,6 +206,28 @@ def _subjects_and_rests(
     return [(x / x.sum(), rest / rest.sum()) for x in subjects]
 
 
+def _texel_share(own: Doubles, look: Doubles, texel_weights: Doubles | None) -> Doubles:
+    """Return the share of the present light of each subject that comes from texels, (k,).
+
+    own: (k, 3, n), its light of each lamp. look: (k, 3), its present light. texel_weights: see
+    `ContrastRows.of`.
+    """
+    if texel_weights is None:
+        return np.zeros(len(own))
+    light, total = np.einsum("kcn,nc->k", own, texel_weights), look.sum(axis=1)
+    return np.asarray(np.clip(light / np.where(total > 0, total, np.inf), 0, 1))
+
+
+def seen_share(light: Doubles, transform: ViewTransform) -> Doubles:
+    """Return the share of light that counts, (p,): 1 up to the white of the display, and beyond it
+    as much as makes it white.
+
+    light: (3, p), linear. transform: the view transform of the loss.
+    """
+    mean = light.mean(axis=0)
+    return np.asarray(np.minimum(1, transform.white / np.maximum(mean, transform.white)))
+
+
 def display_amplitude(light: Doubles, transform: ViewTransform | None) -> Doubles:
     """Return how much values of the loss change with a relative change of light, (3, k).
 
@@ -213,16 +252,26 @@ class PaintTerms:
     restraint: NormalEquations | None = None
 
     @classmethod
-    def of(cls, wash: Wash, fit: Fit, own: Doubles, *, importance: float, unpainted: float) -> Self:
+    def of(
+        cls,
+        wash: Wash,
+        fit: Fit,
+        own: Doubles,
+        *,
+        importance: float,
+        unpainted: float,
+        texels: Bools,
+    ) -> Self:
         """Read the terms of a sketch.
 
         own: (n, 3), weights with the colours that lights have. importance: of all pixels together.
-        unpainted: the weight of each unpainted pixel.
+        unpainted: the weight of each unpainted pixel. texels: (n,), lights that are texels.
         """
         keeps_colors = fit.colors in ("gentle", "white")
+        texel_weights = own * texels[:, None] if texels.any() else None
         return cls(
             ExpectedLights.of(wash, own) if keeps_colors else None,
-            ContrastRows.of(wash, fit.transform).term(importance),
+            ContrastRows.of(wash, fit.transform, texel_weights).term(importance),
             restrain_lights(wash, own, fit.transform, unpainted=unpainted),
         )
 

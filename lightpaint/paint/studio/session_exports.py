@@ -241,7 +241,8 @@ def render_verification(
     if result.agrees and result.is_blind:
         state = "nothing found against it"
     text = f"Rendered again with {result.spp} samples per pixel: {state}"
-    text += f" ({spoken_distance(result)})."
+    # How many standard errors apart they are helps whoever looks for a mistake.
+    text += "." if result.agrees else f" ({spoken_distance(result)})."
     return picture, text, result.agrees
 
 
