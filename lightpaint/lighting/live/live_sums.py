@@ -239,7 +239,8 @@ class SmallFilm:
         """
         counts = self._counts
         importance = np.minimum(self._a / np.where(counts > 0, counts, 1), 1)
-        painted, look = (x.T.reshape(*self._size, 3) for x in (self._painted, self._current))
+        painted: Floats = self._painted.T.reshape(*self._size, 3)
+        look = self._current.T.reshape(*self._size, 3)
         small_importance = importance.reshape(self._size)
         wishes = counted_wishes(layers(self._side), self._counted_share)
         if is_sketch and self._marks.any():
@@ -253,7 +254,8 @@ class SmallFilm:
     @property
     def has_mark(self) -> Bools:
         """Blocks in which brighter than the painting is as good in any channel, (p,)."""
-        return self._marks.any(axis=0) if self._marks.size else np.zeros(self._a.shape, bool)
+        no_marks = np.zeros(self._a.shape, bool)
+        return np.asarray(self._marks.any(axis=0)) if self._marks.size else no_marks
 
     @cached_property
     def _counts(self) -> Doubles:
