@@ -88,6 +88,10 @@ QUICK_MAX_BYTES = 2**29
 #: Maximum size in bytes of indirect light, images and noise in half floats, that stays in memory.
 INDIRECT_MAX_BYTES = 2**28
 
+#: Level of ZIP of parts with lit pixels alone, whose numbers have few digits. The usual level saves
+#: 5 to 9 % of the bytes, and takes half as much time again.
+LIT_LEVEL = 1
+
 #: Maximum size in bytes of a basis file that is read.
 MAX_BYTES = 2**36
 
@@ -121,7 +125,8 @@ def write_basis(path: str | Path, basis: Basis) -> None:
             channels = lit or all_channels([as_encoded_plane(x, basis.size) for x in planes])
             has_lit_parts.append(lit is not None)
             sums[light.name] = checksum(checked_text(texts), channels)
-            yield PartHead.of(light.name, channels, texts, display=basis.size), channels
+            head = PartHead.of(light.name, channels, texts, display=basis.size)
+            yield head if lit is None else replace(head, level=LIT_LEVEL), channels
         for part in others:
             head = PartHead.of(part.name, part.channels, part.attributes, display=part.display)
             yield head, part.channels

@@ -324,7 +324,8 @@ class PartHead:
     """The header of a part.
 
     size: (height, width). channels: name → type of its pixels. texts: its text attributes. display:
-    (height, width) of the picture; None for `size`. is_packed: whether to compress with ZIP.
+    (height, width) of the picture; None for `size`. is_packed: whether to compress with ZIP. level:
+    of ZIP.
     """
 
     name: str
@@ -333,6 +334,7 @@ class PartHead:
     texts: Mapping[str, str] = field(default_factory=dict)
     display: tuple[int, int] | None = None
     is_packed: bool = True
+    level: int = LEVEL
 
     @classmethod
     def of(
@@ -421,7 +423,7 @@ class PartHead:
             data = rows[first:last].reshape((last - first) // lines, -1)
             filtered = zip_filtered(data) if self.is_packed else data
             for k, (plain, steps) in enumerate(zip(data, filtered, strict=True)):
-                small = zlib.compress(steps, LEVEL) if self.is_packed else b""
+                small = zlib.compress(steps, self.level) if self.is_packed else b""
                 is_smaller = self.is_packed and len(small) < len(plain)
                 yield top + first + k * lines, small if is_smaller else plain.tobytes()
 
