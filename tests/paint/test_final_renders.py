@@ -14,13 +14,13 @@ from PIL import Image
 from renderer import mitsuba_render, write_room
 
 import lightpaint as lp
+from lightpaint import pipeline
 from lightpaint.errors import OutputError, PaintError
 from lightpaint.images.estimate import read_estimate
 from lightpaint.images.formats.exr import read_parts
 from lightpaint.lighting.answer.lighting import Lighting
 from lightpaint.paint import protocol
 from lightpaint.paint.studio import session_exports
-from lightpaint.pipeline import relit_renders
 from lightpaint.pipeline.relit_renders import DENOISED, render_final
 
 #: Samples that take much longer than a test.
@@ -216,7 +216,7 @@ def test_a_render_that_cannot_be_written_says_why(
     def fail(*_: Any) -> None:
         raise OutputError("the disk is full")
 
-    monkeypatch.setattr(relit_renders, "write_final_png", fail)
+    monkeypatch.setattr(pipeline, "write_final_png", fail)
     moving.send(request())
     assert wait_for(moving, "failed", 1)["text"] == "the disk is full"
     refused: dict[str, Callable[[], protocol.RenderFinal]] = {
