@@ -8,12 +8,12 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from lightpaint.colour.color_difference import delta_e
 from nightly import examples
 
 import lightpaint as lp
 from lightpaint.basis.basis import Origin
 from lightpaint.basis.lights import BasisLight
+from lightpaint.colour.color import delta_e
 from lightpaint.images.formats.exr import ExrPart, write_parts
 from lightpaint.paint import protocol
 from lightpaint.paint.notebook import widget_arguments
