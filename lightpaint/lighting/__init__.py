@@ -85,9 +85,9 @@ if TYPE_CHECKING:
     from lightpaint.lighting.answer.lighting_file import write_lighting as write_lighting
     from lightpaint.lighting.answer.lighting_keys import LightingKey as LightingKey
     from lightpaint.lighting.answer.lighting_keys import key_slopes as key_slopes
+    from lightpaint.lighting.constraints.absolute_scale import Scale as Scale
     from lightpaint.lighting.constraints.absolute_scale import agreed_scale as agreed_scale
     from lightpaint.lighting.constraints.absolute_scale import unscaled_error as unscaled_error
-    from lightpaint.lighting.constraints.absolute_scale import unscaled_lights as unscaled_lights
     from lightpaint.lighting.constraints.absolute_scale import with_scale as with_scale
     from lightpaint.lighting.constraints.absolute_scale import with_sure_scale as with_sure_scale
     from lightpaint.lighting.constraints.constraints import LAMP_KEYS as LAMP_KEYS

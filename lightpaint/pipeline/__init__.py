@@ -73,10 +73,7 @@ if TYPE_CHECKING:
     from lightpaint.pipeline.wished_planes import MeasuredPlanes as MeasuredPlanes
     from lightpaint.pipeline.wished_planes import check_planes as check_planes
     from lightpaint.pipeline.wished_planes import check_reached as check_reached
-    from lightpaint.pipeline.wished_planes import (
-        constraints_and_unscaled as constraints_and_unscaled,
-    )
-    from lightpaint.pipeline.wished_planes import constraints_for_planes as constraints_for_planes
+    from lightpaint.pipeline.wished_planes import constraints_and_scale as constraints_and_scale
     from lightpaint.pipeline.wished_planes import limited_power as limited_power
     from lightpaint.pipeline.wished_planes import measure_planes as measure_planes
     from lightpaint.pipeline.wished_planes import no_glare_remark as no_glare_remark

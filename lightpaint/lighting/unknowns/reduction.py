@@ -20,6 +20,7 @@ from lightpaint.colour import Lamp
 from lightpaint.display_text import brief, some_names
 from lightpaint.errors import ConstraintError
 from lightpaint.lighting.algebra.quadratic import Cap
+from lightpaint.lighting.constraints.absolute_scale import with_scale
 from lightpaint.lighting.constraints.constraints import Constraints, LightConstraint, Requirements
 from lightpaint.lighting.constraints.light_constraints import (
     constraints_by_light,
@@ -540,6 +541,7 @@ def _with_constrained_parts(
 
 def lamps_by_name(constraints: Constraints, lights: Sequence[BasisLight]) -> dict[str, Lamp]:
     """Return what mixes lights from emitters, by the light's name. Raises ConstraintError."""
+    constraints = with_scale(constraints, lights)
     by_light = constraints_by_light(constraints, lights)
     return {lights[k].name: lamp for k, lamp in _lamps(constraints, lights, by_light).items()}
 
