@@ -130,6 +130,8 @@ if TYPE_CHECKING:
     from lightpaint.lighting.solver import solution_of as solution_of
     from lightpaint.lighting.solver import solve as solve
     from lightpaint.lighting.solver import solve_frames as solve_frames
+    from lightpaint.lighting.unknowns.full_lamps import FullLamp as FullLamp
+    from lightpaint.lighting.unknowns.full_lamps import full_lamps as full_lamps
     from lightpaint.lighting.unknowns.lamp_parts import WholeLamps as WholeLamps
     from lightpaint.lighting.unknowns.reduced_problem import reduced_problems as reduced_problems
     from lightpaint.lighting.unknowns.reduction import Reduction as Reduction

@@ -24,7 +24,9 @@ if TYPE_CHECKING:
     from lightpaint.pipeline.job.sources import check_nothing_unused as check_nothing_unused
     from lightpaint.pipeline.job.sources import check_spectral as check_spectral
     from lightpaint.pipeline.job.sources import content as content
+    from lightpaint.pipeline.job.sources import lamps_of_scene as lamps_of_scene
     from lightpaint.pipeline.job.sources import observer_of as observer_of
+    from lightpaint.pipeline.job.sources import scaled_constraints as scaled_constraints
     from lightpaint.pipeline.job.sources import spectral_scene as spectral_scene
     from lightpaint.pipeline.job.sources import vars_of as vars_of
     from lightpaint.pipeline.job_bases import obtain as obtain
