@@ -7,11 +7,10 @@ from pathlib import Path
 import numpy as np
 import pytest
 from command import run, run_refused, succeed
-from lightpaint.lighting.solve import solve
 from lit_planes import BULB, DISC, floor, write_scene
 from webs import cosine, ies_text, write_web
 
-from lightpaint import Job, Painting, SceneFile, Settings, Target, load_scene, render_basis
+from lightpaint import Job, Painting, SceneFile, Settings, Target, load_scene, render_basis, solve
 from lightpaint import run as run_job
 from lightpaint.errors import ConstraintError
 from lightpaint.images.formats.exr import write_rgb
