@@ -130,9 +130,7 @@ class _Limits:
 
 
 class RowProducts:
-    """The outer products of rows, (m, n), with themselves, of which those of few numbers are
-    added by place.
-    """
+    """The outer products of rows, (m, n), with themselves; short rows add theirs by place."""
 
     def __init__(self, rows: Doubles) -> None:
         counts = np.count_nonzero(rows, axis=1)
