@@ -63,7 +63,7 @@ WALL, WALL_SIZE = (16, 9), (960, 540)
 CELL, TITLE, TITLE_SIZE = (640, 360), 36, 22
 
 #: Stops of the office's painting.
-OFFICE_STOPS = -7.0
+OFFICE_STOPS = -8.4
 
 #: The two tracks of the gallery, the spots that may turn and slide on each, and spots to add.
 TRACKS = {

@@ -85,9 +85,9 @@ if TYPE_CHECKING:
     from lightpaint.lighting.answer.lighting_file import write_lighting as write_lighting
     from lightpaint.lighting.answer.lighting_keys import LightingKey as LightingKey
     from lightpaint.lighting.answer.lighting_keys import key_slopes as key_slopes
+    from lightpaint.lighting.constraints.absolute_scale import Scale as Scale
     from lightpaint.lighting.constraints.absolute_scale import agreed_scale as agreed_scale
     from lightpaint.lighting.constraints.absolute_scale import unscaled_error as unscaled_error
-    from lightpaint.lighting.constraints.absolute_scale import unscaled_lights as unscaled_lights
     from lightpaint.lighting.constraints.absolute_scale import with_scale as with_scale
     from lightpaint.lighting.constraints.absolute_scale import with_sure_scale as with_sure_scale
     from lightpaint.lighting.constraints.constraints import LAMP_KEYS as LAMP_KEYS
@@ -130,6 +130,8 @@ if TYPE_CHECKING:
     from lightpaint.lighting.solver import solution_of as solution_of
     from lightpaint.lighting.solver import solve as solve
     from lightpaint.lighting.solver import solve_frames as solve_frames
+    from lightpaint.lighting.unknowns.full_lamps import FullLamp as FullLamp
+    from lightpaint.lighting.unknowns.full_lamps import full_lamps as full_lamps
     from lightpaint.lighting.unknowns.lamp_parts import WholeLamps as WholeLamps
     from lightpaint.lighting.unknowns.reduced_problem import reduced_problems as reduced_problems
     from lightpaint.lighting.unknowns.reduction import Reduction as Reduction

@@ -17,6 +17,7 @@ from lightpaint.lighting import (
     constraints_of,
     is_pattern,
     reduce_to,
+    with_scale,
     with_sure_scale,
 )
 from lightpaint.paint.layers.layer_files import check_kind
@@ -129,10 +130,9 @@ def _scene_on_film(
 
         _check_constraints(basis_lights(scene), constraints, settings, check_lamps)
         if settings.planes is not None:
-            from lightpaint.pipeline import check_planes, constraints_for_planes
+            from lightpaint.pipeline import check_planes
 
-            every = constraints_for_planes(scene, constraints, settings)
-            check_planes(scene, settings.planes, every)
+            check_planes(scene, settings.planes, constraints, settings)
 
     prepare = partial(_with_spectra, settings=settings, constraints=constraints)
     if isinstance(source, Scene):
@@ -192,7 +192,9 @@ def _check_constraints(
     have the power that a limit in the settings needs.
     """
     all_constraints = constraints_of(lights.requests).and_then(constraints)
-    reduction = reduce_to(with_sure_scale(all_constraints, lights), lights)
+    # Of planes it is known after a measurement which lights reach them.
+    scaled = with_sure_scale if settings.planes is None else with_scale
+    reduction = reduce_to(scaled(all_constraints, lights), lights)
     check_lamps({lights[k].name: lamp.names for k, lamp in reduction.lamps.items()})
     if settings.watts is not None:
         check_powers(reduction, [light.name for light in lights], "a limit of power")

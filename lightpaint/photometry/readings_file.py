@@ -163,9 +163,15 @@ def _sure(
     is_share: bool = False,
     is_most: bool = False,
 ) -> str:
-    """Return a value in words, with the sure end of its interval where that alone misses."""
-    spoken, spoken_end = (f"{x:.2f}" if is_share else f"{x:.4g}" for x in (value, end))
+    """Return a value in words, with the sure end of its interval where that alone misses, in as
+    many digits as show that.
+    """
     is_enough = value <= asked if is_most else value >= asked
+    for digits in range(6):
+        shown = f".{2 + digits}f" if is_share else f".{4 + digits}g"
+        spoken, spoken_end = format(value, shown), format(end, shown)
+        if not is_enough or (float(spoken_end) > asked if is_most else float(spoken_end) < asked):
+            break
     bound = "at most" if is_most else "at least"
     return f"{spoken}{unit}" + (f" (for sure {bound} {spoken_end})" if is_enough else "")
 

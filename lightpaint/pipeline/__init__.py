@@ -24,7 +24,9 @@ if TYPE_CHECKING:
     from lightpaint.pipeline.job.sources import check_nothing_unused as check_nothing_unused
     from lightpaint.pipeline.job.sources import check_spectral as check_spectral
     from lightpaint.pipeline.job.sources import content as content
+    from lightpaint.pipeline.job.sources import lamps_of_scene as lamps_of_scene
     from lightpaint.pipeline.job.sources import observer_of as observer_of
+    from lightpaint.pipeline.job.sources import scaled_constraints as scaled_constraints
     from lightpaint.pipeline.job.sources import spectral_scene as spectral_scene
     from lightpaint.pipeline.job.sources import vars_of as vars_of
     from lightpaint.pipeline.job_bases import obtain as obtain
@@ -73,10 +75,7 @@ if TYPE_CHECKING:
     from lightpaint.pipeline.wished_planes import MeasuredPlanes as MeasuredPlanes
     from lightpaint.pipeline.wished_planes import check_planes as check_planes
     from lightpaint.pipeline.wished_planes import check_reached as check_reached
-    from lightpaint.pipeline.wished_planes import (
-        constraints_and_unscaled as constraints_and_unscaled,
-    )
-    from lightpaint.pipeline.wished_planes import constraints_for_planes as constraints_for_planes
+    from lightpaint.pipeline.wished_planes import constraints_and_scale as constraints_and_scale
     from lightpaint.pipeline.wished_planes import limited_power as limited_power
     from lightpaint.pipeline.wished_planes import measure_planes as measure_planes
     from lightpaint.pipeline.wished_planes import no_glare_remark as no_glare_remark

@@ -19,10 +19,8 @@ from lightpaint.pipeline.job.settings import Settings
 from lightpaint.pipeline.results.result_folder import ResultFolder, answer_files, files_of_planes
 from lightpaint.pipeline.wished_planes import (
     MeasuredPlanes,
-    check_reached,
-    constraints_and_unscaled,
+    constraints_and_scale,
     measure_planes,
-    no_glare_remark,
     with_glare,
 )
 from lightpaint.progress import Progress, listener, silent
@@ -67,16 +65,12 @@ def plan_lighting(
         SceneError: For an invalid planes file.
     """
     settings, listen = settings or Settings(), listener(progress)
-    every, unscaled = constraints_and_unscaled(scene, constraints or Constraints(), settings)
+    every, scale = constraints_and_scale(scene, constraints or Constraints(), settings)
     lights = basis_lights(scene)
     reduction = reduce_to(every, lights)
     check_powers(reduction, [light.name for light in lights], "the least power")
-    measured = measure_planes(scene, planes, settings, every.cd_per_unit, listen)
-    check_reached(measured.illuminance, unscaled)
-    if unscaled:
-        listen.say(no_glare_remark(unscaled))
-    else:
-        measured = with_glare(measured, scene, settings, listen)
+    measured = measure_planes(scene, planes, settings, scale, listen)
+    measured = with_glare(measured, scene, settings, listen)
     return plan_of(measured, reduction, scene_identity=scene.identity)
 
 

@@ -18,6 +18,7 @@ from lightpaint.lighting import (
     Problem,
     Reduction,
     RequiredProblem,
+    Scale,
     Solution,
     WishedLight,
     check_powers,
@@ -26,11 +27,9 @@ from lightpaint.lighting import (
     reduce_to,
     solution_of,
     unscaled_error,
-    unscaled_lights,
     watts_allowed,
     wished_light,
     with_scale,
-    with_sure_scale,
     with_wishes,
     without_wishes,
 )
@@ -55,13 +54,15 @@ class MeasuredPlanes:
     """Planes of a file with the illuminance of each light on them.
 
     floor_m2: the area that power is divided by; 0 if there is none. glare: that the observers of
-    the file see; None if it was not measured.
+    the file see; None if it was not measured. unscaled: lights whose brightness is a guess, and
+    which reach no plane.
     """
 
     file: PlanesFile
     illuminance: Illuminance
     floor_m2: float
     glare: Glare | None = None
+    unscaled: tuple[BasisLight, ...] = ()
 
     def weights_by_case(self, weights: Doubles) -> Mapping[str, Doubles]:
         """Return the weights (n, 3) of each case; of the light of the scene as "" without cases."""
@@ -84,15 +85,15 @@ def measure_planes(
     scene: Scene,
     path: str | Path,
     settings: Settings,
-    cd_per_unit: float | None,
+    scale: Scale,
     listen: Listener,
 ) -> MeasuredPlanes:
     """Measure the illuminance of each light on the planes of a file.
 
-    cd_per_unit: of the lights file or the settings. Raises LightpaintError if nothing says what a
-    radiance of 1 stands for.
+    Raises LightpaintError if nothing says what a radiance of 1 stands for, or it is a guess for a
+    light that reaches a plane.
     """
-    file, cd_per_unit = read_planes(path, scene), checked_scale(path, cd_per_unit)
+    file, cd_per_unit = read_planes(path, scene), checked_scale(path, scale.cd_per_unit)
     for remark in file.remarks(scene):
         listen.say(remark)
     illuminance = measure_illuminance(
@@ -105,19 +106,25 @@ def measure_planes(
         exact_spp=settings.exact_spp,
         progress=listen,
     )
+    check_reached(illuminance, scale.unscaled)
     points = sum(len(plane) for plane in file.planes)
     listen.note(f"illuminance measured at {points} points of {len(file.planes)} planes")
     floor_m2 = _floor_area(file, scene)
     if settings.watts is not None:
         file = replace(file, power=PowerBudget(settings.watts))
-    return MeasuredPlanes(file, illuminance, floor_m2)
+    return MeasuredPlanes(file, illuminance, floor_m2, unscaled=scale.unscaled)
 
 
 def with_glare(
     planes: MeasuredPlanes, scene: Scene, settings: Settings, listen: Listener
 ) -> MeasuredPlanes:
-    """Return measured planes with the glare of each light for the observers of their file."""
+    """Return measured planes with the glare of each light for the observers of their file, unless
+    they may see a light without a scale.
+    """
     if not planes.file.observers:
+        return planes
+    if planes.unscaled:
+        listen.say(no_glare_remark(planes.unscaled))
         return planes
     glare = measure_glare(
         scene,
@@ -165,44 +172,36 @@ def limited_power(watts: float, lights: Lights) -> MeasuredPlanes:
     return MeasuredPlanes(PlanesFile(Path(), (), PowerBudget(watts)), illuminance, 0.0)
 
 
-def constraints_for_planes(
+def constraints_and_scale(
     scene: Scene, constraints: Constraints, settings: Settings
-) -> Constraints:
-    """Return all constraints on the lights of a scene, with what a radiance of 1 stands for."""
-    return with_sure_scale(_every(scene, constraints, settings), basis_lights(scene))
-
-
-def constraints_and_unscaled(
-    scene: Scene, constraints: Constraints, settings: Settings
-) -> tuple[Constraints, tuple[BasisLight, ...]]:
-    """Return constraints as `constraints_for_planes`, and the lights whose brightness is a guess,
-    which `check_reached` allows where they reach no plane.
+) -> tuple[Constraints, Scale]:
+    """Return all constraints on the lights of a scene, and the scale of these. `check_reached`
+    allows lights without a scale where they reach no plane.
     """
-    every, lights = _every(scene, constraints, settings), basis_lights(scene)
-    return with_scale(every, lights), unscaled_lights(every, lights)
-
-
-def _every(scene: Scene, constraints: Constraints, settings: Settings) -> Constraints:
     every = constraints_of(scene.requests).and_then(constraints)
-    return every.and_then(Constraints(cd_per_unit=settings.cd_per_unit))
+    every = every.and_then(Constraints(cd_per_unit=settings.cd_per_unit))
+    lights = basis_lights(scene)
+    return with_scale(every, lights), Scale.of(every, lights)
 
 
 def check_planes(
     scene: Scene,
     path: str | Path,
     constraints: Constraints,
+    settings: Settings,
     *,
     read: Callable[[str | Path, Scene], PlanesFile] = read_planes,
 ) -> None:
     """Raise LightpaintError unless planes of a file can be measured in a scene, and its lamps have
     what wishes for their power need. Nothing is rendered.
 
-    constraints: as `constraints_for_planes` returns them. read: reads the file.
+    constraints: on the lights, beside those of the lights file. read: reads the file.
     """
-    checked_scale(path, constraints.cd_per_unit)
+    every, _ = constraints_and_scale(scene, constraints, settings)
+    checked_scale(path, every.cd_per_unit)
     file, lights = read(path, scene), basis_lights(scene)
     if watts_allowed(file.power, _floor_area(file, scene)) is not None:
-        reduction = reduce_to(constraints, lights)
+        reduction = reduce_to(every, lights)
         check_powers(reduction, [light.name for light in lights], "a limit of power")
 
 
@@ -213,8 +212,7 @@ def planes_of_job(job: Job, lights: Lights, listen: Listener) -> MeasuredPlanes 
     settings, scene = job.settings, job.views[0].scene
     if settings.planes is None or scene is None:
         return None if settings.watts is None else limited_power(settings.watts, lights)
-    scale = job.all_constraints.cd_per_unit
-    planes = measure_planes(scene, settings.planes, settings, scale, listen)
+    planes = measure_planes(scene, settings.planes, settings, job.scale, listen)
     return with_glare(planes, scene, settings, listen)
 
 

@@ -59,7 +59,7 @@ from lightpaint.scene.runtime.kernel_threads import kernels
 from lightpaint.scene.runtime.mitsuba_errors import mitsuba_errors, render_errors
 from lightpaint.scene.runtime.render_lock import MITSUBA
 from lightpaint.scene.runtime.variant import is_in_spectra, spectral_variant
-from lightpaint.scene.scene_tree import ParsedScene, darkened, with_elements, with_motions
+from lightpaint.scene.scene_tree import ParsedScene, with_elements, with_motions, with_settings
 
 _Result_T = TypeVar("_Result_T")
 
@@ -260,6 +260,18 @@ class Scene(SceneFiles, Shown):
         lights = lights_of_lamps(self.lights, lamps, scene=str(self.path))
         return replace(self, lights=lights, is_spectral=True, observer=observer)
 
+    def with_emission(self, emission: Mapping[str, RGB]) -> "Scene":
+        """Return this scene with other current emissions of lights that are adjusted, by name."""
+        settings = settings_for(self.lights, self.emitters, emission, scene=str(self.path))
+        lights = tuple(
+            light.with_emission(emission[light.name]) if light.name in emission else light
+            for light in self.lights
+        )
+        now = {member.name: member for light in lights for member in light.members}
+        emitters = tuple(now.get(x.name, x) for x in self.emitters)
+        parsed = with_settings(self.parsed, settings)
+        return replace(self, lights=lights, emitters=emitters, parsed=parsed)
+
     @property
     def materials(self) -> frozenset[str]:
         """Mitsuba's names of the kinds of its materials."""
@@ -333,7 +345,7 @@ class Scene(SceneFiles, Shown):
             lights=lights,
             content=content,
             chosen=names,
-            parsed=darkened(self.parsed, dark),
+            parsed=with_settings(self.parsed, dark),
         )
 
     @MITSUBA.acquired()

@@ -413,15 +413,13 @@ def with_motions(parsed: ParsedScene, motions: Mapping[int, Motion]) -> ParsedSc
     return copied
 
 
-def darkened(parsed: ParsedScene, dark: Mapping[int, EmitterSetting]) -> ParsedScene:
-    """Return a copy of a scene in which emitters have other settings. dark: settings by emitter
-    node.
-    """
+def with_settings(parsed: ParsedScene, settings: Mapping[int, EmitterSetting]) -> ParsedScene:
+    """Return a copy of a scene in which emitters have other settings, by emitter node."""
     import mitsuba as mi
 
     copied = copy(parsed)
     copied.state = mi.parser.ParserState(parsed.state)
-    for node, setting in dark.items():
+    for node, setting in settings.items():
         set_emission(copied.state, node, setting, on_shape=node in parsed.shape_of)
     return copied
 

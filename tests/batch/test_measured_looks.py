@@ -30,6 +30,7 @@ from lightpaint.batch.work.item_execution import run_item
 from lightpaint.batch.work.worker_storage import WorkerCache
 from lightpaint.errors import BatchError
 from lightpaint.images.formats.exr import write_rgb
+from lightpaint.lighting.constraints.absolute_scale import Scale
 from lightpaint.photometry.measure import error_excess, weights_on
 from lightpaint.pipeline.job.settings import Settings
 from lightpaint.pipeline.wished_planes import measure_planes
@@ -178,7 +179,8 @@ def test_the_error_of_a_manifest_holds_for_planes_too(folder: Path) -> None:
     values = json.loads(step.task.job)["settings"]
     settings = Settings(**{key: values[key] for key in ("planes", "error")})
     scene = load_scene(folder / "project" / "room.xml")
-    found = measure_planes(scene, values["planes"], settings, 100.0, listener(silent)).illuminance
+    scale, listen = Scale(100.0), listener(silent)
+    found = measure_planes(scene, values["planes"], settings, scale, listen).illuminance
     assert error_excess(found, weights_on(found.lights), 0.004) <= 1
 
 

@@ -55,7 +55,7 @@ def test_lights_without_a_scale_may_reach_no_plane(folder: Path) -> None:
     assert refused.returncode == 2
     assert not (folder / "refused").exists()
     error = refused.stderr.splitlines()[-1]  # after the remarks of the measurement
-    assert "'disc', which reaches desk, is in W/(m² sr), beside luminaires" in error
+    assert "'disc', which reaches desk, is in W/(m² sr), beside lamps" in error
     assert "--unit 1" in error
     succeed(folder, "measure", "lit.xml", "--force", "--unit", "1")
 

@@ -212,7 +212,7 @@ def test_losses_count_once_for_emitters(tmp_path: Path, amount: str) -> None:
 
 def test_lights_beside_it_need_a_scale(tmp_path: Path) -> None:
     scene = _room(tmp_path, '[light.bulb]\nphotometry = "lamps/lamp.ies"')
-    with pytest.raises(ConstraintError, match=r"'panel' is in W/\(m² sr\), beside luminaires"):
+    with pytest.raises(ConstraintError, match=r"'panel' is in W/\(m² sr\), beside lamps"):
         _reduction(scene)
     _reduction(scene, Constraints.of(cd_per_unit=1))
     others = {

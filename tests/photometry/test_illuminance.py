@@ -1,5 +1,6 @@
 """Illuminance as a linear function of weights, its readings and their errors; no renderer."""
 
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -151,3 +152,18 @@ def test_weights_of_another_shape_are_refused(weights: Any) -> None:
 def test_other_planes_are_refused() -> None:
     with pytest.raises(SceneError, match="no plane 'desk': there is p0"):
         illuminance(np.ones(3)).reading("desk", ONE)
+
+
+def test_the_sure_end_has_as_many_digits_as_show_that_it_misses() -> None:
+    """0.598 for sure is not 0.60 where 0.6 is wished for, nor 499.97 lx 500 lx."""
+    desk, _ = wished("desk", Wishes(mean=500, uniformity=0.6), 0)
+    matrix, noise = np.zeros((2, 2, 3)), np.zeros((2, 2, 3))
+    matrix[:, 0, 1], noise[:, 0, 1] = (390, 890), (2, -2)
+    found = Illuminance((desk,), LIGHTS, matrix, noise, 1.0)
+    reading = found.reading("desk", ONE)
+    near = replace(desk, wishes=Wishes(uniformity=reading.uniformity - 1e-4))
+    [text] = missed_wishes(replace(found, planes=(near,)), ONE)
+    words = text.replace(")", "").split()
+    asked, end = near.wishes.uniformity, float(words[words.index("least") + 1].rstrip(","))
+    assert asked is not None
+    assert end < asked <= reading.uniformity

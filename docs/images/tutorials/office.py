@@ -22,11 +22,11 @@ OFFICE = "scenes/office/office.xml"
 PLANES = "scenes/office/office.planes.toml"
 
 #: Glazes: multiplied with what is there, on the whole room and on the wall at the left.
-DUSK, GLOW = (0.42, 0.36, 0.30), (2.6, 2.3, 1.9)
+DUSK, GLOW = (0.26, 0.225, 0.17), (2.6, 2.3, 1.9)
 WALL, SIZE = ((0.02, 0.25), (0.55, 0.28)), 0.5
 
 #: Exposure of the template, which template.json has.
-STOPS = -7.0
+STOPS = -8.4
 
 #: Powers of the eleven looks, in watts.
 WATTS = range(90, 191, 10)

@@ -51,7 +51,6 @@ from lightpaint.pipeline import (
     Settings,
     check_nothing_unused,
     check_planes,
-    constraints_for_planes,
     content,
     is_as_written,
     view_names,
@@ -283,8 +282,7 @@ class _Planner:
             return self._planes[key]
 
         if settings.planes is not None:
-            every = constraints_for_planes(scene, constraints, settings)
-            check_planes(scene, settings.planes, every, read=read)
+            check_planes(scene, settings.planes, constraints, settings, read=read)
             self.measurements[name] = _cost_of_lux(scene, read(settings.planes, scene), settings)
 
     def _job(

@@ -15,7 +15,7 @@ from lightpaint.pipeline import (
     ResultFolder,
     Settings,
     answer_files,
-    constraints_for_planes,
+    constraints_and_scale,
     files_of_planes,
     measure_planes,
     new_answer,
@@ -99,7 +99,7 @@ def measure_derived(
     """
     if settings.planes is None or scene is None:
         return None
-    scale = constraints_for_planes(scene, constraints, settings).cd_per_unit
+    _, scale = constraints_and_scale(scene, constraints, settings)
     placed = scene_of(scene, lighting)
     planes = measure_planes(placed, settings.planes, settings, scale, listen)
     return with_glare(planes, placed, settings, listen)

@@ -17,7 +17,7 @@ from lightpaint.cli.output import documents, terminal
 from lightpaint.cli.output.lines import CommandOutcome
 from lightpaint.errors import OutputError, SceneError
 from lightpaint.files import check_files, check_writable, write_text
-from lightpaint.lighting import Constraints, constraints_of, read_lighting, with_scale
+from lightpaint.lighting import Constraints, Scale, constraints_of, read_lighting
 from lightpaint.photometry.illuminance import Illuminance
 from lightpaint.photometry.measure import measure_illuminance
 from lightpaint.photometry.measure_glare import measure_glare
@@ -37,7 +37,7 @@ from lightpaint.pipeline import (
     SceneFile,
     Settings,
     check_reached,
-    constraints_and_unscaled,
+    constraints_and_scale,
     new_answer,
     no_glare_remark,
     plan_folder,
@@ -116,8 +116,8 @@ def _lit_scene(
     Raises SceneError if nothing says cd/m².
     """
     scene, emission = source.content, None
-    own = with_scale(constraints_of(scene.requests), basis_lights(scene)).cd_per_unit
-    unscaled = constraints_and_unscaled(scene, Constraints(), settings)[1]
+    own = Scale.of(constraints_of(scene.requests), basis_lights(scene)).cd_per_unit
+    unscaled = constraints_and_scale(scene, Constraints(), settings)[1].unscaled
     if lighting is not None:
         finish(lighting.parent)
         answer = read_lighting(lighting)

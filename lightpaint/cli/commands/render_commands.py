@@ -3,7 +3,7 @@ one painting or several, with their variations and a gallery of all.
 """
 
 import shlex
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
 from shlex import quote
@@ -20,9 +20,9 @@ from lightpaint.cli.tolerances import Tolerances
 from lightpaint.colour import ViewTransform
 from lightpaint.demo import write_demo
 from lightpaint.display_text import some_of
-from lightpaint.errors import LOOK_ERRORS, BackendError, OutputError
+from lightpaint.errors import LOOK_ERRORS, BackendError, ConstraintError, OutputError
 from lightpaint.files import check_files, check_name, check_writable
-from lightpaint.lighting import agreed_scale, read_lighting
+from lightpaint.lighting import FullLamp, agreed_scale, read_lighting
 from lightpaint.pipeline import (
     BasisFile,
     GroupsFile,
@@ -36,6 +36,7 @@ from lightpaint.pipeline import (
     check_nothing_unused,
     check_sheet,
     frames_to_write,
+    lamps_of_scene,
     look_of_basis,
     obtain,
     relight_frames,
@@ -49,6 +50,7 @@ from lightpaint.pipeline import (
     render_template,
     result_folders,
     run,
+    scaled_constraints,
     template_of_basis,
     verify_result,
 )
@@ -220,17 +222,30 @@ def lights(
     """
     content = scene.content
     cd_per_unit = agreed_scale(content.cd_per_unit, cd_per_unit)
+    lamps, cd_per_unit = _lamps(content, cd_per_unit)
     if sheet is not None and is_named:
         check_sheet(content, sheet, force=force)
     note_scene(content)
     for remark in remarks_of_scene(content):
         terminal.say(remark)
-    tables.show_lights(content, cd_per_unit)
+    tables.show_lights(content, cd_per_unit, lamps)
     is_drawn = sheet is not None and _draw_sheet(content, sheet, is_named=is_named, force=force)
     sheet_fields = {"sheet": str(sheet)} if is_drawn else {}
     return CommandOutcome(
-        lambda: {**documents.lights_document(content, cd_per_unit), **sheet_fields}
+        lambda: {**documents.lights_document(content, cd_per_unit, lamps), **sheet_fields}
     )
+
+
+def _lamps(scene: Scene, cd_per_unit: float | None) -> tuple[Mapping[str, FullLamp], float | None]:
+    """Return the lamps of a scene, none if its lights file has a mistake, which is printed; and
+    candelas of an intensity of 1, as given or as the lights file says.
+    """
+    try:
+        scaled = scaled_constraints(scene, cd_per_unit)
+        return lamps_of_scene(scene, scaled), scaled.cd_per_unit
+    except ConstraintError as error:
+        terminal.say(error.sentence)
+        return {}, cd_per_unit
 
 
 def _draw_sheet(scene: Scene, sheet: Path, *, is_named: bool, force: bool) -> bool:

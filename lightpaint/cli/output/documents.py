@@ -1,26 +1,47 @@
 """The documents of `--json`, for programs (docs/solving.md)."""
 
 import json
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
 from lightpaint.basis import Basis
 from lightpaint.basis.cache import cache
 from lightpaint.cli.doctor import Finding
-from lightpaint.cli.output.tables import photometry_of
+from lightpaint.cli.output.tables import photometry_at_full, photometry_of
 from lightpaint.cli.tolerances import Tolerances
+from lightpaint.lighting import FullLamp
 from lightpaint.pipeline import RECORD, Job, Look, PaintedView
 from lightpaint.relit import Verification
 from lightpaint.report import finite, verification_numbers
 from lightpaint.scene import MULTIPLE, WHOLE_EMISSION, Light, Scene
 
 
-def lights_document(scene: Scene, cd_per_unit: float | None) -> dict[str, Any]:
-    """Return the document of `lights`."""
+def lights_document(
+    scene: Scene, cd_per_unit: float | None, lamps: Mapping[str, FullLamp]
+) -> dict[str, Any]:
+    """Return the document of `lights`. lamps: at full, by light."""
     scale = {} if cd_per_unit is None else {"cd_per_unit": cd_per_unit}
-    listed = [light_document(light, cd_per_unit) for light in scene.lights]
+    listed = [
+        light_document(x, cd_per_unit) | lamp_document(x, cd_per_unit, lamps.get(x.name))
+        for x in scene.lights
+    ]
     return {"scene": str(scene.path), **scale, "lights": listed}
+
+
+def lamp_document(light: Light, cd_per_unit: float | None, lamp: FullLamp | None) -> dict[str, Any]:
+    """Return what mixes a light, and its light and power at full; empty without a lamp."""
+    if lamp is None:
+        return {}
+    emitters = [
+        {"name": x.name, "emission": list(x.emission), "max": x.most, "watts": x.watts}
+        for x in lamp.lamp.emitters
+    ]
+    full = photometry_at_full(light, cd_per_unit, lamp)
+    return {
+        "emitters": emitters,
+        "at_full": {"emission": list(lamp.emission), "watts": lamp.watts, **full.fields()},
+    }
 
 
 def light_document(light: Light, cd_per_unit: float | None) -> dict[str, Any]:

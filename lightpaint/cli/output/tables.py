@@ -1,6 +1,6 @@
 """Tables of scenes, bases and suggestions, with sentences below them."""
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 
 import numpy as np
 
@@ -8,6 +8,7 @@ from lightpaint.arrays import as_rgb
 from lightpaint.basis.cache import Entry
 from lightpaint.cli.output import terminal
 from lightpaint.colour import Photometry, photometry
+from lightpaint.lighting import FullLamp
 from lightpaint.placement import Suggestion
 from lightpaint.relit import Verification
 from lightpaint.report import agreement, spoken_percent, spoken_position, spoken_suggestions
@@ -15,12 +16,13 @@ from lightpaint.scene import MULTIPLE, Emitter, Light, Scene
 from lightpaint.scene.lights.texels import domain_of, image_of, layouts_of, node_name
 
 
-def show_lights(scene: Scene, cd_per_unit: float | None) -> None:
-    """Print the lights of a scene, groups with their members."""
+def show_lights(scene: Scene, cd_per_unit: float | None, lamps: Mapping[str, FullLamp]) -> None:
+    """Print the lights of a scene, groups with their members. lamps: at full, by light."""
     headings = ("light", "plugin", "emission R G B", "unit", "size or place", "sampling", "colour")
     # Lumens and candelas need a scale.
     amounts = () if cd_per_unit is None else ("luminous", "flux")
-    table = terminal.table(*headings, *amounts)
+    of_lamps = ("emitters", *(("lm at full",) if amounts else ()), "W at full") if lamps else ()
+    table = terminal.table(*headings, *amounts, *of_lamps)
     adjusted = (x for x in scene.lights if not x.is_fixed and image_of(x.name))
     images = layouts_of(name for light in adjusted for name in light.member_names)
     for image, layout in images.items():
@@ -49,6 +51,7 @@ def show_lights(scene: Scene, cd_per_unit: float | None) -> None:
                 "",
                 "" if light.is_fixed else whole.color,
                 *whole.amounts[: len(amounts)],
+                *_lamp_cells(light, cd_per_unit, lamps.get(light.name)),
             )
         # One row is enough for many similar lamps without names.
         for member in () if light.is_found else light.members:
@@ -62,8 +65,24 @@ def show_lights(scene: Scene, cd_per_unit: float | None) -> None:
                 f"{member.sampling_weight:g}",
                 light_photometry.color,
                 *light_photometry.amounts[: len(amounts)],
+                *_lamp_cells(light, cd_per_unit, lamps.get(light.name) if is_single else None),
             )
     terminal.print_table(table)
+
+
+def _lamp_cells(light: Light, cd_per_unit: float | None, lamp: FullLamp | None) -> list[str]:
+    """Return the names of a lamp's emitters, its lumens at full if there is a scale, and watts."""
+    if lamp is None:
+        return []
+    flux = photometry_at_full(light, cd_per_unit, lamp).amounts[1].removesuffix(" lm")
+    watts = "" if lamp.watts is None else f"{lamp.watts:.4g}"
+    return [" + ".join(lamp.lamp.names), *([] if cd_per_unit is None else [flux]), watts]
+
+
+def photometry_at_full(light: Light, cd_per_unit: float | None, lamp: FullLamp) -> Photometry:
+    """Return the photometry of a light whose lamp is at full."""
+    flux = light.unit_flux
+    return photometry(lamp.emission, unit=light.unit, unit_flux=flux, cd_per_unit=cd_per_unit)
 
 
 def photometry_of(light: Light | Emitter, cd_per_unit: float | None) -> Photometry:

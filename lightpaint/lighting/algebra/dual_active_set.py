@@ -58,6 +58,10 @@ FEW_LEAVE, MAX_GUESSES = 8, 12
 #: Most steps for each unknown and sum.
 STEPS_EACH = 4
 
+#: Most steps of a quick attempt. A linear program, which says whether there is an answer at all,
+#: takes as long as these.
+QUICK_STEPS = 200
+
 
 @dataclass(frozen=True)
 class NearAnswer:
@@ -187,20 +191,27 @@ class DualActiveSet:
         self._sums = _CountedSums(len(M))
 
     def minimise(
-        self, b: Doubles, near: NearAnswer, *, tolerance: float
+        self, b: Doubles, near: NearAnswer, *, tolerance: float, is_quick: bool = False
     ) -> tuple[Optimum, Doubles] | None:
         """Minimise for b, (k,), from the answer to a similar problem.
 
-        tolerance: of the KKT residual. Return the optimum, and the multipliers of the sums; None if
-        nothing satisfies all limits, or steps do not end.
+        tolerance: of the KKT residual. is_quick: whether to end without an answer after
+        `QUICK_STEPS`. Return the optimum, and the multipliers of the sums; None if nothing
+        satisfies all limits, or steps do not end.
         """
         b = b / self._root
         size = float(np.abs(b).max(initial=0)) or 1.0
         x = np.clip(near.x * self._root, self._lower, self._upper)
         with one_thread():
-            held, steps = self._limits_of(near, x) or self._limits_inside(b + NEARNESS * x, x), 0
+            held, steps = self._limits_of(near, x), 0
+            if held is None:
+                inside = self._limits_inside(b + NEARNESS * x, x)
+                # Interior points fail where nothing satisfies all limits, or an unknown is fixed.
+                if inside is None and is_quick and not self._is_fixed.any():
+                    return None
+                held = inside or self._bounds_of(x)
             for _ in range(MAX_PULLS):
-                ended = self._optimum_from(b, x, held)
+                ended = self._optimum_from(b, x, held, is_quick=is_quick)
                 if ended is None:
                     return None
                 last, (point, held, more) = x, ended
@@ -234,9 +245,14 @@ class DualActiveSet:
         low = self._is_fixed | (x <= self._lower)
         return _Held(low, ~low & (x >= self._upper), holds[self._sums.which])
 
-    def _limits_inside(self, b: Doubles, start: Doubles) -> _Held:
+    def _bounds_of(self, x: Doubles) -> _Held:
+        """Return the bounds at which x, (k,), is, and no sums."""
+        low = self._is_fixed | (x <= self._lower)
+        return _Held(low, ~low & (x >= self._upper), np.zeros(self._sums.which.size, bool))
+
+    def _limits_inside(self, b: Doubles, start: Doubles) -> _Held | None:
         """Return the limits that hold near the optimum, as interior points know it, with the sums
-        that start, (k,), misses most; where these fail, those that hold start.
+        that start, (k,), misses most; None where these fail.
         """
         sums, caps = self._sums, np.arange(self._count, self._least.size)
         self._join(caps[np.isfinite(self._least[caps]) & ~np.isin(caps, sums.which)])
@@ -248,14 +264,12 @@ class DualActiveSet:
             self._M, b, *bounds, nothing, sums.rows, sums.least, infinite, scale, (), size
         )
         inside = interior_point(problem, start, close=INSIDE_CLOSE)
-        x, holds = start, np.zeros(sums.least.size, bool)
-        if inside is not None:
-            x, holds = inside.x, inside.multipliers > 0
-        low = self._is_fixed | (x <= self._lower)
-        return _Held(low, ~low & (x >= self._upper), holds)
+        if inside is None:
+            return None
+        return replace(self._bounds_of(inside.x), sums=inside.multipliers > 0)
 
     def _optimum_from(
-        self, b: Doubles, start: Doubles, held: _Held
+        self, b: Doubles, start: Doubles, held: _Held, *, is_quick: bool
     ) -> tuple[_DualPoint, _Held, int] | None:
         """Return the optimum with the pull, the limits that hold there, and the number of steps.
 
@@ -267,7 +281,7 @@ class DualActiveSet:
             return None
         point, held, steps = begun
         check = cancellation_check()
-        most = STEPS_EACH * (b.size + len(self._least))
+        most = QUICK_STEPS if is_quick else STEPS_EACH * (b.size + len(self._least))
         while steps < most:
             check()
             limit = self._most_missed(point, held)
@@ -301,7 +315,8 @@ class DualActiveSet:
         guessed = self._guessed(b, held)
         if guessed is not None and (held.sums & ~guessed[1].sums).sum() <= FEW_LEAVE:
             return guessed
-        inside = self._with_right_signs(b, self._limits_inside(b, start))
+        limits = self._limits_inside(b, start) or self._bounds_of(start)
+        inside = self._with_right_signs(b, limits)
         if inside is not None or begun is None:
             return inside
         return (*_with_joined(*begun[:2], self._sums.least.size), begun[2])

@@ -25,6 +25,9 @@ MAX_STEPS, CLOSE, STEP_SHARE = 40, 1e-14, 0.995
 #: Multipliers, relative to the gradient, that say that nothing satisfies all limits.
 OUT_OF_REACH = 1e30
 
+#: Numbers in a row up to which its products are added by place: a cap of one lamp has few.
+SHORT = 8
+
 #: Unknowns from which a matrix is large.
 LARGE = 64
 
@@ -90,7 +93,7 @@ class _Limits:
     """All finite limits of a problem as G x <= h: bounds from below and above, caps likewise."""
 
     def __init__(self, q: Quadratic) -> None:
-        self._A = q.A
+        self._A, self._products = q.A, RowProducts(q.A)
         sides = (-q.lower, q.upper, -q.cap_lower, q.cap_upper)
         self._which: list[Indices] = [np.flatnonzero(np.isfinite(side)) for side in sides]
         self.h = np.concatenate([side[k] for side, k in zip(sides, self._which, strict=True)])
@@ -121,8 +124,30 @@ class _Limits:
     def squares(self, weights: Doubles) -> Doubles:
         """Return Gᵀ diag(weights) G, (n, n)."""
         low, high, cap_low, cap_high = self.split(weights)
-        matrix = (self._A.T * (cap_low + cap_high)) @ self._A
+        matrix = self._products.sum(cap_low + cap_high)
         matrix.flat[:: len(matrix) + 1] += low + high
+        return np.asarray(matrix)
+
+
+class RowProducts:
+    """The outer products of rows, (m, n), with themselves; short rows add theirs by place."""
+
+    def __init__(self, rows: Doubles) -> None:
+        counts = np.count_nonzero(rows, axis=1)
+        self._is_short = (counts <= SHORT) & (counts > 0)
+        self._n, self._long = rows.shape[1], rows[~self._is_short]
+        short = rows[self._is_short]
+        places = np.argsort(short == 0, axis=1, kind="stable")[:, :SHORT]
+        values = np.take_along_axis(short, places, axis=1)
+        self._places = (places[:, :, None] * self._n + places[:, None, :]).ravel()
+        self._values = values[:, :, None] * values[:, None, :]
+
+    def sum(self, weights: Doubles) -> Doubles:
+        """Return the sum of weights, (m,), times the products, (n, n)."""
+        matrix = (self._long.T * weights[~self._is_short]) @ self._long
+        if self._values.size:
+            terms = self._values * weights[self._is_short, None, None]
+            matrix += np.bincount(self._places, terms.ravel(), self._n**2).reshape(matrix.shape)
         return np.asarray(matrix)
 
 

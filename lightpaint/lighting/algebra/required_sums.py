@@ -124,7 +124,9 @@ class RequiredSums:
             of_caps = self._nothing_of_caps if cap_multipliers is None else cap_multipliers
             near = NearAnswer(start, duals, of_caps)
             tolerance = options.get("tolerance", TOLERANCE)
-            found = self._active_set.minimise(b, near, tolerance=tolerance)
+            found = self._active_set.minimise(
+                b, near, tolerance=tolerance, is_quick=not max_updates
+            )
             if found is not None:
                 return RequiredOptimum(*found, miss=0.0)
         x, last, check = start, np.inf, cancellation_check()

@@ -1,7 +1,7 @@
-"""The scale of a scene with luminaires, which are in candela whatever else is in it."""
+"""The scale of a scene with luminaires, or lamps in candela or lumens, whatever else is in it."""
 
 from collections.abc import Sequence
-from dataclasses import replace
+from dataclasses import dataclass, replace
 
 from lightpaint.basis import BasisLight
 from lightpaint.errors import ConstraintError
@@ -11,58 +11,66 @@ from lightpaint.luminaires import LUMINAIRE_PLUGINS
 from lightpaint.sentences import Hint
 
 
-def with_scale(constraints: Constraints, lights: Sequence[BasisLight]) -> Constraints:
-    """Return constraints whose scale is 1 cd/m² for a radiance of 1, if there are luminaires among
-    the lights, and if nothing says another.
+@dataclass(frozen=True)
+class Scale:
+    """The scale of lights.
+
+    cd_per_unit: cd/m² that a radiance of 1 stands for; None if nothing says it. unscaled: lights
+    for which that is a guess.
     """
-    if constraints.cd_per_unit is not None or not any(map(_is_luminaire, lights)):
-        return constraints
-    return replace(constraints, cd_per_unit=1.0)
+
+    cd_per_unit: float | None
+    unscaled: tuple[BasisLight, ...] = ()
+
+    @classmethod
+    def of(cls, constraints: Constraints, lights: Sequence[BasisLight]) -> "Scale":
+        """Return the scale that constraints say; else 1 cd/m², if some of the lights are
+        luminaires, or lamps in candela or lumens, which leaves the others unscaled.
+        """
+        if constraints.cd_per_unit is not None:
+            return cls(constraints.cd_per_unit)
+        by_light = constraints_by_light(constraints, lights)
+        is_scaled = [_is_scaled(*pair) for pair in zip(lights, by_light, strict=True)]
+        if not any(is_scaled):
+            return cls(None)
+        is_off = [given is not None and given.off for given in by_light]
+        rows = zip(lights, is_scaled, is_off, strict=True)
+        return cls(1.0, tuple(light for light, *known in rows if not any(known)))
+
+
+def with_scale(constraints: Constraints, lights: Sequence[BasisLight]) -> Constraints:
+    """Return constraints with the scale that they and the lights say, if they do."""
+    return replace(constraints, cd_per_unit=Scale.of(constraints, lights).cd_per_unit)
 
 
 def with_sure_scale(constraints: Constraints, lights: Sequence[BasisLight]) -> Constraints:
     """Return constraints as `with_scale` does.
 
-    Raises ConstraintError if nothing says the scale, and a light beside luminaires is not in
-    candela or lumens: its brightness would be a guess.
+    Raises ConstraintError if nothing says the scale, and a light beside those in candela or lumens
+    is not: its brightness would be a guess.
     """
-    for light in unscaled_lights(constraints, lights):
+    scale = Scale.of(constraints, lights)
+    for light in scale.unscaled:
         raise unscaled_error(light)
-    return with_scale(constraints, lights)
-
-
-def unscaled_lights(
-    constraints: Constraints, lights: Sequence[BasisLight]
-) -> tuple[BasisLight, ...]:
-    """Return the lights beside luminaires that are not in candela or lumens; none if constraints
-    say the scale.
-    """
-    if with_scale(constraints, lights) is constraints:
-        return ()
-    pairs = zip(lights, constraints_by_light(constraints, lights), strict=True)
-    return tuple(x for x, given in pairs if not (_is_luminaire(x) or _is_absolute(given)))
+    return replace(constraints, cd_per_unit=scale.cd_per_unit)
 
 
 def unscaled_error(light: BasisLight, place: str = "") -> ConstraintError:
     """Return the error of a light whose brightness is a guess. place: what it lights."""
     return ConstraintError(
         f"light {light.name!r}{place and f', which reaches {place},'} is in {light.unit}, beside "
-        "luminaires in candela: list its emitters in cd or lm, or say how many candelas an "
+        "lamps in candela or lumens: list its emitters in cd or lm, or say how many candelas an "
         "intensity of 1 is, by ",
         Hint("cd_per_unit", 1),
         " or by cd_per_unit = 1 in the lights file",
     )
 
 
-def _is_luminaire(light: BasisLight) -> bool:
-    return LUMINAIRE_PLUGINS.issuperset(light.plugin.split(" + "))
-
-
-def _is_absolute(constraint: LightConstraint | None) -> bool:
-    if constraint is None:
-        return False
-    is_mixed = bool(constraint.emitters) and all(x.per != "Y" for x in constraint.emitters)
-    return constraint.off or is_mixed
+def _is_scaled(light: BasisLight, given: LightConstraint | None) -> bool:
+    """Return whether a light is a luminaire, or a lamp whose emitters are in candela or lumens."""
+    if LUMINAIRE_PLUGINS.issuperset(light.plugin.split(" + ")):
+        return True
+    return given is not None and bool(given.emitters) and all(x.per != "Y" for x in given.emitters)
 
 
 def agreed_scale(of_luminaires: float | None, given: float | None) -> float | None:

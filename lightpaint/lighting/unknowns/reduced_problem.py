@@ -396,7 +396,7 @@ class ReducedSolver:
             rows, least = reduction.required
             self._sums = RequiredSums(
                 p.M,
-                rows[:, block.unknowns],
+                rows if block.unknowns.size == rows.shape[1] else rows[:, block.unknowns],
                 least,
                 lower=p.lower,
                 upper=p.upper,

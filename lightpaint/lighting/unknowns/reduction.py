@@ -20,6 +20,7 @@ from lightpaint.colour import Lamp
 from lightpaint.display_text import brief, some_names
 from lightpaint.errors import ConstraintError
 from lightpaint.lighting.algebra.quadratic import Cap
+from lightpaint.lighting.constraints.absolute_scale import with_scale
 from lightpaint.lighting.constraints.constraints import Constraints, LightConstraint, Requirements
 from lightpaint.lighting.constraints.light_constraints import (
     constraints_by_light,
@@ -267,14 +268,17 @@ class Reduction:
         requirements = self.requirements
         assert requirements is not None
         unknown, light, rgb = self.columns
-        rows = np.zeros((len(requirements), len(self.unknowns)))
-        for c in range(3):
-            entries = np.flatnonzero(rgb[:, c])
-            if entries.size:
-                parts = requirements.rows[:, light[entries], c] * rgb[entries, c]
-                columns, first = np.unique(unknown[entries], return_index=True)
-                is_plain = columns.size == entries.size
-                rows[:, columns] += parts if is_plain else np.add.reduceat(parts, first, axis=1)
+        entry, channel = np.nonzero(rgb)
+        given = requirements.rows.reshape(len(requirements), -1)
+        parts = given[:, 3 * light[entry] + channel]
+        parts *= rgb[entry, channel]
+        columns, first = np.unique(unknown[entry], return_index=True)
+        if columns.size < entry.size:
+            parts = np.add.reduceat(parts, first, axis=1)
+        rows = parts
+        if columns.size < len(self.unknowns):
+            rows = np.zeros((len(requirements), len(self.unknowns)))
+            rows[:, columns] = parts
         least = requirements.least - np.einsum("mnc,nc->m", requirements.rows, self.fixed_weights)
         if requirements.watts.any():
             rows += np.outer(requirements.watts, watts_of_unknowns(self.knobs, self.lamps))
@@ -540,6 +544,7 @@ def _with_constrained_parts(
 
 def lamps_by_name(constraints: Constraints, lights: Sequence[BasisLight]) -> dict[str, Lamp]:
     """Return what mixes lights from emitters, by the light's name. Raises ConstraintError."""
+    constraints = with_scale(constraints, lights)
     by_light = constraints_by_light(constraints, lights)
     return {lights[k].name: lamp for k, lamp in _lamps(constraints, lights, by_light).items()}
 

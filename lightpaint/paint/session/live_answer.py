@@ -24,6 +24,7 @@ from lightpaint.lighting import (
     constraints_of,
     reduce_lights,
     resolve_fit,
+    with_scale,
     with_sure_scale,
 )
 from lightpaint.paint import protocol
@@ -229,7 +230,8 @@ class LiveAnswer:
 
     def _unrequired(self, requests: SessionRequests) -> Constraints:
         constraints = constraints_of(self._basis.requests).and_then(self._base_constraints)
-        return with_sure_scale(constraints.and_then(requests.constraints()), self._basis.lights)
+        scaled = with_sure_scale if self._settings.planes is None else with_scale
+        return scaled(constraints.and_then(requests.constraints()), self._basis.lights)
 
     def _wishes_under(self, requests: SessionRequests) -> WishesInEffect | None:
         """Return the wishes for planes under requests; None without any, and where limits of lamps

@@ -107,7 +107,7 @@ class PlaneMeasurements:
         """
         # Imported here: a session without planes needs no renderer.
         from lightpaint.pipeline import (
-            constraints_for_planes,
+            constraints_and_scale,
             limited_power,
             measure_planes,
         )
@@ -118,8 +118,8 @@ class PlaneMeasurements:
             measured = limited_power(settings.watts, self._access.session.basis.lights)
         else:
             views = [self._rig.moved_scene(requests.placed, k) for k in range(len(self._subjects))]
-            every = constraints_for_planes(views[0], self._subjects[0].constraints, settings)
-            scale, listen = every.cd_per_unit, listener(progress)
+            given, listen = self._subjects[0].constraints, listener(progress)
+            _, scale = constraints_and_scale(views[0], given, settings)
             measured = measure_planes(views[0], settings.planes, settings, scale, listen)
             points = np.concatenate([plane.points for plane in measured.file.planes])
             sights = tuple(plane_sight(view, points) for view in views)

@@ -22,11 +22,13 @@ from lightpaint.images import whole_factor
 from lightpaint.keywords import keywords
 from lightpaint.lighting import (
     Constraints,
+    Scale,
     agreed_scale,
     check_powers,
     constraints_of,
     reduce_to,
     resolve_for_targets,
+    with_scale,
     with_sure_scale,
 )
 from lightpaint.pipeline.job.job_checks import (
@@ -150,6 +152,7 @@ class Job:
     sequence: FrameSequence | None = None
     views: tuple[PaintedView, ...] = field(init=False, repr=False)
     all_constraints: Constraints = field(init=False, repr=False)
+    scale: Scale = field(init=False, repr=False)
     all_rigging: Rigging = field(init=False, repr=False)
     fit: Settings = field(init=False, repr=False)
     remarks: tuple[str, ...] = field(init=False, repr=False)
@@ -200,7 +203,10 @@ class Job:
         check_animation(self.settings, all_constraints, len(self.painted_frames))
         # Reports impossible constraints before rendering.
         lights = self._lights(scenes, bases)
-        all_constraints = with_sure_scale(all_constraints, lights)
+        # Which lights reach planes is known after these are measured.
+        self._set(scale=Scale.of(all_constraints, lights))
+        scaled = with_sure_scale if self.settings.planes is None else with_scale
+        all_constraints = scaled(all_constraints, lights)
         reduction = reduce_to(all_constraints, lights)
         if self.settings.watts is not None:
             check_powers(reduction, [light.name for light in lights], "a limit of power")

@@ -4,6 +4,7 @@ Each consists of plain values that can be sent elsewhere, and is read once, on f
 """
 
 from collections.abc import Iterable, Mapping, Sequence
+from contextlib import suppress
 from dataclasses import dataclass, field
 from functools import cached_property
 from pathlib import Path
@@ -13,9 +14,17 @@ from lightpaint.arrays import Floats
 from lightpaint.basis import Basis, LightGroups, read_basis, read_light_groups
 from lightpaint.basis.render import basis_lights, check_renders_spectra
 from lightpaint.colour import EYE, Observer, TransformChoice, read_observer
-from lightpaint.errors import BasisError, LightpaintError, SceneError
+from lightpaint.errors import BasisError, ConstraintError, LightpaintError, SceneError
 from lightpaint.keywords import keywords
-from lightpaint.lighting import Constraints, WholeLamps, constraints_of, lamps_by_name
+from lightpaint.lighting import (
+    Constraints,
+    FullLamp,
+    WholeLamps,
+    constraints_of,
+    full_lamps,
+    lamps_by_name,
+    with_scale,
+)
 from lightpaint.pipeline.job.settings import Settings
 from lightpaint.placement import PlacementRecord, read_placement
 from lightpaint.scene import Scene, load_scene, part_name
@@ -98,10 +107,10 @@ class SceneFile(ReadOnce):
 
     @cached_property
     def content(self) -> Scene:
-        """The scene, loaded on first use."""
+        """The scene, loaded on first use, with luminaires as `with_full_lamps` has them."""
         fields = vars_of(self)
         spectral, observer = fields.pop("spectral"), fields.pop("observer")
-        scene = load_scene(**fields)
+        scene = with_full_lamps(load_scene(**fields))
         if not spectral:
             return scene
         return spectral_scene(scene, constraints_of(scene.requests), observer_of(observer))
@@ -245,6 +254,36 @@ def check_nothing_unused(settings: Settings, basis: Any) -> None:
 def observer_of(path: str | None) -> Observer:
     """Return the camera of a table, or the eye without one. Raises ColorError."""
     return EYE if path is None else read_observer(Path(path))
+
+
+def scaled_constraints(scene: Scene, cd_per_unit: float | None = None) -> Constraints:
+    """Return the constraints of a scene's lights file, with the scale of its lights. cd_per_unit:
+    if it is given. Raises ConstraintError.
+    """
+    constraints = constraints_of(scene.requests).and_then(Constraints(cd_per_unit=cd_per_unit))
+    return with_scale(constraints, basis_lights(scene))
+
+
+def lamps_of_scene(scene: Scene, constraints: Constraints) -> Mapping[str, FullLamp]:
+    """Return the lamps at full, by light. constraints: that make them. Raises ConstraintError."""
+    lights = basis_lights(scene)
+    return {lights[k].name: x for k, x in full_lamps(constraints, lights).items()}
+
+
+def with_full_lamps(scene: Scene) -> Scene:
+    """Return a scene whose luminaires are at full as the lights file makes them: all emitters on.
+
+    Luminaires whose level the scene says, as a relit scene does, stay at it; so do all if the
+    lights file has a mistake, which whoever solves reports.
+    """
+    hung = {x.name for x in scene.luminaires if not x.has_own_level}
+    names = {x.name for x in scene.lights if not x.is_fixed and hung.issuperset(x.member_names)}
+    if not names:
+        return scene
+    with suppress(ConstraintError):
+        lamps = lamps_of_scene(scene, scaled_constraints(scene))
+        return scene.with_emission({k: x.emission for k, x in lamps.items() if k in names})
+    return scene
 
 
 def spectral_scene(scene: Scene, constraints: Constraints, observer: Observer = EYE) -> Scene:

@@ -60,7 +60,7 @@ class HungLuminaire:
     candela of its file. distance: to the nearest surface that it lights, if that was looked for.
     tilt: degrees by which its nadir is away from downwards. is_panel: whether its size counts.
     further: file and offset of spots that were part of its light in a relit scene, and that it
-    replaces.
+    replaces. has_own_level: whether the scene says how bright it is; else it is at full.
     """
 
     name: str
@@ -72,6 +72,7 @@ class HungLuminaire:
     tilt: float = 0.0
     is_panel: bool = False
     further: tuple[tuple[int, int], ...] = ()
+    has_own_level: bool = False
 
     def remarks(self) -> list[str]:
         """Return what its user should know of it."""
@@ -135,6 +136,7 @@ def hang_luminaires(
             tilt,
             is_panel,
             tuple(_element(parsed, k) for k, whole in further.items() if whole == name),
+            _has_own_level(parsed, node) or name in further.values(),
         )
         if name in further.values():
             _rejoin(parsed.state.nodes[node].props, hung)
@@ -265,6 +267,12 @@ def _become_luminaire(
     for key, value in numbers.items():
         props[key] = value
     props["intensity"] = mi.ScalarColor3f(*intensity)
+
+
+def _has_own_level(parsed: ParsedScene, node: int) -> bool:
+    """Return whether the scene says how bright a luminaire is, or that it is off."""
+    is_luminaire = parsed.state.nodes[node].props.plugin_name() in LUMINAIRE_PLUGINS
+    return is_luminaire or not any(_level(parsed, node))
 
 
 def _level(parsed: ParsedScene, node: int) -> tuple[float, ...]:

@@ -111,6 +111,11 @@ class Light:
         facts = () if self.spectrum is None else ("spectrum", self.spectrum)
         return combined_identity(unlit_content, self.is_fixed, self.unit, own_digests, *facts)
 
+    def with_emission(self, emission: RGB) -> "Light":
+        """Return this light with another current emission, which its members have."""
+        members = tuple(replace(m, emission=self.emission_of(m, emission)) for m in self.members)
+        return replace(self, members=members, emission=emission)
+
     def emission_of(self, member: Emitter, emission: RGB) -> RGB:
         """Return the emission of `member` in its own unit when this light has `emission`."""
         if self.unit != MULTIPLE:

@@ -5,7 +5,7 @@ import pytest
 
 from lightpaint.arrays import Doubles
 from lightpaint.lighting.algebra import clipped_newton
-from lightpaint.lighting.algebra.interior_point import interior_point
+from lightpaint.lighting.algebra.interior_point import SHORT, RowProducts, interior_point
 from lightpaint.lighting.algebra.optimum import minimise
 from lightpaint.lighting.algebra.quadratic import Cap, Quadratic, scaled
 
@@ -84,3 +84,14 @@ def test_a_fixed_unknown_is_left_to_other_methods() -> None:
     upper[0] = 0
     q = scaled(M, b, 0.0, upper, ())
     assert interior_point(q, np.zeros(q.n)) is None
+
+
+@pytest.mark.parametrize("n", [3, SHORT, 40])
+def test_products_of_rows_add_up_however_many_numbers_they_have(n: int) -> None:
+    """Rows of few numbers, of all, and of none: against the product of matrices, to round-off."""
+    rng = np.random.default_rng(n)
+    rows = rng.normal(size=(50, n)) * (rng.random((50, n)) < rng.random((50, 1)))
+    rows[7] = 0
+    weights = rng.random(50)
+    found = RowProducts(rows).sum(weights)
+    np.testing.assert_allclose(found, (rows.T * weights) @ rows, atol=1e-12)
