@@ -267,8 +267,8 @@ class Basis(Shown):
         """
         return replace(
             self,
-            planes=planes,
-            noise=noise,
+            planes=as_planes(planes),
+            noise=as_planes(noise),
             emitters_seen=emitters_seen,
             guide_table=None,
             features=None,

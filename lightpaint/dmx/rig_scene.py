@@ -346,7 +346,9 @@ def room_of_scene(path: Path, folder: Path) -> Room:
 
 def _scene_tags(text: bytes) -> list[bytes]:
     """Return the names of the elements of a scene. text: UTF-8. Raises ValueError for other XML."""
-    names, open_names, roots = [], [], []
+    names: list[bytes] = []
+    open_names: list[bytes] = []
+    roots = []
     for token in markup(text):
         if (name := token["tag"]) is not None:
             names.append(name)
@@ -359,7 +361,7 @@ def _scene_tags(text: bytes) -> list[bytes]:
     if open_names:
         raise ValueError(f"it ends before </{decoded(open_names[-1])}>")
     if [x["tag"] for x in roots] != [b"scene"] or "version" not in attributes(roots[0]):
-        raise ValueError('it is no scene of Mitsuba: expected one <scene version="3.0.0">')
+        raise ValueError('it is not a scene of Mitsuba: expected one <scene version="3.0.0">')
     return names
 
 
