@@ -1,7 +1,7 @@
 """How often do 95 % intervals of lights hold in display space?
 
     python benchmarks/display_coverage.py [--rooms gallery mirror glass] [--seeds 200] [--spp 64]
-    python benchmarks/display_coverage.py --answers default [--gallery 1/2]
+    python benchmarks/display_coverage.py --answers default [--gallery 1/2] [--film 40x24]
 
 The gallery on a small film, a room with a wall that is a mirror and a room with a ball and a pane
 of glass, six lamps in each. The painting is the light of other lamps by all samples, half of it
@@ -55,8 +55,8 @@ SCENE = """<scene version="3.0.0">
     <integrator type="path"><integer name="max_depth" value="6"/></integrator>
     <sensor type="perspective" id="camera"><float name="fov" value="60"/>
         <transform name="to_world"><lookat origin="0 1.1 3.6" target="0 0.95 0" up="0 1 0"/>
-        </transform><film type="hdrfilm"><integer name="width" value="64"/>
-        <integer name="height" value="36"/></film></sensor>
+        </transform><film type="hdrfilm"><integer name="width" value="{width}"/>
+        <integer name="height" value="{height}"/></film></sensor>
     <shape type="rectangle"><transform name="to_world"><scale value="3"/>
         <rotate x="1" angle="-90"/><translate z="1"/></transform>
         <bsdf type="diffuse"><rgb name="reflectance" value="0.55 0.45 0.35"/></bsdf></shape>
@@ -103,6 +103,7 @@ def main() -> None:
     parser.add_argument("--rooms", nargs="+", default=["gallery", *ROOMS])
     parser.add_argument("--answers", choices=("literal", "default"), default="literal")
     parser.add_argument("--gallery", default="1/8", metavar="1/N", help="resolution of the gallery")
+    parser.add_argument("--film", default="64x36", metavar="WxH", help="of the other rooms")
     parser.add_argument("--seeds", type=int, default=200, metavar="N")
     parser.add_argument("--spp", type=int, default=64)
     add_csv(parser)
@@ -112,7 +113,8 @@ def main() -> None:
     print(f"{'':20s}{'held':>8s}{'least':>8s}{'RMS error':>11s}")
     with tempfile.TemporaryDirectory() as folder:
         for room in options.rooms:
-            scene = make_scene(room, Path(folder), options.gallery)
+            resolution = options.film if room in ROOMS else options.gallery
+            scene = make_scene(room, Path(folder), resolution)
             is_literal = options.answers == "literal"
             rows += measure(
                 room, scene, seeds=options.seeds, spp=options.spp, is_literal=is_literal
@@ -164,11 +166,13 @@ def answers(basis: Basis, target: Target, is_literal: bool) -> tuple[lp.Solution
 
 
 def make_scene(room: str, folder: Path, resolution: str) -> Scene:
-    """Return the scene of a room on a small film. resolution: of the gallery."""
+    """Return the scene of a room on a small film: `1/8` of the gallery's, `64x36` of others."""
     if room not in ROOMS:
         return lp.load_scene(ROOT / "scenes" / room / "scene.xml").reduced(resolution)
     path = folder / f"{room}.xml"
-    path.write_text(SCENE.format(room=ROOMS[room], box=BOXES[room]), encoding="utf-8")
+    width, height = resolution.split("x")
+    text = SCENE.format(room=ROOMS[room], box=BOXES[room], width=width, height=height)
+    path.write_text(text, encoding="utf-8")
     return lp.load_scene(path)
 
 

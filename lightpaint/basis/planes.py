@@ -14,6 +14,7 @@ import numpy as np
 import numpy.typing as npt
 
 from lightpaint.arrays import Bools, Doubles, Floats, Indices
+from lightpaint.errors import BasisError
 from lightpaint.progress import with_progress
 from lightpaint.threads import one_thread, parallel_map
 
@@ -366,8 +367,15 @@ class MemoryPlanes(PlanesBase):
 
 
 def as_planes(planes: Planes | Floats) -> Planes:
-    """Return an array (n, h, w, 3) as planes in memory, and planes unchanged."""
-    return MemoryPlanes(planes) if isinstance(planes, np.ndarray) else planes
+    """Return an array (n, h, w, 3) as planes in memory, and planes unchanged.
+
+    Raises BasisError for an array of other axes.
+    """
+    if isinstance(planes, np.ndarray):
+        if planes.ndim != 4:
+            raise BasisError(f"images of shape {planes.shape}: need (n, h, w, 3)")
+        return MemoryPlanes(planes)
+    return planes
 
 
 def joined_planes(

@@ -360,7 +360,7 @@ def _scene_tags(text: bytes) -> list[bytes]:
     if open_names:
         raise ValueError(f"it ends before </{decoded(open_names[-1])}>")
     if [x["tag"] for x in roots] != [b"scene"] or "version" not in attributes(roots[0]):
-        raise ValueError('it is no scene of Mitsuba: expected one <scene version="3.0.0">')
+        raise ValueError('it is not a scene of Mitsuba: expected one <scene version="3.0.0">')
     return names
 
 
