@@ -6,7 +6,7 @@ anything else by `Annotated[int | None, whole(2, 64)]`.
 
     refine: Annotated[int, whole(0, 100), Option("--refine K", "render …", theme="Lights")] = 0
 
-The type, the choices and the default of the option are those of the field. Its name in errors, its
+The type, the choices and the default of the option are the field's. Its name in errors, its
 place in `--help` and its page of the reference follow from it.
 """
 

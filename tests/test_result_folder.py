@@ -187,7 +187,7 @@ def test_two_paintings_of_one_name_in_one_command(work_folder: Path) -> None:
     line = run_refused(
         work_folder, *SOLVE, "template/evening.exr", "gallery/evening.exr", "-o", "out"
     )
-    assert "results would overwrite each other in evening: run those" in line
+    assert "results would overwrite each other in evening: run equal names" in line
 
 
 def test_jobs_that_were_born_before_the_other_was_run(work_folder: Path) -> None:
@@ -322,7 +322,7 @@ def test_relight_keeps_what_is_not_its_own(work_folder: Path, room: Path) -> Non
     assert completed.returncode == 2
     assert "look holds the answer to look.exr, not to other/lighting.json" in completed.stderr
     completed = relight("other/lighting.json", "look/lighting.json")
-    assert "results would overwrite each other in look: run those" in completed.stderr
+    assert "results would overwrite each other in look: run equal names" in completed.stderr
     os.link(lighting, work_folder / "other" / "relit.png")
     completed = relight("look/lighting.json", "-o", "other", "--force")
     assert "other/relit.png is an input of this command" in completed.stderr

@@ -50,7 +50,7 @@ class LitEntries:
 
     @cached_property
     def places(self) -> Indices:
-        """Where they are in an array (n, p), (m,)."""
+        """Their places in an array (n, p), (m,)."""
         return self.lights * self.shape[1] + self.columns
 
 

@@ -61,7 +61,7 @@ class RunOptions:
         a(str, "the address of a scheduler"),
         Option(
             "--cluster ADDRESS",
-            "let workers of a Dask cluster do the looks, and parts of bases; ADDRESS is that of "
+            "let workers of a Dask cluster do the looks, and parts of bases; ADDRESS is the one of "
             "its scheduler, like tcp://scheduler:8786",
             theme="Machines",
         ),

@@ -151,7 +151,7 @@ class ObserverRequest:
     """An observer as a planes file describes them.
 
     where: the key in the file, for errors. at, towards: (3,), the place of the eyes and a point
-    that they look at; None for those of the camera.
+    that they look at; None for the points of the camera.
     """
 
     name: str

@@ -195,7 +195,7 @@ def check_planes(
     """Raise LightpaintError unless planes of a file can be measured in a scene, and its lamps have
     what wishes for their power need. Nothing is rendered.
 
-    constraints: on the lights, beside those of the lights file. read: reads the file.
+    constraints: on the lights, beside the constraints of the lights file. read: reads the file.
     """
     every, _ = constraints_and_scale(scene, constraints, settings)
     checked_scale(path, every.cd_per_unit)

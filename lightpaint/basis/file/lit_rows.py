@@ -16,7 +16,7 @@ Halves = npt.NDArray[np.float16]
 def noise_numbers(
     light: npt.NDArray[np.float16], ratios: npt.NDArray[np.float16]
 ) -> npt.NDArray[np.float16]:
-    """Return the stored numbers of a half difference from those of its image and their ratios."""
+    """Return the stored numbers of a half difference from those that its image has, and ratios."""
     return round_to_halves(as_singles(light) * as_singles(ratios))
 
 
@@ -40,7 +40,7 @@ def lit_pixels(steps: Halves, size: tuple[int, int]) -> npt.NDArray[np.uint32]:
 
 @dataclass(frozen=True)
 class LitRows:
-    """Where the rows of a picture are in a part with lit pixels.
+    """Places of the rows of a picture in a part with lit pixels.
 
     begins: (h + 1,), the first lit pixel of each row in the list of them. before: (rows of the
     part,), the pixel of the picture at which the steps in each of them begin.

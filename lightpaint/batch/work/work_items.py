@@ -39,7 +39,7 @@ FORMAT: Literal["lightpaint-task 1"] = "lightpaint-task 1"
 #: Steps: the answer, its final render, and exports for other programs.
 Kind = Literal["answer", "render", "export"]
 
-#: Folder of the exports, in that of the look.
+#: Folder of the exports, in the folder of the look.
 EXPORT = "export"
 
 

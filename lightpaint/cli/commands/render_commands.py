@@ -145,7 +145,7 @@ class _SharedWork:
             return job
         if is_variation:
             return job.with_placement(self._placement)
-        # The bases are those of lights which another painting moved.
+        # The bases are of lights which another painting moved.
         self.bases, self._placement = None, None
         return job
 

@@ -53,7 +53,7 @@ Solve = Callable[[NormalEquations, Reduction, Doubles], tuple[Reduction, Doubles
 class SomeLights:
     """A choice of knobs of a reduction, and the lights that they move.
 
-    whole: the reduction of all lights. places: those of the knobs, in ascending order.
+    whole: the reduction of all lights. places: of the knobs, in ascending order.
     """
 
     whole: Reduction
@@ -129,7 +129,7 @@ class SomeLights:
 
     def part_of(self, equations: NormalEquations) -> NormalEquations:
         """Return the terms of `equations`, of all lights, in the squares of these lights: without
-        those of the other lights, and those of one of each.
+        the knobs of the other lights, and the knobs of one of each.
         """
         lights, coupling = self.lights, equations.coupling
         return NormalEquations(

@@ -47,7 +47,7 @@ MAX_UPDATED_SHARE = 0.25
 MIN_SKIPPED_SHARE = 0.1
 
 #: Largest RMS noise of the current look, relative to the display's range, at which single pixels
-#: are fitted: that of some 32 samples per pixel on the shipped scenes (docs/benchmarks.md).
+#: are fitted: the noise of some 32 samples per pixel on the shipped scenes (docs/benchmarks.md).
 NOISY_DISPLAY = 0.035
 
 #: Sides of blocks to try, and the fewest blocks along the shorter side of a picture.
@@ -278,7 +278,7 @@ class BinnedPixels:
 def block_side(bases: Sequence[Basis], transform: ViewTransform | None) -> int:
     """Return the side, in pixels, of blocks whose noise is small on a display; 1 for no blocks.
 
-    The noise is that of the current look, not of the painting, so that no stroke changes the
+    The noise is the noise of the current look, not of the painting, so that no stroke changes the
     problem elsewhere. The side is 1 for unknown noise, and in linear light, where the equations
     are corrected for noise.
     """

@@ -36,7 +36,7 @@ such a rest down instead, so the light of the rest shall come as painted, too:
     F += s' Σ_k Σ_c A_kc² (P_r / R − 1)²
 
 Texels of an image could meet any contrast by a patchwork of odd colours. So as far as the light of
-a wish comes from texels, its contrast stays that of a brush.
+a wish comes from texels, its contrast stays the contrast of a brush.
 """
 
 from dataclasses import dataclass

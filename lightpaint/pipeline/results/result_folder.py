@@ -295,7 +295,7 @@ def write_answer(
 
     scene: the scene to relight. groups: light groups of another renderer, which get files for other
     programs. has_lighting: True if lighting.json exists already, or is not needed. A lighting that
-    says nothing of places gets those of the scene.
+    says nothing of places gets the places of the scene.
     """
     lighting = with_places(lighting.of_lamps(), scene)
     if not has_lighting:
@@ -306,7 +306,7 @@ def write_answer(
 
 
 def with_places(lighting: Lighting, scene: Scene | None) -> Lighting:
-    """Return a lighting that says where lights are, those of `scene` if it does not, and what sees
+    """Return a lighting that says where lights are, as in `scene` if it does not, and what sees
     the scene with spectra.
     """
     if scene is not None and scene.is_spectral:
@@ -346,8 +346,7 @@ def new_answer(
 ) -> Iterator[AnswerFolder]:
     """Yield a folder with an answer, to which more files may be added; it then appears all at once.
 
-    The other arguments are those of `write_answer`. Raises OutputError as `ResultFolder.filled`
-    does.
+    The other arguments are as for `write_answer`. Raises OutputError as `ResultFolder.filled` does.
     """
     with results.filled() as folder:
         relit = write_answer(

@@ -244,7 +244,7 @@ class ViewGeometry:
 
 def _projection(points: Doubles, pixels: Doubles) -> Doubles | None:
     """Return the projection that maps points to pixels, positive in front of the camera; None if
-    they do not decide it, as those of a single wall.
+    they do not decide it, as the points of a single wall.
     """
     step = max(1, len(points) // MAX_POINTS)
     points, pixels = points[::step], pixels[::step]

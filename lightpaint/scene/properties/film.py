@@ -7,7 +7,7 @@ and offset are multiples of the block size, Mitsuba's own film is made smaller. 
 keeps its size, its crop window is cut to whole blocks, and a pixel is the mean of a block.
 
 By itself Mitsuba samples wavelengths as the eye sees them. Of a narrow LED most samples then see
-nothing: the noise is some five times that of RGB. But a `specfilm` samples them by the sum of its
+nothing: there is some five times the noise of RGB. But a `specfilm` samples them by the sum of its
 channels. So it gets a channel for each curve of the observer, and one more, whose values are not
 used: the light of the scene's emitters.
 """
@@ -52,7 +52,7 @@ class Bands:
     emitted: Doubles
 
     def channels(self) -> dict[str, Any]:
-        """Return the channels of Mitsuba's film: those of the observer come first."""
+        """Return the channels of Mitsuba's film: the channels of the observer come first."""
         columns = [x for x in (*self.curves.T, self.emitted) if x.any()]
         return {
             f"channel_{k}": {
@@ -68,7 +68,7 @@ class Bands:
 def bands_of(state: Any, emissions: Iterable[tuple[int, str]], observer: Observer) -> Bands:
     """Return the bands of renders of a scene.
 
-    state: its nodes, from Mitsuba's parser. emissions: node and parameter of those of its emitters.
+    state: its nodes, from Mitsuba's parser. emissions: node and parameter of each.
     """
     curves = observer.curves(WAVES)
     seen, emitted = np.linalg.norm(observer.response(WAVES), axis=1), np.zeros(len(WAVES))
@@ -82,7 +82,7 @@ def bands_of(state: Any, emissions: Iterable[tuple[int, str]], observer: Observe
 
 
 def _spectra(state: Any, emissions: Iterable[tuple[int, str]]) -> Iterator[Doubles]:
-    """Yield the power at WAVES of each emitter; that of RGB counts as even."""
+    """Yield the power at WAVES of each emitter; a power of RGB counts as even."""
     import mitsuba as mi
 
     for node, parameter in emissions:

@@ -261,8 +261,8 @@ class Appearance:
         """Share that came of what was asked for, from 0 to 1: the smaller of the `mean_shares` of
         brightness and of colour.
 
-        Where no wish asks for anything visible, that of the requested ΔE, without noise. 0 if the
-        current scene is closer.
+        Where no wish asks for anything visible, the share of the requested ΔE, without noise. 0 if
+        the current scene is closer.
         """
         known = [x for x in mean_shares(self.deliveries) if x is not None]
         if known and not self.is_worse:

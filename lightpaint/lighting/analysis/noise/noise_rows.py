@@ -28,7 +28,7 @@ CACHED_NUMBERS = 2**16
 
 
 def factor(values: Doubles, halves: Doubles, own_share: float) -> Doubles:
-    """Return values, of which a share is a pixel's own, and the rest that of the pixel beside.
+    """Return values, of which a share is a pixel's own, and the rest the value of the pixel beside.
 
     values, halves: (…, pixels), of pixels in the order of the picture, and their half differences.
     """
@@ -40,7 +40,7 @@ def factor(values: Doubles, halves: Doubles, own_share: float) -> Doubles:
 def mixed_with_beside(
     values: Doubles, beside: Doubles, halves: Doubles, own_share: float
 ) -> Doubles:
-    """Return values mixed with those of the pixels beside, where these are alike.
+    """Return values mixed with the values of the pixels beside, where these are alike.
 
     All of the same shape. halves: half differences of the values.
     """
@@ -96,7 +96,7 @@ class NoiseSums:
 
 @dataclass(frozen=True)
 class ChannelPixels:
-    """Some pixels of a channel, as all lights share them.
+    """Pixels of a channel, some or all, as all lights share them.
 
     c: the channel. D: their weight. mean, half: factors of the half differences and of the light of
     each light in its gradient. missing: |residual|. unseen: where no emitter is. All (p,). weights,
