@@ -10,6 +10,7 @@ import pytest
 import lightpaint as lp
 from lightpaint.basis.basis import meter_exposure
 from lightpaint.colour.color import kelvin_to_rgb, luminance
+from lightpaint.lighting.live.live_sums import SmallFilm
 from lightpaint.lighting.loss import expected_lights, weight_penalty
 from lightpaint.lighting.loss.expected_lights import ExpectedLights, Wash, adjusted_share
 from lightpaint.lighting.loss.weight_penalty import ContrastRows
@@ -244,8 +245,8 @@ def test_a_flame_is_no_wish_for_the_light_on_its_lantern() -> None:
     assert found == [[0, 0, 0, 0], [0, 0.5, 1, 0], [1, 0, 0, 0]]
 
 
-def test_a_locked_lamp_in_view_does_not_light_up_the_room(make_basis: Any) -> None:
-    """Its flame was painted brighter, and the lantern around it darker, as the room."""
+def lantern(make_basis: Any, *, is_exact: bool = False) -> tuple[lp.Basis, lp.Target]:
+    """A flame that was painted brighter and warmer, in a lantern and a room painted darker."""
     flame = np.zeros((120, 160), bool)
     flame[60:62, 81:83] = True
     y, x = np.mgrid[:120, :160]
@@ -256,18 +257,77 @@ def test_a_locked_lamp_in_view_does_not_light_up_the_room(make_basis: Any) -> No
         emission=[(0.3,) * 3, (0.3,) * 3],
     )
     basis = replace(basis, emitters_seen=flame)
-    image = basis.current_look * np.where(flame, 4.0, 0.2)[..., None]
-    areas = (~flame).astype(np.float32), flame.astype(np.float32)
-    wishes = tuple(Wish(k, v) for k, v in zip(("room", "flame"), areas, strict=True))
+    image = basis.current_look * np.where(flame[..., None], 4 * warmer(80), 0.2)
+    wishes = (
+        Wish("room", (~flame).astype(np.float32)),
+        Wish("flame", flame.astype(np.float32), is_exact=is_exact),
+    )
     target = replace(
         painting(room(make_basis), np.ones((H, W, 3))),
         image=image.astype(np.float32),
         importance=np.ones(flame.shape, np.float32),
         wishes=wishes,
     )
+    return basis, target
+
+
+@pytest.mark.parametrize("is_exact", [False, True])
+def test_a_locked_lamp_in_view_does_not_light_up_the_room(make_basis: Any, is_exact: bool) -> None:
+    """Its flame was painted brighter, and the lantern around it darker, as the room."""
+    basis, target = lantern(make_basis, is_exact=is_exact)
     constraints = lp.Constraints.of({"light 1": {"lock": [2.4] * 3}})
     weights = lp.solve(basis, target, constraints=constraints).weights
     assert weights[0].max() < 0.1  # it was painted at 0.06
+
+
+def test_a_flame_in_numbers_is_a_wish_for_its_lamp(make_basis: Any) -> None:
+    """A display shows any flame as white, and what is around it was painted dark."""
+    basis, target = lantern(make_basis, is_exact=True)
+    weights = lp.solve(basis, target).weights
+    painted = 0.3 * 4 * warmer(80)
+    # It gives way to the paint around it by a few percent.
+    np.testing.assert_allclose(weights[1], painted, rtol=0.1)
+    assert weights[0].max() < 0.1
+    by_brush = lp.solve(basis, lantern(make_basis)[1]).weights
+    assert by_brush[1].max() < 0.5 * painted.max()
+
+
+def test_the_term_of_a_flame_vanishes_for_its_painted_light(make_basis: Any) -> None:
+    basis, target = lantern(make_basis, is_exact=True)
+    flames = Wash.of(basis, target).flames
+    painted = 0.3 * 4 * warmer(80)
+    np.testing.assert_allclose(flames.rows, np.tile([0.0, 50.0], (1, 3, 1)))
+    np.testing.assert_allclose(flames.light, [50 * painted], rtol=1e-6)  # float32 paint
+    term = weight_penalty.flame_term(flames, target.transform, 7.0)
+    assert term is not None
+    met, twice = (term.objective(np.array([[5.0] * 3, x * painted])) for x in (1, 2))
+    assert met.max() < 1e-9
+    shown = 50 * painted * weight_penalty.BELOW_WHITE / (50 * painted.max())
+    amplitude = weight_penalty.display_amplitude(shown[:, None], target.transform)[:, 0]
+    np.testing.assert_allclose(twice, weight_penalty.FLAME * 7.0 * amplitude**2, rtol=1e-5)
+    assert weight_penalty.flame_term(flames, None, 7.0) is None
+    assert len(expected_lights.FlameWishes.joined([flames, flames]).light) == 2
+
+
+def test_an_object_with_a_flame_in_it_is_no_wish_for_the_flame(make_basis: Any) -> None:
+    basis, target = lantern(make_basis, is_exact=True)
+    around = target.wishes[1].area.copy()
+    around[58:64, 79:85] = 1
+    wishes = (replace(target.wishes[1], area=around),)
+    assert not len(Wash.of(basis, replace(target, wishes=wishes)).flames.light)
+
+
+def test_a_brush_reads_the_same_flames(make_basis: Any) -> None:
+    """Also where the pixels of its film are blocks of several."""
+    basis, target = lantern(make_basis, is_exact=True)
+    film = SmallFilm(basis, target.image, target.importance, max_pixels=2000)
+
+    def layers(side: int) -> list[Wish]:
+        return [x.reduced(side) if side > 1 else x for x in target.wishes]
+
+    live, exact = film.wash(layers, is_sketch=True).flames, Wash.of(basis, target).flames
+    np.testing.assert_allclose(live.rows, exact.rows, rtol=1e-12)
+    np.testing.assert_allclose(live.light, exact.light, rtol=1e-12)
 
 
 def test_an_unpainted_rest_has_no_contrast(make_basis: Any) -> None:

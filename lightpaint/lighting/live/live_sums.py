@@ -12,6 +12,8 @@ from lightpaint.colour import ViewTransform
 from lightpaint.images import block_mean, block_sums, enlarged
 from lightpaint.lighting.live.tiles import MAX_CHEAP_LIGHTS, TiledEquations
 from lightpaint.lighting.loss.expected_lights import (
+    ON_EMITTERS,
+    FlameWishes,
     Wash,
     counted_wishes,
     exact_share,
@@ -131,7 +133,7 @@ class SmallFilm:
         height, width = importance.shape
         self._side = side = max(1, ceil((height * width / max_pixels) ** 0.5))
         self._image, self._importance, self._seen = image, importance, basis.emitters_seen
-        self._at_least, self._marks = at_least, np.zeros((3, 0), bool)
+        self._planes, self._at_least, self._marks = basis.planes, at_least, np.zeros((3, 0), bool)
         rows, columns = -(-height // side), -(-width // side)
         self._size = rows, columns
         # Emitters do not count in a block that shows anything else.
@@ -180,6 +182,7 @@ class SmallFilm:
 
     def replace_planes(self, basis: Basis, lights: Iterable[int]) -> None:
         """Average the replaced planes of some lights, by number."""
+        self._planes = basis.planes
         for k in lights:
             self.rows[:, k] = _planes(self._average(basis.planes.plane(k)))
 
@@ -242,14 +245,26 @@ class SmallFilm:
         painted: Floats = self._painted.T.reshape(*self._size, 3)
         look = self._current.T.reshape(*self._size, 3)
         small_importance = importance.reshape(self._size)
-        wishes = counted_wishes(layers(self._side), self._counted_share)
+        covers = layers(self._side)
+        wishes, flames = counted_wishes(covers, self._counted_share), self._flames(covers, layers)
         if is_sketch and self._marks.any():
             marks = self._marks.T.reshape(*self._size, 3)
             painted = extend_marked(painted, small_importance, marks, wishes, look)
         shares = wish_shares(wishes, painted, small_importance, look)
         exact, places = exact_share(wishes, self._size), wish_places(shares, self._size)
         light = self.rows, painted.reshape(-1, 3).T, self._current
-        return Wash(*light, importance, counts, shares, exact, places)
+        return Wash(*light, importance, counts, shares, exact, places, flames)
+
+    def _flames(self, covers: Sequence[Wish], layers: LayerWishes) -> FlameWishes:
+        """Return the wishes for emitters in view. covers: the wishes averaged over blocks."""
+        seen = 1 - self._counted_share
+        may_be = any(
+            x.is_exact and 0 < ON_EMITTERS * x.area.sum() <= np.minimum(x.area, seen).sum()
+            for x in covers
+        )
+        # Blocks do not tell an emitter from what is beside it.
+        wishes = layers(1) if may_be else ()
+        return FlameWishes.of(self._planes, self._seen, self._image, self._importance, wishes)
 
     @property
     def has_mark(self) -> Bools:

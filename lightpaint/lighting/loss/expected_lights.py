@@ -13,7 +13,7 @@ from typing import Self
 
 import numpy as np
 
-from lightpaint.arrays import Doubles, Floats, Indices
+from lightpaint.arrays import Bools, Doubles, Floats, Indices
 from lightpaint.basis import Basis, Planes, block_means
 from lightpaint.colour import luminance
 from lightpaint.images import block_sums
@@ -52,6 +52,53 @@ MIN_ADJUSTED = 0.1
 #: Approximate number of blocks of a wish that are compared for it.
 ADJUSTED_BLOCKS = 2**10
 
+#: Share of a wish that lies on emitters in view from which it is a wish for their own light, and
+#: the approximate number of pixels over which that light is averaged.
+ON_EMITTERS, FLAME_PIXELS = 0.5, 2**10
+
+
+@dataclass(frozen=True)
+class FlameWishes:
+    """Wishes in numbers for the light of emitters in view themselves, as of a lantern's flame.
+
+    rows: (k, 3, n), the mean of Φ over the emitters' pixels in each wish. light: (k, 3), linear,
+    the mean that is painted there.
+    """
+
+    rows: Doubles
+    light: Doubles
+
+    @classmethod
+    def of(
+        cls,
+        planes: Planes,
+        seen: Bools,
+        image: Floats,
+        importance: Floats | Doubles,
+        wishes: Sequence[Wish],
+    ) -> Self:
+        """Find the wishes of a view. seen: (h, w), where an emitter is in view; image: (h, w, 3);
+        importance: (h, w); wishes: with areas of (h, w).
+        """
+        rows, light = [np.zeros((0, 3, planes.count))], [np.zeros((0, 3))]
+        for wish in wishes:
+            weight = wish.area.astype(np.float64) * np.minimum(importance, 1)
+            own = np.where(seen, weight, 0).ravel()
+            if not (wish.is_exact and own.sum() > ON_EMITTERS * weight.sum()):
+                continue
+            pixels = np.flatnonzero(own)
+            pixels = pixels[:: ceil(pixels.size / FLAME_PIXELS)]
+            share = own[pixels] / own[pixels].sum()
+            found = planes.pixels(pixels).astype(np.float64)
+            rows.append(np.einsum("p,npc->cn", share, found)[None])
+            light.append(share @ image.reshape(-1, 3)[pixels][None].astype(np.float64))
+        return cls(np.concatenate(rows), np.concatenate(light))
+
+    @classmethod
+    def joined(cls, views: "Sequence[FlameWishes]") -> Self:
+        """Return the wishes of several views behind each other."""
+        return cls(*(np.concatenate([getattr(x, k) for x in views]) for k in ("rows", "light")))
+
 
 @dataclass(frozen=True)
 class Wash:
@@ -61,7 +108,7 @@ class Wash:
     is painted. counts: (p,), the number of its pixels that count. wishes: (k, p), the share of a
     block that each wish covers; exact: (p,), the cover of wishes whose colours were given as
     numbers. places: (k, p), the number of the separate place of each wish to which a block belongs,
-    and 0 for none.
+    and 0 for none. flames: the wishes for emitters in view.
     """
 
     rows: Floats
@@ -72,6 +119,7 @@ class Wash:
     wishes: Floats
     exact: Doubles
     places: Indices
+    flames: FlameWishes
 
     @classmethod
     def of(cls, basis: Basis, target: Target) -> "Wash":
@@ -93,7 +141,8 @@ class Wash:
             own = slice(first, first + len(view.wishes)), slice(start, start + view.counts.size)
             wishes[own], places[own] = view.wishes, view.places
             first += len(view.wishes)
-        return cls(**joined, wishes=wishes, places=places)
+        flames = FlameWishes.joined([x.flames for x in views])
+        return cls(**joined, wishes=wishes, places=places, flames=flames)
 
     def sample(self, count: int, count_of_wish: int) -> tuple[Indices, Doubles]:
         """Return about `count` painted blocks, (m,), and the number of painted pixels for which
@@ -146,7 +195,8 @@ class PaintedBlocks:
     """A view averaged over blocks of pixels, before its wishes are found.
 
     rows: (3, n, p), Φ. painted, look: (h, w, 3), linear. importance, counts: (h, w), as in `Wash`.
-    layers: the wishes of a painting with layers, with an area of a value for each block.
+    layers: the wishes of a painting with layers, with an area of a value for each block. flames:
+    its wishes for emitters in view.
     """
 
     rows: Floats
@@ -155,6 +205,7 @@ class PaintedBlocks:
     importance: Doubles
     counts: Doubles
     layers: Sequence[Wish]
+    flames: FlameWishes
 
     @classmethod
     def of(cls, basis: Basis, target: Target) -> Self:
@@ -174,9 +225,10 @@ class PaintedBlocks:
             for wish in target.wishes
         ]
         layers = counted_wishes(layers, counts / pixels)
-        return cls(
-            light_rows(basis.planes, counted, side), painted, look, importance, counts, layers
-        )
+        seen = basis.emitters_seen
+        flames = FlameWishes.of(basis.planes, seen, target.image, target.importance, target.wishes)
+        rows = light_rows(basis.planes, counted, side)
+        return cls(rows, painted, look, importance, counts, layers, flames)
 
     @property
     def wash(self) -> Wash:
@@ -191,6 +243,7 @@ class PaintedBlocks:
             wishes,
             exact_share(self.layers, self.importance.shape),
             wish_places(wishes, self.importance.shape),
+            self.flames,
         )
 
 

@@ -35,6 +35,10 @@ such a rest down instead, so the light of the rest shall come as painted, too:
 
     F += s' Σ_k Σ_c A_kc² (P_r / R − 1)²
 
+A wish for a flame in view is a wish for the lamp: what is around the flame may have been painted
+otherwise, and a display shows any flame as white. So such a wish in numbers asks for the emitter's
+own light, P_e / E = 1, as the rest above, with the A of light of its colour that is just not white.
+
 Texels of an image could meet any contrast by a patchwork of odd colours. So as far as the light of
 a wish comes from texels, its contrast stays the contrast of a brush.
 """
@@ -56,6 +60,7 @@ from lightpaint.lighting.loss.expected_lights import (
     DARK,
     UNIFORM_STOPS,
     ExpectedLights,
+    FlameWishes,
     Wash,
     adjusted_share,
 )
@@ -68,6 +73,13 @@ CONTRAST, EXACT_CONTRAST = 0.5, 8.0
 
 #: The same of the light of a rest that was adjusted by a number.
 EXACT_REST = 1.5
+
+#: The same of the light of emitters in view that was given by numbers.
+FLAME = 0.5
+
+#: Light by which changes of an emitter's are measured, relative to white, beyond which a display
+#: shows none.
+BELOW_WHITE = 0.9
 
 #: Smallest share of the rest of a picture that must be painted for a contrast to be asked for: an
 #: unpainted rest is held to the look, which was not meant as a contrast.
@@ -186,6 +198,27 @@ class ContrastRows:
         return NormalEquations(M, b, keep @ self.rest_goal**2)
 
 
+def flame_term(
+    flames: FlameWishes, transform: ViewTransform | None, strength: float
+) -> NormalEquations | None:
+    """Return the term of wishes for emitters in view; None without any.
+
+    transform: of the loss; None for linear light, in which their pixels alone ask for as much.
+    strength: the importance of all paint.
+    """
+    light = flames.light[(flames.light > 0).all(axis=1)]
+    if transform is None or not len(light) or strength <= 0:
+        return None
+    brightest = light.max(axis=1, keepdims=True)
+    shown = light * np.minimum(1, BELOW_WHITE * transform.white / brightest)
+    amplitude = display_amplitude(shown.T, transform).T
+    rows = flames.rows[(flames.light > 0).all(axis=1)] * (amplitude / light)[..., None]
+    each = strength * FLAME / len(light)
+    M = each * np.einsum("kci,kcj->cij", rows, rows)
+    b = each * np.einsum("kci,kc->ci", rows, amplitude)
+    return NormalEquations(M, b, each * np.square(amplitude).sum(axis=0))
+
+
 def _subjects_and_rests(
     wash: Wash, area: Doubles, places: Indices, total: float
 ) -> list[tuple[Doubles, Doubles]]:
@@ -271,7 +304,10 @@ class PaintTerms:
         texel_weights = own * texels[:, None] if texels.any() else None
         return cls(
             ExpectedLights.of(wash, own) if keeps_colors else None,
-            ContrastRows.of(wash, fit.transform, texel_weights).term(importance),
+            _sum(
+                ContrastRows.of(wash, fit.transform, texel_weights).term(importance),
+                flame_term(wash.flames, fit.transform, importance),
+            ),
             restrain_lights(wash, own, fit.transform, unpainted=unpainted),
         )
 
@@ -307,8 +343,13 @@ def joint_pull(
     )
     prior = image_prior(lights, power, fit, painted_share, terms.expected)
     parts = (pull, near, prior, terms.contrast, terms.restraint, tether)
-    pulls = [x for x in parts if x is not None]
-    return reduce(add, pulls) if pulls else None
+    return _sum(*parts)
+
+
+def _sum(*terms: NormalEquations | None) -> NormalEquations | None:
+    """Return the sum of terms; None without any."""
+    given = [x for x in terms if x is not None]
+    return reduce(add, given) if given else None
 
 
 def weight_pull(
