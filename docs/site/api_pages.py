@@ -133,6 +133,7 @@ PARTS: dict[str, tuple[str, ...]] = {
     "basis.basis": ("Origin",),
     "basis.lightgroups.render_layers": ("RenderLayer",),
     "lighting.constraints.constraints": ("Tie",),
+    "lighting.constraints.absolute_scale": ("Scale",),
     "lighting.loss.expected_lights": ("ExpectedLights",),
     "lighting.normal_equations": ("NormalEquations",),
     "lighting.loss.reweighting": ("Reweighting",),

@@ -580,10 +580,10 @@ export interface PlaneLight {
 /**
  * The illuminance on measuring planes under an answer and the master dimmer.
  *
- * planes: in the order of the state. watts: power of all lamps; null if that of one is unknown.
- * power: the limit of it; null for none. is_required: whether answers have to meet the wishes, as
- * far as they can be met. is_old: whether lights have been moved, added or removed since the
- * planes were measured.
+ * planes: in the order of the state. watts: power of all lamps; null if the power of one is
+ * unknown. power: the limit of it; null for none. is_required: whether answers have to meet the
+ * wishes, as far as they can be met. is_old: whether lights have been moved, added or removed
+ * since the planes were measured.
  */
 export interface PlanesReading {
   planes: PlaneLight[];
@@ -1556,8 +1556,8 @@ export interface DropLook {
  * Propose a lighting to the painter: it becomes a look with each light locked at the proposed
  * level, and replaces an earlier proposal of that name. Answered by `looks`.
  *
- * lights: emission by name of light; other lights keep that of the current answer. name: of the
- * proposal.
+ * lights: emission by name of light; other lights keep the emission of the current answer. name:
+ * of the proposal.
  */
 export interface Propose {
   name: string;
