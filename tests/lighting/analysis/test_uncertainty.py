@@ -698,3 +698,22 @@ def test_lights_that_hardly_reach_the_paint_stay_undetermined_alone(seed: int):
     # The noise of the four is the same in both. Precision: the sums of the pair are singular but
     # for rounding, which may widen an interval.
     assert (sides[1] < 2 * sides[0]).all()
+
+
+def test_many_corners_of_a_gamut_widen_no_error_bar(make_basis: Any):
+    """A gamut only takes freedom away. Of corners as near to each other as those of a picture's
+    own colours, any three span the same weights, and which of them an answer mixes says nothing.
+    """
+    clean, truth = _pools(3), np.array([[1.0, 0.9, 0.8], [0.7, 0.8, 0.75], [1.1, 1.2, 1.0]])
+    target = _target(np.einsum("nhwc,nc->hwc", clean, truth))
+    corners = truth[0] + 0.05 * np.random.default_rng(0).normal(size=(13, 3))
+    constraints = Constraints.of(dict.fromkeys("abc", {"primaries": corners.tolist()}))
+    for seed in range(4):
+        images, halves = _noisy_halves(clean, 0.3, np.random.default_rng(seed))
+        basis = make_basis(
+            images=images, half_differences=halves, names="abc", emission=np.ones((3, 3))
+        )
+        free = error_bars(solve(basis, target, literal=True))
+        mixed = error_bars(solve(basis, target, literal=True, constraints=constraints))
+        # Answers at a face of the gamut lie elsewhere, and what is missed there adds to the noise.
+        assert (mixed.standard_error <= 1.3 * free.standard_error).all()

@@ -36,6 +36,10 @@ OUTSIDE_SHARE = 0.05
 #: that another light would have to make up for that, no answer under w >= 0 does.
 MAX_DEVIATION = 1.0
 
+#: Part of an unknown's effect on the weights of its light that others of this light do not have,
+#: from which it counts as a direction of its own.
+MIN_APART = 1e-3
+
 #: Level of a light that is off, relative to the mean light of the whole picture.
 FAINT = 0.01
 
@@ -176,12 +180,55 @@ def block_freedoms(solution: Solution, equations: NormalEquations) -> Iterator[B
         lower, upper = reduction.lower[unknowns], reduction.upper[unknowns]
         is_movable = (lower < upper) & has_effect
         side = np.where(x[unknowns] <= lower, 1, np.where(x[unknowns] >= upper, -1, 0)) * is_movable
-        inside, bound = np.flatnonzero(is_movable & (side == 0)), np.flatnonzero(side)
+        is_inside, is_bound = independent_unknowns(block, is_movable & (side == 0), side != 0)
+        inside, bound = np.flatnonzero(is_inside), np.flatnonzero(is_bound)
         caps_here = rows[:, unknowns].any(axis=1)
         sums = rows[caps_here][:, unknowns]
         free, lowering = _keep_sums(sums, inside)
         limits = _active_limits(sums, lowering, bound, side, upper - lower, distances[caps_here])
         yield BlockFreedom(block, emitted, free, limits)
+
+
+def independent_unknowns(block: Block, inside: Bools, bound: Bools) -> tuple[Bools, Bools]:
+    """Return the unknowns inside their bounds and at them, (k,) each, without those whose effect
+    others have.
+
+    A gamut has a corner for each unknown, so a light has more of these than channels. Its freedom
+    is the freedom of its weights: where corners inside their bounds span a direction, another one
+    at its bound keeps nothing from moving along it. Of corners at their bounds, those are kept
+    which point farthest away from all kept ones.
+    """
+    owners, effects = _own_effects(block)
+    inside, bound = inside.copy(), bound.copy()
+    movable = np.flatnonzero((inside | bound) & (owners >= 0))
+    lights, counts = np.unique(owners[movable], return_counts=True)
+    for light in lights[counts > effects.shape[1]]:
+        own = movable[owners[movable] == light]
+        left = effects[own] / np.linalg.norm(effects[own], axis=1, keepdims=True)
+        kept = np.zeros(own.size, bool)
+        for group in (inside[own], bound[own]):
+            while (sizes := np.linalg.norm(left, axis=1) * group).max() > MIN_APART:
+                best = int(sizes.argmax())
+                kept[best], axis = True, left[best] / sizes[best]
+                left = left - np.outer(left @ axis, axis)
+        inside[own[~kept]] = bound[own[~kept]] = False
+    return inside, bound
+
+
+def _own_effects(block: Block) -> tuple[Indices, Doubles]:
+    """Return the light of each unknown that moves one light alone, (k,), else -1; and its effect
+    on the channels of that light, (k, channels).
+    """
+    k, none = block.unknowns.size, -1
+    owners, effects = np.full(k, none), np.zeros((k, len(block.entries)))
+    is_shared = np.zeros(k, bool)
+    for place, e in enumerate(block.entries):
+        lights = e.lights[e.first]
+        known = owners[e.columns]
+        is_shared[e.columns] |= (e.counts > 1) | ((known != none) & (known != lights))
+        owners[e.columns], effects[e.columns, place] = lights, e.values[e.first]
+    owners[is_shared | ~effects.any(axis=1)] = none
+    return owners, effects
 
 
 def free_directions(solution: Solution) -> list[Doubles]:
