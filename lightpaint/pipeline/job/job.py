@@ -122,7 +122,7 @@ class Job:
         sequence: The frames of the shot whose light groups are in `basis`.
         views: Set on creation: the views, each with what it needs.
         all_constraints: Set on creation: all constraints, the lights file's first.
-        scale: Set on creation: the cd/m² of a radiance of 1, and the lights for which it is a guess.
+        scale: Set on creation: cd/m² of a radiance of 1, and the lights for which that is a guess.
         all_rigging: Set on creation: all rigging, the lights file's first.
         fit: Set on creation: the settings, including those that the paintings decide.
         remarks: Set on creation: remarks for the user, in plain text.

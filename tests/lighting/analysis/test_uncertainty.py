@@ -707,7 +707,7 @@ def test_many_corners_of_a_gamut_widen_no_error_bar(make_basis: Any):
     clean, truth = _pools(3), np.array([[1.0, 0.9, 0.8], [0.7, 0.8, 0.75], [1.1, 1.2, 1.0]])
     target = _target(np.einsum("nhwc,nc->hwc", clean, truth))
     corners = truth[0] + 0.05 * np.random.default_rng(0).normal(size=(13, 3))
-    constraints = Constraints.of(dict.fromkeys("abc", {"primaries": corners.tolist()}))
+    constraints = Constraints.of({name: {"primaries": corners.tolist()} for name in "abc"})
     for seed in range(4):
         images, halves = _noisy_halves(clean, 0.3, np.random.default_rng(seed))
         basis = make_basis(
