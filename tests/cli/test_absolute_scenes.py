@@ -114,7 +114,7 @@ WARM_COOL = """emitters = [
 
 
 def _listed(folder: Path, table: str, content: str = BULB + floor()) -> dict[str, dict]:
-    """What `lights --json` lists of a bulb with a table in the lights file."""
+    """Return the entry of a bulb in `lights --json`, whose lights file has this table."""
     write_web(folder / "lamp.ies", ies_text(cosine))
     write_scene(folder, content, max_depth=2)
     (folder / "lit.lights.toml").write_text(f"[light.bulb]\n{table}", encoding="utf-8")

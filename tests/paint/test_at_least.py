@@ -116,7 +116,7 @@ STOPS = st.floats(-1.5, 2)
 
 
 def _over_look(basis: lp.Basis, stops: np.ndarray, transform: lp.ViewTransform) -> lp.Target:
-    """What 8 bits hold of the look, changed by so many stops of each channel on either half."""
+    """Return the look in 8 bits, each half changed by some stops in each channel."""
     factors = np.repeat(2.0 ** stops.reshape(1, 2, 3), SIZE[1] // 2, axis=1)
     codes = np.round(255 * np.clip(transform.encode(basis.current_look * factors), 0, 1)) / 255
     return lp.Target(
