@@ -225,15 +225,12 @@ class LitPlanes(RowPlanes):
 
     def lit_plane(self, i: int) -> tuple[slice | Indices, Floats]:
         """Return pixels of light i, outside of which it is black, and their light, (3, p)."""
-        pixels: slice | Indices = slice(None)
+        pixels: slice | Indices
         if i in self._clean:
-            values = self._clean[i].copy()
+            pixels, values = slice(None), self._clean[i].copy()
         else:
-            # One copy of all strips: there are many, of few lit pixels each.
-            of_strips = [strip.lit_of(i) for strip in self._lit]
-            lit = [x.astype(np.intp) + y for (x, _), y in zip(of_strips, self._begins, strict=True)]
-            pixels = np.concatenate(lit)
-            values = _singles(np.concatenate([x for _, x in of_strips], axis=1))
+            stored = self.stored(i)
+            pixels, values = stored.pixels.astype(np.intp), _singles(stored.numbers)
         if self._scales[i] != 1:
             values *= self._scales[i]
         return pixels, values
