@@ -88,6 +88,9 @@ UNTOLD_HERE = f"{UNDETERMINED} at this number of samples"
 #: Maximum number of wishes in a list of sentences.
 MAX_WISHES = 4
 
+#: Share of an only wish below which a headline begins with its being out of reach.
+HALF = 0.5
+
 #: What may bring a wish: where no light reaches it, where none reaches it alone, and where a light
 #: for it lights something else, too.
 REACH_ADVICE = "A light that hangs or points elsewhere may reach it."
@@ -469,12 +472,12 @@ def spoken_mean_shares(deliveries: Sequence[Delivery]) -> str:
 def spoken_came(appearance: Appearance) -> str:
     """Return how much of all wishes came, `Most of the way: brightness 98 %, colour 67 %`; as a
     share of ΔE, `Most of the way (70 %)`, if none asks for anything visible. Of an only wish that
-    no light can bring, `Out of reach (8 % came)`.
+    no light can bring, if less than half of it came, `Out of reach (8 % came)`.
     """
     far, shares = spoken_progress(appearance.progress), spoken_mean_shares(appearance.deliveries)
     if far == NO_CLOSER_TEXT:
         return far
-    if lacks_only_wish(appearance):
+    if lacks_only_wish(appearance) and appearance.progress < HALF:
         return f"Out of reach ({shares} came)"
     return f"{far}: {shares}" if shares else f"{far} ({spoken_percent(appearance.progress)})"
 

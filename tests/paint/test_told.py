@@ -278,6 +278,13 @@ def test_an_only_wish_that_no_light_brings_is_first_said_to_be_out_of_reach():
         )
         assert sketch_headline(appearance) == expected
         assert headline(appearance) == expected
+    # Of which most came is said how far, and then what is missing.
+    most = replace(appearance, deliveries=(replace(wall, brightness=0.62, color=0.61),))
+    for text in (sketch_headline(most), headline(most)):
+        assert text == expected.replace(
+            "Out of reach (brightness 27 %, colour 33 % came)",
+            "Most of the way: brightness 62 %, colour 61 %",
+        )
     # With a light of its own it is the hold that keeps it.
     own = replace(appearance, area_lights=OWN)
     assert sketch_headline(own).startswith("Part of the way: brightness 27 %, colour 33 %. ")
