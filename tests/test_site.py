@@ -179,7 +179,7 @@ def test_messages_that_are_explained_are_those_of_the_code() -> None:
     """`…` stands for what differs; each piece between has to stand in one literal."""
     page = (REPOSITORY / "docs" / "troubleshooting.md").read_text("utf-8")
     messages = [" ".join(x.split()) for x in re.findall(r"\*\*`([^`]+)`\*\*", page)]
-    assert len(messages) > 80
+    assert len(messages) > 50
     literals = "\n".join(_literals())
     missing = [
         piece
