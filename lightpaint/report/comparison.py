@@ -23,6 +23,7 @@ from lightpaint.report.answer_pictures import (
     target_picture,
 )
 from lightpaint.report.phrases import spoken_progress
+from lightpaint.report.verdict_sentences import are_held_back
 from lightpaint.target import Target
 
 #: Narrower images are enlarged, pixel by pixel, until their captions can be read, unless they would
@@ -196,7 +197,7 @@ def _short_verdict(appearance: Appearance) -> str:
     word = (
         "close"
         if appearance.is_close
-        else "out of reach"
+        else ("held back" if are_held_back(appearance) else "out of reach")
         if appearance.is_far and not appearance.is_hidden_by_noise
         else "close on the whole"
         if appearance.is_nearly_equal

@@ -364,6 +364,11 @@ def spoken_noise(appearance: Appearance) -> str:
     return ""
 
 
+def are_held_back(appearance: Appearance) -> bool:
+    """Return whether something that may be loosened keeps the lights from a painting."""
+    return bool(appearance.causes) or _are_kept(appearance)
+
+
 def _are_kept(appearance: Appearance) -> bool:
     """Return whether constraints hold back all lights that contribute much to the place."""
     is_short = (

@@ -21,6 +21,8 @@ from lightpaint.images.formats.exr import write_rgb
 from lightpaint.images.formats.png import png_bytes
 from lightpaint.lighting.analysis.appearance.appearance import Appearance
 from lightpaint.lighting.analysis.appearance.delivery import Delivery
+from lightpaint.lighting.analysis.appearance.limiting_reasons import Reason
+from lightpaint.lighting.analysis.diagnosis import Place
 from lightpaint.lighting.answer.combination import combine
 from lightpaint.lighting.answer.lighting import Lighting
 from lightpaint.lighting.constraints.constraints import Constraints
@@ -127,8 +129,33 @@ def test_captions_of_numbers_are_whole_below_small_pictures(
     assert [captions[words] for words in told] == told
 
 
+WISHES = (Delivery("Moonlight", 0.98, 0.43), Delivery("Wall", 1.0, 1.0))
+PLACE = Place((1, 1), 0.9, (0, 0, 8, 8), (0.4, 0.4, 0.4), (0.1, 0.1, 0.1))
+FAR = Appearance(14.0, 0.0, 16.0, PLACE)
+
+
+@pytest.mark.parametrize(
+    ("appearance", "caption", "start"),
+    [
+        (
+            Appearance(2.0, 0.0, 20.0, None, deliveries=WISHES),
+            "close on the whole: mean dE 2.0 (noise 0.0)",
+            "Close on the whole: ",
+        ),
+        (
+            replace(FAR, reasons=(Reason("hold"),)),
+            "held back: mean dE 14.0 (noise 0.0)",
+            "Unpainted parts keep the lights from this: ",
+        ),
+        (
+            FAR,
+            "out of reach: mean dE 14.0 (noise 0.0)",
+            "These lights cannot match this: ",
+        ),
+    ],
+)
 def test_the_caption_rates_an_answer_as_the_sentence_does(
-    make_basis: Any, monkeypatch: pytest.MonkeyPatch
+    make_basis: Any, monkeypatch: pytest.MonkeyPatch, appearance: Any, caption: str, start: str
 ):
     cut = comparison.shorten_to_width
     captions: dict[str, str] = {}
@@ -138,12 +165,9 @@ def test_the_caption_rates_an_answer_as_the_sentence_does(
         return captions[words]
 
     monkeypatch.setattr(comparison, "shorten_to_width", record)
-    wishes = (Delivery("Moonlight", 0.98, 0.43), Delivery("Wall", 1.0, 1.0))
-    appearance = Appearance(2.0, 0.0, 20.0, None, deliveries=wishes)
     comparison_image(**_look(make_basis), appearance=appearance)
-    words = "close on the whole: mean dE 2.0 (noise 0.0)"
-    assert captions[words] == words
-    assert headline(appearance).startswith("Close on the whole: ")
+    assert captions[caption] == caption
+    assert headline(appearance).startswith(start)
 
 
 def test_a_long_name_stays_below_its_own_picture(make_basis: Any):
