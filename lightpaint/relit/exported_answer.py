@@ -48,7 +48,7 @@ def emitters_of(scene: Scene, lighting: Lighting) -> list[tuple[str, str, RGB]]:
     """Return name, Mitsuba's parameter and emission of every adjusted emitter but texels.
 
     The parameter is "" if the emission is a multiple of that in the scene, as for a sky. A
-    projector of one colour has the intensity along its axis.
+    projector of one colour has the intensity along its axis. Emissions include the emitter's gain.
     """
     regrouped_scene = scene_of(scene, lighting)
     return [
@@ -63,10 +63,14 @@ def _quantity(emitter: Emitter, rgb: RGB) -> tuple[str, RGB]:
     if kind is None or kind.scaling is not Scaling.COLOUR or kind.unit == FULL:
         return "", rgb
     if emitter.plugin != "projector":
-        return kind.parameter, rgb
+        return kind.parameter, _times(emitter.gain, rgb)
     # Its irradiance is π times smaller than what a plane at distance 1 gets.
-    r, g, b = (math.pi * channel for channel in rgb)
-    return "intensity", (r, g, b)
+    return "intensity", _times(math.pi * emitter.gain, rgb)
+
+
+def _times(factor: float, rgb: RGB) -> RGB:
+    r, g, b = rgb
+    return factor * r, factor * g, factor * b
 
 
 def rig_lights(scene: Scene, lighting: Lighting) -> tuple[list[NukeLight], list[str]]:
@@ -117,10 +121,9 @@ def _has_point(emitter: Emitter) -> bool:
 def _intensity(emitter: Emitter, rgb: RGB) -> RGB:
     """Return the emission, of a panel its intensity along its axis: its radiance times its area."""
     if emitter.plugin != "area":
-        return rgb
+        return _times(emitter.gain, rgb)
     assert emitter.unit_flux is not None
-    r, g, b = (emitter.unit_flux / math.pi * channel for channel in rgb)
-    return r, g, b
+    return _times(emitter.unit_flux / math.pi, rgb)
 
 
 @dataclass(frozen=True)

@@ -24,11 +24,16 @@ from lightpaint.scene.properties.emission import (
     why_not_adjusted,
 )
 from lightpaint.scene.properties.pose import FLAT_SHAPES, Site, site_of
+from lightpaint.scene.properties.site import unit
 from lightpaint.scene.scene_tree import GENERATED_ID, ParsedScene
 from lightpaint.validation import MAX_NAME
 
 #: Emitters that no RGB variant of Mitsuba renders correctly, each with advice.
 NOT_RENDERED = {"timed_sunsky": "use sunsky with the hour you want"}
+
+#: Emitters of irradiance that shine along an axis, and what float32 changes its length by.
+SCALED_BY_LENGTH = ("directional", "projector")
+LENGTH_TOLERANCE = 1e-5
 
 
 @dataclass(frozen=True)
@@ -44,6 +49,7 @@ class Emitter:
     light depends on besides the scene; None if it is not in a file. site: its position, direction
     and cone. texel: its place in the image of the element, if that is split into texels. is_dark:
     whether it is never sampled, and hence dark in Mitsuba whatever it emits; a colour is then 0.
+    gain: the factor by which Mitsuba multiplies its emission (`gain_of`).
     """
 
     name: str
@@ -63,6 +69,7 @@ class Emitter:
     site: Site = field(default_factory=Site)
     texel: Texel | None = None
     is_dark: bool = False
+    gain: float = 1.0
 
     def __repr__(self) -> str:
         return f"Emitter({self.name!r}, {self.plugin} {self.form})"
@@ -129,6 +136,7 @@ def find_emitters(parsed: ParsedScene, loaded: Any, hasher: SceneHasher) -> tupl
                 digest=hasher.emitter(node_of[name], kind),
                 site=site,
                 is_dark=is_dark,
+                gain=gain_of(emitter, plugin),
             )
         )
     return tuple(sorted(emitters, key=lambda emitter: emitter.node))
@@ -220,6 +228,21 @@ def flux_of_unit(emitter: Any, plugin: str, kind: EmissionKind | None) -> float 
     return float(texture.mean()) * spot_flux(cutoff, beam_width)
 
 
+def gain_of(emitter: Any, plugin: str) -> float:
+    """Return the factor by which Mitsuba multiplies the irradiance of a loaded emitter: the length
+    of the axis along which it shines, which the scale of its `to_world` changes (seen in 3.9.1).
+
+    1 for all other emitters, and within the precision of float32.
+    """
+    import mitsuba as mi
+
+    if plugin not in SCALED_BY_LENGTH:
+        return 1.0
+    matrix = np.array(mi.traverse(emitter)["to_world"].matrix, dtype=float).reshape(4, 4)
+    length = float(np.linalg.norm(matrix[:3, 2]))
+    return 1.0 if abs(length - 1) < LENGTH_TOLERANCE else length
+
+
 def describe_form(emitter: Any, plugin: str) -> str:
     """Return position and size of a loaded emitter as text, in scene units."""
     import mitsuba as mi
@@ -242,9 +265,10 @@ def describe_form(emitter: Any, plugin: str) -> str:
     if "to_world" not in parameters:
         return ""
     matrix = np.array(parameters["to_world"].matrix, dtype=float).reshape(4, 4)
-    if plugin == "directional":
-        return f"towards {at(matrix[:3, 2])}"
-    return f"at {at(matrix[:3, 3])} towards {at(matrix[:3, 2])}"
+    way = f"towards {at(unit(matrix[:3, 2]))}"
+    if (gain := gain_of(emitter, plugin)) != 1:
+        way = f"{way}, × {gain:.3g} by its scale"
+    return way if plugin == "directional" else f"at {at(matrix[:3, 3])} {way}"
 
 
 def has_name(parsed: ParsedScene, emitter: int) -> bool:
