@@ -33,11 +33,8 @@ from lightpaint.lighting import (
     with_wishes,
     without_wishes,
 )
-from lightpaint.photometry.glare import Glare
-from lightpaint.photometry.illuminance import Illuminance
-from lightpaint.photometry.measure import measure_illuminance
-from lightpaint.photometry.measure_glare import measure_glare
-from lightpaint.photometry.measuring_plane import PowerBudget
+from lightpaint.photometry import Glare, Illuminance, PowerBudget
+from lightpaint.photometry.measure import measure_glare, measure_illuminance
 from lightpaint.photometry.planes_file import PlanesFile, read_planes
 from lightpaint.pipeline.job.job import Job
 from lightpaint.pipeline.job.job_checks import checked_scale

@@ -24,8 +24,7 @@ from lightpaint.errors import LightpaintError
 from lightpaint.files import read_text, replacing
 from lightpaint.images import block_mean, denoised, fitting_factor, read_estimate
 from lightpaint.lighting import read_lighting
-from lightpaint.photometry.measuring_plane import plane_title
-from lightpaint.photometry.readings_file import PLANES
+from lightpaint.photometry import PLANES, plane_title
 from lightpaint.pipeline import PLANES_FOLDER as PLANES_FOLDER
 from lightpaint.pipeline import RECORD
 from lightpaint.relit import plain_cell
