@@ -14,7 +14,7 @@ from lightpaint.errors import LightpaintError
 from lightpaint.lighting.analysis.noise.uncertainty import error_bars
 from lightpaint.pipeline.job.job import Job
 from lightpaint.pipeline.job.settings import PILOT_SPP, Settings
-from lightpaint.pipeline.needed_samples import add_needed_samples
+from lightpaint.pipeline.job_bases import add_needed_samples
 from lightpaint.pipeline.one_call import paint_with_light
 from lightpaint.progress import listener
 from lightpaint.report.measures import picture_errors

@@ -17,7 +17,7 @@ from lightpaint.lighting.answer.lighting_file import read_lighting
 from lightpaint.lighting.constraints.constraints import Constraints
 from lightpaint.lighting.constraints.values import parse_color
 from lightpaint.pipeline.job.job import Job
-from lightpaint.pipeline.needed_samples import Certainty
+from lightpaint.pipeline.job_bases import Certainty
 from lightpaint.pipeline.one_call import paint_with_light
 from lightpaint.pipeline.results.results import Look
 from lightpaint.progress import Listener

@@ -29,13 +29,9 @@ if TYPE_CHECKING:
     from lightpaint.pipeline.job.sources import scaled_constraints as scaled_constraints
     from lightpaint.pipeline.job.sources import spectral_scene as spectral_scene
     from lightpaint.pipeline.job.sources import vars_of as vars_of
+    from lightpaint.pipeline.job_bases import Certainty as Certainty
+    from lightpaint.pipeline.job_bases import needed_counts as needed_counts
     from lightpaint.pipeline.job_bases import obtain as obtain
-    from lightpaint.pipeline.light_plan import PLAN as PLAN
-    from lightpaint.pipeline.light_plan import LightPlan as LightPlan
-    from lightpaint.pipeline.light_plan import plan_folder as plan_folder
-    from lightpaint.pipeline.light_plan import plan_lighting as plan_lighting
-    from lightpaint.pipeline.needed_samples import Certainty as Certainty
-    from lightpaint.pipeline.needed_samples import needed_counts as needed_counts
     from lightpaint.pipeline.one_call import paint_with_light as paint_with_light
     from lightpaint.pipeline.pipeline import run as run
     from lightpaint.pipeline.placed_lights import find_places as find_places
@@ -72,6 +68,8 @@ if TYPE_CHECKING:
     from lightpaint.pipeline.templates import render_sheet as render_sheet
     from lightpaint.pipeline.templates import render_template as render_template
     from lightpaint.pipeline.templates import template_of_basis as template_of_basis
+    from lightpaint.pipeline.wished_planes import PLAN as PLAN
+    from lightpaint.pipeline.wished_planes import LightPlan as LightPlan
     from lightpaint.pipeline.wished_planes import MeasuredPlanes as MeasuredPlanes
     from lightpaint.pipeline.wished_planes import check_planes as check_planes
     from lightpaint.pipeline.wished_planes import check_reached as check_reached
@@ -79,6 +77,8 @@ if TYPE_CHECKING:
     from lightpaint.pipeline.wished_planes import limited_power as limited_power
     from lightpaint.pipeline.wished_planes import measure_planes as measure_planes
     from lightpaint.pipeline.wished_planes import no_glare_remark as no_glare_remark
+    from lightpaint.pipeline.wished_planes import plan_folder as plan_folder
+    from lightpaint.pipeline.wished_planes import plan_lighting as plan_lighting
     from lightpaint.pipeline.wished_planes import with_glare as with_glare
 
 if not TYPE_CHECKING:  # a type checker would take any name

@@ -27,8 +27,13 @@ from lightpaint.lighting import (
 )
 from lightpaint.pipeline.job.job import Job, PaintedView
 from lightpaint.pipeline.job.settings import Settings
-from lightpaint.pipeline.job_bases import obtain_bases_of, problem_of, view_listener, without_noise
-from lightpaint.pipeline.needed_samples import add_needed_samples
+from lightpaint.pipeline.job_bases import (
+    add_needed_samples,
+    obtain_bases_of,
+    problem_of,
+    view_listener,
+    without_noise,
+)
 from lightpaint.pipeline.placed_lights import find_suns, place_lights, suggest_move
 from lightpaint.pipeline.results.result_folder import (
     LIGHTING,

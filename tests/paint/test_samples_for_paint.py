@@ -21,7 +21,7 @@ from lightpaint.paint.studio.session_bases import SAMPLING, add_round
 from lightpaint.paint.studio.studio import Studio
 from lightpaint.paint.subject import Subject
 from lightpaint.pipeline.job.settings import Settings
-from lightpaint.pipeline.needed_samples import Certainty
+from lightpaint.pipeline.job_bases import Certainty
 from lightpaint.scene.scene_reader import load_scene
 
 
