@@ -14,7 +14,7 @@ from renderer import assert_equal_bits, write_room
 
 import lightpaint as lp
 from lightpaint.basis.cache import cache, scene_facts
-from lightpaint.basis.render.render_origin import basis_lights
+from lightpaint.basis.render.rendered_basis import basis_lights
 from lightpaint.errors import ConstraintError, PaintError
 from lightpaint.images.denoiser import Features
 from lightpaint.images.object_map import Objects

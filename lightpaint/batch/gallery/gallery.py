@@ -58,7 +58,7 @@ from lightpaint.report import (
 )
 from lightpaint.storage.json_records import strict_json
 from lightpaint.version import __version__
-from lightpaint.viewer.bundle import bundled, styles
+from lightpaint.viewer import bundled, styles
 
 #: Style sheets of the page.
 STYLES = ("batch/gallery/gallery.css", "viewer/mixer/wipe.css", "viewer/mixer/mixer.css")

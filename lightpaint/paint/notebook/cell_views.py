@@ -30,7 +30,7 @@ from lightpaint.paint.session_access import SessionOwner
 from lightpaint.paint.studio.studio import Studio
 from lightpaint.report import data_uri, html, mixer_assets, mixer_html, target_picture
 from lightpaint.target import Target
-from lightpaint.viewer.bundle import styles
+from lightpaint.viewer import styles
 
 #: Maximum number of pixels in all planes of the mixer: with their scripts these stay below 400 kB.
 MAX_PLANE_PIXELS = 44_000

@@ -45,7 +45,7 @@ from lightpaint.paint.store.store import MemoryStore, Store
 from lightpaint.paint.studio.studio import Studio
 from lightpaint.pipeline.job.settings import SettingsByName
 from lightpaint.target import Target, write_painting
-from lightpaint.viewer.bundle import bundled, styles
+from lightpaint.viewer import bundled, styles
 
 #: Painters of this process that keep their session in a file, by its path.
 _PAINTERS_BY_FILE: WeakValueDictionary[Path, "Painter"] = WeakValueDictionary()
