@@ -44,7 +44,7 @@ from lightpaint.paint.store.store import Store
 from lightpaint.paint.subject_factory import make_subject, make_subjects
 from lightpaint.pipeline.job.sources import BasisFile, GroupsFile, SceneFile
 from lightpaint.version import __version__
-from lightpaint.viewer.bundle import BundleError
+from lightpaint.viewer import BundleError
 
 
 @pytest.fixture

@@ -12,7 +12,7 @@ from renderer import LIGHTS, SCREEN, one_pass, write_room
 from webs import batwing, cosine, ies_text, street, write_web
 
 from lightpaint.arrays import Doubles
-from lightpaint.basis.render.render_origin import basis_lights
+from lightpaint.basis.render.rendered_basis import basis_lights
 from lightpaint.errors import ConstraintError, SceneError
 from lightpaint.lighting.constraints.absolute_scale import agreed_scale, with_sure_scale
 from lightpaint.lighting.constraints.constraints import Constraints

@@ -13,7 +13,7 @@ from test_plans import REFLECTANCES, SIZE, write_room
 from webs import batwing, cosine, ies_text
 
 from lightpaint.arrays import Doubles, Position
-from lightpaint.basis.render.render_origin import basis_lights
+from lightpaint.basis.render.rendered_basis import basis_lights
 from lightpaint.errors import SceneError
 from lightpaint.lighting.constraints.constraints_file import constraints_of
 from lightpaint.lighting.unknowns.reduction import lamps_by_name

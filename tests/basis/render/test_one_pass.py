@@ -21,7 +21,7 @@ from lightpaint.basis.render.banded_film import memory_needed
 from lightpaint.basis.render.basis_render import _render_one_by_one, render_basis
 from lightpaint.basis.render.integrators import needs_a_bounce, why_not_one_pass
 from lightpaint.basis.render.render_budget import Budget, Keeper
-from lightpaint.basis.render.render_origin import ONE_PASS, SEPARATE
+from lightpaint.basis.render.rendered_basis import ONE_PASS, SEPARATE
 from lightpaint.basis.render.separate_renders import BLACK, WHITE
 from lightpaint.errors import SceneError
 from lightpaint.lighting.answer.lighting import Lighting
