@@ -28,7 +28,7 @@ from lightpaint.lighting.fit import Fit
 from lightpaint.lighting.problem import Problem
 from lightpaint.lighting.solver import solution_of
 from lightpaint.lighting.unknowns.reduction import reduce_to
-from lightpaint.lighting.wishes.required_problem import with_wishes
+from lightpaint.lighting.wishes.wish_problems import with_wishes
 from lightpaint.lighting.wishes.wished_light import wished_light
 from lightpaint.photometry.illuminance import Illuminance
 from lightpaint.photometry.measure import measure_illuminance

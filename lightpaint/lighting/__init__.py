@@ -37,10 +37,10 @@ if TYPE_CHECKING:
     from lightpaint.lighting.analysis.appearance.delivery import newest_delivery as newest_delivery
     from lightpaint.lighting.analysis.appearance.delivery import spoken_share as spoken_share
     from lightpaint.lighting.analysis.appearance.delivery import worst_delivery as worst_delivery
+    from lightpaint.lighting.analysis.appearance.display_difference import NOTICED as NOTICED
     from lightpaint.lighting.analysis.appearance.display_difference import (
         PaintComparison as PaintComparison,
     )
-    from lightpaint.lighting.analysis.appearance.error_place import NOTICED as NOTICED
     from lightpaint.lighting.analysis.appearance.limiting_reasons import Loosening as Loosening
     from lightpaint.lighting.analysis.appearance.limiting_reasons import Reason as Reason
     from lightpaint.lighting.analysis.appearance.pixel_sample import LimitGroup as LimitGroup
@@ -65,16 +65,16 @@ if TYPE_CHECKING:
     from lightpaint.lighting.analysis.noise.sample_demand import top_up_counts as top_up_counts
     from lightpaint.lighting.analysis.noise.uncertainty import Uncertainty as Uncertainty
     from lightpaint.lighting.analysis.noise.uncertainty import error_bars as error_bars
-    from lightpaint.lighting.analysis.surface_colors import SurfaceColor as SurfaceColor
-    from lightpaint.lighting.analysis.surface_colors import surface_colors as surface_colors
+    from lightpaint.lighting.analysis.rendered_colors import LightRendering as LightRendering
+    from lightpaint.lighting.analysis.rendered_colors import SurfaceColor as SurfaceColor
+    from lightpaint.lighting.analysis.rendered_colors import renderings_of as renderings_of
+    from lightpaint.lighting.analysis.rendered_colors import surface_colors as surface_colors
     from lightpaint.lighting.answer.certificate import Bound as Bound
     from lightpaint.lighting.answer.certificate import Certificate as Certificate
     from lightpaint.lighting.answer.certificate import Software as Software
     from lightpaint.lighting.answer.certificate import version as version
     from lightpaint.lighting.answer.combination import combine as combine
     from lightpaint.lighting.answer.combination import dimmed as dimmed
-    from lightpaint.lighting.answer.light_rendering import LightRendering as LightRendering
-    from lightpaint.lighting.answer.light_rendering import renderings_of as renderings_of
     from lightpaint.lighting.answer.lighting import ALL_REACHED as ALL_REACHED
     from lightpaint.lighting.answer.lighting import Lighting as Lighting
     from lightpaint.lighting.answer.lighting import LightSetting as LightSetting
@@ -137,16 +137,16 @@ if TYPE_CHECKING:
     from lightpaint.lighting.unknowns.reduction import Reduction as Reduction
     from lightpaint.lighting.unknowns.reduction import lamps_by_name as lamps_by_name
     from lightpaint.lighting.unknowns.reduction import reduce_to as reduce_to
-    from lightpaint.lighting.wishes.linear_programs import least_watts as least_watts
     from lightpaint.lighting.wishes.planes_answer import PlanesAnswer as PlanesAnswer
     from lightpaint.lighting.wishes.planes_answer import WishOutcome as WishOutcome
     from lightpaint.lighting.wishes.planes_answer import planes_answer as planes_answer
-    from lightpaint.lighting.wishes.required_problem import RequiredProblem as RequiredProblem
-    from lightpaint.lighting.wishes.required_problem import (
+    from lightpaint.lighting.wishes.wish_problems import RequiredProblem as RequiredProblem
+    from lightpaint.lighting.wishes.wish_problems import least_watts as least_watts
+    from lightpaint.lighting.wishes.wish_problems import (
         requirements_within_reach as requirements_within_reach,
     )
-    from lightpaint.lighting.wishes.required_problem import with_wishes as with_wishes
-    from lightpaint.lighting.wishes.required_problem import without_wishes as without_wishes
+    from lightpaint.lighting.wishes.wish_problems import with_wishes as with_wishes
+    from lightpaint.lighting.wishes.wish_problems import without_wishes as without_wishes
     from lightpaint.lighting.wishes.wished_light import LitCase as LitCase
     from lightpaint.lighting.wishes.wished_light import WishedLight as WishedLight
     from lightpaint.lighting.wishes.wished_light import check_powers as check_powers

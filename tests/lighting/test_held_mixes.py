@@ -11,7 +11,7 @@ from lightpaint.colour.display.view_transform import ViewTransform
 from lightpaint.colour.spectra.color_rendering import fidelity
 from lightpaint.colour.spectra.spectrum import WAVELENGTHS, rgb_of_powers, spectrum_of
 from lightpaint.lighting.analysis.analysis import analyse
-from lightpaint.lighting.answer.light_rendering import renderings_of
+from lightpaint.lighting.analysis.rendered_colors import renderings_of
 from lightpaint.lighting.answer.lighting_file import read_lighting, write_lighting
 from lightpaint.lighting.constraints.constraints import Constraints
 from lightpaint.lighting.held_mixes import HELD

@@ -10,7 +10,7 @@ from lightpaint.colour.color import kelvin_to_rgb
 from lightpaint.colour.lamp import Lamp, LampEmitter
 from lightpaint.colour.spectra.spectrum import WAVELENGTHS, black_body, rgb_of_powers
 from lightpaint.errors import LightpaintError
-from lightpaint.lighting.answer.light_rendering import renderings_of
+from lightpaint.lighting.analysis.rendered_colors import renderings_of
 from lightpaint.lighting.answer.lighting import Lighting, LightSetting
 from lightpaint.lighting.answer.lighting_file import read_lighting, write_lighting
 from lightpaint.lighting.constraints.constraints import Constraints

@@ -20,7 +20,7 @@ from lightpaint.colour.spectra.spectrum import (
     xyz_of_powers,
 )
 from lightpaint.images.object_map import Objects
-from lightpaint.lighting.analysis.surface_colors import surface_colors
+from lightpaint.lighting.analysis.rendered_colors import surface_colors
 from lightpaint.lighting.constraints.constraints import Constraints
 from lightpaint.lighting.solver import solve
 from lightpaint.report.page.lights_table import rendering_section

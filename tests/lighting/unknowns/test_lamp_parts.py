@@ -12,8 +12,8 @@ from lightpaint.colour.spectra.color_rendering import fidelity
 from lightpaint.colour.spectra.spectrum import rgb_of_powers
 from lightpaint.errors import ConstraintError
 from lightpaint.lighting.analysis.analysis import analyse
+from lightpaint.lighting.analysis.rendered_colors import renderings_of
 from lightpaint.lighting.answer.combination import combine
-from lightpaint.lighting.answer.light_rendering import renderings_of
 from lightpaint.lighting.answer.lighting_file import read_lighting, write_lighting
 from lightpaint.lighting.constraints.constraints import Constraints
 from lightpaint.lighting.solver import solve

@@ -16,9 +16,13 @@ from lightpaint.lighting.fit import Fit
 from lightpaint.lighting.problem import Problem
 from lightpaint.lighting.solver import solution_of
 from lightpaint.lighting.unknowns.reduction import reduce_to
-from lightpaint.lighting.wishes.linear_programs import least_watts, power_of, shares_given_up
 from lightpaint.lighting.wishes.planes_answer import planes_answer
-from lightpaint.lighting.wishes.required_problem import with_wishes
+from lightpaint.lighting.wishes.wish_problems import (
+    least_watts,
+    power_of,
+    shares_given_up,
+    with_wishes,
+)
 from lightpaint.lighting.wishes.wished_light import wished_light
 from lightpaint.photometry.illuminance import Illuminance
 from lightpaint.photometry.measuring_plane import (

@@ -21,7 +21,7 @@ from lightpaint.lighting.analysis.appearance.constraint_kinds import (
     SINGLE_LIGHT_KINDS,
     ConstraintsByLight,
 )
-from lightpaint.lighting.analysis.appearance.error_place import NO_NAME, object_with_most
+from lightpaint.lighting.analysis.appearance.display_difference import NO_NAME, object_with_most
 from lightpaint.lighting.loss.lit_pixels import LitPixels
 from lightpaint.lighting.loss.painting import unpainted_weight_of
 from lightpaint.lighting.loss.painting_loss import PaintingLoss

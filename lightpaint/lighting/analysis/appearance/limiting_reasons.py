@@ -17,8 +17,7 @@ from lightpaint.lighting.analysis.appearance.constraint_kinds import (
     ALL_LIGHTS_KINDS,
     ConstraintKind,
 )
-from lightpaint.lighting.analysis.appearance.display_difference import PaintComparison
-from lightpaint.lighting.analysis.appearance.error_place import NOTICED
+from lightpaint.lighting.analysis.appearance.display_difference import NOTICED, PaintComparison
 from lightpaint.lighting.analysis.appearance.pixel_sample import (
     LimitGroup,
     PixelSample,

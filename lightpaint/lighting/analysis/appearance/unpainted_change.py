@@ -11,15 +11,12 @@ from lightpaint.lighting.analysis.appearance.constraint_kinds import (
     ConstraintKind,
     ConstraintsByLight,
 )
-from lightpaint.lighting.analysis.appearance.display_difference import PaintComparison
-from lightpaint.lighting.analysis.appearance.error_place import NO_NAME
+from lightpaint.lighting.analysis.appearance.display_difference import NO_NAME, PaintComparison
+from lightpaint.lighting.analysis.diagnosis import REGIONS
 from lightpaint.lighting.solution import Solution
 
 #: Smallest unpainted share of the picture for a place to be mentioned.
 MIN_PLACE = 0.01
-
-#: Regions along each side of the picture: left, middle, right.
-REGIONS = 3
 
 #: Kinds of constraints that fix the level of a light.
 FIXING_KINDS: tuple[ConstraintKind, ...] = ("off", "lock")
