@@ -58,7 +58,7 @@ if TYPE_CHECKING:
     from lightpaint.lighting.analysis.diagnosis import Diagnosis as Diagnosis
     from lightpaint.lighting.analysis.diagnosis import diagnose as diagnose
     from lightpaint.lighting.analysis.noise.noise_correction import correct_noise as correct_noise
-    from lightpaint.lighting.analysis.noise.refinement import refine as refine
+    from lightpaint.lighting.analysis.noise.noise_correction import refine as refine
     from lightpaint.lighting.analysis.noise.uncertainty import Uncertainty as Uncertainty
     from lightpaint.lighting.analysis.noise.uncertainty import error_bars as error_bars
     from lightpaint.lighting.answer.certificate import Certificate as Certificate

@@ -24,9 +24,6 @@ if TYPE_CHECKING:
     from lightpaint.lighting.analysis.appearance.color_choices import (
         can_change_colors as can_change_colors,
     )
-    from lightpaint.lighting.analysis.appearance.constraint_kinds import (
-        KEYS_BY_KIND as KEYS_BY_KIND,
-    )
     from lightpaint.lighting.analysis.appearance.delivery import Delivery as Delivery
     from lightpaint.lighting.analysis.appearance.delivery import main_deliveries as main_deliveries
     from lightpaint.lighting.analysis.appearance.delivery import mean_shares as mean_shares
@@ -59,7 +56,7 @@ if TYPE_CHECKING:
     from lightpaint.lighting.analysis.diagnosis import error_shares as error_shares
     from lightpaint.lighting.analysis.noise.noise import denoised_matrix as denoised_matrix
     from lightpaint.lighting.analysis.noise.noise_correction import correct_noise as correct_noise
-    from lightpaint.lighting.analysis.noise.refinement import refine as refine
+    from lightpaint.lighting.analysis.noise.noise_correction import refine as refine
     from lightpaint.lighting.analysis.noise.sample_demand import pixel_variances as pixel_variances
     from lightpaint.lighting.analysis.noise.sample_demand import sample_demand as sample_demand
     from lightpaint.lighting.analysis.noise.sample_demand import top_up_counts as top_up_counts
@@ -99,6 +96,9 @@ if TYPE_CHECKING:
     from lightpaint.lighting.constraints.constraints_file import constraints_of as constraints_of
     from lightpaint.lighting.constraints.constraints_file import (
         read_constraints as read_constraints,
+    )
+    from lightpaint.lighting.constraints.light_constraints import (
+        KEYS_BY_KIND as KEYS_BY_KIND,
     )
     from lightpaint.lighting.constraints.light_constraints import start_weights as start_weights
     from lightpaint.lighting.constraints.light_constraints import tables_by_light as tables_by_light

@@ -5,7 +5,6 @@ from typing import TYPE_CHECKING
 from lightpaint.lazy_names import lazy_names
 
 if TYPE_CHECKING:
-    from lightpaint.photometry.false_colour import false_colours as false_colours
     from lightpaint.photometry.glare import LARGEST_ANGLE as LARGEST_ANGLE
     from lightpaint.photometry.glare import LEAST_ANGLE as LEAST_ANGLE
     from lightpaint.photometry.glare import LEAST_RATING as LEAST_RATING
@@ -23,6 +22,7 @@ if TYPE_CHECKING:
     from lightpaint.photometry.measuring_plane import plane_title as plane_title
     from lightpaint.photometry.readings_file import PLANES as PLANES
     from lightpaint.photometry.readings_file import POINTS as POINTS
+    from lightpaint.photometry.readings_file import false_colours as false_colours
     from lightpaint.photometry.readings_file import glare_document as glare_document
     from lightpaint.photometry.readings_file import measured_origin as measured_origin
     from lightpaint.photometry.readings_file import missed_wishes as missed_wishes

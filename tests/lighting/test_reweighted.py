@@ -14,8 +14,7 @@ from lightpaint.colour.display.view_transform import ViewTransform
 from lightpaint.images.estimate import Estimate
 from lightpaint.lighting import solver as solve_module
 from lightpaint.lighting.analysis.diagnosis import diagnose
-from lightpaint.lighting.analysis.noise.noise_correction import correct_noise
-from lightpaint.lighting.analysis.noise.refinement import refine
+from lightpaint.lighting.analysis.noise.noise_correction import correct_noise, refine
 from lightpaint.lighting.analysis.noise.uncertainty import error_bars
 from lightpaint.lighting.answer.combination import combine
 from lightpaint.lighting.answer.lighting import Lighting

@@ -25,7 +25,6 @@ from lightpaint.progress import cancellation_check
 #: leaves room for an answer.
 ROOM = 1e-8
 
-
 #: Rows of points that are added at a time, largest miss of a row relative to its size, and most
 #: rounds.
 ADDED_ROWS, CLOSE, MAX_ROUNDS = 40, 1e-9, 200

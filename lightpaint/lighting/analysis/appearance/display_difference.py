@@ -27,7 +27,6 @@ from lightpaint.lighting.solution import Solution
 #: Painted pixels that are compared, and pixels along the side of a block that averages noise.
 MAX_COMPARED_PIXELS, BLOCK = 2**15, 8
 
-
 #: Smallest share of the error on a named object, and its largest share of the picture.
 MIN_ERROR_SHARE, MAX_PICTURE_SHARE = 0.6, 0.5
 

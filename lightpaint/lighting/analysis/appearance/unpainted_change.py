@@ -7,12 +7,12 @@ import numpy as np
 from lightpaint.arrays import Bools, Doubles, Floats, Indices
 from lightpaint.basis import Basis
 from lightpaint.colour import ciede2000
-from lightpaint.lighting.analysis.appearance.constraint_kinds import (
+from lightpaint.lighting.analysis.appearance.display_difference import NO_NAME, PaintComparison
+from lightpaint.lighting.analysis.diagnosis import REGIONS
+from lightpaint.lighting.constraints.light_constraints import (
     ConstraintKind,
     ConstraintsByLight,
 )
-from lightpaint.lighting.analysis.appearance.display_difference import NO_NAME, PaintComparison
-from lightpaint.lighting.analysis.diagnosis import REGIONS
 from lightpaint.lighting.solution import Solution
 
 #: Smallest unpainted share of the picture for a place to be mentioned.
