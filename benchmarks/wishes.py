@@ -23,7 +23,7 @@ from hall import write_floor, write_hall
 
 from lightpaint.basis.render.basis_render import render_basis
 from lightpaint.colour.display.view_transform import ViewTransform
-from lightpaint.lighting.constraints.constraints import Constraints
+from lightpaint.lighting.constraints.constraint_table import Constraints
 from lightpaint.lighting.fit import Fit
 from lightpaint.lighting.problem import Problem
 from lightpaint.lighting.solver import solution_of
@@ -35,7 +35,7 @@ from lightpaint.photometry.measure import measure_illuminance
 from lightpaint.photometry.measuring_plane import PowerBudget, Wishes
 from lightpaint.photometry.planes_file import read_planes
 from lightpaint.scene.scene_reader import load_scene
-from lightpaint.target.target import Target
+from lightpaint.target.painted_target import Target
 
 #: Chromaticities of the two whites of each lamp.
 WHITES = {"warm": [0.4599, 0.4106], "cool": [0.3457, 0.3585]}

@@ -7,9 +7,9 @@ from lightpaint.lazy_names import lazy_names
 if TYPE_CHECKING:
     from lightpaint.lighting.algebra.method import Method as Method
     from lightpaint.lighting.algebra.optimum import minimise as minimise
-    from lightpaint.lighting.analysis.analysis import Analysis as Analysis
-    from lightpaint.lighting.analysis.analysis import analyse as analyse
-    from lightpaint.lighting.analysis.analysis import with_findings as with_findings
+    from lightpaint.lighting.analysis.answer_analysis import Analysis as Analysis
+    from lightpaint.lighting.analysis.answer_analysis import analyse as analyse
+    from lightpaint.lighting.analysis.answer_analysis import with_findings as with_findings
     from lightpaint.lighting.analysis.appearance.appearance import CLOSE as CLOSE
     from lightpaint.lighting.analysis.appearance.appearance import INVISIBLE as INVISIBLE
     from lightpaint.lighting.analysis.appearance.appearance import Appearance as Appearance
@@ -87,12 +87,12 @@ if TYPE_CHECKING:
     from lightpaint.lighting.constraints.absolute_scale import unscaled_error as unscaled_error
     from lightpaint.lighting.constraints.absolute_scale import with_scale as with_scale
     from lightpaint.lighting.constraints.absolute_scale import with_sure_scale as with_sure_scale
-    from lightpaint.lighting.constraints.constraints import LAMP_KEYS as LAMP_KEYS
-    from lightpaint.lighting.constraints.constraints import LIGHT_KEYS as LIGHT_KEYS
-    from lightpaint.lighting.constraints.constraints import Constraints as Constraints
-    from lightpaint.lighting.constraints.constraints import LightConstraint as LightConstraint
-    from lightpaint.lighting.constraints.constraints import Requirements as Requirements
-    from lightpaint.lighting.constraints.constraints import is_pattern as is_pattern
+    from lightpaint.lighting.constraints.constraint_table import LAMP_KEYS as LAMP_KEYS
+    from lightpaint.lighting.constraints.constraint_table import LIGHT_KEYS as LIGHT_KEYS
+    from lightpaint.lighting.constraints.constraint_table import Constraints as Constraints
+    from lightpaint.lighting.constraints.constraint_table import LightConstraint as LightConstraint
+    from lightpaint.lighting.constraints.constraint_table import Requirements as Requirements
+    from lightpaint.lighting.constraints.constraint_table import is_pattern as is_pattern
     from lightpaint.lighting.constraints.constraints_file import constraints_of as constraints_of
     from lightpaint.lighting.constraints.constraints_file import (
         read_constraints as read_constraints,

@@ -19,7 +19,7 @@ from lightpaint.colour import Lamp
 from lightpaint.keywords import keywords
 from lightpaint.lighting.answer.lighting import Lighting
 from lightpaint.lighting.constraints.absolute_scale import with_sure_scale
-from lightpaint.lighting.constraints.constraints import Constraints
+from lightpaint.lighting.constraints.constraint_table import Constraints
 from lightpaint.lighting.constraints.constraints_file import constraints_of
 from lightpaint.lighting.fit import Fit
 from lightpaint.lighting.held_mixes import choose_held_mixes, with_mixes_at

@@ -12,11 +12,11 @@ from lightpaint.paint.background_threads import StoppedError
 from lightpaint.paint.layers.canvas import ViewLayers
 from lightpaint.paint.protocol import Message, PictureUpdate, ProgressReport
 from lightpaint.paint.session.look_library import LookLibrary
+from lightpaint.paint.session.painting_session import Session
 from lightpaint.paint.session.picture_table import Picture, PictureTable
-from lightpaint.paint.session.session import Session
 from lightpaint.paint.session.snapshot import SessionSnapshot
+from lightpaint.paint.store.session_file import Store
 from lightpaint.paint.store.session_requests import SessionRequests
-from lightpaint.paint.store.store import Store
 from lightpaint.scene.runtime.render_lock import MITSUBA
 
 

@@ -5,8 +5,6 @@ from typing import TYPE_CHECKING
 from lightpaint.lazy_names import lazy_names
 
 if TYPE_CHECKING:
-    from lightpaint.pipeline.job.job import Job as Job
-    from lightpaint.pipeline.job.job import PaintedView as PaintedView
     from lightpaint.pipeline.job.job_checks import remarks_of_film as remarks_of_film
     from lightpaint.pipeline.job.job_checks import remarks_of_memory as remarks_of_memory
     from lightpaint.pipeline.job.job_checks import remarks_of_scene as remarks_of_scene
@@ -15,6 +13,8 @@ if TYPE_CHECKING:
     from lightpaint.pipeline.job.job_record import encode_job as encode_job
     from lightpaint.pipeline.job.settings import Settings as Settings
     from lightpaint.pipeline.job.settings import SettingsByName as SettingsByName
+    from lightpaint.pipeline.job.solve_job import Job as Job
+    from lightpaint.pipeline.job.solve_job import PaintedView as PaintedView
     from lightpaint.pipeline.job.sources import BasisFile as BasisFile
     from lightpaint.pipeline.job.sources import GroupsFile as GroupsFile
     from lightpaint.pipeline.job.sources import Painting as Painting
@@ -32,8 +32,8 @@ if TYPE_CHECKING:
     from lightpaint.pipeline.job_bases import Certainty as Certainty
     from lightpaint.pipeline.job_bases import needed_counts as needed_counts
     from lightpaint.pipeline.job_bases import obtain as obtain
+    from lightpaint.pipeline.job_run import run as run
     from lightpaint.pipeline.one_call import paint_with_light as paint_with_light
-    from lightpaint.pipeline.pipeline import run as run
     from lightpaint.pipeline.placed_lights import find_places as find_places
     from lightpaint.pipeline.placed_lights import moved_basis as moved_basis
     from lightpaint.pipeline.placed_lights import say_changes as say_changes
@@ -45,6 +45,12 @@ if TYPE_CHECKING:
     from lightpaint.pipeline.relit_renders import render_final as render_final
     from lightpaint.pipeline.relit_renders import write_final_exr as write_final_exr
     from lightpaint.pipeline.relit_renders import write_final_png as write_final_png
+    from lightpaint.pipeline.results.look import Look as Look
+    from lightpaint.pipeline.results.look import hung_of as hung_of
+    from lightpaint.pipeline.results.look import result_folders as result_folders
+    from lightpaint.pipeline.results.look import verify_result as verify_result
+    from lightpaint.pipeline.results.look import view_names as view_names
+    from lightpaint.pipeline.results.look import write_predicted as write_predicted
     from lightpaint.pipeline.results.result_folder import LIGHTING as LIGHTING
     from lightpaint.pipeline.results.result_folder import PLANES_FOLDER as PLANES_FOLDER
     from lightpaint.pipeline.results.result_folder import RECORD as RECORD
@@ -56,12 +62,6 @@ if TYPE_CHECKING:
     from lightpaint.pipeline.results.result_folder import new_answer as new_answer
     from lightpaint.pipeline.results.result_folder import write_answer as write_answer
     from lightpaint.pipeline.results.result_folder import write_planes as write_planes
-    from lightpaint.pipeline.results.results import Look as Look
-    from lightpaint.pipeline.results.results import hung_of as hung_of
-    from lightpaint.pipeline.results.results import result_folders as result_folders
-    from lightpaint.pipeline.results.results import verify_result as verify_result
-    from lightpaint.pipeline.results.results import view_names as view_names
-    from lightpaint.pipeline.results.results import write_predicted as write_predicted
     from lightpaint.pipeline.templates import check_sheet as check_sheet
     from lightpaint.pipeline.templates import look_of_basis as look_of_basis
     from lightpaint.pipeline.templates import render_look as render_look

@@ -24,8 +24,8 @@ from lightpaint.lighting import (
     solution_of,
     top_up_counts,
 )
-from lightpaint.pipeline.job.job import Job, PaintedView
 from lightpaint.pipeline.job.settings import PILOT_SPP, Settings
+from lightpaint.pipeline.job.solve_job import Job, PaintedView
 from lightpaint.progress import Announcement, Listener, Pace, Progress, labelled, listener
 from lightpaint.report import LEAST_SHARE, picture_errors, spoken_percent
 from lightpaint.scene import Scene

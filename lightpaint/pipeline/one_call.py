@@ -10,11 +10,11 @@ from lightpaint.colour import TransformChoice
 from lightpaint.errors import SceneError, TargetError
 from lightpaint.keywords import keywords
 from lightpaint.lighting import Constraints
-from lightpaint.pipeline.job.job import Job
 from lightpaint.pipeline.job.settings import Settings
+from lightpaint.pipeline.job.solve_job import Job
 from lightpaint.pipeline.job.sources import BasisFile, Painting, SceneFile, check_needed
-from lightpaint.pipeline.pipeline import run
-from lightpaint.pipeline.results.results import Look
+from lightpaint.pipeline.job_run import run
+from lightpaint.pipeline.results.look import Look
 from lightpaint.placement import Rigging
 from lightpaint.progress import Progress, silent
 from lightpaint.scene import Scene

@@ -41,9 +41,9 @@ from lightpaint.lighting import (
 from lightpaint.photometry import Glare, Illuminance, PowerBudget
 from lightpaint.photometry.measure import measure_glare, measure_illuminance
 from lightpaint.photometry.planes_file import PlanesFile, read_planes
-from lightpaint.pipeline.job.job import Job
 from lightpaint.pipeline.job.job_checks import checked_scale
 from lightpaint.pipeline.job.settings import Settings
+from lightpaint.pipeline.job.solve_job import Job
 from lightpaint.pipeline.results.result_folder import ResultFolder, answer_files, files_of_planes
 from lightpaint.progress import Listener, Progress, listener, silent
 from lightpaint.scene import Scene

@@ -23,12 +23,12 @@ from lightpaint.scene.lights.texels.texel import (
     parse_map_size,
     parse_size,
 )
+from lightpaint.scene.mitsuba_scene import Scene, inspect_scene, up_of
 from lightpaint.scene.properties.film import check_film, sensor_index
 from lightpaint.scene.properties.integrator import IntegratorChoice
 from lightpaint.scene.runtime.mitsuba_errors import explain_old_scene, mitsuba_errors
 from lightpaint.scene.runtime.render_lock import MITSUBA
 from lightpaint.scene.runtime.variant import use_variant
-from lightpaint.scene.scene import Scene, inspect_scene, up_of
 from lightpaint.scene.scene_tree import ParsedScene
 
 #: Endings of pictures and lightings, which people give in place of a scene.

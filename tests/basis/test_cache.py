@@ -29,7 +29,7 @@ from lightpaint.errors import LightpaintError, OutputError, SceneError
 from lightpaint.pipeline.job.settings import Settings
 from lightpaint.pipeline.job_bases import obtain
 from lightpaint.progress import Interrupted
-from lightpaint.scene.scene import Scene
+from lightpaint.scene.mitsuba_scene import Scene
 from lightpaint.scene.scene_reader import load_scene
 
 #: What one is called that no program has written to its end.

@@ -16,18 +16,18 @@ import pytest
 from batches import contents
 from command import run
 from dask_cluster import Workers, cluster_of, wait_until
-from lightpaint.scene.runtime.kernel_threads import limit_threads
 from renderer import write_room
 
 from lightpaint.basis.file import basis_file
 from lightpaint.basis.render import banded_film, basis_render
 from lightpaint.basis.render import render_parts as parts_module
-from lightpaint.batch.cluster.cluster import Cluster
+from lightpaint.batch.cluster.dask_engine import Cluster
 from lightpaint.batch.plan.planner import plan_batch
 from lightpaint.batch.run import BatchOutcome, run_batch
 from lightpaint.batch.run_options import RunOptions
 from lightpaint.images.formats.exr import write_rgb
 from lightpaint.scene import scene_render
+from lightpaint.scene.runtime.kernel_threads import limit_threads
 
 distributed = pytest.importorskip("distributed", reason="Dask's distributed")
 

@@ -20,7 +20,7 @@ from lightpaint.dmx.levels import DriveFade, check_drives, decode_levels, drives
 from lightpaint.dmx.mvr import read_rig
 from lightpaint.dmx.rig_scene import cd_per_unit, lights_text, scene_text
 from lightpaint.lighting.answer.lighting import Lighting, LightSetting
-from lightpaint.lighting.constraints.constraints import LightConstraint
+from lightpaint.lighting.constraints.constraint_table import LightConstraint
 from lightpaint.relit.export.rig_files import Cue, cue_list_csv, level_rows
 
 #: Name, colour under D65, and the levels of each slot.

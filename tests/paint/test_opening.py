@@ -21,7 +21,7 @@ from lightpaint.images.object_map import Objects
 from lightpaint.paint import subject_factory
 from lightpaint.paint.launch import SessionFile
 from lightpaint.paint.store.history_steps import Identity
-from lightpaint.paint.store.store import Store
+from lightpaint.paint.store.session_file import Store
 from lightpaint.paint.subject import LazyScene, Subject, session_identity
 from lightpaint.paint.subject_factory import make_subject
 from lightpaint.pipeline.job.settings import Settings

@@ -30,9 +30,9 @@ from lightpaint.paint import background_threads, protocol
 from lightpaint.paint.notebook import widget, widget_arguments
 from lightpaint.paint.store import database
 from lightpaint.paint.store.history_steps import Identity, Pixels
-from lightpaint.paint.store.store import Store
+from lightpaint.paint.store.session_file import Store
 from lightpaint.paint.studio import session_bases
-from lightpaint.paint.studio.studio import Studio
+from lightpaint.paint.studio.session_studio import Studio
 from lightpaint.paint.subject import Subject
 from lightpaint.pipeline.job.settings import Settings, SettingsByName
 from lightpaint.viewer import BundleError, bundled, source

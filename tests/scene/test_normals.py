@@ -4,8 +4,8 @@ from collections.abc import Iterator
 
 import numpy as np
 import pytest
-from lightpaint.scene.runtime.kernel_threads import kernels_for_all_sizes, limit_threads
 
+from lightpaint.scene.runtime.kernel_threads import kernels_for_all_sizes, limit_threads
 from lightpaint.scene.runtime.variant import use_variant
 from lightpaint.scene.scene_tree import make_normals_reproducible
 

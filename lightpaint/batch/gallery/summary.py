@@ -17,7 +17,7 @@ from lightpaint.arrays import RGB
 from lightpaint.basis import light_images
 from lightpaint.batch.manifest.file_names import SUMMARY_FORMAT, THUMBNAILS
 from lightpaint.batch.plan.journal import JournalLine
-from lightpaint.batch.plan.plan import Plan, PlannedLook
+from lightpaint.batch.plan.plan_steps import Plan, PlannedLook
 from lightpaint.batch.work.work_items import EXPORT, Kind
 from lightpaint.colour import ViewTransform, choose_exposure, to_8_bit
 from lightpaint.errors import LightpaintError

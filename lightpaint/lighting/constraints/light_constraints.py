@@ -18,7 +18,7 @@ from lightpaint.colour import cct_and_duv
 from lightpaint.display_text import some_names, with_similar_name
 from lightpaint.errors import ConstraintError
 from lightpaint.images import Estimate
-from lightpaint.lighting.constraints.constraints import (
+from lightpaint.lighting.constraints.constraint_table import (
     COLOR_KEYS,
     LAMP_KEYS,
     Constraints,

@@ -13,7 +13,7 @@ import numpy as np
 from lightpaint.arrays import Doubles, Indices
 from lightpaint.errors import LightpaintError
 from lightpaint.lighting.algebra.required_sums import RequiredSums
-from lightpaint.lighting.constraints.constraints import Requirements
+from lightpaint.lighting.constraints.constraint_table import Requirements
 from lightpaint.lighting.problem import Problem
 from lightpaint.lighting.unknowns.lamp_parts import watts_of_fixed, watts_of_unknowns
 from lightpaint.lighting.unknowns.reduced_problem import solve_reduced

@@ -20,7 +20,7 @@ from lightpaint.arrays import Doubles, Indices
 from lightpaint.basis import Lights
 from lightpaint.display_text import with_similar_name
 from lightpaint.errors import ConstraintError
-from lightpaint.lighting.constraints.constraints import Requirements
+from lightpaint.lighting.constraints.constraint_table import Requirements
 from lightpaint.lighting.unknowns.reduction import Reduction
 from lightpaint.photometry import (
     LARGEST_ERROR,

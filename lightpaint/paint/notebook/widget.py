@@ -41,8 +41,8 @@ from lightpaint.paint.notebook.widget_arguments import (
 from lightpaint.paint.protocol import AnswerUpdate, Message, Notice, SessionState
 from lightpaint.paint.session.snapshot import SessionSnapshot
 from lightpaint.paint.store.history_steps import Identity
-from lightpaint.paint.store.store import MemoryStore, Store
-from lightpaint.paint.studio.studio import Studio
+from lightpaint.paint.store.session_file import MemoryStore, Store
+from lightpaint.paint.studio.session_studio import Studio
 from lightpaint.pipeline.job.settings import SettingsByName
 from lightpaint.target import Target, write_painting
 from lightpaint.viewer import bundled, styles

@@ -39,6 +39,7 @@ from lightpaint.paint.rig.page_geometry import (
     up_axis,
 )
 from lightpaint.paint.session.moved_lights import Placed, added_names
+from lightpaint.paint.session.painting_session import Session
 from lightpaint.paint.session.picture_table import (
     Picture,
     page_emitters,
@@ -47,7 +48,6 @@ from lightpaint.paint.session.picture_table import (
     plane_scale,
     plane_thumbnail,
 )
-from lightpaint.paint.session.session import Session
 from lightpaint.paint.session_access import Publisher, SessionAccess
 from lightpaint.paint.store.history_steps import name_in_view
 from lightpaint.scene import NewEmitter, Pose

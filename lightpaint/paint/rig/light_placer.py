@@ -25,8 +25,8 @@ from lightpaint.paint.rig.moved_looks import of_moved_scenes
 from lightpaint.paint.session.moved_lights import Placed
 from lightpaint.paint.session.snapshot import SessionSnapshot
 from lightpaint.paint.session_access import Publisher, SessionAccess
+from lightpaint.paint.store.session_file import Store, StoredRecords
 from lightpaint.paint.store.session_requests import HOLD_KEYS
-from lightpaint.paint.store.store import Store, StoredRecords
 from lightpaint.placement import (
     Freedom,
     Move,

@@ -28,8 +28,8 @@ from lightpaint.paint.protocol import (
     AnswerUpdate,
     Findings,
 )
+from lightpaint.paint.session.painting_session import Session
 from lightpaint.paint.session.picture_table import Picture, display_thumbnail
-from lightpaint.paint.session.session import Session
 from lightpaint.paint.session.session_messages import judge, wish_delivery
 from lightpaint.paint.session.snapshot import SessionSnapshot
 from lightpaint.paint.session_access import Publisher, SessionAccess

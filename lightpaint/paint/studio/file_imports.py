@@ -27,7 +27,7 @@ from lightpaint.paint.protocol import (
     TaskStarted,
 )
 from lightpaint.paint.references.reference_table import read_reference
-from lightpaint.paint.session.session import Session
+from lightpaint.paint.session.painting_session import Session
 from lightpaint.paint.session_access import Publisher, SessionAccess
 
 #: Largest file that a page may send, in bytes.

@@ -21,6 +21,7 @@ from lightpaint.paint.layers.canvas import Canvas
 from lightpaint.paint.protocol import ProgressReport, Tone
 from lightpaint.paint.rig.light_mover import LightMover
 from lightpaint.paint.session.look_library import LookLibrary
+from lightpaint.paint.session.painting_session import Session
 from lightpaint.paint.session.picture_table import (
     Picture,
     opens_plain,
@@ -29,7 +30,6 @@ from lightpaint.paint.session.picture_table import (
     plane_size,
     plane_thumbnail,
 )
-from lightpaint.paint.session.session import Session
 from lightpaint.paint.session.session_state import (
     offer_layers,
     offer_presets,
@@ -42,7 +42,7 @@ from lightpaint.paint.session.session_state import (
 from lightpaint.paint.session.snapshot import SessionSnapshot
 from lightpaint.paint.session_access import Publisher, SessionAccess
 from lightpaint.paint.store.history_steps import Identity, name_in_view
-from lightpaint.paint.store.store import Store
+from lightpaint.paint.store.session_file import Store
 from lightpaint.paint.studio.file_imports import begin_with_layers
 from lightpaint.paint.subject import Subject, obtain_bases, painting_transform
 from lightpaint.progress import Progress, silent

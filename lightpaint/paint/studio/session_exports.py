@@ -32,7 +32,7 @@ from lightpaint.paint.protocol import Message, RenderInfo, RenderList
 from lightpaint.paint.session.picture_table import Picture, display_thumbnail
 from lightpaint.paint.session.snapshot import SessionSnapshot
 from lightpaint.paint.session_access import Publisher, SessionAccess
-from lightpaint.paint.store.store import StoredRecords
+from lightpaint.paint.store.session_file import StoredRecords
 from lightpaint.paint.subject import Subject, layers_paths, painting_path, picture_path
 from lightpaint.pipeline import LIGHTING, RELIT, Job, run, write_answer
 from lightpaint.progress import Progress, cancellable

@@ -28,8 +28,8 @@ from lightpaint.lighting.answer.lighting import Lighting
 from lightpaint.pipeline.job.job_checks import remarks_of_scene
 from lightpaint.progress import silent
 from lightpaint.relit.relit_scene import relight
+from lightpaint.scene.mitsuba_scene import Scene
 from lightpaint.scene.runtime.variant import use_variant
-from lightpaint.scene.scene import Scene
 from lightpaint.scene.scene_reader import load_scene
 from lightpaint.scene.scene_render import SAMPLES_PER_PASS, Stream, pass_seed, plan_passes, render
 

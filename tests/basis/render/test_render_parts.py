@@ -9,7 +9,6 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
-from lightpaint.scene.runtime.kernel_threads import limit_threads
 from renderer import LIGHTS, write_room
 
 from lightpaint.basis.basis import Basis
@@ -19,7 +18,8 @@ from lightpaint.basis.render.basis_render import render_basis
 from lightpaint.basis.render.render_parts import Part, PartRenderer, PartSums, plan_parts
 from lightpaint.basis.render.rendered_basis import mean_and_half_difference
 from lightpaint.errors import SceneError
-from lightpaint.scene.scene import Scene
+from lightpaint.scene.mitsuba_scene import Scene
+from lightpaint.scene.runtime.kernel_threads import limit_threads
 from lightpaint.scene.scene_reader import load_scene
 
 SPP = 32

@@ -21,7 +21,7 @@ from lightpaint.basis.render.basis_render import render_basis
 from lightpaint.basis.render.rendered_basis import is_on_the_way
 from lightpaint.errors import BasisError
 from lightpaint.progress import Interrupted
-from lightpaint.scene.scene import Scene
+from lightpaint.scene.mitsuba_scene import Scene
 from lightpaint.scene.scene_reader import load_scene
 
 SECOND_SENSOR = """<sensor type="perspective" id="second"><transform name="to_world">

@@ -17,8 +17,8 @@ from lightpaint.basis.render.rendered_basis import ONE_PASS
 from lightpaint.basis.render.separate_renders import BLACK, WHITE
 from lightpaint.images.estimate import Estimate
 from lightpaint.images.formats.exr import write_rgb
+from lightpaint.scene.mitsuba_scene import Scene
 from lightpaint.scene.runtime.variant import use_variant
-from lightpaint.scene.scene import Scene
 from lightpaint.scene.scene_reader import load_scene
 from lightpaint.scene.scene_render import Stream, render
 

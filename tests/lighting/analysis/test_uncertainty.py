@@ -27,10 +27,10 @@ from lightpaint.lighting.analysis.noise.uncertainty import (
     with_error_bars,
 )
 from lightpaint.lighting.analysis.noise.weight_directions import _one_sided
-from lightpaint.lighting.constraints.constraints import Constraints
+from lightpaint.lighting.constraints.constraint_table import Constraints
 from lightpaint.lighting.normal_equations import NormalEquations
 from lightpaint.lighting.solver import solve
-from lightpaint.target.target import Target
+from lightpaint.target.painted_target import Target
 
 SIZE = (24, 24)
 SEEDS = 40

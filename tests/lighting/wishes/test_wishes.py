@@ -11,7 +11,7 @@ from qp import least
 from scipy.optimize import linprog
 
 from lightpaint.errors import ConstraintError
-from lightpaint.lighting.constraints.constraints import Constraints
+from lightpaint.lighting.constraints.constraint_table import Constraints
 from lightpaint.lighting.fit import Fit
 from lightpaint.lighting.problem import Problem
 from lightpaint.lighting.solver import solution_of
@@ -32,7 +32,7 @@ from lightpaint.photometry.measuring_plane import (
     Ratio,
     Wishes,
 )
-from lightpaint.target.target import Target
+from lightpaint.target.painted_target import Target
 
 #: Rows are met up to 1e-9 of their size, and the oracles have tolerances of their own.
 SAME = 1e-6

@@ -24,7 +24,7 @@ from lightpaint.lighting.analysis.appearance.unpainted_change import (
     change_from_scene,
 )
 from lightpaint.lighting.analysis.noise.noise_correction import correct_noise
-from lightpaint.lighting.constraints.constraints import Constraints
+from lightpaint.lighting.constraints.constraint_table import Constraints
 from lightpaint.lighting.constraints.light_constraints import (
     ALL_LIGHTS_KINDS,
     ConstraintKind,

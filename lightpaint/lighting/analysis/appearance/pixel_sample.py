@@ -12,7 +12,7 @@ from lightpaint.arrays import Doubles, Floats
 from lightpaint.basis import Basis, block_means
 from lightpaint.images import Estimate, block_mean, block_sums, whole_factor
 from lightpaint.lighting.analysis.appearance.display_difference import PaintComparison
-from lightpaint.lighting.constraints.constraints import Constraints
+from lightpaint.lighting.constraints.constraint_table import Constraints
 from lightpaint.lighting.constraints.light_constraints import (
     ALL_LIGHTS_KINDS,
     ConstraintKind,

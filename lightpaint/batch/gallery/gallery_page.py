@@ -33,7 +33,7 @@ from lightpaint.batch.gallery.summary import (
 from lightpaint.batch.manifest.entries import LookEntry
 from lightpaint.batch.manifest.file_names import SUMMARY, THUMBNAILS
 from lightpaint.batch.plan.journal import JournalLine
-from lightpaint.batch.plan.plan import PlaceGroup, Plan, PlannedLook, PlanStep
+from lightpaint.batch.plan.plan_steps import PlaceGroup, Plan, PlannedLook, PlanStep
 from lightpaint.batch.work.item_execution import job_fields
 from lightpaint.batch.work.work_items import Kind, Task
 from lightpaint.batch.work.worker_storage import WorkerCache

@@ -36,13 +36,13 @@ from lightpaint.paint.rig.light_mover import LightMover
 from lightpaint.paint.rig.light_placer import LightPlacer
 from lightpaint.paint.rig.moved_looks import LookComparison
 from lightpaint.paint.session.moved_lights import Placed
-from lightpaint.paint.session.session import Session
+from lightpaint.paint.session.painting_session import Session
 from lightpaint.paint.session.session_state import offer_ground, state_fields
 from lightpaint.paint.session.snapshot import SessionSnapshot
 from lightpaint.paint.session_access import Publisher, SessionAccess
 from lightpaint.paint.store.history_steps import Identity, Pixels
+from lightpaint.paint.store.session_file import Store
 from lightpaint.paint.store.session_requests import SessionRequests
-from lightpaint.paint.store.store import Store
 from lightpaint.paint.studio.background_jobs import BackgroundJobs
 from lightpaint.paint.studio.console_switch import Console, ConsoleSwitch
 from lightpaint.paint.studio.exact_answers import (
