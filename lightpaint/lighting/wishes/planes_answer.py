@@ -113,7 +113,6 @@ def planes_answer(
     *,
     floor_m2: float,
     prices: Doubles | None = None,
-    cost_delta_e: float | None = None,
     glare: Glare | None = None,
     are_ignored: bool = False,
 ) -> PlanesAnswer:
@@ -142,7 +141,6 @@ def planes_answer(
         floor_m2,
         _is_all_at_full(reduction, weights),
         len(movable),
-        cost_delta_e,
         glare=glare,
         are_ignored=are_ignored,
     )
