@@ -23,7 +23,7 @@ from lightpaint.basis.basis import Basis, Origin
 from lightpaint.basis.lights import BasisLight
 from lightpaint.basis.planes import BLOCK_PIXELS
 from lightpaint.lighting.algebra.optimum import minimise
-from lightpaint.lighting.constraints.constraints import Constraints
+from lightpaint.lighting.constraints.constraint_table import Constraints
 from lightpaint.lighting.fit import Fit, resolve_for_targets
 from lightpaint.lighting.live.live import LiveSolver
 from lightpaint.lighting.live.live_view import LiveView
@@ -31,7 +31,7 @@ from lightpaint.lighting.normal_equations import NormalEquations, inner_products
 from lightpaint.lighting.problem import Problem
 from lightpaint.lighting.unknowns.reduced_problem import solve_reduced
 from lightpaint.lighting.unknowns.reduction import reduce_to
-from lightpaint.target.target import Target
+from lightpaint.target.painted_target import Target
 from lightpaint.threads import one_thread
 
 HEIGHT, WIDTH, BRUSH = 360, 640, 64

@@ -28,7 +28,7 @@ from hall import write_hall
 from lightpaint import load_scene
 from lightpaint.basis.render.basis_render import render_basis
 from lightpaint.basis.render.separate_renders import BLACK, WHITE
-from lightpaint.scene.scene import Scene
+from lightpaint.scene.mitsuba_scene import Scene
 from lightpaint.scene.scene_render import Stream, render_loaded
 
 GALLERY = Path(__file__).parent.parent / "scenes" / "gallery" / "scene.xml"

@@ -44,14 +44,14 @@ from lightpaint.basis.basis import meter_exposure
 from lightpaint.basis.cache.cached_render import obtain_basis
 from lightpaint.colour.color import delta_e, kelvin_to_rgb, luminance
 from lightpaint.errors import PaintError
-from lightpaint.paint.presets.presets import PRESETS
+from lightpaint.paint.presets.lighting_presets import PRESETS
 from lightpaint.paint.protocol import ApplyPreset
-from lightpaint.paint.session.session import Session
+from lightpaint.paint.session.painting_session import Session
 from lightpaint.paint.store.history_steps import Identity
-from lightpaint.paint.store.store import MemoryStore
+from lightpaint.paint.store.session_file import MemoryStore
 from lightpaint.pipeline.job.settings import Settings
 from lightpaint.scene.lights.texels.texel import image_of
-from lightpaint.target.target import Wish
+from lightpaint.target.painted_target import Wish
 
 SCENES = Path(__file__).parent.parent / "scenes"
 SIZES = {"gallery": "160x90", "stage": "160x90", "table": "160x90", "cornell": "64x64"}

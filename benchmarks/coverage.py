@@ -24,10 +24,10 @@ import numpy as np
 import lightpaint as lp
 from lightpaint.basis.basis import Basis
 from lightpaint.basis.render.basis_render import train_tracer
-from lightpaint.basis.render.one_pass_basis import basis_of_sums
+from lightpaint.basis.render.rendered_basis import basis_of_sums
+from lightpaint.scene.mitsuba_scene import Scene
 from lightpaint.scene.runtime.variant import use_variant
-from lightpaint.scene.scene import Scene
-from lightpaint.target.target import Target
+from lightpaint.target.painted_target import Target
 
 ROOT = Path(__file__).parent.parent
 

@@ -24,9 +24,9 @@ from rows import add_csv, write_rows
 
 import lightpaint as lp
 from lightpaint.basis.basis import Basis
+from lightpaint.scene.mitsuba_scene import Scene
 from lightpaint.scene.runtime.variant import use_variant
-from lightpaint.scene.scene import Scene
-from lightpaint.target.target import Target
+from lightpaint.target.painted_target import Target
 
 ROOT = Path(__file__).parent.parent
 

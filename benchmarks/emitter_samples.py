@@ -21,7 +21,7 @@ from hall import write_hall
 
 from lightpaint import load_scene, use_variant
 from lightpaint.basis.render.basis_render import train_tracer
-from lightpaint.scene.scene import Scene
+from lightpaint.scene.mitsuba_scene import Scene
 
 SCENES = Path(__file__).parent.parent / "scenes"
 

@@ -23,7 +23,7 @@ from emitter_samples import open_scene
 
 from lightpaint import use_variant
 from lightpaint.basis.render import basis_render
-from lightpaint.scene.scene import Scene
+from lightpaint.scene.mitsuba_scene import Scene
 
 #: More samples per pixel than the training passes have in any picture.
 UNBOUNDED_SPP = 2**20

@@ -36,7 +36,7 @@ from lightpaint.basis.texel_images import LightImage, light_images
 from lightpaint.colour.color import delta_e, luminance
 from lightpaint.images.formats.exr import write_rgb
 from lightpaint.scene.lights.texels.texel import parse_size
-from lightpaint.scene.scene import Scene
+from lightpaint.scene.mitsuba_scene import Scene
 from lightpaint.scene.scene_render import Stream, render
 
 MATERIALS = {

@@ -62,8 +62,8 @@ from lightpaint.lighting.live.live import LiveSolver
 from lightpaint.lighting.live.live_view import LiveView
 from lightpaint.paint.launch import low_latency
 from lightpaint.paint.server.server import Server
-from lightpaint.paint.store.store import Store
-from lightpaint.paint.studio.studio import Studio
+from lightpaint.paint.store.session_file import Store
+from lightpaint.paint.studio.session_studio import Studio
 from lightpaint.paint.subject import Subject
 from lightpaint.pipeline.job.settings import Settings
 

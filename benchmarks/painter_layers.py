@@ -21,9 +21,9 @@ import numpy as np
 import lightpaint as lp
 from lightpaint.paint import protocol
 from lightpaint.paint.layers.layer_stack import Layer
-from lightpaint.paint.session.session import Session
+from lightpaint.paint.session.painting_session import Session
 from lightpaint.paint.store.history_steps import Identity
-from lightpaint.paint.store.store import MemoryStore, Store
+from lightpaint.paint.store.session_file import MemoryStore, Store
 from lightpaint.pipeline.job.settings import Settings
 
 #: Makes layers, as adjustments of the whole picture and as strokes of their own.

@@ -36,7 +36,7 @@ from scipy.optimize import nnls
 import lightpaint as lp
 from lightpaint.arrays import Floats
 from lightpaint.images.pixel_blocks import block_mean
-from lightpaint.scene.scene import Scene
+from lightpaint.scene.mitsuba_scene import Scene
 
 ROOT = Path(__file__).parent.parent
 

@@ -9,7 +9,7 @@ from scipy.optimize import nnls
 import lightpaint as lp
 from lightpaint.arrays import Doubles, Floats
 from lightpaint.scene.lights.new_emitter import NewKind
-from lightpaint.scene.scene import Scene
+from lightpaint.scene.mitsuba_scene import Scene
 
 #: Number of fixed candidates, and samples of each one's image.
 CANDIDATES, CANDIDATE_SPP = 96, 16

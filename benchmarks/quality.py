@@ -18,7 +18,7 @@ from rows import add_csv, write_rows
 from lightpaint import Basis, Scene, load_scene, read_target, render_basis, solve
 from lightpaint.colour.color import luminance
 from lightpaint.report.measures import energy_shares
-from lightpaint.target.target import Target
+from lightpaint.target.painted_target import Target
 
 RESOLUTIONS = ("1/1", "1/2", "1/4")
 SAMPLES = (16, 32, 64, 128, 256, 512, 1024)

@@ -27,7 +27,7 @@ import numpy as np
 import numpy.typing as npt
 
 from lightpaint import load_scene, render_basis, write_basis
-from lightpaint.scene.scene import Scene
+from lightpaint.scene.mitsuba_scene import Scene
 
 #: Half the sides of the room in metres; reflectance of floor, ceiling and walls, two of which
 #: differ.

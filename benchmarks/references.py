@@ -41,9 +41,9 @@ from lightpaint.basis.basis import meter_exposure
 from lightpaint.basis.cache.cached_render import obtain_basis
 from lightpaint.colour.color import delta_e, luminance
 from lightpaint.paint.protocol import ApplyPreset, LookLike, PlacePair
-from lightpaint.paint.session.session import Session
+from lightpaint.paint.session.painting_session import Session
 from lightpaint.paint.store.history_steps import Identity
-from lightpaint.paint.store.store import MemoryStore
+from lightpaint.paint.store.session_file import MemoryStore
 from lightpaint.pipeline.job.settings import Settings
 
 #: Sensors by scene: that which is painted, and another one, if there is one.

@@ -34,7 +34,7 @@ from lightpaint import load_scene
 from lightpaint.photometry.measure import measure_illuminance
 from lightpaint.photometry.measuring_plane import MeasuringPlane
 from lightpaint.photometry.planes_file import read_planes
-from lightpaint.scene.scene import Scene
+from lightpaint.scene.mitsuba_scene import Scene
 
 #: Reflections that both programs follow.
 BOUNCES = 5

@@ -21,7 +21,7 @@ import numpy.typing as npt
 from lightpaint import Basis, Target, load_scene, read_target, render_basis, solve
 from lightpaint.lighting.loss.painting import target_squares
 from lightpaint.lighting.problem import Problem
-from lightpaint.scene.scene import Scene
+from lightpaint.scene.mitsuba_scene import Scene
 
 ROOT = Path(__file__).parent.parent
 CORNELL = ROOT / "scenes" / "cornell" / "scene.xml"

@@ -41,8 +41,7 @@ from lightpaint.lighting.problem import Problem
 from lightpaint.lighting.solution import Solution
 from lightpaint.lighting.solver import solution_of
 from lightpaint.pipeline.job.settings import PILOT_SPP
-from lightpaint.pipeline.job_bases import without_noise
-from lightpaint.pipeline.needed_samples import add_needed_samples
+from lightpaint.pipeline.job_bases import add_needed_samples, without_noise
 from lightpaint.progress import listener, silent
 from lightpaint.report.measures import LEAST_SHARE, picture_errors
 

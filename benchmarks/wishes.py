@@ -23,19 +23,19 @@ from hall import write_floor, write_hall
 
 from lightpaint.basis.render.basis_render import render_basis
 from lightpaint.colour.display.view_transform import ViewTransform
-from lightpaint.lighting.constraints.constraints import Constraints
+from lightpaint.lighting.constraints.constraint_table import Constraints
 from lightpaint.lighting.fit import Fit
 from lightpaint.lighting.problem import Problem
 from lightpaint.lighting.solver import solution_of
 from lightpaint.lighting.unknowns.reduction import reduce_to
-from lightpaint.lighting.wishes.required_problem import with_wishes
+from lightpaint.lighting.wishes.wish_problems import with_wishes
 from lightpaint.lighting.wishes.wished_light import wished_light
 from lightpaint.photometry.illuminance import Illuminance
 from lightpaint.photometry.measure import measure_illuminance
 from lightpaint.photometry.measuring_plane import PowerBudget, Wishes
 from lightpaint.photometry.planes_file import read_planes
 from lightpaint.scene.scene_reader import load_scene
-from lightpaint.target.target import Target
+from lightpaint.target.painted_target import Target
 
 #: Chromaticities of the two whites of each lamp.
 WHITES = {"warm": [0.4599, 0.4106], "cool": [0.3457, 0.3585]}

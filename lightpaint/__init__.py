@@ -49,8 +49,8 @@ if TYPE_CHECKING:
     from lightpaint.images.estimate import Estimate as Estimate
     from lightpaint.images.formats.png import display_picture as display_picture
     from lightpaint.images.object_map import Objects as Objects
-    from lightpaint.lighting.analysis.analysis import Analysis as Analysis
-    from lightpaint.lighting.analysis.analysis import analyse as analyse
+    from lightpaint.lighting.analysis.answer_analysis import Analysis as Analysis
+    from lightpaint.lighting.analysis.answer_analysis import analyse as analyse
     from lightpaint.lighting.analysis.appearance.appearance import Appearance as Appearance
     from lightpaint.lighting.analysis.appearance.appearance import (
         compare_appearance as compare_appearance,
@@ -58,7 +58,7 @@ if TYPE_CHECKING:
     from lightpaint.lighting.analysis.diagnosis import Diagnosis as Diagnosis
     from lightpaint.lighting.analysis.diagnosis import diagnose as diagnose
     from lightpaint.lighting.analysis.noise.noise_correction import correct_noise as correct_noise
-    from lightpaint.lighting.analysis.noise.refinement import refine as refine
+    from lightpaint.lighting.analysis.noise.noise_correction import refine as refine
     from lightpaint.lighting.analysis.noise.uncertainty import Uncertainty as Uncertainty
     from lightpaint.lighting.analysis.noise.uncertainty import error_bars as error_bars
     from lightpaint.lighting.answer.certificate import Certificate as Certificate
@@ -66,7 +66,7 @@ if TYPE_CHECKING:
     from lightpaint.lighting.answer.lighting import Lighting as Lighting
     from lightpaint.lighting.answer.lighting_file import read_lighting as read_lighting
     from lightpaint.lighting.answer.lighting_file import write_lighting as write_lighting
-    from lightpaint.lighting.constraints.constraints import Constraints as Constraints
+    from lightpaint.lighting.constraints.constraint_table import Constraints as Constraints
     from lightpaint.lighting.constraints.constraints_file import (
         read_constraints as read_constraints,
     )
@@ -76,28 +76,28 @@ if TYPE_CHECKING:
     from lightpaint.lighting.solver import solve as solve
     from lightpaint.paint.notebook.widget import Painter as Painter
     from lightpaint.photometry.illuminance import Illuminance as Illuminance
+    from lightpaint.photometry.measure import measure_glare as measure_glare
     from lightpaint.photometry.measure import measure_illuminance as measure_illuminance
-    from lightpaint.photometry.measure_glare import measure_glare as measure_glare
     from lightpaint.photometry.measuring_plane import MeasuringPlane as MeasuringPlane
     from lightpaint.photometry.planes_file import read_planes as read_planes
-    from lightpaint.pipeline.job.job import Job as Job
     from lightpaint.pipeline.job.settings import Settings as Settings
+    from lightpaint.pipeline.job.solve_job import Job as Job
     from lightpaint.pipeline.job.sources import Painting as Painting
     from lightpaint.pipeline.job.sources import SceneFile as SceneFile
+    from lightpaint.pipeline.job_run import run as run
     from lightpaint.pipeline.one_call import paint_with_light as paint_with_light
-    from lightpaint.pipeline.pipeline import run as run
     from lightpaint.pipeline.relit_renders import relight_frames as relight_frames
-    from lightpaint.pipeline.results.results import Look as Look
+    from lightpaint.pipeline.results.look import Look as Look
     from lightpaint.pipeline.templates import render_template as render_template
     from lightpaint.pipeline.templates import template_of_basis as template_of_basis
     from lightpaint.placement.freedom import Freedom as Freedom
+    from lightpaint.placement.light_changes import AddedLight as AddedLight
+    from lightpaint.placement.light_changes import Move as Move
+    from lightpaint.placement.light_changes import Placement as Placement
     from lightpaint.placement.new_lights import MirroredPair as MirroredPair
     from lightpaint.placement.new_lights import NewLights as NewLights
     from lightpaint.placement.place_search import place as place
     from lightpaint.placement.place_search import suggest_lights as suggest_lights
-    from lightpaint.placement.placement import AddedLight as AddedLight
-    from lightpaint.placement.placement import Move as Move
-    from lightpaint.placement.placement import Placement as Placement
     from lightpaint.placement.rigging import Rigging as Rigging
     from lightpaint.placement.suggestion import Suggestion as Suggestion
     from lightpaint.relit.export.exports import write_exports as write_exports
@@ -106,11 +106,11 @@ if TYPE_CHECKING:
     from lightpaint.relit.verification_render import verify as verify
     from lightpaint.report.verdict_sentences import verdict as verdict
     from lightpaint.scene.lights.new_emitter import NewEmitter as NewEmitter
+    from lightpaint.scene.mitsuba_scene import Scene as Scene
     from lightpaint.scene.properties.pose import Pose as Pose
     from lightpaint.scene.runtime.variant import use_variant as use_variant
-    from lightpaint.scene.scene import Scene as Scene
     from lightpaint.scene.scene_reader import load_scene as load_scene
-    from lightpaint.target.target import Target as Target
+    from lightpaint.target.painted_target import Target as Target
     from lightpaint.target.target_reader import read_target as read_target
 
 choose_llvm_at_import()

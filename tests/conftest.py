@@ -25,8 +25,8 @@ from lightpaint.basis.lights import BasisLight
 from lightpaint.basis.render.basis_render import render_basis
 from lightpaint.placement.paths import view_paths
 from lightpaint.placement.search import new_light_search, pose_search
+from lightpaint.scene.mitsuba_scene import Scene
 from lightpaint.scene.runtime import kernel_threads
-from lightpaint.scene.scene import Scene
 from lightpaint.scene.scene_reader import load_scene
 
 # Shared machines are slow now and then, which is not a failure; a fixed choice of examples makes

@@ -16,9 +16,9 @@ from lightpaint.images.denoiser import Features
 from lightpaint.paint import protocol
 from lightpaint.paint.layers.layer_pixels import selection_mask
 from lightpaint.paint.layers.layer_stack import Gradient, Layer, LayerKind
-from lightpaint.paint.session.session import Session
+from lightpaint.paint.session.painting_session import Session
 from lightpaint.paint.store.history_steps import Identity
-from lightpaint.paint.store.store import MemoryStore, Store
+from lightpaint.paint.store.session_file import MemoryStore, Store
 from lightpaint.pipeline.job.settings import Settings
 
 #: Of the views: the first has more than one tile across.

@@ -9,7 +9,7 @@ from lightpaint.lighting.normal_equations import NormalEquations
 from lightpaint.lighting.unknowns.knobs import Knob
 from lightpaint.lighting.unknowns.reduced_problem import ReducedOptimum, solve_reduced
 from lightpaint.lighting.unknowns.reduction import Reduction
-from lightpaint.target.target import Target
+from lightpaint.target.painted_target import Target
 
 
 def stack_rows(basis: Any, target: Target) -> tuple[Any, Any]:

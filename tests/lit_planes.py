@@ -6,7 +6,7 @@ from pathlib import Path
 import numpy as np
 
 from lightpaint.photometry.measuring_plane import MeasuringPlane
-from lightpaint.scene.scene import Scene
+from lightpaint.scene.mitsuba_scene import Scene
 from lightpaint.scene.scene_reader import load_scene
 
 UP = (0.0, 1.0, 0.0)

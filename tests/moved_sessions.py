@@ -16,8 +16,8 @@ from lightpaint.paint import protocol
 from lightpaint.paint.rig.added_lights import light_of_new, new_emitter
 from lightpaint.paint.rig.lamp_rig import one_light_basis, with_planes_of
 from lightpaint.paint.session.moved_lights import Placed, added_names
-from lightpaint.paint.session.session import Session
-from lightpaint.paint.store.store import Store
+from lightpaint.paint.session.painting_session import Session
+from lightpaint.paint.store.session_file import Store
 from lightpaint.pipeline.job.settings import Settings
 
 

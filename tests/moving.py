@@ -9,11 +9,11 @@ import numpy as np
 from patience import PATIENCE_S
 from renderer import write_room
 
-from lightpaint.lighting.constraints.constraints import Constraints
+from lightpaint.lighting.constraints.constraint_table import Constraints
 from lightpaint.paint import protocol
 from lightpaint.paint.protocol import Message
-from lightpaint.paint.store.store import Store
-from lightpaint.paint.studio.studio import Studio
+from lightpaint.paint.store.session_file import Store
+from lightpaint.paint.studio.session_studio import Studio
 from lightpaint.paint.subject import Subject
 from lightpaint.pipeline.job.settings import Settings
 from lightpaint.placement.free_space import pixels_of

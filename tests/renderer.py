@@ -12,7 +12,7 @@ from lightpaint.basis.render.basis_render import render_basis
 from lightpaint.images.formats.exr import write_rgb
 from lightpaint.lighting.answer.lighting import Lighting
 from lightpaint.relit.relit_scene import relight
-from lightpaint.scene.scene import Scene
+from lightpaint.scene.mitsuba_scene import Scene
 
 REPOSITORY = Path(__file__).parent.parent
 CORNELL = REPOSITORY / "scenes" / "cornell" / "scene.xml"

@@ -13,7 +13,7 @@ from lightpaint.paint.store.history_steps import (
     StoredLook,
     ViewIdentity,
 )
-from lightpaint.paint.store.store import Store
+from lightpaint.paint.store.session_file import Store
 
 SIZE = (12, 10)
 IDENTITY = Identity("room.xml", "0f0f", ("panel", "bulb"), (ViewIdentity("camera", SIZE),))

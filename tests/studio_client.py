@@ -13,8 +13,8 @@ import lightpaint as lp
 from lightpaint.cli.commands.paint_command import command_for_paintings
 from lightpaint.paint import protocol
 from lightpaint.paint.protocol import Message
-from lightpaint.paint.store.store import Store
-from lightpaint.paint.studio.studio import Studio
+from lightpaint.paint.store.session_file import Store
+from lightpaint.paint.studio.session_studio import Studio
 from lightpaint.paint.subject import Subject
 
 

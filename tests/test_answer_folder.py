@@ -14,7 +14,7 @@ from lightpaint.pipeline.results.result_folder import (
     new_answer,
     write_answer,
 )
-from lightpaint.scene.scene import Scene
+from lightpaint.scene.mitsuba_scene import Scene
 from lightpaint.scene.scene_reader import load_scene
 
 

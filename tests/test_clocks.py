@@ -13,8 +13,8 @@ from patience import PATIENCE_S
 from stored_sessions import IDENTITY, content, look, step
 
 import lightpaint as lp
-from lightpaint.paint.store.store import Store
-from lightpaint.scene.scene import Scene
+from lightpaint.paint.store.session_file import Store
+from lightpaint.scene.mitsuba_scene import Scene
 from lightpaint.storage.staging import staged
 
 #: Seconds by which the clock is wrong, one after the other.

@@ -15,11 +15,11 @@ from live_server import run_in_loop
 from patience import PATIENCE_S
 
 import lightpaint as lp
-from lightpaint.batch.manifest.manifest import read_manifest
+from lightpaint.batch.manifest.looks_file import read_manifest
 from lightpaint.errors import BatchError, ConstraintError, LightingError, PaintError, SceneError
 from lightpaint.lighting.algebra.optimum import minimise
 from lightpaint.lighting.answer.lighting_file import MAX_BYTES, read_lighting
-from lightpaint.lighting.constraints.constraints import Constraints
+from lightpaint.lighting.constraints.constraint_table import Constraints
 from lightpaint.paint.message_frames import parse_request
 from lightpaint.paint.protocol import Message
 from lightpaint.paint.server.session_clients import Connections

@@ -14,7 +14,7 @@ import pytest
 
 import lightpaint as lp
 from lightpaint.basis.cache.cache import MAX_BYTES
-from lightpaint.batch.cluster.cluster import LIMIT_FACTOR, MIN_LIMIT_S
+from lightpaint.batch.cluster.dask_engine import LIMIT_FACTOR, MIN_LIMIT_S
 from lightpaint.batch.manifest.checks import SOLVE_STEPS
 from lightpaint.batch.manifest.entries import MAX_LOOKS
 from lightpaint.batch.manifest.file_names import MAX_VISITED
@@ -230,7 +230,7 @@ def test_which_files_are_painted_over_is_said_alike():
 def test_the_corridor_is_quoted_as_it_stands():
     text = (ROOT / "docs" / "architecture.md").read_text()
     [quoted] = re.findall(r"```python\n((?:@\w+\(\)\n)?def run.*?)```", text, re.DOTALL)
-    module = ast.parse((ROOT / "lightpaint" / "pipeline/pipeline.py").read_text())
+    module = ast.parse((ROOT / "lightpaint" / "pipeline/job_run.py").read_text())
     [run] = (x for x in module.body if isinstance(x, ast.FunctionDef) and x.name == "run")
     del run.body[0]  # the docstring
     assert ast.dump(ast.parse(quoted).body[0]) == ast.dump(run)

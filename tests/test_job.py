@@ -29,7 +29,7 @@ from lightpaint.errors import (
 from lightpaint.images.formats.exr import write_rgb
 from lightpaint.pipeline.job.sources import BasisFile, GroupsFile
 from lightpaint.scene.scene_reader import load_scene
-from lightpaint.target.target import Target
+from lightpaint.target.painted_target import Target
 
 SIDE = """<sensor type="perspective" id="side"><transform name="to_world">
     <lookat origin="2 1 2" target="0 0.5 0" up="0 1 0"/></transform><film type="hdrfilm">

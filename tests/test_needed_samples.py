@@ -12,15 +12,15 @@ from lightpaint.basis.render import basis_render
 from lightpaint.basis.render.basis_render import render_basis
 from lightpaint.errors import LightpaintError
 from lightpaint.lighting.analysis.noise.uncertainty import error_bars
-from lightpaint.pipeline.job.job import Job
 from lightpaint.pipeline.job.settings import PILOT_SPP, Settings
-from lightpaint.pipeline.needed_samples import add_needed_samples
+from lightpaint.pipeline.job.solve_job import Job
+from lightpaint.pipeline.job_bases import add_needed_samples
 from lightpaint.pipeline.one_call import paint_with_light
 from lightpaint.progress import listener
 from lightpaint.report.measures import picture_errors
-from lightpaint.scene.scene import Scene
+from lightpaint.scene.mitsuba_scene import Scene
 from lightpaint.scene.scene_reader import load_scene
-from lightpaint.target.target import Target
+from lightpaint.target.painted_target import Target
 
 
 class Heard:

@@ -10,8 +10,8 @@ import pytest
 from lightpaint.errors import ImageError
 from lightpaint.images.estimate import Estimate, write_estimate
 from lightpaint.images.formats.exr import ExrPart, rgb_channels, write_parts
-from lightpaint.pipeline.results import results
-from lightpaint.pipeline.results.results import VIEW_KEY, verify_result
+from lightpaint.pipeline.results import look
+from lightpaint.pipeline.results.look import VIEW_KEY, verify_result
 
 IMAGE = np.ones((2, 3, 3), np.float32)
 
@@ -79,7 +79,7 @@ def test_the_view_of_the_solve_is_taken_unless_another_is_given(
         "verify": lambda *_args, spp, **_options: sensors.append(spp),
     }
     for name, function in replacements.items():
-        monkeypatch.setattr(results, name, function)
+        monkeypatch.setattr(look, name, function)
     folder = _result(tmp_path, None if view is None else json.dumps(view))
     verify_result(folder, spp=choice)
     assert tuple(sensors) == expected

@@ -19,7 +19,7 @@ from lightpaint.errors import BatchError, LightpaintError
 from lightpaint.files import write_bytes
 from lightpaint.images.estimate import Estimate
 from lightpaint.images.formats.exr import write_rgb
-from lightpaint.scene.scene import Scene
+from lightpaint.scene.mitsuba_scene import Scene
 from lightpaint.scene.scene_reader import load_scene
 
 AIMED = lp.Pose(target=(-0.6, 0, -0.3))

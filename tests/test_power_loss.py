@@ -16,7 +16,7 @@ from lightpaint.batch.plan.journal import Journal, JournalLine
 from lightpaint.files import write_text
 from lightpaint.lighting.answer.lighting import Lighting, LightSetting
 from lightpaint.lighting.answer.lighting_file import read_lighting, write_lighting
-from lightpaint.paint.store.store import Store
+from lightpaint.paint.store.session_file import Store
 from lightpaint.storage.staging import staged
 
 

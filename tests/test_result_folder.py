@@ -207,21 +207,21 @@ def test_what_comes_to_the_folder_during_a_run_is_kept(
     work_folder: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """Two of one name at once, as `xargs -P` starts them."""
-    from lightpaint.pipeline import pipeline
+    from lightpaint.pipeline import job_run
 
     job, other = (
         lp.Job((), (lp.Painting(f"{name}/evening.exr"),), Path("out"), BasisFile("a.basis.exr"))
         for name in ("template", "gallery")
     )
-    analyse = pipeline.analyse
+    analyse = job_run.analyse
     with monkeypatch.context() as patch:
 
         def write_meanwhile(*arguments: Any, **options: Any) -> Any:
-            patch.setattr(pipeline, "analyse", analyse)
+            patch.setattr(job_run, "analyse", analyse)
             lp.run(other)
             return analyse(*arguments, **options)
 
-        patch.setattr(pipeline, "analyse", write_meanwhile)
+        patch.setattr(job_run, "analyse", write_meanwhile)
         with pytest.raises(OutputError, match=r"holds the answer to gallery/evening\.exr"):
             lp.run(job)
     assert json.loads((work_folder / "out" / RECORD).read_text())["answers"] == [

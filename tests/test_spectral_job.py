@@ -18,7 +18,7 @@ from lightpaint.images.formats.exr import write_rgb
 from lightpaint.lighting.answer.lighting_file import read_lighting
 from lightpaint.lighting.constraints.constraints_file import constraints_of
 from lightpaint.pipeline.job.sources import spectral_scene
-from lightpaint.pipeline.results.results import verify_result
+from lightpaint.pipeline.results.look import verify_result
 from lightpaint.relit.formats import spectra_csv
 from lightpaint.relit.relit_scene import relight
 from lightpaint.scene.scene_reader import load_scene

@@ -47,7 +47,7 @@ def test_start_loads_no_library(code: str):
 def test_a_name_loads_its_own_room_and_no_renderer():
     loaded = _loaded_by("import lightpaint as lp; lp.solve; lp.read_target; lp.display_picture")
     assert "lightpaint.lighting.solver" in loaded
-    assert not loaded & {"mitsuba", "OpenImageIO", "colour", "rich", "lightpaint.pipeline.pipeline"}
+    assert not loaded & {"mitsuba", "OpenImageIO", "colour", "rich", "lightpaint.pipeline.job_run"}
 
 
 def test_every_public_name_is_there_and_seen_by_type_checkers():

@@ -14,18 +14,18 @@ from lightpaint.colour.color_ranges import white_range
 from lightpaint.errors import LightpaintError
 from lightpaint.images.formats.exr import write_rgb
 from lightpaint.lighting.answer.lighting_file import read_lighting
-from lightpaint.lighting.constraints.constraints import Constraints
+from lightpaint.lighting.constraints.constraint_table import Constraints
 from lightpaint.lighting.constraints.values import parse_color
-from lightpaint.pipeline.job.job import Job
-from lightpaint.pipeline.needed_samples import Certainty
+from lightpaint.pipeline.job.solve_job import Job
+from lightpaint.pipeline.job_bases import Certainty
 from lightpaint.pipeline.one_call import paint_with_light
-from lightpaint.pipeline.results.results import Look
+from lightpaint.pipeline.results.look import Look
 from lightpaint.progress import Listener
 from lightpaint.scene.lights.texels.texel import coarse_name
 from lightpaint.scene.properties.emission import read_emitted_image
 from lightpaint.scene.scene_reader import load_scene
 from lightpaint.scene.scene_render import Stream, render
-from lightpaint.target.target import Target
+from lightpaint.target.painted_target import Target
 
 SCENE = """<scene version="3.0.0">
     <integrator type="path"><integer name="max_depth" value="3"/></integrator>

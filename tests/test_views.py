@@ -27,15 +27,15 @@ from lightpaint.lighting.normal_equations import NormalEquations
 from lightpaint.lighting.solver import solve
 from lightpaint.paint.protocol import ConstrainLight, Export, Message, Paint
 from lightpaint.paint.store.history_steps import ViewIdentity
-from lightpaint.paint.store.store import MemoryStore
-from lightpaint.paint.studio.studio import Studio
+from lightpaint.paint.store.session_file import MemoryStore
+from lightpaint.paint.studio.session_studio import Studio
 from lightpaint.paint.subject import session_identity
 from lightpaint.paint.subject_factory import make_subjects
 from lightpaint.pipeline.job.settings import Settings
 from lightpaint.pipeline.job.sources import SceneFile
 from lightpaint.pipeline.one_call import paint_with_light
 from lightpaint.scene.scene_reader import load_scene
-from lightpaint.target.target import Target
+from lightpaint.target.painted_target import Target
 
 CLOSE = """<sensor type="perspective" id="close"><float name="fov" value="40"/>
     <transform name="to_world"><lookat origin="1 1 2" target="0 0.5 0" up="0 1 0"/></transform>

@@ -31,11 +31,11 @@ import lightpaint as lp  # noqa: E402
 from lightpaint.basis.basis import meter_exposure  # noqa: E402
 from lightpaint.basis.cache.cached_render import obtain_basis  # noqa: E402
 from lightpaint.basis.denoised_mixes import denoise_current_look, denoise_mix  # noqa: E402
-from lightpaint.paint.presets.presets import PRESETS  # noqa: E402
+from lightpaint.paint.presets.lighting_presets import PRESETS  # noqa: E402
 from lightpaint.paint.protocol import ApplyPreset, LookLike  # noqa: E402
-from lightpaint.paint.session.session import Session  # noqa: E402
+from lightpaint.paint.session.painting_session import Session  # noqa: E402
 from lightpaint.paint.store.history_steps import Identity  # noqa: E402
-from lightpaint.paint.store.store import MemoryStore  # noqa: E402
+from lightpaint.paint.store.session_file import MemoryStore  # noqa: E402
 from lightpaint.pipeline.job.settings import Settings  # noqa: E402
 
 SIZES = {"gallery": "213x120", "stage": "213x120", "table": "160x90", "cornell": "128x128"}

@@ -20,7 +20,7 @@ from PIL import Image, ImageDraw, ImageFont
 from lightpaint import Basis, Constraints, Lighting, Target, load_scene, render_basis, solve
 from lightpaint.colour.color import kelvin_to_rgb
 from lightpaint.colour.primaries import encode_display, to_8_bit
-from lightpaint.lighting.answer.light_rendering import renderings_of
+from lightpaint.lighting.analysis.rendered_colors import renderings_of
 
 HERE = Path(__file__).resolve().parent
 WIDTH, HEIGHT, FOOT = 320, 200, 22

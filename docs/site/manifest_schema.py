@@ -19,7 +19,7 @@ from lightpaint.batch.manifest.keys import (
     SUBJECT_KEYS,
 )
 from lightpaint.colour import Preference
-from lightpaint.lighting.constraints.constraints import LIGHT_KEYS
+from lightpaint.lighting.constraints.constraint_table import LIGHT_KEYS
 from lightpaint.validation import Check
 
 _TEXT: Schema = {"type": "string", "minLength": 1}

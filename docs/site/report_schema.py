@@ -13,7 +13,7 @@ from lightpaint.lighting.analysis.appearance.delivery import Delivery
 from lightpaint.lighting.analysis.appearance.limiting_reasons import Reason
 from lightpaint.lighting.analysis.appearance.unpainted_change import UnpaintedChange
 from lightpaint.lighting.analysis.diagnosis import Place
-from lightpaint.lighting.analysis.surface_colors import SurfaceColor
+from lightpaint.lighting.analysis.rendered_colors import SurfaceColor
 from lightpaint.lighting.fit import Fit
 from lightpaint.placement.suggestion import MoveSuggestion, Suggestion
 from lightpaint.report.report_json import FORMAT

@@ -20,7 +20,7 @@ from lightpaint.lighting.answer.lighting import EmitterPlace, Lighting, LightSet
 from lightpaint.lighting.answer.lighting_file import FORMAT
 from lightpaint.paint.protocol import Event, Request
 from lightpaint.pipeline.results.result_folder import _Record
-from lightpaint.placement.placement import PlacementRecord
+from lightpaint.placement.light_changes import PlacementRecord
 from lightpaint.relit.export import fixtures
 
 DIALECT = "https://json-schema.org/draft/2020-12/schema"

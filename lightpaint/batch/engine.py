@@ -1,5 +1,5 @@
 """Engines that run work items: this process, worker processes on this machine, or a cluster
-(cluster.py).
+(dask_engine.py).
 """
 
 import multiprocessing

@@ -11,15 +11,22 @@ from pathlib import Path
 from typing import Any
 
 from lightpaint.basis import Basis
-from lightpaint.batch.cluster.cluster import Cluster
+from lightpaint.batch.cluster.dask_engine import Cluster
 from lightpaint.batch.distributed_work import distributed_renderer, solve_by_sums
 from lightpaint.batch.engine import Engine, InProcess, Processes
-from lightpaint.batch.gallery.gallery import write_gallery, write_task_planes
+from lightpaint.batch.gallery.gallery_page import write_gallery, write_task_planes
 from lightpaint.batch.gallery.summary import SummaryRow
 from lightpaint.batch.manifest.file_names import THUMBNAILS
 from lightpaint.batch.manifest.keys import as_key
 from lightpaint.batch.plan.journal import Journal, JournalLine
-from lightpaint.batch.plan.plan import Plan, PlannedLook, PlanStep, by_bases, look_seconds, waves
+from lightpaint.batch.plan.plan_steps import (
+    Plan,
+    PlannedLook,
+    PlanStep,
+    by_bases,
+    look_seconds,
+    waves,
+)
 from lightpaint.batch.run_options import RunOptions
 from lightpaint.batch.task_bases import (
     has_basis,

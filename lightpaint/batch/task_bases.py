@@ -12,7 +12,7 @@ from lightpaint.basis import Basis, write_basis
 from lightpaint.basis.cache import cache
 from lightpaint.batch.distributed_work import PartwiseRender
 from lightpaint.batch.engine import Engine
-from lightpaint.batch.plan.plan import PlaceGroup
+from lightpaint.batch.plan.plan_steps import PlaceGroup
 from lightpaint.batch.work.item_execution import SharedPlacing, job_fields
 from lightpaint.batch.work.work_items import SceneFilm, Task, key_of_scene
 from lightpaint.batch.work.worker_storage import WorkerCache

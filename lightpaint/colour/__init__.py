@@ -54,6 +54,8 @@ if TYPE_CHECKING:
     from lightpaint.colour.luminous_flux import lambertian_flux as lambertian_flux
     from lightpaint.colour.luminous_flux import photometry as photometry
     from lightpaint.colour.luminous_flux import point_flux as point_flux
+    from lightpaint.colour.luminous_flux import solid_angle as solid_angle
+    from lightpaint.colour.luminous_flux import spot_cone as spot_cone
     from lightpaint.colour.luminous_flux import spot_flux as spot_flux
     from lightpaint.colour.primaries import ACESCG as ACESCG
     from lightpaint.colour.primaries import REC709 as REC709

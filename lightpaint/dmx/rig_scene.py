@@ -17,10 +17,9 @@ import numpy as np
 import numpy.typing as npt
 
 from lightpaint.arrays import Doubles
-from lightpaint.colour import WAVELENGTHS, SlotFilter, Spectrum
+from lightpaint.colour import WAVELENGTHS, SlotFilter, Spectrum, spot_cone
 from lightpaint.dmx.console_rig import ConsoleRig, RigEmitter, RigFixture, RigLight
 from lightpaint.dmx.mvr import KIND, PlacedModel
-from lightpaint.dmx.spot_cone import spot_cone
 from lightpaint.errors import SceneError
 from lightpaint.files import first_line, read_bytes
 from lightpaint.scene.checks.tokens import (

@@ -7,9 +7,9 @@ from lightpaint.lazy_names import lazy_names
 if TYPE_CHECKING:
     from lightpaint.lighting.algebra.method import Method as Method
     from lightpaint.lighting.algebra.optimum import minimise as minimise
-    from lightpaint.lighting.analysis.analysis import Analysis as Analysis
-    from lightpaint.lighting.analysis.analysis import analyse as analyse
-    from lightpaint.lighting.analysis.analysis import with_findings as with_findings
+    from lightpaint.lighting.analysis.answer_analysis import Analysis as Analysis
+    from lightpaint.lighting.analysis.answer_analysis import analyse as analyse
+    from lightpaint.lighting.analysis.answer_analysis import with_findings as with_findings
     from lightpaint.lighting.analysis.appearance.appearance import CLOSE as CLOSE
     from lightpaint.lighting.analysis.appearance.appearance import INVISIBLE as INVISIBLE
     from lightpaint.lighting.analysis.appearance.appearance import Appearance as Appearance
@@ -24,9 +24,6 @@ if TYPE_CHECKING:
     from lightpaint.lighting.analysis.appearance.color_choices import (
         can_change_colors as can_change_colors,
     )
-    from lightpaint.lighting.analysis.appearance.constraint_kinds import (
-        KEYS_BY_KIND as KEYS_BY_KIND,
-    )
     from lightpaint.lighting.analysis.appearance.delivery import Delivery as Delivery
     from lightpaint.lighting.analysis.appearance.delivery import main_deliveries as main_deliveries
     from lightpaint.lighting.analysis.appearance.delivery import mean_shares as mean_shares
@@ -37,10 +34,10 @@ if TYPE_CHECKING:
     from lightpaint.lighting.analysis.appearance.delivery import newest_delivery as newest_delivery
     from lightpaint.lighting.analysis.appearance.delivery import spoken_share as spoken_share
     from lightpaint.lighting.analysis.appearance.delivery import worst_delivery as worst_delivery
+    from lightpaint.lighting.analysis.appearance.display_difference import NOTICED as NOTICED
     from lightpaint.lighting.analysis.appearance.display_difference import (
         PaintComparison as PaintComparison,
     )
-    from lightpaint.lighting.analysis.appearance.error_place import NOTICED as NOTICED
     from lightpaint.lighting.analysis.appearance.limiting_reasons import Loosening as Loosening
     from lightpaint.lighting.analysis.appearance.limiting_reasons import Reason as Reason
     from lightpaint.lighting.analysis.appearance.pixel_sample import LimitGroup as LimitGroup
@@ -59,22 +56,22 @@ if TYPE_CHECKING:
     from lightpaint.lighting.analysis.diagnosis import error_shares as error_shares
     from lightpaint.lighting.analysis.noise.noise import denoised_matrix as denoised_matrix
     from lightpaint.lighting.analysis.noise.noise_correction import correct_noise as correct_noise
-    from lightpaint.lighting.analysis.noise.refinement import refine as refine
+    from lightpaint.lighting.analysis.noise.noise_correction import refine as refine
     from lightpaint.lighting.analysis.noise.sample_demand import pixel_variances as pixel_variances
     from lightpaint.lighting.analysis.noise.sample_demand import sample_demand as sample_demand
     from lightpaint.lighting.analysis.noise.sample_demand import top_up_counts as top_up_counts
     from lightpaint.lighting.analysis.noise.uncertainty import Uncertainty as Uncertainty
     from lightpaint.lighting.analysis.noise.uncertainty import error_bars as error_bars
-    from lightpaint.lighting.analysis.surface_colors import SurfaceColor as SurfaceColor
-    from lightpaint.lighting.analysis.surface_colors import surface_colors as surface_colors
+    from lightpaint.lighting.analysis.rendered_colors import LightRendering as LightRendering
+    from lightpaint.lighting.analysis.rendered_colors import SurfaceColor as SurfaceColor
+    from lightpaint.lighting.analysis.rendered_colors import renderings_of as renderings_of
+    from lightpaint.lighting.analysis.rendered_colors import surface_colors as surface_colors
     from lightpaint.lighting.answer.certificate import Bound as Bound
     from lightpaint.lighting.answer.certificate import Certificate as Certificate
     from lightpaint.lighting.answer.certificate import Software as Software
     from lightpaint.lighting.answer.certificate import version as version
     from lightpaint.lighting.answer.combination import combine as combine
     from lightpaint.lighting.answer.combination import dimmed as dimmed
-    from lightpaint.lighting.answer.light_rendering import LightRendering as LightRendering
-    from lightpaint.lighting.answer.light_rendering import renderings_of as renderings_of
     from lightpaint.lighting.answer.lighting import ALL_REACHED as ALL_REACHED
     from lightpaint.lighting.answer.lighting import Lighting as Lighting
     from lightpaint.lighting.answer.lighting import LightSetting as LightSetting
@@ -90,15 +87,18 @@ if TYPE_CHECKING:
     from lightpaint.lighting.constraints.absolute_scale import unscaled_error as unscaled_error
     from lightpaint.lighting.constraints.absolute_scale import with_scale as with_scale
     from lightpaint.lighting.constraints.absolute_scale import with_sure_scale as with_sure_scale
-    from lightpaint.lighting.constraints.constraints import LAMP_KEYS as LAMP_KEYS
-    from lightpaint.lighting.constraints.constraints import LIGHT_KEYS as LIGHT_KEYS
-    from lightpaint.lighting.constraints.constraints import Constraints as Constraints
-    from lightpaint.lighting.constraints.constraints import LightConstraint as LightConstraint
-    from lightpaint.lighting.constraints.constraints import Requirements as Requirements
-    from lightpaint.lighting.constraints.constraints import is_pattern as is_pattern
+    from lightpaint.lighting.constraints.constraint_table import LAMP_KEYS as LAMP_KEYS
+    from lightpaint.lighting.constraints.constraint_table import LIGHT_KEYS as LIGHT_KEYS
+    from lightpaint.lighting.constraints.constraint_table import Constraints as Constraints
+    from lightpaint.lighting.constraints.constraint_table import LightConstraint as LightConstraint
+    from lightpaint.lighting.constraints.constraint_table import Requirements as Requirements
+    from lightpaint.lighting.constraints.constraint_table import is_pattern as is_pattern
     from lightpaint.lighting.constraints.constraints_file import constraints_of as constraints_of
     from lightpaint.lighting.constraints.constraints_file import (
         read_constraints as read_constraints,
+    )
+    from lightpaint.lighting.constraints.light_constraints import (
+        KEYS_BY_KIND as KEYS_BY_KIND,
     )
     from lightpaint.lighting.constraints.light_constraints import start_weights as start_weights
     from lightpaint.lighting.constraints.light_constraints import tables_by_light as tables_by_light
@@ -137,16 +137,16 @@ if TYPE_CHECKING:
     from lightpaint.lighting.unknowns.reduction import Reduction as Reduction
     from lightpaint.lighting.unknowns.reduction import lamps_by_name as lamps_by_name
     from lightpaint.lighting.unknowns.reduction import reduce_to as reduce_to
-    from lightpaint.lighting.wishes.linear_programs import least_watts as least_watts
     from lightpaint.lighting.wishes.planes_answer import PlanesAnswer as PlanesAnswer
     from lightpaint.lighting.wishes.planes_answer import WishOutcome as WishOutcome
     from lightpaint.lighting.wishes.planes_answer import planes_answer as planes_answer
-    from lightpaint.lighting.wishes.required_problem import RequiredProblem as RequiredProblem
-    from lightpaint.lighting.wishes.required_problem import (
+    from lightpaint.lighting.wishes.wish_problems import RequiredProblem as RequiredProblem
+    from lightpaint.lighting.wishes.wish_problems import least_watts as least_watts
+    from lightpaint.lighting.wishes.wish_problems import (
         requirements_within_reach as requirements_within_reach,
     )
-    from lightpaint.lighting.wishes.required_problem import with_wishes as with_wishes
-    from lightpaint.lighting.wishes.required_problem import without_wishes as without_wishes
+    from lightpaint.lighting.wishes.wish_problems import with_wishes as with_wishes
+    from lightpaint.lighting.wishes.wish_problems import without_wishes as without_wishes
     from lightpaint.lighting.wishes.wished_light import LitCase as LitCase
     from lightpaint.lighting.wishes.wished_light import WishedLight as WishedLight
     from lightpaint.lighting.wishes.wished_light import check_powers as check_powers

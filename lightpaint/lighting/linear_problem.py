@@ -17,7 +17,7 @@ from lightpaint.colour import ViewTransform
 from lightpaint.display_text import short_repr
 from lightpaint.errors import TargetError
 from lightpaint.lighting.constraints.absolute_scale import with_scale
-from lightpaint.lighting.constraints.constraints import Constraints
+from lightpaint.lighting.constraints.constraint_table import Constraints
 from lightpaint.lighting.constraints.constraints_file import constraints_of
 from lightpaint.lighting.constraints.light_constraints import (
     WhiteLimits,

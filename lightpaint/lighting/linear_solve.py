@@ -9,9 +9,9 @@ colours each lamp gets the closest slot; then all are solved for again, with the
 short search moves single wheels where the loss falls.
 """
 
-from collections.abc import Collection, Sequence
+from collections.abc import Callable, Collection, Sequence
 from dataclasses import dataclass, replace
-from typing import Any, Generic, TypeVar
+from typing import Any, Generic, Protocol, TypeVar
 
 import numpy as np
 
@@ -134,20 +134,47 @@ def solve_linear(problem: _Problem, start: Doubles) -> LinearAnswer[_Problem]:
     """Solve the squares from weights (n, 3); with `sparse`, for the best lights alone. Colour
     wheels come to slots.
     """
-    mixed = answer = solve_mixed(problem, start)
-    if mixed.problem.reduction.open_wheels:
-        answer = solve_reduction(mixed.problem.with_slots(mixed.weights), mixed.weights)
-    if not answer.problem.reduction.slots:
+    mixed = solve_mixed(problem, start)
+    answer = at_slots(mixed, solve_reduction, _loss_with_pull)
+    if answer is None:
         return mixed
-    if (better := answer.problem.with_better_slots(answer.weights)) is not None:
-        trial = solve_reduction(better, answer.weights)
-        answer = min(answer, trial, key=_loss_with_pull)
     answer = replace(answer, problem=answer.problem.with_final_slots())
     certificate, former = answer.lighting.certificate, mixed.lighting.certificate
     assert certificate is not None
     assert former is not None
     lighting = answer.lighting.with_certificate(replace(certificate, curve=former.curve))
     return replace(answer, lighting=lighting, tried=mixed.tried)
+
+
+class _Answered(Protocol):
+    """An answer to a problem, with weights (n, 3)."""
+
+    @property
+    def problem(self) -> LinearProblem: ...
+    @property
+    def weights(self) -> Doubles: ...
+
+
+_Answer = TypeVar("_Answer", bound=_Answered)
+
+
+def at_slots(
+    mixed: _Answer,
+    solve_again: Callable[[Any, Doubles], _Answer],
+    loss: Callable[[_Answer], float],
+) -> _Answer | None:
+    """Return an answer whose colour wheels are at slots; None without a wheel.
+
+    mixed: the answer whose wheels mix their slots. solve_again: solves its problem with other
+    slots, from weights (n, 3).
+    """
+    answer = mixed
+    if mixed.problem.reduction.open_wheels:
+        answer = solve_again(mixed.problem.with_slots(mixed.weights), mixed.weights)
+    if not answer.problem.reduction.slots:
+        return None
+    better = answer.problem.with_better_slots(answer.weights)
+    return answer if better is None else min(answer, solve_again(better, answer.weights), key=loss)
 
 
 def _loss_with_pull(answer: LinearAnswer[_Problem]) -> float:

@@ -19,12 +19,13 @@ from lightpaint.colour import Lamp
 from lightpaint.keywords import keywords
 from lightpaint.lighting.answer.lighting import Lighting
 from lightpaint.lighting.constraints.absolute_scale import with_sure_scale
-from lightpaint.lighting.constraints.constraints import Constraints
+from lightpaint.lighting.constraints.constraint_table import Constraints
 from lightpaint.lighting.constraints.constraints_file import constraints_of
 from lightpaint.lighting.fit import Fit
 from lightpaint.lighting.held_mixes import choose_held_mixes, with_mixes_at
 from lightpaint.lighting.linear_solve import (
     LinearAnswer,
+    at_slots,
     make_answer,
     solve_linear,
     solve_mixed,
@@ -193,20 +194,15 @@ def solution_of(problem: Problem, *, start: Doubles | None = None) -> Solution:
         return _solve_squares(problem, begin)
     blocks = _blocks_of(problem)
     mixed, reached = _solve_rounds(problem, begin, blocks)
-    solution = mixed
 
     def with_slots_of(found: Problem, weights: Doubles) -> Solution:
         at_slots = replace(problem, reduction=found.reduction, full=found.full)
         near = nearest_weights(at_slots.reduction, weights)
         return _descend(at_slots, near, reached, blocks)
 
-    if mixed.problem.reduction.open_wheels:
-        solution = with_slots_of(mixed.problem.with_slots(mixed.weights), mixed.weights)
-    if not solution.problem.reduction.slots:
+    solution = at_slots(mixed, with_slots_of, loss_with_pull)
+    if solution is None:
         return mixed
-    if (better := solution.problem.with_better_slots(solution.weights)) is not None:
-        trial = with_slots_of(better, solution.weights)
-        solution = min(solution, trial, key=loss_with_pull)
     final, curve = solution.problem.with_final_slots(), mixed.certificate.curve
     solution = replace(solution, problem=final, tried=mixed.tried)
     return solution.with_certificate_fields(curve=curve)

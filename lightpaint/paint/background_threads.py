@@ -12,7 +12,7 @@ from typing import Any
 from lightpaint.errors import LightpaintError, NothingToUndoError
 from lightpaint.files import first_line
 from lightpaint.paint.protocol import Message, Notice, Tone
-from lightpaint.paint.store.store import Store
+from lightpaint.paint.store.session_file import Store
 
 #: Seconds after a stroke before the exact solve starts.
 SOLVE_DELAY_S = 0.2

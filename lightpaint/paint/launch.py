@@ -20,9 +20,9 @@ from lightpaint.paint.server.address import BoundSocket, listen
 from lightpaint.paint.server.server import Server, check_installed
 from lightpaint.paint.store.database import SESSION_FILE, set_aside
 from lightpaint.paint.store.history_steps import Identity
-from lightpaint.paint.store.store import Store
+from lightpaint.paint.store.session_file import Store
 from lightpaint.paint.studio.console_switch import Console
-from lightpaint.paint.studio.studio import Studio
+from lightpaint.paint.studio.session_studio import Studio
 from lightpaint.paint.subject import LazyScene, Subject, check_view_names, session_identity
 from lightpaint.scene import Scene
 from lightpaint.signals import interruptible_between_pieces

@@ -8,15 +8,15 @@ from typing import Any, Generic, NamedTuple, TypeVar
 
 from lightpaint.errors import PaintError
 from lightpaint.lighting import Lighting
-from lightpaint.paint.background_threads import StoppedError
+from lightpaint.paint.background_threads import BackgroundThreads, StoppedError
 from lightpaint.paint.layers.canvas import ViewLayers
 from lightpaint.paint.protocol import Message, PictureUpdate, ProgressReport
 from lightpaint.paint.session.look_library import LookLibrary
+from lightpaint.paint.session.painting_session import Session
 from lightpaint.paint.session.picture_table import Picture, PictureTable
-from lightpaint.paint.session.session import Session
 from lightpaint.paint.session.snapshot import SessionSnapshot
+from lightpaint.paint.store.session_file import Store
 from lightpaint.paint.store.session_requests import SessionRequests
-from lightpaint.paint.store.store import Store
 from lightpaint.scene.runtime.render_lock import MITSUBA
 
 
@@ -221,3 +221,15 @@ class Publisher:
         self.last_progress = report = ProgressReport(task=label, done=done, total=total, unit=unit)
         with MITSUBA.aside():  # the receiver may wait for a render of its own
             self.publish(report)
+
+
+class StudioLinks(NamedTuple):
+    """What the parts of a studio work with.
+
+    access: the session. publisher: sends messages and pictures to pages. threads: run background
+    work.
+    """
+
+    access: SessionAccess
+    publisher: Publisher
+    threads: BackgroundThreads

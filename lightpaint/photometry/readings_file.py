@@ -3,17 +3,20 @@
 import csv
 import io
 import json
-from collections.abc import Iterable, Iterator, Mapping
+import math
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import asdict
 from pathlib import Path
 from typing import Any
 
 import numpy as np
+import numpy.typing as npt
+from PIL import Image, ImageDraw, ImageFont
 
 from lightpaint.arrays import Doubles
+from lightpaint.display_text import visible
 from lightpaint.files import one_line, write_bytes, write_text
 from lightpaint.images.formats import png_bytes
-from lightpaint.photometry.false_colour import false_colours
 from lightpaint.photometry.glare import Glare, GlareReading
 from lightpaint.photometry.illuminance import Illuminance, PlaneReading, relative_intervals
 from lightpaint.photometry.measuring_plane import PRESETS, MeasuringPlane, Wishes
@@ -25,6 +28,28 @@ POINTS, PLANES, PICTURE_SUFFIX = "planes.csv", "planes.json", ".png"
 
 #: Relative miss that is none: errors in a solve are those with all lamps at full.
 CLOSE = 2e-3
+
+#: Colours from little to much light, evenly spaced: they also differ in lightness, for those who
+#: see few colours and for prints without any.
+COLOURS = np.array(
+    [(38, 14, 74), (59, 60, 138), (42, 110, 142), (32, 156, 137), (98, 200, 98), (248, 230, 60)],
+    float,
+)
+
+GROUND, TEXT, LINE = (24, 24, 26), (226, 226, 226), 0.55
+
+#: Approximate side of the longer side of a plane's picture, largest side of a cell, and space for
+#: the scale at the right and the title above, in pixels.
+LONGEST, LARGEST_CELL, SCALE_WIDTH, TITLE_HEIGHT, MARGIN = 640, 96, 120, 40, 16
+
+#: Size of numbers on the picture, in pixels, and the least space between two.
+NUMBER_SIZE, NUMBER_GAP = 12, 24
+
+#: Grey of a colour, 0 to 255, above which the number on it is dark.
+LIGHT_GROUND = 110
+
+#: Approximate number of isolux lines, and least height of the picture.
+STEPS, LEAST_HEIGHT = 10, 240
 
 
 def readings_files(planes: Iterable[str]) -> list[str]:
@@ -187,3 +212,156 @@ def measured_origin(folder: Path) -> str | None:
     if not isinstance(document, Mapping) or document.get("format") != FORMAT:
         return None
     return one_line(str(document.get("origin", "")))
+
+
+def isolux_levels(most: float) -> list[float]:
+    """Return the levels of isolux lines up to `most` lx: multiples of 1, 2 or 5 times a power of
+    ten.
+    """
+    if not most > 0:
+        return [0.0, 1.0]
+    raw = most / STEPS
+    power = 10.0 ** math.floor(math.log10(raw))
+    step = next(power * k for k in (1, 2, 5, 10) if raw <= power * k * (1 + 1e-9))
+    return [step * k for k in range(math.ceil(most / step - 1e-9) + 1)]
+
+
+def false_colours(plane: MeasuringPlane, values: Doubles, title: str) -> npt.NDArray[np.uint8]:
+    """Return a picture of the illuminance on a plane, (h, w, 3).
+
+    values: (p,), lx at its points. Between points the light is interpolated; cells without a point
+    stay dark. Lines are where it passes a level of the scale. Numbers are in lx, at as many points
+    as there is space for. The lengths of the plane follow the title.
+    """
+    cells = plane.picture(values)[::-1]
+    side = max(1, min(LARGEST_CELL, LONGEST // max(cells.shape)))
+    levels = isolux_levels(float(values.max()))
+    picture = _painted(cells, side, levels)
+    height = max(picture.shape[0], LEAST_HEIGHT) + TITLE_HEIGHT + MARGIN
+    width = picture.shape[1] + 2 * MARGIN + SCALE_WIDTH
+    font = ImageFont.load_default(14)
+    sheet = Image.new("RGB", (max(width, 360), height), GROUND)
+    sheet.paste(Image.fromarray(picture), (MARGIN, TITLE_HEIGHT))
+    draw = ImageDraw.Draw(sheet)
+    draw.text((MARGIN, 12), visible(title) + lengths_text(plane), TEXT, font)
+    _draw_numbers(draw, cells, side, levels[-1])
+    left, top = picture.shape[1] + 2 * MARGIN, TITLE_HEIGHT
+    _draw_scale(draw, levels, (left, top, height - top - MARGIN), font)
+    return np.asarray(sheet)
+
+
+def lengths_text(plane: MeasuringPlane) -> str:
+    """Return the mean lengths of a plane's grid in metres, across and along, after a comma.
+
+    "" for listed points, a single row, and surfaces that lie beside each other in the picture.
+    """
+    index = plane.picture(np.arange(len(plane), dtype=float))
+    lengths = []
+    for axis in (1, 0):
+        steps = np.diff(plane.points[np.nan_to_num(index).astype(int)], axis=axis)
+        are_points = ~np.isnan(np.diff(index, axis=axis))
+        has_gap = np.isnan(index).all(axis=1 - axis).any()
+        if not plane.spacing or has_gap or not are_points.any():
+            return ""
+        step = float(np.linalg.norm(steps, axis=-1)[are_points].mean())
+        lengths.append(index.shape[axis] * step)
+    return f", {lengths[0]:.3g} m x {lengths[1]:.3g} m"
+
+
+def number_texts(values: Doubles) -> list[str]:
+    """Return illuminances as short texts, (n,) in lx: whole numbers from 100 lx on."""
+    most = float(np.max(values, initial=0))
+    decimals = 0 if most >= 100 else 1 if most >= 10 else 2
+    return [f"{x:.{decimals}f}" for x in values]
+
+
+def numbered_cells(shape: tuple[int, int], side: int, size: tuple[float, float]) -> list[slice]:
+    """Return the rows and the columns of cells that have a number, so that no two overlap and none
+    leaves the picture.
+
+    side: of a cell, in pixels. size: width and height of the largest number, in pixels.
+    """
+    width, height = size
+    chosen = []
+    for count, length in zip(shape, (height, width), strict=True):
+        step = math.ceil((length + NUMBER_GAP) / side)
+        edge = max(0, math.ceil(length / 2 / side - 0.5))
+        inside = count - 2 * edge
+        chosen.append(slice(edge + (inside - 1) % step // 2, count - edge, step))
+    return chosen
+
+
+def _draw_numbers(draw: ImageDraw.ImageDraw, cells: Doubles, side: int, most: float) -> None:
+    """Write the illuminance into cells, in dark on light ones and the other way round."""
+    font = ImageFont.load_default(NUMBER_SIZE)
+    rows, columns = np.nonzero(~np.isnan(cells))
+    places = zip(rows.tolist(), columns.tolist(), strict=True)
+    texts = dict(zip(places, number_texts(cells[rows, columns]), strict=True))
+    boxes = {place: draw.textbbox((0, 0), text, font) for place, text in texts.items()}
+    size = max(box[2] for box in boxes.values()), max(box[3] for box in boxes.values())
+    row_slice, column_slice = numbered_cells(cells.shape, side, size)
+    for row in range(cells.shape[0])[row_slice]:
+        for column in range(cells.shape[1])[column_slice]:
+            if (row, column) not in texts:
+                continue
+            left, top, right, bottom = boxes[row, column]
+            x = MARGIN + (column + 0.5) * side - (left + right) / 2
+            y = TITLE_HEIGHT + (row + 0.5) * side - (top + bottom) / 2
+            grey = float(colours_of(cells[row, column] / most) @ (0.2126, 0.7152, 0.0722))
+            draw.text((x, y), texts[row, column], GROUND if grey > LIGHT_GROUND else TEXT, font)
+
+
+def _painted(cells: Doubles, side: int, levels: Sequence[float]) -> npt.NDArray[np.uint8]:
+    """Return the colours of interpolated cells, with lines at levels, (h, w, 3)."""
+    from scipy.ndimage import distance_transform_edt  # late: every command loads this module
+
+    rows, columns = cells.shape
+    is_empty = np.isnan(cells)
+    # Towards a cell without a point, the light is taken to go on as in the nearest cell with one.
+    nearest = distance_transform_edt(is_empty, return_distances=False, return_indices=True)
+    light = cells[tuple(nearest)]
+    for axis, count in enumerate((rows, columns)):
+        light = _interpolated(light, (np.arange(count * side) + 0.5) / side - 0.5, axis=axis)
+    band = np.searchsorted(levels, light, side="right") - 1
+    picture = colours_of(light / levels[-1])
+    is_line = np.zeros(light.shape, bool)
+    for axis in (0, 1):
+        is_line |= np.diff(band, axis=axis, prepend=np.take(band, [0], axis=axis)) != 0
+    picture[is_line] *= LINE
+    picture[np.kron(is_empty, np.ones((side, side), bool))] = GROUND
+    return np.round(picture).astype(np.uint8)
+
+
+def _interpolated(cells: Doubles, places: Doubles, axis: int) -> Doubles:
+    """Return cells linearly interpolated along an axis. places: in cells, from their centres."""
+    last = cells.shape[axis] - 1
+    places = np.clip(places, 0, last)
+    low = np.minimum(places.astype(int), max(last - 1, 0))
+    share = np.expand_dims(places - low, 1 - axis)
+    near, far = (np.take(cells, np.minimum(k, last), axis=axis) for k in (low, low + 1))
+    return np.asarray((1 - share) * near + share * far)
+
+
+def colours_of(shares: Doubles) -> Doubles:
+    """Return the colours of shares of the scale, 0 to 1, with a last axis of 3, 0 to 255."""
+    places = np.linspace(0, 1, len(COLOURS))
+    return np.stack([np.interp(shares, places, channel) for channel in COLOURS.T], axis=-1)
+
+
+def _draw_scale(
+    draw: ImageDraw.ImageDraw,
+    levels: Sequence[float],
+    box: tuple[int, int, int],
+    font: ImageFont.FreeTypeFont | ImageFont.ImageFont,
+) -> None:
+    """Draw the scale, the brightest above. box: left, top and height."""
+    left, top, height = box
+    for y in range(height):
+        share = 1 - y / max(height - 1, 1)
+        r, g, b = (int(v) for v in colours_of(np.array(share)))
+        draw.line([(left, top + y), (left + 16, top + y)], (r, g, b))
+    for level in levels:
+        y = top + round((height - 1) * (1 - level / levels[-1]))
+        draw.line([(left, y), (left + 20, y)], TEXT)
+        unit = " lx" if level == levels[-1] else ""
+        draw.text((left + 26, y - 8), f"{level:g}{unit}", TEXT, font)

@@ -1,20 +1,22 @@
 """The one call that does everything: it makes a job from its arguments and runs it."""
 
 from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass
+from functools import cached_property
 from pathlib import Path
 from typing import Any, overload
 
 from lightpaint.basis import Basis, LightGroups
 from lightpaint.basis.cache import check_same_view
 from lightpaint.colour import TransformChoice
-from lightpaint.errors import SceneError, TargetError
+from lightpaint.errors import LightpaintError, SceneError, TargetError
 from lightpaint.keywords import keywords
 from lightpaint.lighting import Constraints
-from lightpaint.pipeline.job.job import Job
 from lightpaint.pipeline.job.settings import Settings
+from lightpaint.pipeline.job.solve_job import Job
 from lightpaint.pipeline.job.sources import BasisFile, Painting, SceneFile, check_needed
-from lightpaint.pipeline.pipeline import run
-from lightpaint.pipeline.results.results import Look
+from lightpaint.pipeline.job_run import run
+from lightpaint.pipeline.results.look import Look
 from lightpaint.placement import Rigging
 from lightpaint.progress import Progress, silent
 from lightpaint.scene import Scene
@@ -104,62 +106,71 @@ def paint_with_light(
     }
     bases = basis if isinstance(basis, list) else None
     if bases is not None:
-        scenes = _as_list(scene)
-        if len(scenes) != len(bases):
-            raise SceneError(f"{len(scenes)} scenes for {len(bases)} bases: give one for each")
-        scene = [_with_film_of(*pair) for pair in zip(scenes, bases, strict=True)]
+        scene = _on_films_of(bases, _as_list(scene))
         # These scenes have the films of their bases already.
         basis, settings = None, settings | {"resolution": "1/1"}
+    checked = Settings(**settings)
     read = {"mask": mask and str(mask), "layer": layer, "find": find}
-    requests = Constraints() if constraints is None else constraints, rigging or Rigging()
-    job = _job(
-        (scene, options), (target, read), Path(folder), basis, requests, Settings(**settings)
+    scenes = _Inputs(scene, SceneFile, {k: v for k, v in options.items() if v not in (None, {})})
+    targets = _Inputs(
+        target, Painting, {**read, "transform": TransformChoice.of(checked.transform)}
+    )
+    _check_scenes(scenes, basis)
+    unused = [name for name, value in read.items() if value not in (None, True)]
+    targets.check_used(unused, TargetError, "a target that is already read")
+    source: Any = BasisFile(str(basis)) if isinstance(basis, str | Path) else basis
+    job = Job(
+        scenes.contents,
+        targets.contents,
+        Path(folder),
+        source,
+        Constraints() if constraints is None else constraints,
+        checked,
+        by_sensor=isinstance(scene, list | tuple),
+        rigging=rigging or Rigging(),
     )
     looks = run(job, progress, bases=bases)
     return looks if job.by_sensor else looks[0]
 
 
-def _job(
-    scene: tuple[Any, Mapping[str, Any]],
-    target: tuple[Any, Mapping[str, Any]],
-    folder: Path,
-    basis: Any,
-    requests: tuple[Constraints, Rigging],
-    settings: Settings,
-) -> Job:
-    """Return the job that the arguments of `paint_with_light` describe.
-
-    scene, target: sources, with the options for reading them.
+@dataclass(frozen=True)
+class _Inputs:
+    """Scenes or targets of a call: none, one or several, of which a path becomes a `file` that is
+    read with `options`.
     """
-    constraints, rigging = requests
-    (scenes, scene_options), (targets, target_options) = scene, target
-    scene_options = {
-        name: value for name, value in scene_options.items() if value not in (None, {})
-    }
-    by_sensor = isinstance(scenes, list | tuple)
-    painting_options = {**target_options, "transform": TransformChoice.of(settings.transform)}
-    unused_options = [name for name, value in target_options.items() if value not in (None, True)]
-    scenes = [SceneFile(str(x), **scene_options) if _is_path(x) else x for x in _as_list(scenes)]
-    targets = [
-        Painting(str(x), **painting_options) if _is_path(x) else x for x in _as_list(targets)
-    ]
-    for each in scenes:
+
+    given: Any
+    file: type[SceneFile] | type[Painting]
+    options: Mapping[str, Any]
+
+    @cached_property
+    def contents(self) -> tuple[Any, ...]:
+        """The scenes or targets of a job."""
+        return tuple(
+            self.file(str(x), **self.options) if isinstance(x, str | Path) else x
+            for x in _as_list(self.given)
+        )
+
+    def check_used(
+        self, options: Iterable[str], error: type[LightpaintError], content: str
+    ) -> None:
+        """Raise `error` for options, by name, if nothing is read with them but `content`."""
+        names = [Hint(name) for name in options]
+        if names and not any(isinstance(x, self.file) for x in self.contents):
+            raise error(Sentence.joined(names), f" cannot change {content}: give its path")
+
+
+def _check_scenes(scenes: _Inputs, basis: object) -> None:
+    """Raise SceneError for other things than scenes, and for options that read none."""
+    for each in scenes.contents:
         if not isinstance(each, Scene | SceneFile):
             raise SceneError(
                 f"the scene is of type {type(each).__name__}: expected the path of Mitsuba XML, a "
                 "loaded Scene, or None with a basis"
             )
-    if scene_options and not scenes:
-        check_needed(scene_options, basis)
-    if scene_options and not any(isinstance(x, SceneFile) for x in scenes):
-        names = Sentence.joined(map(Hint, scene_options))
-        raise SceneError(names, " cannot change a scene that is already loaded: give its path")
-    if unused_options and not any(isinstance(x, Painting) for x in targets):
-        names = Sentence.joined(map(Hint, unused_options))
-        raise TargetError(names, " cannot change a target that is already read: give its path")
-    basis = BasisFile(str(basis)) if _is_path(basis) else basis
-    options: dict[str, Any] = {"by_sensor": by_sensor, "rigging": rigging}
-    return Job(tuple(scenes), tuple(targets), folder, basis, constraints, settings, **options)
+    if not scenes.contents:
+        check_needed(scenes.options, basis)
+    scenes.check_used(scenes.options, SceneError, "a scene that is already loaded")
 
 
 def _as_list(value: Any) -> list[Any]:
@@ -169,8 +180,11 @@ def _as_list(value: Any) -> list[Any]:
     return list(value) if isinstance(value, list | tuple) else [value]
 
 
-def _is_path(value: Any) -> bool:
-    return isinstance(value, str | Path)
+def _on_films_of(bases: Sequence[Basis], scenes: Sequence[Any]) -> list[Scene]:
+    """Return scenes with the sensors and films of their bases."""
+    if len(scenes) != len(bases):
+        raise SceneError(f"{len(scenes)} scenes for {len(bases)} bases: give one for each")
+    return [_with_film_of(*pair) for pair in zip(scenes, bases, strict=True)]
 
 
 def _with_film_of(scene: Any, basis: Basis) -> Scene:

@@ -21,12 +21,12 @@ from lightpaint.display_text import some_names
 from lightpaint.errors import SceneError
 from lightpaint.images import Estimate, block_mean
 from lightpaint.lighting import Constraints, Problem, Solution, solution_of
-from lightpaint.pipeline.job.job import Job
 from lightpaint.pipeline.job.job_checks import sky_for_sun, wanted_sun
 from lightpaint.pipeline.job.settings import Settings
+from lightpaint.pipeline.job.solve_job import Job
 from lightpaint.pipeline.job.sources import content
 from lightpaint.pipeline.job_bases import obtain, problem_of, view_listener, without_noise
-from lightpaint.pipeline.results.results import all_changes, spoken_change
+from lightpaint.pipeline.results.look import all_changes, spoken_change
 from lightpaint.placement import (
     Freedom,
     Move,

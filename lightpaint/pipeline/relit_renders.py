@@ -37,8 +37,8 @@ from lightpaint.images.formats import (
 )
 from lightpaint.keywords import keywords
 from lightpaint.lighting import Lighting, read_lighting
-from lightpaint.pipeline.job.job import Job
 from lightpaint.pipeline.job.job_checks import remarks_of_pictures
+from lightpaint.pipeline.job.solve_job import Job
 from lightpaint.pipeline.job.sources import GroupsFile
 from lightpaint.pipeline.results.result_folder import (
     LIGHTING,

@@ -1,4 +1,6 @@
-"""Planes on which a job wishes for illuminance: measured before the solve, and read after it."""
+"""Planes on which a job wishes for illuminance, measured before the solve and read after it; and
+plans: settings of the lamps that meet such wishes with the least power.
+"""
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
@@ -10,8 +12,10 @@ from lightpaint.arrays import Doubles
 from lightpaint.basis import BasisLight, Lights
 from lightpaint.basis.render import basis_lights
 from lightpaint.display_text import some_names
+from lightpaint.keywords import keywords
 from lightpaint.lighting import (
     Constraints,
+    Lighting,
     LitCase,
     PaintComparison,
     PlanesAnswer,
@@ -23,6 +27,7 @@ from lightpaint.lighting import (
     WishedLight,
     check_powers,
     constraints_of,
+    least_watts,
     planes_answer,
     reduce_to,
     solution_of,
@@ -33,20 +38,21 @@ from lightpaint.lighting import (
     with_wishes,
     without_wishes,
 )
-from lightpaint.photometry.glare import Glare
-from lightpaint.photometry.illuminance import Illuminance
-from lightpaint.photometry.measure import measure_illuminance
-from lightpaint.photometry.measure_glare import measure_glare
-from lightpaint.photometry.measuring_plane import PowerBudget
+from lightpaint.photometry import Glare, Illuminance, PowerBudget
+from lightpaint.photometry.measure import measure_glare, measure_illuminance
 from lightpaint.photometry.planes_file import PlanesFile, read_planes
-from lightpaint.pipeline.job.job import Job
 from lightpaint.pipeline.job.job_checks import checked_scale
 from lightpaint.pipeline.job.settings import Settings
-from lightpaint.progress import Listener
+from lightpaint.pipeline.job.solve_job import Job
+from lightpaint.pipeline.results.result_folder import ResultFolder, answer_files, files_of_planes
+from lightpaint.progress import Listener, Progress, listener, silent
 from lightpaint.scene import Scene
 
 #: Least cosine between the normal of a plane and the vertical at which it faces upwards.
 FACING_UP = 0.7
+
+#: The file of a plan's numbers.
+PLAN = "plan.json"
 
 
 @dataclass(frozen=True)
@@ -280,3 +286,80 @@ def _floor_area(file: PlanesFile, scene: Scene) -> float:
     up = np.array(scene.up)
     areas = (x.area_m2 for x in file.planes if float((x.normals @ up).mean()) > FACING_UP)
     return max(areas, default=0.0)
+
+
+@dataclass(frozen=True)
+class LightPlan:
+    """The settings of least power. lighting: of all lamps. planes: what it gives on the planes."""
+
+    lighting: Lighting
+    planes: PlanesAnswer
+
+
+@keywords()
+def plan_lighting(
+    scene: Scene,
+    planes: str | Path,
+    *,
+    constraints: Constraints | None = None,
+    settings: Settings | None = None,
+    progress: Progress = silent,
+) -> LightPlan:
+    """Find the settings of the lamps that meet the wishes for planes with the least power.
+
+    Args:
+        scene: From `load_scene`. Its lights file gives each lamp's emitters, with their power.
+        planes: Path of a planes file.
+        constraints: On lights; they override the constraints of the lights file.
+        settings: Of these `error`, `seed`, `use_cache`, `cd_per_unit` and `watts` count.
+        progress: Called with the progress of the work.
+
+    Returns:
+        The lighting, and what it gives on the planes. Wishes beyond all lamps are met as far as
+        they can be.
+
+    Raises:
+        LightpaintError: If the power of a lamp is unknown, or nothing says what a radiance of 1 is.
+        SceneError: For an invalid planes file.
+    """
+    settings, listen = settings or Settings(), listener(progress)
+    every, scale = constraints_and_scale(scene, constraints or Constraints(), settings)
+    lights = basis_lights(scene)
+    reduction = reduce_to(every, lights)
+    check_powers(reduction, [light.name for light in lights], "the least power")
+    measured = measure_planes(scene, planes, settings, scale, listen)
+    measured = with_glare(measured, scene, settings, listen)
+    return plan_of(measured, reduction, scene_identity=scene.identity)
+
+
+def plan_of(planes: MeasuredPlanes, reduction: Reduction, *, scene_identity: str = "") -> LightPlan:
+    """Return the plan for measured planes. reduction: of the lights, without requirements."""
+    wished = planes.wished_of(reduction)
+    required = reduction.with_requirements(wished.requirements)
+    program = least_watts(wished, required)
+    weights = required.weights(program.x)
+    answer = planes_answer(
+        wished,
+        reduction,
+        weights,
+        floor_m2=planes.floor_m2,
+        prices=wished.multipliers_of(program.multipliers),
+        glare=planes.glare,
+    )
+    lighting = Lighting.of_weights(
+        planes.illuminance.lights,
+        weights,
+        labels=[(label, False) for label in reduction.labels],
+        lamps=reduction.lamps,
+        target=planes.file.path.name,
+        scene_identity=scene_identity,
+        cd_per_unit=planes.illuminance.cd_per_unit,
+    )
+    return LightPlan(lighting, answer)
+
+
+def plan_folder(scene: Scene, planes: Path, folder: Path, *, force: bool) -> ResultFolder:
+    """Return the folder that a plan is written to."""
+    files = [*answer_files(folder, scene=scene), folder / PLAN, *files_of_planes(folder, planes)]
+    reads = (planes, *scene.read_files)
+    return ResultFolder(folder, tuple(files), reads, (planes,), force=force)

@@ -11,6 +11,14 @@ if TYPE_CHECKING:
     from lightpaint.placement.applied_rigging import rigged_lights as rigged_lights
     from lightpaint.placement.applied_rigging import surfaces_of as surfaces_of
     from lightpaint.placement.freedom import Freedom as Freedom
+    from lightpaint.placement.light_changes import HARDLY_VISIBLE as HARDLY_VISIBLE
+    from lightpaint.placement.light_changes import TO_END as TO_END
+    from lightpaint.placement.light_changes import AddedLight as AddedLight
+    from lightpaint.placement.light_changes import Move as Move
+    from lightpaint.placement.light_changes import Placement as Placement
+    from lightpaint.placement.light_changes import PlacementRecord as PlacementRecord
+    from lightpaint.placement.light_changes import read_placement as read_placement
+    from lightpaint.placement.light_changes import record_of as record_of
     from lightpaint.placement.lights_to_place import free_light as free_light
     from lightpaint.placement.lights_to_place import why_not_searched as why_not_searched
     from lightpaint.placement.look_goals import on_small_film as on_small_film
@@ -23,14 +31,6 @@ if TYPE_CHECKING:
     from lightpaint.placement.place_search import check_suggestible as check_suggestible
     from lightpaint.placement.place_search import place as place
     from lightpaint.placement.place_search import suggest_lights as suggest_lights
-    from lightpaint.placement.placement import HARDLY_VISIBLE as HARDLY_VISIBLE
-    from lightpaint.placement.placement import TO_END as TO_END
-    from lightpaint.placement.placement import AddedLight as AddedLight
-    from lightpaint.placement.placement import Move as Move
-    from lightpaint.placement.placement import Placement as Placement
-    from lightpaint.placement.placement import PlacementRecord as PlacementRecord
-    from lightpaint.placement.placement import read_placement as read_placement
-    from lightpaint.placement.placement import record_of as record_of
     from lightpaint.placement.rigging import LIGHT_KINDS as LIGHT_KINDS
     from lightpaint.placement.rigging import Rigging as Rigging
     from lightpaint.placement.rigging import rigging_of as rigging_of

@@ -17,6 +17,7 @@ from lightpaint.keywords import keywords
 from lightpaint.lighting import Constraints, Solution
 from lightpaint.placement.free_space import as_position, pixels_of
 from lightpaint.placement.freedom import Freedom
+from lightpaint.placement.light_changes import AddedLight, Move, Placement, hung
 from lightpaint.placement.lights_to_place import (
     Arrangement,
     Movable,
@@ -30,7 +31,6 @@ from lightpaint.placement.look_goals import check_looks, check_views, films_of
 from lightpaint.placement.new_lights import MirroredPair, NewLights
 from lightpaint.placement.paths.panel_lights import PanelSite, without_panels
 from lightpaint.placement.paths.view_paths import SearchPaths
-from lightpaint.placement.placement import AddedLight, Move, Placement, hung
 from lightpaint.placement.placement_fit import fit_of
 from lightpaint.placement.search.judgement import (
     ArrangementError,

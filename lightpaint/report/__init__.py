@@ -56,11 +56,11 @@ if TYPE_CHECKING:
     from lightpaint.report.page.mixer import packed_gels as packed_gels
     from lightpaint.report.page.mixer import planes_for_page as planes_for_page
     from lightpaint.report.page.mixer import transform_data as transform_data
-    from lightpaint.report.page.page import prepare_page as prepare_page
-    from lightpaint.report.page.page import report_page as report_page
     from lightpaint.report.page.placement_section import spoken_position as spoken_position
     from lightpaint.report.page.placement_section import spoken_suggestions as spoken_suggestions
     from lightpaint.report.page.placement_section import spoken_turn as spoken_turn
+    from lightpaint.report.page.report_page import prepare_page as prepare_page
+    from lightpaint.report.page.report_page import report_page as report_page
     from lightpaint.report.phrases import NO_CLOSER_TEXT as NO_CLOSER_TEXT
     from lightpaint.report.phrases import rendering_sentences as rendering_sentences
     from lightpaint.report.phrases import spoken_amount as spoken_amount

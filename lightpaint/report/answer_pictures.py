@@ -86,13 +86,13 @@ def paint_coverage(importance: Floats) -> Floats:
     return np.asarray(np.clip(coverage(importance) / PAINT_SHOWN, 0, 1))
 
 
-def unpainted_look(current: Floats, *, transform: ViewTransform, hatched: bool = False) -> Floats:
-    """Return the current look as a background: grey and dim, with diagonal lines if `hatched`."""
-    return np.repeat(_dim_look(current, transform, hatched=hatched)[..., None], 3, axis=-1)
+def unpainted_look(current: Floats, *, transform: ViewTransform) -> Floats:
+    """Return the current look as a background: grey and dim."""
+    return np.repeat(_dim_look(current, transform, hatched=False)[..., None], 3, axis=-1)
 
 
 def _dim_look(current: Floats, transform: ViewTransform, *, hatched: bool) -> Floats:
-    """Return the grey of `unpainted_look`, (h, w)."""
+    """Return the grey of `unpainted_look`, (h, w), with diagonal lines if `hatched`."""
     height, width = current.shape[:2]
     period = max(6, width // 80)
 

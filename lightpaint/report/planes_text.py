@@ -5,10 +5,18 @@ from collections.abc import Iterator, Mapping
 from typing import Any
 
 from lightpaint.lighting import PlanesAnswer, WishOutcome
-from lightpaint.photometry.glare import LARGEST_ANGLE, LEAST_ANGLE, LEAST_RATING, GlareReading
-from lightpaint.photometry.illuminance import NORMAL_95, PlaneReading
-from lightpaint.photometry.measuring_plane import PRESETS, MeasuringPlane, plane_title
-from lightpaint.photometry.readings_file import glare_document
+from lightpaint.photometry import (
+    LARGEST_ANGLE,
+    LEAST_ANGLE,
+    LEAST_RATING,
+    NORMAL_95,
+    PRESETS,
+    GlareReading,
+    MeasuringPlane,
+    PlaneReading,
+    glare_document,
+    plane_title,
+)
 
 #: Headings of a table of observers.
 GLARE_HEADINGS = ("observer", "UGR", "background cd/m²", "most from")

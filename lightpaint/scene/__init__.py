@@ -23,6 +23,7 @@ if TYPE_CHECKING:
     from lightpaint.scene.lights.new_emitter import PLUGIN_OF as PLUGIN_OF
     from lightpaint.scene.lights.new_emitter import NewEmitter as NewEmitter
     from lightpaint.scene.lights.new_emitter import new_emitter_at as new_emitter_at
+    from lightpaint.scene.mitsuba_scene import Scene as Scene
     from lightpaint.scene.properties.emission import AS_AUTHORED as AS_AUTHORED
     from lightpaint.scene.properties.emission import ENVIRONMENTS as ENVIRONMENTS
     from lightpaint.scene.properties.emission import MULTIPLE as MULTIPLE
@@ -38,7 +39,6 @@ if TYPE_CHECKING:
     from lightpaint.scene.properties.pose import Pose as Pose
     from lightpaint.scene.properties.pose import motion_of as motion_of
     from lightpaint.scene.properties.pose import pose_of as pose_of
-    from lightpaint.scene.scene import Scene as Scene
     from lightpaint.scene.scene_reader import load_scene as load_scene
     from lightpaint.scene.scene_reader import with_layout as with_layout
     from lightpaint.scene.scene_render import SAMPLES_PER_PASS as SAMPLES_PER_PASS

@@ -9,8 +9,8 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING, Literal
 
 if TYPE_CHECKING:
+    from lightpaint.scene.mitsuba_scene import Scene
     from lightpaint.scene.properties.film import Film
-    from lightpaint.scene.scene import Scene
 
 Quality = Literal["preview", "final"]
 

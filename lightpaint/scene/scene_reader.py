@@ -2,9 +2,10 @@
 
 import os
 from collections.abc import Collection, Iterable, Mapping, Sequence
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from fnmatch import fnmatchcase
 from pathlib import Path
+from typing import Any, Self
 
 from lightpaint.errors import SceneError
 from lightpaint.files import file_length
@@ -23,12 +24,12 @@ from lightpaint.scene.lights.texels.texel import (
     parse_map_size,
     parse_size,
 )
+from lightpaint.scene.mitsuba_scene import Scene, inspect_scene, up_of
 from lightpaint.scene.properties.film import check_film, sensor_index
 from lightpaint.scene.properties.integrator import IntegratorChoice
 from lightpaint.scene.runtime.mitsuba_errors import explain_old_scene, mitsuba_errors
 from lightpaint.scene.runtime.render_lock import MITSUBA
 from lightpaint.scene.runtime.variant import use_variant
-from lightpaint.scene.scene import Scene, inspect_scene, up_of
 from lightpaint.scene.scene_tree import ParsedScene
 
 #: Endings of pictures and lightings, which people give in place of a scene.
@@ -122,35 +123,28 @@ def load_scene(
     with explain_old_scene(path), mitsuba_errors(path):
         parsed = ParsedScene(path, values, backend.variant, integrator_choice)
     index = sensor_index(sensor, parsed.sensor_names, path)
-    selection = lights_file_for(path, lights_file, beside_scene=use_lights_file)
-    selection = selection.with_more(lights, groups)
-    named_groups = selection.groups
-    if only_luminaires:
-        selection = selection.only_luminaires()
+    file = lights_file_for(path, lights_file, beside_scene=use_lights_file)
+    file = file.with_more(lights, groups)
+    selection = file.only_luminaires() if only_luminaires else file
     sizes = _image_sizes(selection, split)
     with explain_old_scene(path), mitsuba_errors(path):
-        whole = inspect_scene(parsed, index)
-        if luminaires := selection.requests.luminaires:
-            up = up_of(parsed, index, whole["emitters"])
-            scale = selection.requests.cd_per_unit
-            parsed = hang_luminaires(parsed, luminaires, named_groups, up, scale)
-            whole = inspect_scene(parsed, index)
+        parsed, whole = _inspected(parsed, index, selection, file.groups)
     sizes = images_to_split(sizes, whole["emitters"], str(path))
-    mirrored = _symmetric_images(selection, symmetric, sizes)
-    sizes, selection = _with_mirror_images(mirrored, sizes, selection)
+    images = _SplitImages(sizes, _symmetric_images(selection, symmetric, sizes)).mirrored()
+    selection = replace(selection, groups={**images.pairs, **selection.groups})
     with explain_old_scene(path), mitsuba_errors(path):
-        facts = with_split(whole, parsed, sizes, mirrored)
+        facts = images.in_facts(whole, parsed)
     check_film(path, facts["film"], facts["spp"])
     check_emitters(path, facts["emitters"])
-    facts["emitters"] = _with_colors_of_lamps(
-        facts["emitters"], [*selection.requests.lamps, *lamps]
-    )
+    lamp_names = [*selection.requests.lamps, *lamps]
+    facts["emitters"] = _with_colors_of_lamps(facts["emitters"], lamp_names)
     chosen = _select_lights(path, facts["emitters"], selection, group_alike=group_alike)
-    if len(adjusted := _adjusted_images(chosen)) < len(sizes):
+    if len(adjusted := _adjusted_images(chosen)) < len(images.sizes):
         # An image of which nothing is adjusted stays as it is, in full detail.
-        sizes = {name: size for name, size in sizes.items() if name in adjusted}
-        facts = with_split(whole, parsed, sizes, mirrored)
-        selection = selection.without_groups_of(set(mirrored) - adjusted)
+        selection = selection.without_groups_of(images.symmetric - adjusted)
+        images = images.only(adjusted)
+        facts = images.in_facts(whole, parsed)
+        facts["emitters"] = _with_colors_of_lamps(facts["emitters"], lamp_names)
         chosen = _select_lights(path, facts["emitters"], selection, group_alike=group_alike)
     return Scene(
         path=path,
@@ -159,11 +153,66 @@ def load_scene(
         lights_file=selection.path,
         requests=selection.requests,
         parsed=parsed,
-        split=sizes,
-        symmetric=frozenset(sizes).intersection(mirrored),
+        split=images.sizes,
+        symmetric=images.symmetric,
         map_size=None if map_size is None else parse_map_size(map_size),
         **facts,
     )
+
+
+@dataclass(frozen=True)
+class _SplitImages:
+    """Lights that become images of texels.
+
+    sizes: columns and rows, or layouts, by name of the light. symmetric: names of those that are
+    equal to their mirror images.
+    """
+
+    sizes: Mapping[str, GridSize | TexelLayout]
+    symmetric: frozenset[str]
+
+    def mirrored(self) -> Self:
+        """Return the images, of which symmetric ones have symmetric layouts."""
+        sizes = dict(self.sizes)
+        for name in self.symmetric:
+            size = sizes[name]
+            layout = size.made_symmetric() if isinstance(size, TexelLayout) else TexelLayout(size)
+            sizes[name] = layout if layout.splits else layout.size
+        return replace(self, sizes=sizes)
+
+    @property
+    def pairs(self) -> dict[str, Sequence[str]]:
+        """The texels of symmetric images with their mirror images, each pair under one name."""
+        pairs: dict[str, Sequence[str]] = {}
+        for name in sorted(self.symmetric):
+            size = self.sizes[name]
+            layout = size if isinstance(size, TexelLayout) else TexelLayout(size)
+            pairs = {**mirrored_pairs(name, layout), **pairs}
+        return pairs
+
+    def only(self, names: Collection[str]) -> Self:
+        """Return the images with these names."""
+        sizes = {name: size for name, size in self.sizes.items() if name in names}
+        return replace(self, sizes=sizes, symmetric=self.symmetric.intersection(sizes))
+
+    def in_facts(self, facts: Mapping[str, Any], parsed: ParsedScene) -> dict[str, Any]:
+        """Return the facts of `inspect_scene` with these images in texels."""
+        return with_split(facts, parsed, self.sizes, self.symmetric)
+
+
+def _inspected(
+    parsed: ParsedScene, sensor: int, selection: LightsFile, groups: Mapping[str, Iterable[str]]
+) -> tuple[ParsedScene, dict[str, Any]]:
+    """Return a scene with the luminaires of its lights file, and the facts of `inspect_scene`.
+
+    groups: of the lights file, also those that are not selected.
+    """
+    facts = inspect_scene(parsed, sensor)
+    if not (luminaires := selection.requests.luminaires):
+        return parsed, facts
+    up, scale = up_of(parsed, sensor, facts["emitters"]), selection.requests.cd_per_unit
+    parsed = hang_luminaires(parsed, luminaires, groups, up, scale)
+    return parsed, inspect_scene(parsed, sensor)
 
 
 @MITSUBA.acquired()
@@ -216,7 +265,7 @@ def _image_sizes(
 
 def _symmetric_images(
     selection: LightsFile, symmetric: Iterable[str] | None, sizes: Collection[str]
-) -> list[str]:
+) -> frozenset[str]:
     """Return the names of symmetric images: `symmetric`, or the images of the file that are
     split."""
     is_of_file = symmetric is None
@@ -229,23 +278,7 @@ def _symmetric_images(
         if not matches and not is_of_file:
             raise SceneError(f"symmetric: {pattern!r} is not split into texels: split it")
         names.update(matches)
-    return sorted(names)
-
-
-def _with_mirror_images(
-    symmetric: Iterable[str], sizes: Mapping[str, GridSize | TexelLayout], selection: LightsFile
-) -> tuple[dict[str, GridSize | TexelLayout], LightsFile]:
-    """Return sizes in which symmetric images are their own mirror images, and a selection in which
-    each pair of their texels is a group.
-    """
-    sizes = dict(sizes)
-    pairs: dict[str, Sequence[str]] = {}
-    for name in symmetric:
-        size = sizes[name]
-        layout = size.made_symmetric() if isinstance(size, TexelLayout) else TexelLayout(size)
-        sizes[name] = layout if layout.splits else layout.size
-        pairs = {**mirrored_pairs(name, layout), **pairs}
-    return sizes, replace(selection, groups={**pairs, **selection.groups})
+    return frozenset(names)
 
 
 def _adjusted_images(lights: Sequence[Light]) -> set[str]:

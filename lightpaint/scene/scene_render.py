@@ -12,10 +12,10 @@ from lightpaint.arrays import RGB, Doubles, Floats
 from lightpaint.errors import SceneError
 from lightpaint.images import Estimate, block_mean
 from lightpaint.progress import Progress, silent
+from lightpaint.scene.mitsuba_scene import Scene
 from lightpaint.scene.properties.film import as_seen
 from lightpaint.scene.runtime.kernel_threads import kernels
 from lightpaint.scene.runtime.render_lock import tracing
-from lightpaint.scene.scene import Scene
 from lightpaint.scene.scene_tree import with_sampling
 
 #: Number of camera samples in one pass. Passes are short, since a running kernel cannot be

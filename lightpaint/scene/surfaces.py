@@ -12,8 +12,8 @@ from lightpaint.colour import WAVELENGTHS
 from lightpaint.images import BACKGROUND as NOTHING_SEEN
 from lightpaint.images import Features, Objects, block_mean, block_pixels
 from lightpaint.progress import Progress, silent
+from lightpaint.scene.mitsuba_scene import Scene
 from lightpaint.scene.runtime.render_lock import tracing
-from lightpaint.scene.scene import Scene
 from lightpaint.scene.scene_render import Stream, largest_pass, pass_seed
 
 #: Number of samples per pixel, each a separate render, since shape indices must not be averaged.

@@ -5,12 +5,12 @@ from typing import TYPE_CHECKING
 from lightpaint.lazy_names import lazy_names
 
 if TYPE_CHECKING:
-    from lightpaint.target.target import PASS_RESIZE as PASS_RESIZE
-    from lightpaint.target.target import Target as Target
-    from lightpaint.target.target import Wish as Wish
-    from lightpaint.target.target import separate as separate
-    from lightpaint.target.target import titled as titled
-    from lightpaint.target.target import write_painting as write_painting
+    from lightpaint.target.painted_target import PASS_RESIZE as PASS_RESIZE
+    from lightpaint.target.painted_target import Target as Target
+    from lightpaint.target.painted_target import Wish as Wish
+    from lightpaint.target.painted_target import separate as separate
+    from lightpaint.target.painted_target import titled as titled
+    from lightpaint.target.painted_target import write_painting as write_painting
     from lightpaint.target.target_reader import Paint as Paint
     from lightpaint.target.target_reader import read_over_look as read_over_look
     from lightpaint.target.target_reader import read_target as read_target

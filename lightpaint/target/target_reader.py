@@ -26,7 +26,13 @@ from lightpaint.target.painted_pixels import (
     lossy_difference,
     painted_where,
 )
-from lightpaint.target.target import Target, describe_negative, painted_of, share_of, spoken_share
+from lightpaint.target.painted_target import (
+    Target,
+    describe_negative,
+    painted_of,
+    share_of,
+    spoken_share,
+)
 from lightpaint.target.template import (
     CLEAN,
     LIGHT_FILE,

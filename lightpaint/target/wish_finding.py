@@ -26,7 +26,7 @@ import numpy.typing as npt
 from lightpaint.arrays import Bools, Doubles, Floats, Indices
 from lightpaint.colour import LUMINANCE, decode_display, encode_display
 from lightpaint.images import block_sums, enlarged
-from lightpaint.target.target import Target, Wish
+from lightpaint.target.painted_target import Target, Wish
 
 #: Stops by which a place must ask for something else than what is around it, to be a wish.
 DISTINCT_STOPS = 0.5

@@ -24,12 +24,12 @@ from lightpaint.basis.file import basis_file
 from lightpaint.basis.file.basis_file import read_basis, write_basis
 from lightpaint.basis.file.file_planes import FilePlanes
 from lightpaint.basis.render.basis_render import render_basis
-from lightpaint.basis.render.render_origin import is_on_the_way
+from lightpaint.basis.render.rendered_basis import is_on_the_way
 from lightpaint.errors import LightpaintError, OutputError, SceneError
 from lightpaint.pipeline.job.settings import Settings
 from lightpaint.pipeline.job_bases import obtain
 from lightpaint.progress import Interrupted
-from lightpaint.scene.scene import Scene
+from lightpaint.scene.mitsuba_scene import Scene
 from lightpaint.scene.scene_reader import load_scene
 
 #: What one is called that no program has written to its end.

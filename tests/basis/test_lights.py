@@ -8,7 +8,7 @@ import pytest
 from lightpaint.basis.lights import BasisLight, Lights
 from lightpaint.errors import BasisError
 from lightpaint.lighting.answer.lighting import Lighting
-from lightpaint.lighting.constraints.constraints import Constraints
+from lightpaint.lighting.constraints.constraint_table import Constraints
 from lightpaint.lighting.fit import Fit, resolve_fit
 from lightpaint.lighting.linear_problem import Sums, reduce_lights, summed_problem
 from lightpaint.lighting.linear_solve import solve_linear

@@ -17,8 +17,8 @@ import lightpaint
 from lightpaint.basis.basis import Basis
 from lightpaint.basis.cache import cache, scene_facts
 from lightpaint.basis.cache.scene_facts import SceneFacts, facts_key, recall_facts, remember_facts
-from lightpaint.basis.render.render_origin import basis_lights
-from lightpaint.scene.scene import Scene
+from lightpaint.basis.render.rendered_basis import basis_lights
+from lightpaint.scene.mitsuba_scene import Scene
 from lightpaint.scene.scene_reader import load_scene
 
 SCENE = """<scene version="3.0.0">

@@ -21,11 +21,11 @@ from nightly import nightly
 
 from lightpaint.batch import engine
 from lightpaint.batch.engine import Processes
-from lightpaint.batch.gallery.gallery import contact_sheet, gallery_page
+from lightpaint.batch.gallery.gallery_page import contact_sheet, gallery_page
 from lightpaint.batch.gallery.summary import LightRow, SummaryRow, summary_csv
 from lightpaint.batch.manifest.file_names import FILES, is_reserved
 from lightpaint.batch.manifest.keys import as_key
-from lightpaint.batch.manifest.manifest import read_manifest
+from lightpaint.batch.manifest.looks_file import read_manifest
 from lightpaint.batch.plan.planner import plan_batch
 from lightpaint.batch.run import _Run, run_batch
 from lightpaint.batch.run_options import RunOptions

@@ -21,7 +21,7 @@ from renderer import write_room
 from lightpaint.basis.file import basis_file
 from lightpaint.basis.render import banded_film, basis_render
 from lightpaint.basis.render import render_parts as parts_module
-from lightpaint.batch.cluster.cluster import Cluster
+from lightpaint.batch.cluster.dask_engine import Cluster
 from lightpaint.batch.plan.planner import plan_batch
 from lightpaint.batch.run import BatchOutcome, run_batch
 from lightpaint.batch.run_options import RunOptions

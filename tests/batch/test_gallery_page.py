@@ -17,7 +17,12 @@ from PIL import Image
 
 from lightpaint.basis.lights import BasisLight
 from lightpaint.batch.gallery import summary
-from lightpaint.batch.gallery.gallery import gallery_page, planes_name, read_planes, write_planes
+from lightpaint.batch.gallery.gallery_page import (
+    gallery_page,
+    planes_name,
+    read_planes,
+    write_planes,
+)
 from lightpaint.batch.gallery.summary import NARROW, WIDE, LightRow, SummaryRow, lights_of_answer
 from lightpaint.colour.display.view_transform import ViewTransform
 from lightpaint.colour.primaries import to_8_bit

@@ -22,7 +22,7 @@ from lightpaint.batch.gallery.summary import (
     planes_of_answer,
     summary_csv,
 )
-from lightpaint.batch.plan.plan import estimate
+from lightpaint.batch.plan.plan_steps import estimate
 from lightpaint.batch.plan.planner import plan_batch
 from lightpaint.batch.run import run_batch
 from lightpaint.batch.run_options import RunOptions

@@ -9,7 +9,7 @@ import pytest
 
 from lightpaint.batch.manifest import entries
 from lightpaint.batch.manifest.file_names import files_matching
-from lightpaint.batch.manifest.manifest import read_manifest
+from lightpaint.batch.manifest.looks_file import read_manifest
 from lightpaint.batch.plan.planner import plan_batch
 from lightpaint.errors import BatchError
 

@@ -16,7 +16,7 @@ from lightpaint.batch.run_options import RunOptions
 from lightpaint.errors import BatchError
 from lightpaint.images.formats.exr import write_rgb
 from lightpaint.lighting.answer.lighting_file import read_lighting
-from lightpaint.placement.placement import read_placement
+from lightpaint.placement.light_changes import read_placement
 from lightpaint.progress import Interrupted, Listener
 
 LOOKS = """

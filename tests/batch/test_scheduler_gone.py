@@ -15,7 +15,7 @@ import pytest
 from batches import SilentListener
 
 from lightpaint.batch.cluster import workers
-from lightpaint.batch.cluster.cluster import Cluster
+from lightpaint.batch.cluster.dask_engine import Cluster
 from lightpaint.batch.cluster.parcels import unpack
 from lightpaint.batch.cluster.workers import ClusterWorkers
 from lightpaint.batch.work.work_items import ItemResult

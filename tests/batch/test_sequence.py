@@ -19,7 +19,7 @@ from lightpaint.batch.manifest.sequence import OFF_STOPS, frame_position, interp
 from lightpaint.colour.color import cct_and_duv, kelvin_to_rgb, luminance
 from lightpaint.errors import LightingError
 from lightpaint.lighting.answer.lighting import Lighting
-from lightpaint.lighting.constraints.constraints import Constraints
+from lightpaint.lighting.constraints.constraint_table import Constraints
 from lightpaint.lighting.fit import DEFAULT_HOLD
 from lightpaint.pipeline.job.settings import Settings
 

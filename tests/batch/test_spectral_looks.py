@@ -23,10 +23,10 @@ from lightpaint.errors import BatchError
 from lightpaint.lighting.answer.combination import dimmed
 from lightpaint.lighting.answer.lighting import Lighting, LightSetting
 from lightpaint.lighting.answer.lighting_file import read_lighting
-from lightpaint.pipeline.job.job import Job
 from lightpaint.pipeline.job.settings import Settings
+from lightpaint.pipeline.job.solve_job import Job
 from lightpaint.pipeline.job.sources import Painting, SceneFile
-from lightpaint.pipeline.pipeline import run
+from lightpaint.pipeline.job_run import run
 
 LOOKS = """
 [defaults]

@@ -25,7 +25,7 @@ from lightpaint.images.formats.png import png_bytes
 from lightpaint.lighting.analysis.appearance.color_choices import ColorChoice
 from lightpaint.lighting.analysis.appearance.limiting_reasons import Loosening, Reason
 from lightpaint.lighting.answer.lighting import LightSetting
-from lightpaint.lighting.constraints.constraints import Constraints
+from lightpaint.lighting.constraints.constraint_table import Constraints
 
 CURRENT = [[0.5, 0.5, 0.5], [0.4, 0.3, 0.2], [0.2, 0.3, 0.4], [0, 0, 0]]
 WEIGHTS = np.array([[1, 1, 1], [0, 0, 0], [0.2, 0.3, 0.4], [0.6, 0.2, 0.1]], np.float32)

@@ -26,7 +26,7 @@ from lightpaint.dmx.levels import encode_levels
 from lightpaint.lighting.answer.lighting import Lighting, LightSetting
 from lightpaint.lighting.answer.lighting_file import write_lighting
 from lightpaint.paint.store.history_steps import Identity, StoredLook, ViewIdentity
-from lightpaint.paint.store.store import Store
+from lightpaint.paint.store.session_file import Store
 from lightpaint.scene.properties.site import EmitterPlace, unit
 
 COLORS = ("red", "green", "blue")

@@ -10,7 +10,7 @@ from PIL import Image
 from renderer import LIGHTS, write_room
 
 from lightpaint.images.formats.exr import write_rgb
-from lightpaint.pipeline.job.job import Job
+from lightpaint.pipeline.job.solve_job import Job
 from lightpaint.pipeline.job.sources import Painting, SceneFile
 from lightpaint.scene.lights.texels.texel import texel_names
 from lightpaint.scene.properties.emission import read_emitted_image

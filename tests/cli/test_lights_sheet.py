@@ -17,8 +17,8 @@ from lightpaint.pipeline.results.result_folder import write_answer
 from lightpaint.pipeline.templates import SHEET_KEY, recorded_places
 from lightpaint.report.rig.rig_drawing import CHANGED
 from lightpaint.scene.lights.new_emitter import NewEmitter
+from lightpaint.scene.mitsuba_scene import Scene
 from lightpaint.scene.runtime.variant import use_variant
-from lightpaint.scene.scene import Scene
 from lightpaint.scene.scene_reader import load_scene
 
 

@@ -13,7 +13,7 @@ from renderer import LIGHTS, write_room
 
 from lightpaint.basis.file.basis_file import write_basis
 from lightpaint.cli.options.parser import command_parser
-from lightpaint.cli.tolerances import Tolerances
+from lightpaint.cli.output.documents import Tolerances
 from lightpaint.images.formats.exr import write_rgb
 from lightpaint.lighting.analysis.appearance.appearance import Appearance
 

@@ -21,7 +21,7 @@ from lightpaint.errors import BasisError, ImageError
 from lightpaint.lighting.answer.lighting import Lighting
 from lightpaint.lighting.answer.lighting_file import write_lighting
 from lightpaint.pipeline.job.sources import BasisFile, GroupsFile
-from lightpaint.target.target import Target
+from lightpaint.target.painted_target import Target
 
 
 @pytest.fixture

@@ -39,12 +39,12 @@ from lightpaint.paint.background_threads import BackgroundThreads
 from lightpaint.paint.message_frames import from_frame, to_frame
 from lightpaint.paint.protocol import VERSION
 from lightpaint.paint.store.history_steps import Identity, Step
+from lightpaint.paint.store.session_file import Store
 from lightpaint.paint.store.session_requests import SessionRequests
-from lightpaint.paint.store.store import Store
 from lightpaint.paint.subject_factory import make_subject, make_subjects
 from lightpaint.pipeline.job.sources import BasisFile, GroupsFile, SceneFile
 from lightpaint.version import __version__
-from lightpaint.viewer.bundle import BundleError
+from lightpaint.viewer import BundleError
 
 
 @pytest.fixture

@@ -18,7 +18,7 @@ from lightpaint.files import write_bytes, write_text
 from lightpaint.images.formats.exr import write_rgb
 from lightpaint.paint.store.session_requests import SessionRequests
 from lightpaint.paint.subject import Subject
-from lightpaint.placement.placement import AddedLight, Move, PlacementRecord
+from lightpaint.placement.light_changes import AddedLight, Move, PlacementRecord
 from lightpaint.scene.lights.new_emitter import NewEmitter
 
 #: Where the bulb goes.

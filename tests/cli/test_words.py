@@ -16,7 +16,7 @@ from lightpaint.cli.options.parser import command_parser
 from lightpaint.cli.options.source_options import LOADING
 from lightpaint.cli.output.vocabulary import BY_OPTION, OPTIONS, SPELLINGS, spoken
 from lightpaint.dmx.mvr import read_rig
-from lightpaint.lighting.constraints.constraints import Constraints
+from lightpaint.lighting.constraints.constraint_table import Constraints
 from lightpaint.paint.launch import paint_in_browser
 from lightpaint.pipeline.job.settings import Settings
 from lightpaint.pipeline.job.sources import NOT_IN_GROUPS

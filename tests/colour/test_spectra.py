@@ -21,7 +21,7 @@ from lightpaint.colour.spectra.spectrum import (
     xyz_of_powers,
 )
 from lightpaint.errors import ColorError, ConstraintError
-from lightpaint.lighting.constraints.constraints import Constraints, LightConstraint
+from lightpaint.lighting.constraints.constraint_table import Constraints, LightConstraint
 from lightpaint.sentences import SourceKey
 
 HERE = Path()

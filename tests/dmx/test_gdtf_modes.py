@@ -6,11 +6,11 @@ import numpy as np
 import pytest
 from rig_files import BEAM, RGBW, RGBW_CHANNELS, channel, gdtf
 
+from lightpaint.colour.luminous_flux import solid_angle, spot_cone
 from lightpaint.dmx.gdtf import geometry_tree, mode_channels
 from lightpaint.dmx.gdtf.fixture_type import FixtureType
 from lightpaint.dmx.gdtf.mode_channels import dmx_value
 from lightpaint.dmx.gdtf.mode_lights import FixtureMode
-from lightpaint.dmx.spot_cone import solid_angle, spot_cone
 from lightpaint.errors import RigError
 
 

@@ -21,7 +21,7 @@ from rig_files import (
     zipped,
 )
 
-from lightpaint.basis.render.render_origin import basis_lights
+from lightpaint.basis.render.rendered_basis import basis_lights
 from lightpaint.colour.luminous_flux import spot_flux
 from lightpaint.colour.spectra.spectrum import read_spectrum
 from lightpaint.dmx import rig_scene

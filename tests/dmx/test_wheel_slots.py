@@ -10,6 +10,7 @@ from rig_files import channel, fixture, gdtf, layered, write_mvr
 
 from lightpaint.colour.color import matching_functions
 from lightpaint.colour.lamp import Lamp, LampEmitter
+from lightpaint.colour.luminous_flux import solid_angle
 from lightpaint.colour.primaries import REC2020, rgb_to_xyz
 from lightpaint.dmx.console_rig import ConsoleRig, RigLight
 from lightpaint.dmx.gdtf.emitter_colour import rgb_of_xy, xy_of_kelvin
@@ -18,9 +19,8 @@ from lightpaint.dmx.gdtf.mode_lights import FixtureMode
 from lightpaint.dmx.levels import DriveFade, check_drives, decode_levels, drives_of, encode_levels
 from lightpaint.dmx.mvr import read_rig
 from lightpaint.dmx.rig_scene import cd_per_unit, lights_text, scene_text
-from lightpaint.dmx.spot_cone import solid_angle
 from lightpaint.lighting.answer.lighting import Lighting, LightSetting
-from lightpaint.lighting.constraints.constraints import LightConstraint
+from lightpaint.lighting.constraints.constraint_table import LightConstraint
 from lightpaint.relit.export.rig_files import Cue, cue_list_csv, level_rows
 
 #: Name, colour under D65, and the levels of each slot.

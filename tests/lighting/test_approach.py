@@ -11,7 +11,7 @@ from scipy.optimize import minimize
 
 from lightpaint.basis.basis import Basis
 from lightpaint.colour.display.view_transform import ViewTransform
-from lightpaint.lighting.constraints.constraints import Constraints
+from lightpaint.lighting.constraints.constraint_table import Constraints
 from lightpaint.lighting.fit import Fit
 from lightpaint.lighting.loss import lit_pixels, loss, reweighting
 from lightpaint.lighting.loss.lit_pixels import LitPixels
@@ -19,7 +19,7 @@ from lightpaint.lighting.loss.reweighting import sample_pixels
 from lightpaint.lighting.problem import Problem
 from lightpaint.lighting.solution import Solution
 from lightpaint.lighting.solver import solve
-from lightpaint.target.target import Target
+from lightpaint.target.painted_target import Target
 
 SIZE = (48, 60)
 VIEWS = [ViewTransform("srgb"), ViewTransform("agx", 1.0), ViewTransform("filmic", -1.0)]

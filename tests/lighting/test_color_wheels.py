@@ -12,9 +12,9 @@ from scipy.optimize import lsq_linear, nnls
 from lightpaint.colour.color import ciede2000, lab, luminance
 from lightpaint.colour.primaries import REC709, REC2020, rgb_to_xyz
 from lightpaint.errors import ConstraintError
-from lightpaint.lighting.analysis.analysis import analyse
+from lightpaint.lighting.analysis.answer_analysis import analyse
 from lightpaint.lighting.answer.lighting_file import read_lighting, write_lighting
-from lightpaint.lighting.constraints.constraints import Constraints
+from lightpaint.lighting.constraints.constraint_table import Constraints
 from lightpaint.lighting.fit import Fit, resolve_for_targets
 from lightpaint.lighting.live.live import LiveSolver
 from lightpaint.lighting.live.live_view import LiveView
@@ -22,7 +22,7 @@ from lightpaint.lighting.problem import Problem
 from lightpaint.lighting.solver import solve, solve_frames
 from lightpaint.lighting.unknowns import slot_search
 from lightpaint.report.phrases import spoken_lamp, spoken_wheels
-from lightpaint.target.target import Target
+from lightpaint.target.painted_target import Target
 
 SIZE = (5, 4)
 

@@ -14,7 +14,7 @@ from lightpaint.lighting.live.live_sums import SmallFilm
 from lightpaint.lighting.loss import expected_lights, weight_penalty
 from lightpaint.lighting.loss.expected_lights import ExpectedLights, Wash, adjusted_share
 from lightpaint.lighting.loss.weight_penalty import ContrastRows
-from lightpaint.target.target import Wish
+from lightpaint.target.painted_target import Wish
 
 SCENES = Path(__file__).parents[2] / "scenes"
 

@@ -10,10 +10,10 @@ from lightpaint.colour.color import delta_e, kelvin_to_rgb
 from lightpaint.colour.display.view_transform import ViewTransform
 from lightpaint.colour.spectra.color_rendering import fidelity
 from lightpaint.colour.spectra.spectrum import WAVELENGTHS, rgb_of_powers, spectrum_of
-from lightpaint.lighting.analysis.analysis import analyse
-from lightpaint.lighting.answer.light_rendering import renderings_of
+from lightpaint.lighting.analysis.answer_analysis import analyse
+from lightpaint.lighting.analysis.rendered_colors import renderings_of
 from lightpaint.lighting.answer.lighting_file import read_lighting, write_lighting
-from lightpaint.lighting.constraints.constraints import Constraints
+from lightpaint.lighting.constraints.constraint_table import Constraints
 from lightpaint.lighting.held_mixes import HELD
 from lightpaint.lighting.problem import display_transform
 from lightpaint.lighting.solver import solve
@@ -21,7 +21,7 @@ from lightpaint.paint.session.snapshot import SessionSnapshot
 from lightpaint.paint.store.session_requests import SessionRequests
 from lightpaint.pipeline.job.settings import Settings
 from lightpaint.report.phrases import rendering_sentences
-from lightpaint.target.target import Target
+from lightpaint.target.painted_target import Target
 
 SIZE = (6, 20)
 #: Peaks of LEDs: nanometres, width and height. The white one is a blue LED with a phosphor.

@@ -17,7 +17,7 @@ from lightpaint.lighting.loss.weight_penalty import image_prior
 from lightpaint.lighting.solver import solve
 from lightpaint.scene.lights.texels.image_domains import solid_angles
 from lightpaint.scene.lights.texels.texel import TexelLayout, mirrored_pairs, texel_names
-from lightpaint.target.target import Target
+from lightpaint.target.painted_target import Target
 
 FREE = Fit(colors="free")
 

@@ -13,14 +13,14 @@ from scipy.optimize import lsq_linear
 from lightpaint.colour.color import cct_and_duv, kelvin_to_rgb
 from lightpaint.dmx import drives_of
 from lightpaint.errors import BasisError, ConstraintError, LightingError
-from lightpaint.lighting.analysis.analysis import analyse
+from lightpaint.lighting.analysis.answer_analysis import analyse
 from lightpaint.lighting.answer.lighting_file import read_lighting, write_lighting
-from lightpaint.lighting.constraints.constraints import Constraints
+from lightpaint.lighting.constraints.constraint_table import Constraints
 from lightpaint.lighting.constraints.constraints_file import read_constraints
 from lightpaint.lighting.constraints.light_constraints import constraints_by_light, tables_by_light
 from lightpaint.lighting.solver import solve
 from lightpaint.lighting.unknowns.reduction import reduce_to
-from lightpaint.target.target import Target
+from lightpaint.target.painted_target import Target
 
 SIZE = (5, 4)
 

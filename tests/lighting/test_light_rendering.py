@@ -10,16 +10,16 @@ from lightpaint.colour.color import kelvin_to_rgb
 from lightpaint.colour.lamp import Lamp, LampEmitter
 from lightpaint.colour.spectra.spectrum import WAVELENGTHS, black_body, rgb_of_powers
 from lightpaint.errors import LightpaintError
-from lightpaint.lighting.answer.light_rendering import renderings_of
+from lightpaint.lighting.analysis.rendered_colors import renderings_of
 from lightpaint.lighting.answer.lighting import Lighting, LightSetting
 from lightpaint.lighting.answer.lighting_file import read_lighting, write_lighting
-from lightpaint.lighting.constraints.constraints import Constraints
+from lightpaint.lighting.constraints.constraint_table import Constraints
 from lightpaint.lighting.constraints.constraints_file import read_constraints
 from lightpaint.lighting.solver import solve
 from lightpaint.relit.formats import spectra_csv
 from lightpaint.report.page.lights_table import rendering_numbers, rendering_section
 from lightpaint.report.phrases import rendering_sentences
-from lightpaint.target.target import Target
+from lightpaint.target.painted_target import Target
 
 
 def _light(name: str, kelvin: float, drive: float, watts: float | None = 50) -> LightSetting:

@@ -11,9 +11,9 @@ from scipy.optimize import linprog
 from lightpaint.colour.color import luminance
 from lightpaint.colour.lamp import Lamp, LampEmitter
 from lightpaint.errors import ConstraintError
-from lightpaint.lighting.constraints.constraints import Constraints
+from lightpaint.lighting.constraints.constraint_table import Constraints
 from lightpaint.lighting.solver import solve
-from lightpaint.target.target import Target
+from lightpaint.target.painted_target import Target
 
 SIZE = (5, 4)
 

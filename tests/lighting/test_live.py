@@ -13,14 +13,14 @@ from hypothesis import strategies as st
 from lightpaint.basis.basis import Basis
 from lightpaint.basis.planes import MemoryPlanes
 from lightpaint.images.estimate import Estimate
-from lightpaint.lighting.constraints.constraints import Constraints
+from lightpaint.lighting.constraints.constraint_table import Constraints
 from lightpaint.lighting.fit import Fit, resolve_for_targets
 from lightpaint.lighting.live.live import ANSWERS_PER_READING, LiveSolver
 from lightpaint.lighting.live.live_view import LiveView
 from lightpaint.lighting.loss.painting import unpainted_weight_of
 from lightpaint.lighting.problem import Problem
 from lightpaint.lighting.solver import solution_of
-from lightpaint.target.target import Target
+from lightpaint.target.painted_target import Target
 
 SIZES = (37, 41), (31, 17)
 SUMS = ("M", "b", "target_norm2")

@@ -12,8 +12,8 @@ from scipy.optimize import minimize
 
 from lightpaint.arrays import Doubles, Floats
 from lightpaint.colour.display.view_transform import ViewTransform
-from lightpaint.lighting.analysis.analysis import analyse
-from lightpaint.lighting.constraints.constraints import Constraints
+from lightpaint.lighting.analysis.answer_analysis import analyse
+from lightpaint.lighting.constraints.constraint_table import Constraints
 from lightpaint.lighting.fit import Fit
 from lightpaint.lighting.loss import loss as loss_module
 from lightpaint.lighting.loss.lit_pixels import DeferredSquares, LitPixels
@@ -21,7 +21,7 @@ from lightpaint.lighting.loss.loss import Cut, Loss, PixelLoss, planes_of
 from lightpaint.lighting.normal_equations import NormalEquations
 from lightpaint.lighting.problem import Problem
 from lightpaint.lighting.solver import solution_of
-from lightpaint.target.target import Target
+from lightpaint.target.painted_target import Target
 
 SIZE = 12, 17
 

@@ -6,7 +6,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from lightpaint.lighting.constraints.constraints import Constraints, Requirements
+from lightpaint.lighting.constraints.constraint_table import Constraints, Requirements
 from lightpaint.lighting.fit import Fit, resolve_for_targets
 from lightpaint.lighting.live import live as live_module
 from lightpaint.lighting.live import many_lights
@@ -16,7 +16,7 @@ from lightpaint.lighting.live.many_lights import SomeLights
 from lightpaint.lighting.problem import Problem
 from lightpaint.lighting.solver import solution_of
 from lightpaint.lighting.unknowns.reduction import reduce_to
-from lightpaint.target.target import Target
+from lightpaint.target.painted_target import Target
 
 LIGHTS, SIZE = 24, (30, 40)
 

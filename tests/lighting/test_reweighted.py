@@ -14,12 +14,11 @@ from lightpaint.colour.display.view_transform import ViewTransform
 from lightpaint.images.estimate import Estimate
 from lightpaint.lighting import solver as solve_module
 from lightpaint.lighting.analysis.diagnosis import diagnose
-from lightpaint.lighting.analysis.noise.noise_correction import correct_noise
-from lightpaint.lighting.analysis.noise.refinement import refine
+from lightpaint.lighting.analysis.noise.noise_correction import correct_noise, refine
 from lightpaint.lighting.analysis.noise.uncertainty import error_bars
 from lightpaint.lighting.answer.combination import combine
 from lightpaint.lighting.answer.lighting import Lighting
-from lightpaint.lighting.constraints.constraints import Constraints
+from lightpaint.lighting.constraints.constraint_table import Constraints
 from lightpaint.lighting.fit import Fit
 from lightpaint.lighting.loss import lit_pixels, painting_loss, reweighting
 from lightpaint.lighting.loss.lit_pixels import LitPixels
@@ -30,7 +29,7 @@ from lightpaint.lighting.problem import Problem
 from lightpaint.lighting.solution import Solution
 from lightpaint.lighting.solver import solve, solve_again
 from lightpaint.lighting.unknowns.reduced_problem import solve_reduced
-from lightpaint.target.target import Target
+from lightpaint.target.painted_target import Target
 
 SIZE = (8, 9)
 SRGB = ViewTransform("srgb")

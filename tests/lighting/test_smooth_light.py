@@ -17,7 +17,7 @@ from lightpaint.lighting.analysis.noise.noise_correction import (
     on_smooth_light,
 )
 from lightpaint.lighting.solver import solve
-from lightpaint.target.target import Target
+from lightpaint.target.painted_target import Target
 
 SIZE, LIGHTS = (32, 48), 64
 

@@ -8,10 +8,10 @@ from light_groups import pictures
 
 from lightpaint.basis.basis import Basis, Origin
 from lightpaint.basis.lights import BasisLight
-from lightpaint.lighting.constraints.constraints import Constraints
+from lightpaint.lighting.constraints.constraint_table import Constraints
 from lightpaint.lighting.problem import remove_traces
 from lightpaint.lighting.solver import solve
-from lightpaint.target.target import Target
+from lightpaint.target.painted_target import Target
 
 SIZE = (24, 32)
 

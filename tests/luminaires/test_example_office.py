@@ -6,7 +6,7 @@ from typing import Any
 
 import pytest
 
-from lightpaint.basis.render.render_origin import basis_lights
+from lightpaint.basis.render.rendered_basis import basis_lights
 from lightpaint.lighting.constraints.constraints_file import constraints_of
 from lightpaint.lighting.unknowns.reduction import reduce_to
 from lightpaint.luminaires.web_file import read_web

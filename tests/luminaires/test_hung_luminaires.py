@@ -12,15 +12,15 @@ from renderer import LIGHTS, SCREEN, one_pass, write_room
 from webs import batwing, cosine, ies_text, street, write_web
 
 from lightpaint.arrays import Doubles
-from lightpaint.basis.render.render_origin import basis_lights
+from lightpaint.basis.render.rendered_basis import basis_lights
 from lightpaint.errors import ConstraintError, SceneError
 from lightpaint.lighting.constraints.absolute_scale import agreed_scale, with_sure_scale
-from lightpaint.lighting.constraints.constraints import Constraints
+from lightpaint.lighting.constraints.constraint_table import Constraints
 from lightpaint.lighting.constraints.constraints_file import constraints_of
 from lightpaint.lighting.unknowns.reduction import Reduction, reduce_to
 from lightpaint.luminaires.web_file import read_web
 from lightpaint.placement.lights_to_place import why_not_searched
-from lightpaint.scene.scene import Scene
+from lightpaint.scene.mitsuba_scene import Scene
 from lightpaint.scene.scene_reader import load_scene
 
 #: The renderer's numbers are float32.

@@ -18,12 +18,12 @@ from lightpaint.images.formats.exr import ExrPart, write_parts
 from lightpaint.paint import protocol
 from lightpaint.paint.notebook import widget_arguments
 from lightpaint.paint.session.look_library import LookLibrary
+from lightpaint.paint.session.painting_session import Session
 from lightpaint.paint.session.picture_table import PictureTable
-from lightpaint.paint.session.session import Session
 from lightpaint.paint.store.history_steps import Identity
-from lightpaint.paint.store.store import MemoryStore, Store
+from lightpaint.paint.store.session_file import MemoryStore, Store
 from lightpaint.pipeline.job.settings import Settings
-from lightpaint.target.target import write_painting
+from lightpaint.target.painted_target import write_painting
 
 SIZE = (18, 32)
 WHOLE = (0, *SIZE[:1], 0, SIZE[1])

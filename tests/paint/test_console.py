@@ -22,10 +22,10 @@ from lightpaint.dmx.levels import check_lamps
 from lightpaint.errors import PaintError, RigError
 from lightpaint.paint import protocol
 from lightpaint.paint.session.look_library import LookLibrary
+from lightpaint.paint.session.painting_session import Session
 from lightpaint.paint.session.picture_table import PictureTable
-from lightpaint.paint.session.session import Session
 from lightpaint.paint.store.history_steps import Identity, StoredLook
-from lightpaint.paint.store.store import MemoryStore
+from lightpaint.paint.store.session_file import MemoryStore
 from lightpaint.paint.studio.console_switch import Console, ConsoleSwitch, drives_of_session
 from lightpaint.paint.subject_factory import make_subject
 from lightpaint.pipeline.job.settings import Settings

@@ -13,7 +13,7 @@ from lightpaint.cli.commands.paint_command import command_for_paintings, options
 from lightpaint.cli.options.command_arguments import values_of
 from lightpaint.cli.options.parser import command_parser
 from lightpaint.errors import ConstraintError
-from lightpaint.lighting.constraints.constraints import Constraints
+from lightpaint.lighting.constraints.constraint_table import Constraints
 from lightpaint.paint import protocol
 from lightpaint.paint.store.session_requests import SessionRequests
 from lightpaint.paint.subject_factory import make_subject

@@ -15,7 +15,7 @@ from lightpaint.paint.layers.layer_stack import LayerStack
 from lightpaint.paint.session import history
 from lightpaint.paint.session.history import find_milestones
 from lightpaint.paint.store.history_steps import Step
-from lightpaint.paint.store.store import Store
+from lightpaint.paint.store.session_file import Store
 from lightpaint.paint.store.stored_arrays import StepAnswer
 
 

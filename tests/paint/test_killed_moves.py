@@ -10,7 +10,7 @@ from moved_sessions import RandomMover, open_moved_session
 from renderer import REPOSITORY
 
 from lightpaint.paint import protocol
-from lightpaint.paint.store.store import MemoryStore, Store
+from lightpaint.paint.store.session_file import MemoryStore, Store
 
 
 @pytest.mark.nightly

@@ -10,9 +10,9 @@ from lightpaint.basis.lights import Lights
 from lightpaint.images.denoiser import Features
 from lightpaint.paint import protocol
 from lightpaint.paint.presets.lamp_roles import BLOCKS, LampRoles, find_roles
-from lightpaint.paint.session.session import Session
+from lightpaint.paint.session.painting_session import Session
 from lightpaint.paint.store.history_steps import Identity
-from lightpaint.paint.store.store import MemoryStore
+from lightpaint.paint.store.session_file import MemoryStore
 from lightpaint.pipeline.job.settings import Settings
 
 H, W = 24, 32

@@ -41,11 +41,11 @@ from lightpaint.paint.layers.layer_files import (
 from lightpaint.paint.layers.layer_pixels import LayerPixels
 from lightpaint.paint.layers.layer_stack import Layer, LayerStack
 from lightpaint.paint.protocol import Message
-from lightpaint.paint.session.session import Session
+from lightpaint.paint.session.painting_session import Session
 from lightpaint.paint.store.history_steps import Pixels
-from lightpaint.paint.store.store import MemoryStore
+from lightpaint.paint.store.session_file import MemoryStore
 from lightpaint.paint.studio.file_imports import begin_with_layers
-from lightpaint.paint.studio.studio import Studio
+from lightpaint.paint.studio.session_studio import Studio
 from lightpaint.paint.subject import Subject
 from lightpaint.paint.subject_factory import make_subjects
 

@@ -28,7 +28,7 @@ from lightpaint.paint.layers.layer_stack import PAINTING, Gradient, Layer, Layer
 from lightpaint.paint.session.look_library import LookLibrary
 from lightpaint.paint.session.picture_table import PictureTable
 from lightpaint.paint.store.history_steps import Pixels
-from lightpaint.paint.store.store import Store
+from lightpaint.paint.store.session_file import Store
 
 SIZE = SIZES[0]
 WHOLE = (0, SIZE[0], 0, SIZE[1])

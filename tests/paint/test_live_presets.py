@@ -11,10 +11,10 @@ from lightpaint.basis.basis import meter_exposure
 from lightpaint.colour.color import delta_e
 from lightpaint.errors import PaintError
 from lightpaint.paint import protocol
-from lightpaint.paint.presets.presets import PRESETS
-from lightpaint.paint.session.session import Session
+from lightpaint.paint.presets.lighting_presets import PRESETS
+from lightpaint.paint.session.painting_session import Session
 from lightpaint.paint.store.history_steps import Identity
-from lightpaint.paint.store.store import MemoryStore
+from lightpaint.paint.store.session_file import MemoryStore
 from lightpaint.pipeline.job.settings import Settings
 
 SCENES = Path(__file__).parents[2] / "scenes"

@@ -14,14 +14,14 @@ from lightpaint.basis.basis import Basis
 from lightpaint.basis.lights import Lights
 from lightpaint.colour.display.view_transform import ViewTransform
 from lightpaint.errors import LightpaintError
-from lightpaint.lighting.constraints.constraints import Constraints
+from lightpaint.lighting.constraints.constraint_table import Constraints
 from lightpaint.paint import protocol
 from lightpaint.paint.protocol import Message
 from lightpaint.paint.session.live_answer import LiveReadings
-from lightpaint.paint.session.session import Session
+from lightpaint.paint.session.painting_session import Session
 from lightpaint.paint.session.session_planes import SessionPlanes
 from lightpaint.paint.store.history_steps import Identity
-from lightpaint.paint.store.store import MemoryStore
+from lightpaint.paint.store.session_file import MemoryStore
 from lightpaint.photometry.illuminance import Illuminance
 from lightpaint.photometry.measuring_plane import (
     LightCase,

@@ -27,8 +27,8 @@ from lightpaint.paint import protocol
 from lightpaint.paint.rig import lamp_rig
 from lightpaint.paint.rig.light_placer import SearchNotes
 from lightpaint.paint.session.live_answer import changed_requests
+from lightpaint.paint.store.session_file import Store
 from lightpaint.paint.store.session_requests import SessionRequests
-from lightpaint.paint.store.store import Store
 from lightpaint.scene.properties.pose import Site
 from lightpaint.scene.scene_reader import load_scene
 

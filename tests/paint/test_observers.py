@@ -37,10 +37,10 @@ from lightpaint.paint.server.guard import Guard
 from lightpaint.paint.server.server import page_app
 from lightpaint.paint.server.session_clients import Connections
 from lightpaint.paint.session.look_library import MAX_PROPOSALS, LookLibrary
+from lightpaint.paint.session.painting_session import Session
 from lightpaint.paint.session.picture_table import PictureTable
-from lightpaint.paint.session.session import Session
 from lightpaint.paint.store.history_steps import Identity
-from lightpaint.paint.store.store import MemoryStore
+from lightpaint.paint.store.session_file import MemoryStore
 from lightpaint.pipeline.job.settings import Settings
 
 HOST = "127.0.0.1:8421"

@@ -14,14 +14,14 @@ from renderer import assert_equal_bits, write_room
 
 import lightpaint as lp
 from lightpaint.basis.cache import cache, scene_facts
-from lightpaint.basis.render.render_origin import basis_lights
+from lightpaint.basis.render.rendered_basis import basis_lights
 from lightpaint.errors import ConstraintError, PaintError
 from lightpaint.images.denoiser import Features
 from lightpaint.images.object_map import Objects
 from lightpaint.paint import subject_factory
 from lightpaint.paint.launch import SessionFile
 from lightpaint.paint.store.history_steps import Identity
-from lightpaint.paint.store.store import Store
+from lightpaint.paint.store.session_file import Store
 from lightpaint.paint.subject import LazyScene, Subject, session_identity
 from lightpaint.paint.subject_factory import make_subject
 from lightpaint.pipeline.job.settings import Settings

@@ -12,8 +12,8 @@ from renderer import LIGHTS, write_room
 from lightpaint.errors import PaintError
 from lightpaint.paint import protocol
 from lightpaint.paint.protocol import Message
-from lightpaint.paint.store.store import Store
-from lightpaint.paint.studio.studio import Studio
+from lightpaint.paint.store.session_file import Store
+from lightpaint.paint.studio.session_studio import Studio
 from lightpaint.paint.subject import session_identity
 from lightpaint.paint.subject_factory import make_subject
 from lightpaint.pipeline.job.settings import Settings

@@ -13,7 +13,7 @@ from spectral_room import DRIVES, LEVELS, write_spectral_room
 import lightpaint as lp
 from lightpaint.errors import ConstraintError, LightpaintError
 from lightpaint.lighting.answer.lighting_file import read_lighting
-from lightpaint.lighting.constraints.constraints import Constraints
+from lightpaint.lighting.constraints.constraint_table import Constraints
 from lightpaint.lighting.constraints.constraints_file import constraints_of
 from lightpaint.lighting.unknowns.reduction import reduce_to
 from lightpaint.paint import protocol

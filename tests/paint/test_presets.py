@@ -14,11 +14,11 @@ from lightpaint.errors import PaintError
 from lightpaint.images.denoiser import Features
 from lightpaint.images.object_map import Objects
 from lightpaint.paint import protocol
-from lightpaint.paint.presets.presets import PRESETS
+from lightpaint.paint.presets.lighting_presets import PRESETS
 from lightpaint.paint.presets.view_areas import ViewAreas
-from lightpaint.paint.session.session import Session
+from lightpaint.paint.session.painting_session import Session
 from lightpaint.paint.store.history_steps import Identity
-from lightpaint.paint.store.store import MemoryStore
+from lightpaint.paint.store.session_file import MemoryStore
 from lightpaint.pipeline.job.settings import Settings
 
 H, W = 36, 64

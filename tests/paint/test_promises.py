@@ -9,16 +9,16 @@ from nightly import nightly, seeds
 
 from lightpaint.colour.display.view_transform import ViewTransform
 from lightpaint.images.object_map import Objects
-from lightpaint.lighting.analysis.analysis import Analysis, analyse
+from lightpaint.lighting.analysis.answer_analysis import Analysis, analyse
 from lightpaint.lighting.analysis.appearance.appearance import INVISIBLE
-from lightpaint.lighting.constraints.constraints import Constraints
+from lightpaint.lighting.constraints.constraint_table import Constraints
 from lightpaint.paint.protocol import Advice
 from lightpaint.paint.session.session_messages import advice, sketch_headline
 from lightpaint.paint.session.snapshot import SessionSnapshot
 from lightpaint.paint.store.session_requests import SessionRequests
 from lightpaint.pipeline.job.settings import Settings
 from lightpaint.report.phrases import spoken_amount, spoken_changed
-from lightpaint.target.target import Target
+from lightpaint.target.painted_target import Target
 
 SIZE, LEFT = (45, 75), np.s_[:, :30]
 

@@ -20,9 +20,9 @@ from lightpaint.paint.references.reference_light import (
     light_distance,
 )
 from lightpaint.paint.references.tones import LightTones, Tones
-from lightpaint.paint.session.session import Session
+from lightpaint.paint.session.painting_session import Session
 from lightpaint.paint.store.history_steps import Identity
-from lightpaint.paint.store.store import MemoryStore
+from lightpaint.paint.store.session_file import MemoryStore
 from lightpaint.pipeline.job.settings import Settings
 
 H, W = 54, 96

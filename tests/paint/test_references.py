@@ -30,9 +30,9 @@ from lightpaint.paint.references.reference_table import (
     read_reference,
 )
 from lightpaint.paint.references.tones import LightTones
-from lightpaint.paint.session.session import Session
+from lightpaint.paint.session.painting_session import Session
 from lightpaint.paint.store.history_steps import Identity
-from lightpaint.paint.store.store import MemoryStore, Store
+from lightpaint.paint.store.session_file import MemoryStore, Store
 from lightpaint.pipeline.job.settings import Settings
 from lightpaint.target.painted_pixels import compressed_like
 

@@ -15,13 +15,13 @@ from lightpaint.basis.cache.denoised_planes import read_denoised_planes
 from lightpaint.basis.render import basis_render
 from lightpaint.paint import protocol
 from lightpaint.paint.background_threads import LatestWork
-from lightpaint.paint.store.store import MemoryStore
+from lightpaint.paint.store.session_file import MemoryStore
 from lightpaint.paint.studio import session_bases
 from lightpaint.paint.studio.session_bases import SAMPLING, add_round
-from lightpaint.paint.studio.studio import Studio
+from lightpaint.paint.studio.session_studio import Studio
 from lightpaint.paint.subject import Subject
 from lightpaint.pipeline.job.settings import Settings
-from lightpaint.pipeline.needed_samples import Certainty
+from lightpaint.pipeline.job_bases import Certainty
 from lightpaint.scene.scene_reader import load_scene
 
 

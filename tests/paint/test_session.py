@@ -20,14 +20,15 @@ from lightpaint.basis.lights import BasisLight
 from lightpaint.cli.commands.paint_command import options_of
 from lightpaint.colour.color import LUMINANCE, kelvin_to_rgb
 from lightpaint.lighting.answer.combination import dimmed
-from lightpaint.lighting.constraints.constraints import Constraints
+from lightpaint.lighting.constraints.constraint_table import Constraints
 from lightpaint.lighting.fit import DEFAULT_HOLD
 from lightpaint.paint import protocol
 from lightpaint.paint.session.live_answer import LiveDrives
 from lightpaint.paint.session.look_library import LookLibrary
+from lightpaint.paint.session.painting_session import Session
 from lightpaint.paint.session.picture_table import PictureTable
-from lightpaint.paint.session.session import Session
 from lightpaint.paint.store.history_steps import Identity, Pixels, Step
+from lightpaint.paint.store.session_file import MemoryStore
 from lightpaint.paint.store.session_requests import (
     ALL_LIGHTS_KEYS,
     FIT_KEYS,
@@ -35,7 +36,6 @@ from lightpaint.paint.store.session_requests import (
     TITLES,
     SessionRequests,
 )
-from lightpaint.paint.store.store import MemoryStore
 from lightpaint.pipeline.job.settings import Settings
 from lightpaint.scene.lights.lights_file import SceneRequests
 

@@ -23,8 +23,8 @@ from stored_sessions import IDENTITY, SIZE, Plain, big, content, look, patch, st
 from lightpaint.colour.display.view_transform import ViewTransform
 from lightpaint.errors import OutputError, PaintError
 from lightpaint.paint.session.look_library import LookLibrary
+from lightpaint.paint.session.painting_session import Session
 from lightpaint.paint.session.picture_table import PictureTable
-from lightpaint.paint.session.session import Session
 from lightpaint.paint.store import database
 from lightpaint.paint.store.compression import pack, unpack
 from lightpaint.paint.store.database import set_aside
@@ -37,7 +37,7 @@ from lightpaint.paint.store.history_steps import (
     ViewIdentity,
     replay,
 )
-from lightpaint.paint.store.store import MemoryStore, Store
+from lightpaint.paint.store.session_file import MemoryStore, Store
 from lightpaint.pipeline.job.settings import Settings
 
 ACTIONS = st.lists(
@@ -154,7 +154,7 @@ WRITER = """
 import sys
 from pathlib import Path
 from stored_sessions import IDENTITY, look, step
-from lightpaint.paint.store.store import Store
+from lightpaint.paint.store.session_file import Store
 store = Store.open(Path(sys.argv[1]), IDENTITY)
 print("open", len(store.steps), flush=True)
 for number in range(len(store.steps), 10**6):
@@ -292,7 +292,7 @@ LIMITED = """
 import resource, sys
 from pathlib import Path
 from stored_sessions import IDENTITY, big, content
-from lightpaint.paint.store.store import Store
+from lightpaint.paint.store.session_file import Store
 store, number = Store.open(Path(sys.argv[1]), IDENTITY), 0
 before = resource.getrlimit(resource.RLIMIT_FSIZE)
 resource.setrlimit(resource.RLIMIT_FSIZE, (300_000, before[1]))

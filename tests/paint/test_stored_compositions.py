@@ -18,10 +18,15 @@ from lightpaint.paint import protocol
 from lightpaint.paint.layers.composed_layers import accent
 from lightpaint.paint.layers.composition import compose_layer
 from lightpaint.paint.layers.layer_stack import Layer
-from lightpaint.paint.session.session import Session
+from lightpaint.paint.session.painting_session import Session
 from lightpaint.paint.store.compression import ZEROS_LENGTH, pack, pack_patches, unpack_patches
 from lightpaint.paint.store.history_steps import Patch, Pixels
-from lightpaint.paint.store.store import COMPOSITION_VERSION, Store, StoredComposition, _digest
+from lightpaint.paint.store.session_file import (
+    COMPOSITION_VERSION,
+    Store,
+    StoredComposition,
+    _digest,
+)
 
 
 def keep(session: Session) -> None:
@@ -122,7 +127,7 @@ def test_stale_and_damaged_compositions_are_not_used(tmp_path: Path) -> None:
         assert store.compositions(looks) is not None
         assert store.compositions([2 * looks[0]]) is None
         assert store.compositions([*looks, *looks]) is None
-        with patch("lightpaint.paint.store.store.COMPOSITION_VERSION", 0):
+        with patch("lightpaint.paint.store.session_file.COMPOSITION_VERSION", 0):
             assert store.compositions(looks) is None
     for change in (
         "UPDATE composition SET step = step + 1",

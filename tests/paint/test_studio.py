@@ -27,13 +27,13 @@ from lightpaint.paint import protocol, subject
 from lightpaint.paint.background_threads import SOLVE_DELAY_S
 from lightpaint.paint.protocol import Message
 from lightpaint.paint.session import picture_table
-from lightpaint.paint.session.session import Session
+from lightpaint.paint.session.painting_session import Session
 from lightpaint.paint.session.snapshot import SessionSnapshot
 from lightpaint.paint.session_access import Publisher
 from lightpaint.paint.store import database
-from lightpaint.paint.store.store import Store
+from lightpaint.paint.store.session_file import Store
 from lightpaint.paint.studio import session_bases, session_exports
-from lightpaint.paint.studio.studio import Studio
+from lightpaint.paint.studio.session_studio import Studio
 from lightpaint.paint.subject import Subject
 from lightpaint.report.phrases import spoken_amount
 

@@ -30,12 +30,12 @@ from lightpaint.paint import background_threads, protocol
 from lightpaint.paint.notebook import widget, widget_arguments
 from lightpaint.paint.store import database
 from lightpaint.paint.store.history_steps import Identity, Pixels
-from lightpaint.paint.store.store import Store
+from lightpaint.paint.store.session_file import Store
 from lightpaint.paint.studio import session_bases
-from lightpaint.paint.studio.studio import Studio
+from lightpaint.paint.studio.session_studio import Studio
 from lightpaint.paint.subject import Subject
 from lightpaint.pipeline.job.settings import Settings, SettingsByName
-from lightpaint.viewer.bundle import BundleError, bundled, source
+from lightpaint.viewer import BundleError, bundled, source
 
 pytest.importorskip("anywidget", reason="anywidget")
 comm = pytest.importorskip("comm", reason="comm")
@@ -890,8 +890,8 @@ def test_the_script_is_one_module() -> None:
     ],
 )
 def test_what_is_not_understood_is_refused(files: Any, message: str, monkeypatch: Any) -> None:
-    monkeypatch.setattr("lightpaint.viewer.bundle.source", lambda path: files[path])
-    monkeypatch.setattr("lightpaint.viewer.bundle._code", lambda path: files[path])
+    monkeypatch.setattr("lightpaint.viewer.source", lambda path: files[path])
+    monkeypatch.setattr("lightpaint.viewer._code", lambda path: files[path])
     with pytest.raises(BundleError, match=message):
         bundled.__wrapped__("a.js")
 

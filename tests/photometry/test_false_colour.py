@@ -4,7 +4,8 @@ import numpy as np
 import pytest
 from lit_planes import UP
 
-from lightpaint.photometry.false_colour import (
+from lightpaint.photometry.measuring_plane import MeasuringPlane
+from lightpaint.photometry.readings_file import (
     GROUND,
     LARGEST_CELL,
     LONGEST,
@@ -18,7 +19,6 @@ from lightpaint.photometry.false_colour import (
     number_texts,
     numbered_cells,
 )
-from lightpaint.photometry.measuring_plane import MeasuringPlane
 
 
 def ragged() -> MeasuringPlane:

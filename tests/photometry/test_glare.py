@@ -13,13 +13,13 @@ from test_plans import REFLECTANCES, SIZE, write_room
 from webs import batwing, cosine, ies_text
 
 from lightpaint.arrays import Doubles, Position
-from lightpaint.basis.render.render_origin import basis_lights
+from lightpaint.basis.render.rendered_basis import basis_lights
 from lightpaint.errors import SceneError
 from lightpaint.lighting.constraints.constraints_file import constraints_of
 from lightpaint.lighting.unknowns.reduction import lamps_by_name
 from lightpaint.luminaires.web import Opening
 from lightpaint.photometry.glare import Glare, GlareObserver, position_index
-from lightpaint.photometry.measure_glare import measure_glare
+from lightpaint.photometry.measure import measure_glare
 from lightpaint.photometry.planes_file import read_planes
 from lightpaint.scene.scene_reader import load_scene
 

@@ -27,8 +27,8 @@ from lightpaint.errors import SceneError
 from lightpaint.photometry.illuminance import Illuminance
 from lightpaint.photometry.measure import error_excess, measure_illuminance, weights_on
 from lightpaint.progress import Interrupted
+from lightpaint.scene.mitsuba_scene import Scene
 from lightpaint.scene.properties.pose import Pose
-from lightpaint.scene.scene import Scene
 
 POINTS = [(0, 0, 0), (0.8, 0, 0), (-0.5, 0, 1.1), (0.2, 0.7, -0.4)]
 

@@ -11,7 +11,7 @@ from lightpaint.errors import SceneError
 from lightpaint.photometry.measuring_plane import MeasuringPlane, PowerBudget, Ratio, Wishes
 from lightpaint.photometry.plane_placement import cell_counts
 from lightpaint.photometry.planes_file import PlanesFile, read_planes
-from lightpaint.scene.scene import Scene
+from lightpaint.scene.mitsuba_scene import Scene
 from lightpaint.scene.scene_reader import load_scene
 
 #: A floor of 4 by 4, walls at its back (z = −2) and left (x = −2), a ceiling at 3, a cupboard and

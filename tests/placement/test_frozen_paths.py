@@ -20,8 +20,8 @@ from lightpaint.placement.paths.frozen_paths import FrozenPaths, PathSums
 from lightpaint.placement.paths.panel_lights import PanelSite
 from lightpaint.placement.paths.view_paths import SearchPaths
 from lightpaint.scene.lights.new_emitter import NewEmitter
+from lightpaint.scene.mitsuba_scene import Scene
 from lightpaint.scene.properties.pose import Site
-from lightpaint.scene.scene import Scene
 from lightpaint.scene.scene_reader import load_scene
 from lightpaint.scene.surfaces import render_features
 

@@ -11,11 +11,11 @@ from renderer import write_room
 
 import lightpaint as lp
 from lightpaint.errors import SceneError
-from lightpaint.pipeline.results.results import spoken_change
+from lightpaint.pipeline.results.look import spoken_change
 from lightpaint.placement.free_space import seen_by_camera
 from lightpaint.placement.new_lights import Mirror
 from lightpaint.scene.lights.new_emitter import NewEmitter
-from lightpaint.scene.scene import Scene
+from lightpaint.scene.mitsuba_scene import Scene
 from lightpaint.scene.scene_reader import load_scene
 
 THERE = (0.45, 1.2, 0.5)

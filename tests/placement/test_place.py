@@ -12,10 +12,10 @@ from renderer import LIGHTS, write_room
 
 import lightpaint as lp
 from lightpaint.errors import SceneError
-from lightpaint.pipeline.results.results import spoken_move
+from lightpaint.pipeline.results.look import spoken_move
 from lightpaint.placement.freedom import FreeLight
+from lightpaint.scene.mitsuba_scene import Scene
 from lightpaint.scene.properties.pose import Site
-from lightpaint.scene.scene import Scene
 from lightpaint.scene.scene_reader import load_scene
 
 LINE = ((-1.0, 1.5, 0.0), (1.0, 1.5, 0.0))

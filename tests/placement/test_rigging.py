@@ -13,7 +13,7 @@ from lightpaint.lighting.constraints.constraints_file import constraints_of
 from lightpaint.placement.applied_rigging import freedoms_of
 from lightpaint.placement.rigging import rigging_of
 from lightpaint.scene.lights.lights_file import read_lights_file
-from lightpaint.scene.scene import Scene
+from lightpaint.scene.mitsuba_scene import Scene
 from lightpaint.scene.scene_reader import load_scene
 
 SHEET = """

@@ -7,7 +7,7 @@ from renderer import write_room
 import lightpaint as lp
 from lightpaint.basis.basis import Basis
 from lightpaint.errors import SceneError
-from lightpaint.scene.scene import Scene
+from lightpaint.scene.mitsuba_scene import Scene
 from lightpaint.scene.scene_reader import load_scene
 
 #: Where bulb and beam hang in the paintings.

@@ -16,21 +16,21 @@ from lightpaint.basis.basis import Basis
 from lightpaint.basis.render.basis_render import render_basis
 from lightpaint.colour.display.view_transform import ViewTransform
 from lightpaint.errors import SceneError
-from lightpaint.lighting.constraints.constraints import Constraints
+from lightpaint.lighting.constraints.constraint_table import Constraints
 from lightpaint.lighting.solution import Solution
 from lightpaint.lighting.solver import solve
+from lightpaint.placement.light_changes import Placement
 from lightpaint.placement.place_search import (
     check_suggestible,
     emitter_xml,
     place,
     suggest_lights,
 )
-from lightpaint.placement.placement import Placement
 from lightpaint.placement.suggestion import Suggestion
 from lightpaint.report.page.placement_section import spoken_suggestions, suggestion_section
-from lightpaint.scene.scene import Scene
+from lightpaint.scene.mitsuba_scene import Scene
 from lightpaint.scene.scene_reader import load_scene
-from lightpaint.target.target import Target
+from lightpaint.target.painted_target import Target
 
 #: A light that the scene to solve does not have.
 HIDDEN = (0.4, 1.2, 0.6)

@@ -16,7 +16,7 @@ from lightpaint.lighting.analysis.noise.noise_correction import correct_noise
 from lightpaint.lighting.answer.combination import combine
 from lightpaint.lighting.solver import solve
 from lightpaint.relit.verification import compare
-from lightpaint.target.target import Target
+from lightpaint.target.painted_target import Target
 
 SIZE, SEEDS = (16, 24), 120
 

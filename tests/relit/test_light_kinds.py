@@ -19,7 +19,7 @@ from lightpaint.relit.verification_render import verify
 from lightpaint.scene.lights.light import settings_for
 from lightpaint.scene.properties.emission import MULTIPLE, Scaling
 from lightpaint.scene.scene_reader import load_scene
-from lightpaint.target.target import Target
+from lightpaint.target.painted_target import Target
 
 PLACE = """<transform name="to_world"><lookat origin="0.5 1.8 1.5" target="0 0.3 0" up="0 1 0"/>
     </transform>"""

@@ -22,7 +22,7 @@ from lightpaint.luminaires.web import SPOT_TOLERANCE, PhotometricWeb, spots_of
 from lightpaint.relit.emission_xml import plugin_remark
 from lightpaint.relit.relit_scene import relight
 from lightpaint.relit.verification_render import shares_of_emitters, verify
-from lightpaint.scene.scene import Scene
+from lightpaint.scene.mitsuba_scene import Scene
 from lightpaint.scene.scene_reader import load_scene
 
 TOML = """[light.bulb]

@@ -22,7 +22,7 @@ from lightpaint.relit.exported_answer import Source
 from lightpaint.relit.formats import names_of_forms, writers_of
 from lightpaint.relit.relit_scene import scene_patch
 from lightpaint.scene.lights.new_emitter import NewEmitter
-from lightpaint.scene.scene import Scene
+from lightpaint.scene.mitsuba_scene import Scene
 from lightpaint.scene.scene_reader import load_scene
 
 TURNED = lp.Pose(position=(0.5, 1.7, 1.0), target=(-0.6, 0, -0.3), cutoff=20)

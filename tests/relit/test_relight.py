@@ -22,7 +22,7 @@ from lightpaint.lighting.constraints.constraints_file import constraints_of
 from lightpaint.lighting.unknowns.reduction import reduce_to
 from lightpaint.relit.relit_scene import check_relightable, relight, scene_patch
 from lightpaint.relit.verification_render import verify
-from lightpaint.scene.scene import Scene
+from lightpaint.scene.mitsuba_scene import Scene
 from lightpaint.scene.scene_reader import load_scene
 
 

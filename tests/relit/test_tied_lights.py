@@ -18,9 +18,9 @@ from lightpaint.lighting.solver import solve
 from lightpaint.pipeline.one_call import paint_with_light
 from lightpaint.relit.relit_scene import check_relightable, relight
 from lightpaint.relit.verification_render import verify
-from lightpaint.scene.scene import Scene
+from lightpaint.scene.mitsuba_scene import Scene
 from lightpaint.scene.scene_reader import load_scene
-from lightpaint.target.target import Target
+from lightpaint.target.painted_target import Target
 
 SUNSKY = """<emitter type="sunsky" id="day"><float name="sun_scale" value="0.01"/>
     <float name="sky_scale" value="0.02"/>

@@ -17,7 +17,7 @@ from lightpaint.lighting.answer.lighting import Lighting, LightSetting
 from lightpaint.relit.relit_scene import relight
 from lightpaint.relit.xml_edit import Element, XmlFile, _parse
 from lightpaint.scene.checks.tokens import tag
-from lightpaint.scene.scene import Scene
+from lightpaint.scene.mitsuba_scene import Scene
 from lightpaint.scene.scene_reader import load_scene
 
 BULB = LIGHTS["bulb"]

@@ -14,9 +14,9 @@ from lightpaint.lighting.solver import solve
 from lightpaint.report.diagnosis_sentences import fit_options, fit_sentence
 from lightpaint.report.measures import ReportedAnswer
 from lightpaint.report.page.limit_sections import closer_choice, colors_section, spoken_choice
-from lightpaint.report.page.page import report_page
+from lightpaint.report.page.report_page import report_page
 from lightpaint.report.report_json import report_numbers
-from lightpaint.target.target import Target
+from lightpaint.target.painted_target import Target
 
 WARM, NEUTRAL, COOL = (tuple(kelvin_to_rgb(k).tolist()) for k in (2700.0, 5000.0, 12000.0))
 GREEN, PALE = (0.1, 1.3, 0.2), (0.5, 1.15, 0.5)

@@ -5,7 +5,7 @@ import re
 import pytest
 from renderer import REPOSITORY
 
-from lightpaint.viewer.bundle import bundled, compact_script, source, styles
+from lightpaint.viewer import bundled, compact_script, source, styles
 
 
 @pytest.mark.parametrize(

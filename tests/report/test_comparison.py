@@ -25,11 +25,11 @@ from lightpaint.lighting.analysis.appearance.limiting_reasons import Reason
 from lightpaint.lighting.analysis.diagnosis import Place
 from lightpaint.lighting.answer.combination import combine
 from lightpaint.lighting.answer.lighting import Lighting
-from lightpaint.lighting.constraints.constraints import Constraints
+from lightpaint.lighting.constraints.constraint_table import Constraints
 from lightpaint.lighting.solver import solve
-from lightpaint.pipeline.job.job import Job
+from lightpaint.pipeline.job.solve_job import Job
 from lightpaint.pipeline.job.sources import Painting
-from lightpaint.pipeline.pipeline import run
+from lightpaint.pipeline.job_run import run
 from lightpaint.report import comparison
 from lightpaint.report.answer_pictures import (
     DIVERGING,
@@ -46,7 +46,7 @@ from lightpaint.report.comparison import SURROUND, Tile, comparison_image, compo
 from lightpaint.report.measures import ReportedAnswer
 from lightpaint.report.report_json import report_numbers
 from lightpaint.report.verdict_sentences import headline
-from lightpaint.target.target import Target
+from lightpaint.target.painted_target import Target
 from lightpaint.target.target_reader import read_target
 
 SIZE = (24, 32)

@@ -7,12 +7,12 @@ import numpy as np
 import pytest
 
 from lightpaint.colour.display.view_transform import ViewTransform
-from lightpaint.lighting.analysis.analysis import without_constraints
+from lightpaint.lighting.analysis.answer_analysis import without_constraints
 from lightpaint.lighting.analysis.noise.noise_correction import correct_noise
-from lightpaint.lighting.constraints.constraints import Constraints
+from lightpaint.lighting.constraints.constraint_table import Constraints
 from lightpaint.lighting.solver import solve
 from lightpaint.report.page.limit_sections import constraints_section
-from lightpaint.target.target import Target
+from lightpaint.target.painted_target import Target
 
 SIZE = (10, 12)
 

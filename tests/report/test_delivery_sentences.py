@@ -11,7 +11,7 @@ from lightpaint.lighting.analysis.appearance.delivery import Delivery
 from lightpaint.lighting.analysis.appearance.limiting_reasons import Reason
 from lightpaint.lighting.analysis.diagnosis import Place
 from lightpaint.report.diagnosis_sentences import spoken_deliveries
-from lightpaint.report.page.page import wishes_section
+from lightpaint.report.page.report_page import wishes_section
 from lightpaint.report.verdict_sentences import headline
 
 PLACE = Place((1, 1), 0.9, (0, 0, 8, 8), (0.4, 0.4, 0.4), (0.1, 0.1, 0.1))

@@ -13,11 +13,11 @@ from PIL import Image
 
 import lightpaint as lp
 from lightpaint.basis.basis import Basis
-from lightpaint.lighting.analysis.analysis import analyse
+from lightpaint.lighting.analysis.answer_analysis import analyse
 from lightpaint.lighting.problem import Problem
-from lightpaint.pipeline.results.results import Look
+from lightpaint.pipeline.results.look import Look
 from lightpaint.relit.verification_render import compare
-from lightpaint.scene.scene import Scene
+from lightpaint.scene.mitsuba_scene import Scene
 
 MANY = 120
 NAUGHTY = "<script>alert('x')</script> & co"

@@ -17,16 +17,16 @@ from lightpaint.basis.basis import Basis
 from lightpaint.colour.display.view_transform import ViewTransform
 from lightpaint.images.estimate import Estimate
 from lightpaint.lighting import solver as solve_module
-from lightpaint.lighting.analysis.analysis import analyse
+from lightpaint.lighting.analysis.answer_analysis import analyse
 from lightpaint.lighting.answer.combination import combine
 from lightpaint.lighting.answer.lighting_file import write_lighting
-from lightpaint.lighting.constraints.constraints import Constraints
+from lightpaint.lighting.constraints.constraint_table import Constraints
 from lightpaint.lighting.solver import solve
 from lightpaint.lighting.unknowns import reduced_problem
-from lightpaint.pipeline.results.results import Look, write_report
+from lightpaint.pipeline.results.look import Look, write_report
 from lightpaint.placement.suggestion import Suggestion
 from lightpaint.relit.verification import compare
-from lightpaint.target.target import Target
+from lightpaint.target.painted_target import Target
 
 SIZE = (24, 32)
 

@@ -27,8 +27,8 @@ from lightpaint.report.measures import (
 )
 from lightpaint.report.page.figures import data_uri, thumbnail
 from lightpaint.report.page.lights_table import hex_color
-from lightpaint.report.page.page import report_page
-from lightpaint.target.target import Target
+from lightpaint.report.page.report_page import report_page
+from lightpaint.target.painted_target import Target
 
 SIZE = (24, 32)
 VOID = {"meta", "link", "img", "input", "br", "wbr"}

@@ -12,18 +12,18 @@ from nightly import nightly
 from patience import PATIENCE_S
 
 from lightpaint.images.estimate import Estimate
-from lightpaint.lighting.analysis.analysis import without_constraints
+from lightpaint.lighting.analysis.answer_analysis import without_constraints
 from lightpaint.lighting.analysis.diagnosis import diagnose
 from lightpaint.lighting.analysis.noise.uncertainty import Uncertainty
 from lightpaint.lighting.answer.combination import combine
-from lightpaint.lighting.constraints.constraints import Constraints
+from lightpaint.lighting.constraints.constraint_table import Constraints
 from lightpaint.lighting.solution import Solution
 from lightpaint.lighting.solver import solve
 from lightpaint.relit.verification import compare
 from lightpaint.report.measures import ReportedAnswer
 from lightpaint.report.page.html import ROWS_SHOWN
-from lightpaint.report.page.page import report_page
-from lightpaint.target.target import Target
+from lightpaint.report.page.report_page import report_page
+from lightpaint.target.painted_target import Target
 
 SIZE = (27, 48)
 WIDTHS = (320, 360, 390, 768, 1280)

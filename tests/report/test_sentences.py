@@ -31,7 +31,7 @@ from lightpaint.report.phrases import (
     spoken_percents,
     spoken_place,
 )
-from lightpaint.target.target import Target
+from lightpaint.target.painted_target import Target
 
 SIZE = (12, 12)
 

@@ -25,7 +25,7 @@ from lightpaint.lighting.answer.lighting_file import read_lighting
 from lightpaint.lighting.solver import solve
 from lightpaint.relit.verification import compare
 from lightpaint.report.verdict_sentences import headline, verdict
-from lightpaint.target.target import Target
+from lightpaint.target.painted_target import Target
 
 DARK, LIT = (0.1, 0.1, 0.1), (0.4, 0.4, 0.4)
 

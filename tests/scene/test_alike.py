@@ -21,8 +21,8 @@ from lightpaint.scene.lights.light_choice import (
     alike_groups,
     choose_lights,
 )
+from lightpaint.scene.mitsuba_scene import Scene
 from lightpaint.scene.properties.emission import EmissionKind, Scaling
-from lightpaint.scene.scene import Scene
 from lightpaint.scene.scene_reader import load_scene
 
 GLASS = '<bsdf type="twosided" id="glass"><bsdf type="diffuse" id="inner"/></bsdf>'

@@ -30,7 +30,7 @@ from lightpaint.scene.runtime.variant import use_variant
 from lightpaint.scene.scene_reader import load_scene
 from lightpaint.scene.scene_render import Stream, render
 from lightpaint.scene.surfaces import render_surfaces
-from lightpaint.target.target import Target
+from lightpaint.target.painted_target import Target
 
 FULL_HD = Film(0, (1920, 1080), (1920, 1080), (0, 0))
 CROPPED = Film(0, (640, 360), (320, 180), (80, 60))

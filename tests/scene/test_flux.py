@@ -9,7 +9,7 @@ import pytest
 from renderer import LIGHTS, write_room
 
 from lightpaint.scene.lights.light import Light
-from lightpaint.scene.scene import Scene
+from lightpaint.scene.mitsuba_scene import Scene
 from lightpaint.scene.scene_reader import load_scene
 
 #: The renderer's numbers are float32.

@@ -17,8 +17,8 @@ from lightpaint.errors import SceneError
 from lightpaint.images.formats.exr import write_rgb
 from lightpaint.lighting.answer.lighting import Lighting
 from lightpaint.relit.relit_files import relit_files
+from lightpaint.scene.mitsuba_scene import Scene
 from lightpaint.scene.properties.integrator import IntegratorChoice
-from lightpaint.scene.scene import Scene
 from lightpaint.scene.scene_reader import load_scene
 
 #: Of Mitsuba 0.6, which Mitsuba 3 lacks.

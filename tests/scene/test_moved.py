@@ -9,8 +9,8 @@ from renderer import write_room
 import lightpaint as lp
 from lightpaint.errors import SceneError
 from lightpaint.lighting.answer.lighting import Lighting
+from lightpaint.scene.mitsuba_scene import Scene
 from lightpaint.scene.properties.site import rotation_between
-from lightpaint.scene.scene import Scene
 from lightpaint.scene.scene_reader import load_scene
 
 #: Poses of lights without a shape, whose planes are theirs alone.

@@ -9,7 +9,7 @@ from renderer import write_room
 import lightpaint as lp
 from lightpaint.errors import SceneError
 from lightpaint.scene.lights.new_emitter import NewEmitter
-from lightpaint.scene.scene import Scene
+from lightpaint.scene.mitsuba_scene import Scene
 from lightpaint.scene.scene_reader import load_scene
 
 POINT = NewEmitter("key", "point", lp.Pose(position=(0.4, 1.2, 0.6)), emission=(2, 1, 0.5))

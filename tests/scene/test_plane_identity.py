@@ -9,7 +9,7 @@ import pytest
 from renderer import GLOSSY, LIGHTS, PATH, write_room
 
 from lightpaint.images.formats.exr import write_rgb
-from lightpaint.scene.scene import Scene
+from lightpaint.scene.mitsuba_scene import Scene
 from lightpaint.scene.scene_reader import load_scene
 
 #: Lights of the test room.

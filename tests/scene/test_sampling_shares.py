@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 from renderer import LIGHTS, write_room
 
-from lightpaint.scene.scene import Scene
+from lightpaint.scene.mitsuba_scene import Scene
 from lightpaint.scene.scene_reader import load_scene
 from lightpaint.scene.scene_render import EVEN_SHARE, Stream, render, sampled_by
 

@@ -10,8 +10,8 @@ from lit_planes import lit_scene
 from renderer import CORNELL, LIGHTS, mitsuba_render, write_room
 
 from lightpaint.errors import BackendError, SceneError
+from lightpaint.scene.mitsuba_scene import Scene
 from lightpaint.scene.runtime.variant import use_variant
-from lightpaint.scene.scene import Scene
 from lightpaint.scene.scene_reader import load_scene
 
 

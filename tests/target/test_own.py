@@ -8,7 +8,7 @@ import OpenEXR
 import pytest
 
 import lightpaint as lp
-from lightpaint.target.target import KEY, write_painting
+from lightpaint.target.painted_target import KEY, write_painting
 
 
 def _target(**options: Any) -> lp.Target:

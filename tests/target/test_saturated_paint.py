@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 import lightpaint as lp
-from lightpaint.target.target import Wish
+from lightpaint.target.painted_target import Wish
 from lightpaint.target.wish_finding import extend_saturated, find_wishes
 
 H, W = 40, 64

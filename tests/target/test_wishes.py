@@ -6,7 +6,7 @@ import pytest
 import lightpaint as lp
 from lightpaint.colour.primaries import decode_display, encode_display
 from lightpaint.errors import SizeError
-from lightpaint.target.target import Wish, separate
+from lightpaint.target.painted_target import Wish, separate
 from lightpaint.target.wish_finding import asked_ratio, find_wishes, number_places
 
 LOOK = np.full((40, 60, 3), 0.2, np.float32)

@@ -20,7 +20,7 @@ from lightpaint.basis.cache.plane_reuse import (
 from lightpaint.basis.file.basis_file import as_stored, is_large, leave_indirect
 from lightpaint.basis.render.basis_render import render_basis
 from lightpaint.basis.render.pixel_top_up import KeptTracer, top_up
-from lightpaint.basis.render.render_origin import (
+from lightpaint.basis.render.rendered_basis import (
     ONE_PASS,
     basis_lights,
     is_of,

@@ -19,7 +19,7 @@ from lightpaint.basis.file.basis_file import is_large
 from lightpaint.basis.lights import Lights
 from lightpaint.basis.planes import IndirectLight, Planes
 from lightpaint.basis.render.render_budget import half_of
-from lightpaint.basis.render.render_origin import ONE_PASS, basis_lights, method_of, origin_of
+from lightpaint.basis.render.rendered_basis import ONE_PASS, basis_lights, method_of, origin_of
 from lightpaint.basis.render.separate_renders import emitters_seen
 from lightpaint.scene import ENVIRONMENTS, Scene
 from lightpaint.version import __version__

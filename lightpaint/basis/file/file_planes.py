@@ -19,8 +19,7 @@ import numpy as np
 import numpy.typing as npt
 
 from lightpaint.arrays import Doubles, Floats, Indices
-from lightpaint.basis.file.light_channels import PLANE_CHANNELS, is_lit_part
-from lightpaint.basis.file.lit_rows import LitRows
+from lightpaint.basis.file.light_channels import PLANE_CHANNELS, LitRows, is_lit_part
 from lightpaint.basis.planes import MemoryPlanes, Planes, PlanesBase, as_slice, mix
 from lightpaint.images.formats import PartLayout, RowFile
 from lightpaint.threads import parallel_map

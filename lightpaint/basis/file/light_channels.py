@@ -1,8 +1,17 @@
-"""The channels of the part of a light in a basis file: of all pixels, or of its lit pixels."""
+"""The channels of the part of a light in a basis file, of all pixels or of its lit pixels; and rows
+of the latter (see lit_parts.py).
+"""
 
 from collections.abc import Collection
+from dataclasses import dataclass
 
+import numpy as np
+import numpy.typing as npt
+
+from lightpaint.arrays import Floats, Indices, copy_as_singles, round_to_halves
+from lightpaint.errors import BasisError
 from lightpaint.images import HALF_DIFFERENCE
+from lightpaint.images.formats import PartLayout, RowFile
 
 #: Channels of each light: its image and its noise.
 IMAGE_CHANNELS, NOISE_CHANNELS = (*"RGB",), (*(f"{HALF_DIFFERENCE}.{c}" for c in "RGB"),)
@@ -16,7 +25,7 @@ INDIRECT_CHANNELS = {*INDIRECT_IMAGE_CHANNELS, *INDIRECT_NOISE_CHANNELS}
 #: Channels of all planes that a light may have.
 PLANE_CHANNELS = (IMAGE_CHANNELS, NOISE_CHANNELS, INDIRECT_IMAGE_CHANNELS, INDIRECT_NOISE_CHANNELS)
 
-#: The channel of a part with only lit pixels (see lit_parts.py) that has the steps between them.
+#: The channel of a part with only lit pixels that has the steps between them.
 STEP = "step"
 
 #: Prefixes of the channels of image and ratios, of all light and of indirect light.
@@ -44,3 +53,74 @@ def channels_of_plane(number: int) -> tuple[list[str], list[str]]:
 def is_lit_part(channels: Collection[str]) -> bool:
     """Return whether a part with these channels holds the lit pixels of a light."""
     return STEP in channels
+
+
+def noise_numbers(
+    light: npt.NDArray[np.float16], ratios: npt.NDArray[np.float16]
+) -> npt.NDArray[np.float16]:
+    """Return the stored numbers of a half difference from those that its image has, and ratios."""
+    return round_to_halves(as_singles(light) * as_singles(ratios))
+
+
+def as_singles(numbers: npt.NDArray[np.float16]) -> npt.NDArray[np.float32]:
+    """Return half floats as float32."""
+    singles = np.empty(numbers.shape, np.float32)
+    copy_as_singles(numbers, singles)
+    return singles
+
+
+def lit_pixels(steps: npt.NDArray[np.float16], size: tuple[int, int]) -> npt.NDArray[np.uint32]:
+    """Return the lit pixels of a part, in row-major order. Raises BasisError if damaged."""
+    count = np.count_nonzero(steps)
+    counted = np.nan_to_num(steps[:count].astype(np.float64), nan=0.5)
+    pixels = np.cumsum(counted) - 1
+    is_whole = (counted == np.rint(counted)).all() and (counted > 0).all()
+    if not is_whole or (count and pixels[-1] >= size[0] * size[1]):
+        raise BasisError("the steps between the lit pixels of a light are wrong")
+    return pixels.astype(np.uint32)
+
+
+@dataclass(frozen=True)
+class LitRows:
+    """Places of the rows of a picture in a part with lit pixels.
+
+    begins: (h + 1,), the first lit pixel of each row in the list of them. before: (rows of the
+    part,), the pixel of the picture at which the steps in each of them begin.
+    """
+
+    begins: Indices
+    before: Indices
+
+    @classmethod
+    def of(cls, file: RowFile, part: PartLayout) -> "LitRows":
+        """Return the rows of a part, of which all steps are read."""
+        steps = np.empty((1, *part.size), np.float32)
+        file.read_rows(part, 0, part.size[0], [STEP], steps)
+        pixels = lit_pixels(steps.astype(np.float16).reshape(-1), part.display).astype(np.intp)
+        height, width = part.display
+        begins = np.searchsorted(pixels, width * np.arange(height + 1))
+        return cls(begins, np.concatenate([[-1], pixels[width - 1 :: width]]))
+
+    def read(self, file: RowFile, part: PartLayout, rows: slice, number: int, into: Floats) -> None:
+        """Read rows of the picture into (3, rows, w), as stored. number: of the plane."""
+        into[...] = 0
+        first, last = (int(x) for x in self.begins[[rows.start, rows.stop]])
+        if first == last:
+            return
+        width = part.display[1]
+        top, bottom = first // width, -(-last // width)
+        image, ratios = channels_of_plane(number)
+        names = [STEP, *image, *ratios]
+        block = np.empty((len(names), bottom - top, width), np.float32)
+        file.read_rows(part, top, bottom, names, block)
+        flat = block.reshape(len(names), -1)
+        pixels = self.before[top] + np.cumsum(flat[0].astype(np.intp))
+        listed = slice(first - top * width, last - top * width)
+        values = flat[1:4, listed]
+        if ratios:
+            of_noise = noise_numbers(
+                values.astype(np.float16), flat[4:7, listed].astype(np.float16)
+            )
+            values = as_singles(of_noise)
+        y, x = np.divmod(pixels[listed], width)
+        into[:, y - rows.start, x] = values

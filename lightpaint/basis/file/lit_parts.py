@@ -11,9 +11,14 @@ from collections.abc import Sequence
 import numpy as np
 
 from lightpaint.basis.file.half_floats import HALF, EncodedPlane, PlaneEncoding
-from lightpaint.basis.file.light_channels import LIT_CHANNELS, PREFIXES, STEP
+from lightpaint.basis.file.light_channels import (
+    LIT_CHANNELS,
+    PREFIXES,
+    STEP,
+    lit_pixels,
+    noise_numbers,
+)
 from lightpaint.basis.file.lit_planes import LitPlane
-from lightpaint.basis.file.lit_rows import lit_pixels, noise_numbers
 from lightpaint.basis.file.noise_rounding import noise_ratios
 from lightpaint.images.formats import Channels
 

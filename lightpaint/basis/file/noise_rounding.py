@@ -17,8 +17,8 @@ import numpy.typing as npt
 
 from lightpaint.arrays import Doubles, Floats, Indices, read_only, round_to_halves
 from lightpaint.basis.file.half_floats import CLEAN, TILE, inner_pixels, scale_of
+from lightpaint.basis.file.light_channels import as_singles, noise_numbers
 from lightpaint.basis.file.lit_planes import LitPlane
-from lightpaint.basis.file.lit_rows import as_singles, noise_numbers
 
 #: Number of lights from which planes are rounded so: with fewer it takes longer than it saves.
 MANY_LIGHTS = 96

@@ -18,19 +18,19 @@ if TYPE_CHECKING:
         remark_on_separate_renders as remark_on_separate_renders,
     )
     from lightpaint.basis.render.integrators import why_not_one_pass as why_not_one_pass
-    from lightpaint.basis.render.one_pass_basis import basis_of_sums as basis_of_sums
     from lightpaint.basis.render.pixel_top_up import KeptTracer as KeptTracer
     from lightpaint.basis.render.pixel_top_up import kept_loaded as kept_loaded
     from lightpaint.basis.render.render_budget import check_samples as check_samples
-    from lightpaint.basis.render.render_origin import ONE_PASS as ONE_PASS
-    from lightpaint.basis.render.render_origin import basis_lights as basis_lights
-    from lightpaint.basis.render.render_origin import is_of as is_of
-    from lightpaint.basis.render.render_origin import method_of as method_of
-    from lightpaint.basis.render.render_origin import samples_for as samples_for
     from lightpaint.basis.render.render_parts import Part as Part
     from lightpaint.basis.render.render_parts import PartRenderer as PartRenderer
     from lightpaint.basis.render.render_parts import PartSums as PartSums
     from lightpaint.basis.render.render_parts import plan_parts as plan_parts
+    from lightpaint.basis.render.rendered_basis import ONE_PASS as ONE_PASS
+    from lightpaint.basis.render.rendered_basis import basis_lights as basis_lights
+    from lightpaint.basis.render.rendered_basis import basis_of_sums as basis_of_sums
+    from lightpaint.basis.render.rendered_basis import is_of as is_of
+    from lightpaint.basis.render.rendered_basis import method_of as method_of
+    from lightpaint.basis.render.rendered_basis import samples_for as samples_for
     from lightpaint.basis.render.separate_renders import emitters_seen as emitters_seen
 
 if not TYPE_CHECKING:  # a type checker would take any name

@@ -18,9 +18,8 @@ from lightpaint.arrays import Bools, Floats
 from lightpaint.basis.basis import Basis
 from lightpaint.basis.file.file_planes import RowPlanes, TemporaryArray
 from lightpaint.basis.render.integrators import has_indirect_planes, plane_count
-from lightpaint.basis.render.one_pass_basis import mean_and_half_difference
 from lightpaint.basis.render.render_budget import BLOCK_SPP
-from lightpaint.basis.render.render_origin import ONE_PASS, method_of
+from lightpaint.basis.render.rendered_basis import ONE_PASS, mean_and_half_difference, method_of
 from lightpaint.errors import SceneError
 from lightpaint.scene import SAMPLES_PER_PASS, Scene
 from lightpaint.sentences import Hint

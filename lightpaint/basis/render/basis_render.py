@@ -19,12 +19,13 @@ from lightpaint.basis.render.banded_film import (
     check_memory,
     renders_in_bands,
 )
-from lightpaint.basis.render.one_pass_basis import basis_of_planes, basis_of_sums
 from lightpaint.basis.render.render_budget import Budget, Keeper, check_samples, steps
-from lightpaint.basis.render.render_origin import (
+from lightpaint.basis.render.rendered_basis import (
     ONE_PASS,
     SEPARATE,
     basis_lights,
+    basis_of_planes,
+    basis_of_sums,
     is_of,
     method_of,
     origin_of,

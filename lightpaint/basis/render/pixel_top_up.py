@@ -19,10 +19,14 @@ from lightpaint.basis.basis import Basis
 from lightpaint.basis.planes import IndirectLight, Planes, as_planes
 from lightpaint.basis.render.basis_render import train_tracer
 from lightpaint.basis.render.integrators import has_indirect_planes, plane_count
-from lightpaint.basis.render.one_pass_basis import add_halves, mean_and_half_difference
 from lightpaint.basis.render.render_budget import PASS_DIVISOR
-from lightpaint.basis.render.render_origin import ONE_PASS, is_of
 from lightpaint.basis.render.render_parts import PART_MAX_BYTES
+from lightpaint.basis.render.rendered_basis import (
+    ONE_PASS,
+    add_halves,
+    is_of,
+    mean_and_half_difference,
+)
 from lightpaint.errors import BasisError
 from lightpaint.progress import Interrupted, Progress, silent
 from lightpaint.scene import Scene, largest_pass, view_seed

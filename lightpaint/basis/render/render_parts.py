@@ -26,9 +26,15 @@ from lightpaint.basis.render.banded_film import (
 )
 from lightpaint.basis.render.basis_render import with_first_hits
 from lightpaint.basis.render.integrators import plane_count
-from lightpaint.basis.render.one_pass_basis import basis_of_planes, basis_of_sums
 from lightpaint.basis.render.render_budget import PASS_DIVISOR, half_of
-from lightpaint.basis.render.render_origin import ONE_PASS, basis_lights, method_of, origin_of
+from lightpaint.basis.render.rendered_basis import (
+    ONE_PASS,
+    basis_lights,
+    basis_of_planes,
+    basis_of_sums,
+    method_of,
+    origin_of,
+)
 from lightpaint.basis.render.separate_renders import (
     LightSums,
     emitters_seen,

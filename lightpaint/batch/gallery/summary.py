@@ -17,15 +17,14 @@ from lightpaint.arrays import RGB
 from lightpaint.basis import light_images
 from lightpaint.batch.manifest.file_names import SUMMARY_FORMAT, THUMBNAILS
 from lightpaint.batch.plan.journal import JournalLine
-from lightpaint.batch.plan.plan import Plan, PlannedLook
+from lightpaint.batch.plan.plan_steps import Plan, PlannedLook
 from lightpaint.batch.work.work_items import EXPORT, Kind
 from lightpaint.colour import ViewTransform, choose_exposure, to_8_bit
 from lightpaint.errors import LightpaintError
 from lightpaint.files import read_text, replacing
 from lightpaint.images import block_mean, denoised, fitting_factor, read_estimate
 from lightpaint.lighting import read_lighting
-from lightpaint.photometry.measuring_plane import plane_title
-from lightpaint.photometry.readings_file import PLANES
+from lightpaint.photometry import PLANES, plane_title
 from lightpaint.pipeline import PLANES_FOLDER as PLANES_FOLDER
 from lightpaint.pipeline import RECORD
 from lightpaint.relit import plain_cell

@@ -16,7 +16,7 @@ from lightpaint.batch.manifest.keys import (
     Mistakes,
     near_key,
 )
-from lightpaint.batch.manifest.manifest import Manifest, Table, subject_keys
+from lightpaint.batch.manifest.looks_file import Manifest, Table, subject_keys
 from lightpaint.display_text import some_names
 from lightpaint.errors import LightpaintError
 from lightpaint.files import is_name

@@ -32,7 +32,7 @@ from lightpaint.batch.manifest.keys import (
     Mistakes,
     Space,
 )
-from lightpaint.batch.manifest.manifest import Manifest, Table
+from lightpaint.batch.manifest.looks_file import Manifest, Table
 from lightpaint.batch.manifest.sequence import frame_position
 from lightpaint.colour import TransformChoice
 from lightpaint.display_text import some_names

@@ -11,7 +11,7 @@ from glob import escape
 from pathlib import Path
 from typing import Any
 
-from lightpaint.batch.plan.plan import Plan, PlannedLook
+from lightpaint.batch.plan.plan_steps import Plan, PlannedLook
 from lightpaint.errors import BatchError
 from lightpaint.files import check_writable, write_text
 from lightpaint.sentences import Hint

@@ -11,9 +11,9 @@ from lightpaint.basis.render import basis_lights, memory_needed, why_not_one_pas
 from lightpaint.batch.manifest.entries import LookEntry, entries_of
 from lightpaint.batch.manifest.file_names import check_gallery
 from lightpaint.batch.manifest.keys import Mistakes, as_key, vary
-from lightpaint.batch.manifest.manifest import Manifest, read_manifest
+from lightpaint.batch.manifest.looks_file import Manifest, read_manifest
 from lightpaint.batch.plan.journal import Fingerprints, Journal
-from lightpaint.batch.plan.plan import (
+from lightpaint.batch.plan.plan_steps import (
     Cost,
     PlaceGroup,
     Plan,

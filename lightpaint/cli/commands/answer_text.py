@@ -15,7 +15,7 @@ from lightpaint.cli.output.vocabulary import BY_OPTION, spoken
 from lightpaint.colour import LUMINANCE, luminance, rgb_to_hex
 from lightpaint.display_text import some_names, some_of
 from lightpaint.lighting import KEYS_BY_KIND, LightSetting, PlanesAnswer, Reason, renderings_of
-from lightpaint.photometry.glare import GlareReading
+from lightpaint.photometry import GlareReading
 from lightpaint.pipeline import Look, Settings
 from lightpaint.report import (
     ANY_COLOR,

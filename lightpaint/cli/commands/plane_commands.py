@@ -18,19 +18,18 @@ from lightpaint.cli.output.lines import CommandOutcome
 from lightpaint.errors import OutputError, SceneError
 from lightpaint.files import check_files, check_writable, write_text
 from lightpaint.lighting import Constraints, Scale, constraints_of, read_lighting
-from lightpaint.photometry.illuminance import Illuminance
-from lightpaint.photometry.measure import measure_illuminance
-from lightpaint.photometry.measure_glare import measure_glare
-from lightpaint.photometry.measuring_plane import PRESETS
-from lightpaint.photometry.planes_file import planes_file_beside, read_planes
-from lightpaint.photometry.readings_file import (
+from lightpaint.photometry import (
     POINTS,
+    PRESETS,
+    Illuminance,
     measured_origin,
     missed_wishes,
     readings_document,
     readings_files,
     write_readings,
 )
+from lightpaint.photometry.measure import measure_glare, measure_illuminance
+from lightpaint.photometry.planes_file import planes_file_beside, read_planes
 from lightpaint.pipeline import (
     PLAN,
     LightPlan,

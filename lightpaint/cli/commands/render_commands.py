@@ -14,9 +14,9 @@ from lightpaint.basis.cache import write_from_cache
 from lightpaint.cli.commands.answer_text import Table, show_look, spoken_settings
 from lightpaint.cli.options.job_options import folders_of, is_folder
 from lightpaint.cli.output import documents, tables, terminal
+from lightpaint.cli.output.documents import Tolerances
 from lightpaint.cli.output.lines import CommandOutcome
 from lightpaint.cli.output.vocabulary import from_any_folder
-from lightpaint.cli.tolerances import Tolerances
 from lightpaint.colour import ViewTransform
 from lightpaint.demo import write_demo
 from lightpaint.display_text import some_of

@@ -22,7 +22,7 @@ from lightpaint.cli.options.source_options import (
     scene_to_export,
     source_of_template,
 )
-from lightpaint.cli.tolerances import Tolerances
+from lightpaint.cli.output.documents import Tolerances
 from lightpaint.errors import BatchError
 from lightpaint.files import scene_name
 from lightpaint.lighting import read_constraints

@@ -2,6 +2,7 @@
 
 import json
 from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
@@ -9,12 +10,47 @@ from lightpaint.basis import Basis
 from lightpaint.basis.cache import cache
 from lightpaint.cli.doctor import Finding
 from lightpaint.cli.output.tables import photometry_at_full, photometry_of
-from lightpaint.cli.tolerances import Tolerances
-from lightpaint.lighting import FullLamp
+from lightpaint.lighting import Appearance, FullLamp
 from lightpaint.pipeline import RECORD, Job, Look, PaintedView
 from lightpaint.relit import Verification
 from lightpaint.report import finite, verification_numbers
 from lightpaint.scene import MULTIPLE, WHOLE_EMISSION, Light, Scene
+
+
+@dataclass(frozen=True)
+class Tolerances:
+    """The required closeness of an answer; None for no requirement.
+
+    max_miss: largest mean ΔE over the painted pixels. min_fit: smallest `Appearance.share_met`.
+    """
+
+    max_miss: float | None = None
+    min_fit: float | None = None
+
+    def shortfalls(self, appearance: Appearance) -> list[str]:
+        """Return the unmet tolerances of an answer, as text that follows its name."""
+        shortfalls = []
+        if self.max_miss is not None and appearance.delta_e > self.max_miss:
+            shortfalls.append(
+                f"misses a mean ΔE of {appearance.delta_e:.3f}, more than --max-miss "
+                f"{self.max_miss:g}"
+            )
+        if self.min_fit is not None and appearance.share_met < self.min_fit:
+            shortfalls.append(
+                f"meets a share of {appearance.share_met:.3f}, less than --min-fit {self.min_fit:g}"
+            )
+        return shortfalls
+
+    def document(self, appearance: Appearance) -> dict[str, object]:
+        """Return the requirements and whether they are met, for programs."""
+        requirements = {"max_miss": self.max_miss, "min_fit": self.min_fit}
+        if not (
+            requirements := {
+                name: value for name, value in requirements.items() if value is not None
+            }
+        ):
+            return {}
+        return {"asked": requirements, "is_met": not self.shortfalls(appearance)}
 
 
 def lights_document(

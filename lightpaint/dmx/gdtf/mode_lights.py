@@ -15,6 +15,7 @@ from xml.etree.ElementTree import Element
 import numpy as np
 
 from lightpaint.arrays import Doubles
+from lightpaint.colour import solid_angle
 from lightpaint.dmx.console_rig import DmxChannel, RigEmitter, RigFilter, RigWheel
 from lightpaint.dmx.gdtf.color_wheel import SlotColour, slot_combinations, wheel_slots
 from lightpaint.dmx.gdtf.emitter_colour import (
@@ -40,7 +41,6 @@ from lightpaint.dmx.gdtf.mode_channels import (
     shutter_levels,
 )
 from lightpaint.dmx.levels import can_invert
-from lightpaint.dmx.spot_cone import solid_angle
 from lightpaint.sentences import Hint, Sentence
 
 #: What is assumed of a fixture whose file does not say it: lumens, degrees at 50 % and at 10 % of

@@ -11,7 +11,6 @@ from collections.abc import Collection, Mapping
 from contextlib import suppress
 from importlib.util import find_spec
 from threading import Condition, Thread
-from types import TracebackType
 from typing import Protocol, Self
 
 from lightpaint.dmx.console_rig import ConsoleRig
@@ -211,12 +210,7 @@ class ConsoleLink:
     def __enter__(self) -> Self:
         return self
 
-    def __exit__(
-        self,
-        kind: type[BaseException] | None,
-        error: BaseException | None,
-        trace: TracebackType | None,
-    ) -> None:
+    def __exit__(self, *_: object) -> None:
         self.close()
 
     def _run(self) -> None:

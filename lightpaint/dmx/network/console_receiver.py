@@ -6,7 +6,6 @@ import time
 from collections.abc import Hashable, Iterable
 from dataclasses import dataclass
 from ipaddress import AddressValueError, IPv4Address
-from types import TracebackType
 from typing import Self
 
 from lightpaint.dmx.console_rig import UNIVERSE_SIZE
@@ -194,12 +193,7 @@ class ConsoleReceiver:
     def __enter__(self) -> Self:
         return self
 
-    def __exit__(
-        self,
-        kind: type[BaseException] | None,
-        error: BaseException | None,
-        trace: TracebackType | None,
-    ) -> None:
+    def __exit__(self, *_: object) -> None:
         self.close()
 
     def _take_one(self) -> bool:

@@ -5,7 +5,7 @@ from dataclasses import dataclass, replace
 
 from lightpaint.basis import BasisLight
 from lightpaint.errors import ConstraintError
-from lightpaint.lighting.constraints.constraints import Constraints, LightConstraint
+from lightpaint.lighting.constraints.constraint_table import Constraints, LightConstraint
 from lightpaint.lighting.constraints.light_constraints import constraints_by_light
 from lightpaint.luminaires import LUMINAIRE_PLUGINS
 from lightpaint.sentences import Hint

@@ -8,7 +8,7 @@ from lightpaint.colour import file_of_spectrum
 from lightpaint.errors import ConstraintError
 from lightpaint.files import one_line
 from lightpaint.keywords import keywords
-from lightpaint.lighting.constraints.constraints import COLOR_KEYS, LIGHT_KEYS, Constraints
+from lightpaint.lighting.constraints.constraint_table import COLOR_KEYS, LIGHT_KEYS, Constraints
 from lightpaint.lighting.constraints.values import check_keys, parse_primaries, parse_strength
 from lightpaint.luminaires import LUMINAIRE_KEYS, PHOTOMETRY
 from lightpaint.scene.lights.lights_file import IMAGE_KEYS, MOVES, SceneRequests, read_keys

@@ -120,11 +120,7 @@ def parse_emitters(table: Mapping[str, Any], light: SourceKey) -> tuple[EmitterR
         kind, what = ("slots", "be on a wheel") if is_wheel else ("emitters", "be mixed")
         raise ConstraintError(where, f" lists {len(value)} {kind}: at most {most} can {what}")
     emitters = tuple(_parse_emitter(x, where / str(k + 1)) for k, x in enumerate(value))
-    names = [x.name for x in emitters]
-    if repeated := [name for name in names if names.count(name) > 1]:
-        raise ConstraintError(
-            where, f" has two emitters named {repeated[0]!r}: give each a name of its own"
-        )
+    _check_names([x.name for x in emitters], "emitters", where)
     return emitters
 
 
@@ -146,12 +142,16 @@ def parse_slots(table: Mapping[str, Any], light: SourceKey) -> tuple[SlotFilter,
             '[{name = "congo", transmission = [0.1, 0.02, 0.6]}]',
         )
     slots = tuple(_parse_slot(x, where / str(k + 1)) for k, x in enumerate(value))
-    names = [x.name for x in slots]
+    _check_names([x.name for x in slots], "slots", where)
+    return slots
+
+
+def _check_names(names: Sequence[str], kind: str, where: SourceKey) -> None:
+    """Raise ConstraintError for a name that two emitters or slots have."""
     if repeated := [name for name in names if names.count(name) > 1]:
         raise ConstraintError(
-            where, f" has two slots named {repeated[0]!r}: give each a name of its own"
+            where, f" has two {kind} named {repeated[0]!r}: give each a name of its own"
         )
-    return slots
 
 
 def _parse_slot(table: Mapping[str, Any], where: SourceKey) -> SlotFilter:

@@ -24,7 +24,7 @@ import numpy as np
 from lightpaint.arrays import RGB, Doubles
 from lightpaint.basis import Basis, texel_lights
 from lightpaint.colour import Lamp
-from lightpaint.lighting.constraints.constraints import Constraints
+from lightpaint.lighting.constraints.constraint_table import Constraints
 from lightpaint.lighting.constraints.light_constraints import (
     WhiteLimits,
     painted_whites,

@@ -18,7 +18,7 @@ from functools import cached_property
 import numpy as np
 
 from lightpaint.arrays import Doubles, Floats, Indices
-from lightpaint.lighting.constraints.constraints import Requirements
+from lightpaint.lighting.constraints.constraint_table import Requirements
 from lightpaint.lighting.loss.painting_loss import PaintedPixels
 from lightpaint.lighting.loss.reweighting import interpolate
 from lightpaint.lighting.normal_equations import NormalEquations

@@ -54,7 +54,7 @@ import numpy as np
 from lightpaint.arrays import Bools, Doubles, Indices
 from lightpaint.basis import Lights, light_images, texel_lights
 from lightpaint.colour import LUMINANCE, ViewTransform, luminance
-from lightpaint.lighting.constraints.constraints import Constraints
+from lightpaint.lighting.constraints.constraint_table import Constraints
 from lightpaint.lighting.fit import Fit
 from lightpaint.lighting.loss.expected_lights import (
     DARK,

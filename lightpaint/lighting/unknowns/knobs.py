@@ -12,7 +12,7 @@ from lightpaint.basis import BasisLight
 from lightpaint.colour import ColorHull, Lamp, Preference, WhiteRange, luminance
 from lightpaint.display_text import some_names
 from lightpaint.errors import ConstraintError
-from lightpaint.lighting.constraints.constraints import LightConstraint, Tie
+from lightpaint.lighting.constraints.constraint_table import LightConstraint, Tie
 from lightpaint.lighting.constraints.values import Level, Lock
 from lightpaint.sentences import SourceKey
 

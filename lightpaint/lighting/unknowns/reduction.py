@@ -21,7 +21,11 @@ from lightpaint.display_text import brief, some_names
 from lightpaint.errors import ConstraintError
 from lightpaint.lighting.algebra.quadratic import Cap
 from lightpaint.lighting.constraints.absolute_scale import with_scale
-from lightpaint.lighting.constraints.constraints import Constraints, LightConstraint, Requirements
+from lightpaint.lighting.constraints.constraint_table import (
+    Constraints,
+    LightConstraint,
+    Requirements,
+)
 from lightpaint.lighting.constraints.light_constraints import (
     constraints_by_light,
     constraints_on_parts,

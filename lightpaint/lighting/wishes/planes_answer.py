@@ -11,8 +11,7 @@ from lightpaint.errors import ConstraintError
 from lightpaint.lighting.unknowns.lamp_parts import watts_of_fixed
 from lightpaint.lighting.unknowns.reduction import Reduction
 from lightpaint.lighting.wishes.wished_light import LightWish, WishedLight, check_powers
-from lightpaint.photometry.glare import Glare, GlareReading
-from lightpaint.photometry.illuminance import PlaneReading
+from lightpaint.photometry import Glare, GlareReading, PlaneReading
 
 #: Relative shortfall from which a wish is not met: rows are met up to round-off.
 MISSED = 1e-4
@@ -114,7 +113,6 @@ def planes_answer(
     *,
     floor_m2: float,
     prices: Doubles | None = None,
-    cost_delta_e: float | None = None,
     glare: Glare | None = None,
     are_ignored: bool = False,
 ) -> PlanesAnswer:
@@ -143,7 +141,6 @@ def planes_answer(
         floor_m2,
         _is_all_at_full(reduction, weights),
         len(movable),
-        cost_delta_e,
         glare=glare,
         are_ignored=are_ignored,
     )

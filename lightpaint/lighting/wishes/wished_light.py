@@ -20,15 +20,17 @@ from lightpaint.arrays import Doubles, Indices
 from lightpaint.basis import Lights
 from lightpaint.display_text import with_similar_name
 from lightpaint.errors import ConstraintError
-from lightpaint.lighting.constraints.constraints import Requirements
+from lightpaint.lighting.constraints.constraint_table import Requirements
 from lightpaint.lighting.unknowns.reduction import Reduction
-from lightpaint.photometry.illuminance import (
+from lightpaint.photometry import (
     LARGEST_ERROR,
     NORMAL_95,
     Illuminance,
+    LightCase,
+    MeasuringPlane,
+    PowerBudget,
     relative_intervals,
 )
-from lightpaint.photometry.measuring_plane import LightCase, MeasuringPlane, PowerBudget
 
 #: What a wish is about.
 Kind = Literal["mean", "uniformity", "max", "ratio", "power"]

@@ -34,7 +34,7 @@ from lightpaint.paint.layers.layer_pixels import (
 )
 from lightpaint.paint.layers.layer_stack import MAX_STRENGTH, Layer, LayerStack
 from lightpaint.paint.store.history_steps import Patch, Pixels, Region, Step, slices
-from lightpaint.paint.store.store import StoredComposition
+from lightpaint.paint.store.session_file import StoredComposition
 from lightpaint.target import Target
 
 #: Side, in pixels, of the squares that are saved when a stroke first touches them.

@@ -29,7 +29,7 @@ from lightpaint.paint.layers.layer_stack import (
     stack_after,
 )
 from lightpaint.paint.store.history_steps import Patch, Pixels, Region, Step, name_in_view
-from lightpaint.paint.store.store import StoredComposition
+from lightpaint.paint.store.session_file import StoredComposition
 
 
 class Canvases:

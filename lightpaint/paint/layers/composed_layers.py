@@ -32,7 +32,7 @@ from lightpaint.paint.layers.layer_pixels import (
 )
 from lightpaint.paint.layers.layer_stack import Layer, LayerStack
 from lightpaint.paint.store.history_steps import Patch, Pixels, Region, Step, slices
-from lightpaint.paint.store.store import StoredComposition
+from lightpaint.paint.store.session_file import StoredComposition
 from lightpaint.target import Wish, separate
 
 #: Importance of the rest of a fully painted picture relative to one layer, and the largest accent,

@@ -27,10 +27,10 @@ from lightpaint.paint.background_threads import error_text, error_tone, lower_pr
 from lightpaint.paint.message_frames import is_other_version, parse_request
 from lightpaint.paint.protocol import Closing, Failure, Hello, Message, TakeOver
 from lightpaint.paint.session_access import SessionOwner
-from lightpaint.paint.studio.studio import Studio
+from lightpaint.paint.studio.session_studio import Studio
 from lightpaint.report import data_uri, html, mixer_assets, mixer_html, target_picture
 from lightpaint.target import Target
-from lightpaint.viewer.bundle import styles
+from lightpaint.viewer import styles
 
 #: Maximum number of pixels in all planes of the mixer: with their scripts these stay below 400 kB.
 MAX_PLANE_PIXELS = 44_000

@@ -41,11 +41,11 @@ from lightpaint.paint.notebook.widget_arguments import (
 from lightpaint.paint.protocol import AnswerUpdate, Message, Notice, SessionState
 from lightpaint.paint.session.snapshot import SessionSnapshot
 from lightpaint.paint.store.history_steps import Identity
-from lightpaint.paint.store.store import MemoryStore, Store
-from lightpaint.paint.studio.studio import Studio
+from lightpaint.paint.store.session_file import MemoryStore, Store
+from lightpaint.paint.studio.session_studio import Studio
 from lightpaint.pipeline.job.settings import SettingsByName
 from lightpaint.target import Target, write_painting
-from lightpaint.viewer.bundle import bundled, styles
+from lightpaint.viewer import bundled, styles
 
 #: Painters of this process that keep their session in a file, by its path.
 _PAINTERS_BY_FILE: WeakValueDictionary[Path, "Painter"] = WeakValueDictionary()

@@ -13,7 +13,7 @@ from lightpaint.basis import Basis, LightGroups
 from lightpaint.colour import TransformChoice, ViewTransform
 from lightpaint.errors import KeywordError, LightpaintError, PaintError
 from lightpaint.lighting import Constraints, Lighting, resolve_importance
-from lightpaint.paint.session.session import Session
+from lightpaint.paint.session.painting_session import Session
 from lightpaint.paint.store.database import OTHER_FOLDER, START_AFRESH
 from lightpaint.paint.store.history_steps import Pixels
 from lightpaint.paint.store.session_requests import SessionRequests

@@ -15,7 +15,7 @@ from lightpaint.paint.layers.canvas import Canvas
 from lightpaint.paint.layers.canvases import Canvases
 from lightpaint.paint.layers.composition import adjusted
 from lightpaint.paint.layers.layer_stack import MAX_NAME_LENGTH, Layer
-from lightpaint.paint.presets.presets import (
+from lightpaint.paint.presets.lighting_presets import (
     PRESETS,
     open_group,
     open_preset,

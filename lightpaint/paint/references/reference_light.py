@@ -16,7 +16,13 @@ from lightpaint.paint.layers.canvas import Canvas
 from lightpaint.paint.layers.composition import compose_layer
 from lightpaint.paint.layers.layer_stack import Layer
 from lightpaint.paint.presets.lamp_roles import LampRoles, find_roles, light_share
-from lightpaint.paint.presets.presets import LampGroup, is_divided, layers_of, masks_of, reduction
+from lightpaint.paint.presets.lighting_presets import (
+    LampGroup,
+    is_divided,
+    layers_of,
+    masks_of,
+    reduction,
+)
 from lightpaint.paint.presets.view_areas import MIN_ALBEDO, Mask, ViewAreas
 from lightpaint.paint.references.tones import LightTones, Tones
 from lightpaint.paint.store.history_steps import Pixels

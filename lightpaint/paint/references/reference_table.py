@@ -27,7 +27,7 @@ from lightpaint.images.formats import (
 )
 from lightpaint.paint.store.compression import pack, unpack
 from lightpaint.paint.store.database import DAMAGE_ERRORS, REFERENCE_TABLE
-from lightpaint.paint.store.store import Store
+from lightpaint.paint.store.session_file import Store
 from lightpaint.storage.json_records import strict_json
 
 #: Pixels of the longer side of a reference that is kept; larger ones are reduced.

@@ -15,7 +15,7 @@ from lightpaint.arrays import Doubles
 from lightpaint.basis import Basis, DenoisedPlanes, as_halves, denoise_to_halves
 from lightpaint.colour import LUMINANCE
 from lightpaint.errors import LightpaintError, PaintError, SceneError
-from lightpaint.paint.background_threads import BackgroundThreads, LatestWork, StoppedError
+from lightpaint.paint.background_threads import LatestWork, StoppedError
 from lightpaint.paint.layers.canvas import Canvas
 from lightpaint.paint.protocol import (
     AddLight,
@@ -39,6 +39,7 @@ from lightpaint.paint.rig.page_geometry import (
     up_axis,
 )
 from lightpaint.paint.session.moved_lights import Placed, added_names
+from lightpaint.paint.session.painting_session import Session
 from lightpaint.paint.session.picture_table import (
     Picture,
     page_emitters,
@@ -47,8 +48,7 @@ from lightpaint.paint.session.picture_table import (
     plane_scale,
     plane_thumbnail,
 )
-from lightpaint.paint.session.session import Session
-from lightpaint.paint.session_access import Publisher, SessionAccess
+from lightpaint.paint.session_access import StudioLinks
 from lightpaint.paint.store.history_steps import name_in_view
 from lightpaint.scene import NewEmitter, Pose
 from lightpaint.scene.properties.site import Site
@@ -72,29 +72,26 @@ class LightMover:
     """Moves lights of a session for its studio.
 
     Args:
-        access: The session.
-        publisher: Sends messages and pictures to pages.
+        links: To the session, its pages and its threads.
         rig: The lights and their places, and the source of their planes.
-        threads: Runs background work.
         clean_planes: Returns the denoised planes of bases; None for each that has none yet.
         on_rendered: Called after rendered planes have replaced quick ones.
     """
 
     def __init__(
         self,
-        access: SessionAccess,
-        publisher: Publisher,
+        links: StudioLinks,
         rig: LampRig,
-        threads: BackgroundThreads,
         *,
         clean_planes: Callable[[Sequence[Basis]], Sequence[DenoisedPlanes | None]],
         on_rendered: Callable[[], None],
     ) -> None:
-        self.rig, self._access, self._publisher, self._threads = rig, access, publisher, threads
+        self._access, self._publisher, self._threads = links
+        self.rig = rig
         self._clean_planes, self._on_rendered = clean_planes, on_rendered
         self._shows_rig, self._shown = False, dict[str, Mapping[str, Any]]()
         self._dragged = set[str]()  # lights being dragged
-        self._work = LatestWork(self._render, publisher.publish)
+        self._work = LatestWork(self._render, self._publisher.publish)
         self._is_working, self._is_open = False, True
 
     def stop(self) -> None:

@@ -8,7 +8,7 @@ from typing import Any
 from lightpaint.display_text import some_names
 from lightpaint.errors import LightpaintError, PaintError
 from lightpaint.lighting import Solution
-from lightpaint.paint.background_threads import BackgroundThreads, StoppedError
+from lightpaint.paint.background_threads import StoppedError
 from lightpaint.paint.protocol import (
     EstimatePlaces,
     Message,
@@ -24,9 +24,9 @@ from lightpaint.paint.rig.lamp_rig import LampRig
 from lightpaint.paint.rig.moved_looks import of_moved_scenes
 from lightpaint.paint.session.moved_lights import Placed
 from lightpaint.paint.session.snapshot import SessionSnapshot
-from lightpaint.paint.session_access import Publisher, SessionAccess
+from lightpaint.paint.session_access import StudioLinks
+from lightpaint.paint.store.session_file import Store, StoredRecords
 from lightpaint.paint.store.session_requests import HOLD_KEYS
-from lightpaint.paint.store.store import Store, StoredRecords
 from lightpaint.placement import (
     Freedom,
     Move,
@@ -105,14 +105,12 @@ class LightPlacer:
 
     def __init__(
         self,
-        access: SessionAccess,
-        publisher: Publisher,
+        links: StudioLinks,
         rig: LampRig,
-        threads: BackgroundThreads,
         hang_lights: Callable[[str, Placed, Placed], bool],
     ) -> None:
-        self._access, self._publisher, self._rig, self._threads = access, publisher, rig, threads
-        self._hang_lights = hang_lights
+        self._access, self._publisher, self._threads = links
+        self._rig, self._hang_lights = rig, hang_lights
         self._request: PlaceLights | None = None
         self._ended_request: PlaceLights | None = None  # it ends with the best so far
         self._pace: float | None = None  # of the last search that was not ended early

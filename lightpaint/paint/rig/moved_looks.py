@@ -12,7 +12,7 @@ from lightpaint.basis import Basis, as_halves, denoise_mix
 from lightpaint.display_text import some_names
 from lightpaint.errors import LightpaintError
 from lightpaint.files import write_text
-from lightpaint.paint.background_threads import BackgroundThreads, LatestWork, StoppedError
+from lightpaint.paint.background_threads import LatestWork, StoppedError
 from lightpaint.paint.protocol import CompareLooks, Message, Notice, PictureUpdate, TaskStarted
 from lightpaint.paint.rig.added_lights import new_emitter
 from lightpaint.paint.rig.lamp_rig import LampRig
@@ -21,7 +21,7 @@ from lightpaint.paint.session.look_library import LookLighting
 from lightpaint.paint.session.moved_lights import Placed, added_names
 from lightpaint.paint.session.picture_table import Picture, page_plane
 from lightpaint.paint.session.snapshot import SessionSnapshot
-from lightpaint.paint.session_access import Publisher, SessionAccess
+from lightpaint.paint.session_access import StudioLinks
 from lightpaint.paint.store.history_steps import name_in_view
 from lightpaint.paint.subject import Subject, places_path
 from lightpaint.placement import AddedLight, Move, PlacementRecord, is_panel
@@ -91,19 +91,13 @@ PLAIN, CLEAN = "look_plane/", "look_clean/"
 class LookComparison:
     """The pictures of compared looks, each with its own lights at its own places.
 
-    mover: renders planes that no look has yet. threads: run the work.
+    mover: renders planes that no look has yet.
     """
 
-    def __init__(
-        self,
-        access: SessionAccess,
-        publisher: Publisher,
-        mover: LightMover,
-        threads: BackgroundThreads,
-    ) -> None:
-        self._access, self._publisher, self._mover = access, publisher, mover
-        self._threads = threads
-        self._work = LatestWork(self._show, publisher.publish)
+    def __init__(self, links: StudioLinks, mover: LightMover) -> None:
+        self._access, self._publisher, self._threads = links
+        self._mover = mover
+        self._work = LatestWork(self._show, self._publisher.publish)
         self._looks: Mapping[int, LookLighting] = {}
         self._offered = set[str]()  # names of pictures
         self._is_working = False

@@ -19,9 +19,9 @@ from lightpaint.paint.server.address import BoundSocket, listen
 from lightpaint.paint.server.client import Client
 from lightpaint.paint.server.guard import PROTOCOL, App, Guard
 from lightpaint.paint.server.session_clients import Connections, ServedSession, picture_message
-from lightpaint.paint.store.store import Store
+from lightpaint.paint.store.session_file import Store
 from lightpaint.version import __version__
-from lightpaint.viewer.bundle import BundleError, bundled, styles
+from lightpaint.viewer import BundleError, bundled, styles
 
 if TYPE_CHECKING:
     import uvicorn

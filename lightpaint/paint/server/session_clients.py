@@ -42,7 +42,7 @@ from lightpaint.paint.protocol import (
 )
 from lightpaint.paint.server.client import Client, IncomingMessage
 from lightpaint.paint.session_access import SessionOwner
-from lightpaint.paint.store.store import Store
+from lightpaint.paint.store.session_file import Store
 from lightpaint.progress import cancellable
 
 _Result = TypeVar("_Result")

@@ -21,8 +21,8 @@ from lightpaint.paint.session.live_answer import LiveAnswer
 from lightpaint.paint.session.picture_table import display_thumbnail
 from lightpaint.paint.store.database import DamagedError
 from lightpaint.paint.store.history_steps import Patch, Region, Step
+from lightpaint.paint.store.session_file import Store
 from lightpaint.paint.store.session_requests import SessionRequests
-from lightpaint.paint.store.store import Store
 from lightpaint.paint.store.stored_arrays import StepAnswer
 
 #: A step becomes a milestone this many steps after the last one.

@@ -28,8 +28,8 @@ from lightpaint.paint.protocol import (
     SaveLook,
 )
 from lightpaint.paint.session.moved_lights import Placed
+from lightpaint.paint.session.painting_session import Session
 from lightpaint.paint.session.picture_table import PictureTable, display_thumbnail
-from lightpaint.paint.session.session import Session
 from lightpaint.paint.store.history_steps import Pixels, StoredLook, mix_pixels, name_in_view
 from lightpaint.paint.store.session_requests import SessionRequests
 

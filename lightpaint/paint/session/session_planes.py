@@ -26,8 +26,8 @@ from lightpaint.paint.protocol import (
     PlanesReading,
     PlaneWish,
 )
-from lightpaint.photometry.illuminance import Illuminance
-from lightpaint.photometry.measuring_plane import (
+from lightpaint.photometry import (
+    Illuminance,
     LightCase,
     MeasuringPlane,
     PowerBudget,

@@ -15,7 +15,7 @@ from lightpaint.paint.layers.canvas import Canvas
 from lightpaint.paint.layers.canvases import Canvases
 from lightpaint.paint.layers.layer_pixels import selection_mask
 from lightpaint.paint.layers.layer_stack import Layer
-from lightpaint.paint.presets.presets import PRESETS, find_preset, requested_look
+from lightpaint.paint.presets.lighting_presets import PRESETS, find_preset, requested_look
 from lightpaint.paint.protocol import (
     ImageInfo,
     PresetInfo,
@@ -28,6 +28,7 @@ from lightpaint.paint.protocol import (
 from lightpaint.paint.references.reference_table import Reference, ReferenceTable
 from lightpaint.paint.session import picture_table
 from lightpaint.paint.session.look_library import LookLibrary
+from lightpaint.paint.session.painting_session import Session
 from lightpaint.paint.session.picture_table import (
     Picture,
     PictureTable,
@@ -37,7 +38,6 @@ from lightpaint.paint.session.picture_table import (
     plane_scale,
     plane_size,
 )
-from lightpaint.paint.session.session import Session
 from lightpaint.paint.session.session_messages import light_info
 from lightpaint.paint.store.history_steps import name_in_view
 

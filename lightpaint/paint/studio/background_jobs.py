@@ -12,7 +12,7 @@ from lightpaint.basis import Basis, DenoisedPlanes, as_halves
 from lightpaint.errors import PaintError
 from lightpaint.lighting import Lighting, analyse, dimmed, with_findings
 from lightpaint.paint import protocol
-from lightpaint.paint.background_threads import BackgroundThreads, StoppedError
+from lightpaint.paint.background_threads import StoppedError
 from lightpaint.paint.protocol import (
     Explanation,
     ExportResult,
@@ -25,7 +25,7 @@ from lightpaint.paint.protocol import (
 from lightpaint.paint.rig.light_mover import LightMover
 from lightpaint.paint.rig.moved_looks import of_moved_scenes, shadow_remark, write_places
 from lightpaint.paint.session.snapshot import SessionSnapshot
-from lightpaint.paint.session_access import Publisher, SessionAccess
+from lightpaint.paint.session_access import StudioLinks
 from lightpaint.paint.store.history_steps import name_in_view
 from lightpaint.paint.store.session_requests import SessionRequests
 from lightpaint.paint.studio.session_exports import EXPORTS, folder_name, new_folder
@@ -55,14 +55,12 @@ class BackgroundJobs:
 
     def __init__(
         self,
-        access: SessionAccess,
-        publisher: Publisher,
+        links: StudioLinks,
         mover: LightMover,
-        threads: BackgroundThreads,
         *,
         clean_planes: Callable[[Sequence[Basis]], Sequence[DenoisedPlanes | None]],
     ) -> None:
-        self._access, self._publisher, self._threads = access, publisher, threads
+        self._access, self._publisher, self._threads = links
         self._mover, self._clean_planes = mover, clean_planes
         self._subjects = mover.rig.subjects
         self._write_lock, self._render_lock = Lock(), Lock()

@@ -8,7 +8,7 @@ from lightpaint.arrays import Position
 from lightpaint.dmx import ConsoleLink, ConsoleRig, RigDrives, address_text, aimed_rig
 from lightpaint.errors import PaintError
 from lightpaint.paint.protocol import BlackOut, ConsoleInfo, ConsoleState, Message, SwitchConsole
-from lightpaint.paint.session.session import Session
+from lightpaint.paint.session.painting_session import Session
 
 
 @dataclass(frozen=True)

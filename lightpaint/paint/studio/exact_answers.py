@@ -28,11 +28,11 @@ from lightpaint.paint.protocol import (
     AnswerUpdate,
     Findings,
 )
+from lightpaint.paint.session.painting_session import Session
 from lightpaint.paint.session.picture_table import Picture, display_thumbnail
-from lightpaint.paint.session.session import Session
 from lightpaint.paint.session.session_messages import judge, wish_delivery
 from lightpaint.paint.session.snapshot import SessionSnapshot
-from lightpaint.paint.session_access import Publisher, SessionAccess
+from lightpaint.paint.session_access import StudioLinks
 from lightpaint.paint.store.history_steps import name_in_view
 from lightpaint.progress import cancellable
 
@@ -59,15 +59,13 @@ class ExactAnswers:
     """
 
     def __init__(
-        self,
-        access: SessionAccess,
-        publisher: Publisher,
-        solved: Callable[[SessionSnapshot, Solution], None],
+        self, links: StudioLinks, solved: Callable[[SessionSnapshot, Solution], None]
     ) -> None:
-        self._access, self._publisher, self._solved = access, publisher, solved
+        self._access, self._publisher, _ = links
+        self._solved = solved
         self._last: AnswerUpdate | None = None
         self._keep_at = time.monotonic() + KEEP_INTERVAL_S
-        self._loop = ExactSolveLoop(self._solve, publisher.publish)
+        self._loop = ExactSolveLoop(self._solve, self._publisher.publish)
         self.run, self.stop, self.notify = self._loop.run, self._loop.stop, self._loop.notify
 
     def findings_of(self, session: Session) -> Findings:
@@ -119,13 +117,13 @@ class ChoiceSolver:
 
     def __init__(
         self,
-        access: SessionAccess,
-        publisher: Publisher,
+        links: StudioLinks,
         clean_planes: Callable[[Sequence[Basis]], Sequence[DenoisedPlanes | None]],
     ) -> None:
-        self._access, self._publisher, self._clean_planes = access, publisher, clean_planes
+        self._access, self._publisher, _ = links
+        self._clean_planes = clean_planes
         self._last: AnswerChoices | None = None
-        self._loop = LatestWork(self._solve, publisher.publish)
+        self._loop = LatestWork(self._solve, self._publisher.publish)
         self.run, self.stop = self._loop.run, self._loop.stop
 
     def give(self, snapshot: SessionSnapshot, solution: Solution) -> None:

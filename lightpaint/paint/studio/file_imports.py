@@ -13,7 +13,6 @@ import numpy.typing as npt
 from lightpaint.errors import LightpaintError, PaintError
 from lightpaint.files import one_line
 from lightpaint.paint import protocol
-from lightpaint.paint.background_threads import BackgroundThreads
 from lightpaint.paint.layers.canvases import LayeredPaintings
 from lightpaint.paint.layers.layer_files import read_layers
 from lightpaint.paint.layers.layer_stack import PAINTING_ID, LayerStack
@@ -27,8 +26,8 @@ from lightpaint.paint.protocol import (
     TaskStarted,
 )
 from lightpaint.paint.references.reference_table import read_reference
-from lightpaint.paint.session.session import Session
-from lightpaint.paint.session_access import Publisher, SessionAccess
+from lightpaint.paint.session.painting_session import Session
+from lightpaint.paint.session_access import StudioLinks
 
 #: Largest file that a page may send, in bytes.
 MAX_LAYERS_BYTES = 2**29
@@ -101,14 +100,8 @@ class LayerImports:
     on_loaded: called, without the lock, after the session has got the layers.
     """
 
-    def __init__(
-        self,
-        access: SessionAccess,
-        publisher: Publisher,
-        threads: BackgroundThreads,
-        on_loaded: Callable[[], None],
-    ) -> None:
-        self._access, self._publisher, self._threads = access, publisher, threads
+    def __init__(self, links: StudioLinks, on_loaded: Callable[[], None]) -> None:
+        self._access, self._publisher, self._threads = links
         self._on_loaded = on_loaded
         self._file = ReceivedFile(MAX_LAYERS_BYTES)
 
@@ -161,10 +154,8 @@ def _report(layers: LayerStack, name: str) -> str:
 class ReferenceImports:
     """The references of a session: files become some, and pages drop others."""
 
-    def __init__(
-        self, access: SessionAccess, publisher: Publisher, threads: BackgroundThreads
-    ) -> None:
-        self._access, self._publisher, self._threads = access, publisher, threads
+    def __init__(self, links: StudioLinks) -> None:
+        self._access, self._publisher, self._threads = links
         self._file = ReceivedFile(MAX_REFERENCE_BYTES)
 
     def handle(

@@ -10,12 +10,12 @@ import numpy as np
 
 from lightpaint.arrays import Bools, Doubles
 from lightpaint.errors import LightpaintError
-from lightpaint.paint.background_threads import BackgroundThreads, LatestWork, StoppedError
+from lightpaint.paint.background_threads import LatestWork, StoppedError
 from lightpaint.paint.protocol import Camera, Message, Notice, ProgressReport
 from lightpaint.paint.rig.lamp_rig import LampRig
 from lightpaint.paint.rig.page_geometry import camera_of
 from lightpaint.paint.session.session_planes import PlaneSight, SessionPlanes
-from lightpaint.paint.session_access import Publisher, SessionAccess
+from lightpaint.paint.session_access import StudioLinks
 from lightpaint.paint.store.session_requests import SessionRequests
 from lightpaint.paint.subject import Subject
 from lightpaint.progress import Progress, listener
@@ -39,19 +39,17 @@ class PlaneMeasurements:
 
     def __init__(
         self,
+        links: StudioLinks,
         subjects: Sequence[Subject],
-        access: SessionAccess,
-        publisher: Publisher,
-        threads: BackgroundThreads,
         rig: LampRig,
         *,
         show: Callable[[], Message],
         on_measured: Callable[[], None],
     ) -> None:
-        self._subjects, self._access, self._publisher = tuple(subjects), access, publisher
-        self._threads, self._rig, self._show = threads, rig, show
-        self._on_measured = on_measured
-        self._work = LatestWork(self._measure, publisher.publish)
+        self._access, self._publisher, self._threads = links
+        self._subjects, self._rig = tuple(subjects), rig
+        self._show, self._on_measured = show, on_measured
+        self._work = LatestWork(self._measure, self._publisher.publish)
         self._place_key: str | None = None  # of the last measurement that was begun or is due
         self.stop = self._work.stop
 

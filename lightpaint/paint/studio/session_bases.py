@@ -21,6 +21,7 @@ from lightpaint.paint.layers.canvas import Canvas
 from lightpaint.paint.protocol import ProgressReport, Tone
 from lightpaint.paint.rig.light_mover import LightMover
 from lightpaint.paint.session.look_library import LookLibrary
+from lightpaint.paint.session.painting_session import Session
 from lightpaint.paint.session.picture_table import (
     Picture,
     opens_plain,
@@ -29,7 +30,6 @@ from lightpaint.paint.session.picture_table import (
     plane_size,
     plane_thumbnail,
 )
-from lightpaint.paint.session.session import Session
 from lightpaint.paint.session.session_state import (
     offer_layers,
     offer_presets,
@@ -40,9 +40,9 @@ from lightpaint.paint.session.session_state import (
     offered_transforms,
 )
 from lightpaint.paint.session.snapshot import SessionSnapshot
-from lightpaint.paint.session_access import Publisher, SessionAccess
+from lightpaint.paint.session_access import StudioLinks
 from lightpaint.paint.store.history_steps import Identity, name_in_view
-from lightpaint.paint.store.store import Store
+from lightpaint.paint.store.session_file import Store
 from lightpaint.paint.studio.file_imports import begin_with_layers
 from lightpaint.paint.subject import Subject, obtain_bases, painting_transform
 from lightpaint.progress import Progress, silent
@@ -173,10 +173,9 @@ class SessionBases:
     """The bases of a studio's session, each of more samples than the one before.
 
     Args:
+        links: To the session that the first bases open, and to its pages.
         subjects: The views to be painted, under one lighting.
         open_store: Opens the store of their session once their lights are known.
-        access: Receives the session that the first bases open.
-        publisher: Sends pictures and progress to pages.
         denoiser: Denoises the planes of the bases.
         mover: Makes the planes of lights that the session moves, and offers their pictures.
         on_new_bases: Called, without the lock, after the session has continued with new bases.
@@ -185,18 +184,17 @@ class SessionBases:
 
     def __init__(
         self,
+        links: StudioLinks,
         subjects: Sequence[Subject],
         open_store: Callable[[Identity], Store],
-        access: SessionAccess,
-        publisher: Publisher,
         denoiser: PlaneDenoiser,
         mover: LightMover,
         *,
         on_new_bases: Callable[[], None],
         warn: Callable[[str, Tone], None],
     ) -> None:
+        self._access, self._publisher, _ = links
         self._subjects, self._open_store = subjects, open_store
-        self._access, self._publisher = access, publisher
         self._denoiser, self._mover = denoiser, mover
         self._on_new_bases, self._warn = on_new_bases, warn
 
@@ -289,15 +287,11 @@ class BackgroundSampling:
     """A thread's loop that adds samples after each exact answer, until the brush moves."""
 
     def __init__(
-        self,
-        subjects: Sequence[Subject],
-        access: SessionAccess,
-        bases: SessionBases,
-        publisher: Publisher,
+        self, links: StudioLinks, subjects: Sequence[Subject], bases: SessionBases
     ) -> None:
-        self._subjects, self._access = subjects, access
-        self._bases, self._publisher = bases, publisher
-        self._loop = LatestWork(self._add, publisher.publish)
+        self._access, self._publisher, _ = links
+        self._subjects, self._bases = subjects, bases
+        self._loop = LatestWork(self._add, self._publisher.publish)
         self._is_reported = False  # whether pages show that samples are added
         self.stop = self._loop.stop
 

@@ -25,14 +25,14 @@ from lightpaint.images import denoised, denoiser_text
 from lightpaint.images.formats import png_bytes
 from lightpaint.lighting import Lighting, combine
 from lightpaint.paint import protocol
-from lightpaint.paint.background_threads import BackgroundThreads, StoppedError, error_text
+from lightpaint.paint.background_threads import StoppedError, error_text
 from lightpaint.paint.layers.canvas import ViewLayers
 from lightpaint.paint.layers.layer_files import write_layers_exr, write_layers_openraster
 from lightpaint.paint.protocol import Message, RenderInfo, RenderList
 from lightpaint.paint.session.picture_table import Picture, display_thumbnail
 from lightpaint.paint.session.snapshot import SessionSnapshot
-from lightpaint.paint.session_access import Publisher, SessionAccess
-from lightpaint.paint.store.store import StoredRecords
+from lightpaint.paint.session_access import StudioLinks
+from lightpaint.paint.store.session_file import StoredRecords
 from lightpaint.paint.subject import Subject, layers_paths, painting_path, picture_path
 from lightpaint.pipeline import LIGHTING, RELIT, Job, run, write_answer
 from lightpaint.progress import Progress, cancellable
@@ -249,7 +249,7 @@ def render_verification(
 class FinalRenders:
     """The final renders that pages have requested, also before the painter was started anew.
 
-    access: the session, which keeps the list. subjects: the views. exact_answer: as
+    links: to the session, which keeps the list. subjects: the views. exact_answer: as
     `BackgroundJobs.exact_answer`.
 
     Attributes:
@@ -258,20 +258,18 @@ class FinalRenders:
 
     def __init__(
         self,
-        access: SessionAccess,
-        publisher: Publisher,
-        threads: BackgroundThreads,
+        links: StudioLinks,
         subjects: tuple[Subject, ...],
         exact_answer: ExactAnswer,
     ) -> None:
-        self._access, self._publisher, self._threads = access, publisher, threads
+        self._access, self._publisher, self._threads = links
         self._subjects, self._exact_answer = subjects, exact_answer
         self._infos: dict[int, RenderInfo] = {}
         self._records: StoredRecords[RenderInfo] | None = None  # until there is a session
         self._previews: dict[int, Picture] = {}
         self._change, self._turn = Condition(), Lock()
-        publisher.pictures.offer_family("render", self._preview)
-        publisher.pictures.offer_family("render_file", self._file)
+        self._publisher.pictures.offer_family("render", self._preview)
+        self._publisher.pictures.offer_family("render_file", self._file)
 
     @property
     def infos(self) -> tuple[RenderInfo, ...]:

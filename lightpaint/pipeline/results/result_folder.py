@@ -19,11 +19,9 @@ from lightpaint.basis import LightGroups
 from lightpaint.errors import LightpaintError, OutputError
 from lightpaint.files import check_files, check_writable, one_line, read_text, write_text
 from lightpaint.lighting import Lighting, write_lighting
-from lightpaint.photometry.glare import Glare
-from lightpaint.photometry.illuminance import Illuminance
+from lightpaint.photometry import Glare, Illuminance, readings_files, write_readings
 from lightpaint.photometry.planes_file import plane_names
-from lightpaint.photometry.readings_file import readings_files, write_readings
-from lightpaint.pipeline.results.results import RESULTS
+from lightpaint.pipeline.results.look import RESULTS
 from lightpaint.relit import EXPORTS, check_relightable, relight, settle, write_exports
 from lightpaint.scene import Scene, load_scene
 from lightpaint.sentences import Hint, Sentence

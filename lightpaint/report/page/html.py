@@ -15,7 +15,7 @@ from markupsafe import Markup
 
 from lightpaint.report.basis_memo import ROWS_SHOWN, SPARE_ROWS
 from lightpaint.report.phrases import spoken_percent
-from lightpaint.viewer.bundle import compact_script, source, styles, unindented
+from lightpaint.viewer import compact_script, source, styles, unindented
 
 #: Folder of the report's templates, below the package.
 TEMPLATES = "report/page/templates"

@@ -43,7 +43,7 @@ from lightpaint.report.page.figures import CLEAN_REDUCTION, data_uri
 from lightpaint.report.page.html import html
 from lightpaint.report.page.lights_table import most_visible_lights
 from lightpaint.threads import parallel_map
-from lightpaint.viewer.bundle import bundled, compact_script, source, styles
+from lightpaint.viewer import bundled, compact_script, source, styles
 
 #: Colour temperatures of the sliders, in kelvin, evenly in mireds.
 COOLEST, WARMEST, STEPS = 15000.0, 1500.0, 31

@@ -24,7 +24,7 @@ from lightpaint.basis.render.basis_render import render_basis
 from lightpaint.basis.render.render_parts import PartRenderer, PartSums, plan_parts
 from lightpaint.errors import SceneError
 from lightpaint.progress import Interrupted
-from lightpaint.scene.scene import Scene
+from lightpaint.scene.mitsuba_scene import Scene
 
 #: Rows of a band: three bands and a shorter one of the twenty rows of the test room.
 ROWS = 6

@@ -15,8 +15,8 @@ from lightpaint.basis.render import basis_render
 from lightpaint.basis.render.basis_render import _render_one_by_one, render_basis
 from lightpaint.basis.render.render_budget import Budget, Keeper
 from lightpaint.progress import silent
+from lightpaint.scene.mitsuba_scene import Scene
 from lightpaint.scene.runtime.variant import use_variant
-from lightpaint.scene.scene import Scene
 from lightpaint.scene.scene_reader import load_scene
 
 #: Two spots that each light one end of the floor, and a lamp behind the wall.

@@ -17,7 +17,7 @@ from lightpaint.lighting.answer.combination import combine
 from lightpaint.relit.relit_scene import relight
 from lightpaint.relit.verification_render import verify
 from lightpaint.scene.lights.texels.texel import TexelLayout
-from lightpaint.scene.scene import Scene
+from lightpaint.scene.mitsuba_scene import Scene
 from lightpaint.scene.scene_reader import load_scene, with_layout
 
 ROTATED = """<emitter type="envmap" id="sky"><string name="filename" value="map.exr"/>

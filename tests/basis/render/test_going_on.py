@@ -16,8 +16,8 @@ from lightpaint.basis.render import basis_render, render_budget
 from lightpaint.basis.render.basis_render import render_basis
 from lightpaint.errors import BasisError
 from lightpaint.progress import Interrupted
+from lightpaint.scene.mitsuba_scene import Scene
 from lightpaint.scene.runtime.variant import use_variant
-from lightpaint.scene.scene import Scene
 from lightpaint.scene.scene_reader import load_scene
 from lightpaint.scene.scene_render import plan_passes
 

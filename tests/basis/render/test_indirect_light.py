@@ -10,7 +10,7 @@ from renderer import write_room
 from lightpaint.basis.render import integrators
 from lightpaint.basis.render.basis_render import render_basis, train_guide
 from lightpaint.basis.render.render_parts import PartRenderer, PartSums, plan_parts
-from lightpaint.scene.scene import Scene
+from lightpaint.scene.mitsuba_scene import Scene
 from lightpaint.scene.scene_reader import load_scene
 
 SPP = 16

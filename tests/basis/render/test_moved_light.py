@@ -31,7 +31,7 @@ from lightpaint.pipeline.job.settings import Settings
 from lightpaint.pipeline.job.sources import SceneFile
 from lightpaint.pipeline.job_bases import obtain
 from lightpaint.progress import Interrupted, listener, silent
-from lightpaint.scene.scene import Scene
+from lightpaint.scene.mitsuba_scene import Scene
 from lightpaint.scene.scene_reader import load_scene
 
 #: Edits of the XML of the test room.

@@ -21,15 +21,15 @@ from lightpaint.basis.render.banded_film import memory_needed
 from lightpaint.basis.render.basis_render import _render_one_by_one, render_basis
 from lightpaint.basis.render.integrators import needs_a_bounce, why_not_one_pass
 from lightpaint.basis.render.render_budget import Budget, Keeper
-from lightpaint.basis.render.render_origin import ONE_PASS, SEPARATE
+from lightpaint.basis.render.rendered_basis import ONE_PASS, SEPARATE
 from lightpaint.basis.render.separate_renders import BLACK, WHITE
 from lightpaint.errors import SceneError
 from lightpaint.lighting.answer.lighting import Lighting
 from lightpaint.pipeline.job.job_checks import remarks_of_scene
 from lightpaint.progress import silent
 from lightpaint.relit.relit_scene import relight
+from lightpaint.scene.mitsuba_scene import Scene
 from lightpaint.scene.runtime.variant import use_variant
-from lightpaint.scene.scene import Scene
 from lightpaint.scene.scene_reader import load_scene
 from lightpaint.scene.scene_render import SAMPLES_PER_PASS, Stream, pass_seed, plan_passes, render
 

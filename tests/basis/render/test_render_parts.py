@@ -15,11 +15,11 @@ from lightpaint.basis.basis import Basis
 from lightpaint.basis.render import basis_render, render_budget
 from lightpaint.basis.render import render_parts as parts_module
 from lightpaint.basis.render.basis_render import render_basis
-from lightpaint.basis.render.one_pass_basis import mean_and_half_difference
 from lightpaint.basis.render.render_parts import Part, PartRenderer, PartSums, plan_parts
+from lightpaint.basis.render.rendered_basis import mean_and_half_difference
 from lightpaint.errors import SceneError
+from lightpaint.scene.mitsuba_scene import Scene
 from lightpaint.scene.runtime.kernel_threads import limit_threads
-from lightpaint.scene.scene import Scene
 from lightpaint.scene.scene_reader import load_scene
 
 SPP = 32

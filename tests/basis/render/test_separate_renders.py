@@ -17,11 +17,11 @@ from lightpaint.basis.basis import Basis
 from lightpaint.basis.cache.cached_render import obtain_basis
 from lightpaint.basis.file.basis_file import read_basis, write_basis
 from lightpaint.basis.render.basis_render import render_basis
-from lightpaint.basis.render.render_origin import ONE_PASS, SEPARATE
+from lightpaint.basis.render.rendered_basis import ONE_PASS, SEPARATE
 from lightpaint.basis.render.separate_renders import BLACK, WHITE
 from lightpaint.errors import BasisError, SceneError
 from lightpaint.progress import Interrupted
-from lightpaint.scene.scene import Scene
+from lightpaint.scene.mitsuba_scene import Scene
 from lightpaint.scene.scene_reader import load_scene
 from lightpaint.scene.scene_render import Stream, pass_seed
 
@@ -133,12 +133,12 @@ def test_a_part_of_separate_renders_does_not_replace_a_whole_basis(
 ) -> None:
     """As when a basis of one pass is kept and a variant is asked for that has no such thing."""
     monkeypatch.setattr(
-        "lightpaint.basis.render.render_origin.why_not_one_pass", lambda _scene: None
+        "lightpaint.basis.render.rendered_basis.why_not_one_pass", lambda _scene: None
     )
     start = obtain_basis(scene, spp=8)
     assert start.origin.method == ONE_PASS
     monkeypatch.setattr(
-        "lightpaint.basis.render.render_origin.why_not_one_pass", lambda _scene: "because"
+        "lightpaint.basis.render.rendered_basis.why_not_one_pass", lambda _scene: "because"
     )
     with pytest.raises(KeyboardInterrupt) as interrupt:
         obtain_basis(scene, spp=16, progress=lambda *_: os.kill(os.getpid(), signal.SIGINT) or None)

@@ -11,7 +11,7 @@ from spectral_room import DRIVES, write_spectral_room
 
 from lightpaint.basis.basis import Basis
 from lightpaint.basis.render.basis_render import render_basis
-from lightpaint.basis.render.render_origin import basis_lights
+from lightpaint.basis.render.rendered_basis import basis_lights
 from lightpaint.colour.color import ciede2000, delta_e, lab, luminance
 from lightpaint.colour.lamp import Lamp, LampEmitter
 from lightpaint.colour.primaries import colour_science

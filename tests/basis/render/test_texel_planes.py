@@ -22,9 +22,9 @@ from lightpaint.lighting.answer.lighting import Lighting
 from lightpaint.lighting.problem import Problem
 from lightpaint.relit.relit_scene import relight
 from lightpaint.relit.verification_render import verify
-from lightpaint.scene.scene import Scene
+from lightpaint.scene.mitsuba_scene import Scene
 from lightpaint.scene.scene_reader import load_scene
-from lightpaint.target.target import Target
+from lightpaint.target.painted_target import Target
 
 ROTATED = """<emitter type="envmap" id="sky"><string name="filename" value="map.exr"/>
     <float name="scale" value="2"/><transform name="to_world"><rotate x="1" angle="40"/>

@@ -18,10 +18,10 @@ from lightpaint.basis.basis import Basis
 from lightpaint.basis.cache.cached_render import obtain_basis
 from lightpaint.basis.file.basis_file import read_basis, write_basis
 from lightpaint.basis.render.basis_render import render_basis
-from lightpaint.basis.render.render_origin import SEPARATE, is_of
+from lightpaint.basis.render.rendered_basis import SEPARATE, is_of
 from lightpaint.basis.render.separate_renders import BLACK, WHITE
+from lightpaint.scene.mitsuba_scene import Scene
 from lightpaint.scene.properties.emission import MULTIPLE
-from lightpaint.scene.scene import Scene
 from lightpaint.scene.scene_reader import load_scene
 
 SLOW = '<integrator type="volpathmis"><integer name="max_depth" value="5"/></integrator>'

@@ -18,10 +18,10 @@ from lightpaint.basis.cache.cached_render import obtain_basis, top_up_basis
 from lightpaint.basis.file.basis_file import read_basis, write_basis
 from lightpaint.basis.render import basis_render, pixel_top_up
 from lightpaint.basis.render.basis_render import render_basis
-from lightpaint.basis.render.render_origin import is_on_the_way
+from lightpaint.basis.render.rendered_basis import is_on_the_way
 from lightpaint.errors import BasisError
 from lightpaint.progress import Interrupted
-from lightpaint.scene.scene import Scene
+from lightpaint.scene.mitsuba_scene import Scene
 from lightpaint.scene.scene_reader import load_scene
 
 SECOND_SENSOR = """<sensor type="perspective" id="second"><transform name="to_world">

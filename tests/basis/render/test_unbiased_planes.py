@@ -13,12 +13,12 @@ from lightpaint.arrays import Doubles
 from lightpaint.basis.basis import Basis
 from lightpaint.basis.render import basis_render
 from lightpaint.basis.render.basis_render import render_basis
-from lightpaint.basis.render.render_origin import ONE_PASS
+from lightpaint.basis.render.rendered_basis import ONE_PASS
 from lightpaint.basis.render.separate_renders import BLACK, WHITE
 from lightpaint.images.estimate import Estimate
 from lightpaint.images.formats.exr import write_rgb
+from lightpaint.scene.mitsuba_scene import Scene
 from lightpaint.scene.runtime.variant import use_variant
-from lightpaint.scene.scene import Scene
 from lightpaint.scene.scene_reader import load_scene
 from lightpaint.scene.scene_render import Stream, render
 

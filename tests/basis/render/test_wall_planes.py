@@ -20,8 +20,8 @@ from lightpaint.errors import SceneError
 from lightpaint.lighting.answer.combination import combine
 from lightpaint.relit.relit_scene import relight
 from lightpaint.relit.verification_render import verify
+from lightpaint.scene.mitsuba_scene import Scene
 from lightpaint.scene.properties.emission import read_emitted_image
-from lightpaint.scene.scene import Scene
 from lightpaint.scene.scene_reader import load_scene
 
 PLACE = """<transform name="to_world"><scale x="0.8" y="0.5"/><rotate z="1" angle="25"/>

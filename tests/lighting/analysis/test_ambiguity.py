@@ -6,9 +6,9 @@ import numpy as np
 
 from lightpaint.basis.basis import Basis, Origin
 from lightpaint.basis.lights import BasisLight
-from lightpaint.lighting.analysis.analysis import ambiguities, indistinguishable
+from lightpaint.lighting.analysis.answer_analysis import ambiguities, indistinguishable
 from lightpaint.lighting.solver import solve
-from lightpaint.target.target import Target
+from lightpaint.target.painted_target import Target
 
 NAMES = ["key", "fill", "rim", "sky", "lamp"]
 

@@ -9,7 +9,7 @@ import pytest
 from lightpaint.colour.color import delta_e, luminance
 from lightpaint.colour.display.view_transform import ViewTransform
 from lightpaint.images.object_map import Objects
-from lightpaint.lighting.analysis.analysis import analyse
+from lightpaint.lighting.analysis.answer_analysis import analyse
 from lightpaint.lighting.analysis.appearance.appearance import (
     CLOSE,
     Appearance,
@@ -21,11 +21,11 @@ from lightpaint.lighting.analysis.appearance.pixel_sample import PixelSample
 from lightpaint.lighting.analysis.appearance.unpainted_change import unpainted_change
 from lightpaint.lighting.analysis.noise.uncertainty import error_bars
 from lightpaint.lighting.answer.combination import combine
-from lightpaint.lighting.constraints.constraints import Constraints
+from lightpaint.lighting.constraints.constraint_table import Constraints
 from lightpaint.lighting.solver import solve
 from lightpaint.report.verdict_sentences import headline
 from lightpaint.scene.lights.texels.texel import texel_names
-from lightpaint.target.target import Target, Wish
+from lightpaint.target.painted_target import Target, Wish
 
 SIZE = (24, 48)
 

@@ -10,7 +10,7 @@ from lightpaint.images.object_map import Objects
 from lightpaint.lighting.analysis.appearance.appearance import compare_appearance
 from lightpaint.lighting.analysis.appearance.area_lights import AreaLights, lights_of_area
 from lightpaint.lighting.solver import solve
-from lightpaint.target.target import Target
+from lightpaint.target.painted_target import Target
 
 SIZE = (24, 48)
 

@@ -18,9 +18,9 @@ from lightpaint.lighting.analysis import active_bounds
 from lightpaint.lighting.analysis.diagnosis import diagnose
 from lightpaint.lighting.answer.certificate import Bound
 from lightpaint.lighting.answer.lighting_file import read_lighting, write_lighting
-from lightpaint.lighting.constraints.constraints import Constraints
+from lightpaint.lighting.constraints.constraint_table import Constraints
 from lightpaint.lighting.solver import solve
-from lightpaint.target.target import Target
+from lightpaint.target.painted_target import Target
 
 SIZE = (5, 4)
 LUMINANCE = np.array([0.2126, 0.7152, 0.0722])

@@ -21,9 +21,9 @@ from lightpaint.lighting.analysis.appearance.delivery import (
     worst_delivery,
 )
 from lightpaint.lighting.analysis.appearance.wish_parts import wish_parts
-from lightpaint.lighting.constraints.constraints import Constraints
+from lightpaint.lighting.constraints.constraint_table import Constraints
 from lightpaint.lighting.solver import solve
-from lightpaint.target.target import Target, Wish
+from lightpaint.target.painted_target import Target, Wish
 
 SIZE = (24, 48)
 WHOLE = np.ones(SIZE, np.float32)

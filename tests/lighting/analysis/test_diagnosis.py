@@ -12,7 +12,7 @@ from lightpaint.colour.display.view_transform import ViewTransform
 from lightpaint.lighting.analysis.diagnosis import diagnose
 from lightpaint.lighting.answer.combination import combine
 from lightpaint.lighting.solver import solve
-from lightpaint.target.target import Target, Wish
+from lightpaint.target.painted_target import Target, Wish
 
 SIZE = (12, 18)
 

@@ -10,7 +10,7 @@ from lightpaint.lighting.analysis.diagnosis import diagnose
 from lightpaint.lighting.analysis.noise.residuals import channel_grain
 from lightpaint.lighting.solver import solve
 from lightpaint.report.diagnosis_sentences import error_sentences
-from lightpaint.target.target import Target
+from lightpaint.target.painted_target import Target
 
 SIZE = (90, 120)
 Y, X = np.mgrid[: SIZE[0], : SIZE[1]]

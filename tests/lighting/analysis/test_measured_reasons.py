@@ -9,12 +9,12 @@ import pytest
 from lightpaint.basis.lights import BasisLight
 from lightpaint.colour.display.view_transform import ViewTransform
 from lightpaint.lighting.analysis.appearance.appearance import compare_appearance
-from lightpaint.lighting.analysis.appearance.constraint_kinds import ConstraintsByLight
 from lightpaint.lighting.analysis.noise.noise_correction import correct_noise
-from lightpaint.lighting.constraints.constraints import Constraints
+from lightpaint.lighting.constraints.constraint_table import Constraints
+from lightpaint.lighting.constraints.light_constraints import ConstraintsByLight
 from lightpaint.lighting.solution import Solution
 from lightpaint.lighting.solver import solve
-from lightpaint.target.target import Target
+from lightpaint.target.painted_target import Target
 
 SIZE = (90, 150)
 

@@ -12,7 +12,7 @@ from lightpaint.basis.planes import MemoryPlanes
 from lightpaint.colour.display.view_transform import ViewTransform
 from lightpaint.lighting.analysis.noise.noise import NoisyPixels, noise_sums
 from lightpaint.lighting.solver import solve
-from lightpaint.target.target import Target
+from lightpaint.target.painted_target import Target
 
 N, SIZE = 4, (9, 11)
 

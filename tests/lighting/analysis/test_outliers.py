@@ -25,7 +25,7 @@ from lightpaint.report.diagnosis_sentences import (
 )
 from lightpaint.report.page.lights_table import lights_table
 from lightpaint.report.page.notebook_html import html_of
-from lightpaint.target.target import Target
+from lightpaint.target.painted_target import Target
 
 SIZE = (24, 24)
 SEEDS = 40

@@ -11,7 +11,7 @@ from lightpaint.lighting.analysis.noise.noise_correction import correct_noise
 from lightpaint.lighting.analysis.noise.residuals import steadier_light
 from lightpaint.lighting.analysis.noise.uncertainty import error_bars
 from lightpaint.lighting.solver import solve
-from lightpaint.target.target import Target
+from lightpaint.target.painted_target import Target
 
 SIZE = (24, 24)
 

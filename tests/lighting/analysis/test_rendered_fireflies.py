@@ -11,7 +11,7 @@ from lightpaint.basis.basis import Basis
 from lightpaint.basis.render import basis_render
 from lightpaint.basis.render.basis_render import render_basis
 from lightpaint.lighting.analysis.noise import uncertainty
-from lightpaint.target.target import Target
+from lightpaint.target.painted_target import Target
 
 #: Outside of the picture, so that its light comes by way of what it lights.
 BULB_IN_GLASS = """<shape type="sphere" id="bulb"><point name="center" x="-1.3" y="1.5" z="1.6"/>

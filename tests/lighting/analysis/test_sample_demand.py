@@ -16,7 +16,7 @@ from lightpaint.lighting.analysis.noise.sample_demand import (
 )
 from lightpaint.lighting.analysis.noise.uncertainty import error_bars
 from lightpaint.lighting.solver import solve
-from lightpaint.target.target import Target
+from lightpaint.target.painted_target import Target
 
 SIZE = (20, 24)
 

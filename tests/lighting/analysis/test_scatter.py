@@ -11,7 +11,7 @@ from lightpaint.lighting.analysis.noise.noise_rows import UNCORRECTED, factor, v
 from lightpaint.lighting.analysis.noise.uncertainty import error_bars
 from lightpaint.lighting.analysis.noise.weight_directions import WeightSpread
 from lightpaint.lighting.solver import solve
-from lightpaint.target.target import Target
+from lightpaint.target.painted_target import Target
 
 SIZE = (24, 24)
 SEEDS = 60

@@ -20,13 +20,13 @@ from lightpaint.colour.spectra.spectrum import (
     xyz_of_powers,
 )
 from lightpaint.images.object_map import Objects
-from lightpaint.lighting.analysis.surface_colors import surface_colors
-from lightpaint.lighting.constraints.constraints import Constraints
+from lightpaint.lighting.analysis.rendered_colors import surface_colors
+from lightpaint.lighting.constraints.constraint_table import Constraints
 from lightpaint.lighting.solver import solve
 from lightpaint.report.page.lights_table import rendering_section
 from lightpaint.scene.scene_reader import load_scene
 from lightpaint.scene.surfaces import render_reflectances
-from lightpaint.target.target import Target
+from lightpaint.target.painted_target import Target
 
 SIZE = (4, 12)
 PEAKS = {"red": (630, 12), "green": (525, 16), "blue": (455, 12)}

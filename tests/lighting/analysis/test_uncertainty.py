@@ -18,8 +18,7 @@ from lightpaint.errors import BasisError, SizeError
 from lightpaint.images.estimate import Estimate
 from lightpaint.lighting.analysis.noise.dominant_pixels import NORMAL_95
 from lightpaint.lighting.analysis.noise.noise import denoised_matrix, pseudo_inverse
-from lightpaint.lighting.analysis.noise.noise_correction import correct_noise
-from lightpaint.lighting.analysis.noise.refinement import refine
+from lightpaint.lighting.analysis.noise.noise_correction import correct_noise, refine
 from lightpaint.lighting.analysis.noise.uncertainty import (
     _least_power,
     _power_error,
@@ -28,10 +27,10 @@ from lightpaint.lighting.analysis.noise.uncertainty import (
     with_error_bars,
 )
 from lightpaint.lighting.analysis.noise.weight_directions import _one_sided
-from lightpaint.lighting.constraints.constraints import Constraints
+from lightpaint.lighting.constraints.constraint_table import Constraints
 from lightpaint.lighting.normal_equations import NormalEquations
 from lightpaint.lighting.solver import solve
-from lightpaint.target.target import Target
+from lightpaint.target.painted_target import Target
 
 SIZE = (24, 24)
 SEEDS = 40

@@ -12,11 +12,11 @@ from lightpaint.lighting.analysis.appearance import limiting_reasons
 from lightpaint.lighting.analysis.noise import noise
 from lightpaint.lighting.analysis.noise.noise import denoised_matrix, pseudo_inverse
 from lightpaint.lighting.analysis.noise.weight_directions import Directions
-from lightpaint.lighting.constraints.constraints import Constraints
+from lightpaint.lighting.constraints.constraint_table import Constraints
 from lightpaint.lighting.normal_equations import NormalEquations, block_diagonal
 from lightpaint.lighting.solver import solve
 from lightpaint.lighting.unknowns.reduction import reduce_to
-from lightpaint.target.target import Target
+from lightpaint.target.painted_target import Target
 
 #: Float64 sums of a few terms of size one.
 EXACT = {"rtol": 1e-12, "atol": 1e-12}

@@ -15,10 +15,10 @@ from lightpaint.colour.color import cct_and_duv, hex_to_rgb, kelvin_to_rgb
 from lightpaint.colour.color_ranges import white_range
 from lightpaint.errors import ConstraintError
 from lightpaint.lighting.answer.lighting_file import read_lighting, write_lighting
-from lightpaint.lighting.constraints.constraints import Constraints
+from lightpaint.lighting.constraints.constraint_table import Constraints
 from lightpaint.lighting.solver import solve
 from lightpaint.lighting.unknowns.reduced_problem import reduced_problems
-from lightpaint.target.target import Target
+from lightpaint.target.painted_target import Target
 
 SIZE = (5, 4)
 LUMINANCE = np.array([0.2126, 0.7152, 0.0722])

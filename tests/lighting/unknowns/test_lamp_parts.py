@@ -11,15 +11,15 @@ from lightpaint.colour.color import kelvin_to_rgb
 from lightpaint.colour.spectra.color_rendering import fidelity
 from lightpaint.colour.spectra.spectrum import rgb_of_powers
 from lightpaint.errors import ConstraintError
-from lightpaint.lighting.analysis.analysis import analyse
+from lightpaint.lighting.analysis.answer_analysis import analyse
+from lightpaint.lighting.analysis.rendered_colors import renderings_of
 from lightpaint.lighting.answer.combination import combine
-from lightpaint.lighting.answer.light_rendering import renderings_of
 from lightpaint.lighting.answer.lighting_file import read_lighting, write_lighting
-from lightpaint.lighting.constraints.constraints import Constraints
+from lightpaint.lighting.constraints.constraint_table import Constraints
 from lightpaint.lighting.solver import solve
 from lightpaint.lighting.unknowns.lamp_parts import WholeLamps
 from lightpaint.lighting.unknowns.reduction import lamps_by_name, reduce_to
-from lightpaint.target.target import Target
+from lightpaint.target.painted_target import Target
 
 SIZE = (6, 5)
 WAVES = np.arange(380, 781, 10)

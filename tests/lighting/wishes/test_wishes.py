@@ -11,14 +11,18 @@ from qp import least
 from scipy.optimize import linprog
 
 from lightpaint.errors import ConstraintError
-from lightpaint.lighting.constraints.constraints import Constraints
+from lightpaint.lighting.constraints.constraint_table import Constraints
 from lightpaint.lighting.fit import Fit
 from lightpaint.lighting.problem import Problem
 from lightpaint.lighting.solver import solution_of
 from lightpaint.lighting.unknowns.reduction import reduce_to
-from lightpaint.lighting.wishes.linear_programs import least_watts, power_of, shares_given_up
 from lightpaint.lighting.wishes.planes_answer import planes_answer
-from lightpaint.lighting.wishes.required_problem import with_wishes
+from lightpaint.lighting.wishes.wish_problems import (
+    least_watts,
+    power_of,
+    shares_given_up,
+    with_wishes,
+)
 from lightpaint.lighting.wishes.wished_light import wished_light
 from lightpaint.photometry.illuminance import Illuminance
 from lightpaint.photometry.measuring_plane import (
@@ -28,7 +32,7 @@ from lightpaint.photometry.measuring_plane import (
     Ratio,
     Wishes,
 )
-from lightpaint.target.target import Target
+from lightpaint.target.painted_target import Target
 
 #: Rows are met up to 1e-9 of their size, and the oracles have tolerances of their own.
 SAME = 1e-6

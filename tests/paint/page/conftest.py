@@ -15,7 +15,7 @@ from axe import axe_source
 from painter_page import Painter
 from renderer import REPOSITORY
 
-from lightpaint.viewer import bundle
+from lightpaint import viewer
 
 PAGE = REPOSITORY / "lightpaint" / "paint" / "page"
 HERE = Path(__file__).parent
@@ -90,15 +90,15 @@ def fake_bundle() -> bytes:
     A hundred modules, one by one, take more of each test than what it does. They load as a server
     gives them in `test_real.py`, `test_language.py` and wherever else a test asks for them.
     """
-    package_source = bundle.source
+    package_source = viewer.source
 
     def source(path: str) -> str:
         own = HERE / path.removeprefix("paint/page/")
         return own.read_text(encoding="utf-8") if own.is_file() else package_source(path)
 
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(bundle, "source", source)
-        return bundle.bundled("paint/page/fake/main.js").encode()
+        patch.setattr(viewer, "source", source)
+        return viewer.bundled("paint/page/fake/main.js").encode()
 
 
 def served_file(site: Site, path: str) -> tuple[dict[str, str], bytes]:
@@ -114,7 +114,7 @@ def served_file(site: Site, path: str) -> tuple[dict[str, str], bytes]:
     if path == BUNDLE:
         return {"content-type": KINDS[".js"]}, fake_bundle()
     if path == STYLE_SHEET:
-        return {"content-type": KINDS[".css"]}, bundle.styles("paint/page/style.css").encode()
+        return {"content-type": KINDS[".css"]}, viewer.styles("paint/page/style.css").encode()
     if path == BUNDLE_PAGE:
         text = (HERE / "fake" / "index.html").read_text(encoding="utf-8")
         return {"content-type": KINDS[".html"]}, text.replace("main.js", "bundle.js").encode()

@@ -13,8 +13,8 @@ import pytest
 from foreign_server import ForeignServer
 
 from lightpaint.paint.server.server import Server
-from lightpaint.paint.store.store import MemoryStore
-from lightpaint.paint.studio.studio import Studio
+from lightpaint.paint.store.session_file import MemoryStore
+from lightpaint.paint.studio.session_studio import Studio
 from lightpaint.paint.subject import Subject
 
 NO_KEY_TEXT = (

@@ -14,8 +14,8 @@ from patience import PATIENCE_S
 from renderer import write_room
 
 from lightpaint.paint.server.server import Server
-from lightpaint.paint.store.store import Store
-from lightpaint.paint.studio.studio import Studio
+from lightpaint.paint.store.session_file import Store
+from lightpaint.paint.studio.session_studio import Studio
 from lightpaint.paint.subject import Subject
 from lightpaint.pipeline.job.settings import Settings
 from lightpaint.placement.free_space import pixels_of

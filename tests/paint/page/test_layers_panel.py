@@ -26,8 +26,8 @@ from lightpaint.paint.layers.layer_pixels import LayerPixels
 from lightpaint.paint.layers.layer_stack import Layer, LayerStack
 from lightpaint.paint.server.server import Server
 from lightpaint.paint.store.history_steps import Pixels
-from lightpaint.paint.store.store import Store
-from lightpaint.paint.studio.studio import Studio
+from lightpaint.paint.store.session_file import Store
+from lightpaint.paint.studio.session_studio import Studio
 from lightpaint.paint.subject_factory import make_subject
 from lightpaint.pipeline.job.sources import BasisFile
 

@@ -22,7 +22,7 @@ from lightpaint.lighting.answer.lighting import Lighting
 from lightpaint.report.measures import ReportedAnswer
 from lightpaint.report.page.html import ROWS_SHOWN
 from lightpaint.report.page.mixer import mixer_assets, mixer_html
-from lightpaint.report.page.page import report_page
+from lightpaint.report.page.report_page import report_page
 
 SIZE = (36, 64)
 EVIL = "</script><script>document.title='x'</script>"

@@ -10,7 +10,7 @@ from painter_page import Painter
 
 import lightpaint as lp
 from lightpaint.paint.studio.plane_measurements import plane_sight
-from lightpaint.photometry.false_colour import COLOURS, colours_of, isolux_levels
+from lightpaint.photometry.readings_file import COLOURS, colours_of, isolux_levels
 
 SENSORS = {
     "perspective": {"fov": 70},

@@ -34,9 +34,9 @@ from lightpaint.images.object_map import Objects
 from lightpaint.lighting.analysis.noise.noise_correction import correct_noise
 from lightpaint.paint.server.server import Server
 from lightpaint.paint.store.history_steps import name_in_view
-from lightpaint.paint.store.store import Store
+from lightpaint.paint.store.session_file import Store
 from lightpaint.paint.studio.console_switch import Console, drives_of_session
-from lightpaint.paint.studio.studio import Studio
+from lightpaint.paint.studio.session_studio import Studio
 from lightpaint.paint.subject import Subject
 from lightpaint.paint.subject_factory import make_subject
 from lightpaint.pipeline.job.sources import BasisFile

@@ -14,8 +14,8 @@ from PIL import Image
 
 import lightpaint as lp
 from lightpaint.paint.server.server import Server
-from lightpaint.paint.store.store import Store
-from lightpaint.paint.studio.studio import Studio
+from lightpaint.paint.store.session_file import Store
+from lightpaint.paint.studio.session_studio import Studio
 from lightpaint.paint.subject_factory import make_subject
 from lightpaint.pipeline.job.sources import BasisFile
 

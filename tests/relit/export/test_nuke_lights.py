@@ -22,7 +22,7 @@ from lightpaint.relit.exported_answer import Source
 from lightpaint.relit.formats import names_of_forms
 from lightpaint.relit.relit_scene import scene_of
 from lightpaint.scene.lights.new_emitter import NewEmitter
-from lightpaint.scene.scene import Scene
+from lightpaint.scene.mitsuba_scene import Scene
 from lightpaint.scene.scene_reader import load_scene
 
 #: Numbers are written with nine digits.

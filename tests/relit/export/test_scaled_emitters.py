@@ -12,7 +12,7 @@ from lightpaint.basis.basis import Basis
 from lightpaint.basis.render.basis_render import render_basis
 from lightpaint.lighting.answer.lighting import Lighting
 from lightpaint.relit.exported_answer import emitters_of, rig_lights
-from lightpaint.scene.scene import Scene
+from lightpaint.scene.mitsuba_scene import Scene
 from lightpaint.scene.scene_reader import load_scene
 
 #: The renderer's numbers are float32.

@@ -16,7 +16,7 @@ from lightpaint.progress import listener, silent
 from lightpaint.relit.export.program_axes import blender_axes, lat_long, map_axes
 from lightpaint.relit.exported_answer import Source
 from lightpaint.relit.formats import write_content, writers_of
-from lightpaint.scene.scene import Scene
+from lightpaint.scene.mitsuba_scene import Scene
 
 #: Directions in the scene's axes, y up.
 DIRECTIONS = [(1, 0.3, 0.2), (-1, 0.2, 0.4), (0.1, 0.4, 1), (0.2, 0.1, -1), (0.1, 1, 0.2),

@@ -18,8 +18,8 @@ from lightpaint.images.formats.exr import write_rgb
 from lightpaint.lighting.answer.lighting import Lighting
 from lightpaint.relit.export.fixtures import fixtures_of
 from lightpaint.relit.exported_answer import Source, emitters_of, half_slide, slide_images_of
+from lightpaint.scene.mitsuba_scene import Scene
 from lightpaint.scene.runtime.variant import use_variant
-from lightpaint.scene.scene import Scene
 
 COLUMNS, ROWS = 6, 4
 #: Side of the floor that is seen, in metres, and pixels of its picture.

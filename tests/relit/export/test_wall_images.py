@@ -15,7 +15,7 @@ import lightpaint as lp
 from lightpaint.images.formats.exr import write_rgb
 from lightpaint.lighting.answer.lighting import Lighting
 from lightpaint.relit.exported_answer import Source
-from lightpaint.scene.scene import Scene
+from lightpaint.scene.mitsuba_scene import Scene
 
 COLUMNS, ROWS = 6, 4
 #: Half the width and height of the wall, and where it hangs.

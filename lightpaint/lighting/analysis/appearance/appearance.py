@@ -29,10 +29,10 @@ from lightpaint.lighting.analysis.appearance.delivery import (
     measure_deliveries,
     worst_delivery,
 )
-from lightpaint.lighting.analysis.appearance.display_difference import PaintComparison
-from lightpaint.lighting.analysis.appearance.error_place import (
+from lightpaint.lighting.analysis.appearance.display_difference import (
     NOTICED,
     SPOT,
+    PaintComparison,
     block_differences,
     lights_at,
     object_with_most_error,

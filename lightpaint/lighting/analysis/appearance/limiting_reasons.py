@@ -13,12 +13,7 @@ import numpy as np
 
 from lightpaint.arrays import Doubles, Floats
 from lightpaint.images import is_large
-from lightpaint.lighting.analysis.appearance.constraint_kinds import (
-    ALL_LIGHTS_KINDS,
-    ConstraintKind,
-)
-from lightpaint.lighting.analysis.appearance.display_difference import PaintComparison
-from lightpaint.lighting.analysis.appearance.error_place import NOTICED
+from lightpaint.lighting.analysis.appearance.display_difference import NOTICED, PaintComparison
 from lightpaint.lighting.analysis.appearance.pixel_sample import (
     LimitGroup,
     PixelSample,
@@ -29,7 +24,11 @@ from lightpaint.lighting.analysis.appearance.unpainted_change import (
     change_from_scene,
 )
 from lightpaint.lighting.analysis.noise.noise_correction import correct_noise
-from lightpaint.lighting.constraints.constraints import Constraints
+from lightpaint.lighting.constraints.constraint_table import Constraints
+from lightpaint.lighting.constraints.light_constraints import (
+    ALL_LIGHTS_KINDS,
+    ConstraintKind,
+)
 from lightpaint.lighting.fit import Fit
 from lightpaint.lighting.problem import Problem
 from lightpaint.lighting.solution import Solution

@@ -11,13 +11,13 @@ import numpy.typing as npt
 from lightpaint.arrays import Doubles, Floats
 from lightpaint.basis import Basis, block_means
 from lightpaint.images import Estimate, block_mean, block_sums, whole_factor
-from lightpaint.lighting.analysis.appearance.constraint_kinds import (
+from lightpaint.lighting.analysis.appearance.display_difference import PaintComparison
+from lightpaint.lighting.constraints.constraint_table import Constraints
+from lightpaint.lighting.constraints.light_constraints import (
     ALL_LIGHTS_KINDS,
     ConstraintKind,
     ConstraintsByLight,
 )
-from lightpaint.lighting.analysis.appearance.display_difference import PaintComparison
-from lightpaint.lighting.constraints.constraints import Constraints
 from lightpaint.lighting.fit import Fit
 from lightpaint.lighting.joined_views import Views
 from lightpaint.lighting.loss.painting import importance_sums, unpainted_weight

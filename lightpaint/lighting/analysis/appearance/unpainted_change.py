@@ -7,19 +7,16 @@ import numpy as np
 from lightpaint.arrays import Bools, Doubles, Floats, Indices
 from lightpaint.basis import Basis
 from lightpaint.colour import ciede2000
-from lightpaint.lighting.analysis.appearance.constraint_kinds import (
+from lightpaint.lighting.analysis.appearance.display_difference import NO_NAME, PaintComparison
+from lightpaint.lighting.analysis.diagnosis import REGIONS
+from lightpaint.lighting.constraints.light_constraints import (
     ConstraintKind,
     ConstraintsByLight,
 )
-from lightpaint.lighting.analysis.appearance.display_difference import PaintComparison
-from lightpaint.lighting.analysis.appearance.error_place import NO_NAME
 from lightpaint.lighting.solution import Solution
 
 #: Smallest unpainted share of the picture for a place to be mentioned.
 MIN_PLACE = 0.01
-
-#: Regions along each side of the picture: left, middle, right.
-REGIONS = 3
 
 #: Kinds of constraints that fix the level of a light.
 FIXING_KINDS: tuple[ConstraintKind, ...] = ("off", "lock")

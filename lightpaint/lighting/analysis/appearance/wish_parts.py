@@ -17,7 +17,7 @@ import numpy as np
 from lightpaint.arrays import Bools, Doubles, Floats
 from lightpaint.colour import ViewTransform, lab
 from lightpaint.images import Objects, block_mean, fitting_factor
-from lightpaint.lighting.analysis.appearance.error_place import object_with_most
+from lightpaint.lighting.analysis.appearance.display_difference import object_with_most
 from lightpaint.lighting.problem import display_light
 from lightpaint.target import Wish
 from lightpaint.threads import one_thread

@@ -31,8 +31,7 @@ from lightpaint.lighting import (
     spoken_share,
     version,
 )
-from lightpaint.photometry.false_colour import false_colours
-from lightpaint.photometry.measuring_plane import plane_title
+from lightpaint.photometry import false_colours, plane_title
 from lightpaint.relit.verification import ERROR, Verification, limit_of_tests
 from lightpaint.report.answer_pictures import (
     CleanLooks,

@@ -33,7 +33,7 @@ from lightpaint.batch.gallery.summary import (
 from lightpaint.batch.manifest.entries import LookEntry
 from lightpaint.batch.manifest.file_names import SUMMARY, THUMBNAILS
 from lightpaint.batch.plan.journal import JournalLine
-from lightpaint.batch.plan.plan import PlaceGroup, Plan, PlannedLook, PlanStep
+from lightpaint.batch.plan.plan_steps import PlaceGroup, Plan, PlannedLook, PlanStep
 from lightpaint.batch.work.item_execution import job_fields
 from lightpaint.batch.work.work_items import Kind, Task
 from lightpaint.batch.work.worker_storage import WorkerCache
@@ -58,7 +58,7 @@ from lightpaint.report import (
 )
 from lightpaint.storage.json_records import strict_json
 from lightpaint.version import __version__
-from lightpaint.viewer.bundle import bundled, styles
+from lightpaint.viewer import bundled, styles
 
 #: Style sheets of the page.
 STYLES = ("batch/gallery/gallery.css", "viewer/mixer/wipe.css", "viewer/mixer/mixer.css")

@@ -28,7 +28,7 @@ from lightpaint.lighting.analysis.appearance.color_choices import (
 )
 from lightpaint.lighting.analysis.diagnosis import Diagnosis, diagnose
 from lightpaint.lighting.analysis.noise.uncertainty import Uncertainty, error_bars, with_error_bars
-from lightpaint.lighting.constraints.constraints import Constraints
+from lightpaint.lighting.constraints.constraint_table import Constraints
 from lightpaint.lighting.linear_problem import reduce_lights
 from lightpaint.lighting.problem import gamuts_for, whites_for
 from lightpaint.lighting.solution import Solution

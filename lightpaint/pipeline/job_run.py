@@ -25,11 +25,17 @@ from lightpaint.lighting import (
     surface_colors,
     with_findings,
 )
-from lightpaint.pipeline.job.job import Job, PaintedView
 from lightpaint.pipeline.job.settings import Settings
-from lightpaint.pipeline.job_bases import obtain_bases_of, problem_of, view_listener, without_noise
-from lightpaint.pipeline.needed_samples import add_needed_samples
+from lightpaint.pipeline.job.solve_job import Job, PaintedView
+from lightpaint.pipeline.job_bases import (
+    add_needed_samples,
+    obtain_bases_of,
+    problem_of,
+    view_listener,
+    without_noise,
+)
 from lightpaint.pipeline.placed_lights import find_suns, place_lights, suggest_move
+from lightpaint.pipeline.results.look import Look, write_predicted, write_report
 from lightpaint.pipeline.results.result_folder import (
     LIGHTING,
     AnswerFolder,
@@ -38,7 +44,6 @@ from lightpaint.pipeline.results.result_folder import (
     with_places,
     write_planes,
 )
-from lightpaint.pipeline.results.results import Look, write_predicted, write_report
 from lightpaint.pipeline.wished_planes import (
     MeasuredPlanes,
     answer_on_planes,

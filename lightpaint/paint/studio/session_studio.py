@@ -36,13 +36,13 @@ from lightpaint.paint.rig.light_mover import LightMover
 from lightpaint.paint.rig.light_placer import LightPlacer
 from lightpaint.paint.rig.moved_looks import LookComparison
 from lightpaint.paint.session.moved_lights import Placed
-from lightpaint.paint.session.session import Session
+from lightpaint.paint.session.painting_session import Session
 from lightpaint.paint.session.session_state import offer_ground, state_fields
 from lightpaint.paint.session.snapshot import SessionSnapshot
-from lightpaint.paint.session_access import Publisher, SessionAccess
+from lightpaint.paint.session_access import Publisher, SessionAccess, StudioLinks
 from lightpaint.paint.store.history_steps import Identity, Pixels
+from lightpaint.paint.store.session_file import Store
 from lightpaint.paint.store.session_requests import SessionRequests
-from lightpaint.paint.store.store import Store
 from lightpaint.paint.studio.background_jobs import BackgroundJobs
 from lightpaint.paint.studio.console_switch import Console, ConsoleSwitch
 from lightpaint.paint.studio.exact_answers import (
@@ -88,7 +88,8 @@ class Studio:
         self.failure: Exception | None = None
         self._access = access = SessionAccess()
         self.publisher = publisher = Publisher(access.lock)
-        self._threads = threads = BackgroundThreads(publisher.publish)
+        self._threads = BackgroundThreads(publisher.publish)
+        links = StudioLinks(access, publisher, self._threads)
         self.rig = LampRig(self.subjects)
         denoiser = PlaneDenoiser(
             publisher.publish_picture,
@@ -96,48 +97,39 @@ class Studio:
             use_cache=self.subjects[0].settings.use_cache,
         )
         self._mover = LightMover(
-            access,
-            publisher,
+            links,
             self.rig,
-            threads,
             clean_planes=denoiser.clean_planes,
             on_rendered=lambda: self._exact_answers.notify(),
         )
         self._bases = SessionBases(
+            links,
             self.subjects,
             open_store,
-            access,
-            publisher,
             denoiser,
             self._mover,
             on_new_bases=self._show_new_bases,
             warn=self._publish_save_state,
         )
-        self._sampling = BackgroundSampling(self.subjects, access, self._bases, publisher)
-        self._choices = ChoiceSolver(access, publisher, denoiser.clean_planes)
-        self._exact_answers = ExactAnswers(access, publisher, self._follow_exact)
+        self._sampling = BackgroundSampling(links, self.subjects, self._bases)
+        self._choices = ChoiceSolver(links, denoiser.clean_planes)
+        self._exact_answers = ExactAnswers(links, self._follow_exact)
         self._console = ConsoleSwitch(
             console,
             find_directions=self._directions if self.has_scenes else None,
             warn=lambda text: publisher.publish(Notice(text=text, tone="warn")),
         )
         self._write_retry = UnsavedRetry(lambda: self.store, self._publish_save_state)
-        self._comparison = LookComparison(access, publisher, self._mover, threads)
-        self._jobs = BackgroundJobs(
-            access, publisher, self._mover, threads, clean_planes=denoiser.clean_planes
-        )
+        self._comparison = LookComparison(links, self._mover)
+        self._jobs = BackgroundJobs(links, self._mover, clean_planes=denoiser.clean_planes)
         self._shown_ground = 0  # number of the look under the painting that pages have
-        self._layer_imports = LayerImports(access, publisher, threads, self._exact_answers.notify)
-        self._reference_imports = ReferenceImports(access, publisher, threads)
-        self._renders = FinalRenders(
-            access, publisher, threads, self.subjects, self._jobs.exact_answer
-        )
-        self._placer = LightPlacer(access, publisher, self.rig, threads, self._hang_lights)
+        self._layer_imports = LayerImports(links, self._exact_answers.notify)
+        self._reference_imports = ReferenceImports(links)
+        self._renders = FinalRenders(links, self.subjects, self._jobs.exact_answer)
+        self._placer = LightPlacer(links, self.rig, self._hang_lights)
         self._planes = PlaneMeasurements(
+            links,
             self.subjects,
-            access,
-            publisher,
-            threads,
             self.rig,
             show=self.state,
             on_measured=self._exact_answers.notify,

@@ -51,8 +51,8 @@ from lightpaint.paint.session.session_planes import SessionPlanes
 from lightpaint.paint.session.snapshot import SessionSnapshot
 from lightpaint.paint.store.database import DamagedError
 from lightpaint.paint.store.history_steps import Pixels
+from lightpaint.paint.store.session_file import Store, StoredComposition
 from lightpaint.paint.store.session_requests import SessionRequests
-from lightpaint.paint.store.store import Store, StoredComposition
 from lightpaint.pipeline.job.settings import Settings
 from lightpaint.target import Target
 
