@@ -106,7 +106,34 @@ def instances(folder: Path) -> dict[str, Any]:
         "pose": pose,
         "newemitter": lp.NewEmitter("n", "point", pose),
     }
-    return values | arguments(values, folder)
+    return values | arguments(values, folder) | results(values, folder)
+
+
+def results(values: Mapping[str, Any], folder: Path) -> dict[str, Any]:
+    """Return what calls give that would render, by the names of their classes."""
+    scene, basis, emitter = (values[x] for x in ("scene", "basis", "newemitter"))
+    picture, place = np.ones((2, 2, 3), np.float32), emitter.site
+    up, points = np.array([[0.0, 1, 0]] * 2), np.array([[0.0, 1, 0], [0.5, 1, 0]])
+    plane = lp.MeasuringPlane("desk", points, up, 0.5, 0.5, (1, 2), np.array([[0, 0], [0, 1]]))
+    move, added = lp.Move("panel", place, place, 0.1), lp.AddedLight(emitter, 0.1)
+    lux = np.ones((2, len(basis.lights), 3))
+    verification = lp.Verification(
+        values["estimate"], np.zeros((8, 12, 3)), 1.0, (0.0, 0.0, 0.0), 0.0, 0.1, 0.1, 0.5, 1.0
+    )
+    answer = (values[x] for x in ("target", "basis", "solution", "estimate"))
+    return {
+        "Verification": verification,
+        "Look": lp.Look(*answer, scene, verification, values["analysis"]),
+        "Move": move,
+        "AddedLight": added,
+        "Placement": lp.Placement((scene,), (move,), (added,), 0.2, 0.1),
+        "Suggestion": lp.Suggestion(
+            "n", (0.0, 1.0, 0.0), (1.0, 1.0, 1.0), 0.1, 0.1, "", (0.5, 0.5), picture, picture
+        ),
+        "MeasuringPlane": plane,
+        "Illuminance": lp.Illuminance((plane,), basis.lights, lux, 0 * lux, 179.0),
+        "Demo": lp.Demo(folder / "scene.xml", folder / "evening.png", folder / "evening"),
+    }
 
 
 def arguments(values: Mapping[str, Any], folder: Path) -> dict[str, Any]:
@@ -134,11 +161,16 @@ def arguments(values: Mapping[str, Any], folder: Path) -> dict[str, Any]:
     }
 
 
+def found(values: Mapping[str, Any], name: str) -> Any:
+    """Return the instance of a class among right values."""
+    return values.get(name, values.get(name.lower()))
+
+
 def public_calls(values: Mapping[str, Any]) -> Iterator[tuple[str, Callable[..., Any], Any]]:
     """Yield the name of each public call, the call, and the right values of its arguments."""
     for name in sorted(set(lp.__all__) - set(LEFT_OUT)):
         call = getattr(lp, name)
-        instance, more = values.get(name.lower()), {}
+        instance, more = found(values, name), {}
         if not inspect.isclass(call):
             yield name, call, values
             continue
@@ -174,6 +206,28 @@ def cases(values: Mapping[str, Any]) -> Iterator[Case]:
                 )
 
 
+def painter_cases(basis: lp.Basis, painter: Any) -> Iterator[Case]:
+    """Yield what a cell can do wrong with a painter, new ones of a basis and one that there is."""
+    parameters = [*inspect.signature(lp.Painter).parameters, "spp", "colors"]
+    for word, wrong in WRONG.items():
+        yield Case(f"Painter({word})", paint_and_close, [wrong], {})
+        yield Case(f"Painter([{word}])", paint_and_close, [[wrong]], {})
+        yield Case(f"Painter(targets {word})", paint_and_close, [basis, [wrong]], {})
+        for name in sorted({*parameters} - {"scene", "settings"}):
+            yield Case(f"Painter({name} is {word})", paint_and_close, [basis], {name: wrong})
+        for name in ("target", "targets", "lighting", "constraints", "height"):
+            yield Case(f"Painter.{name} = {word}", setattr, [painter, name, wrong], {})
+        yield Case(f"Painter.save(view={word})", painter.save, ["a.exr"], {"view": wrong})
+        yield Case(f"Painter.save({word})", painter.save, [wrong], {})
+        for call in (painter.observe, painter.unobserve):
+            for args in ([wrong], [print, wrong], [print, "target", wrong]):
+                yield Case(f"Painter.{call.__name__}({args})", call, args, {})
+
+
+def paint_and_close(*args: Any, **options: Any) -> None:
+    lp.Painter(*args, **options).close()
+
+
 def complaint(case: Case) -> str:
     """Return what is wrong with the error of a call; "" if it works, or has one line of ours."""
 
@@ -207,3 +261,27 @@ def test_every_wrong_argument_is_one_line(
     assert len(values["basis"].to_dataframe()) == len(values["basis"].names)
     assert len(values["lighting"].to_dataframe()) == len(values["lighting"])
     assert len(values["solution"].to_dataframe()) == len(values["lighting"])
+
+
+def test_every_wrong_argument_of_a_painter_is_one_line(
+    folder: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    pytest.importorskip("anywidget", reason="the extra `notebook`")
+    monkeypatch.chdir(folder)
+    basis = small_basis()
+    painter = lp.Painter(basis)
+    chosen = list(painter_cases(basis, painter))
+    assert len(chosen) > 300
+    assert [text for case in chosen if (text := complaint(case))] == []
+    painter.height = 300
+    painter.observe(print, "target")
+    painter.unobserve(print, "target")
+    assert painter.lighting is not None
+    painter.close()
+
+
+def test_every_public_class_is_among_these(folder: Path) -> None:
+    """Also those whose instances only a render gives."""
+    values = instances(folder)
+    classes = {x for x in lp.__all__ if inspect.isclass(getattr(lp, x))} - {*LEFT_OUT}
+    assert {x for x in classes if not isinstance(found(values, x), getattr(lp, x))} == set()

@@ -38,6 +38,7 @@ from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from io import BytesIO
 from pathlib import Path
+from threading import Thread
 from typing import Literal
 
 from PIL import Image, ImageDraw
@@ -518,7 +519,10 @@ def load(page: Page) -> None:
 def painter(
     scene: str, spp: int, port: int, *more: str, folder: str | None = None
 ) -> Iterator[str]:
-    """Start a painter and give its address. folder: of its session, by default one of its own."""
+    """Start a painter and give its address. folder: of its session, by default one of its own.
+
+    Raises RuntimeError with its lines where it ends before it has an address.
+    """
     with tempfile.TemporaryDirectory() as own:
         words = [
             "paint",
@@ -534,7 +538,16 @@ def painter(
         server = subprocess.Popen(run, stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True)
         assert server.stdout is not None
         try:
-            yield next(word for line in server.stdout for word in line.split() if "#token=" in word)
+            lines: list[str] = []
+            for line in server.stdout:
+                lines.append(line)
+                if addresses := [word for word in line.split() if "#token=" in word]:
+                    break
+            else:
+                raise RuntimeError("".join(lines))
+            # It would wait for a reader of what else it prints.
+            Thread(target=server.stdout.read, daemon=True).start()
+            yield addresses[0]
         finally:
             server.terminate()
             server.wait(60)

@@ -14,6 +14,7 @@ if TYPE_CHECKING:
     from lightpaint.batch.manifest.file_names import FILES as FILES
     from lightpaint.batch.manifest.file_names import check_gallery as check_gallery
     from lightpaint.batch.manifest.file_names import is_reserved as is_reserved
+    from lightpaint.batch.manifest.keys import as_key as as_key
     from lightpaint.batch.manifest.keys import parse_variations as parse_variations
     from lightpaint.batch.manifest.looks_file import (
         write_starter_manifest as write_starter_manifest,

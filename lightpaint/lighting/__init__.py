@@ -38,6 +38,9 @@ if TYPE_CHECKING:
     from lightpaint.lighting.analysis.appearance.display_difference import (
         PaintComparison as PaintComparison,
     )
+    from lightpaint.lighting.analysis.appearance.held_answer import (
+        hold_to_current as hold_to_current,
+    )
     from lightpaint.lighting.analysis.appearance.limiting_reasons import Loosening as Loosening
     from lightpaint.lighting.analysis.appearance.limiting_reasons import Reason as Reason
     from lightpaint.lighting.analysis.appearance.pixel_sample import LimitGroup as LimitGroup

@@ -81,6 +81,9 @@ ROUGH_STEP = 1e-3
 #: paintings; ten times as much doubles the error of pictures between two.
 TIE = 1e-2
 
+#: Share of the loss of contrasts now from which they count as missed.
+MISSED_CONTRAST = 0.5
+
 #: Largest number of rounds over all frames, and the change of a weight, relative to the largest, at
 #: which they end.
 MAX_ROUNDS, MAX_CHANGE = 100, 1e-6
@@ -187,9 +190,35 @@ def solution_of(problem: Problem, *, start: Doubles | None = None) -> Solution:
     """Solve a problem. start: (n, 3), where to begin, its own start by default.
 
     If its loss is not linear, rounds of linear problems lead to the optimum. Colour wheels come to
-    the slots that are closest there, and the lights to the optimum with these.
+    the slots that are closest there, and the lights to the optimum with these. Contrasts that the
+    lights cannot bring are given up where the current lights come closer to the painting.
     """
     begin = problem.start if start is None else start
+    solution = _solve_whole(problem, begin)
+    if _is_spoilt_by_contrast(solution):
+        solution = _solve_whole(replace(problem, contrast=None), begin)
+    return solution
+
+
+def _is_spoilt_by_contrast(solution: Solution) -> bool:
+    """Return whether the answer misses the painting by more than the current lights do, and yet
+    most of the contrasts.
+
+    A contrast is a ratio to the rest of the picture. Where no light can lift the subject alone,
+    all lights go down for it, as everything that is missed is less in the dark.
+    """
+    problem = solution.problem
+    contrast, now = problem.contrast, problem.reference
+    if contrast is None:
+        return False
+    missed, missed_now = (float(contrast.objective(w).sum()) for w in (solution.weights, now))
+    if missed <= MISSED_CONTRAST * missed_now:
+        return False
+    return sum(solution.certificate.objective) > float(problem.objective(now).sum())
+
+
+def _solve_whole(problem: Problem, begin: Doubles) -> Solution:
+    """Solve a problem with all its terms from weights (n, 3)."""
     if problem.is_linear:
         return _solve_squares(problem, begin)
     blocks = _blocks_of(problem)

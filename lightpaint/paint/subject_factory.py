@@ -6,6 +6,7 @@ from pathlib import Path
 from typing import Any
 
 from lightpaint.basis import Basis, LightGroups, Lights
+from lightpaint.basis.cache import folder as cache_folder
 from lightpaint.colour import TransformChoice, read_observer
 from lightpaint.errors import PaintError, SceneError
 from lightpaint.files import file_length, scene_name
@@ -86,7 +87,7 @@ def make_subject(
     folder: by default one that is named after the source. check_lamps: is called with the names of
     emitters by light, as soon as they are known, and raises if these cannot be painted with. The
     others are as in `Subject`. Raises LightpaintError if the source cannot be painted, or its
-    lights cannot meet the constraints.
+    lights cannot meet the constraints, and OutputError if there is no folder for its cache.
     """
     settings = settings or Settings()
     constraints = Constraints() if constraints is None else constraints
@@ -96,6 +97,7 @@ def make_subject(
             raise PaintError(f"{layers} has the layers of one view: open that view alone")
         check_kind(layers)
     if isinstance(source, SceneFile | Scene):
+        cache_folder()  # raises before anybody opens a page that could show no picture
         scene = _scene_on_film(source, settings, constraints, check_lamps)
         fields: dict[str, Any] = {"scene": scene}
     else:

@@ -182,6 +182,8 @@ class Illuminance:
         shape, expected = np.shape(weights), self.matrix.shape[1:]
         if shape != expected:
             raise SceneError(f"weights of the shape {shape}: expected {expected}, a row per light")
+        if not np.isfinite(weights).all():
+            raise SceneError("weights that are infinite or no numbers: expected amounts of light")
         return np.asarray(matrix.reshape(len(matrix), np.size(weights)) @ np.ravel(weights))
 
 

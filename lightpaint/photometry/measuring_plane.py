@@ -180,7 +180,14 @@ class MeasuringPlane:
         return int(rows), int(columns)
 
     def picture(self, values: Doubles) -> Doubles:
-        """Return values at the points, (p,), as a picture (rows, columns); NaN without a point."""
+        """Return values at the points, (p,), as a picture (rows, columns); NaN without a point.
+
+        Raises SceneError for values of another shape.
+        """
+        if np.shape(values) != (len(self),):
+            raise SceneError(
+                f"values of the shape {np.shape(values)}: expected {(len(self),)}, one per point"
+            )
         picture = np.full(self.picture_size, np.nan)
         picture[self.cells[:, 0], self.cells[:, 1]] = values
         return picture

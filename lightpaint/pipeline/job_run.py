@@ -2,6 +2,7 @@
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -20,6 +21,7 @@ from lightpaint.lighting import (
     SurfaceColor,
     analyse,
     choose_mixes,
+    hold_to_current,
     solution_of,
     solve_frames,
     surface_colors,
@@ -196,6 +198,16 @@ def _finished(job: Job, solution: Solution, listen: Listener) -> Solution:
     )
     with stage("noise correction", listen, Sentence(" (", Hint("literal", True), " skips it)")):
         solution = without_noise(job, solution)
+    held = hold_to_current(solution, partial(without_noise, job))
+    if held is not solution:
+        listen.say(
+            Sentence(
+                "lights stay about as they are: larger changes lead away from the paint (",
+                Hint("literal", True),
+                " makes those of the least squares)",
+            )
+        )
+        solution = held
     pairs = zip((view.scene for view in job.views), solution.problem.views.bases, strict=True)
     scenes = [(scene, basis) for scene, basis in pairs if scene is not None]
     solution = refine_by_rendering(

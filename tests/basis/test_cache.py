@@ -437,6 +437,17 @@ def test_a_folder_with_other_files_is_no_cache(
     assert sorted(work.rglob("*")) == before
 
 
+def test_no_page_opens_for_pictures_that_nothing_can_cache(tmp_path: Path) -> None:
+    """The address would be printed first, and a browser would wait there."""
+    scene = write_room(tmp_path)
+    completed = run(
+        tmp_path, "paint", str(scene), "--no-browser", "--port=0", LIGHTPAINT_CACHE=str(tmp_path)
+    )
+    assert completed.returncode == 2
+    assert completed.stdout == ""
+    assert f"LIGHTPAINT_CACHE names {tmp_path}, which has other files" in completed.stderr
+
+
 def test_only_our_own_files_are_deleted(empty_cache: Path, make_basis: Any) -> None:
     """Also of a folder that is ours: by name, and by what is inside."""
     bases_of(make_basis, "hall.xml")

@@ -18,6 +18,7 @@ import pytest
 from batches import LOOKS, NAMES, contents, kill_batch, run_whole_batch, small_basis, write_batch
 from command import run, succeed
 from nightly import nightly
+from PIL import Image
 
 from lightpaint.batch import engine
 from lightpaint.batch.engine import Processes
@@ -705,3 +706,17 @@ def test_remarks_stand_in_the_log(batch_folder: Path) -> None:
     log = (batch_folder / "a.log").read_text()
     assert "a negative luminance in 1 of 96 pixels" in log
     assert log.count("third: answer done in") == 1
+
+
+def test_remarks_name_keys_of_the_manifest(batch_folder: Path) -> None:
+    """The command has no such options, and whoever reads the log writes no Python."""
+    image = np.full((8, 12, 3), 128, np.uint8)
+    Image.fromarray(image).save(batch_folder / "p2.png")
+    text = (batch_folder / "looks.toml").read_text().replace("p2.exr", "p2.png")
+    (batch_folder / "looks.toml").write_text(text)
+    line = ("looks.toml", "-o", "out", "--only", "third", "--log", "a.log")
+    completed = run(batch_folder, "batch", *line)
+    for printed in (completed.stderr, (batch_folder / "a.log").read_text()):
+        assert printed.count("(template = ... names one)") == 1
+        assert "--template" not in printed
+        assert "template=" not in printed

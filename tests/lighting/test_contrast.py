@@ -10,6 +10,7 @@ import pytest
 import lightpaint as lp
 from lightpaint.basis.basis import meter_exposure
 from lightpaint.colour.color import kelvin_to_rgb, luminance
+from lightpaint.lighting import hold_to_current, solver
 from lightpaint.lighting.live.live_sums import SmallFilm
 from lightpaint.lighting.loss import expected_lights, weight_penalty
 from lightpaint.lighting.loss.expected_lights import ExpectedLights, Wash, adjusted_share
@@ -476,3 +477,45 @@ def warmer(mired: float) -> np.ndarray:
     """Gains (3,) of luminance 1 that make a white of 5000 K warmer, or cooler below 0."""
     gains = kelvin_to_rgb(1e6 / (200 + mired)) / kelvin_to_rgb(5000)
     return np.asarray(gains / luminance(gains))
+
+
+def out_of_reach(make_basis: Any) -> tuple[lp.Basis, lp.Target]:
+    """Two lamps that light everything alike, and a third of the picture painted warm and bright."""
+    slopes = [np.tile(np.linspace(1, x, W), (H, 1)) for x in (0.9, 1.1)]
+    images = np.array(slopes)[..., None] * np.ones(3)
+    emission = [(0.12, 0.1, 0.08), (0.08, 0.08, 0.08)]
+    basis: lp.Basis = make_basis(images=images, names=["dome", "bulb"], emission=emission)
+    place = np.zeros((H, W, 1), bool)
+    place[6:18, 10:28] = True
+    rest = np.tile(np.linspace(1, 1.15, W), (H, 1))[..., None]
+    image = basis.current_look * np.where(place, [2.2, 1.1, 0.35], rest)
+    target = painting(basis, image, with_layers=False)
+    return basis, replace(target, over_look=False)
+
+
+def test_a_contrast_out_of_reach_does_not_darken_the_picture(
+    make_basis: Any, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """The ratio of subject to rest stays as it is however dark both are: the least contrast that is
+    missed is the one of a dark picture, farther from the painting than the current lights.
+    """
+    basis, target = out_of_reach(make_basis)
+    solution = lp.solve(basis, target)
+    objective = solution.problem.objective
+    assert objective(solution.weights).sum() < objective(basis.current_weights).sum()
+    monkeypatch.setattr(solver, "MISSED_CONTRAST", np.inf)  # never given up
+    dark = lp.solve(basis, target).weights
+    assert objective(dark).sum() > objective(basis.current_weights).sum()
+    assert basis.mix(dark).mean() < 0.9 * basis.mix(solution.weights).mean()
+
+
+def test_lights_stay_where_every_change_leads_away_from_the_paint(make_basis: Any) -> None:
+    """In ΔE, which reports give: the least squares change all of the picture for a part of it."""
+    basis, target = out_of_reach(make_basis)
+    squares = lp.compare_appearance(lp.solve(basis, target))
+    assert squares.is_worse
+    held = lp.compare_appearance(hold_to_current(lp.solve(basis, target)))
+    assert held.delta_e < squares.delta_e - 0.2
+    assert held.delta_e <= held.requested_change
+    literal = lp.solve(basis, target, literal=True)
+    assert hold_to_current(literal) is literal  # the paper's answer stays what it is

@@ -18,6 +18,7 @@ from scipy.optimize import nnls
 
 import lightpaint as lp
 from lightpaint.basis.render.basis_render import render_basis
+from lightpaint.lighting import hold_to_current
 
 ROOT = Path(__file__).parent.parent.parent
 
@@ -108,6 +109,16 @@ def _assert_close(weights: Any, others: Any, part: float = ROUND_OFF) -> None:
 def test_all_scenes_have_paintings() -> None:
     scenes = {path.parent.name for path in (ROOT / "scenes").glob("*/scene.xml")}
     assert {name.partition("/")[0] for name in PAINTINGS} == scenes
+
+
+@pytest.mark.parametrize("name", PAINTINGS)
+def test_no_answer_is_farther_from_its_painting_than_the_lights_as_they_are(
+    planes: Planes, name: str
+) -> None:
+    """In the mean ΔE that reports give."""
+    basis = planes(name)
+    appearance = lp.compare_appearance(hold_to_current(lp.solve(basis, _painting(name, basis))))
+    assert appearance.delta_e <= appearance.requested_change
 
 
 #: By day sums of some, and the lightings of all.

@@ -392,7 +392,7 @@ def test_what_cannot_be_given_is_said_at_once(
     with pytest.raises(lp.LightpaintError, match="folder is 5: expected the path of a folder"):
         lp.Painter(basis, folder=5)
     for height in (-5, 10):
-        with pytest.raises(traitlets.TraitError, match="should not be less than 240"):
+        with pytest.raises(lp.LightpaintError, match="expected a whole number of pixels from 240"):
             open_painter(height=height)
     with pytest.raises(lp.LightpaintError, match=r"give lp.read_basis\('x.basis.exr'\)"):
         lp.Painter("x.basis.exr")

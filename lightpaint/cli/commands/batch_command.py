@@ -2,7 +2,7 @@
 
 import os
 import shlex
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from datetime import UTC, datetime
 from pathlib import Path
 from typing import Any
@@ -26,6 +26,7 @@ from lightpaint.batch import (
 )
 from lightpaint.cli.output import documents, terminal
 from lightpaint.cli.output.lines import CommandOutcome
+from lightpaint.cli.output.vocabulary import spoken_of_manifest
 from lightpaint.display_text import some_of, visible
 from lightpaint.errors import BatchError, OutputError
 from lightpaint.files import scene_name
@@ -65,8 +66,7 @@ def batch(
     manifest, output_folder = (str(Path(x).absolute()) for x in (paths[0], folder))
     words = ["lightpaint", "batch", manifest, "-o", output_folder]
     note(f"{shlex.join(words)}: {len(plan.chosen_looks)} looks")
-    _say_remarks(plan, note)
-    outcome = _run(plan, run_options, note)
+    outcome = _run(plan, run_options, note, known=_say_remarks(plan, note))
     note(f"done {len(outcome.done)}, failed {len(outcome.failed)}")
     return _outcome(plan, outcome)
 
@@ -90,38 +90,49 @@ def _write_first_manifest(
     return CommandOutcome(lambda: {"manifest": str(path), "looks": len(paintings)})
 
 
-def _say_remarks(plan: Plan, note: Callable[[str], Any]) -> None:
-    """Say the remarks of a plan and of its looks, each once. note: adds a line to the log."""
+def _say_remarks(plan: Plan, note: Callable[[str], Any]) -> list[str]:
+    """Say the remarks of a plan and of its looks, each once, and return those that are shown.
+
+    note: adds a line to the log.
+    """
     of_looks = (x for look in plan.chosen_looks for x in look.remarks)
-    remarks = list(dict.fromkeys((*plan.remarks, *of_looks)))
+    remarks = list(dict.fromkeys(map(spoken_of_manifest, (*plan.remarks, *of_looks))))
     for remark in remarks:
         note(remark)
     for remark in remarks[:MAX_LISTED]:
         terminal.say(remark)
     if len(remarks) > MAX_LISTED:
         terminal.say(f"and {len(remarks) - MAX_LISTED} more remarks, each when its look is done")
+    return remarks[:MAX_LISTED]
 
 
 class _LoggedListener(terminal.TerminalListener):
-    """A listener whose remarks stand in the log as well. note: adds a line to it."""
+    """A listener whose remarks stand in the log as well.
 
-    def __init__(self, note: Callable[[str], Any]) -> None:
+    note: adds a line to it. known: remarks that it has, and that are shown.
+    """
+
+    def __init__(self, note: Callable[[str], Any], known: Sequence[str]) -> None:
         super().__init__()
-        self._note = note
+        self._note, self._known = note, known
 
     def say(self, text: str) -> None:
         """Show a remark, and log it."""
-        self._note(text)
-        self.show(text)
+        spoken = spoken_of_manifest(text)
+        if spoken not in self._known:
+            self._note(spoken)
+            self.show(spoken)
 
     def show(self, text: str) -> None:
         """Show a remark that the log has in other words."""
         super().say(text)
 
 
-def _run(plan: Plan, run_options: RunOptions, note: Callable[[str], Any]) -> BatchOutcome:
-    """Run a plan, and say which look is done. note: adds a line to the log."""
-    listen = _LoggedListener(note)
+def _run(
+    plan: Plan, run_options: RunOptions, note: Callable[[str], Any], *, known: Sequence[str]
+) -> BatchOutcome:
+    """Run a plan, and say which look is done. note, known: as for `_LoggedListener`."""
+    listen = _LoggedListener(note, known)
 
     def on_step(look: PlannedLook, result: ItemResult) -> None:
         name, time_text = f"{look.entry.name}: {result.kind}", time_left(result)

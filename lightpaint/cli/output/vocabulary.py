@@ -4,7 +4,7 @@ import os
 import shlex
 from collections.abc import Mapping, Sequence
 
-from lightpaint.batch import RunOptions
+from lightpaint.batch import RunOptions, as_key
 from lightpaint.pipeline import Settings
 from lightpaint.sentences import Datum, Hint, Lead, Sentence, SourceKey, Word
 from lightpaint.validation import options_of
@@ -63,6 +63,13 @@ OPTIONS_OF_KEYS = {"limits": "limit", "duv": "kelvin"}
 def spoken(text: str) -> str:
     """Return `text` of the library with the options of the command line."""
     return text.spelled(_spell) if isinstance(text, Sentence) else text
+
+
+def spoken_of_manifest(text: str) -> str:
+    """Return `text` of the library with the keys of a manifest, and options for what has none."""
+    if not isinstance(text, Sentence):
+        return text
+    return text.spelled(lambda datum: as_key(datum) or _spell(datum))
 
 
 def _spell(datum: Datum) -> str | None:

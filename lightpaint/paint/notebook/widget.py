@@ -18,8 +18,10 @@ from typing import TYPE_CHECKING, Any, Generic, TypeVar, Unpack
 from weakref import WeakValueDictionary
 
 from lightpaint.colour import TransformChoice, ViewTransform
+from lightpaint.display_text import brief
 from lightpaint.errors import PaintError
 from lightpaint.files import first_line
+from lightpaint.keywords import keywords
 from lightpaint.lighting import (
     Constraints,
     Lighting,
@@ -34,6 +36,7 @@ from lightpaint.paint.notebook import widget_arguments
 from lightpaint.paint.notebook.cell_views import CellOutput, KernelThread, WidgetViews, static_view
 from lightpaint.paint.notebook.widget_arguments import (
     LOADERS,
+    MIN_HEIGHT,
     LoadArguments,
     notebook_advice,
     same_paintings,
@@ -60,9 +63,6 @@ except ImportError as error:
 
 #: Traits that cells set and observe.
 LIVE_TRAITS = ("target", "targets", "lighting", "constraints")
-
-#: Minimum height of the painter, in pixels of the screen.
-MIN_HEIGHT = 240
 
 #: Default layout: without a width, an HBox gives the painter none.
 DEFAULT_LAYOUT = {"width": "100%", "min_width": "320px"}
@@ -341,6 +341,9 @@ class Painter(anywidget.AnyWidget):  # type: ignore[misc]
         layout: Mapping[str, Any] | ipywidgets.Layout | None = None,
         **settings: Unpack[SettingsByName],
     ) -> None:
+        widget_arguments.check_height(height)
+        if not isinstance(layout, ipywidgets.Layout | None):
+            widget_arguments.check_layout(layout, ipywidgets.Layout.class_trait_names())
         self._lock, self._ready = RLock(), Event()
         self._is_closed = False
         self._solved: tuple[int, Solution | None] | None = None
@@ -352,7 +355,9 @@ class Painter(anywidget.AnyWidget):  # type: ignore[misc]
             layers=layers,
             settings=widget_arguments.read_settings(settings, ARGUMENT_NAMES),
             constraints=constraints,
-            transform=transform or widget_arguments.transform_of_targets(target),
+            transform=widget_arguments.transform_of_targets(target)
+            if transform is None
+            else transform,
         )
         if target is not None:
             widget_arguments.check_target_sizes(target, subjects)
@@ -428,6 +433,7 @@ class Painter(anywidget.AnyWidget):  # type: ignore[misc]
             self._solved = snapshot.version, solution
         return self._solved[1]
 
+    @keywords()
     def save(self, path: str | Path, *, view: int = 0) -> None:
         """Write the painting (`.exr`) or its lighting (`.json`), as `lightpaint solve` reads them.
 
@@ -466,10 +472,12 @@ class Painter(anywidget.AnyWidget):  # type: ignore[misc]
     # Assignments from a cell
 
     def __setattr__(self, name: str, value: Any) -> None:
-        """Set an attribute. Raises AttributeError for a misspelt name."""
+        """Set an attribute. Raises AttributeError for a misspelt name, PaintError for a height."""
         is_known = name.startswith("_") or hasattr(type(self), name)
         if not is_known and (hint := widget_arguments.did_you_mean(name, [*LIVE_TRAITS, "height"])):
             raise AttributeError(f"lp.Painter has no attribute {name!r}{hint}")
+        if name == "height":
+            widget_arguments.check_height(value)
         super().__setattr__(name, value)
 
     def _assign(self, name: str, value: Any) -> None:
@@ -485,13 +493,20 @@ class Painter(anywidget.AnyWidget):  # type: ignore[misc]
 
         Raises PaintError for a handler that cannot be called, and for names that are not traits.
         """
-        known = [*self.trait_names(), traitlets.All]
-        widget_arguments.check_observer(handler, names, known, LIVE_TRAITS)
+        self._check_observer(handler, names, type)
         super().observe(self._callback(handler), names, type)
 
     def unobserve(self, handler: Any, names: Any = traitlets.All, type: str = "change") -> None:
-        """Stop calling `handler`."""
-        super().unobserve(self._callback(handler), names, type)
+        """Stop calling `handler`. Raises PaintError for one that does not observe these."""
+        self._check_observer(handler, names, type)
+        try:
+            super().unobserve(self._callback(handler), names, type)
+        except ValueError as error:
+            raise PaintError(f"{brief(handler)} does not observe this painter") from error
+
+    def _check_observer(self, handler: Any, names: Any, change: Any) -> None:
+        known = [*self.trait_names(), traitlets.All]
+        widget_arguments.check_observer(handler, names, change, known, LIVE_TRAITS)
 
     def _callback(self, handler: Any) -> Any:
         # ipywidgets' own observers are ObserveHandlers, not callbacks of a cell.

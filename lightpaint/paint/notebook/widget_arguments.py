@@ -1,9 +1,10 @@
 """Arguments and assignments of the notebook's painter, checked and translated for the session."""
 
-from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence, Set
 from contextlib import contextmanager
 from dataclasses import fields
 from difflib import get_close_matches
+from numbers import Integral
 from pathlib import Path
 from typing import Any
 
@@ -11,6 +12,7 @@ import numpy as np
 
 from lightpaint.basis import Basis, LightGroups
 from lightpaint.colour import TransformChoice, ViewTransform
+from lightpaint.display_text import brief
 from lightpaint.errors import KeywordError, LightpaintError, PaintError
 from lightpaint.lighting import Constraints, Lighting, resolve_importance
 from lightpaint.paint.session.painting_session import Session
@@ -23,6 +25,9 @@ from lightpaint.pipeline.job.settings import Settings
 from lightpaint.scene import Scene, load_scene
 from lightpaint.sentences import Datum, Remedy
 from lightpaint.target import PASS_RESIZE, Target
+
+#: Minimum height of the painter, in pixels of the screen.
+MIN_HEIGHT = 240
 
 #: Types that can be painted.
 Paintable = Basis | Scene | LightGroups | str | Path
@@ -216,16 +221,40 @@ def did_you_mean(name: str, names: Iterable[str]) -> str:
     return f": did you mean {near[0]!r}?" if near else ""
 
 
-def check_observer(handler: Any, names: Any, known: Sequence[Any], usual: Iterable[str]) -> None:
+def check_observer(
+    handler: Any, names: Any, change: Any, known: Sequence[Any], usual: Iterable[str]
+) -> None:
     """Raise PaintError for a handler that cannot be called, and for unknown names of traits.
 
-    names: one of `known`, or several of them. usual: those that a hint may give.
+    names: one of `known`, of which the last is for all, or several of them. change: the kind of
+    change, or the same last. usual: names that a hint may give.
     """
     if not callable(handler):
-        raise PaintError(f"{handler!r} cannot observe a painter: expected a function")
-    for name in [names] if isinstance(names, str) or names in known else names:
+        raise PaintError(f"{brief(handler)} cannot observe a painter: expected a function")
+    if not isinstance(names, str | list | tuple | Set) and names is not known[-1]:
+        raise PaintError(f"names is {brief(names)}: expected a name, or a list of names")
+    if not isinstance(change, str) and change is not known[-1]:
+        raise PaintError(f"type is {brief(change)}: expected a text, like 'change'")
+    for name in [names] if isinstance(names, str) or names is known[-1] else names:
         if name not in known:
-            raise PaintError(f"painter.{name} cannot be observed{did_you_mean(name, usual)}")
+            raise PaintError(f"painter.{name} cannot be observed{did_you_mean(str(name), usual)}")
+
+
+def check_height(height: Any) -> None:
+    """Raise PaintError for a height of the painter that is not one."""
+    if isinstance(height, bool) or not isinstance(height, Integral) or height < MIN_HEIGHT:
+        raise PaintError(
+            f"height is {brief(height)}: expected a whole number of pixels from {MIN_HEIGHT} on"
+        )
+
+
+def check_layout(layout: Any, known: Iterable[str]) -> None:
+    """Raise PaintError for a dict of a layout with other names than `known`, or another value."""
+    if not isinstance(layout, Mapping):
+        raise PaintError(f"layout is {brief(layout)}: expected a dict, like {{'width': '50%'}}")
+    for name in layout:
+        if name not in known:
+            raise PaintError(f"layout has no {name!r}{did_you_mean(str(name), known)}")
 
 
 def widget_subjects(

@@ -56,6 +56,20 @@ def with_nodes(light):
     emission.inputs["Color"].default_value = (0.5, 1, 1, 1)
 
 
+def with_node_group(light):
+    """Let a group make the light of a lamp."""
+    group = bpy.data.node_groups.new("gel", "ShaderNodeTree")
+    group.interface.new_socket("Light", in_out="OUTPUT", socket_type="NodeSocketShader")
+    inside, out = group.nodes.new("ShaderNodeEmission"), group.nodes.new("NodeGroupOutput")
+    group.links.new(inside.outputs[0], out.inputs[0])
+    if light.node_tree is None:
+        light.use_nodes = True
+    node = light.node_tree.nodes.new("ShaderNodeGroup")
+    node.node_tree = group
+    output = next(x for x in light.node_tree.nodes if x.type == "OUTPUT_LIGHT")
+    light.node_tree.links.new(node.outputs[0], output.inputs["Surface"])
+
+
 def floor_and_camera():
     bpy.ops.mesh.primitive_plane_add(size=1)
     bpy.context.object.data.materials.append(
@@ -91,6 +105,8 @@ def main():
     ]
     lamps[-1].scale = (2, 1, 1)
     with_nodes(lamps[0].data)
+    grouped = lamp("grouped", "POINT")
+    with_node_group(grouped.data)
     bpy.ops.mesh.primitive_plane_add(
         size=0.02, location=(0, 0, HEIGHT), rotation=(3.14159265, 0, 0)
     )
@@ -102,7 +118,7 @@ def main():
     runpy.run_path(str(FOLDER / "set_scene.py"))
     radiances = {}
     for one in (*lamps, panel, None):
-        for other in (*lamps, panel):
+        for other in (*lamps, grouped, panel):
             other.hide_render = other is not one
         scene.world = world if one is None else None
         radiances["sky" if one is None else one.name] = radiance()

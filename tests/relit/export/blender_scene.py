@@ -4,6 +4,7 @@ Arguments: what to do, and a folder. Not a test by itself: test_exports.py runs 
 """
 
 import json
+import math
 import runpy
 import sys
 from pathlib import Path
@@ -208,13 +209,14 @@ def space():
     empty()
     sun = light("sun", "SUN", 3, (1, 0.5, 0.25), (0, 0, 5), "a")
     lamp = light("x", "POINT", 10, (1, 1, 1), (0, 0, 1), "b")
-    glow = emitting("glow", (0.5, 0.5, 0.5), 1)
+    glow = emitting("glow", (1, 0.25, 0.0625), 1)
     cube(1, (0, 0, 0), glow, "b")
     bpy.ops.wm.set_working_color_space(working_space="ACEScg", convert_colors=True)
     for _ in range(2):
         runpy.run_path(SCRIPT)
     [multiply] = [n for n in glow.node_tree.nodes if n.type == "VECT_MATH"]
-    found = emitted(sun.data), emitted(lamp.data), list(multiply.inputs[1].default_value)
+    glows = [math.prod(x.default_value[c] for x in multiply.inputs[:2]) for c in range(3)]
+    found = emitted(sun.data), emitted(lamp.data), glows
     print("FOUND " + json.dumps(found))
 
 

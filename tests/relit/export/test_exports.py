@@ -493,9 +493,9 @@ def test_multipliers_are_those_of_rec709_in_a_file_of_another_space(
     write_exports(tmp_path, groups, _lighting(groups))
     output = in_blender(new_blender, Path(__file__).parent / "blender_scene.py", "space", tmp_path)
     found = next(x for x in output.splitlines() if x.startswith("FOUND "))
-    # Of a material, which may have a texture, it is what white becomes. Blender's own conversion
-    # has matrices of six digits.
-    expected = np.array([[6, 0.75, 0], [1, 10, 30], [0.1, 1, 3]]) @ from_rec709(ACESCG).T
+    # Blender's own conversion has matrices of six digits.
+    glow = [0.1 * 1, 1 * 0.25, 3 * 0.0625]
+    expected = np.array([[6, 0.75, 0], [1, 10, 30], glow]) @ from_rec709(ACESCG).T
     np.testing.assert_allclose(json.loads(found.partition(" ")[2]), expected, rtol=2e-5)
 
 

@@ -25,7 +25,7 @@ def test_a_floor_in_blender_is_lit_as_in_the_scene(
     rgb = np.array([8.0, 4.0, 1.0])
     kinds = {
         **dict.fromkeys(("panel", "desk", "sky"), "radiance"),
-        **dict.fromkeys(("bulb", "spot"), "intensity"),
+        **dict.fromkeys(("bulb", "spot", "grouped"), "intensity"),
         "sun": "irradiance",
         "gone": "radiance",
     }
@@ -35,6 +35,8 @@ def test_a_floor_in_blender_is_lit_as_in_the_scene(
     output = in_blender(new_blender, Path(__file__).parent / "blender_lit.py", space, tmp_path)
     assert "lightpaint: 'gone' is left as it is" in output
     assert "lightpaint: 'dome' is left as it is" in output
+    assert "lightpaint: nodes of 'grouped' change its light" in output
+    assert "nodes of 'bulb'" not in output
     values = json.loads(next(x for x in output.splitlines() if x.startswith("SEEN"))[5:])
     # Irradiance of a white floor: I/d², L·A/d² of what is small, all of a sky π L; over π of it.
     falls = {"bulb": 1 / 4, "spot": 1 / 4, "sun": 1.0, "sky": math.pi}

@@ -79,7 +79,7 @@ def test_a_slide_in_blender_lights_a_floor_the_same(
     script = Path(__file__).parent / "blender_slide.py"
     output = in_blender(new_blender, script, tmp_path, before)
     assert "left as it is" not in output
-    assert "multiply its light" not in output  # of the second run, the nodes of the first
+    assert "change its light" not in output  # of the second run, the nodes of the first
     seen = json.loads(next(line for line in output.splitlines() if line.startswith("SEEN"))[5:])
     # Blender's first row is the lowest.
     picture = np.reshape(seen, (PIXELS, PIXELS, 4))[::-1, :, :3]

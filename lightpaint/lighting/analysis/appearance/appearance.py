@@ -21,10 +21,9 @@ from lightpaint.lighting.analysis.appearance.area_lights import (
     lights_of_area,
 )
 from lightpaint.lighting.analysis.appearance.delivery import (
-    MIN_DELIVERED,
     Delivery,
     DeliveryReport,
-    main_deliveries,
+    has_come,
     mean_shares,
     measure_deliveries,
     worst_delivery,
@@ -282,8 +281,7 @@ class Appearance:
     @property
     def has_come(self) -> bool:
         """True if three quarters or more came of each wish that asks for something visible."""
-        known = [x.least for x in main_deliveries(self.deliveries) if x.least is not None]
-        return min(known, default=0.0) >= MIN_DELIVERED
+        return has_come(self.deliveries)
 
     @property
     def worst_wish(self) -> Delivery | None:

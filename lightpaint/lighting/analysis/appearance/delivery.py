@@ -192,6 +192,12 @@ def worst_delivery(deliveries: Sequence[Delivery]) -> Delivery | None:
     return None
 
 
+def has_come(deliveries: Sequence[Delivery]) -> bool:
+    """Return whether three quarters or more came of each wish that asks for something visible."""
+    known = [x.least for x in main_deliveries(deliveries) if x.least is not None]
+    return min(known, default=0.0) >= MIN_DELIVERED
+
+
 class MeanShares(NamedTuple):
     """The shares of all wishes together, as `Delivery` has them; None if none was asked for."""
 
