@@ -43,6 +43,7 @@ from lightpaint.lighting.loss.painting import (
 from lightpaint.lighting.loss.weight_penalty import PaintTerms
 from lightpaint.lighting.normal_equations import NormalEquations
 from lightpaint.lighting.unknowns.gamuts import Gamuts, PaintedLight
+from lightpaint.lighting.unknowns.lamps_in_view import LampsInView
 from lightpaint.lighting.unknowns.reduction import Reduction
 from lightpaint.lighting.unknowns.white_mixes import tangent_reduction
 from lightpaint.target import Target
@@ -208,9 +209,9 @@ class Problem(LinearProblem):
             current=lambda: whole.current_look,
         )
         reference = start_weights(all_constraints.start, whole.lights)
-        gamuts = gamuts_for(whole, views, fit, reference)
         painted = wash_fields(views, fit, reference)
-        whites = whites_for(painted.get("expected"), fit)
+        gamuts = gamuts_for(whole, views, fit, reference, painted["expected"])
+        whites = whites_for(painted["expected"], fit)
         reduction = reduce_lights(all_constraints, whole.lights, fit, gamuts, whites)
         return cls(
             basis=whole,
@@ -404,10 +405,17 @@ def are_sketches(views: Views) -> bool:
     return any(target.over_look or target.through_view for target in views.targets)
 
 
-def gamuts_for(basis: Basis, views: Views, fit: Fit, own: Doubles | None = None) -> Gamuts | None:
+def gamuts_for(
+    basis: Basis,
+    views: Views,
+    fit: Fit,
+    own: Doubles | None = None,
+    expected: ExpectedLights | None = None,
+) -> Gamuts | None:
     """Return the colours that each light may take; None if `fit` does not limit them.
 
-    own: (n, 3), weights with the colours that lights have, by default the current ones.
+    own: (n, 3), weights with the colours that lights have, by default the current ones. expected:
+    the lights that the paintings let one expect, where lights keep to them.
     """
     if not fit.keeps_to_hues(is_sketch=are_sketches(views)):
         return None
@@ -418,7 +426,12 @@ def gamuts_for(basis: Basis, views: Views, fit: Fit, own: Doubles | None = None)
     painted = partial(PaintedLight.of, views_of_paint)
     own = basis.current_weights if own is None else own
     is_texel, is_bold = texel_lights(basis.lights), fit.colors == "free"
-    return Gamuts(painted, basis.power, own, is_texel, is_bold=is_bold)
+    in_view = None
+    if expected is not None and not is_bold:
+        around = expected.painted
+        paintings = [(x.image, x.importance, x.at_least) for x in views.targets]
+        in_view = LampsInView.of(views.bases, own, lambda: paintings, lambda: around)
+    return Gamuts(painted, basis.power, own, is_texel, is_bold=is_bold, in_view=in_view)
 
 
 def _color_importance(target: Target) -> Floats:

@@ -1,5 +1,6 @@
 """Paint over an emitter in view: for what it lights, or for its glow, and seldom for less of it."""
 
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -8,10 +9,13 @@ import pytest
 import lightpaint as lp
 from lightpaint.arrays import Doubles
 from lightpaint.basis.basis import Basis
+from lightpaint.basis.lights import Lights
 from lightpaint.lighting.fit import resolve_for_targets
 from lightpaint.lighting.live.live import LiveSolver
 from lightpaint.lighting.live.live_view import LiveView
 from lightpaint.lighting.loss.painting import find_glow_paint
+from lightpaint.lighting.unknowns.lamps_in_view import LampsInView
+from lightpaint.target import Wish
 
 SIZE = (36, 30)
 FLAME = (slice(16, 19), slice(14, 17))
@@ -161,3 +165,98 @@ def test_strokes_one_after_the_other_count_as_all_at_once(basis: Basis):
 def test_nothing_painted_is_nothing_meant(basis: Basis):
     look, none = basis.current_look, np.zeros(SIZE, np.float32)
     assert not find_glow_paint(look, none, look, basis.emitters_seen, None, dark=0.01).any()
+
+
+CAGE = (slice(12, 22), slice(11, 19))
+CLOTH = (slice(24, 32), slice(6, 24))
+
+
+def lantern_on_a_cloth(make_basis: Any) -> lp.Basis:
+    """`boom` lights a cloth and the lantern on it, `lantern` its own cage most."""
+    seen = np.zeros(SIZE, bool)
+    seen[FLAME] = True
+    rows, columns = np.mgrid[: SIZE[0], : SIZE[1]]
+    near = np.exp(-np.hypot(rows - 17, columns - 15) / 4)
+    is_lit = np.zeros(SIZE)
+    is_lit[CAGE] = is_lit[CLOTH] = 1
+    images = np.stack([np.full(SIZE, 0.05), 0.4 * is_lit, np.where(seen, 12, 1.0 * near)])
+    return make_basis(  # type: ignore[no-any-return]
+        images=np.repeat(images[..., None], 3, axis=-1),
+        names=["sky", "boom", "lantern"],
+        seen=seen,
+        emission=[(0.8, 1, 1.2), (0.8, 1, 1.2), (1.4, 1, 0.5)],
+    )
+
+
+def answers_to_a_warm_cloth(basis: lp.Basis) -> dict[str, Doubles]:
+    """The lighting for a cool cage on a warm cloth, exactly and under the brush."""
+    image, counts = basis.current_look.copy(), np.ones(SIZE, np.float32)
+    image *= 0.5
+    image[CLOTH] *= 2 * WARM
+    counts[FLAME] = 0
+    options: dict[str, Any] = {"through_view": True, "over_look": True}
+    target = lp.Target("t", image, counts, False, transform=lp.ViewTransform(), **options)
+    live = LiveSolver(
+        [LiveView(basis, image.copy(), counts.copy())],
+        fit=resolve_for_targets(lp.Fit(), [target]),
+        constraints=lp.Constraints(),
+        is_sketch=True,
+    )
+    weights = basis.current_weights
+    for _ in range(8):
+        weights = live.answer(weights)
+    return {"exact": lp.solve(basis, target).weights, "live": weights}
+
+
+def warmth(light: Any) -> float:
+    return float(light[0] / light[2])
+
+
+@pytest.mark.parametrize("kind", ["exact", "live"])
+def test_a_flame_in_view_does_not_turn_blue_for_a_warm_cloth(
+    make_basis: Any, monkeypatch: pytest.MonkeyPatch, kind: str
+) -> None:
+    """What lights the cloth warms the cage too, and blue light of the lantern would hide that."""
+    basis = lantern_on_a_cloth(make_basis)
+    own = basis.current_weights[2]
+    answer = answers_to_a_warm_cloth(basis)[kind][2]
+    assert answer.max() > 0.1 * own.max()  # it shines
+    assert warmth(answer) > 0.85 * warmth(own)  # as much as cannot be seen
+    # Were it not in view, it would be another lamp.
+    monkeypatch.setattr(LampsInView, "lamps", np.zeros(3, bool))
+    assert warmth(answers_to_a_warm_cloth(basis)[kind][2]) < 0.4 * warmth(own)
+
+
+def test_a_flame_that_is_painted_blue_becomes_so(make_basis: Any) -> None:
+    basis = lantern_on_a_cloth(make_basis)
+    image, counts = basis.current_look * 0.5, np.ones(SIZE, np.float32)
+    image[FLAME] *= [0.3, 1, 2.5]
+    wish = Wish("flame", np.zeros(SIZE, np.float32), is_exact=True)
+    wish.area[FLAME] = 1
+    room = Wish("room", 1 - wish.area)
+    options: dict[str, Any] = {"through_view": True, "over_look": True, "wishes": (room, wish)}
+    target = lp.Target("t", image, counts, False, transform=lp.ViewTransform(), **options)
+    answer = lp.solve(basis, target).weights[2]
+    assert warmth(answer) < 0.4 * warmth(basis.current_weights[2])
+
+
+def test_lamps_in_view_and_the_light_that_is_painted_on_them(make_basis: Any) -> None:
+    """A spot, which has no surface, cannot be seen, however bright a pixel is."""
+    basis = lantern_on_a_cloth(make_basis)
+    image, counts = basis.current_look.copy(), np.zeros(SIZE, np.float32)
+    now = basis.current_weights
+
+    def found(at_least: Any = None, basis: lp.Basis = basis) -> LampsInView:
+        return LampsInView.of([basis], now, lambda: [(image, counts, at_least)], lambda: 2 * now)
+
+    np.testing.assert_array_equal(found().lamps, [False, False, True])
+    np.testing.assert_array_equal(found().painted(), np.stack([now, 2 * now], axis=1))
+    image[FLAME] *= [0.5, 1, 3]
+    counts[FLAME] = 0.7
+    expected = now * [[1, 1, 1], [1, 1, 1], [0.5, 1, 3]]
+    np.testing.assert_allclose(found().painted()[:, 0], expected, rtol=1e-5)  # float32 paint
+    # Paint at the top of its range has no colour.
+    everywhere = np.ones((*SIZE, 3), bool)
+    np.testing.assert_array_equal(found(everywhere).painted()[:, 0], now)
+    spots = [replace(light, parameter="intensity") for light in basis.lights]
+    assert not found(basis=replace(basis, lights=Lights.of(spots))).lamps.any()

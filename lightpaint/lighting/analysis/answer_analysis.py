@@ -302,7 +302,7 @@ def without_constraints(solution: Solution) -> Solution | None:
     problem = solution.problem
     if not problem.constraints or solution.whole is not None:
         return None
-    gamuts = gamuts_for(problem.basis, problem.views, problem.fit)
+    gamuts = gamuts_for(problem.basis, problem.views, problem.fit, expected=problem.expected)
     whites = whites_for(problem.expected, problem.fit)
     free = reduce_lights(Constraints(), problem.lights, problem.fit, gamuts, whites)
     anew = replace(

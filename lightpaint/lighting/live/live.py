@@ -41,6 +41,7 @@ from lightpaint.lighting.loss.painting import unpainted_weight
 from lightpaint.lighting.loss.weight_penalty import PaintTerms, joint_pull, pull_to_current
 from lightpaint.lighting.normal_equations import NormalEquations
 from lightpaint.lighting.unknowns.gamuts import Gamuts, PaintedLight
+from lightpaint.lighting.unknowns.lamps_in_view import LampsInView
 from lightpaint.lighting.unknowns.reduced_problem import nearest_weights, solve_reduced
 from lightpaint.lighting.unknowns.reduction import Reduction
 from lightpaint.lighting.unknowns.white_mixes import (
@@ -86,6 +87,7 @@ class LiveSolver:
         self._start: Mapping[str, RGB] = {}
         self._washed: Wash | None = None
         self._pull: NormalEquations | None = None
+        self._expected: ExpectedLights | None = None
         self._last_read, self._answers_left = tuple[LiveView, ...](), 0
         self.constrain(fit, constraints)
 
@@ -244,8 +246,10 @@ class LiveSolver:
         """
         self._washed = None
         self._follow_whites(views)
+        terms = self._paint_terms(views, unpainted)
+        self._expected = terms.expected
         self._follow_gamuts(views)
-        self._pull = self._weight_pull(views, unpainted)
+        self._pull = self._weight_pull(views, terms)
         self._last_read, self._answers_left = views, ANSWERS_PER_READING
 
     def _follow_whites(self, views: tuple[LiveView, ...]) -> None:
@@ -294,7 +298,16 @@ class LiveSolver:
         painted = partial(self._painted_light, views)
         is_texel = texel_lights(self._basis.lights)
         is_bold = self._fit.colors == "free"
-        gamuts = Gamuts(painted, _power(views), self._reference, is_texel, is_bold=is_bold)
+        in_view = None
+        bases, own = [view.basis for view in views], self._reference
+        if self._expected is not None and not is_bold:
+            in_view = LampsInView.of(
+                bases,
+                own,
+                lambda: [view.paint for view in views],
+                lambda: own if self._expected is None else self._expected.painted,
+            )
+        gamuts = Gamuts(painted, _power(views), own, is_texel, is_bold=is_bold, in_view=in_view)
         self._within, self._gamuts_of = self._reduction.with_gamuts(gamuts), views
 
     def _best(self, equations: NormalEquations, start: Doubles) -> Doubles:
@@ -310,18 +323,26 @@ class LiveSolver:
         """Solve for some of many lights, whose misses of requirements would add up over rounds."""
         return solve_under_brush(equations, reduction, start, method=self._fit.method)
 
-    def _weight_pull(self, views: tuple[LiveView, ...], unpainted: float) -> NormalEquations | None:
+    def _paint_terms(self, views: tuple[LiveView, ...], unpainted: float) -> PaintTerms:
+        """Return what the paint lets one expect. unpainted: the weight of each unpainted pixel."""
+        if not self._fit.reads_wishes(is_sketch=self._is_sketch):
+            return PaintTerms()
+        return PaintTerms.of(
+            self._wash(views),
+            self._fit,
+            self._reference,
+            importance=_importance(views),
+            unpainted=unpainted,
+            texels=texel_lights(self._basis.lights),
+        )
+
+    def _weight_pull(
+        self, views: tuple[LiveView, ...], terms: PaintTerms
+    ) -> NormalEquations | None:
         """Return the pull on the weights, as `Problem.pull`."""
         power, lights = _power(views), self._basis.lights
         # The total importance, relative to the number of pixels.
-        total = sum(float(view.counts[0]) for view in views)
-        share = total / sum(view.pixels for view in views)
-        terms, texels = PaintTerms(), texel_lights(lights)
-        if self._fit.reads_wishes(is_sketch=self._is_sketch):
-            wash, own = self._wash(views), self._reference
-            terms = PaintTerms.of(
-                wash, self._fit, own, importance=total, unpainted=unpainted, texels=texels
-            )
+        share = _importance(views) / sum(view.pixels for view in views)
         return joint_pull(
             lights,
             power,
@@ -330,7 +351,7 @@ class LiveSolver:
             self._constraints,
             terms,
             painted_share=share,
-            keeps_color=self._reduction.is_free & power.any(axis=1) & ~texels,
+            keeps_color=self._reduction.is_free & power.any(axis=1) & ~texel_lights(lights),
         )
 
     def _joint_films(self, views: tuple[LiveView, ...]) -> Films:
@@ -353,6 +374,11 @@ class LiveSolver:
 def _allowed(reduction: Reduction, weights: Doubles) -> Doubles:
     """Return weights (n, 3) between allowed ones, with the colours that lights may have."""
     return clip_to_gamuts(reduction, snap_to_whites(reduction, weights))
+
+
+def _importance(views: Sequence[LiveView]) -> float:
+    """Return the total importance of the paint of all views."""
+    return sum(float(view.counts[0]) for view in views)
 
 
 def _power(views: Sequence[LiveView]) -> Doubles:

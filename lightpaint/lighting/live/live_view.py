@@ -20,6 +20,7 @@ from lightpaint.lighting.loss.painting import (
     dark_threshold,
     find_glow_paint,
 )
+from lightpaint.lighting.unknowns.lamps_in_view import GlowPaint
 
 #: Pixels of a part of a row over which importance is summed.
 SEGMENT_PIXELS = 64
@@ -68,6 +69,11 @@ class LiveView:
         """True if brighter than the painting is as good anywhere: then no sums suffice."""
         at_least = self._at_least()
         return at_least is not None and bool(at_least.any())
+
+    @property
+    def paint(self) -> GlowPaint:
+        """The painting, its importance, and where brighter is as good."""
+        return self._image, self._counted, self._at_least()
 
     @property
     def pixels(self) -> int:

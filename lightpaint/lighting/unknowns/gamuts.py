@@ -4,7 +4,8 @@ A dim lamp, or one that lights a coloured surface, can lower the error by colour
 painted: a little green that compensates for other lamps. So each lamp is limited to mixes of its
 own colour, of whites, and of the light that the painting needs where the lamp counts. This light is
 redder or bluer than the lamps' light there by the ratio of the painted Ψ to the look, and at most
-by the ratio of Ψ to the surface.
+by the ratio of Ψ to the surface. A lamp that is itself in view takes no other whites, and of what
+is painted only its own colour with the mean change where it shines, or with the change on itself.
 """
 
 from collections.abc import Callable, Sequence
@@ -26,6 +27,7 @@ from lightpaint.colour import (
     white_range,
 )
 from lightpaint.lighting.constraints.light_constraints import LAMP_KELVINS
+from lightpaint.lighting.unknowns.lamps_in_view import LampsInView
 
 #: Whites that paint may ask for, in kelvin: those that have a name.
 ALL_KELVINS = (1901, 100_000)
@@ -134,6 +136,7 @@ class Gamuts:
     light: samples the painted pixels; call `refresh` after strokes. power, current: (n, 3), ‖Φᵢ‖²
     of the lamps' pictures, and their current weights. exempt: (n,), lights of any colour. is_bold:
     whether whites of any temperature are allowed, and twice as much beyond what is painted.
+    in_view: the lamps that are seen themselves, which have narrower gamuts; None for none.
     """
 
     def __init__(
@@ -144,8 +147,9 @@ class Gamuts:
         exempt: Bools | None = None,
         *,
         is_bold: bool = False,
+        in_view: LampsInView | None = None,
     ) -> None:
-        self._is_bold = is_bold
+        self._is_bold, self._in_view = is_bold, in_view
         self._light, self._power, self._current = light, power, current
         self._exempt = np.zeros(len(current), bool) if exempt is None else exempt
         self._own = np.where(luminance(current)[:, None] > 0, current, 1.0)
@@ -153,6 +157,8 @@ class Gamuts:
         own_reach = chromaticity(self._own) @ DIRECTIONS.T
         lamps, whites = (reach_of(white_range(*k).colors) for k in (LAMP_KELVINS, ALL_KELVINS))
         self._reach = np.maximum(own_reach + 2 * REACH_STEP, lamps + WHITE_MARGIN)
+        if in_view is not None:
+            self._reach[in_view.lamps] = own_reach[in_view.lamps] + 2 * REACH_STEP
         self._whites = whites
         self._cool_whites = reach_of(white_range(LAMP_KELVINS[1], ALL_KELVINS[1]).colors)
         # Off-white lamps lie near the whites, and so do surfaces under them; coloured lamps do not.
@@ -169,6 +175,11 @@ class Gamuts:
 
     def __getitem__(self, light: int) -> ColorHull:
         if light not in self._gamuts:
+            if self._in_view is not None and self._in_view.lamps[light]:
+                painted = chromaticity(self._in_view.painted()[light]) @ DIRECTIONS.T
+                reach = np.maximum(self._reach[light], painted.max(axis=0) + WHITE_MARGIN)
+                self._gamuts[light] = self._hull(light, reach)
+                return self._gamuts[light]
             if self._needed is None:
                 self._needed = _NeededLight.of(self._light(), self._power, self._current)
             needed = self._needed.reach(light)

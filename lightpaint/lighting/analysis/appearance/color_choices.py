@@ -185,7 +185,8 @@ def _with_colors(
     if problem.fit.reads_wishes(is_sketch=is_sketch) != fit.reads_wishes(is_sketch=is_sketch):
         problem = replace(problem, **wash_fields(problem.views, fit, problem.reference, wash))
     expected = problem.expected or expected_for(problem.views, fit, problem.reference, wash)
-    gamuts = gamuts_for(problem.basis, problem.views, fit, problem.reference)
+    of_sketch = expected if fit.reads_wishes(is_sketch=is_sketch) else None
+    gamuts = gamuts_for(problem.basis, problem.views, fit, problem.reference, of_sketch)
     full = reduce_lights(
         problem.constraints, problem.lights, fit, gamuts, whites_for(expected, fit)
     )
