@@ -10,7 +10,9 @@ from lightpaint.basis.file import lit_planes
 from lightpaint.basis.file.lit_planes import LitPlane, LitPlanes
 from lightpaint.basis.planes import MemoryPlanes
 from lightpaint.colour.display.view_transform import ViewTransform
+from lightpaint.lighting.analysis.noise import noise_rows
 from lightpaint.lighting.analysis.noise.noise import NoisyPixels, noise_sums
+from lightpaint.lighting.analysis.noise.noise_rows import FOLDED_PIXELS, MANY_LIGHTS, folded
 from lightpaint.lighting.solver import solve
 from lightpaint.target.painted_target import Target
 
@@ -50,3 +52,48 @@ def test_black_pixels_add_no_noise(
     pixels = np.arange(5, 60)
     rows = [NoisyPixels.of(x).gradient_noise(pixels) for x in both]
     np.testing.assert_allclose(rows[1], rows[0], rtol=1e-5, atol=1e-8)
+
+
+def test_folded_pixels_have_about_the_same_variances() -> None:
+    """Within 5 standard errors of a sum of as many squares, also if one pixel has most of them."""
+    rng = np.random.default_rng(2)
+    rows = rng.normal(size=(MANY_LIGHTS, 8 * 1000 + 3))  # some are left over
+    rows[:, 17] *= 300
+    few = folded(rows)
+    assert few.shape[1] <= rows.shape[1] / FOLDED_PIXELS + FOLDED_PIXELS
+    directions = rng.normal(size=(50, MANY_LIGHTS))
+    directions[:25] -= (
+        np.outer(directions[:25] @ rows[:, 17], rows[:, 17]) / (rows[:, 17] ** 2).sum()
+    )
+    exact, found = (np.square(directions @ x).sum(axis=1) for x in (rows, few))
+    np.testing.assert_allclose(found, exact, rtol=5 * np.sqrt(2 / few.shape[1]))
+    assert not np.allclose(found, exact, rtol=1e-3)
+
+
+def test_few_lights_keep_all_pixels() -> None:
+    rows = np.ones((MANY_LIGHTS - 1, 8 * FOLDED_PIXELS))
+    assert folded(rows) is rows
+
+
+@pytest.mark.parametrize("own_lamps", [False, True], ids=["free", "one colour"])
+def test_error_bars_of_folded_pixels_are_those_of_all(
+    make_basis: Any, monkeypatch: pytest.MonkeyPatch, own_lamps: bool
+) -> None:
+    """Within 5 standard errors of a variance that so many sums determine."""
+    rng = np.random.default_rng(3)
+    size = (40, 60)
+    images = rng.random((N, *size, 3)).astype(np.float32)
+    halves = rng.normal(0, 0.2, images.shape).astype(np.float32) * images
+    basis = make_basis(images=images, half_differences=halves)
+    everywhere = np.ones(size, np.float32)
+    target = Target("t", rng.random((*size, 3), np.float32), everywhere, everything=True)
+    solution = solve(basis, target, literal=True, colors="own" if own_lamps else "free")
+    exact = noise_sums(solution).gradient
+    monkeypatch.setattr(noise_rows, "MANY_LIGHTS", 1)
+    few = noise_sums(solution).gradient
+    assert not np.array_equal(few, exact)
+    spread = 5 * np.sqrt(2 * FOLDED_PIXELS / (size[0] * size[1]))
+    scale = np.sqrt(np.einsum("cici->ci", exact))
+    np.testing.assert_allclose(
+        few / scale[:, :, None, None] / scale, exact / scale[:, :, None, None] / scale, atol=spread
+    )

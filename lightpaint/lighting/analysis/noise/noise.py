@@ -34,6 +34,7 @@ from lightpaint.lighting.analysis.noise.noise_rows import (
     RowsOf,
     dense_rows,
     factor,
+    folded,
 )
 from lightpaint.lighting.analysis.noise.residuals import PixelGradients, Residuals, channel_grain
 from lightpaint.lighting.normal_equations import NormalEquations
@@ -277,7 +278,7 @@ class NoisyPixels:
 
         def add(c: int) -> None:
             room = rooms.array(c, (len(self.weights), len(missed)))
-            rows[c] = rows_of(self._channel(pixels, missed, c), sums, room)
+            rows[c] = folded(rows_of(self._channel(pixels, missed, c), sums, room))
             sums.gradient[c, :, c] += rows[c] @ rows[c].T
 
         rooms.each_channel(add)

@@ -6,13 +6,13 @@ half difference is, nothing is added.
 
 from collections.abc import Callable
 from dataclasses import dataclass
-from functools import cached_property
+from functools import cache, cached_property
 from typing import Any
 
 import numpy as np
 import numpy.typing as npt
 
-from lightpaint.arrays import Bools, Doubles, Floats, Indices
+from lightpaint.arrays import Bools, Doubles, Floats, Indices, read_only
 from lightpaint.basis import LitEntries
 from lightpaint.lighting.analysis.noise.dominant_pixels import Peaks
 
@@ -25,6 +25,13 @@ UNCORRECTED = 0.5
 
 #: Numbers of some lights for which the steps to their rows stay in the processor's cache.
 CACHED_NUMBERS = 2**16
+
+#: Fewest lights of which pixels are added before they are multiplied, and the number of pixels of
+#: a sum. On 640x360 pixels, standard errors of weights are off by .5 % so, in the root mean square.
+MANY_LIGHTS, FOLDED_PIXELS = 128, 8
+
+#: Seed of the signs with which they are added.
+FOLD_SEED = 5
 
 
 def factor(values: Doubles, halves: Doubles, own_share: float) -> Doubles:
@@ -61,6 +68,31 @@ def values_beside(values: npt.NDArray[Any]) -> npt.NDArray[Any]:
     if count % 2:
         beside[..., -1] = values[..., max(count - 2, 0)]
     return beside
+
+
+def folded(rows: Doubles) -> Doubles:
+    """Return rows, (n, p), of fewer pixels, (n, k), with about the same products of all pairs.
+
+    Each of the k is the sum of some pixels with random signs: so products of two pixels cancel, and
+    the expectation of R Rᵀ stays the same (Charikar, Chen and Farach-Colton 2002). That is enough
+    for the variance of a weight, vᵀ R Rᵀ v, which is a sum of squares, but not for an inverse. Few
+    lights keep all of their pixels.
+    """
+    n, pixels = rows.shape
+    count = pixels // FOLDED_PIXELS
+    if n < MANY_LIGHTS or count == 0:
+        return rows
+    some = FOLDED_PIXELS * count
+    parts = rows[:, :some].reshape(n, FOLDED_PIXELS, count)
+    sums = np.einsum("nfk,fk->nk", parts, _signs(count).astype(rows.dtype))
+    return sums if some == pixels else np.concatenate([sums, rows[:, some:]], axis=1)
+
+
+@cache
+def _signs(count: int) -> npt.NDArray[np.int8]:
+    """Return random signs, (FOLDED_PIXELS, count), the same on every machine."""
+    signs = np.random.default_rng(FOLD_SEED).integers(0, 2, (FOLDED_PIXELS, count), np.int8)
+    return read_only(2 * signs - 1)
 
 
 @dataclass(frozen=True)
