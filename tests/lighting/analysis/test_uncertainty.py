@@ -16,6 +16,7 @@ from lightpaint.basis.lights import BasisLight
 from lightpaint.basis.planes import MemoryPlanes
 from lightpaint.errors import BasisError, SizeError
 from lightpaint.images.estimate import Estimate
+from lightpaint.lighting.analysis.noise import uncertainty
 from lightpaint.lighting.analysis.noise.dominant_pixels import NORMAL_95
 from lightpaint.lighting.analysis.noise.noise import denoised_matrix, pseudo_inverse
 from lightpaint.lighting.analysis.noise.noise_correction import correct_noise, refine
@@ -628,9 +629,13 @@ def lit_planes_of(images: Any) -> LitPlanes:
     return LitPlanes([LitPlane.of(list(x), 1.0) for x in channels], images.shape[1:3])
 
 
+@pytest.mark.parametrize("together", [1, 5, 32])
 @pytest.mark.parametrize("kind", [MemoryPlanes, lit_planes_of])
-def test_the_weakest_matrix_is_that_of_an_inverse_for_each_light(kind: Any):
+def test_the_weakest_matrix_is_that_of_an_inverse_for_each_light(
+    kind: Any, together: int, monkeypatch: pytest.MonkeyPatch
+) -> None:
     """Against the pseudo-inverse anew after each light; to round-off of the inverses."""
+    monkeypatch.setattr(uncertainty, "COLUMNS_AT_A_TIME", together)
     rng = np.random.default_rng(1)
     n, size = 12, (6, 8)
     image = rng.gamma(0.3, 1, (n, *size, 3)).astype(np.float32)

@@ -69,6 +69,9 @@ DOUBT_RANGE = 0.6, 0.8
 #: Standard errors on the safe side of a sum, and the least share of M that remains of a light.
 SAFE_ERRORS, MIN_LEFT = 1.0, 1e-3
 
+#: Changes of an inverse that are collected: one by one each takes a walk over the matrix.
+COLUMNS_AT_A_TIME = 32
+
 #: The least share of a light within what M determines, if no other lights replace it exactly.
 OWN = 1 - 1e-6
 
@@ -139,9 +142,11 @@ def weakest_matrix(
         return weakest
     # The power that no other light can replace is 1 over the diagonal of the inverse.
     noisy_inverse = [np.diag(pseudo_inverse(x)) for x in M]
-    inverse = [pseudo_inverse(x) for x in weakest]
+    inverse = [_GrowingInverse(pseudo_inverse(x)) for x in weakest]
     # A light that others replace exactly has no part of its own which could be weaker.
-    is_own = [np.einsum("ij,ji->i", *pair) > OWN for pair in zip(inverse, weakest, strict=True)]
+    is_own = [
+        np.einsum("ij,ji->i", x.matrix, y) > OWN for x, y in zip(inverse, weakest, strict=True)
+    ]
     channels = [weight[..., c % weight.shape[2]].ravel() for c in range(3)]
     totals = [_sum(D) for D in channels]
     for k in with_progress(in_doubt, "lights"):
@@ -151,7 +156,8 @@ def weakest_matrix(
             smooth = _least_power(*of_light, totals[c])
             error = _power_error(*of_half)
             # Only the part that no other light can replace may shrink.
-            noisy, alone = 1 / float(noisy_inverse[c][k]), 1 / float(inverse[c][k, k])
+            column = inverse[c].column(k)
+            noisy, alone = 1 / float(noisy_inverse[c][k]), 1 / float(column[k])
             least = max(
                 noisy - float(power[c, k, k]) - SAFE_ERRORS * error,
                 alone - float(weakest[c, k, k]) + smooth,
@@ -162,9 +168,31 @@ def weakest_matrix(
                 continue
             weakest[c, k, k] -= less
             # Sherman and Morrison: the part alone is less by as much.
-            column = inverse[c][:, k].copy()
-            inverse[c] += np.multiply.outer(column * (less / (1 - less / alone)), column)
+            inverse[c].add(column, less / (1 - less / alone))
     return weakest
+
+
+class _GrowingInverse:
+    """A matrix, (n, n), to which products x xᵀ are added, several at a time."""
+
+    def __init__(self, matrix: Doubles) -> None:
+        self.matrix = matrix
+        self._columns = np.empty((len(matrix), COLUMNS_AT_A_TIME))
+        self._factors = np.empty(COLUMNS_AT_A_TIME)
+        self._count = 0
+
+    def column(self, k: int) -> Doubles:
+        """Return a column, (n,)."""
+        added = self._columns[:, : self._count]
+        return np.asarray(self.matrix[:, k] + added @ (self._factors[: self._count] * added[k]))
+
+    def add(self, column: Doubles, factor: float) -> None:
+        """Add factor · x xᵀ of a column x, (n,)."""
+        self._columns[:, self._count], self._factors[self._count] = column, factor
+        self._count += 1
+        if self._count == COLUMNS_AT_A_TIME:
+            self.matrix += (self._columns * self._factors) @ self._columns.T
+            self._count = 0
 
 
 def _least_power(D: Floats, image: Floats, total: float) -> float:
