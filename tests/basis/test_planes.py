@@ -75,11 +75,12 @@ def check_alike(planes: Planes, images: np.ndarray, tolerance: float = 0.0) -> N
             planes.picked(pixels).array(), flat[:, None, pixels], **tolerances
         )
     w = rng.random((n, 3))
-    np.testing.assert_allclose(
-        planes.exact_mix(w),
-        np.einsum("nhwc,nc->chw", images.astype(float), w).reshape(3, -1),
-        rtol=1e-12 + tolerance,
-    )
+    for factor in (4, 3, 2, 1, 4, 1):  # some planes keep the latest
+        np.testing.assert_allclose(
+            planes.exact_mix(factor * w),
+            np.einsum("nhwc,nc->chw", images.astype(float), factor * w).reshape(3, -1),
+            rtol=1e-12 + tolerance,
+        )
     expected = np.einsum("nhwc,nc->hwc", images, w)
     np.testing.assert_allclose(planes.mix(w), expected, rtol=1e-5 + tolerance)  # float32 sums
     mask, exact = rng.random((height, width)) < 0.5, images.astype(np.float64)

@@ -14,7 +14,15 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from lightpaint.arrays import Bools, Doubles, Floats, Indices, copy_as_singles, release_freed_memory
+from lightpaint.arrays import (
+    Bools,
+    Doubles,
+    Floats,
+    Indices,
+    copy_as_singles,
+    read_only,
+    release_freed_memory,
+)
 from lightpaint.basis.file.file_planes import RowPlanes
 from lightpaint.basis.planes import LitEntries
 from lightpaint.progress import with_progress
@@ -25,6 +33,9 @@ MIN_LIGHTS = 128
 
 #: Share of the pixels of all planes that are lit, up to which these are faster one by one.
 MAX_LIT_SHARE = 0.25
+
+#: Maximum size in bytes of mixes that are kept, of which one always is.
+MIXED_MAX_BYTES = 2**24
 
 #: Maximum size in bytes of both sets of planes, images and noise, that are kept so.
 MAX_BYTES = 2**30
@@ -106,14 +117,17 @@ class _LitStrip:
 
         counted: (pixels,).
         """
-        n = len(self.begins) - 1
-        owners, is_counted = self.of_planes(np.arange(n)), counted[self.lit]
-        values = (_singles(channel).astype(np.float64) for channel in self.numbers)
-        sums = [
-            [np.bincount(owners, x, n) for x in (is_counted * np.square(channel), channel)]
-            for channel in values
-        ]
-        return np.asarray(sums).transpose(1, 2, 0)
+        is_lit = np.diff(self.begins) > 0
+        first, sums = self.begins[:-1][is_lit], np.zeros((2, len(is_lit), 3))
+        if not first.size:
+            return sums
+        is_counted = counted[self.lit]
+        for c, channel in enumerate(self.numbers):
+            values = _singles(channel).astype(np.float64)
+            # The numbers of a plane follow each other.
+            sums[1, is_lit, c] = np.add.reduceat(values, first)
+            sums[0, is_lit, c] = np.add.reduceat(np.square(values, out=values) * is_counted, first)
+        return sums
 
     def of_planes(self, values: npt.NDArray[Any]) -> npt.NDArray[Any]:
         """Return a value of each plane, (n,), for each of its lit pixels, (m,)."""
@@ -174,6 +188,7 @@ class LitPlanes(RowPlanes):
         (height, width), step = size, self.strip_rows
         edges = [width * row for row in [*range(0, height, step), height]]
         self._begins = edges[:-1]  # of strips, in pixels
+        self._kept: tuple[tuple[bytes, Doubles], ...] = ()  # mixes by their weights, latest first
         is_half = [plane.numbers.dtype == np.float16 for plane in planes]
         self._is_noisy = 2 * sum(is_half) > len(planes)
         # A few clean ones are kept whole, in float32.
@@ -320,7 +335,20 @@ class LitPlanes(RowPlanes):
         return power * np.square(scales), totals * scales
 
     def exact_mix(self, weights: Doubles) -> Doubles:
-        """Return Σ w_i Φ_i channel by channel, (3, p), summed in float64."""
+        """Return Σ w_i Φ_i channel by channel, (3, p), summed in float64; read-only.
+
+        The latest are kept: a solve and its analysis ask for the same picture several times.
+        """
+        key = np.asarray(weights, np.float64).tobytes()
+        for known, mixed in self._kept:
+            if known == key:
+                return mixed
+        mixed = read_only(self._mix(weights))
+        count = max(1, MIXED_MAX_BYTES // mixed.nbytes)
+        self._kept = ((key, mixed), *self._kept)[:count]
+        return mixed
+
+    def _mix(self, weights: Doubles) -> Doubles:
         scaled = weights * self._scales[:, None]
         strips = parallel_map(lambda strip: strip.mix(scaled), self._lit, unit="strips")
         mixed = np.concatenate(strips, axis=1)
