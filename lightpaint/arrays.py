@@ -39,7 +39,8 @@ ALIGNMENT = 64
 #: Bits of float32: all but the sign, infinity, and 2⁻¹⁴, the least half float of full precision.
 _MAGNITUDE, _INFINITY, _LEAST_NORMAL = map(np.uint32, (2**31 - 1, 255 << 23, 113 << 23))
 
-#: Bits of a half float that is not a number.
+#: Bits of a half float that is infinite, and of one that is not a number.
+_HALF_INFINITY = np.uint16(0x7C00)
 _HALF_NAN = np.uint32(0x7E00)
 
 
@@ -100,6 +101,14 @@ def copy_as_singles(values: npt.NDArray[Any], into: npt.NDArray[np.float32]) -> 
         np.take(_singles(), np.ascontiguousarray(values).view(np.uint16), out=into, mode="clip")
     else:
         into[...] = values
+
+
+def is_finite(values: npt.NDArray[Any]) -> bool:
+    """Return whether all numbers are finite: of half floats from their bits, which is faster."""
+    if values.dtype != np.float16 or not values.dtype.isnative:
+        return bool(np.isfinite(values).all())
+    bits = np.ascontiguousarray(values).view(np.uint16)
+    return not bool(((bits & _HALF_INFINITY) == _HALF_INFINITY).any())
 
 
 def round_to_halves(values: Floats) -> npt.NDArray[np.float16]:

@@ -1,9 +1,11 @@
 """Arrays that are copied to where other libraries read them best."""
 
+from typing import Any
+
 import numpy as np
 import pytest
 
-from lightpaint.arrays import ALIGNMENT, aligned
+from lightpaint.arrays import ALIGNMENT, aligned, is_finite
 
 
 @pytest.mark.parametrize("kind", [np.float32, np.uint32, np.float64])
@@ -15,3 +17,12 @@ def test_copies_begin_where_registers_do(kind: type) -> None:
         assert copy.ctypes.data % ALIGNMENT == 0
         assert copy.dtype == kind
         np.testing.assert_array_equal(copy, numbers[start::3])
+
+
+@pytest.mark.parametrize("kind", [np.float16, ">f2", np.float32])
+@pytest.mark.parametrize("value", [np.inf, -np.inf, np.nan, 65504, -0.0, 2**-24])
+def test_is_finite_is_what_numpy_says(kind: Any, value: float) -> None:
+    values = np.zeros((3, 5), kind)
+    values[1, 2] = value
+    assert is_finite(values) == np.isfinite(values).all()
+    assert is_finite(values[:, ::2]) == np.isfinite(values[:, ::2]).all()

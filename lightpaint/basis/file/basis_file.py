@@ -12,7 +12,7 @@ from pathlib import Path
 
 import numpy as np
 
-from lightpaint.arrays import release_freed_memory
+from lightpaint.arrays import is_finite, release_freed_memory
 from lightpaint.basis.basis import Basis, Origin
 from lightpaint.basis.file.file_parts import (
     CHECKSUMS_KEY,
@@ -255,7 +255,7 @@ class _Parts:
         for light, texts, read in zip(lights, self.texts, readers, strict=True):
             channels = read()  # one light at a time, since together they may exceed memory
             its_names = channels if is_lit_part(channels) else names
-            if not all(np.isfinite(channels[name]).all() for name in its_names):
+            if not all(is_finite(channels[name]) for name in its_names):
                 raise BasisError("holds values that are not finite: make it again")
             if checksums is not None:
                 its_text = checked_text(texts)
