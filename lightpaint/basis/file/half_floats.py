@@ -126,6 +126,11 @@ class EncodedPlanes(RowPlanes):
         return self._size
 
     @property
+    def is_noisy(self) -> bool:
+        """True if most planes are stored in half floats, whose rounding their noise hides."""
+        return 2 * sum(x.encoding.kind == HALF for x in self._stored) > self._count
+
+    @property
     def nbytes(self) -> int:
         """Bytes of memory that the planes take."""
         if self._decoded is not None:

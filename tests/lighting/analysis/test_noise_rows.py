@@ -7,10 +7,11 @@ import numpy as np
 import pytest
 
 from lightpaint.basis.file import lit_planes
+from lightpaint.basis.file.half_floats import EncodedPlanes, encoded_plane
 from lightpaint.basis.file.lit_planes import LitPlane, LitPlanes
 from lightpaint.basis.planes import MemoryPlanes
 from lightpaint.colour.display.view_transform import ViewTransform
-from lightpaint.lighting.analysis.noise import noise_rows
+from lightpaint.lighting.analysis.noise import noise, noise_rows
 from lightpaint.lighting.analysis.noise.noise import NoisyPixels, noise_sums
 from lightpaint.lighting.analysis.noise.noise_rows import FOLDED_PIXELS, MANY_LIGHTS, folded
 from lightpaint.lighting.solver import solve
@@ -97,3 +98,25 @@ def test_error_bars_of_folded_pixels_are_those_of_all(
     np.testing.assert_allclose(
         few / scale[:, :, None, None] / scale, exact / scale[:, :, None, None] / scale, atol=spread
     )
+
+
+@pytest.mark.parametrize("unit", [1.0, 2.0**24, 2.0**-24])
+def test_noise_in_half_floats_is_summed_in_float32(make_basis: Any, unit: float) -> None:
+    """To the round-off of float32, in any unit of light."""
+    rng = np.random.default_rng(6)
+    shape = noise.MIN_SINGLE_LIGHTS, 3, *SIZE
+    images = rng.random(shape).astype(np.float16)
+    halves = rng.normal(0, 0.2, shape).astype(np.float16) * images
+    stored = [EncodedPlanes([encoded_plane(x, unit) for x in y]) for y in (images, halves)]
+    images, halves = (np.stack([*x]) for x in stored)
+    basis = make_basis(images=images, half_differences=halves)
+    everywhere = np.ones(SIZE, np.float32)
+    target = Target("t", unit * rng.random((*SIZE, 3), np.float32), everywhere, everything=True)
+    solution = solve(basis, target, literal=True)
+    of_halves = replace(basis, planes=stored[0], noise=stored[1])
+    exact = noise_sums(solution)
+    single = noise_sums(replace(solution, problem=replace(solution.problem, basis=of_halves)))
+    for name in ("power", "gradient", "freedom", "hidden"):
+        expected, found = getattr(exact, name), getattr(single, name)
+        assert not np.array_equal(found, expected) or not expected.any()
+        np.testing.assert_allclose(found, expected, rtol=1e-4, atol=1e-4 * np.abs(expected).max())

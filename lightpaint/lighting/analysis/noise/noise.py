@@ -14,6 +14,7 @@ sure").
 
 from contextlib import nullcontext
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 
@@ -49,6 +50,9 @@ MAX_NOISE_SHARE = 0.5
 
 #: Least noise of a painting that counts, relative to the noise of the prediction.
 MIN_PAINTING_NOISE = 0.02
+
+#: Fewest lights whose noise is summed in float32.
+MIN_SINGLE_LIGHTS = 32
 
 #: Parts of the pixels that are summed in parallel.
 PARTS = 4
@@ -254,6 +258,14 @@ class NoisyPixels:
         shape = len(self.weights), len(missed)
         return np.stack([rows_of(x, None, np.empty(shape, x.D.dtype)) for x in channels])
 
+    @property
+    def _kind(self) -> Any:
+        """Type of the noise of pixels: of some lights in half floats float32, in half the time. The
+        round-off of its sums is far below what half differences determine.
+        """
+        is_exact = len(self.weights) < MIN_SINGLE_LIGHTS or not self.planes.is_noisy
+        return np.float64 if is_exact else np.float32
+
     def sums(self, counted: Indices, *, is_coupled: bool) -> NoiseSums:
         """Sum over some pixels."""
         sums = NoiseSums.zeros(len(self.weights))
@@ -262,8 +274,8 @@ class NoisyPixels:
 
     def add(self, counted: Indices, sums: NoiseSums, *, is_coupled: bool) -> None:
         """Add some pixels to sums."""
-        n, (step, kind) = len(self.weights), block_of(self.planes)
-        rooms = Rooms(n, n * min(step, counted.size), kind, are_kept=is_coupled)
+        n, (step, _) = len(self.weights), block_of(self.planes)
+        rooms = Rooms(n, n * min(step, counted.size), self._kind, are_kept=is_coupled)
         with one_thread():
             for start in with_progress(range(0, counted.size, step)):
                 pixels = as_slice(counted[start : start + step])
@@ -296,7 +308,7 @@ class NoisyPixels:
 
         missed: (pixels, 3), the residual. own_share: as of the pixels, by default.
         """
-        _, kind = block_of(self.planes)
+        kind = self._kind
         own, of_pixels = self.own_share if own_share is None else own_share, self.gradients
         D = self.weight[pixels, c % self.weight.shape[1]].astype(kind)
         mean, half = (x[pixels, c].astype(kind) for x in (of_pixels.mean, of_pixels.half))

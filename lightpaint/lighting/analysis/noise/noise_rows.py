@@ -193,7 +193,8 @@ def dense_rows(
         sums.target_noise[c] += lit @ pixels.of_light
         sums.doubt[c] += lit @ pixels.doubt
     squares = np.square(room)
-    sums.fourth[c] += np.einsum("ip,ip->i", squares, squares)
+    # Fourth powers of light in physical units may be beyond the range of float32.
+    sums.fourth[c] += np.einsum("ip,ip->i", squares, squares, dtype=np.float64)
     return room
 
 
@@ -268,6 +269,8 @@ class LitPairs:
                 sums.target_noise[c] += room @ pixels.of_noise
             flat[self.places] = np.sqrt(pixels.D)[at] * h
             sums.power[c] += room @ room.T
-            sums.fourth[c] += np.bincount(of, np.square(np.square(row)), len(room))
+            sums.fourth[c] += np.bincount(
+                of, np.square(np.square(row), dtype=np.float64), len(room)
+            )
         flat[self.places] = row
         return room
