@@ -18,7 +18,7 @@ from weakref import finalize, ref
 import numpy as np
 import numpy.typing as npt
 
-from lightpaint.arrays import Doubles, Floats, Indices
+from lightpaint.arrays import Doubles, Floats, Indices, read_only
 from lightpaint.basis.file.light_channels import PLANE_CHANNELS, LitRows, is_lit_part
 from lightpaint.basis.planes import MemoryPlanes, Planes, PlanesBase, as_slice, mix
 from lightpaint.images.formats import PartLayout, RowFile
@@ -34,6 +34,9 @@ WALKED_PLANES = 3
 
 #: Maximum size in bytes of planes of which a copy is in memory rather than in a temporary file.
 UNSPOOLED_MAX_BYTES = 2**28
+
+#: Maximum size in bytes of exact mixes that are kept, of which one always is.
+MIXES_MAX_BYTES = 2**24
 
 #: Maximum size in bytes of picked pixels that are copied into memory.
 PICKED_MAX_BYTES = 2**27
@@ -128,6 +131,26 @@ class RowPlanes(PlanesBase):
     def array(self) -> Floats:
         """Return all planes, (n, h, w, 3). The whole array must fit in memory."""
         return np.ascontiguousarray(self.rows(0, self.size[0]))
+
+
+class KeptMixes:
+    """The latest exact mixes of planes that never change: a solve and its analysis ask for the
+    same picture several times.
+    """
+
+    def __init__(self) -> None:
+        self._latest: tuple[tuple[bytes, Doubles], ...] = ()  # by weights
+
+    def get(self, weights: Doubles, make: Callable[[Doubles], Doubles]) -> Doubles:
+        """Return the mix of weights, (n, 3), read-only; `make` makes one that is not kept."""
+        key = np.asarray(weights, np.float64).tobytes()
+        for known, mixed in self._latest:
+            if known == key:
+                return mixed
+        mixed = read_only(make(weights))
+        count = max(1, MIXES_MAX_BYTES // max(mixed.nbytes, 1))
+        self._latest = ((key, mixed), *self._latest)[:count]
+        return mixed
 
 
 class _StripCache:

@@ -27,7 +27,7 @@ from lightpaint.arrays import (
     release_freed_memory,
     round_to_halves,
 )
-from lightpaint.basis.file.file_planes import RowPlanes
+from lightpaint.basis.file.file_planes import KeptMixes, RowPlanes
 
 HALF, FLOAT = np.dtype(np.float16), np.dtype(np.float32)
 
@@ -114,6 +114,7 @@ class EncodedPlanes(RowPlanes):
         self._count, self._size = len(planes), planes[0].size
         self._lock = Lock()
         self._decoded: npt.NDArray[np.float32] | None = None
+        self._mixes = KeptMixes()
 
     @property
     def count(self) -> int:
@@ -190,6 +191,10 @@ class EncodedPlanes(RowPlanes):
         for i, channels in enumerate(block):
             self._decode(i, where, channels)
         return block.transpose(0, 2, 1)
+
+    def exact_mix(self, weights: Doubles) -> Doubles:
+        """Return Σ w_i Φ_i channel by channel, (3, p), summed in float64; read-only."""
+        return self._mixes.get(weights, super().exact_mix)
 
     def _decode(self, i: int, where: slice | Indices, into: Floats) -> None:
         """Decode some pixels of light i into an array (3, p)."""

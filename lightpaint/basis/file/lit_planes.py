@@ -20,10 +20,9 @@ from lightpaint.arrays import (
     Floats,
     Indices,
     copy_as_singles,
-    read_only,
     release_freed_memory,
 )
-from lightpaint.basis.file.file_planes import RowPlanes
+from lightpaint.basis.file.file_planes import KeptMixes, RowPlanes
 from lightpaint.basis.planes import LitEntries
 from lightpaint.progress import with_progress
 from lightpaint.threads import parallel_map
@@ -33,9 +32,6 @@ MIN_LIGHTS = 128
 
 #: Share of the pixels of all planes that are lit, up to which these are faster one by one.
 MAX_LIT_SHARE = 0.25
-
-#: Maximum size in bytes of mixes that are kept, of which one always is.
-MIXED_MAX_BYTES = 2**24
 
 #: Maximum size in bytes of both sets of planes, images and noise, that are kept so.
 MAX_BYTES = 2**30
@@ -163,11 +159,13 @@ class _LitStrip:
 
     def mix(self, weights: Doubles) -> Doubles:
         """Return Σ w_i of the planes, (3, pixels) float64. weights: (n, 3), with the scales."""
+        from scipy.sparse import csc_array
+
+        lit, begins = self.lit.astype(np.int32), self.begins.astype(np.int32)
+        shape = self.size, len(weights)
+        channels = (_singles(channel).astype(np.float64) for channel in self.numbers)
         return np.stack(
-            [
-                np.bincount(self.lit, self.of_planes(weights[:, c]) * _singles(channel), self.size)
-                for c, channel in enumerate(self.numbers)
-            ]
+            [csc_array((x, lit, begins), shape) @ weights[:, c] for c, x in enumerate(channels)]
         )
 
 
@@ -188,7 +186,7 @@ class LitPlanes(RowPlanes):
         (height, width), step = size, self.strip_rows
         edges = [width * row for row in [*range(0, height, step), height]]
         self._begins = edges[:-1]  # of strips, in pixels
-        self._kept: tuple[tuple[bytes, Doubles], ...] = ()  # mixes by their weights, latest first
+        self._mixes = KeptMixes()
         is_half = [plane.numbers.dtype == np.float16 for plane in planes]
         self._is_noisy = 2 * sum(is_half) > len(planes)
         # A few clean ones are kept whole, in float32.
@@ -335,18 +333,8 @@ class LitPlanes(RowPlanes):
         return power * np.square(scales), totals * scales
 
     def exact_mix(self, weights: Doubles) -> Doubles:
-        """Return Σ w_i Φ_i channel by channel, (3, p), summed in float64; read-only.
-
-        The latest are kept: a solve and its analysis ask for the same picture several times.
-        """
-        key = np.asarray(weights, np.float64).tobytes()
-        for known, mixed in self._kept:
-            if known == key:
-                return mixed
-        mixed = read_only(self._mix(weights))
-        count = max(1, MIXED_MAX_BYTES // mixed.nbytes)
-        self._kept = ((key, mixed), *self._kept)[:count]
-        return mixed
+        """Return Σ w_i Φ_i channel by channel, (3, p), summed in float64; read-only."""
+        return self._mixes.get(weights, self._mix)
 
     def _mix(self, weights: Doubles) -> Doubles:
         scaled = weights * self._scales[:, None]
