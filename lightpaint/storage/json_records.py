@@ -8,6 +8,7 @@ import tomllib
 from collections.abc import Collection, Mapping, Sequence
 from contextlib import suppress
 from dataclasses import MISSING, asdict, fields, is_dataclass
+from functools import cache
 from types import NoneType, UnionType
 from typing import Any, Literal, TypeVar, Union, get_args, get_origin, get_type_hints
 
@@ -107,7 +108,7 @@ def read_record(
     """
     if not isinstance(data, dict):
         raise ValueError(f"{data!r} is not an object")
-    kinds, values = get_type_hints(kind), {}
+    kinds, values = _kinds_of(kind), dict[str, Any]()
     record_fields = fields(kind)  # type: ignore[arg-type]
     names = {field.name for field in record_fields}
     if not others and (unknown_keys := [key for key in data if key not in names]):
@@ -124,6 +125,12 @@ def read_record(
         elif name in required or (field.default is MISSING and field.default_factory is MISSING):
             raise ValueError(f"the key {name} is missing")
     return kind(**values)
+
+
+@cache
+def _kinds_of(kind: type[Any]) -> dict[str, Any]:
+    """Return the types of the fields of a dataclass, once for the many records of a file."""
+    return get_type_hints(kind)
 
 
 def fields_of(record: Any, *optional: str) -> dict[str, Any]:
