@@ -5,7 +5,7 @@ raised.
 import json
 import math
 import tomllib
-from collections.abc import Collection, Mapping, Sequence
+from collections.abc import Callable, Collection, Mapping, Sequence
 from contextlib import suppress
 from dataclasses import MISSING, asdict, fields, is_dataclass
 from functools import cache
@@ -26,6 +26,9 @@ MAX_DOTS = 10**8
 UNIONS = (UnionType, Union)
 
 _Record = TypeVar("_Record")
+
+#: Returns the types of a dataclass's fields by name, once for the many records of a file.
+_kinds_of: Callable[[Any], dict[str, Any]] = cache(get_type_hints)
 
 
 def strict_json(text: str) -> Any:
@@ -125,12 +128,6 @@ def read_record(
         elif name in required or (field.default is MISSING and field.default_factory is MISSING):
             raise ValueError(f"the key {name} is missing")
     return kind(**values)
-
-
-@cache
-def _kinds_of(kind: type[Any]) -> dict[str, Any]:
-    """Return the types of the fields of a dataclass, once for the many records of a file."""
-    return get_type_hints(kind)
 
 
 def fields_of(record: Any, *optional: str) -> dict[str, Any]:

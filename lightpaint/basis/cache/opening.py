@@ -75,7 +75,8 @@ def keep_opening(basis: Basis) -> bool:
         if (kept := _read(path, content)) is not None and kept.keys() >= arrays.keys():
             return True
         with replacing(path) as place, place.open("wb") as file:
-            np.savez(file, **{CONTENT: np.array(_digest(content))}, **arrays)
+            kept_arrays: dict[str, Any] = {CONTENT: np.array(_digest(content)), **arrays}
+            np.savez(file, **kept_arrays)
     except (RowsUnsupportedError, OSError, LightpaintError):
         return False
     return True
