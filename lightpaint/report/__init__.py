@@ -11,7 +11,6 @@ if TYPE_CHECKING:
     from lightpaint.report.answer_pictures import spoken_view as spoken_view
     from lightpaint.report.answer_pictures import target_picture as target_picture
     from lightpaint.report.basis_memo import make_ahead as make_ahead
-    from lightpaint.report.basis_memo import make_once as make_once
     from lightpaint.report.basis_memo import page_reduction as page_reduction
     from lightpaint.report.comparison import comparison_image as comparison_image
     from lightpaint.report.comparison import shorten_to_width as shorten_to_width

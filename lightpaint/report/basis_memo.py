@@ -1,19 +1,19 @@
-"""A memo of those parts of pages that depend on the basis alone: made once, or ahead of the answer.
+"""Parts of pages that depend on the basis alone: made once, or ahead of the answer.
 
 Many looks share a basis, and cores are idle now and then while one of them is solved.
 """
 
-import weakref
-from collections.abc import Callable, Hashable
-from concurrent.futures import Future
-from threading import Lock
-from typing import Any, TypeVar
+from collections.abc import Callable
 
-from lightpaint.basis import Basis, DenoisedPlanes, obtain_denoised_planes, read_denoised_planes
+from lightpaint.basis import (
+    Basis,
+    DenoisedPlanes,
+    make_once,
+    obtain_denoised_planes,
+    read_denoised_planes,
+)
 from lightpaint.images import fitting_factor
 from lightpaint.threads import start_in_background
-
-Result = TypeVar("Result")
 
 #: Rows of a long list that are always visible, and the largest number of further rows that are not
 #: folded.
@@ -21,33 +21,6 @@ ROWS_SHOWN, SPARE_ROWS = 10, 3
 
 #: Maximum width of a plane in a page, in pixels, and maximum number of pixels in all planes.
 MAX_WIDTH, MAX_PIXELS = 480, 1_000_000
-
-_lock = Lock()
-#: Results by the identity of a basis's planes, which its views share, and by key.
-_memos: dict[int, dict[Hashable, Future[Any]]] = {}
-
-
-def make_once(basis: Basis, key: Hashable, make: Callable[[], Result]) -> Result:
-    """Return the result of `make`, which runs once for a basis; concurrent callers wait for it."""
-    with _lock:
-        planes = id(basis.planes)
-        if planes not in _memos:
-            weakref.finalize(basis.planes, _memos.pop, planes, None)
-            _memos[planes] = {}
-        memo = _memos[planes]
-        future = memo.get(key)
-        if future is not None:
-            is_mine = False
-        else:
-            future, is_mine = memo.setdefault(key, Future()), True
-    if is_mine:
-        try:
-            future.set_result(make())
-        except BaseException as error:
-            memo.pop(key, None)  # the next may have more luck
-            future.set_exception(error)
-    result: Result = future.result()
-    return result
 
 
 def page_reduction(basis: Basis, count: int, *, max_pixels: int = MAX_PIXELS) -> int:
@@ -70,9 +43,9 @@ def cached_clean_planes(basis: Basis) -> DenoisedPlanes | None:
     """
     count = len(basis.lights)
     if count > ROWS_SHOWN + SPARE_ROWS:
-        return make_once(basis, "planes", lambda: read_denoised_planes(basis))
+        return make_once(basis.planes, "planes", lambda: read_denoised_planes(basis))
     factor = page_reduction(basis, count)
-    return make_once(basis, "planes", lambda: obtain_denoised_planes(basis, factor=factor))
+    return make_once(basis.planes, "planes", lambda: obtain_denoised_planes(basis, factor=factor))
 
 
 def make_ahead(basis: Basis, make: Callable[[Basis], object]) -> None:

@@ -5,9 +5,10 @@ raised.
 import json
 import math
 import tomllib
-from collections.abc import Collection, Mapping, Sequence
+from collections.abc import Callable, Collection, Mapping, Sequence
 from contextlib import suppress
 from dataclasses import MISSING, asdict, fields, is_dataclass
+from functools import cache
 from types import NoneType, UnionType
 from typing import Any, Literal, TypeVar, Union, get_args, get_origin, get_type_hints
 
@@ -25,6 +26,9 @@ MAX_DOTS = 10**8
 UNIONS = (UnionType, Union)
 
 _Record = TypeVar("_Record")
+
+#: Returns the types of a dataclass's fields by name, once for the many records of a file.
+_kinds_of: Callable[[Any], dict[str, Any]] = cache(get_type_hints)
 
 
 def strict_json(text: str) -> Any:
@@ -107,7 +111,7 @@ def read_record(
     """
     if not isinstance(data, dict):
         raise ValueError(f"{data!r} is not an object")
-    kinds, values = get_type_hints(kind), {}
+    kinds, values = _kinds_of(kind), dict[str, Any]()
     record_fields = fields(kind)  # type: ignore[arg-type]
     names = {field.name for field in record_fields}
     if not others and (unknown_keys := [key for key in data if key not in names]):

@@ -18,7 +18,6 @@ from lightpaint.basis.render.rendered_basis import basis_lights
 from lightpaint.errors import ConstraintError, PaintError
 from lightpaint.images.denoiser import Features
 from lightpaint.images.object_map import Objects
-from lightpaint.paint import subject_factory
 from lightpaint.paint.launch import SessionFile
 from lightpaint.paint.store.history_steps import Identity
 from lightpaint.paint.store.session_file import Store
@@ -168,14 +167,3 @@ def test_a_session_of_other_lights_is_refused_when_the_scene_tells(
     assert completed.returncode == 2
     assert "session.db is a session of" in completed.stderr
     assert "(--new)" in completed.stderr
-
-
-def test_a_basis_that_no_page_can_hold_says_what_to_do(
-    path: Path, make_basis: Any, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    basis = make_basis(3, (12, 10))
-    monkeypatch.setattr(subject_factory, "MAX_PAGE_BYTES", 6 * 3 * 120)
-    assert make_subject(basis, path.parent / "s").basis is basis
-    monkeypatch.setattr(subject_factory, "MAX_PAGE_BYTES", 6 * 3 * 120 - 1)
-    with pytest.raises(PaintError, match=r"3 lights of 10x12.*resolution=.*resize=True"):
-        make_subject(basis, path.parent / "s")

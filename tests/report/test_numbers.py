@@ -174,7 +174,8 @@ def test_writing_neither_solves_nor_sums_anew(
     count(Basis, "mix")
     count(Basis.__dict__["totals"], "func")
     # One that has kept nothing yet.
-    write_report(tmp_path, replace(look, basis=replace(look.basis)), command="")
+    basis = replace(look.basis, planes=look.basis.images.copy())
+    write_report(tmp_path, replace(look, basis=basis), command="")
     # Of all lights: the current look, and what is shown of other answers.
     page = (tmp_path / "report.html").read_text(encoding="utf-8")
     others = len(re.findall(r"<strong>(Without constraints|With the constraints|With \d)", page))

@@ -15,6 +15,9 @@ if TYPE_CHECKING:
     from lightpaint.basis.cache.cached_render import check_same_view as check_same_view
     from lightpaint.basis.cache.cached_render import obtain_basis as obtain_basis
     from lightpaint.basis.cache.cached_render import top_up_basis as top_up_basis
+    from lightpaint.basis.cache.opening import find_opening as find_opening
+    from lightpaint.basis.cache.opening import keep_opening as keep_opening
+    from lightpaint.basis.cache.opening import open_kept as open_kept
     from lightpaint.basis.cache.scene_facts import SceneFacts as SceneFacts
 
 if not TYPE_CHECKING:  # a type checker would take any name

@@ -49,16 +49,16 @@ UNUSED_S = 30 * 86400.0
 #: Environment variable that overrides the default folder in the user's cache.
 VARIABLE = "LIGHTPAINT_CACHE"
 
-#: Suffixes of a basis and of the files beside it: its denoised planes, facts about its scene, and
-#: the exact sums of a basis to which samples are still to be added.
+#: Suffixes of a basis and of the files beside it: its denoised planes, facts about its scene, the
+#: exact sums of a basis to which samples are still to be added, and results that open a session.
 SUFFIX, DENOISED_SUFFIX, FACTS_SUFFIX = ".basis.exr", ".clean.npz", ".known.json"
-SUMS_SUFFIX = ".sums.npz"
+SUMS_SUFFIX, OPENING_SUFFIX = ".sums.npz", ".opening.npz"
 #: Folder for parts of bases that are being rendered.
 PARTS = "parts"
 
 BASIS_NAME = re.compile(r"[0-9a-f]{32}\.basis\.exr")
 COMPANION_NAME = re.compile(
-    r"([0-9a-f]{32})(?:\.clean\.npz|\.[0-9a-f]{32}\.known\.json|\.[0-9a-f]{32}\.sums\.npz)"
+    r"([0-9a-f]{32})(?:\.clean\.npz|\.opening\.npz|\.[0-9a-f]{32}\.known\.json|\.[0-9a-f]{32}\.sums\.npz)"
 )
 #: Pattern of the temporary folders that `files.replacing` creates.
 LEFTOVER_NAME = re.compile(r"\.([0-9a-f]{32}\.(?:[0-9a-f.]+\.)?[a-z]+\.[a-z]+)\.[a-z0-9_]{8}")
@@ -76,8 +76,11 @@ MARKS = {
     DENOISED_SUFFIX: b"made_of.npy",
     FACTS_SUFFIX: b'"lightpaint-known',
     SUMS_SUFFIX: b"sums_a.npy",
+    OPENING_SUFFIX: b"opening_of.npy",
 }
-MARK_WITHIN = {SUFFIX: 2**20, DENOISED_SUFFIX: 2**8, FACTS_SUFFIX: 2**8, SUMS_SUFFIX: 2**8}
+MARK_WITHIN = {SUFFIX: 2**20} | dict.fromkeys(
+    (DENOISED_SUFFIX, FACTS_SUFFIX, SUMS_SUFFIX, OPENING_SUFFIX), 2**8
+)
 
 #: Number of foreign files that an error message names, and number of files that are inspected.
 NAMES_SHOWN, NAMES_READ = 3, 100_000
@@ -102,7 +105,7 @@ class Entry:
 
 def find(scene_identity: str, sensor: str, seed: int, size: tuple[int, int]) -> Basis | None:
     """Return the cached basis for these arguments; None if it is missing or damaged."""
-    path = _path(scene_identity, sensor, seed, size)
+    path = path_for(scene_identity, sensor, seed, size)
     return _read(path) if is_own(path) else None
 
 
@@ -125,7 +128,7 @@ def _read(path: Path) -> Basis | None:
 
 def cached_spp(scene_identity: str, sensor: str, seed: int, size: tuple[int, int]) -> int:
     """Return the samples per pixel of the cached basis for these arguments; 0 if there is none."""
-    path = _path(scene_identity, sensor, seed, size)
+    path = path_for(scene_identity, sensor, seed, size)
     origin = _entry(path).origin if is_own(path) else None
     return 0 if origin is None else origin.spp
 
@@ -324,14 +327,15 @@ def _names(entry: Entry) -> set[str]:
     return names
 
 
-def _path(scene_identity: str, sensor: str, seed: int, size: tuple[int, int]) -> Path:
+def path_for(scene_identity: str, sensor: str, seed: int, size: tuple[int, int]) -> Path:
+    """Return the path of the basis for these arguments, whether or not it is cached."""
     key = repr((FORMAT, scene_identity, sensor, seed, size))
     return folder() / f"{hashlib.sha256(key.encode()).hexdigest()[:32]}{SUFFIX}"
 
 
 def _path_of(basis: Basis) -> Path:
     origin = basis.origin
-    return _path(origin.scene_identity, origin.sensor, origin.seed, basis.size)
+    return path_for(origin.scene_identity, origin.sensor, origin.seed, basis.size)
 
 
 def _entry(path: Path) -> Entry:

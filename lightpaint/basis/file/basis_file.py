@@ -14,6 +14,7 @@ import numpy as np
 
 from lightpaint.arrays import is_finite, release_freed_memory
 from lightpaint.basis.basis import Basis, Origin
+from lightpaint.basis.file.deferred_planes import DeferredPlanes, LoadOnce
 from lightpaint.basis.file.file_parts import (
     CHECKSUMS_KEY,
     LARGEST_SCALE,
@@ -227,9 +228,10 @@ class _Parts:
     """The parts of a basis file, whether its pixels are in memory or not.
 
     head: attributes of the first part. texts: attributes of each light's part. channel_readers:
-    functions that read the channels of each light's part. others: parts of no light.
-    planes: function of an order of the parts and an index into `PLANE_CHANNELS` that returns those
-    planes. has_indirect: whether the parts have planes of indirect light.
+    functions that read the channels of each light's part, to check them; none if that is left for
+    later. others: parts of no light. planes: function of an order of the parts and an index into
+    `PLANE_CHANNELS` that returns those planes. has_indirect: whether the parts have planes of
+    indirect light.
     """
 
     head: Mapping[str, str]
@@ -417,10 +419,13 @@ def _common_size(parts: Sequence[ExrPart]) -> tuple[int, int]:
     return sizes[0]
 
 
-def _basis_of_rows(file: RowFile, head: Mapping[str, str]) -> Basis | None:
+def _basis_of_rows(
+    file: RowFile, head: Mapping[str, str], *, is_deferred: bool = False
+) -> Basis | None:
     """Return a basis whose planes stay in the file; None if its parts differ in layout.
 
-    Raises the errors of `_basis_of_parts`.
+    is_deferred: whether planes are read and checked by the first walk over them. Raises the errors
+    of `_basis_of_parts`.
     """
     light_parts = [p for p in file.parts if LIGHT_KEY in p.texts]
     size = picture_size(light_parts[0])
@@ -436,7 +441,15 @@ def _basis_of_rows(file: RowFile, head: Mapping[str, str]) -> Basis | None:
 
     def planes(order: Sequence[int], number: int) -> Planes:
         plane_scales = [scales[k][number] for k in order]
-        return FilePlanes(file, [light_parts[k] for k in order], number, plane_scales)
+        of_file = FilePlanes(file, [light_parts[k] for k in order], number, plane_scales)
+        return DeferredPlanes(of_file, load, number) if is_deferred and number < 2 else of_file
+
+    def read_sets() -> tuple[Planes, Planes]:
+        whole = _basis_of_rows(file, head)
+        assert whole is not None
+        return whole.planes, whole.noise
+
+    load = LoadOnce(read_sets)
 
     collector = LitCollector(size) if len(light_parts) >= MIN_LIGHTS else None
 
@@ -448,19 +461,54 @@ def _basis_of_rows(file: RowFile, head: Mapping[str, str]) -> Basis | None:
             collector.add(name, [as_lit_plane(plane) for plane in planes])
         return channels
 
-    channel_readers = [partial(collected, *x) for x in zip(light_parts, scales, strict=True)]
+    channel_readers = [
+        partial(collected, *x) for x in zip(light_parts, scales, strict=True) if not is_deferred
+    ]
     others = [part(p) for p in file.parts if LIGHT_KEY not in p.texts]
     has_indirect = all(has_indirect_channels(p.channels) for p in light_parts)
     texts = [p.texts for p in light_parts]
     basis = _checked_basis(
         _Parts(head, texts, channel_readers, others, planes, has_indirect=has_indirect)
     )
-    lit = None if collector is None else collector.planes(basis.names)
+    lit = None if collector is None or is_deferred else collector.planes(basis.names)
     return basis if lit is None else replace(basis, planes=lit[0], noise=lit[1])
 
 
+class DeferredFile:
+    """The open file of a basis of many lights, whose planes are read at the first walk over them.
+
+    Raises RowsUnsupportedError for a file of another kind, OSError, and BasisError.
+    """
+
+    def __init__(self, path: Path) -> None:
+        self._path, self._file = path, RowFile(path)
+        self._head = _head(part.texts for part in self._file.parts)
+        if sum(LIGHT_KEY in part.texts for part in self._file.parts) < MIN_LIGHTS:
+            raise RowsUnsupportedError("few lights are read at once")
+        if CHECKSUMS_KEY not in self._head:
+            raise RowsUnsupportedError("no checksums")
+
+    @property
+    def content(self) -> str:
+        """A text that is another one for another basis."""
+        return f"{self._head[CHECKSUMS_KEY]} {self._head[ORIGIN_KEY]}"
+
+    def basis(self) -> Basis:
+        """Return the basis as `read_basis` does, with planes that are checked when they are read.
+
+        Raises RowsUnsupportedError for parts that differ in layout, and the errors of `read_basis`.
+        """
+        try:
+            basis = _basis_of_rows(self._file, self._head, is_deferred=True)
+        except _HEADER_ERRORS as error:
+            raise BasisError(f"{self._path} is a damaged basis: {one_line(str(error))}") from error
+        if basis is None:
+            raise RowsUnsupportedError("parts differ in layout")
+        return replace(basis, source=str(self._path))
+
+
 def _checked_basis(parts: _Parts) -> Basis:
-    """Return the basis of a file after checking it."""
+    """Return the basis of a file after checking it, but for pixels that are checked later."""
     masks = [p.in_display_window().channels["Y"] for p in parts.others if "Y" in p.channels]
     if not parts.texts or not masks:
         raise BasisError("has lost parts of its basis: make it again with lightpaint basis")
@@ -488,7 +536,8 @@ def _checked_basis(parts: _Parts) -> Basis:
         )
     except (BasisError, ImageError) as error:
         raise BasisError(f"is a damaged basis: {one_line(str(error))}") from error
-    parts.check_pixels(lights, checksums)
+    if parts.channel_readers:
+        parts.check_pixels(lights, checksums)
     if checksums is not None:
         check(checksums.seen, "mask of seen emitters", "", {"Y": masks[0]})
     return basis

@@ -17,6 +17,7 @@ import numpy as np
 
 from lightpaint.arrays import Floats, Indices
 from lightpaint.basis.basis import Basis
+from lightpaint.basis.file.deferred_planes import loaded
 from lightpaint.basis.file.half_floats import (
     EncodedPlane,
     EncodedPlanes,
@@ -129,7 +130,7 @@ def plane_sets(basis: Basis) -> list[Planes]:
 
 def stored_planes_of(basis: Basis, k: int) -> list[EncodedPlane | LitPlane]:
     """Return the planes of light k as they are stored, in the order of `PLANE_CHANNELS`."""
-    sets = plane_sets(basis)
+    sets = [loaded(planes) for planes in plane_sets(basis)]
     if all(isinstance(planes, EncodedPlanes | LitPlanes) for planes in sets):
         return [x.stored(k) for x in sets if isinstance(x, EncodedPlanes | LitPlanes)]
     planes = [plane_set.plane(k) for plane_set in sets]

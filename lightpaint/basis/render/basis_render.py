@@ -99,11 +99,11 @@ def render_basis(
     check_samples(spp=spp, until_spp=until_spp, seed=seed)
     budget = Budget(scene.spp if spp is None else spp, time_s, until_spp, until_variance)
     check_size(scene)
-    check_memory(scene, in_bands=renders_in_bands(scene, start))
     if start is not None and not is_of(scene, start, seed):
         raise BasisError("the basis to continue was made from another scene, sensor, film or seed")
     if start is not None and budget.met_by(start.origin.spp):
         return with_first_hits(start.with_requests(scene.requests), scene, seed)
+    check_memory(scene, in_bands=renders_in_bands(scene, start))
     method = method_of(scene)
     if start is not None and start.origin.method != method:
         # It cannot be continued, but must not be replaced by a basis with fewer samples either.

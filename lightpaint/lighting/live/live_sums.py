@@ -7,7 +7,7 @@ from math import ceil
 import numpy as np
 
 from lightpaint.arrays import Bools, Doubles, Floats, Slices
-from lightpaint.basis import Basis
+from lightpaint.basis import Basis, Planes, array_name, array_once
 from lightpaint.colour import ViewTransform
 from lightpaint.images import block_mean, block_sums, enlarged
 from lightpaint.lighting.live.tiles import MAX_CHEAP_LIGHTS, TiledEquations
@@ -139,20 +139,26 @@ class SmallFilm:
         # Emitters do not count in a block that shows anything else.
         unseen = (~self._seen).astype(np.float64)
         self._shown = np.where(_spread(block_sums(unseen, side), side, unseen.shape) > 0, unseen, 1)
-        small = np.stack([self._average(x) for x in basis.planes])
-        # float32 suffices for averages, and sums of it take half the time.
-        planes = small.reshape(len(small), -1, 3).transpose(2, 0, 1)
+        name = array_name(f"averages of {side}", basis.emitters_seen)
+        #: (3, n, p) float32, which suffices for averages: sums of it take half the time.
+        self.rows: Floats = array_once(basis.planes, name, lambda: self._averages(basis.planes))
+        self._owns_rows = False
         #: (3, p), of the visible surfaces; 1 where it is not known.
-        self.albedo: Floats = np.ones(planes.shape[::2], np.float32)
+        self.albedo: Floats = np.ones(self.rows.shape[::2], np.float32)
         if basis.features is not None:
             self.albedo = _planes(self._average(basis.features.albedo))
-        self.rows = np.ascontiguousarray(planes, np.float32)
         self._current = _planes(self._average(basis.current_look))
         self._painted = self._current.copy()
         self._transform: ViewTransform | None = None
         self._seen_painted = self._seen_current = self._current
         self._a, self._left = np.zeros((2, rows * columns))
         self.update((slice(0, height), slice(0, width)))
+
+    def _averages(self, planes: Planes) -> Floats:
+        """Return the averages of all planes, (3, n, p)."""
+        small = np.stack([self._average(x) for x in planes])
+        by_channel = small.reshape(len(small), -1, 3).transpose(2, 0, 1)
+        return np.ascontiguousarray(by_channel, np.float32)
 
     def _average(self, image: Floats) -> Floats:
         """Return (h', w', 3) means over blocks of a picture (h, w, 3)."""
@@ -183,6 +189,8 @@ class SmallFilm:
     def replace_planes(self, basis: Basis, lights: Iterable[int]) -> None:
         """Average the replaced planes of some lights, by number."""
         self._planes = basis.planes
+        if not self._owns_rows:
+            self.rows, self._owns_rows = self.rows.copy(), True
         for k in lights:
             self.rows[:, k] = _planes(self._average(basis.planes.plane(k)))
 
@@ -231,7 +239,9 @@ class SmallFilm:
 
     def mix(self, weights: Doubles) -> Floats:
         """Return the averaged picture (h', w', 3) of a lighting, linear. weights: (n, 3)."""
-        mixed = np.stack([w @ rows for w, rows in zip(weights.T, self.rows, strict=True)], axis=-1)
+        # In float32, as the averages are: many lights would be copied as float64.
+        columns = weights.T.astype(np.float32)
+        mixed = np.stack([w @ rows for w, rows in zip(columns, self.rows, strict=True)], axis=-1)
         return np.asarray(mixed.reshape(*self._size, 3), np.float32)
 
     def wash(self, layers: LayerWishes, *, is_sketch: bool) -> Wash:

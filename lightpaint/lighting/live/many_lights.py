@@ -167,6 +167,8 @@ class ManyLights:
         # as long as its gradient stays the same, at a bound or not.
         self._settled = np.zeros((count, 3))
         self._has_moved = np.zeros(count, bool)
+        self._pictures: dict[bytes, Doubles] = {}  # of the starts of the last round
+        self._squares: tuple[Floats, Floats] | None = None  # of some pixels of some rows
 
     def order(self, weights: Doubles, gradient: Doubles, curvature: Doubles) -> Indices:
         """Return the lights, those first that promise the largest decrease of the loss.
@@ -201,11 +203,11 @@ class ManyLights:
         the reduction with which to go on, and the weights, whose loss is the loss of the best
         start, or less.
         """
-        start, picture, value, pull_gradient = _best_start(rows, pixels, starts, pull)
+        start, picture, value, pull_gradient = self._best_start(rows, pixels, starts, pull)
         image, weight = pixels.squares(picture, from_clipping=False)
         missed, weights_f32 = (weight * (picture - image)).astype(np.float32), _f32(weight)
         gradient = _per_channel(lambda c: rows[c] @ missed[c]).T + pull_gradient
-        curvature = _curvature(rows, weights_f32)
+        curvature = self._curvature(rows, weights_f32)
         if pull is not None:
             curvature += np.einsum("cii->ic", pull.M)
         order = self.order(start, gradient, curvature)
@@ -224,7 +226,7 @@ class ManyLights:
 
         def loss_at(step: Doubles) -> float:  # beyond the pull on the start
             change = (step - start)[lights]
-            lit = np.einsum("cip,ic->cp", own, _f32(change))
+            lit = np.matmul(_f32(change).T[:, None], own)[:, 0]
             total = float(pixels.objective(picture + lit).sum())
             if part_of_pull is None:
                 return total
@@ -243,43 +245,60 @@ class ManyLights:
                 nearest, value = step, reached
         return some.put_back(part), nearest
 
+    def _best_start(
+        self,
+        rows: Floats,
+        pixels: PaintedPixels,
+        starts: Sequence[Doubles],
+        pull: NormalEquations | None,
+    ) -> tuple[Doubles, Doubles, float, Doubles]:
+        """Return the start (n, 3) with the least loss, its picture (3, p), the loss of that picture
+        without the pull, and half the gradient of the pull there, (n, 3).
+        """
+        pictures = {start.tobytes(): start for start in starts}
+        self._pictures = {
+            key: self._pictures[key] if key in self._pictures else _picture(rows, start)
+            for key, start in pictures.items()
+        }
+        found = []
+        for start in starts:
+            picture = self._pictures[start.tobytes()]
+            value, gradient, pulled = (
+                float(pixels.objective(picture).sum()),
+                np.zeros_like(start),
+                0.0,
+            )
+            if pull is not None:
+                gradient = pull.gradient(start)
+                # wᵀMw − 2 bᵀw, of which the gradient Mw − b has the first half.
+                pulled = float((start * (gradient - pull.b.T)).sum())
+            found.append((value + pulled, start, picture, value, gradient))
+        _, start, picture, value, gradient = min(found, key=lambda x: x[0])
+        return start, picture, value, gradient
 
-def _best_start(
-    rows: Floats, pixels: PaintedPixels, starts: Sequence[Doubles], pull: NormalEquations | None
-) -> tuple[Doubles, Doubles, float, Doubles]:
-    """Return the start (n, 3) with the least loss, its picture (3, p), the loss of that picture
-    without the pull, and half the gradient of the pull there, (n, 3).
-    """
-    found = []
-    for start in starts:
-        picture = _picture(rows, start)
-        value, gradient, pulled = float(pixels.objective(picture).sum()), np.zeros_like(start), 0.0
-        if pull is not None:
-            gradient = pull.gradient(start)
-            # wᵀMw − 2 bᵀw, of which the gradient Mw − b has the first half.
-            pulled = float((start * (gradient - pull.b.T)).sum())
-        found.append((value + pulled, start, picture, value, gradient))
-    _, start, picture, value, gradient = min(found, key=lambda x: x[0])
-    return start, picture, value, gradient
+    def _curvature(self, rows: Floats, weight: Floats) -> Doubles:
+        """Return Σ weight Φ² of each light over some of the pixels, for all of them, (n, 3)."""
+        channels, n, p = rows.shape
+        runs = p // CURVATURE_RUN
+        step = CURVATURE_STEP if runs >= CURVATURE_STEP else 1
+        size = runs * CURVATURE_RUN if step > 1 else p
+
+        def some(values: Floats) -> Floats:
+            if step == 1:
+                return values
+            return values[..., :size].reshape(*values.shape[:-1], runs, -1)[..., ::step, :]
+
+        if self._squares is None or self._squares[0] is not rows:
+            self._squares = rows, np.square(some(rows)).reshape(channels, n, -1)
+        of_some = some(weight).reshape(channels, -1)
+        sums = np.matmul(self._squares[1], of_some[..., None])[..., 0]
+        return np.asarray(step * sums.T, np.float64)
 
 
 def _picture(rows: Floats, weights: Doubles) -> Doubles:
     """Return the picture of these weights, (3, p)."""
     w = _f32(weights)
     return _per_channel(lambda c: w[:, c] @ rows[c])
-
-
-def _curvature(rows: Floats, weight: Floats) -> Doubles:
-    """Return Σ weight Φ² of each light over some of the pixels, for all of them, (n, 3)."""
-    _, n, p = rows.shape
-    runs = p // CURVATURE_RUN
-    if runs < CURVATURE_STEP:
-        return np.asarray(np.einsum("cnp,cnp,cp->nc", rows, rows, weight), np.float64)
-    size = runs * CURVATURE_RUN
-    some = rows[:, :, :size].reshape(3, n, runs, CURVATURE_RUN)[:, :, ::CURVATURE_STEP]
-    of_some = weight[:, :size].reshape(3, runs, CURVATURE_RUN)[:, ::CURVATURE_STEP]
-    sums = np.einsum("cnrk,cnrk,crk->nc", some, some, of_some)
-    return np.asarray(sums * CURVATURE_STEP, np.float64)
 
 
 def _per_channel(of_channel: Callable[[int], Floats]) -> Doubles:

@@ -19,6 +19,8 @@ from lightpaint.basis import (
     BLOCK_PIXELS,
     Basis,
     Planes,
+    array_name,
+    array_once,
     as_planes,
     block_means,
     in_one_row,
@@ -307,10 +309,12 @@ def _strips(basis: Basis) -> tuple[Floats, Floats, Bools]:
     weights = basis.current_weights
     pixels = np.flatnonzero(np.repeat(np.isin(np.arange(basis.size[0]), rows), basis.size[1]))
     picture = (len(rows), basis.size[1], 3)
-    look, half = (
-        x.picked(pixels).mix(weights).reshape(picture) for x in (basis.planes, basis.noise)
-    )
-    return look, half, basis.emitters_seen[rows]
+    name = array_name("strips", weights, pixels)
+
+    def mixed(planes: Planes) -> Floats:
+        return array_once(planes, name, lambda: planes.picked(pixels).mix(weights).reshape(picture))
+
+    return mixed(basis.planes), mixed(basis.noise), basis.emitters_seen[rows]
 
 
 def _display_noise(

@@ -179,6 +179,11 @@ class Knob:
     wheel: ColorWheel | None = None
 
     @cached_property
+    def has_any_colour(self) -> bool:
+        """True if the channels of a light have no constraint."""
+        return self.is_free and all(x.lower == 0 and np.isinf(x.upper) for x in self.unknowns)
+
+    @cached_property
     def is_free(self) -> bool:
         """True for a light whose three channels turn independently."""
         return len(self.unknowns) == 3 and all(

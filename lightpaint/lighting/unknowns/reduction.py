@@ -123,7 +123,7 @@ class Reduction:
         """Places of the knobs that have a gamut, and still take any colour."""
         if self.gamuts is None:
             return ()
-        return tuple(k for k, knob in enumerate(self.knobs) if _has_any_colour(knob))
+        return tuple(k for k, knob in enumerate(self.knobs) if knob.has_any_colour)
 
     @cached_property
     def open_wheels(self) -> tuple[int, ...]:
@@ -415,11 +415,6 @@ class Reduction:
             groups = [group for group in groups if not group & channels]
             groups.append(set().union(*meeting))
         return sorted(sorted(group) for group in groups if group)
-
-
-def _has_any_colour(knob: Knob) -> bool:
-    """Return whether the channels of a light have no constraint."""
-    return knob.is_free and all(x.lower == 0 and np.isinf(x.upper) for x in knob.unknowns)
 
 
 def only_knobs(reduction: Reduction, chosen: Collection[int]) -> Reduction:

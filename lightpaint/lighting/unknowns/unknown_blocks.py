@@ -187,13 +187,15 @@ class Block:
                 strict=True,
             )
         )
-        pairs = []
         by_light = np.argsort(light, kind="stable")
-        for members in np.split(by_light, np.flatnonzero(np.diff(light[by_light])) + 1):
-            a, b = (x.ravel() for x in np.meshgrid(members, members, indexing="ij"))
-            differ = channel[a] != channel[b]
-            pairs.append(np.stack([a[differ], b[differ]]))
-        a, b = np.concatenate(pairs, axis=1)
+        _, first, counts = np.unique(light[by_light], return_index=True, return_counts=True)
+        # Each entry of a light meets all of them, in their order.
+        met = np.repeat(counts, counts)
+        begins = np.cumsum(met) - met
+        others = np.repeat(np.repeat(first, counts) - begins, met) + np.arange(met.sum())
+        a, b = np.repeat(by_light, met), by_light[others]
+        differ = channel[a] != channel[b]
+        a, b = a[differ], b[differ]
         return Pairs(column[a], column[b], value[a] * value[b], light[a], channel[a], channel[b])
 
     @cached_property

@@ -9,12 +9,12 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from lightpaint.arrays import Bools, Floats
-from lightpaint.basis import Basis, scale_of
+from lightpaint.arrays import Bools, Doubles, Floats
+from lightpaint.basis import Basis, array_once, scale_of
 from lightpaint.colour import ViewTransform
 from lightpaint.errors import PaintError
 from lightpaint.images import block_mean, blocks_in, fitting_factor
-from lightpaint.report import make_once, resized, thumbnail
+from lightpaint.report import resized, thumbnail
 
 #: Approximate pixels of a thumbnail's longer side.
 THUMBNAIL_SIDE = 192
@@ -179,4 +179,8 @@ def plane_scale(basis: Basis, k: int) -> float:
     """
     if k >= len(basis.lights):
         return 1.0
-    return make_once(basis, "page scales", lambda: [scale_of(plane) for plane in basis.planes])[k]
+    return float(array_once(basis.planes, "scales", lambda: _scales(basis))[k])
+
+
+def _scales(basis: Basis) -> Doubles:
+    return np.array([scale_of(plane) for plane in basis.planes])

@@ -9,12 +9,16 @@ from lightpaint.arrays import Floats
 from lightpaint.basis import (
     Basis,
     DenoisedPlanes,
+    array_name,
+    array_once,
     cache_denoised_planes,
     denoise_current_look,
     denoise_to_halves,
     read_denoised_planes,
 )
+from lightpaint.basis.cache import keep_opening
 from lightpaint.files import one_line
+from lightpaint.images import denoiser_text
 from lightpaint.lighting import Solution
 from lightpaint.paint.background_threads import LatestWork, StoppedError
 from lightpaint.paint.layers.canvas import Canvas
@@ -27,6 +31,7 @@ from lightpaint.paint.session.picture_table import (
     opens_plain,
     page_emitters,
     page_factor,
+    plane_scale,
     plane_size,
     plane_thumbnail,
 )
@@ -97,7 +102,7 @@ class PlaneDenoiser:
             is_looked_for = self._use_cache and not opens_plain(basis)
             cached = read_denoised_planes(basis, factor=factor) if is_looked_for else None
             if cached is None:
-                current_looks.append(denoise_current_look(basis))
+                current_looks.append(_clean_look(basis))
             else:
                 current_looks.append(cached.current)
                 planes_by_view = self._by_view if cached.is_whole else self._small
@@ -169,6 +174,15 @@ class PlaneDenoiser:
                     self._by_view[view] = replace(planes_of_view, is_cached=True)
 
 
+def _clean_look(basis: Basis) -> Floats:
+    """Return the denoised current look, (h, w, 3)."""
+    if not opens_plain(basis) or basis.former is not None:
+        return denoise_current_look(basis)
+    denoiser = "".join(denoiser_text(basis.features, raw="").values())
+    name = array_name(f"clean look by {denoiser}", basis.current_weights)
+    return array_once(basis.planes, name, lambda: denoise_current_look(basis))
+
+
 class SessionBases:
     """The bases of a studio's session, each of more samples than the one before.
 
@@ -206,6 +220,7 @@ class SessionBases:
         with MITSUBA.low_priority():
             for bases in obtain_bases(self._subjects, self._publisher.report_progress):
                 self.use(bases)
+                self._keep_openings(bases)
                 self._denoiser.denoise(self._access.session)
         self._publisher.publish(ProgressReport(task="basis", done=1, total=1, unit=""))
         self._denoiser.write_cache()
@@ -231,6 +246,13 @@ class SessionBases:
                     self._warn(remark, "warn")
             self._offer_pictures(bases, clean_planes, small_planes)
         self._on_new_bases()
+
+    def _keep_openings(self, bases: Sequence[Basis]) -> None:
+        """Keep the results of walks over all planes with which sessions of these bases begin."""
+        for subject, basis in zip(self._subjects, bases, strict=True):
+            if subject.settings.use_cache and opens_plain(basis):
+                plane_scale(basis, 0)  # of all planes, for the pages
+                keep_opening(basis)
 
     def _open_session(
         self, bases: Sequence[Basis], current_looks: Sequence[Floats]

@@ -10,7 +10,7 @@ import numpy as np
 from markupsafe import Markup
 
 from lightpaint.arrays import RGB, Doubles, Floats, Indices
-from lightpaint.basis import Basis, BasisLight, LightImage, light_images
+from lightpaint.basis import Basis, BasisLight, LightImage, light_images, make_once
 from lightpaint.colour import Photometry, encode_display, luminance, rgb_to_hex, to_8_bit
 from lightpaint.images import block_mean, in_turns
 from lightpaint.lighting import (
@@ -27,7 +27,6 @@ from lightpaint.report.basis_memo import (
     ROWS_SHOWN,
     SPARE_ROWS,
     cached_clean_planes,
-    make_once,
     page_reduction,
 )
 from lightpaint.report.diagnosis_sentences import (
@@ -284,7 +283,7 @@ def thumbnails_of(basis: Basis, *, is_clean: bool) -> Mapping[int, Thumbnail]:
     """
     all_lights = range(len(basis.lights))
     return make_once(
-        basis,
+        basis.planes,
         ("thumbnails", is_clean),
         lambda: _thumbnails(basis, all_lights, is_clean=is_clean),
     )

@@ -25,6 +25,7 @@ from lightpaint.basis import (
     denoise_mixes,
     denoise_plane,
     light_images,
+    make_once,
 )
 from lightpaint.colour import (
     ViewTransform,
@@ -38,7 +39,7 @@ from lightpaint.colour import (
 from lightpaint.images import PackedPicture, block_mean, in_turns, pack_picture
 from lightpaint.lighting import ALL_REACHED, Lighting, lighting_fields
 from lightpaint.progress import with_progress
-from lightpaint.report.basis_memo import MAX_PIXELS, cached_clean_planes, make_once, page_reduction
+from lightpaint.report.basis_memo import MAX_PIXELS, cached_clean_planes, page_reduction
 from lightpaint.report.page.figures import CLEAN_REDUCTION, data_uri
 from lightpaint.report.page.html import html
 from lightpaint.report.page.lights_table import most_visible_lights
@@ -182,7 +183,7 @@ def planes_for_page(
     """
     all_lights = np.arange(len(basis.lights))
     return make_once(
-        basis,
+        basis.planes,
         ("mixer", is_clean, max_pixels),
         lambda: _compact_planes(basis, all_lights, [], is_clean=is_clean, max_pixels=max_pixels),
     )

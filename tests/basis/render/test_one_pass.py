@@ -669,6 +669,16 @@ def test_what_does_not_fit_is_refused_before_it_is_tried(
     assert memory_needed(large) > 5 * 600_000 * 20 * 3 * 4 * 6
 
 
+def test_samples_that_are_there_need_no_room(
+    small_room: Scene, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    basis = render_basis(small_room, spp=2)
+    monkeypatch.setattr("lightpaint.basis.render.banded_film._free_memory", lambda: 1)
+    assert render_basis(small_room, spp=2, start=basis).origin == basis.origin
+    with pytest.raises(SceneError, match="are free"):
+        render_basis(small_room, spp=4, start=basis)
+
+
 def test_too_few_samples_are_refused(small_room: Scene) -> None:
     with pytest.raises(SceneError, match="too few for two halves"):
         render_basis(small_room, spp=1)

@@ -1,0 +1,97 @@
+"""The results of walks over all planes with which a session begins, kept beside a cached basis.
+
+Reading a thousand planes takes many seconds, and a painter needs few numbers of them for its first
+picture and its first strokes: the present look, the power of each light, and averages.
+"""
+
+import hashlib
+import zipfile
+from collections.abc import Mapping
+from contextlib import suppress
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+
+from lightpaint.basis.basis import Basis
+from lightpaint.basis.cache import cache
+from lightpaint.basis.file.basis_file import DeferredFile
+from lightpaint.basis.plane_results import known_arrays, set_known_arrays
+from lightpaint.errors import LightpaintError
+from lightpaint.files import replacing
+from lightpaint.images.formats import RowsUnsupportedError
+
+FORMAT, CONTENT = "lightpaint-opening 1", "opening_of"
+
+#: Prefixes of names of arrays that follow from images, and from noise.
+PREFIXES = "images ", "noise "
+
+#: Exceptions raised by a truncated or foreign file.
+_READ_ERRORS = (*(OSError, EOFError, LookupError, ValueError), zipfile.BadZipFile)
+
+Arrays = Mapping[str, npt.NDArray[Any]]
+
+
+def find_opening(
+    scene_identity: str, sensor: str, seed: int, size: tuple[int, int]
+) -> Basis | None:
+    """Return the cached basis for these arguments as `open_kept` does."""
+    path = cache.path_for(scene_identity, sensor, seed, size)
+    return open_kept(path) if cache.is_own(path) else None
+
+
+def open_kept(path: Path) -> Basis | None:
+    """Return the basis of a file, whose planes are read at the first walk over them.
+
+    None if the walks with which a session begins are not known: all planes are needed then.
+    """
+    with suppress(RowsUnsupportedError, OSError, LightpaintError):
+        file = DeferredFile(path)
+        basis = file.basis()
+        arrays = _read(cache.companion_path(basis, cache.OPENING_SUFFIX), file.content)
+        if arrays is None:
+            return None
+        for prefix, planes in zip(PREFIXES, (basis.planes, basis.noise), strict=True):
+            names = [name for name in arrays if name.startswith(prefix)]
+            set_known_arrays(planes, {name.removeprefix(prefix): arrays[name] for name in names})
+        return basis
+    return None
+
+
+def keep_opening(basis: Basis) -> bool:
+    """Keep the results of walks that a session of `basis` began with. Returns whether that worked.
+
+    Nothing is kept of a basis of few lights, which is read quickly, or without a file.
+    """
+    arrays = {
+        prefix + name: array
+        for prefix, planes in zip(PREFIXES, (basis.planes, basis.noise), strict=True)
+        for name, array in known_arrays(planes).items()
+    }
+    try:
+        content = DeferredFile(cache.file_of(basis) or Path(basis.source)).content
+        path = cache.companion_path(basis, cache.OPENING_SUFFIX)
+        if (kept := _read(path, content)) is not None and kept.keys() >= arrays.keys():
+            return True
+        with replacing(path) as place, place.open("wb") as file:
+            kept_arrays: dict[str, Any] = {CONTENT: np.array(_digest(content)), **arrays}
+            np.savez(file, **kept_arrays)
+    except (RowsUnsupportedError, OSError, LightpaintError):
+        return False
+    return True
+
+
+def _read(path: Path, content: str) -> Arrays | None:
+    with suppress(*_READ_ERRORS, LightpaintError):
+        if not cache.is_own(path):
+            return None
+        with path.open("rb") as file, np.load(file, allow_pickle=False) as arrays:
+            if str(arrays[CONTENT]) == _digest(content):
+                path.touch()
+                return {name: arrays[name] for name in arrays.files if name != CONTENT}
+    return None
+
+
+def _digest(content: str) -> str:
+    return f"{FORMAT} {hashlib.sha256(content.encode()).hexdigest()}"
