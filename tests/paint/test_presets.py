@@ -1,6 +1,7 @@
 """Presets are layers that fit any scene: they ask for what they say, in one step."""
 
 from dataclasses import replace
+from itertools import combinations
 from typing import Any
 
 import numpy as np
@@ -9,7 +10,7 @@ from layered_sessions import RandomEditor
 
 import lightpaint as lp
 from lightpaint.basis.lights import Lights
-from lightpaint.colour.color import kelvin_to_rgb, luminance
+from lightpaint.colour.color import delta_e, kelvin_to_rgb, luminance
 from lightpaint.errors import PaintError
 from lightpaint.images.denoiser import Features
 from lightpaint.images.object_map import Objects
@@ -130,6 +131,45 @@ def test_a_white_is_asked_for_whatever_colour_the_lamps_have_now(make_basis: Any
     session.handle(protocol.ApplyPreset("overcast"), {})
     corner = session.views[0].image[-1, -1]
     np.testing.assert_allclose(corner / luminance(corner), kelvin_to_rgb(7000), rtol=0.02)
+
+
+def test_presets_of_a_subject_cannot_be_taken_for_each_other(make_basis: Any) -> None:
+    """By mean ΔE of what they ask of a white room, as many times what is just noticeable."""
+    names = "gallery", "shop_window", "three_point", "only_object"
+    sessions = {name: session_in(room(make_basis)) for name in names}
+    for name, session in sessions.items():
+        session.handle(protocol.ApplyPreset(name), {})
+    for a, b in combinations(names, 2):
+        different = delta_e(sessions[a].views[0].image, sessions[b].views[0].image).mean()
+        assert different > 17, (a, b)
+
+
+def test_ratio_and_colour_of_presets_of_a_subject(make_basis: Any) -> None:
+    """Of the vase to the corner at the right, which the spot on it does not light."""
+
+    def asked(name: str) -> tuple[float, list[float]]:
+        """The ratio in stops, and the stops by which red gains on blue."""
+        session = session_in(room(make_basis))
+        session.handle(protocol.ApplyPreset(name), {})
+        view = session.views[0]
+        vase, corner = view.image[19, 32], view.image[-1, -1]
+        ratio = float(np.log2(luminance(vase) / luminance(corner)))
+        # The lamps are white.
+        return ratio, [float(np.log2(x[0] / x[2])) for x in (vase, corner)]
+
+    ratio, warmth = asked("gallery")  # readable walls, white light
+    assert 1 < ratio < 4
+    assert np.abs(warmth).max() < 0.5
+    ratio, warmth = asked("shop_window")  # white on amber
+    assert ratio > 2
+    assert warmth[1] > warmth[0] + 2
+    ratio, warmth = asked("three_point")  # a warm key, a cool fill by the sky
+    assert ratio > 2
+    assert warmth[0] > 1
+    assert warmth[1] < -0.5
+    ratio, warmth = asked("only_object")  # black around light of the lamps' own colours
+    assert ratio > 6
+    assert np.abs(warmth).max() < 0.01
 
 
 def test_noir_leaves_a_pool_of_light_and_darkness(make_basis: Any) -> None:

@@ -15,6 +15,7 @@ from lightpaint.cli.commands.paint_command import options_of
 from lightpaint.cli.options.job_options import constraints_of
 from lightpaint.cli.options.parser import command_parser
 from lightpaint.paint import protocol
+from lightpaint.paint.layers.layer_stack import Layer
 from lightpaint.paint.store.session_requests import DEFAULT_NEAR, SessionRequests
 
 SIZE = (18, 32)
@@ -141,3 +142,71 @@ def test_it_lies_there_again_when_the_session_opens(client: StudioClient, tmp_pa
     assert reopened.paint(2, 0.7).kind == "answer"  # the pictures are known
     reopened.studio.close()
     reopened.studio.wait()
+
+
+def adjust(client: StudioClient, number: int, gain: float) -> None:
+    """Make the whole picture brighter, in a new layer."""
+    layer = Layer(number, "adjust", f"layer {number}", gain=gain)
+    whole = 0, SIZE[0], 0, SIZE[1]
+    request = protocol.Paint(number, whole, True, layer=number, properties=layer)
+    client.studio.handle(request, {"importance": np.ones(SIZE, np.float32)})
+
+
+def visible(client: StudioClient) -> dict[int, bool]:
+    return {x.id: x.is_visible for x in client.studio.session.views.layers}
+
+
+def test_adjustments_are_not_applied_twice(client: StudioClient) -> None:
+    """The lamps that answer them are the start; a new one changes these lamps."""
+    session = client.studio.session
+    adjust(client, 1, 0.5)
+    client.exact()
+    weights = session.weights.copy()
+    np.testing.assert_allclose(weights, 0.25, rtol=0.1)  # light beyond white counts less
+    client.studio.handle(protocol.StartFromLamps(), {})
+    assert visible(client) == {0: True, 1: False}
+    client.exact()
+    np.testing.assert_allclose(session.weights, weights, rtol=1e-6)
+    adjust(client, 2, 0.5)
+    client.exact()
+    # As near the start as `near` holds it.
+    assert 0.45 < session.weights.mean() / weights.mean() < 0.65
+    client.studio.handle(protocol.StartFromLamps(is_on=False), {})
+    assert visible(client) == {0: True, 1: True, 2: True}
+    client.studio.handle(protocol.Undo(), {})
+    client.studio.handle(protocol.Undo(), {})
+    client.studio.handle(protocol.Undo(), {})
+    assert visible(client) == {0: True, 1: True}
+    assert not session.requests.start
+
+
+def test_an_adjustment_of_paint_stays_on_this_paint(client: StudioClient) -> None:
+    session = client.studio.session
+    client.paint(1, 0.8, (0, 6, 0, SIZE[1]))
+    adjust(client, 2, 0.5)
+    client.exact()
+    view = session.views[0]
+    painted = view.image[:6].copy()
+    client.studio.handle(protocol.StartFromLamps(), {})
+    np.testing.assert_allclose(view.image[:6], painted, rtol=1e-6)
+    assert (view.importance[:6] > 0).all()
+    assert not view.importance[6:].any()
+    [hidden, copy] = session.requests.spent[0]
+    assert (hidden, visible(client)[2]) == (2, False)
+    assert copy is not None
+    assert visible(client)[copy]
+    client.studio.handle(protocol.StartFromLamps(is_on=False), {})
+    assert visible(client) == {0: True, 2: True}
+
+
+def test_a_group_of_adjustments_is_hidden_as_one(client: StudioClient) -> None:
+    studio = client.studio
+    studio.handle(protocol.ApplyPreset("moonlight"), {})
+    before = visible(client)
+    [group] = [x.id for x in studio.session.views.layers if x.kind == "group"]
+    client.exact()
+    studio.handle(protocol.StartFromLamps(), {})
+    assert visible(client) == {**before, group: False}
+    assert studio.session.requests.spent == ((group, None),)
+    studio.handle(protocol.Undo(), {})
+    assert visible(client) == before

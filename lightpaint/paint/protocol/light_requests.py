@@ -52,8 +52,9 @@ class SetMaster(Request, kind="set_master"):
 @dataclass(frozen=True)
 class StartFromLamps(Request, kind="start_from_lamps"):
     """The lights as they are now become the lighting that the solve starts from and stays near, and
-    locked ones are released; or this ends. One step. Answered by `answer`. The setting `near` says
-    how near.
+    locked ones are released; or this ends. Adjustments that they answer are hidden meanwhile. One
+    step. Answered by the whole `state`, with another look under the painting. The setting `near`
+    says how near.
 
     is_on: false to end it.
     """

@@ -25,6 +25,7 @@ from lightpaint.paint import protocol
 from lightpaint.paint.layers.canvases import LayeredPaintings
 from lightpaint.paint.layers.layer_pixels import selection_patch
 from lightpaint.paint.layers.layer_stack import PAINTING_ID, LayerStack
+from lightpaint.paint.layers.spent_adjustments import SpentAdjustments, without_copies
 from lightpaint.paint.protocol import AnswerUpdate, Message
 from lightpaint.paint.references.likeness import open_request
 from lightpaint.paint.references.reference_table import ReferenceTable
@@ -216,6 +217,8 @@ class Session:
                 return self._patch_messages(self._drop_stroke())
         if isinstance(message, Travel):
             return self._travel(message)
+        if isinstance(message, protocol.StartFromLamps):
+            return self._start_from_lamps(message)
         if isinstance(message, RequestChange):
             return [self._change_requests(message)]
         raise PaintError(f"a session has no answer to {type(message).__name__}")
@@ -358,6 +361,23 @@ class Session:
             return self._append_requests(label, requests)
         self._move_slider(requests)
         return self.answer_update(**({"poses": dict(requests.poses)} if is_move else {}))
+
+    def _start_from_lamps(self, message: protocol.StartFromLamps) -> list[Message]:
+        """Start from the lamps as they are, which answer all adjustments, or from the scene again,
+        over which these apply: one step.
+        """
+        earlier = dict(self.requests.spent)
+        lights = self.basis.lights
+        label, requests = changed_requests(self.requests, lights, message, self.weights)
+        self.live_answer.check(requests)
+        self.history.close_stroke("stroke")
+        spent = SpentAdjustments(without_copies(self.views.layers, earlier))
+        if message.is_on:
+            spent = SpentAdjustments.of(self.views)
+            requests = replace(requests, spent=(*earlier.items(), *spent.copies.items()))
+        changes = self.history.replace_all(spent.layers, spent.patches, requests, label)
+        self._update_answer()
+        return self._patch_messages(changes)
 
     def hang_lights(self, label: str, placed: Placed) -> list[Message]:
         """Move lights and add others, by name: one step. Raises LightpaintError if refused.

@@ -59,6 +59,7 @@ class SessionRequests:
     kept: names of the lights that are locked only since they were moved.
     start: emissions by name of light, set by hand, that the solve starts from; none for the
     emissions of the scene.
+    spent: adjustments that are hidden since then, each with the id of its copy, or null.
     """
 
     lights: Mapping[str, Mapping[str, Any]] = field(default_factory=dict)
@@ -70,6 +71,7 @@ class SessionRequests:
     earlier: Mapping[str, Mapping[str, Any]] = field(default_factory=dict)
     kept: tuple[str, ...] = ()
     start: Mapping[str, Sequence[float]] = field(default_factory=dict)
+    spent: tuple[tuple[int, int | None], ...] = ()
 
     @classmethod
     def of(cls, data: Mapping[str, Any]) -> "SessionRequests":
@@ -81,7 +83,9 @@ class SessionRequests:
         earlier = {name: dict(entry) for name, entry in data.get("earlier", {}).items()}
         kept = tuple(data.get("kept", ()))
         start = {name: tuple(emission) for name, emission in data.get("start", {}).items()}
-        requests = cls(lights, ties, values, poses, added, earlier=earlier, kept=kept, start=start)
+        spent = tuple((number, copy) for number, copy in data.get("spent", ()))
+        requests = cls(lights, ties, values, poses, added, earlier=earlier, kept=kept)
+        requests = replace(requests, start=start, spent=spent)
         return requests.with_master(data.get("master", 1.0))
 
     def as_json(self) -> dict[str, Any]:
@@ -99,6 +103,7 @@ class SessionRequests:
             **({"earlier": {k: dict(v) for k, v in self.earlier.items()}} if self.earlier else {}),
             **({"kept": list(self.kept)} if self.kept else {}),
             **({"start": {k: list(v) for k, v in self.start.items()}} if self.start else {}),
+            **({"spent": [list(x) for x in self.spent]} if self.spent else {}),
         }
 
     @property
@@ -153,7 +158,7 @@ class SessionRequests:
             released = released.with_light(name, self.earlier.get(name, {}))
         values = {key: value for key, value in self.values.items() if start or key != "near"}
         emissions = {name: tuple(emission) for name, emission in start.items()}
-        return replace(released, start=emissions, values=values)
+        return replace(released, start=emissions, values=values, spent=())
 
     def holds(self, name: str) -> bool:
         """Return whether a light is held at a level, by itself or with others on its dimmer."""

@@ -27,7 +27,7 @@ export function StartLamps({ ui, app }) {
     return (
       lockedLights(ui).length > 0 &&
       html`<div class="start-lamps"><${Button} label=${t('Start from my lamps')} class="wide"
-        tip=${t('The lamps as they are now become the start: the solve improves them and stays near. Locked ones are released. Layers that make brighter or warmer then change the light of these lamps')}
+        tip=${t('The lamps as they are now become the start: the solve improves them and stays near. Locked ones are released, and adjustments that they answer are hidden')}
         act=${() => session.send('start_from_lamps', { is_on: true })} /></div>`
     );
   const percent = CURVE.toPosition(ui.settings.near ?? DEFAULT);
