@@ -8,7 +8,7 @@ with the luminance-weighted mean Y is
 
 and a flux of Φ watts is u Y(Φ) lm. Without u the numbers are only relative, and have no units.
 
-The flux of a fixture by its beam and field angles is that of the closest cone of Mitsuba's spot.
+A fixture with given beam and field angles has the flux of the closest cone of Mitsuba's spot.
 """
 
 import math

@@ -4,7 +4,8 @@ A literal fit in linear light needs nothing of a basis but M, b and norms. Sums 
 picture add, so that each machine can sum its part of the basis and send no image.
 """
 
-from collections.abc import Mapping
+from abc import ABC, abstractmethod
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import TYPE_CHECKING, Self
@@ -23,19 +24,86 @@ from lightpaint.lighting.constraints.light_constraints import (
     WhiteLimits,
     keep_own_colors,
     own_color_labels,
+    painted_whites,
     start_weights,
     whiten_open_lights,
 )
 from lightpaint.lighting.fit import Fit, resolve_fit, resolve_for_targets
-from lightpaint.lighting.loss.expected_lights import ExpectedLights
+from lightpaint.lighting.loss.expected_lights import ExpectedLights, Wash
 from lightpaint.lighting.loss.painting import ignored_paint
 from lightpaint.lighting.loss.weight_penalty import PaintTerms, joint_pull
 from lightpaint.lighting.normal_equations import NormalEquations
-from lightpaint.lighting.unknowns.gamuts import Gamuts
+from lightpaint.lighting.unknowns.gamuts import Gamuts, PaintedLight
+from lightpaint.lighting.unknowns.lamps_in_view import GlowPaint, LampsInView
 from lightpaint.lighting.unknowns.reduction import Reduction, reduce_to
 from lightpaint.lighting.unknowns.slot_search import improve_slots
 from lightpaint.sentences import Hint, Word
 from lightpaint.target import Target, titled
+
+
+class PaintReading(ABC):
+    """The demands of paintings on lights, beside their squares: expected lights, gamuts and terms.
+
+    bases: of the views. power: (n, 3), ‖Φᵢ‖² of all views together. own: (n, 3), weights with the
+    colours that lights have. fit: with nothing left open. is_sketch: as for `Fit.reads_wishes`.
+    """
+
+    def __init__(
+        self, bases: Sequence[Basis], power: Doubles, own: Doubles, fit: Fit, *, is_sketch: bool
+    ) -> None:
+        self.bases, self.power, self.own, self.fit = tuple(bases), power, own, fit
+        self.is_sketch = is_sketch
+
+    @abstractmethod
+    def wash(self) -> Wash:
+        """Return the paintings and their lights, averaged over blocks of pixels."""
+
+    @abstractmethod
+    def samples(self) -> PaintedLight:
+        """Return a sample of the painted pixels whose colour counts."""
+
+    @abstractmethod
+    def paintings(self) -> Sequence[GlowPaint]:
+        """Return the painting of each view."""
+
+    @abstractmethod
+    def amounts(self) -> tuple[float, float]:
+        """Return the importance of all pixels together, and the weight of each unpainted one."""
+
+    def terms(self) -> PaintTerms:
+        """Return what a sketch lets one expect, and its terms of the loss."""
+        if not self.fit.reads_wishes(is_sketch=self.is_sketch):
+            return PaintTerms(self.expected() if self.fit.colors == "white" else None)
+        importance, unpainted = self.amounts()
+        return PaintTerms.of(
+            self.wash(),
+            self.fit,
+            self.own,
+            importance=importance,
+            unpainted=unpainted,
+            texels=texel_lights(self.bases[0].lights),
+        )
+
+    def expected(self) -> ExpectedLights | None:
+        """Return the lights that paintings let one expect; None if the fit leaves colours free."""
+        if self.fit.colors not in ("gentle", "white"):
+            return None
+        return ExpectedLights.of(self.wash(), self.own)
+
+    def gamuts(self, around: Callable[[], Doubles] | None) -> Gamuts | None:
+        """Return the colours that each light may take; None if the fit does not limit them.
+
+        around: as in `LampsInView`, while lights keep to what a sketch lets one expect.
+        """
+        if not self.fit.keeps_to_hues(is_sketch=self.is_sketch):
+            return None
+        is_bold, in_view = self.fit.colors == "free", None
+        if around is not None and not is_bold:
+            in_view = LampsInView.of(self.bases, self.own, self.paintings, around)
+        is_texel = texel_lights(self.bases[0].lights)
+        return Gamuts(
+            self.samples, self.power, self.own, is_texel, is_bold=is_bold, in_view=in_view
+        )
 
 
 class LinearProblem:
@@ -243,6 +311,13 @@ class SummedProblem(LinearProblem):
         return weights
 
 
+def whites_for(expected: ExpectedLights | None, fit: Fit) -> WhiteLimits | None:
+    """Return the ranges of lights that are to be white; None for others."""
+    if fit.colors != "white" or expected is None:
+        return None
+    return painted_whites(expected.painted)
+
+
 def reduce_lights(
     constraints: Constraints,
     lights: Lights,
@@ -252,7 +327,7 @@ def reduce_lights(
 ) -> Reduction:
     """Reduce the lights to the unknowns that constraints and the options for colours leave.
 
-    gamuts: see `gamuts_for`. whites: see `whiten_open_lights`. Raises ConstraintError for a light
+    gamuts: see `PaintReading`. whites: see `whiten_open_lights`. Raises ConstraintError for a light
     whose constraints exclude white.
     """
     if fit.colors == "white":

@@ -11,7 +11,7 @@ import numpy as np
 import numpy.typing as npt
 
 from lightpaint.arrays import Bools, Doubles, Floats
-from lightpaint.basis import Basis, Lights, texel_lights
+from lightpaint.basis import Basis, Lights
 from lightpaint.colour import ViewTransform, choose_exposure, decode_display
 from lightpaint.display_text import short_repr
 from lightpaint.errors import BasisError, ConstraintError, TargetError
@@ -20,14 +20,17 @@ from lightpaint.lighting.constraints.absolute_scale import with_scale
 from lightpaint.lighting.constraints.constraint_table import Constraints
 from lightpaint.lighting.constraints.constraints_file import constraints_of
 from lightpaint.lighting.constraints.light_constraints import (
-    WhiteLimits,
     held_at_start,
-    painted_whites,
     start_weights,
 )
 from lightpaint.lighting.fit import Fit, Space, resolve_for_targets
 from lightpaint.lighting.joined_views import Views, joint_basis
-from lightpaint.lighting.linear_problem import LinearProblem, reduce_lights
+from lightpaint.lighting.linear_problem import (
+    LinearProblem,
+    PaintReading,
+    reduce_lights,
+    whites_for,
+)
 from lightpaint.lighting.loss.expected_lights import ExpectedLights, Wash
 from lightpaint.lighting.loss.lit_pixels import LitPixels
 from lightpaint.lighting.loss.loss import Loss, Squares
@@ -40,10 +43,9 @@ from lightpaint.lighting.loss.painting import (
     target_light,
     unpainted_weight_of,
 )
-from lightpaint.lighting.loss.weight_penalty import PaintTerms
 from lightpaint.lighting.normal_equations import NormalEquations
-from lightpaint.lighting.unknowns.gamuts import Gamuts, PaintedLight
-from lightpaint.lighting.unknowns.lamps_in_view import LampsInView
+from lightpaint.lighting.unknowns.gamuts import PaintedLight
+from lightpaint.lighting.unknowns.lamps_in_view import GlowPaint
 from lightpaint.lighting.unknowns.reduction import Reduction
 from lightpaint.lighting.unknowns.white_mixes import tangent_reduction
 from lightpaint.target import Target
@@ -209,9 +211,10 @@ class Problem(LinearProblem):
             current=lambda: whole.current_look,
         )
         reference = start_weights(all_constraints.start, whole.lights)
-        painted = wash_fields(views, fit, reference)
-        gamuts = gamuts_for(whole, views, fit, reference, painted["expected"])
-        whites = whites_for(painted["expected"], fit)
+        reading = ViewsReading(views, whole.power, reference, fit)
+        terms = reading.terms()
+        gamuts = reading.gamuts(around_of(terms.expected))
+        whites = whites_for(terms.expected, fit)
         reduction = reduce_lights(all_constraints, whole.lights, fit, gamuts, whites)
         return cls(
             basis=whole,
@@ -224,7 +227,7 @@ class Problem(LinearProblem):
             full=reduction,
             start=reference if start is None else start,
             fit=fit,
-            **painted,
+            **vars(terms),
         )
 
     @property
@@ -347,91 +350,60 @@ def _resolve_views(
     return Views(bases, tuple(resolved)), fit
 
 
+class ViewsReading(PaintReading):
+    """The demands of the paintings of views on their lights.
+
+    power, own, fit: as in `PaintReading`. wash: returns the wash of the views, by default a new
+    one.
+    """
+
+    def __init__(
+        self,
+        views: Views,
+        power: Doubles,
+        own: Doubles,
+        fit: Fit,
+        wash: Callable[[], Wash] | None = None,
+    ) -> None:
+        super().__init__(views.bases, power, own, fit, is_sketch=are_sketches(views))
+        self._views, self._wash = views, partial(wash_of, views) if wash is None else wash
+
+    def wash(self) -> Wash:
+        """Return the paintings and their lights, averaged over blocks of pixels."""
+        return self._wash()
+
+    def samples(self) -> PaintedLight:
+        """Return a sample of the painted pixels whose colour counts."""
+        return PaintedLight.of(
+            [
+                (basis, target.image, _color_importance(target))
+                for basis, target in zip(self._views.bases, self._views.targets, strict=True)
+            ]
+        )
+
+    def paintings(self) -> Sequence[GlowPaint]:
+        """Return the painting of each view."""
+        return [(x.image, x.importance, x.at_least) for x in self._views.targets]
+
+    def amounts(self) -> tuple[float, float]:
+        """Return the importance of all pixels together, and the weight of each unpainted one."""
+        importance = sum(float(x.importance.sum(dtype=np.float64)) for x in self._views.targets)
+        return importance, unpainted_weight_of(self._views, self.fit)
+
+
 def wash_of(views: Views) -> Wash:
     """Return the paintings of views and their lights, averaged over blocks of pixels."""
     return Wash.joined([Wash.of(*view) for view in zip(views.bases, views.targets, strict=True)])
 
 
-def expected_for(
-    views: Views, fit: Fit, own: Doubles, wash: Callable[[], Wash] | None = None
-) -> ExpectedLights | None:
-    """Return the lights that paintings let one expect; None if `fit` leaves colours free.
-
-    own: (n, 3), weights with the colours that lights have. wash: returns the wash of the views, by
-    default a new one.
-    """
-    if fit.colors not in ("gentle", "white"):
-        return None
-    return ExpectedLights.of(wash_of(views) if wash is None else wash(), own)
-
-
-def whites_for(expected: ExpectedLights | None, fit: Fit) -> WhiteLimits | None:
-    """Return the ranges of lights that are to be white; None for others."""
-    if fit.colors != "white" or expected is None:
-        return None
-    return painted_whites(expected.painted)
-
-
-def wash_fields(
-    views: Views, fit: Fit, own: Doubles, wash: Callable[[], Wash] | None = None
-) -> dict[str, Any]:
-    """Return what a sketch lets one expect, and its terms of the loss, as fields of a problem.
-
-    Arguments are as in `expected_for`.
-    """
-    none = vars(PaintTerms())
-    reads_wishes = fit.reads_wishes(is_sketch=are_sketches(views))
-    if not (reads_wishes or fit.colors == "white"):
-        return none
-    if not reads_wishes:
-        return {**none, "expected": expected_for(views, fit, own, wash)}
-    known = wash_of(views) if wash is None else wash()
-    return vars(terms_of_wash(known, views, fit, own))
-
-
-def terms_of_wash(wash: Wash, views: Views, fit: Fit, own: Doubles) -> PaintTerms:
-    """Return what a sketch with this wash lets one expect, and its terms of the loss.
-
-    own: (n, 3), weights with the colours that lights have.
-    """
-    importance = sum(float(x.importance.sum(dtype=np.float64)) for x in views.targets)
-    unpainted = unpainted_weight_of(views, fit)
-    texels = texel_lights(views.bases[0].lights)
-    return PaintTerms.of(wash, fit, own, importance=importance, unpainted=unpainted, texels=texels)
+def around_of(expected: ExpectedLights | None) -> Callable[[], Doubles] | None:
+    """Return the `around` of `PaintReading.gamuts`: what returns the painted light, (n, 3)."""
+    return None if expected is None else lambda: expected.painted
 
 
 def are_sketches(views: Views) -> bool:
     """Return whether any view was painted over the current look, or as a display shows it."""
     return any(target.over_look or target.through_view for target in views.targets)
-
-
-def gamuts_for(
-    basis: Basis,
-    views: Views,
-    fit: Fit,
-    own: Doubles | None = None,
-    expected: ExpectedLights | None = None,
-) -> Gamuts | None:
-    """Return the colours that each light may take; None if `fit` does not limit them.
-
-    own: (n, 3), weights with the colours that lights have, by default the current ones. expected:
-    the lights that the paintings let one expect, where lights keep to them.
-    """
-    if not fit.keeps_to_hues(is_sketch=are_sketches(views)):
-        return None
-    views_of_paint = [
-        (view_basis, target.image, _color_importance(target))
-        for view_basis, target in zip(views.bases, views.targets, strict=True)
-    ]
-    painted = partial(PaintedLight.of, views_of_paint)
-    own = basis.current_weights if own is None else own
-    is_texel, is_bold = texel_lights(basis.lights), fit.colors == "free"
-    in_view = None
-    if expected is not None and not is_bold:
-        around = expected.painted
-        paintings = [(x.image, x.importance, x.at_least) for x in views.targets]
-        in_view = LampsInView.of(views.bases, own, lambda: paintings, lambda: around)
-    return Gamuts(painted, basis.power, own, is_texel, is_bold=is_bold, in_view=in_view)
 
 
 def _color_importance(target: Target) -> Floats:

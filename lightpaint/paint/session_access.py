@@ -224,7 +224,7 @@ class Publisher:
 
 
 class StudioLinks(NamedTuple):
-    """What the parts of a studio work with.
+    """The session, pages and threads that the parts of a studio work with.
 
     access: the session. publisher: sends messages and pictures to pages. threads: run background
     work.

@@ -10,8 +10,8 @@ from scipy.optimize import minimize
 import lightpaint as lp
 from lightpaint.colour.color import LUMINANCE, cct_and_duv, kelvin_to_rgb
 from lightpaint.errors import TargetError
-from lightpaint.lighting import problem
 from lightpaint.lighting.fit import DEFAULT_HOLD, Fit, resolve_for_targets
+from lightpaint.lighting.linear_problem import PaintReading
 from lightpaint.lighting.loss import weight_penalty
 from lightpaint.lighting.loss.painting import unpainted_weight_of
 from lightpaint.lighting.loss.weight_penalty import CLEAR_PULL, COLOR_PULL, MAX_DIMMING
@@ -105,7 +105,7 @@ def test_colors_are_pulled_as_the_formula_says(make_basis: Any, monkeypatch: pyt
     The pull to each light grows with how dim it is expected to be, and falls with how clearly other
     colours are painted where it shines.
     """
-    monkeypatch.setattr(problem, "gamuts_for", lambda *_: None)
+    monkeypatch.setattr(PaintReading, "gamuts", lambda *_: None)
     for name in ("CONTRAST", "EXACT_CONTRAST", "EXACT_REST"):
         monkeypatch.setattr(weight_penalty, name, 0.0)
     basis = _basis(make_basis)

@@ -29,8 +29,8 @@ from lightpaint.lighting.analysis.appearance.color_choices import (
 from lightpaint.lighting.analysis.diagnosis import Diagnosis, diagnose
 from lightpaint.lighting.analysis.noise.uncertainty import Uncertainty, error_bars, with_error_bars
 from lightpaint.lighting.constraints.constraint_table import Constraints
-from lightpaint.lighting.linear_problem import reduce_lights
-from lightpaint.lighting.problem import gamuts_for, whites_for
+from lightpaint.lighting.linear_problem import reduce_lights, whites_for
+from lightpaint.lighting.problem import ViewsReading, around_of
 from lightpaint.lighting.solution import Solution
 from lightpaint.lighting.solver import solution_of
 from lightpaint.progress import stage
@@ -302,7 +302,9 @@ def without_constraints(solution: Solution) -> Solution | None:
     problem = solution.problem
     if not problem.constraints or solution.whole is not None:
         return None
-    gamuts = gamuts_for(problem.basis, problem.views, problem.fit, expected=problem.expected)
+    own = problem.basis.current_weights
+    reading = ViewsReading(problem.views, problem.power, own, problem.fit)
+    gamuts = reading.gamuts(around_of(problem.expected))
     whites = whites_for(problem.expected, problem.fit)
     free = reduce_lights(Constraints(), problem.lights, problem.fit, gamuts, whites)
     anew = replace(

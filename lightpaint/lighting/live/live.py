@@ -14,34 +14,38 @@ Only painted views count. Each has its own sums, so that a stroke costs no more 
 view.
 """
 
-from collections.abc import Mapping, Sequence
-from dataclasses import replace
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, replace
 from functools import partial, reduce
 from operator import add
 
 import numpy as np
 
-from lightpaint.arrays import RGB, Doubles
-from lightpaint.basis import Basis, texel_lights
+from lightpaint.arrays import RGB, Bools, Doubles
+from lightpaint.basis import Basis, Lights, texel_lights
 from lightpaint.colour import Lamp
 from lightpaint.lighting.constraints.constraint_table import Constraints
 from lightpaint.lighting.constraints.light_constraints import (
     WhiteLimits,
-    painted_whites,
     start_weights,
 )
 from lightpaint.lighting.fit import Fit, Space
-from lightpaint.lighting.linear_problem import reduce_lights
+from lightpaint.lighting.linear_problem import (
+    LinearProblem,
+    PaintReading,
+    reduce_lights,
+    whites_for,
+)
 from lightpaint.lighting.live.live_sums import MAX_FILM_PIXELS, Films, SmallFilm
 from lightpaint.lighting.live.live_view import LiveView
 from lightpaint.lighting.live.many_lights import MANY_LIGHTS, MAX_FILM_VALUES, ManyLights
 from lightpaint.lighting.loss.expected_lights import ExpectedLights, Wash
 from lightpaint.lighting.loss.lit_pixels import block_side
 from lightpaint.lighting.loss.painting import unpainted_weight
-from lightpaint.lighting.loss.weight_penalty import PaintTerms, joint_pull, pull_to_current
+from lightpaint.lighting.loss.weight_penalty import PaintTerms, pull_to_current
 from lightpaint.lighting.normal_equations import NormalEquations
-from lightpaint.lighting.unknowns.gamuts import Gamuts, PaintedLight
-from lightpaint.lighting.unknowns.lamps_in_view import LampsInView
+from lightpaint.lighting.unknowns.gamuts import PaintedLight
+from lightpaint.lighting.unknowns.lamps_in_view import GlowPaint
 from lightpaint.lighting.unknowns.reduced_problem import nearest_weights, solve_reduced
 from lightpaint.lighting.unknowns.reduction import Reduction
 from lightpaint.lighting.unknowns.white_mixes import (
@@ -67,6 +71,98 @@ ROUND_OFF = 1e-12
 GAMUT_BLOCKS, GAMUT_WISH_BLOCKS = 2**8, 2**5
 
 
+@dataclass(frozen=True, kw_only=True)
+class LiveProblem(LinearProblem):
+    """The linear problem of live views, whose squares follow the brush.
+
+    lights, power, painted_share: see `LinearProblem`. reference: (n, 3), the lights to start from.
+    """
+
+    lights: Lights
+    power: Doubles
+    reference: Doubles
+    constraints: Constraints
+    reduction: Reduction
+    full: Reduction
+    fit: Fit
+    painted_share: float = 0.0
+    expected: ExpectedLights | None = None
+    contrast: NormalEquations | None = None
+    restraint: NormalEquations | None = None
+    tether: NormalEquations | None = None
+
+    @property
+    def keeps_color(self) -> Bools:
+        """(n,), the lights with a pull to their colour, as far as the pictures of all show."""
+        return self.full.is_free & self.power.any(axis=1) & ~texel_lights(self.lights)
+
+
+class LiveReading(PaintReading):
+    """The demands of live views on their lights, read anew as they are painted.
+
+    films: of the views, together. problem: has lights, reference and fit.
+    """
+
+    def __init__(
+        self, views: tuple[LiveView, ...], films: Films, problem: LiveProblem, *, is_sketch: bool
+    ) -> None:
+        bases = [view.basis for view in views]
+        own, fit = problem.reference, problem.fit
+        super().__init__(bases, _power(views), own, fit, is_sketch=is_sketch)
+        self.views, self._films, self._unpainted = views, films, 0.0
+        self._washed: Wash | None = None
+        self._expected: ExpectedLights | None = None
+
+    def read(self, unpainted: float) -> PaintTerms:
+        """Read the present paintings. unpainted: the weight of each unpainted pixel."""
+        self._washed, self._unpainted = None, unpainted
+        terms = self.terms()
+        self._expected = terms.expected
+        return terms
+
+    @property
+    def importance(self) -> float:
+        """The total importance of the paint of all views."""
+        return sum(float(view.counts[0]) for view in self.views)
+
+    def amounts(self) -> tuple[float, float]:
+        """Return the importance of all pixels together, and the weight of each unpainted one."""
+        return self.importance, self._unpainted
+
+    def wash(self) -> Wash:
+        """Return the paintings and their lights, averaged over the films; once for a reading."""
+        if self._washed is None:
+            layers = [view.layers for view in self.views]
+            self._washed = self._films.wash(layers, is_sketch=self.is_sketch)
+        return self._washed
+
+    def samples(self) -> PaintedLight:
+        """Return a sample of the painted blocks, small wishes as well as what is around them, but
+        for those that mean "at least": their colour is where a range ended.
+        """
+        wash, films = self.wash(), self._films
+        counted = replace(wash, importance=np.where(films.has_mark, 0, wash.importance))
+        blocks, weight = counted.sample(GAMUT_BLOCKS, GAMUT_WISH_BLOCKS)
+        return PaintedLight(
+            wash.rows[:, :, blocks].transpose(1, 2, 0),
+            wash.painted[:, blocks].T,
+            weight,
+            films.albedo[:, blocks].T,
+        )
+
+    def paintings(self) -> Sequence[GlowPaint]:
+        """Return the painting of each view."""
+        return [view.paint for view in self.views]
+
+    def around(self, expected: ExpectedLights | None) -> Callable[[], Doubles] | None:
+        """Return what gives the light of each lamp with the change that is painted now; None if
+        nothing is expected.
+        """
+        if expected is None:
+            return None
+        return lambda: self.own if self._expected is None else self._expected.painted
+
+
 class LiveSolver:
     """The lighting for paintings that change under a brush, updated in place.
 
@@ -88,21 +184,26 @@ class LiveSolver:
         self._basis = views[0].basis
         self._films: tuple[tuple[LiveView, ...], Films] | None = None
         self._start: Mapping[str, RGB] = {}
-        self._washed: Wash | None = None
-        self._pull: NormalEquations | None = None
-        self._expected: ExpectedLights | None = None
         self._last_read, self._answers_left = tuple[LiveView, ...](), 0
         self.constrain(fit, constraints)
 
     def constrain(self, fit: Fit, constraints: Constraints) -> None:
         """Change fit and constraints. Raises ConstraintError for impossible ones."""
         reduction = reduce_lights(constraints, self._basis.lights, fit)
-        self._reference = start_weights(constraints.start, self._basis.lights)
-        self._fit, self._constraints, self._reduction = fit, constraints, reduction
+        self._problem = LiveProblem(
+            lights=self._basis.lights,
+            power=self._basis.power,
+            reference=start_weights(constraints.start, self._basis.lights),
+            constraints=constraints,
+            reduction=reduction,
+            full=reduction,
+            fit=fit,
+        )
         self._whites: WhiteLimits | None = None
         self._untouched: Doubles | None = None
         self._mixed_emissions: Mapping[int, RGB] = {}
-        self._within, self._gamuts_of = reduction, tuple[LiveView, ...]()
+        self._within = reduction
+        self._reading: LiveReading | None = None
         self._answers_left = 0
         self._last_multipliers = LastMultipliers(close=MET_UNDER_BRUSH)
         self._is_kept_to = False  # whether the last answer kept to the constraints
@@ -119,7 +220,7 @@ class LiveSolver:
         Returns the first view's basis.
         """
         self._basis = self._views[0].basis
-        self._untouched, self._gamuts_of, self._answers_left = None, (), 0
+        self._untouched, self._reading, self._answers_left = None, None, 0
         self._many = ManyLights(len(self._basis.lights))
         if self._start:  # whose look has these planes, too
             self._films = None
@@ -132,14 +233,14 @@ class LiveSolver:
         for view in self._views:
             if self._has_tiles:
                 view.tiles()
-            reads_wash = self._fit.reads_wishes(is_sketch=self._is_sketch)
-            if not self._has_tiles or reads_wash or self._fit.colors == "white":
+            reads_wash = self._problem.fit.reads_wishes(is_sketch=self._is_sketch)
+            if not self._has_tiles or reads_wash or self._problem.fit.colors == "white":
                 self._film(view)
 
     @property
     def lamps(self) -> Mapping[int, Lamp]:
         """The lamps that mix lights from emitters, by the light's index."""
-        return {k: lamp.while_painting for k, lamp in self._reduction.lamps.items()}
+        return {k: lamp.while_painting for k, lamp in self._problem.reduction.lamps.items()}
 
     @property
     def mixed_emissions(self) -> Mapping[int, RGB]:
@@ -151,7 +252,7 @@ class LiveSolver:
     @property
     def mode(self) -> Space:
         """The space of the answers."""
-        return self._fit.space or "linear"
+        return self._problem.fit.space or "linear"
 
     @property
     def _are_many(self) -> bool:
@@ -184,10 +285,10 @@ class LiveSolver:
             return self._unpainted_answer()
         if not self._is_kept_to:
             # Weights that the constraints forbid may well be closer to the painting.
-            start = _nearest(start, views, self._reduction)
+            start = _nearest(start, views, self._problem.reduction)
             self._is_kept_to = True
         painted, rest = reduce(add, (view.counts for view in views))
-        unpainted = unpainted_weight(float(painted), float(rest), self._fit)
+        unpainted = unpainted_weight(float(painted), float(rest), self._problem.fit)
         if not (while_painting and self._answers_left and self._last_read == views):
             self._read_paint(views, unpainted)
         self._answers_left -= 1
@@ -216,7 +317,7 @@ class LiveSolver:
 
         unpainted: the weight of each unpainted pixel. while_moving: as for `answer`.
         """
-        reduction, pull = self._within, self._pull
+        reduction, pull = self._within, self._problem.pull
 
         def best(equations: NormalEquations, begin: Doubles) -> Doubles:
             return self._best(equations if pull is None else equations + pull, begin)
@@ -226,7 +327,7 @@ class LiveSolver:
         if self._has_tiles and not while_moving:
             return best(reduce(add, (x.tiles().equations(unpainted) for x in views)), starts[0])
         films = self._joint_films(views)
-        pixels = films.pixels(unpainted, self._fit.transform)
+        pixels = films.pixels(unpainted, self._problem.fit.transform)
         starts = allowed(starts[0]), *starts[1:]
         if self._are_many:
             self._within, weights = self._many.improve(
@@ -238,8 +339,9 @@ class LiveSolver:
     def _unpainted_answer(self) -> Doubles:
         """Return the answer without paint, (n, 3)."""
         if self._untouched is None:
-            at_slots = self._reduction.with_slots(self._reference)
-            self._untouched = _nearest(self._reference, self._views, at_slots)
+            reference = self._problem.reference
+            at_slots = self._problem.reduction.with_slots(reference)
+            self._untouched = _nearest(reference, self._views, at_slots)
         return self._untouched
 
     def _read_paint(self, views: tuple[LiveView, ...], unpainted: float) -> None:
@@ -247,76 +349,40 @@ class LiveSolver:
 
         unpainted: the weight of each unpainted pixel.
         """
-        self._washed = None
-        self._follow_whites(views)
-        terms = self._paint_terms(views, unpainted)
-        self._expected = terms.expected
-        self._follow_gamuts(views)
-        self._pull = self._weight_pull(views, terms)
+        reading, is_new = self._reading, False
+        if reading is None or reading.views != views:
+            films, is_new = self._joint_films(views), True
+            reading = LiveReading(views, films, self._problem, is_sketch=self._is_sketch)
+            self._reading = reading
+        terms = reading.read(unpainted)
+        self._problem = replace(
+            self._problem,
+            power=reading.power,
+            painted_share=reading.importance / sum(view.pixels for view in views),
+            **vars(terms),
+        )
+        self._follow_whites(whites_for(terms.expected, self._problem.fit))
+        # Lights that the last answer confined to their gamuts are confined from the start.
+        if self._within.gamuts is not None and not is_new:
+            self._within.gamuts.refresh()
+        elif (gamuts := reading.gamuts(reading.around(terms.expected))) is not None:
+            self._within = self._problem.reduction.with_gamuts(gamuts)
         self._last_read, self._answers_left = views, ANSWERS_PER_READING
 
-    def _follow_whites(self, views: tuple[LiveView, ...]) -> None:
+    def _follow_whites(self, whites: WhiteLimits | None) -> None:
         """Widen the ranges of lights that are to be white as far as whites are painted."""
-        if self._fit.colors != "white":
+        if whites in (None, self._whites):
             return
-        expected = ExpectedLights.of(self._wash(views), self._reference)
-        whites = painted_whites(expected.painted)
-        if whites != self._whites:
-            self._whites = whites
-            lights = self._basis.lights
-            self._reduction = reduce_lights(self._constraints, lights, self._fit, whites=whites)
-            self._within = self._reduction
-
-    def _wash(self, views: tuple[LiveView, ...]) -> Wash:
-        """Return the paintings and their lights, averaged over the films; once for a reading."""
-        if self._washed is None:
-            layers = [view.layers for view in views]
-            self._washed = self._joint_films(views).wash(layers, is_sketch=self._is_sketch)
-        return self._washed
-
-    def _painted_light(self, views: tuple[LiveView, ...]) -> PaintedLight:
-        """Sample the painted blocks, small wishes as well as what is around them, but for those
-        that mean "at least": their colour is where a range ended.
-        """
-        wash, films = self._wash(views), self._joint_films(views)
-        counted = replace(wash, importance=np.where(films.has_mark, 0, wash.importance))
-        blocks, weight = counted.sample(GAMUT_BLOCKS, GAMUT_WISH_BLOCKS)
-        return PaintedLight(
-            wash.rows[:, :, blocks].transpose(1, 2, 0),
-            wash.painted[:, blocks].T,
-            weight,
-            films.albedo[:, blocks].T,
-        )
-
-    def _follow_gamuts(self, views: tuple[LiveView, ...]) -> None:
-        """Limit the unknowns to the gamuts that the painted views allow.
-
-        Lights that the last answer confined to their gamuts are confined from the start.
-        """
-        if not self._fit.keeps_to_hues(is_sketch=self._is_sketch):
-            return
-        if self._within.gamuts is not None and self._gamuts_of == views:
-            self._within.gamuts.refresh()
-            return
-        painted = partial(self._painted_light, views)
-        is_texel = texel_lights(self._basis.lights)
-        is_bold = self._fit.colors == "free"
-        in_view = None
-        bases, own = [view.basis for view in views], self._reference
-        if self._expected is not None and not is_bold:
-            in_view = LampsInView.of(
-                bases,
-                own,
-                lambda: [view.paint for view in views],
-                lambda: own if self._expected is None else self._expected.painted,
-            )
-        gamuts = Gamuts(painted, _power(views), own, is_texel, is_bold=is_bold, in_view=in_view)
-        self._within, self._gamuts_of = self._reduction.with_gamuts(gamuts), views
+        problem = self._problem
+        reduction = reduce_lights(problem.constraints, problem.lights, problem.fit, whites=whites)
+        self._whites, self._within = whites, reduction
+        self._problem = replace(problem, reduction=reduction, full=reduction)
 
     def _best(self, equations: NormalEquations, start: Doubles) -> Doubles:
         """Return the best weights (n, 3) under the constraints, from those to begin with."""
+        method, last = self._problem.fit.method, self._last_multipliers
         self._within, weights = solve_under_brush(
-            equations, self._within, start, method=self._fit.method, last=self._last_multipliers
+            equations, self._within, start, method=method, last=last
         )
         return weights
 
@@ -324,38 +390,7 @@ class LiveSolver:
         self, equations: NormalEquations, reduction: Reduction, start: Doubles
     ) -> tuple[Reduction, Doubles]:
         """Solve for some of many lights, whose misses of requirements would add up over rounds."""
-        return solve_under_brush(equations, reduction, start, method=self._fit.method)
-
-    def _paint_terms(self, views: tuple[LiveView, ...], unpainted: float) -> PaintTerms:
-        """Return what the paint lets one expect. unpainted: the weight of each unpainted pixel."""
-        if not self._fit.reads_wishes(is_sketch=self._is_sketch):
-            return PaintTerms()
-        return PaintTerms.of(
-            self._wash(views),
-            self._fit,
-            self._reference,
-            importance=_importance(views),
-            unpainted=unpainted,
-            texels=texel_lights(self._basis.lights),
-        )
-
-    def _weight_pull(
-        self, views: tuple[LiveView, ...], terms: PaintTerms
-    ) -> NormalEquations | None:
-        """Return the pull on the weights, as `Problem.pull`."""
-        power, lights = _power(views), self._basis.lights
-        # The total importance, relative to the number of pixels.
-        share = _importance(views) / sum(view.pixels for view in views)
-        return joint_pull(
-            lights,
-            power,
-            self._reference,
-            self._fit,
-            self._constraints,
-            terms,
-            painted_share=share,
-            keeps_color=self._reduction.is_free & power.any(axis=1) & ~texel_lights(lights),
-        )
+        return solve_under_brush(equations, reduction, start, method=self._problem.fit.method)
 
     def _joint_films(self, views: tuple[LiveView, ...]) -> Films:
         if self._films is None or self._films[0] != views:
@@ -366,22 +401,18 @@ class LiveSolver:
         """Return the film of a view; all films together have the pixels of one, or fewer with less
         noise or for many lights.
         """
+        transform = self._problem.fit.transform
         if view.has_film:  # the noise of a picture takes a walk over all planes
-            return view.film(self._fit.transform)
-        side = block_side([view_of_all.basis for view_of_all in self._views], self._fit.transform)
+            return view.film(transform)
+        side = block_side([view_of_all.basis for view_of_all in self._views], transform)
         most = min(MAX_FILM_PIXELS, MAX_FILM_VALUES // len(self._basis.lights))
         most = min(most // len(self._views), view.pixels // side**2)
-        return view.film(self._fit.transform, max(1, most))
+        return view.film(transform, max(1, most))
 
 
 def _allowed(reduction: Reduction, weights: Doubles) -> Doubles:
     """Return weights (n, 3) between allowed ones, with the colours that lights may have."""
     return clip_to_gamuts(reduction, snap_to_whites(reduction, weights))
-
-
-def _importance(views: Sequence[LiveView]) -> float:
-    """Return the total importance of the paint of all views."""
-    return sum(float(view.counts[0]) for view in views)
 
 
 def _power(views: Sequence[LiveView]) -> Doubles:

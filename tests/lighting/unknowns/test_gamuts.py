@@ -8,8 +8,8 @@ import pytest
 import lightpaint as lp
 from lightpaint.colour.color import kelvin_to_rgb
 from lightpaint.colour.color_ranges import DIRECTIONS, chromaticity, white_range
-from lightpaint.lighting import problem
 from lightpaint.lighting.fit import resolve_for_targets
+from lightpaint.lighting.linear_problem import PaintReading
 from lightpaint.lighting.live.live import LiveSolver
 from lightpaint.lighting.live.live_view import LiveView
 from lightpaint.lighting.unknowns.gamuts import PAINTED_MARGIN, Gamuts, PaintedLight
@@ -79,7 +79,7 @@ def test_without_gamuts_lamps_would_be_green(
     make_basis: Any, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """Else the test above could not fail."""
-    monkeypatch.setattr(problem, "gamuts_for", lambda *_: None)
+    monkeypatch.setattr(PaintReading, "gamuts", lambda *_: None)
     solutions = []
     for seed in range(8):
         basis = _room(make_basis, seed)
@@ -133,7 +133,7 @@ def test_nor_under_the_brush(make_basis: Any, seed: int, space: Any) -> None:
 def test_gamuts_are_no_wider_than_what_is_painted(make_basis: Any) -> None:
     basis = _room(make_basis, 3)
     target = _target(*_painting(basis, WARM))
-    gamuts = problem.Problem.of(basis, target).full.gamuts
+    gamuts = lp.Problem.of(basis, target).full.gamuts
     assert gamuts is not None
     allowed = np.vstack([white_range(2200, 9000).colors, WARM * basis.current_weights])
     allowed = np.vstack([allowed, basis.current_weights, WARM * np.eye(3).sum(axis=0)])

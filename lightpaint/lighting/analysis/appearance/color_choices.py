@@ -18,7 +18,7 @@ from lightpaint.display_text import short_repr
 from lightpaint.errors import ConstraintError
 from lightpaint.lighting.analysis.appearance.display_difference import PaintComparison
 from lightpaint.lighting.fit import Colors
-from lightpaint.lighting.linear_problem import reduce_lights
+from lightpaint.lighting.linear_problem import reduce_lights, whites_for
 from lightpaint.lighting.loss.expected_lights import Wash
 from lightpaint.lighting.loss.lit_pixels import LitPixels
 from lightpaint.lighting.loss.reweighting import (
@@ -29,15 +29,7 @@ from lightpaint.lighting.loss.reweighting import (
     sample_pixels,
 )
 from lightpaint.lighting.normal_equations import NormalEquations
-from lightpaint.lighting.problem import (
-    Problem,
-    are_sketches,
-    expected_for,
-    gamuts_for,
-    wash_fields,
-    wash_of,
-    whites_for,
-)
+from lightpaint.lighting.problem import Problem, ViewsReading, around_of, wash_of
 from lightpaint.lighting.solution import Solution
 from lightpaint.lighting.unknowns.reduced_problem import solve_reduced
 from lightpaint.lighting.unknowns.reduction import only_knobs
@@ -179,14 +171,15 @@ def _with_colors(
 ) -> Problem:
     """Return the problem with that choice, for the lights that `sparse` has chosen.
 
-    wash: as of `expected_for`. Raises ConstraintError if a light cannot have it.
+    wash: as of `ViewsReading`. Raises ConstraintError if a light cannot have it.
     """
-    fit, is_sketch = replace(problem.fit, colors=colors), are_sketches(problem.views)
-    if problem.fit.reads_wishes(is_sketch=is_sketch) != fit.reads_wishes(is_sketch=is_sketch):
-        problem = replace(problem, **wash_fields(problem.views, fit, problem.reference, wash))
-    expected = problem.expected or expected_for(problem.views, fit, problem.reference, wash)
-    of_sketch = expected if fit.reads_wishes(is_sketch=is_sketch) else None
-    gamuts = gamuts_for(problem.basis, problem.views, fit, problem.reference, of_sketch)
+    fit = replace(problem.fit, colors=colors)
+    reading = ViewsReading(problem.views, problem.power, problem.reference, fit, wash)
+    reads_wishes = fit.reads_wishes(is_sketch=reading.is_sketch)
+    if problem.fit.reads_wishes(is_sketch=reading.is_sketch) != reads_wishes:
+        problem = replace(problem, **vars(reading.terms()))
+    expected = problem.expected or reading.expected()
+    gamuts = reading.gamuts(around_of(expected if reads_wishes else None))
     full = reduce_lights(
         problem.constraints, problem.lights, fit, gamuts, whites_for(expected, fit)
     )

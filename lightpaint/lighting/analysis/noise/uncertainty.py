@@ -44,8 +44,9 @@ from lightpaint.lighting.analysis.noise.noise import (
 from lightpaint.lighting.analysis.noise.weight_directions import WeightResponse, solve_for
 from lightpaint.lighting.answer.lighting import LightSetting
 from lightpaint.lighting.loss.expected_lights import NoisyBlocks, Wash
+from lightpaint.lighting.loss.weight_penalty import PaintTerms
 from lightpaint.lighting.normal_equations import NormalEquations
-from lightpaint.lighting.problem import Problem, are_sketches, terms_of_wash
+from lightpaint.lighting.problem import Problem, ViewsReading, are_sketches
 from lightpaint.lighting.solution import Solution
 from lightpaint.progress import with_progress
 
@@ -97,11 +98,16 @@ class ReadingNoise:
         as_read = solve_for(solution, problem.solved)
         changes = []
         for wash in _disturbed_washes(problem, count):
-            terms = terms_of_wash(wash, problem.views, problem.fit, problem.reference)
-            disturbed = replace(problem, **vars(terms))
+            disturbed = replace(problem, **vars(_terms_of(problem, wash)))
             moved = solve_for(replace(solution, problem=disturbed), problem.solved)
             changes.append(moved - as_read)
         return cls(np.sqrt(np.square(changes).mean(axis=0)), float(t_ratios(np.array(count))))
+
+
+def _terms_of(problem: Problem, wash: Wash) -> PaintTerms:
+    """Return the terms of a painting with this wash."""
+    own, fit = problem.reference, problem.fit
+    return ViewsReading(problem.views, problem.power, own, fit, lambda: wash).terms()
 
 
 def _disturbed_washes(problem: Problem, count: int) -> Iterator[Wash]:
