@@ -505,7 +505,7 @@ class DualActiveSet:
         """The lengths of the rows of all sums and caps."""
         of_sums = np.einsum("mk,mk,k->m", self._rows, self._rows, 1 / np.square(self._root))
         of_caps = np.square(self._cap_rows).sum(axis=1)
-        return np.sqrt(np.concatenate([of_sums, of_caps]))
+        return np.asarray(np.sqrt(np.concatenate([of_sums, of_caps])))
 
     def _join_missed(self, x: Doubles, most: int = JOINING) -> bool:
         """Add the sums that x, (k,), misses most; return whether there are any."""
