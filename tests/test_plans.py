@@ -1,6 +1,7 @@
 """Plans and paintings under wishes for planes, as people use them; answers checked in Radiance."""
 
 import json
+import re
 from collections.abc import Sequence
 from pathlib import Path
 
@@ -199,7 +200,10 @@ def test_a_plan_is_met_or_says_by_how_much_it_is_not(tmp_path: Path):
     (tmp_path / "bright.planes.toml").write_text(PLANES.replace("300", "3000"), encoding="utf-8")
     bright = run(tmp_path, "plan", "room.xml", "--planes", "bright.planes.toml", "-o", "bright")
     assert bright.returncode == 1
-    assert "of 3000 lx: all lamps are at full; about" in bright.stdout
+    said = r"desk: (\d+) of 3000 lx: all lamps are at full; about (\d+) more of lamp.ies would do"
+    reached, more = map(int, re.search(said, bright.stdout).groups())
+    # The four lamps give all of the light.
+    assert more == pytest.approx(4 * (3000 / reached - 1), abs=1)
     assert set(drives_of(tmp_path / "bright").values()) == {1.0}
 
 

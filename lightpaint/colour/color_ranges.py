@@ -104,9 +104,11 @@ class ColorHull:
         )
 
     def side_towards(self, rgb: Doubles) -> int:
-        """Return the side whose triangle, or the sector beyond it, contains a linear colour
-        (3,).
+        """Return the side whose triangle, or the sector beyond it, contains a linear colour (3,);
+        the first for black, which is in all of them.
         """
+        if not rgb.any():
+            return 0
         middle, to_corners = self._corners_from_middle
         to_color = chromaticity(rgb) - middle
         turn = _cross(to_corners, to_color)

@@ -184,11 +184,7 @@ def _missed(answer: PlanesAnswer, outcome: WishOutcome) -> str:
             return f"{text}, as much as the limit of {limit:.4g} W leaves."
         if not answer.all_at_full:
             return f"{text}, as much as the other wishes leave."
-        count = answer.lamps
-        more = math.ceil(count * (wish.asked / reached - 1)) if reached > 0 else 0
-        these = "this one" if count == 1 else f"these {count}"
-        lamps = "one more lamp" if more == 1 else f"{more} more lamps"
-        advice = f"; about {lamps} like {these} would do" if more else ""
+        advice = _more_lamps(answer, outcome)
         return f"{text}: all lamps are at full{advice}."
     if wish.kind == "uniformity":
         return f"{title}: a uniformity of {reached:.2f}, wished for {wish.asked:g}."
@@ -199,6 +195,18 @@ def _missed(answer: PlanesAnswer, outcome: WishOutcome) -> str:
     if answer.are_ignored:  # what they take follows
         return f"Only {wish.asked:g} W are allowed."
     return f"The lamps take {reached:.4g} W, where {wish.asked:g} W are allowed."
+
+
+def _more_lamps(answer: PlanesAnswer, outcome: WishOutcome) -> str:
+    """Return how many more lamps a plane needs, by a linear estimate."""
+    wish, reached, count = outcome.wish, outcome.reached, answer.lamps
+    if (found := answer.more_luminaires(outcome)) is not None:
+        more, name = found
+        return f"; about {more} more of {name} would do"
+    more = math.ceil(count * (wish.asked / reached - 1)) if reached > 0 else 0
+    these = "this one" if count == 1 else f"these {count}"
+    lamps = "one more lamp" if more == 1 else f"{more} more lamps"
+    return f"; about {lamps} like {these} would do" if more else ""
 
 
 def _prices(answer: PlanesAnswer) -> Iterator[str]:

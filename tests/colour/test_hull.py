@@ -44,6 +44,7 @@ def test_what_is_beyond_comes_to_its_border(rgb: tuple[float, ...]) -> None:
 def test_black_and_its_own_colour_are_as_they_are() -> None:
     hull = _hull()
     assert hull.has(np.zeros(3))
+    assert hull.side_towards(np.zeros(3)) == 0
     for rgb in (np.zeros(3), WHITE, 3 * kelvin_to_rgb(2700)):
         np.testing.assert_array_equal(hull.nearest(rgb), rgb)
 

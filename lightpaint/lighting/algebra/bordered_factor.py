@@ -16,7 +16,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from lightpaint.arrays import Bools, Doubles, Indices
-from lightpaint.lighting.algebra.symmetric_matrices import large_libraries
+from lightpaint.lighting.algebra.symmetric_matrices import BlockFactor, cholesky
 
 #: Columns beside a factor: at least so many, and else this share of its unknowns. With more, a new
 #: factor is as quick.
@@ -30,7 +30,7 @@ class BorderedFactor:
         self._M, self._parts = M, tuple(parts)
         self._base = np.zeros(len(M), bool)
         self._rows = np.zeros(0, np.intp)
-        self._factors: list[tuple[slice, Doubles]] = []
+        self._factor = BlockFactor(0, ())
         self._border = _Border(0, 0)
 
     def solve(
@@ -49,7 +49,7 @@ class BorderedFactor:
                 return None
             added = held = added[:0]
         border = self._places(sums, which, held, added)
-        half = self._divide(right[self._rows])
+        half = self._factor.divide(right[self._rows])
         sides = np.concatenate([least, np.zeros(held.size), right[added]])
         small = -self._border.products[np.ix_(border, border)]
         first, w = which.size + held.size, which.size
@@ -67,26 +67,27 @@ class BorderedFactor:
         else:
             beside = sides
         z = np.zeros(len(self._M))
-        z[self._rows] = self._divide(half, is_second=True)
+        z[self._rows] = self._factor.divide(half, is_second=True)
         z[held], z[added] = 0, beside[first:]
         return z, np.asarray(-beside[:w], np.float64)
 
     def _refactor(self, free: Bools, sums: int) -> bool:
         """Factor the matrix of the free unknowns; return whether it is positive definite."""
-        lapack, _ = large_libraries()
-        self._base, self._factors, rows, begin = free.copy(), [], list[Indices](), 0
+        self._base, rows, begin = free.copy(), list[Indices](), 0
+        factors = list[tuple[slice, Doubles]]()
         for part in self._parts:
             own = part[free[part]]
-            # The transpose is the same matrix in the order of LAPACK, which needs no copy of it.
-            matrix = self._M[np.ix_(own, own)].T
-            factor, failed = lapack.dpotrf(matrix, lower=1, clean=0, overwrite_a=1)
-            if failed:
+            try:
+                # The transpose, in the order of LAPACK, needs no copy.
+                factor = cholesky(self._M[np.ix_(own, own)].T)
+            except np.linalg.LinAlgError:
                 self._base[:] = False
                 return False
             if own.size:
-                self._factors.append((slice(begin, begin + own.size), factor))
+                factors.append((slice(begin, begin + own.size), factor))
             rows.append(own)
             begin += own.size
+        self._factor = BlockFactor(begin, factors)
         self._rows = np.concatenate(rows)
         room = sums + max(LEAST_COLUMNS, int(COLUMN_SHARE * begin))
         self._border = _Border(begin, room)
@@ -110,18 +111,8 @@ class BorderedFactor:
                     column[:] = self._M[x, self._rows]
                 else:
                     column[self._rows == x] = 1
-            border.join(new, self._divide(columns))
+            border.join(new, self._factor.divide(columns))
         return np.array([border.places[key] for key in keys], np.intp)
-
-    def _divide(self, right: Doubles, *, is_second: bool = False) -> Doubles:
-        """Divide (r,) or (r, j) by the factor, or by its transpose."""
-        _, blas = large_libraries()
-        columns = right[:, None] if right.ndim == 1 else right
-        divided = np.empty(columns.shape, order="F")
-        for rows, factor in self._factors:
-            options = {"lower": 1, "trans_a": int(is_second)}
-            divided[rows] = blas.dtrsm(1.0, factor, columns[rows], **options)
-        return divided.reshape(right.shape)
 
 
 class _Border:

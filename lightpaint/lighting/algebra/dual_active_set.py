@@ -5,7 +5,8 @@ some of the bounds and sums, whose multipliers have the right sign; the limit th
 misses most is added, and others leave whose multipliers come to 0 on the way. Each such step raises
 the objective, so that steps end. Of thousands of sums few hold: those that a point misses join
 later (Kelley's cutting planes), and so do caps (quadratic.py). An answer to a similar problem says
-with which limits to begin, so that few change; without one, an interior-point method guesses them.
+with which limits to begin, so that few change; without one, an interior-point method guesses them,
+and again where many steps follow.
 
 Where many mixes are equal, M is singular. A pull to where x was makes the optimum single, and is
 repeated until it pulls no longer (the proximal-point method; Rockafellar, SIAM Journal on Control
@@ -14,6 +15,7 @@ repeated until it pulls no longer (the proximal-point method; Rockafellar, SIAM 
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from functools import cached_property
 from typing import Literal
 
 import numpy as np
@@ -23,7 +25,7 @@ from lightpaint.lighting.algebra.bordered_factor import BorderedFactor
 from lightpaint.lighting.algebra.interior_point import interior_point
 from lightpaint.lighting.algebra.optimum import NO_CAPS, Optimum
 from lightpaint.lighting.algebra.quadratic import EPSILON, Cap, Quadratic, kkt_residual
-from lightpaint.lighting.algebra.symmetric_matrices import large_libraries
+from lightpaint.lighting.algebra.symmetric_matrices import BlockMatrix, large_libraries
 from lightpaint.progress import cancellation_check
 from lightpaint.threads import one_thread
 
@@ -46,14 +48,12 @@ NO_DIRECTION = 1e-9
 #: the share of a row of length 1 that is its own.
 DEPENDENT = 1e-6
 
-#: Where an interior-point method ends: the limits that hold are clear by then. Sums that it knows.
-INSIDE_CLOSE, INSIDE_SUMS = 1e-8, 64
+#: Where an interior-point method ends: the limits that hold are clear by then. Most sums that join
+#: for it, and steps after which it is tried with those that have joined: they take as long as it.
+INSIDE_CLOSE, INSIDE_SUMS, PATIENCE = 1e-12, 64, 48
 
 #: Share of the most wrong multiplier from which others leave with it.
 WORST = 0.5
-
-#: Limits that may leave at the beginning before others are guessed, and most guesses.
-FEW_LEAVE, MAX_GUESSES = 8, 12
 
 #: Most steps for each unknown and sum.
 STEPS_EACH = 4
@@ -121,11 +121,6 @@ class _Held:
         """The number of limits that hold."""
         return int(self.low.sum() + self.high.sum() + self.sums.sum())
 
-    @property
-    def key(self) -> bytes:
-        """The same for the same limits alone."""
-        return np.packbits(np.concatenate([self.low, self.high, self.sums])).tobytes()
-
 
 @dataclass
 class _DualPoint:
@@ -178,16 +173,18 @@ class DualActiveSet:
     ) -> None:
         power = M.diagonal()
         self._root = np.sqrt(np.maximum(power, least_diagonal * (power.max(initial=0) or 1.0)))
-        self._M = M / self._root[:, None]
-        self._M /= self._root
-        self._M.flat[:: len(M) + 1] += NEARNESS
+        whole = M / self._root[:, None]
+        whole /= self._root
+        whole.flat[:: len(M) + 1] += NEARNESS
+        self._whole, self._parts = whole, parts
+        self._M = BlockMatrix.of(whole, parts)
         self._bounds = lower, upper
         self._lower, self._upper = lower * self._root, upper * self._root
         self._is_fixed = self._lower >= self._upper
         self._rows, self._count = rows, len(least)
         self._cap_rows, cap_least = _cap_sums(caps, self._root)
         self._least = np.concatenate([least, cap_least])
-        self._factor = BorderedFactor(self._M, parts or [np.arange(len(M))])
+        self._factor = BorderedFactor(whole, parts or [np.arange(len(M))])
         self._sums = _CountedSums(len(M))
 
     def minimise(
@@ -204,14 +201,15 @@ class DualActiveSet:
         x = np.clip(near.x * self._root, self._lower, self._upper)
         with one_thread():
             held, steps = self._limits_of(near, x), 0
+            is_inside = held is None
             if held is None:
                 inside = self._limits_inside(b + NEARNESS * x, x)
                 # Interior points fail where nothing satisfies all limits, or an unknown is fixed.
                 if inside is None and is_quick and not self._is_fixed.any():
                     return None
-                held = inside or self._bounds_of(x)
+                held, is_inside = inside or self._bounds_of(x), inside is not None
             for _ in range(MAX_PULLS):
-                ended = self._optimum_from(b, x, held, is_quick=is_quick)
+                ended = self._optimum_from(b, x, held, is_inside=is_inside, is_quick=is_quick)
                 if ended is None:
                     return None
                 last, (point, held, more) = x, ended
@@ -231,9 +229,8 @@ class DualActiveSet:
         caps, count = near.of_caps, self._count
         holds = np.concatenate([near.multipliers > 0, caps > 0, caps < 0])
         if not (holds[:count].any() and caps.any()):
-            missed, sizes = self._missed(x), self._sizes(x)
-            is_met = missed >= -MET * sizes
-            if not holds.any() and (missed > MET * sizes).any():
+            is_met, is_missed = self._met(x)
+            if not holds.any() and is_missed:
                 return None
             if not holds[:count].any():
                 holds[:count] = is_met[:count]
@@ -250,40 +247,48 @@ class DualActiveSet:
         low = self._is_fixed | (x <= self._lower)
         return _Held(low, ~low & (x >= self._upper), np.zeros(self._sums.which.size, bool))
 
-    def _limits_inside(self, b: Doubles, start: Doubles) -> _Held | None:
+    def _limits_inside(self, b: Doubles, x: Doubles) -> _Held | None:
         """Return the limits that hold near the optimum, as interior points know it, with the sums
-        that start, (k,), misses most; None where these fail.
+        that x, (k,), misses most; None where these fail.
         """
         sums, caps = self._sums, np.arange(self._count, self._least.size)
         self._join(caps[np.isfinite(self._least[caps]) & ~np.isin(caps, sums.which)])
-        self._join_missed(start, INSIDE_SUMS)
-        nothing, infinite = np.ones(start.size), np.full(sums.least.size, np.inf)
+        self._join_missed(x, INSIDE_SUMS)
+        nothing, infinite = np.ones(b.size), np.full(sums.least.size, np.inf)
         bounds, scale = (self._lower, self._upper), np.ones(sums.least.size)
         size = float(np.abs(b).max(initial=0)) or 1.0
         problem = Quadratic(
-            self._M, b, *bounds, nothing, sums.rows, sums.least, infinite, scale, (), size
+            self._whole, b, *bounds, nothing, sums.rows, sums.least, infinite, scale, (), size
         )
-        inside = interior_point(problem, start, close=INSIDE_CLOSE)
+        inside = interior_point(problem, x, close=INSIDE_CLOSE, parts=self._parts)
         if inside is None:
             return None
         return replace(self._bounds_of(inside.x), sums=inside.multipliers > 0)
 
     def _optimum_from(
-        self, b: Doubles, start: Doubles, held: _Held, *, is_quick: bool
+        self, b: Doubles, start: Doubles, held: _Held, *, is_inside: bool, is_quick: bool
     ) -> tuple[_DualPoint, _Held, int] | None:
         """Return the optimum with the pull, the limits that hold there, and the number of steps.
 
-        start: (k,), to which the pull is. held: limits that may hold there.
+        start: (k,), to which the pull is. held: limits that may hold there. is_inside: whether
+        interior points have found them.
         """
         b = b + NEARNESS * start
         begun = self._begin(b, start, held)
         if begun is None:
             return None
         point, held, steps = begun
-        check = cancellation_check()
+        check, again = cancellation_check(), PATIENCE
+        known_inside = self._sums.which.size if is_inside else -1
         most = QUICK_STEPS if is_quick else STEPS_EACH * (b.size + len(self._least))
         while steps < most:
             check()
+            if steps > again and self._sums.which.size > known_inside:
+                begun = self._begin_inside(b, point.x)
+                if begun is None and is_quick:
+                    return None
+                point, held = begun[:2] if begun else self._with_joined(point, held)
+                again, known_inside = steps + PATIENCE, self._sums.which.size
             limit = self._most_missed(point, held)
             if limit is not None:
                 more = self._add(point, held, limit)
@@ -296,7 +301,7 @@ class DualActiveSet:
                 return None
             if not self._join_missed(exact.x):
                 return exact, held, steps
-            point, held = _with_joined(exact, held, self._sums.least.size)
+            point, held = self._with_joined(exact, held)
         return None
 
     def _begin(
@@ -304,22 +309,21 @@ class DualActiveSet:
     ) -> tuple[_DualPoint, _Held, int] | None:
         """Return an optimum under some limits, their multipliers of the right sign.
 
-        Of the limits that may hold, those leave whose multipliers have the wrong sign. If these are
-        many, others are guessed, as long as guesses differ, and else found by interior points.
+        Of the limits that may hold, those leave whose multipliers have the wrong sign. Where these
+        limits depend on each other, interior points find others.
 
         start: (k,), where unknowns are that change nothing.
         """
-        begun = self._with_right_signs(b, held)
-        if begun is not None and held.count - begun[1].count <= FEW_LEAVE:
-            return begun
-        guessed = self._guessed(b, held)
-        if guessed is not None and (held.sums & ~guessed[1].sums).sum() <= FEW_LEAVE:
-            return guessed
-        limits = self._limits_inside(b, start) or self._bounds_of(start)
-        inside = self._with_right_signs(b, limits)
-        if inside is not None or begun is None:
-            return inside
-        return (*_with_joined(*begun[:2], self._sums.least.size), begun[2])
+        return (
+            self._with_right_signs(b, held)
+            or self._begin_inside(b, start)
+            or self._with_right_signs(b, self._bounds_of(start))
+        )
+
+    def _begin_inside(self, b: Doubles, x: Doubles) -> tuple[_DualPoint, _Held, int] | None:
+        """Return an optimum under limits that interior points find, as `_limits_inside` does."""
+        limits = self._limits_inside(b, x)
+        return None if limits is None else self._with_right_signs(b, limits)
 
     def _with_right_signs(self, b: Doubles, held: _Held) -> tuple[_DualPoint, _Held, int] | None:
         """Drop limits until all multipliers have the right sign."""
@@ -337,28 +341,6 @@ class DualActiveSet:
                 return point, held, steps
             # Where one leaves, others often come to the right sign.
             held = self._without_worst(point, held)
-
-    def _guessed(self, b: Doubles, held: _Held) -> tuple[_DualPoint, _Held, int] | None:
-        """Add all bounds that a point violates, and drop all limits whose multipliers have the
-        wrong sign, until there are none; None if guesses come again.
-        """
-        seen = set[bytes]()
-        for step in range(MAX_GUESSES):
-            point = self._solved(b, held)
-            if point is None or not self._keeps(point, held):
-                return None
-            right, x, free = self._rightly_held(b, point, held), point.x, held.free
-            room = ROUND_OFF * float(np.abs(x).max(initial=0))
-            low = right.low | (free & (x < self._lower - room))
-            high = right.high | (free & (x > self._upper + room))
-            guess = _Held(low, high, right.sums)
-            if guess.key == held.key:
-                return point, held, step + 1
-            if guess.key in seen:
-                return None
-            seen.add(guess.key)
-            held = guess
-        return None
 
     def _rightly_held(self, b: Doubles, point: _DualPoint, held: _Held) -> _Held:
         """Return the limits whose multipliers have the right sign at a point."""
@@ -387,6 +369,8 @@ class DualActiveSet:
 
     def _independent(self, held: _Held) -> _Held:
         """Return the limits without sums that depend on the others over the free unknowns."""
+        if not held.free.any():
+            return replace(held, sums=np.zeros_like(held.sums))
         lapack, _ = large_libraries()
         which = np.flatnonzero(held.sums)
         rows = self._sums.rows[np.ix_(which, held.free)]
@@ -506,12 +490,22 @@ class DualActiveSet:
         sums = np.concatenate([self._rows @ (x / self._root), self._cap_rows @ x])
         return np.asarray(self._least - sums)
 
-    def _sizes(self, x: Doubles) -> Doubles:
-        """Return the sizes of all sums and caps at x, (k,), to which misses are relative."""
-        of_sums = np.abs(self._rows) @ np.abs(x / self._root)
-        terms = np.concatenate([of_sums, np.abs(self._cap_rows) @ np.abs(x)])
-        least = np.where(np.isfinite(self._least), np.abs(self._least), 0)
-        return np.asarray(np.maximum(least, terms))
+    def _met(self, x: Doubles) -> tuple[Bools, bool]:
+        """Return which sums and caps x, (k,), meets or misses, and whether it misses any."""
+        missed, least = self._missed(x), np.where(np.isfinite(self._least), np.abs(self._least), 0)
+        # No sum is larger, so that few are near enough to need their own size.
+        rooms = MET * np.maximum(least, self._lengths * np.linalg.norm(x))
+        near = np.flatnonzero(np.abs(missed) <= rooms)
+        terms = np.abs(self._rows_of(near)) @ np.abs(x)
+        rooms[near] = MET * np.maximum(least[near], terms)
+        return missed >= -rooms, bool((missed > rooms).any())
+
+    @cached_property
+    def _lengths(self) -> Doubles:
+        """The lengths of the rows of all sums and caps."""
+        of_sums = np.einsum("mk,mk,k->m", self._rows, self._rows, 1 / np.square(self._root))
+        of_caps = np.square(self._cap_rows).sum(axis=1)
+        return np.asarray(np.sqrt(np.concatenate([of_sums, of_caps])))
 
     def _join_missed(self, x: Doubles, most: int = JOINING) -> bool:
         """Add the sums that x, (k,), misses most; return whether there are any."""
@@ -529,6 +523,13 @@ class DualActiveSet:
         sums.join(places[order], rows[order], self._least[places[order]])
         return bool(order.size)
 
+    def _with_joined(self, point: _DualPoint, held: _Held) -> tuple[_DualPoint, _Held]:
+        """Return a point and the limits that hold it, with sums that have joined."""
+        more = self._sums.which.size - held.sums.size
+        pushes = np.append(point.pushes, np.zeros(more))
+        sums = np.append(held.sums, np.zeros(more, bool))
+        return replace(point, pushes=pushes), replace(held, sums=sums)
+
     def _join(self, places: Indices) -> None:
         self._sums.join(places, self._rows_of(places), self._least[places])
 
@@ -542,7 +543,7 @@ class DualActiveSet:
 
     def _round_off(self, x: Doubles, b: Doubles, pushes: Doubles, size: float) -> float:
         pushed = np.abs(pushes @ self._sums.rows)
-        terms = np.abs(self._M) @ np.abs(x) + np.abs(b) + pushed
+        terms = self._M.absolute() @ np.abs(x) + np.abs(b) + pushed
         return 4 * EPSILON * float(terms.max(initial=0)) / size
 
     def _unscaled(self, optimum: Optimum, pushes: Doubles) -> tuple[Optimum, Doubles]:
@@ -558,16 +559,6 @@ class DualActiveSet:
             optimum, x=value, multipliers=gradient, cap_multipliers=at_least - at_most
         )
         return unscaled, multipliers[: self._count]
-
-
-def _with_joined(point: _DualPoint, held: _Held, count: int) -> tuple[_DualPoint, _Held]:
-    """Return a point and the limits that hold it, with sums that have joined, now (w,) of them."""
-    more = count - held.sums.size
-    pushes, sums = (
-        np.append(point.pushes, np.zeros(more)),
-        np.append(held.sums, np.zeros(more, bool)),
-    )
-    return replace(point, pushes=pushes), replace(held, sums=sums)
 
 
 def _cap_sums(caps: Sequence[Cap], root: Doubles) -> tuple[Doubles, Doubles]:

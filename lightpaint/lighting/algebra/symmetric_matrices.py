@@ -1,13 +1,14 @@
-"""Symmetric matrices: eigenvectors and products, which an interrupt need not wait for; and SciPy's
-LAPACK and BLAS, where unknowns are many.
+"""Symmetric matrices: eigenvectors and products, which an interrupt need not wait for; matrices in
+blocks; and SciPy's LAPACK and BLAS, where unknowns are many.
 """
 
+from collections.abc import Sequence
 from functools import cache
 from typing import Any
 
 import numpy as np
 
-from lightpaint.arrays import Doubles
+from lightpaint.arrays import Doubles, Indices
 from lightpaint.threads import find_loaded_libraries, run_apart
 
 #: Maximum number of rows of a matrix that takes less than a second.
@@ -27,6 +28,81 @@ def large_libraries() -> tuple[Any, Any]:
 
     find_loaded_libraries()
     return lapack, blas
+
+
+class BlockMatrix:
+    """A symmetric matrix M, (k, k), that joins unknowns within each of some parts alone.
+
+    parts: places of the unknowns of each part. blocks: the matrix of each.
+    """
+
+    def __init__(self, parts: Sequence[Indices], blocks: Sequence[Doubles]) -> None:
+        self._parts, self._blocks = tuple(parts), tuple(blocks)
+        self._k = sum(part.size for part in self._parts)
+
+    @classmethod
+    def of(cls, M: Doubles, parts: Sequence[Indices] = ()) -> "BlockMatrix":
+        """Return the blocks of M. Without parts, M is one."""
+        if len(parts) < 2:
+            return cls([np.arange(len(M))], [M])
+        return cls(parts, [M[np.ix_(part, part)] for part in parts])
+
+    def __matmul__(self, x: Doubles) -> Doubles:
+        """Return M x, of x (k,)."""
+        product = np.empty(self._k)
+        for part, block in zip(self._parts, self._blocks, strict=True):
+            product[part] = block @ x[part]
+        return product
+
+    def absolute(self) -> "BlockMatrix":
+        """Return the matrix of all |M_ij|."""
+        return BlockMatrix(self._parts, [np.abs(block) for block in self._blocks])
+
+    def factored(self, diagonal: Doubles) -> "BlockFactor":
+        """Return the factor of M with more on its diagonal, (k,). Raises LinAlgError if this is not
+        positive definite.
+        """
+        factors = []
+        for part, block in zip(self._parts, self._blocks, strict=True):
+            # The transpose is the same matrix in the order of LAPACK.
+            matrix = block.T.copy(order="F")
+            matrix.flat[:: part.size + 1] += diagonal[part]
+            factors.append((part, cholesky(matrix)))
+        return BlockFactor(self._k, factors)
+
+
+class BlockFactor:
+    """The Cholesky factor L of a block matrix (k, k). factors: the places and the factor of each
+    part.
+    """
+
+    def __init__(self, k: int, factors: Sequence[tuple[slice | Indices, Doubles]]) -> None:
+        self._k, self._factors = k, tuple(factors)
+
+    def divide(self, right: Doubles, *, is_second: bool = False) -> Doubles:
+        """Return L⁻¹ right, or with `is_second` L⁻ᵀ right, of right (k,) or (k, j)."""
+        _, blas = large_libraries()
+        divided = np.empty(right.shape, order="F")
+        for part, factor in self._factors:
+            if right.ndim == 1:
+                divided[part] = blas.dtrsv(factor, right[part], lower=1, trans=int(is_second))
+            else:
+                divided[part] = blas.dtrsm(
+                    1.0, factor, right[part], lower=1, trans_a=int(is_second)
+                )
+        return divided
+
+
+def cholesky(matrix: Doubles) -> Doubles:
+    """Return the lower Cholesky factor of a symmetric matrix in the order of LAPACK, which it
+    overwrites; what is above the diagonal does not count. Raises LinAlgError if it is not positive
+    definite.
+    """
+    lapack, _ = large_libraries()
+    factor, failed = lapack.dpotrf(matrix, lower=1, clean=0, overwrite_a=1)
+    if failed:
+        raise np.linalg.LinAlgError("the matrix is not positive definite")
+    return np.asarray(factor)
 
 
 def eigenvectors(M: Doubles) -> tuple[Doubles, Doubles]:

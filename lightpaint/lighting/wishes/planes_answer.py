@@ -1,12 +1,15 @@
 """The illuminance that a lighting gives on measuring planes, beside what was wished for."""
 
+import math
 from collections.abc import Mapping
 from dataclasses import dataclass
+from fnmatch import fnmatchcase
 from functools import cached_property
 
 import numpy as np
 
 from lightpaint.arrays import Doubles
+from lightpaint.basis import Lights
 from lightpaint.errors import ConstraintError
 from lightpaint.lighting.unknowns.lamp_parts import watts_of_fixed
 from lightpaint.lighting.unknowns.reduction import Reduction
@@ -100,6 +103,23 @@ class PlanesAnswer:
         lit = {case.name: case.applied_to(self.weights) for case in self.wished.cases}
         return lit or {"": self.weights}
 
+    def more_luminaires(self, outcome: WishOutcome) -> tuple[int, str] | None:
+        """Return how many more luminaires would bring a plane to the mean that is wished for, and
+        of which photometric file: the one of which fewest would do, if each gave as much light as
+        those of the file do on average. None if no luminaire lights the plane.
+        """
+        wish, illuminance = outcome.wish, self.wished.illuminance
+        weights = self.weights_by_case[wish.case]
+        part = illuminance.matrix[illuminance.points_of(wish.plane)]
+        given = np.einsum("pnc,nc->n", part, weights) / max(len(part), 1)
+        best: tuple[int, str] | None = None
+        for name, lights in _lights_by_file(illuminance.lights).items():
+            count = sum(len(illuminance.lights[k].members) for k in lights)
+            if (each := float(given[lights].sum()) / count) > 0:
+                found = math.ceil((wish.asked - outcome.reached) / each), name
+                best = found if best is None else min(best, found)
+        return best
+
     @property
     def missed(self) -> tuple[WishOutcome, ...]:
         """The wishes that are not met."""
@@ -144,6 +164,18 @@ def planes_answer(
         glare=glare,
         are_ignored=are_ignored,
     )
+
+
+def _lights_by_file(lights: Lights) -> Mapping[str, list[int]]:
+    """Return the lights by number that have the photometric web of each file, by its name."""
+    file_of = dict[int, str]()
+    requests = lights.requests.luminaires
+    for pattern in sorted(requests, key=lambda x: x in lights.names):  # a name is after patterns
+        for k, light in enumerate(lights):
+            names = {light.name, light.lamp, *light.members}
+            if any(name == pattern or fnmatchcase(name, pattern) for name in names):
+                file_of[k] = requests[pattern].path.name
+    return {name: [k for k in file_of if file_of[k] == name] for name in file_of.values()}
 
 
 def _reached(

@@ -22,8 +22,8 @@ from lightpaint.lighting.wishes.wished_light import WishedLight
 from lightpaint.progress import cancellation_check
 
 #: What is given up of a wish is more than its least share by this part of it, so that round-off
-#: leaves room for an answer.
-ROOM = 1e-8
+#: leaves room for an answer; and where so little room leaves none that steps find at once.
+ROOMS = (1e-8, 1e-3)
 
 #: Rows of points that are added at a time, largest miss of a row relative to its size, and most
 #: rounds.
@@ -58,23 +58,26 @@ def with_wishes(problem: Problem, wished: WishedLight) -> RequiredProblem:
     """
     if wished.is_empty:
         return RequiredProblem(problem, wished, np.zeros(0))
-    within = _within_reach(problem, wished)
+    within = _solved_at_once(_required(problem, wished.requirements))
     if within is not None:
         return RequiredProblem(within, wished, np.zeros(len(wished.wishes)))
-    requirements, shares = requirements_within_reach(wished, problem.reduction)
-    return RequiredProblem(_required(problem, requirements), wished, shares)
+    shares = _shares_given_up(wished, problem.reduction)
+    for room in ROOMS if shares.any() else ():
+        lowered = _required(problem, _lowered(wished, shares, room))
+        if (solved := _solved_at_once(lowered)) is not None:
+            return RequiredProblem(solved, wished, shares)
+    return RequiredProblem(_required(problem, _lowered(wished, shares)), wished, shares)
 
 
-def _within_reach(problem: Problem, wished: WishedLight) -> Problem | None:
-    """Return the problem that meets all wishes, with the answer of its squares to start from; None
-    if that is not found at once.
+def _solved_at_once(required: Problem) -> Problem | None:
+    """Return the problem with the answer of its squares to start from; None if that is not found
+    at once.
 
     What tinted light would add to a wish is nothing to rely on: a painting chooses the colours.
     """
-    required = _required(problem, wished.requirements)
     middle = required.reduction.at_middle_colors()
-    equations = problem.with_pull(problem.solved)
-    found = solve_reduced(equations, middle, problem.start, max_updates=0)
+    equations = required.with_pull(required.solved)
+    found = solve_reduced(equations, middle, required.start, max_updates=0)
     return replace(required, start=found.weights) if found.converged else None
 
 
@@ -93,12 +96,20 @@ def requirements_within_reach(
     """Return the requirements, as much of them as lights can reach, and the share of each wish that
     had to be given up, (w,). reduction: of the lights, without requirements.
     """
-    requirements = wished.requirements
+    shares = _shares_given_up(wished, reduction)
+    return _lowered(wished, shares), shares
+
+
+def _shares_given_up(wished: WishedLight, reduction: Reduction) -> Doubles:
     own = reduction.at_middle_colors()
-    shares = shares_given_up(wished, own.with_requirements(requirements))
-    if shares.any():
-        requirements = requirements.lowered(wished.slack_of(shares) * (1 + ROOM))
-    return requirements, shares
+    return shares_given_up(wished, own.with_requirements(wished.requirements))
+
+
+def _lowered(wished: WishedLight, shares: Doubles, room: float = ROOMS[0]) -> Requirements:
+    """Return the requirements without shares of the wishes, (w,), and a part of these more."""
+    if not shares.any():
+        return wished.requirements
+    return wished.requirements.lowered(wished.slack_of(shares) * (1 + room))
 
 
 def without_wishes(problem: Problem) -> Problem:

@@ -134,6 +134,15 @@ def test_it_does_not_claim_what_nothing_reaches():
     assert sums.minimise(np.zeros(2), near, tolerance=1e-12) is None
 
 
+def test_sums_that_hold_where_no_unknown_is_free_leave_quietly(capfd):
+    """LAPACK complains about matrices without rows."""
+    limits = {"lower": np.zeros(2), "upper": np.ones(2), "caps": (), "least_diagonal": 1e-6}
+    sums = DualActiveSet(np.eye(2), np.ones((1, 2)), np.array([2.5]), **limits)
+    near = NearAnswer(np.ones(2), np.ones(1), np.zeros(0))
+    assert sums.minimise(np.zeros(2), near, tolerance=1e-12) is None
+    assert capfd.readouterr() == ("", "")
+
+
 @pytest.mark.parametrize("seed", list(seeds(6, 40)))
 def test_wrong_limits_to_begin_with_do_not_matter(seed):
     """Multipliers of sums that depend on each other, and unknowns at wrong bounds."""

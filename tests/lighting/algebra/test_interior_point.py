@@ -2,9 +2,11 @@
 
 import numpy as np
 import pytest
+from qp import least_by_interior_points
 
-from lightpaint.arrays import Doubles
+from lightpaint.arrays import Doubles, Indices
 from lightpaint.lighting.algebra import clipped_newton
+from lightpaint.lighting.algebra import interior_point as interior_point_module
 from lightpaint.lighting.algebra.interior_point import SHORT, RowProducts, interior_point
 from lightpaint.lighting.algebra.optimum import minimise
 from lightpaint.lighting.algebra.quadratic import Cap, Quadratic, scaled
@@ -86,6 +88,37 @@ def test_a_fixed_unknown_is_left_to_other_methods() -> None:
     assert interior_point(q, np.zeros(q.n)) is None
 
 
+@pytest.mark.parametrize("parts", [[], [np.arange(c, 90, 3) for c in range(3)]])
+def test_long_sums_beside_unknowns_in_parts(parts: list[Indices]) -> None:
+    """Against Clarabel: M of 90 unknowns in three parts, which 12 sums join."""
+    rng = np.random.default_rng(7)
+    A = rng.random((300, 90)) ** 3
+    M, wanted = A.T @ A, rng.random(90)
+    M[np.arange(90)[:, None] % 3 != np.arange(90) % 3] = 0
+    rows = rng.random((12, 90))
+    least, upper = rows @ wanted * 1.2, np.full(90, 1.5)
+    expected, _ = least_by_interior_points(M, M @ wanted, np.zeros(90), upper, rows, least)
+    nothing, none = np.ones(90), np.full(12, np.inf)
+    size = float((M @ wanted).max())
+    bounds, limits = (np.zeros(90), upper, nothing), (rows, least, none, np.ones(12))
+    q = Quadratic(M, M @ wanted, *bounds, *limits, (), size)
+    near = interior_point(q, np.zeros(90), parts=parts)
+    assert near is not None
+    np.testing.assert_allclose(near.x, expected, atol=1e-6)  # where Clarabel ends
+    assert near.at_lower.any()
+
+
+def test_sums_that_exclude_each_other_end_it_soon(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Multipliers prove it long before the steps run out."""
+    rows, least = np.array([[1.0, 1, 1], [-1, -1, -1]]), np.array([2.0, -1.9])
+    limits = (rows, least, np.full(2, np.inf), np.ones(2))
+    bounds = (np.zeros(3), np.full(3, np.inf), np.ones(3))
+    q = Quadratic(np.eye(3), np.ones(3), *bounds, *limits, (), 1.0)
+    monkeypatch.setattr(interior_point_module, "MAX_STEPS", 30)
+    monkeypatch.setattr(interior_point_module, "OFF", np.inf)
+    assert interior_point(q, np.zeros(3)) is None
+
+
 @pytest.mark.parametrize("n", [3, SHORT, 40])
 def test_products_of_rows_add_up_however_many_numbers_they_have(n: int) -> None:
     """Rows of few numbers, of all, and of none: against the product of matrices, to round-off."""
@@ -93,5 +126,6 @@ def test_products_of_rows_add_up_however_many_numbers_they_have(n: int) -> None:
     rows = rng.normal(size=(50, n)) * (rng.random((50, n)) < rng.random((50, 1)))
     rows[7] = 0
     weights = rng.random(50)
-    found = RowProducts(rows).sum(weights)
+    found = np.zeros((n, n))
+    RowProducts(rows).add_to(found, weights)
     np.testing.assert_allclose(found, (rows.T * weights) @ rows, atol=1e-12)
