@@ -155,7 +155,9 @@ class SessionFile:
             self._open_with(identity)
         lasting = *remarks_of_scene(scene), *remarks_of_film(scene, lazy_scene.settings)
         of_spectra = remarks_on_spectra(scene, constraints_of(scene.requests))
-        self._report_new((*lasting, *of_spectra, *remarks_of_memory(scene)))
+        self._report_new(
+            (*lasting, *of_spectra, *remarks_of_memory(scene, lazy_scene.settings.basis_spp))
+        )
         from lightpaint.scene.runtime.variant import use_variant
 
         # Remarks about this machine may not hold next time.

@@ -6,6 +6,7 @@ from lightpaint.lazy_names import lazy_names
 
 if TYPE_CHECKING:
     from lightpaint.basis.render.banded_film import check_memory as check_memory
+    from lightpaint.basis.render.banded_film import memory_expected as memory_expected
     from lightpaint.basis.render.banded_film import memory_needed as memory_needed
     from lightpaint.basis.render.banded_film import renders_in_bands as renders_in_bands
     from lightpaint.basis.render.basis_render import check_size as check_size

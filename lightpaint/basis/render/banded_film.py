@@ -7,6 +7,7 @@ lie in a temporary file, memory holds one band at a time, and planes are compute
 request.
 """
 
+import math
 import tempfile
 from abc import ABC, abstractmethod
 from collections.abc import Callable
@@ -17,7 +18,8 @@ import numpy as np
 from lightpaint.arrays import Bools, Floats
 from lightpaint.basis.basis import Basis
 from lightpaint.basis.file.file_planes import RowPlanes, TemporaryArray
-from lightpaint.basis.render.integrators import has_indirect_planes, plane_count
+from lightpaint.basis.file.lit_planes import MIN_LIGHTS
+from lightpaint.basis.render.integrators import depth_limit, has_indirect_planes, plane_count
 from lightpaint.basis.render.render_budget import BLOCK_SPP
 from lightpaint.basis.render.rendered_basis import ONE_PASS, mean_and_half_difference, method_of
 from lightpaint.errors import SceneError
@@ -31,6 +33,11 @@ if TYPE_CHECKING:
 
 #: Size of the sums of both halves, in bytes, up to which a film is traced whole; size of a band.
 WHOLE_MAX_BYTES, BAND_BYTES = 2**30, 2**28
+
+#: Bytes of a lit pixel of a light in memory, with its half difference; the share of the questions
+#: to lights that find light no other has found, in halls of 256 and 1,000 lights (docs/scaling.md);
+#: and the largest number of vertices after the first at which most paths still ask.
+LIT_BYTES, FOUND_SHARE, USUAL_VERTICES = 16, 0.55, 6
 
 
 def _is_banded(scene: Scene) -> bool:
@@ -319,6 +326,24 @@ def memory_needed(scene: Scene, *, in_bands: bool = False) -> int:
     # when they are written to a file; passes are small in comparison.
     sets = 12 if has_indirect_planes(scene) else 6
     return sets * images + 512 * SAMPLES_PER_PASS
+
+
+def memory_expected(scene: Scene, spp: int) -> int:
+    """Return about how many bytes rendering a basis takes; `memory_needed` is the upper bound.
+
+    In memory, many lights are dark in most pixels: each path asks some of them alone. spp: samples
+    per pixel.
+    """
+    from lightpaint.basis.render.tracer.one_pass import FIRST_EMITTER_SAMPLES, later_emitter_samples
+
+    bound = memory_needed(scene, in_bands=renders_in_bands(scene))
+    count, (height, width) = len(scene.lights), scene.size
+    if count < MIN_LIGHTS or not renders_in_bands(scene):
+        return bound
+    later = min(max(depth_limit(scene.integrator) - 2, 0), USUAL_VERTICES)
+    asked = spp * (FIRST_EMITTER_SAMPLES + later_emitter_samples(count) * later)
+    lit = 1 - math.exp(-FOUND_SHARE * asked / count)
+    return min(bound, round(count * height * width * LIT_BYTES * lit) + 3 * BAND_BYTES)
 
 
 def check_memory(scene: Scene, *, in_bands: bool = False) -> None:

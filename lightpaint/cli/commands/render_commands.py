@@ -289,7 +289,7 @@ def basis(*, scene: SceneFile, output: Path, settings: Settings) -> CommandOutco
         for remark in (
             *remarks_of_scene(scene_on_film),
             *of_film,
-            *remarks_of_memory(scene_on_film),
+            *remarks_of_memory(scene_on_film, settings.basis_spp),
         ):
             listen.say(remark)
         basis_on_film = obtain(scene_on_film, settings, listen)

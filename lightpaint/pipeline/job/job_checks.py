@@ -7,7 +7,12 @@ from pathlib import Path
 from typing import Any
 
 from lightpaint.basis import Basis, LightGroups, with_equal_lights
-from lightpaint.basis.render import memory_needed, remark_on_separate_renders, renders_in_bands
+from lightpaint.basis.render import (
+    memory_expected,
+    memory_needed,
+    remark_on_separate_renders,
+    renders_in_bands,
+)
 from lightpaint.display_text import some_names
 from lightpaint.errors import (
     BasisError,
@@ -324,15 +329,19 @@ def remarks_of_pictures() -> list[str]:
     return [] if oidn_is_installed() else [MISSING_REMARK]
 
 
-def remarks_of_memory(scene: Scene) -> list[str]:
-    """Return a remark if the basis of `scene` takes much memory."""
-    needed_bytes = memory_needed(scene, in_bands=renders_in_bands(scene))
-    if needed_bytes <= MUCH_MEMORY:
+def remarks_of_memory(scene: Scene, spp: int | None) -> list[str]:
+    """Return a remark if the basis of `scene` takes much memory.
+
+    spp: samples per pixel; None for the scene's own.
+    """
+    most = memory_needed(scene, in_bands=renders_in_bands(scene))
+    if most <= MUCH_MEMORY:
         return []
-    return [
-        f"{len(scene.lights)} lights of {scene.size[1]}x{scene.size[0]} pixels: "
-        f"up to {needed_bytes / 1e9:.1f} GB of memory"
-    ]
+    expected = memory_expected(scene, scene.spp if spp is None else spp)
+    text = f"at most {most / 1e9:.1f} GB of memory"
+    if expected < most:
+        text = f"about {expected / 1e9:.1f} GB of memory, {text.removesuffix(' of memory')}"
+    return [f"{len(scene.lights)} lights of {scene.size[1]}x{scene.size[0]} pixels: {text}"]
 
 
 def remarks_of_target(

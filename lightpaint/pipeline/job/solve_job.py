@@ -373,7 +373,10 @@ class Job:
         for scene in rendered_scenes[:1]:
             remarks += remarks_on_spectra(scene, self.all_constraints)
         for scene in rendered_scenes:
-            remarks += [*remarks_of_film(scene, self.settings), *remarks_of_memory(scene)]
+            remarks += [
+                *remarks_of_film(scene, self.settings),
+                *remarks_of_memory(scene, self.settings.basis_spp),
+            ]
         return remarks + remarks_of_pictures()
 
 

@@ -19,7 +19,13 @@ from lightpaint.basis.file.file_planes import FilePlanes
 from lightpaint.basis.file.half_floats import EncodedPlanes
 from lightpaint.basis.planes import MemoryPlanes
 from lightpaint.basis.render import banded_film, basis_render, render_parts
-from lightpaint.basis.render.banded_film import FileSums, SumPlanes, memory_needed, renders_in_bands
+from lightpaint.basis.render.banded_film import (
+    FileSums,
+    SumPlanes,
+    memory_expected,
+    memory_needed,
+    renders_in_bands,
+)
 from lightpaint.basis.render.basis_render import render_basis
 from lightpaint.basis.render.render_parts import PartRenderer, PartSums, plan_parts
 from lightpaint.errors import SceneError
@@ -186,6 +192,20 @@ def test_memory_is_that_of_half_floats_and_some_bands(
     whole_film, banded = (memory_needed(small_room, in_bands=x) for x in (False, True))
     height, width = small_room.size
     assert whole_film - banded > 9 * len(small_room.lights) * height * width * 12
+
+
+def test_memory_of_lit_pixels_grows_with_samples_up_to_the_bound(
+    small_room: Scene, band_memory: list[int], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    bound = memory_needed(small_room, in_bands=True)
+    assert memory_expected(small_room, 1) == bound  # few lights may be lit everywhere
+    monkeypatch.setattr(banded_film, "MIN_LIGHTS", 1)
+    monkeypatch.setattr(banded_film, "BAND_BYTES", 0)
+    height, width = small_room.size
+    values = len(small_room.lights) * height * width
+    expected = [memory_expected(small_room, spp) / values for spp in (1, 2, 1000)]
+    assert expected[0] < expected[1] < expected[2]
+    assert expected[-1] == banded_film.LIT_BYTES
 
 
 @pytest.mark.nightly
