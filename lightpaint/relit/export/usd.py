@@ -16,7 +16,7 @@ from typing import Any
 
 import numpy as np
 
-from lightpaint.arrays import RGB, Doubles, Position
+from lightpaint.arrays import RGB, Doubles, Position, as_rgb
 from lightpaint.basis import free_name
 from lightpaint.errors import OutputError
 from lightpaint.files import one_line
@@ -32,6 +32,10 @@ from lightpaint.scene.properties.site import EmitterPlace
 
 #: Whether a light is normalized, by Mitsuba's parameter.
 NORMALIZED = {"radiance": False, "irradiance": True, "intensity": True}
+
+#: The space of all colours here, as USD calls it, and spaces whose numbers are not converted.
+REC709 = "lin_rec709_scene"
+UNCONVERTED = {REC709, "lin_rec709", "raw", "data", "identity", "unknown"}
 
 #: Ratio of a prim's surface to its area visible along its axis, or from the side.
 SURFACE = {"SphereLight": 4.0, "CylinderLight": 3.141592653589793}
@@ -205,11 +209,12 @@ def _scope(opened_stage: Any) -> str:
 def _override(prim: Any, present: Any, kind: str, parameter: str, emission: RGB) -> None:
     """Set all properties of a light that affect its brightness and colour.
 
-    present: the light in the stage; None without one. A profile or a picture that it has there
-    would multiply the light, and is left out.
+    present: the light in the stage; None without one. A profile, a picture or filters that it has
+    there would multiply the light, and are left out.
     """
     from pxr import Gf, UsdLux
 
+    emission = from_rec709(emission, color_space_of(present))
     brightest = max(emission)
     color = [channel / brightest for channel in emission] if brightest > 0 else [1.0] * 3
     surface = SURFACE.get(kind, 1.0) if parameter == "intensity" else 1.0
@@ -225,6 +230,39 @@ def _override(prim: Any, present: Any, kind: str, parameter: str, emission: RGB)
         if present is not None and (attribute := present.GetAttribute(name)).IsAuthored():
             kind_of_value = attribute.GetTypeName()
             prim.CreateAttribute(name, kind_of_value, custom=False).Block()
+    if present is not None and UsdLux.LightAPI(present).GetFiltersRel().GetTargets():
+        light.CreateFiltersRel().SetTargets([])
+
+
+def color_space_of(prim: Any) -> Any:
+    """Return the colour space of a light's colour; None for linear Rec.709, and in old USD."""
+    from pxr import Gf, Usd, UsdLux
+
+    if prim is None or not hasattr(Usd, "ColorSpaceAPI"):
+        return None
+    name = Usd.ColorSpaceAPI.ComputeColorSpaceName(UsdLux.LightAPI(prim).GetColorAttr(), None)
+    if not name or name in UNCONVERTED or not Gf.ColorSpace.IsValid(name):
+        return None
+    return Gf.ColorSpace(name)
+
+
+def from_rec709(color: Sequence[float], space: Any) -> RGB:
+    """Return a colour of linear Rec.709 in a space of `color_space_of`, at least 0."""
+    from pxr import Gf
+
+    if space is None:
+        return as_rgb(color)
+    linear = Gf.Color(Gf.Vec3f(*color), Gf.ColorSpace(REC709))
+    return as_rgb([max(float(x), 0.0) for x in Gf.Color(linear, space).GetRGB()])
+
+
+def to_rec709(color: Sequence[float], space: Any) -> RGB:
+    """Return a colour of a space of `color_space_of` in linear Rec.709."""
+    from pxr import Gf
+
+    if space is None:
+        return as_rgb(color)
+    return as_rgb(Gf.Color(Gf.Color(Gf.Vec3f(*color), space), Gf.ColorSpace(REC709)).GetRGB())
 
 
 def open_stage(stage: Path) -> Any:

@@ -9,7 +9,15 @@ from pathlib import Path
 from typing import Any
 
 from lightpaint.arrays import RGB
-from lightpaint.relit.export.usd import Overrides, check_usd, like_stage, open_stage
+from lightpaint.relit.export.usd import (
+    Overrides,
+    check_usd,
+    color_space_of,
+    from_rec709,
+    like_stage,
+    open_stage,
+    to_rec709,
+)
 
 #: End of the attributes in which renderers keep the tag of a light, such as
 #: `inputs:karma:light:lpetag`.
@@ -117,6 +125,7 @@ def _multiply(override: Any, prim: Any, multiplier: RGB, time: Any) -> None:
     light.CreateIntensityAttr().Set(intensity, time)
     if greatest <= 0:
         return
-    color = present.GetColorAttr().Get()
-    scaled = Gf.Vec3f(*(c * m / greatest for c, m in zip(color, multiplier, strict=True)))
-    light.CreateColorAttr().Set(scaled, time)
+    space = color_space_of(prim)
+    color = to_rec709(present.GetColorAttr().Get(), space)
+    scaled = [c * m / greatest for c, m in zip(color, multiplier, strict=True)]
+    light.CreateColorAttr().Set(Gf.Vec3f(*from_rec709(scaled, space)), time)

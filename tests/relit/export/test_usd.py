@@ -7,7 +7,9 @@ from typing import Any
 import numpy as np
 import pytest
 
+from lightpaint.colour.primaries import ACESCG, from_rec709
 from lightpaint.relit.export.usd import usd_overrides
+from lightpaint.relit.export.usd_groups import usd_multipliers
 
 pytest.importorskip("pxr.UsdLux", reason="usd-core")
 from pxr import Gf, Usd, UsdGeom, UsdLux
@@ -103,6 +105,7 @@ def test_what_multiplies_a_light_in_the_stage_is_reset_over_it(tmp_path: Path) -
         shaping = UsdLux.ShapingAPI.Apply(prim)
         shaping.CreateShapingIesFileAttr("lamp.ies")
         shaping.CreateShapingFocusAttr(8.0)
+        UsdLux.LightAPI(prim).CreateFiltersRel().AddTarget("/hall/gel")
         shaping.CreateShapingConeAngleAttr(30.0)
     UsdLux.RectLight.Get(stage, "/hall/lamps/panel").CreateTextureFileAttr("window.exr")
     stage.Save()
@@ -115,8 +118,34 @@ def test_what_multiplies_a_light_in_the_stage_is_reset_over_it(tmp_path: Path) -
         assert (light.GetDiffuseAttr().Get(), light.GetSpecularAttr().Get()) == (1.0, 1.0)
         assert not shaping.GetShapingIesFileAttr().Get()
         assert not shaping.GetShapingFocusAttr().Get()
+        assert light.GetFiltersRel().GetTargets() == []
         assert shaping.GetShapingConeAngleAttr().Get() == 30.0  # its form is the stage's
     assert not UsdLux.RectLight.Get(relit, "/hall/lamps/panel").GetTextureFileAttr().Get()
+
+
+@pytest.mark.skipif(not hasattr(Usd, "ColorSpaceAPI"), reason="USD 24.11")
+def test_colors_are_in_the_space_of_the_stage(tmp_path: Path) -> None:
+    """A stage in ACEScg; the layer's colours are read back there, by the matrix of the ACES."""
+    stage = made_stage(tmp_path / "hall.usda")
+    space = Usd.ColorSpaceAPI.Apply(stage.GetPrimAtPath("/hall"))
+    space.CreateColorSpaceNameAttr().Set("lin_ap1_scene")
+    stage.Save()
+    to_acescg = from_rec709(ACESCG)
+    texts = (
+        usd_overrides(EMITTERS[:1], tmp_path / "hall.usda", tmp_path).text,
+        usd_multipliers({"panel": RGB}, tmp_path / "hall.usda", tmp_path).text,
+    )
+    # The stage's own light is white, 17 times: what its multiples are of.
+    for k, (text, white) in enumerate(zip(texts, (1.0, 17.0 * 2**3), strict=True)):
+        path = tmp_path / f"lights{k}.usda"
+        path.write_text(text, encoding="utf-8")
+        relit = Usd.Stage.Open(str(path))
+        api = UsdLux.LightAPI(relit.GetPrimAtPath("/hall/lamps/panel"))
+        level = api.GetIntensityAttr().Get() * 2.0 ** api.GetExposureAttr().Get()
+        # USD's matrices have the white of the ACES in five digits.
+        np.testing.assert_allclose(
+            level * np.array(api.GetColorAttr().Get()), white * to_acescg @ RGB, rtol=1e-4
+        )
 
 
 def test_nothing_else_of_the_stage_changes(tmp_path: Path) -> None:
