@@ -34,6 +34,9 @@ from lightpaint.sentences import Hint, Sentence
 #: Name for files that no convention matches, in place of a renderer.
 ONE_FILE_PER_LIGHT = "one file per light"
 
+#: The view layer of layers whose names have none, for people.
+UNNAMED_VIEW = "(unnamed)"
+
 #: Largest light by which groups exceed a picture that they add up to, as a share of its light:
 #: what denoising takes from their noise.
 MAX_SUM_EXCESS = 0.25
@@ -114,11 +117,12 @@ def _by_convention(
     if len(views) > 1:
         other = next(m for m in matches if _view(m) == views[1])
         pattern = f"{other[0][: other.start('name')]}{NAME_FIELD}{other[0][other.end('name') :]}"
+        named = [x or UNNAMED_VIEW for x in views]
         remarks.append(
             Sentence(
-                f"of the view layers {some_names(views)} the first is taken: ",
+                f"of the view layers {some_names(named)} the first is taken: ",
                 Hint("pattern", pattern),
-                f" takes {views[1]}",
+                f" takes {named[1]}",
             )
         )
     matches = [m for m in matches if _view(m) == view]

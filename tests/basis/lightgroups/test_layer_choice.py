@@ -279,3 +279,10 @@ def test_short_names_stay_apart(stems: list[str]):
 def test_files_of_any_name_are_lights_but_for_the_beauty():
     choice = choose_files(["key", "Beauty", "fill"])
     assert (choice.lights, choice.beauty) == ({"key": "key", "fill": "fill"}, "Beauty")
+
+
+def test_of_several_views_each_has_a_name_in_the_remark() -> None:
+    """Also the default view of an EXR of two eyes, whose layers have no view in their names."""
+    choice = _choose("", "RGBA_key", "right", "right.RGBA_key")
+    [remark] = choice.remarks
+    assert str(remark).startswith("of the view layers (unnamed), right the first is taken")
