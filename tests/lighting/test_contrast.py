@@ -519,3 +519,10 @@ def test_lights_stay_where_every_change_leads_away_from_the_paint(make_basis: An
     assert held.delta_e <= held.requested_change
     literal = lp.solve(basis, target, literal=True)
     assert hold_to_current(literal) is literal  # the paper's answer stays what it is
+
+
+def test_no_constraint_is_blamed_for_lights_that_stay(make_basis: Any) -> None:
+    """Without the hold they stay as well, as larger changes lead away from the paint."""
+    basis, target = out_of_reach(make_basis)
+    held = hold_to_current(lp.solve(basis, target, hold=4.0, colors="gentle"))
+    assert lp.compare_appearance(held).reasons == ()

@@ -356,7 +356,9 @@ def released_weights(
         constraints=problem.constraints if constraints is None else constraints,
         fit=fit or problem.fit,
     )
-    released_solution = solution_of(replace(released, start=problem.start))
+    # What holds an answer to other lights is no reason that could be released.
+    released = replace(released, start=problem.start, tether=problem.tether)
+    released_solution = solution_of(released)
     if problem.corrected is not None and solution.basis.knows_noise:
         released_solution = correct_noise(released_solution)
     return released_solution.weights

@@ -21,6 +21,7 @@ from lightpaint.lighting.constraints.light_constraints import (
 from lightpaint.lighting.fit import Fit
 from lightpaint.lighting.joined_views import Views
 from lightpaint.lighting.loss.painting import importance_sums, unpainted_weight
+from lightpaint.lighting.normal_equations import NormalEquations
 from lightpaint.lighting.problem import Problem
 from lightpaint.lighting.solution import Solution
 from lightpaint.lighting.solver import solution_of
@@ -215,8 +216,17 @@ class PixelSample:
             constraints=Constraints() if "constraints" in without else in_force,
             fit=replace(fit, **change),
         )
-        begin = replace(problem, start=self.problem.start)
+        begin = replace(problem, start=self.problem.start, tether=self._tether_of(problem))
         return solution_of(begin).weights
+
+    def _tether_of(self, sampled: Problem) -> NormalEquations | None:
+        """Return the pull that holds the answer to other lights, in the scale of the sample: it is
+        no reason that could be released.
+        """
+        tether = self.problem.tether
+        if tether is None:
+            return None
+        return tether.scaled(float(sampled.power.sum() / max(self.problem.power.sum(), 1e-300)))
 
     def _unpainted_weight(self, fit: Fit, remaining: Sequence[int]) -> float:
         """Return the weight of each of the sampled unpainted pixels of some views.
