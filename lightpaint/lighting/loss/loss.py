@@ -61,6 +61,11 @@ class PixelLoss(ABC):
         """True if `curved_squares` are nearer to the loss than `squares`."""
         return False
 
+    @property
+    def guide(self) -> Floats | None:
+        """(3, p), a picture without noise that shows what the light shows; 0 where unknown."""
+        return None
+
     def __len__(self) -> int:
         return len(self.importance)
 

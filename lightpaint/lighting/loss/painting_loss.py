@@ -81,6 +81,16 @@ class PaintedPixels(PixelLoss):
         """True if light itself is compared."""
         return self.transform is None
 
+    @property
+    def guide(self) -> Floats:
+        """The painting, where it is the whole goal: the current look is noisy, and paint that
+        means "at least" hides what is brighter.
+        """
+        is_goal = self.share == 0
+        if self.at_least is not None:
+            is_goal &= ~self.at_least.any(axis=0)
+        return np.where(is_goal, self.painted, 0)
+
     def encode(self, x: Floats) -> Doubles:
         """Return V(x), (3, p)."""
         light: Doubles = x.astype(np.float64, copy=False)

@@ -8,7 +8,11 @@ from nightly import nightly
 
 from lightpaint.colour.display.view_transform import ViewTransform
 from lightpaint.lighting.analysis.noise.noise_correction import correct_noise
-from lightpaint.lighting.analysis.noise.residuals import steadier_light
+from lightpaint.lighting.analysis.noise.residuals import (
+    PixelGradients,
+    Residuals,
+    steadier_light,
+)
 from lightpaint.lighting.analysis.noise.uncertainty import error_bars
 from lightpaint.lighting.solver import solve
 from lightpaint.target.painted_target import Target
@@ -114,3 +118,75 @@ def test_an_edge_stays():
     noise = np.full_like(light, 0.1)
     steady, _ = steadier_light(light, noise, np.ones((20, 20, 1)))
     assert np.abs(steady - light)[:, 8:12].max() < 0.1
+
+
+def _texture() -> Any:
+    """Surfaces that change from pixel to pixel, (h, w, 1)."""
+    return np.random.default_rng(7).uniform(0.1, 1, (*SIZE, 1))
+
+
+def test_textured_light_is_steadied_relative_to_a_painting_of_it():
+    """Noise of a tenth; the texture hides it from pixels alone, and the ratio shows it."""
+    shown, rng = _texture() * np.ones(3), np.random.default_rng(1)
+    a, b = shown * (1 + 0.1 * np.sqrt(2) * rng.standard_normal((2, *SIZE, 3)))
+    light, half, counted = (a + b) / 2, (a - b) / 2, np.ones((*SIZE, 1))
+    painting = shown * np.linspace(0.5, 2, SIZE[1])[:, None]
+
+    def remaining(guide: Any) -> float:
+        steady, _ = steadier_light(light, half, counted, guide)
+        return float(np.square(steady / shown - 1).mean() / np.square(light / shown - 1).mean())
+
+    assert remaining(None) > 0.8
+    # The mean of eight pixels, and what shares are off; most near edges.
+    assert remaining(painting) < 0.35
+    # Without a painting in one half, nothing changes there.
+    half_painting = painting * (np.arange(SIZE[1]) < 12)[:, None]
+    without, found = (steadier_light(light, half, counted, x)[0] for x in (None, half_painting))
+    np.testing.assert_array_equal(found[:, 12:], without[:, 12:])
+    assert np.square(found / shown - 1)[:, :10].mean() < np.square(without / shown - 1).mean() / 2
+
+
+def test_a_painting_with_the_noise_of_the_light_steadies_nothing():
+    """The noisy look itself, painted over: its ratio to the light has no noise at all."""
+    images, halves = _noisy(_pools(), 0.3, 1)
+    light, half = images.sum(axis=0) * _texture(), halves.sum(axis=0) * _texture()
+    counted = np.ones((*SIZE, 1))
+    alone = steadier_light(light, half, counted)
+    for gain in (1.0, 0.7):
+        found = steadier_light(light, half, counted, gain * light)
+        np.testing.assert_array_equal(found[0], alone[0])
+
+
+def test_no_tangent_leads_across_the_edge_of_clipping(make_basis: Any):
+    """A pixel that is clipped for sure, beside noisy ones below white: its loss has no slope."""
+    rng = np.random.default_rng(2)
+    a, b = 0.8 * (1 + 0.1 * rng.standard_normal((2, 1, *SIZE, 3)))
+    a[0, 12, 12], b[0, 12, 12] = 1.101, 1.099
+    basis = make_basis(images=(a + b) / 2, half_differences=(a - b) / 2)
+    image = np.full((*SIZE, 3), 0.8, np.float32)
+    target = Target("t", image, np.ones(SIZE, np.float32), everything=True)
+    transform = ViewTransform("srgb")
+    solution = solve(basis, target, literal=True, space="display", transform=transform)
+    gradients = PixelGradients.of(solution, Residuals.of(solution))
+    pixel = 12 * SIZE[1] + 12
+    assert solution.weights.min() * 1.1 > 1.05
+    assert not gradients.mean[pixel].any()
+    assert gradients.mean.any(axis=1).sum() > 500
+
+
+def test_answers_to_a_painting_of_a_texture_have_no_bias(make_basis: Any):
+    """Half of the noise of textured pictures is in the bend of a display's curve."""
+    clean, seeds = _pools() * _texture(), 60
+    target = _painting(clean)
+    options: dict[str, Any] = {"literal": True, "space": "display"}
+    options |= {"transform": ViewTransform("srgb")}
+    truth = solve(make_basis(images=clean), target, **options).weights
+    solved = []
+    for seed in range(seeds):
+        images, halves = _noisy(clean, 0.5, seed)
+        basis = make_basis(images=images, half_differences=halves)
+        solved.append(correct_noise(solve(basis, target, **options), share=1).weights)
+    error = np.mean(solved, axis=0) - truth
+    spread = np.std(solved, axis=0, ddof=1)
+    # Channels have the same noise: four standard errors of the mean over seeds.
+    assert (np.abs(error) < 4 * spread / np.sqrt(seeds)).all()

@@ -9,7 +9,9 @@ of G at a steadier light x̃, which the neighbours give, is straight in x again:
 
     G(x̃) + G′(x̃) (x − x̃)
 
-Where x̃ is not the true light, the tangent is wrong to second order only (docs/method.md).
+Where x̃ is not the true light, the tangent is wrong to second order only (docs/method.md). A
+painting shows the edges and textures of its scene without noise, so light is steadied relative to
+it: their ratio changes far less from pixel to pixel than light does.
 
 A render that serves as a painting has noise, which no lights make and no brush paints. A second
 difference along both axes,
@@ -56,6 +58,13 @@ BESIDE, WINDOW = 1, 3
 
 #: Step of the differences that stand for derivatives, relative to the light of a pixel.
 STEP = 1e-2
+
+#: Light of a painting below which a ratio to it says little, relative to its mean.
+DARK = 0.01
+
+#: Least change of a ratio from pixel to pixel, relative to what its noise makes, with which the
+#: painting does not have the noise of the light itself, as a noisy look that was painted over has.
+MIN_INDEPENDENT = 0.5
 
 
 @dataclass(frozen=True)
@@ -186,7 +195,8 @@ class PixelGradients:
             D = weight.reshape(-1, weight.shape[2]).astype(np.float64)
             return cls(D * residuals.residual(everything), -D * residuals.noise(everything))
         pixels, look = problem.loss.pixels, None
-        light = _Steadied.of(solution, residuals.predicted, residuals.half)
+        light = _Steadied.of(solution, residuals.predicted, residuals.half, pixels.guide)
+        light = light.within_clipping(pixels)
         if residuals.current is not None:
             shown = solution.basis.current_look.reshape(-1, 3)
             look = _Steadied.of(solution, shown, residuals.current)
@@ -215,18 +225,41 @@ class _Steadied:
     noise_left: Doubles
 
     @classmethod
-    def of(cls, solution: Solution, light: Floats, noise: Floats) -> "_Steadied":
-        """Steady a picture of all views. light: (p, 3); noise: (p, 3), its half differences."""
+    def of(
+        cls, solution: Solution, light: Floats, noise: Floats, guide: Floats | None = None
+    ) -> "_Steadied":
+        """Steady a picture of all views. light: (p, 3); noise: (p, 3), its half differences. guide:
+        (3, p), as in `PixelLoss`.
+        """
         views, size = solution.problem.views, solution.importance.shape
         counted = (solution.importance > 0).astype(np.float64)[..., None]
-        pictures = light.reshape(*size, 3), noise.reshape(*size, 3), counted
+        pictures = [light.reshape(*size, 3), noise.reshape(*size, 3), counted]
+        if guide is not None:
+            pictures.append(guide.T.reshape(*size, 3))
         parts = []
         for k in range(len(views)):
-            image, half, counts = (views.part(x, k).astype(np.float64) for x in pictures)
-            parts.append(steadier_light(image, half, counts))
+            parts.append(steadier_light(*(views.part(x, k).astype(np.float64) for x in pictures)))
         steady, share = (planes_of(views.join(x)) for x in zip(*parts, strict=True))
         own = planes_of(noise)
         return cls(steady, planes_of(light) - steady, own, np.sqrt(1 - np.square(share)) * own)
+
+    def within_clipping(self, pixels: PixelLoss) -> "_Steadied":
+        """Return the same with pixels left as they are that would enter or leave clipping: no
+        tangent leads across its edge.
+        """
+        light = self.steady + self.distance
+        step = 2 * STEP * np.abs(self.steady).max(axis=0)
+        was_flat, *are_flat = (
+            pixels.squares(x, from_clipping=False)[1] == 0
+            for x in (light, self.steady - step, self.steady + step)
+        )
+        stays = np.logical_or.reduce([x != was_flat for x in are_flat])
+        return _Steadied(
+            np.where(stays, light, self.steady),
+            np.where(stays, 0, self.distance),
+            self.noise,
+            np.where(stays, self.noise, self.noise_left),
+        )
 
 
 @dataclass(frozen=True)
@@ -269,23 +302,49 @@ def _gradient(pixels: PixelLoss, light: Doubles) -> Doubles:
     return image
 
 
-def steadier_light(light: Doubles, noise: Doubles, counted: Doubles) -> tuple[Doubles, Doubles]:
+def steadier_light(
+    light: Doubles, noise: Doubles, counted: Doubles, guide: Doubles | None = None
+) -> tuple[Doubles, Doubles]:
     """Return light moved towards the mean of its neighbours as far as only noise differs there,
     and the share of the way that it moves, (h, w, 3) each.
 
     The share is V / (V + B) with the variance V and the squared change B around the pixel, without
-    the pixel itself: how far it moves does not depend on its own noise.
+    the pixel itself: how far it moves does not depend on its own noise. Relative to a guide, B is
+    the change of the ratio; of both ways, the one with the larger share counts.
 
     light, noise: (h, w, 3), an image and its half differences. counted: (h, w, 1), 1 for pixels
-    that count as neighbours, else 0.
+    that count as neighbours, else 0. guide: (h, w, 3), a picture without noise of what the light
+    shows; 0 where it is unknown.
+    """
+    steady, share, _ = _steadied(light, noise, counted)
+    if guide is None:
+        return steady, share
+    is_guided = counted * (guide > 0).any(axis=-1, keepdims=True)
+    shown = np.maximum(guide, 0)
+    floor = DARK * (shown * is_guided).sum() / max(3 * is_guided.sum(), 1)
+    unit = np.where(is_guided, shown + floor, 1)
+    ratio, share_of_ratio, change = _steadied(light / unit, noise / unit, is_guided)
+    is_better = is_guided * (share_of_ratio > share) * (change >= MIN_INDEPENDENT) > 0
+    return (
+        np.where(is_better, ratio * unit, steady),
+        np.where(is_better, share_of_ratio, share),
+    )
+
+
+def _steadied(light: Doubles, noise: Doubles, counted: Doubles) -> tuple[Doubles, Doubles, Doubles]:
+    """Return the light and share of `steadier_light` without a guide, and the squared change from
+    pixel to pixel relative to what noise makes of it, (h, w, 3) each.
     """
     beside, noise_beside = (_mean_beside(x, counted, BESIDE) for x in (light, noise))
-    variance = np.square(noise)
-    change = np.square(light - beside) - variance - np.square(noise_beside)
-    V, B = (_mean_beside(x, counted, WINDOW) for x in (variance, change))
-    total = V + np.maximum(B, 0)
+    variance, variance_beside = np.square(noise), np.square(noise_beside)
+    V, W, changed = (
+        _mean_beside(x, counted, WINDOW)
+        for x in (variance, variance + variance_beside, np.square(light - beside))
+    )
+    total = V + np.maximum(changed - W, 0)
     share = np.divide(V, total, out=np.zeros_like(V), where=V > 0)
-    return np.asarray(light + share * (beside - light)), share
+    change = np.divide(changed, W, out=np.ones_like(V), where=W > 0)
+    return light + share * (beside - light), share, change
 
 
 def _mean_beside(image: Doubles, counted: Doubles, radius: int) -> Doubles:
