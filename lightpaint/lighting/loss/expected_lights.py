@@ -268,17 +268,20 @@ class NoisyBlocks:
             _weighted_means(basis.current_noise, counted, side),
         )
 
-    def disturbed(self, rng: np.random.Generator, amount: float = 1.0) -> Wash:
-        """Return the wash with more noise: in each block, its half difference of either sign.
-
-        amount: of this noise, relative to the noise of the basis.
+    def disturbed(self, rng: np.random.Generator) -> tuple[Wash, Wash]:
+        """Return the wash with more noise, in each block its half difference of either sign, and
+        the same with all signs reversed.
         """
-        signs = rng.choice(np.array([-amount, amount], np.float32), self.blocks.importance.shape)
-        return replace(
-            self.blocks,
-            rows=self.blocks.rows + signs.ravel() * self.noise,
-            look=self.blocks.look + signs[..., None] * self.look_noise,
-        ).wash
+        signs = rng.choice(np.array([-1, 1], np.float32), self.blocks.importance.shape)
+        first, second = (
+            replace(
+                self.blocks,
+                rows=self.blocks.rows + x.ravel() * self.noise,
+                look=self.blocks.look + x[..., None] * self.look_noise,
+            ).wash
+            for x in (signs, -signs)
+        )
+        return first, second
 
 
 def light_rows(planes: Planes, counted: Doubles, side: int) -> Floats:

@@ -1,9 +1,12 @@
 """Error bars of sketches, whose wishes are found in a noisy look."""
 
+from pathlib import Path
+from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
 import pytest
+from PIL import Image
 
 import lightpaint as lp
 from lightpaint.lighting.analysis.noise import uncertainty
@@ -93,9 +96,97 @@ def test_disturbed_blocks_have_the_noise_of_the_basis_twice(make_basis: Any) -> 
     view, wash = NoisyBlocks.of(basis, target), PaintedBlocks.of(basis, target).wash
     assert np.array_equal(wash.rows, Wash.of(basis, target).rows)
     rng = np.random.default_rng(0)
-    draws = [view.disturbed(rng) for _ in range(64)]
+    pairs = [view.disturbed(rng) for _ in range(32)]
+    for first, second in pairs:
+        np.testing.assert_allclose(first.rows + second.rows, 2 * wash.rows, atol=1e-6)
+    draws = [first for first, _ in pairs]
     rows, looks = (np.stack([getattr(x, k) for x in draws]) for k in ("rows", "look"))
     # Each draw adds or subtracts the same amount: exact but for float32.
     assert np.allclose(np.abs(rows - wash.rows), np.abs(view.noise), atol=1e-6)
     assert np.allclose(looks, rows.sum(axis=2), rtol=1e-5)
     assert np.abs((rows > wash.rows).mean() - 0.5) < 4 * 0.5 / np.sqrt(64 * wash.counts.size)
+
+
+def test_half_of_the_difference_of_twins_is_scatter_unless_a_wish_is_found(
+    make_basis: Any, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """In closed form: what both twins do alike is no scatter; a step that one of them takes is."""
+    answer = _corrected(_noisy_basis(make_basis, 0), _sketch())
+    changes = {"a": 5.0, "b": 3.0, "c": 2.0, "d": 0.0}
+
+    def reading(name: str, wishes: int) -> Any:
+        return SimpleNamespace(wishes=range(wishes), change=changes[name])
+
+    pairs = [[reading("a", 2), reading("b", 2)], [reading("c", 3), reading("d", 2)]]
+    monkeypatch.setattr(uncertainty, "_disturbed_washes", lambda *_: (2, iter(pairs)))
+    as_read = uncertainty.solve_for(answer, answer.problem.solved)
+    monkeypatch.setattr(uncertainty, "_answer_to_reading", lambda _, wash: as_read + wash.change)
+    # (5 - 3) / 2, and the mean square of 2 and 0.
+    expected = np.sqrt((1.0**2 + (2.0**2 + 0) / 2) / 2)
+    np.testing.assert_allclose(ReadingNoise.of(answer).scatter, expected, rtol=1e-12)
+
+
+TEXTURED_ROOM = """<scene version="3.0.0">
+    <integrator type="path"><integer name="max_depth" value="5"/></integrator>
+    <sensor type="perspective" id="camera"><float name="fov" value="60"/>
+        <transform name="to_world"><lookat origin="0 1.1 3.6" target="0 0.95 0" up="0 1 0"/>
+        </transform><film type="hdrfilm"><integer name="width" value="40"/>
+        <integer name="height" value="24"/></film></sensor>
+    <bsdf type="diffuse" id="t"><texture name="reflectance" type="bitmap">
+        <string name="filename" value="texture.png"/></texture></bsdf>
+    <shape type="rectangle"><transform name="to_world"><scale value="3"/>
+        <rotate x="1" angle="-90"/></transform><ref id="t"/></shape>
+    <shape type="rectangle"><transform name="to_world"><scale value="3"/><translate z="-1"/>
+        </transform><ref id="t"/></shape>
+    <shape type="sphere"><point name="center" x="0" y="0.6" z="0"/>
+        <float name="radius" value="0.6"/><ref id="t"/></shape>
+    <shape type="rectangle" id="panel"><transform name="to_world"><scale value="0.4"/>
+        <rotate x="1" angle="90"/><translate x="-1" y="2.4"/></transform>
+        <emitter type="area"><rgb name="radiance" value="6 5 4"/></emitter></shape>
+    <shape type="rectangle" id="strip"><transform name="to_world"><scale x="0.1" y="0.6"/>
+        <rotate y="1" angle="-90"/><translate x="2" y="1" z="1"/></transform>
+        <emitter type="area"><rgb name="radiance" value="9 9 12"/></emitter></shape>
+    <emitter type="spot" id="spot"><transform name="to_world">
+        <lookat origin="1 2.5 2" target="0 0 0" up="0 1 0"/></transform>
+        <rgb name="intensity" value="5"/></emitter>
+    <emitter type="constant" id="sky"><rgb name="radiance" value="0.2"/></emitter>
+</scene>"""
+
+
+@pytest.mark.nightly
+@pytest.mark.parametrize("spp", [16, 32, 64])
+def test_error_bars_of_default_answers_in_a_textured_room_are_as_wide_as_the_errors(
+    tmp_path: Path, spp: int
+) -> None:
+    """Of a painting in 8 bits, a fifth around 1, and intervals about 95 % over lights and seeds."""
+    texels = np.random.default_rng(3).integers(20, 255, (256, 256, 3), dtype=np.uint8)
+    Image.fromarray(texels).save(tmp_path / "texture.png")
+    (tmp_path / "room.xml").write_text(TEXTURED_ROOM, encoding="utf-8")
+    scene = lp.load_scene(tmp_path / "room.xml")
+    truth = lp.render_basis(scene, spp=4096, seed=999)
+    levels = [[0.5, 0.5, 0.5], [1.5, 1, 0.7], [2, 2, 2], [0.3, 0.4, 0.6]]
+    view = lp.ViewTransform("srgb")
+    codes = np.round(255 * view.encode(0.5 * truth.mix(np.array(levels))))
+    target = lp.Target(
+        "painted",
+        view.decode(codes / 255).astype(np.float32),
+        np.ones(truth.size, np.float32),
+        everything=True,
+        at_least=codes >= 255,
+        transform=view,
+        through_view=True,
+    )
+    best, solved, stated, held = _corrected(truth, target).weights, [], [], []
+    for seed in range(60):
+        answer = _corrected(lp.render_basis(scene, spp=spp, seed=seed), target)
+        bars = lp.error_bars(answer)
+        assert bars is not None
+        low, high = bars.interval
+        solved.append(answer.weights)
+        stated.append(bars.standard_error)
+        held.append((low <= best) & (best <= high))
+    errors = np.sqrt(np.square(np.array(solved) - best).mean(axis=0))
+    ratio = np.exp(np.log(np.median(stated, axis=0) / errors).mean())
+    # One wish moves all lights together, so that a scatter over seeds has an error of a tenth.
+    assert 0.8 < ratio < 1.3
+    assert 0.92 < np.mean(held) < 0.99

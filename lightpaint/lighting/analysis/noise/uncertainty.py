@@ -17,7 +17,10 @@ takes to be a wish, two become one, or one more is found. The noise of M does no
 
 So the painting is read again and again with noise added, the half difference of each block of
 pixels with either sign (a wild bootstrap, Wu 1986), and the last linear problem is solved with what
-each reading asks for (docs/method.md, "How sure").
+each reading asks for. Each reading has a twin with all signs reversed, and half of their difference
+counts: what twice the noise does in the mean is no scatter. A wish that either twin finds or loses
+is a step, which often only one of them takes: there the changes of both count (docs/method.md, "How
+sure").
 """
 
 import math
@@ -44,21 +47,16 @@ from lightpaint.lighting.analysis.noise.noise import (
 from lightpaint.lighting.analysis.noise.weight_directions import WeightResponse, solve_for
 from lightpaint.lighting.answer.lighting import LightSetting
 from lightpaint.lighting.loss.expected_lights import NoisyBlocks, Wash
-from lightpaint.lighting.loss.weight_penalty import PaintTerms
 from lightpaint.lighting.normal_equations import NormalEquations
 from lightpaint.lighting.problem import Problem, ViewsReading, are_sketches
 from lightpaint.lighting.solution import Solution
 from lightpaint.progress import with_progress
 
-#: Readings of a painting, and of one for many lights, whose solves take long.
-READINGS, FEW_READINGS = 8, 3
+#: Pairs of readings of a painting, and of one for many lights, whose solves take long.
+PAIRS, FEW_PAIRS = 4, 2
 
 #: Fewest lights that count as many.
 MANY_LIGHTS = 64
-
-#: Amount of noise that is added, relative to the noise of the basis. A threshold answers less to
-#: noise that comes on top of other noise (docs/benchmarks.md has how often intervals hold).
-AMOUNT = 1.2
 
 #: Seed of the signs of the noise that is added.
 SEED = 1
@@ -94,28 +92,38 @@ class ReadingNoise:
         problem = solution.problem
         if not problem.fit.reads_wishes(is_sketch=are_sketches(problem.views)):
             return cls(np.zeros_like(solution.weights), 1.0)
-        count = READINGS if len(solution.weights) < MANY_LIGHTS else FEW_READINGS
-        as_read = solve_for(solution, problem.solved)
-        changes = []
-        for wash in _disturbed_washes(problem, count):
-            disturbed = replace(problem, **vars(_terms_of(problem, wash)))
-            moved = solve_for(replace(solution, problem=disturbed), problem.solved)
-            changes.append(moved - as_read)
-        return cls(np.sqrt(np.square(changes).mean(axis=0)), float(t_ratios(np.array(count))))
+        count = PAIRS if len(solution.weights) < MANY_LIGHTS else FEW_PAIRS
+        as_read, squares = solve_for(solution, problem.solved), []
+        known, pairs = _disturbed_washes(problem, count)
+        for pair in pairs:
+            changes = [_answer_to_reading(solution, wash) - as_read for wash in pair]
+            is_smooth = all(len(wash.wishes) == known for wash in pair)
+            parts = [(changes[0] - changes[1]) / 2] if is_smooth else changes
+            squares.append(np.square(parts).mean(axis=0))
+        return cls(np.sqrt(np.mean(squares, axis=0)), float(t_ratios(np.array(count))))
 
 
-def _terms_of(problem: Problem, wash: Wash) -> PaintTerms:
-    """Return the terms of a painting with this wash."""
-    own, fit = problem.reference, problem.fit
-    return ViewsReading(problem.views, problem.power, own, fit, lambda: wash).terms()
-
-
-def _disturbed_washes(problem: Problem, count: int) -> Iterator[Wash]:
-    """Yield washes of the views of a problem, each with other noise."""
+def _disturbed_washes(problem: Problem, count: int) -> tuple[int, Iterator[list[Wash]]]:
+    """Return the number of wishes that the views of a problem show, and pairs of washes of them:
+    with more noise, and with its opposite.
+    """
     rng, views = np.random.default_rng(SEED), problem.views
     blocks = [NoisyBlocks.of(*view) for view in zip(views.bases, views.targets, strict=True)]
-    for _ in with_progress(range(count), "readings"):
-        yield Wash.joined([view.disturbed(rng, AMOUNT) for view in blocks])
+
+    def pairs() -> Iterator[list[Wash]]:
+        for _ in with_progress(range(count), "readings"):
+            disturbed = [view.disturbed(rng) for view in blocks]
+            yield [Wash.joined(washes) for washes in zip(*disturbed, strict=True)]
+
+    return sum(len(view.blocks.wash.wishes) for view in blocks), pairs()
+
+
+def _answer_to_reading(solution: Solution, wash: Wash) -> Doubles:
+    """Return the weights, (n, 3), of the last linear problem with what a wash asks for."""
+    problem = solution.problem
+    own, fit = problem.reference, problem.fit
+    terms = ViewsReading(problem.views, problem.power, own, fit, lambda: wash).terms()
+    return solve_for(replace(solution, problem=replace(problem, **vars(terms))), problem.solved)
 
 
 def noise_doubts(solution: Solution, power: Doubles) -> Doubles:
