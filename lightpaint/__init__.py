@@ -76,9 +76,9 @@ if TYPE_CHECKING:
     from lightpaint.lighting.solver import solve as solve
     from lightpaint.paint.notebook.widget import Painter as Painter
     from lightpaint.photometry.illuminance import Illuminance as Illuminance
+    from lightpaint.photometry.illuminance import MeasuringPlane as MeasuringPlane
     from lightpaint.photometry.measure import measure_glare as measure_glare
     from lightpaint.photometry.measure import measure_illuminance as measure_illuminance
-    from lightpaint.photometry.measuring_plane import MeasuringPlane as MeasuringPlane
     from lightpaint.photometry.planes_file import read_planes as read_planes
     from lightpaint.pipeline.job.settings import Settings as Settings
     from lightpaint.pipeline.job.solve_job import Job as Job

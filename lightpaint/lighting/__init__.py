@@ -38,21 +38,21 @@ if TYPE_CHECKING:
     from lightpaint.lighting.analysis.appearance.display_difference import (
         PaintComparison as PaintComparison,
     )
+    from lightpaint.lighting.analysis.appearance.display_difference import (
+        UnpaintedChange as UnpaintedChange,
+    )
+    from lightpaint.lighting.analysis.appearance.display_difference import (
+        change_from_scene as change_from_scene,
+    )
+    from lightpaint.lighting.analysis.appearance.display_difference import (
+        unpainted_change as unpainted_change,
+    )
     from lightpaint.lighting.analysis.appearance.held_answer import (
         hold_to_current as hold_to_current,
     )
     from lightpaint.lighting.analysis.appearance.limiting_reasons import Loosening as Loosening
     from lightpaint.lighting.analysis.appearance.limiting_reasons import Reason as Reason
     from lightpaint.lighting.analysis.appearance.pixel_sample import LimitGroup as LimitGroup
-    from lightpaint.lighting.analysis.appearance.unpainted_change import (
-        UnpaintedChange as UnpaintedChange,
-    )
-    from lightpaint.lighting.analysis.appearance.unpainted_change import (
-        change_from_scene as change_from_scene,
-    )
-    from lightpaint.lighting.analysis.appearance.unpainted_change import (
-        unpainted_change as unpainted_change,
-    )
     from lightpaint.lighting.analysis.diagnosis import Diagnosis as Diagnosis
     from lightpaint.lighting.analysis.diagnosis import Place as Place
     from lightpaint.lighting.analysis.diagnosis import diagnose as diagnose

@@ -16,9 +16,11 @@ from lightpaint.lighting.analysis.appearance.appearance import (
     compare_appearance,
     with_undetermined,
 )
-from lightpaint.lighting.analysis.appearance.display_difference import PaintComparison
+from lightpaint.lighting.analysis.appearance.display_difference import (
+    PaintComparison,
+    unpainted_change,
+)
 from lightpaint.lighting.analysis.appearance.pixel_sample import PixelSample
-from lightpaint.lighting.analysis.appearance.unpainted_change import unpainted_change
 from lightpaint.lighting.analysis.noise.uncertainty import error_bars
 from lightpaint.lighting.answer.combination import combine
 from lightpaint.lighting.constraints.constraint_table import Constraints
