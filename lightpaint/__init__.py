@@ -51,8 +51,8 @@ if TYPE_CHECKING:
     from lightpaint.images.object_map import Objects as Objects
     from lightpaint.lighting.analysis.answer_analysis import Analysis as Analysis
     from lightpaint.lighting.analysis.answer_analysis import analyse as analyse
-    from lightpaint.lighting.analysis.appearance.appearance import Appearance as Appearance
-    from lightpaint.lighting.analysis.appearance.appearance import (
+    from lightpaint.lighting.analysis.appearance.answer_appearance import Appearance as Appearance
+    from lightpaint.lighting.analysis.appearance.answer_appearance import (
         compare_appearance as compare_appearance,
     )
     from lightpaint.lighting.analysis.diagnosis import Diagnosis as Diagnosis

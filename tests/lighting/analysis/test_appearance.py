@@ -10,7 +10,7 @@ from lightpaint.colour.color import delta_e, luminance
 from lightpaint.colour.display.view_transform import ViewTransform
 from lightpaint.images.object_map import Objects
 from lightpaint.lighting.analysis.answer_analysis import analyse
-from lightpaint.lighting.analysis.appearance.appearance import (
+from lightpaint.lighting.analysis.appearance.answer_appearance import (
     CLOSE,
     Appearance,
     compare_appearance,

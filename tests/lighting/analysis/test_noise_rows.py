@@ -10,7 +10,7 @@ from lightpaint.basis.file import lit_planes
 from lightpaint.basis.file.lit_planes import LitPlane, LitPlanes
 from lightpaint.basis.planes import MemoryPlanes
 from lightpaint.colour.display.view_transform import ViewTransform
-from lightpaint.lighting.analysis.noise.noise import NoisyPixels, noise_sums
+from lightpaint.lighting.analysis.noise.basis_noise import NoisyPixels, noise_sums
 from lightpaint.lighting.solver import solve
 from lightpaint.target.painted_target import Target
 
