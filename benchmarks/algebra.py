@@ -25,7 +25,7 @@ from lightpaint.basis.planes import BLOCK_PIXELS
 from lightpaint.lighting.algebra.optimum import minimise
 from lightpaint.lighting.constraints.constraint_table import Constraints
 from lightpaint.lighting.fit import Fit, resolve_for_targets
-from lightpaint.lighting.live.live import LiveSolver
+from lightpaint.lighting.live.live_solver import LiveSolver
 from lightpaint.lighting.live.live_view import LiveView
 from lightpaint.lighting.normal_equations import NormalEquations, inner_products
 from lightpaint.lighting.problem import Problem

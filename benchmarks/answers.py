@@ -179,7 +179,7 @@ def live_ms(basis: Any, image: np.ndarray, importance: np.ndarray) -> float:
     """Return the mean ms of the answers to a stroke that brings out the painting."""
     import lightpaint as lp
     from lightpaint.lighting.fit import resolve_fit
-    from lightpaint.lighting.live.live import LiveSolver
+    from lightpaint.lighting.live.live_solver import LiveSolver
     from lightpaint.lighting.live.live_view import LiveView
 
     transform, (height, width) = view_of(basis), basis.size

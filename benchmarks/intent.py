@@ -55,7 +55,7 @@ from lightpaint.basis.cache.cached_render import obtain_basis
 from lightpaint.colour.color import delta_e, kelvin_to_rgb, luminance
 from lightpaint.images.denoiser import denoised
 from lightpaint.lighting.analysis.appearance import limiting_reasons
-from lightpaint.lighting.live.live import LiveSolver
+from lightpaint.lighting.live.live_solver import LiveSolver
 from lightpaint.lighting.live.live_view import LiveView
 
 SCENES = Path(__file__).parent.parent / "scenes"

@@ -58,10 +58,10 @@ import lightpaint as lp
 from lightpaint.basis.basis import Origin
 from lightpaint.basis.lights import BasisLight
 from lightpaint.lighting.fit import resolve_fit
-from lightpaint.lighting.live.live import LiveSolver
+from lightpaint.lighting.live.live_solver import LiveSolver
 from lightpaint.lighting.live.live_view import LiveView
 from lightpaint.paint.launch import low_latency
-from lightpaint.paint.server.server import Server
+from lightpaint.paint.server.page_server import Server
 from lightpaint.paint.store.session_file import Store
 from lightpaint.paint.studio.session_studio import Studio
 from lightpaint.paint.subject import Subject

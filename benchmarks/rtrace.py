@@ -31,8 +31,8 @@ import numpy.typing as npt
 from rcontrib import SURFACES, X, Y, Z, radiance_tools, walls, write_walls
 
 from lightpaint import load_scene
+from lightpaint.photometry.illuminance import MeasuringPlane
 from lightpaint.photometry.measure import measure_illuminance
-from lightpaint.photometry.measuring_plane import MeasuringPlane
 from lightpaint.photometry.planes_file import read_planes
 from lightpaint.scene.mitsuba_scene import Scene
 

@@ -25,7 +25,7 @@ from image_lights import CHECK_SPP, MATERIALS, SCENE, TARGET_SPP, directions, mi
 
 import lightpaint as lp
 from lightpaint.arrays import Doubles, Floats
-from lightpaint.basis.texel_images import light_images
+from lightpaint.basis.lights import light_images
 from lightpaint.colour.color import luminance
 from lightpaint.colour.primaries import encode_display, to_8_bit
 from lightpaint.images.formats.exr import write_rgb

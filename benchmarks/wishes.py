@@ -34,9 +34,8 @@ from lightpaint.lighting.solver import solution_of
 from lightpaint.lighting.unknowns.reduction import reduce_to
 from lightpaint.lighting.wishes.wish_problems import with_wishes
 from lightpaint.lighting.wishes.wished_light import wished_light
-from lightpaint.photometry.illuminance import Illuminance
+from lightpaint.photometry.illuminance import Illuminance, PowerBudget, Wishes
 from lightpaint.photometry.measure import measure_illuminance
-from lightpaint.photometry.measuring_plane import PowerBudget, Wishes
 from lightpaint.photometry.planes_file import read_planes
 from lightpaint.scene.scene_reader import load_scene
 from lightpaint.target.painted_target import Target

@@ -51,8 +51,8 @@ if TYPE_CHECKING:
     from lightpaint.images.object_map import Objects as Objects
     from lightpaint.lighting.analysis.answer_analysis import Analysis as Analysis
     from lightpaint.lighting.analysis.answer_analysis import analyse as analyse
-    from lightpaint.lighting.analysis.appearance.appearance import Appearance as Appearance
-    from lightpaint.lighting.analysis.appearance.appearance import (
+    from lightpaint.lighting.analysis.appearance.answer_appearance import Appearance as Appearance
+    from lightpaint.lighting.analysis.appearance.answer_appearance import (
         compare_appearance as compare_appearance,
     )
     from lightpaint.lighting.analysis.diagnosis import Diagnosis as Diagnosis
@@ -76,9 +76,9 @@ if TYPE_CHECKING:
     from lightpaint.lighting.solver import solve as solve
     from lightpaint.paint.notebook.widget import Painter as Painter
     from lightpaint.photometry.illuminance import Illuminance as Illuminance
+    from lightpaint.photometry.illuminance import MeasuringPlane as MeasuringPlane
     from lightpaint.photometry.measure import measure_glare as measure_glare
     from lightpaint.photometry.measure import measure_illuminance as measure_illuminance
-    from lightpaint.photometry.measuring_plane import MeasuringPlane as MeasuringPlane
     from lightpaint.photometry.planes_file import read_planes as read_planes
     from lightpaint.pipeline.job.settings import Settings as Settings
     from lightpaint.pipeline.job.solve_job import Job as Job

@@ -22,6 +22,12 @@ from typing import Annotated, Any, Literal, Union, get_args, get_origin, get_typ
 from lightpaint.display_text import brief
 from lightpaint.errors import LightpaintError
 
+#: Maximum number of pixels of a film, and maximum samples per pixel: larger ones are typing errors.
+MAX_PIXELS, MAX_SPP = 2**28, 2**20
+
+#: Most texels of an image: each is a light with pictures of its own.
+MAX_TEXELS = 4096
+
 #: Purposes of options, in the order in which `--help` shows them.
 Theme = Literal[
     "Painting",
@@ -38,6 +44,18 @@ Theme = Literal[
     "Results",
 ]
 
+#: More than any light emits, yet small enough for sums and products in float32.
+BRIGHTEST = 1e30
+
+#: Longest name of a light, a group or a pattern for them, in characters.
+MAX_NAME = 1000
+
+#: Lights, groups, patterns or ties that a file or a message may list.
+MAX_LISTED = 10_000
+
+#: Colours that one light may mix: more than any fixture has.
+MAX_PRIMARIES = 16
+
 
 @dataclass(frozen=True)
 class Check:
@@ -51,18 +69,6 @@ class Check:
     expectation: str
     schema: Mapping[str, Any] = field(default_factory=dict)
     unit: str = ""
-
-
-#: More than any light emits, yet small enough for sums and products in float32.
-BRIGHTEST = 1e30
-
-
-#: Longest name of a light, a group or a pattern for them, in characters.
-MAX_NAME = 1000
-#: Lights, groups, patterns or ties that a file or a message may list.
-MAX_LISTED = 10_000
-#: Colours that one light may mix: more than any fixture has.
-MAX_PRIMARIES = 16
 
 
 def parse_number(text: str | float) -> float:

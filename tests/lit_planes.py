@@ -5,7 +5,7 @@ from pathlib import Path
 
 import numpy as np
 
-from lightpaint.photometry.measuring_plane import MeasuringPlane
+from lightpaint.photometry.illuminance import MeasuringPlane
 from lightpaint.scene.mitsuba_scene import Scene
 from lightpaint.scene.scene_reader import load_scene
 

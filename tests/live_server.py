@@ -20,7 +20,7 @@ from websockets.uri import parse_uri
 
 from lightpaint.paint.message_frames import from_frame, to_frame
 from lightpaint.paint.server.guard import PROTOCOL
-from lightpaint.paint.server.server import Server
+from lightpaint.paint.server.page_server import Server
 
 #: More than the system takes for somebody who does not read.
 LARGE = np.zeros((2048, 2048, 4), np.float32)

@@ -37,11 +37,10 @@ from lightpaint.photometry.measure import DEFAULT_ERROR
 from lightpaint.pipeline.job.settings import MAX_SUGGEST
 from lightpaint.scene.lights.light_choice import MAX_SEPARATE
 from lightpaint.scene.lights.lights_file import MAX_BYTES as MAX_LIGHTS_FILE
-from lightpaint.scene.limits import MAX_SPP
 from lightpaint.scene.quality_presets import PRESETS
 from lightpaint.scene.scene_reader import load_scene
 from lightpaint.target.template import PLAIN_FILES
-from lightpaint.validation import MAX_LISTED, MAX_NAME, MAX_PRIMARIES
+from lightpaint.validation import MAX_LISTED, MAX_NAME, MAX_PRIMARIES, MAX_SPP
 
 ROOT = Path(__file__).parent.parent
 #: Of the root, the documentation and its tutorials.

@@ -14,7 +14,7 @@ import lightpaint as lp
 from lightpaint.basis.file import basis_file, file_planes
 from lightpaint.images import denoiser, pixel_blocks
 from lightpaint.images.formats.png import png_bytes
-from lightpaint.lighting.loss import loss
+from lightpaint.lighting.loss import pixel_loss
 from lightpaint.report import answer_pictures
 
 #: Bytes of memory for each pixel that a solve and its report may take, beside the planes: 3.5 GB at
@@ -33,8 +33,8 @@ def stay_in_the_file(patch: pytest.MonkeyPatch, large: int) -> None:
     patch.setattr(file_planes, "STRIP_CACHE_BYTES", 16 * large)
     patch.setattr(file_planes, "PICKED_MAX_BYTES", 16 * large)
     patch.setattr(pixel_blocks, "BAND_PIXELS", large // 8)
-    patch.setattr(loss, "MAX_KEPT_PIXELS", large)
-    patch.setattr(loss, "STRIP_PIXELS", min(loss.STRIP_PIXELS, large // 4))
+    patch.setattr(pixel_loss, "MAX_KEPT_PIXELS", large)
+    patch.setattr(pixel_loss, "STRIP_PIXELS", min(pixel_loss.STRIP_PIXELS, large // 4))
     for module in (pixel_blocks, denoiser, answer_pictures):
         patch.setattr(module, "LARGE_PICTURE", large)
 

@@ -12,7 +12,7 @@ from spectral_room import DRIVES, LEVELS, paint_spectral_room, write_spectral_ro
 from webs import batwing, cosine, ies_text, street, write_web
 
 from lightpaint import Constraints, Job, Painting, SceneFile, Settings, run
-from lightpaint.colour.spectra.observer import EYE, read_observer
+from lightpaint.colour.spectra.spectrum import EYE, read_observer
 from lightpaint.errors import LightpaintError, SceneError
 from lightpaint.images.formats.exr import write_rgb
 from lightpaint.lighting.answer.lighting_file import read_lighting

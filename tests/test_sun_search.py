@@ -8,7 +8,7 @@ import pytest
 from command import run, run_refused, succeed
 from nightly import nightly
 
-from lightpaint.basis.texel_images import light_images
+from lightpaint.basis.lights import light_images
 from lightpaint.colour.color import luminance
 from lightpaint.colour.color_ranges import white_range
 from lightpaint.errors import LightpaintError

@@ -42,7 +42,7 @@ sys.path.insert(0, str(ROOT / "targets"))
 from clean import Floats, Surfaces, denoise, see  # noqa: E402
 
 import lightpaint as lp  # noqa: E402
-from lightpaint.basis.texel_images import light_images  # noqa: E402
+from lightpaint.basis.lights import light_images  # noqa: E402
 from lightpaint.images.denoiser import denoised  # noqa: E402
 from lightpaint.report.page.placement_section import aim_picture  # noqa: E402
 from lightpaint.report.rig.hung_lights import hung_lights  # noqa: E402

@@ -10,8 +10,8 @@ from dataclass_schemas import Schema, list_of, schema_of, value_schema
 from lightpaint.basis.basis import Origin
 from lightpaint.lighting.analysis.appearance.color_choices import ColorChoice
 from lightpaint.lighting.analysis.appearance.delivery import Delivery
+from lightpaint.lighting.analysis.appearance.display_difference import UnpaintedChange
 from lightpaint.lighting.analysis.appearance.limiting_reasons import Reason
-from lightpaint.lighting.analysis.appearance.unpainted_change import UnpaintedChange
 from lightpaint.lighting.analysis.diagnosis import Place
 from lightpaint.lighting.analysis.rendered_colors import SurfaceColor
 from lightpaint.lighting.fit import Fit

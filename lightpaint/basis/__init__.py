@@ -47,9 +47,15 @@ if TYPE_CHECKING:
     from lightpaint.basis.lightgroups.render_layers import is_exr as is_exr
     from lightpaint.basis.lightgroups.render_layers import is_light_groups as is_light_groups
     from lightpaint.basis.lightgroups.render_layers import is_own_basis as is_own_basis
+    from lightpaint.basis.lights import TEXELS as TEXELS
     from lightpaint.basis.lights import BasisLight as BasisLight
+    from lightpaint.basis.lights import LightImage as LightImage
     from lightpaint.basis.lights import Lights as Lights
     from lightpaint.basis.lights import free_name as free_name
+    from lightpaint.basis.lights import is_of_texels as is_of_texels
+    from lightpaint.basis.lights import joined_texels as joined_texels
+    from lightpaint.basis.lights import light_images as light_images
+    from lightpaint.basis.lights import texel_lights as texel_lights
     from lightpaint.basis.plane_results import array_name as array_name
     from lightpaint.basis.plane_results import array_once as array_once
     from lightpaint.basis.plane_results import make_once as make_once
@@ -66,12 +72,6 @@ if TYPE_CHECKING:
     from lightpaint.basis.planes import joined_planes as joined_planes
     from lightpaint.basis.planes import mix_channels as mix_channels
     from lightpaint.basis.planes import thinned as thinned
-    from lightpaint.basis.texel_images import TEXELS as TEXELS
-    from lightpaint.basis.texel_images import LightImage as LightImage
-    from lightpaint.basis.texel_images import is_of_texels as is_of_texels
-    from lightpaint.basis.texel_images import joined_texels as joined_texels
-    from lightpaint.basis.texel_images import light_images as light_images
-    from lightpaint.basis.texel_images import texel_lights as texel_lights
 
 if not TYPE_CHECKING:  # a type checker would take any name
     __getattr__, __dir__, __all__ = lazy_names(__name__)

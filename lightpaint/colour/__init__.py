@@ -80,17 +80,17 @@ if TYPE_CHECKING:
     from lightpaint.colour.spectra.color_rendering import color_rendering as color_rendering
     from lightpaint.colour.spectra.color_rendering import fidelity as fidelity
     from lightpaint.colour.spectra.color_rendering import white_of as white_of
-    from lightpaint.colour.spectra.observer import EYE as EYE
-    from lightpaint.colour.spectra.observer import Observer as Observer
-    from lightpaint.colour.spectra.observer import read_observer as read_observer
+    from lightpaint.colour.spectra.spectrum import EYE as EYE
     from lightpaint.colour.spectra.spectrum import FEWEST_POINTS as FEWEST_POINTS
     from lightpaint.colour.spectra.spectrum import STEP as STEP
     from lightpaint.colour.spectra.spectrum import WAVELENGTHS as WAVELENGTHS
+    from lightpaint.colour.spectra.spectrum import Observer as Observer
     from lightpaint.colour.spectra.spectrum import Spectrum as Spectrum
     from lightpaint.colour.spectra.spectrum import daylight as daylight
     from lightpaint.colour.spectra.spectrum import file_of_spectrum as file_of_spectrum
     from lightpaint.colour.spectra.spectrum import measured_points as measured_points
     from lightpaint.colour.spectra.spectrum import named_spectrum as named_spectrum
+    from lightpaint.colour.spectra.spectrum import read_observer as read_observer
     from lightpaint.colour.spectra.spectrum import rgb_of_powers as rgb_of_powers
     from lightpaint.colour.spectra.spectrum import spectrum_of as spectrum_of
     from lightpaint.colour.spectra.spectrum import xyz_of_powers as xyz_of_powers

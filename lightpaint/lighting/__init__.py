@@ -10,13 +10,13 @@ if TYPE_CHECKING:
     from lightpaint.lighting.analysis.answer_analysis import Analysis as Analysis
     from lightpaint.lighting.analysis.answer_analysis import analyse as analyse
     from lightpaint.lighting.analysis.answer_analysis import with_findings as with_findings
-    from lightpaint.lighting.analysis.appearance.appearance import CLOSE as CLOSE
-    from lightpaint.lighting.analysis.appearance.appearance import INVISIBLE as INVISIBLE
-    from lightpaint.lighting.analysis.appearance.appearance import Appearance as Appearance
-    from lightpaint.lighting.analysis.appearance.appearance import (
+    from lightpaint.lighting.analysis.appearance.answer_appearance import CLOSE as CLOSE
+    from lightpaint.lighting.analysis.appearance.answer_appearance import INVISIBLE as INVISIBLE
+    from lightpaint.lighting.analysis.appearance.answer_appearance import Appearance as Appearance
+    from lightpaint.lighting.analysis.appearance.answer_appearance import (
         compare_appearance as compare_appearance,
     )
-    from lightpaint.lighting.analysis.appearance.appearance import (
+    from lightpaint.lighting.analysis.appearance.answer_appearance import (
         with_undetermined as with_undetermined,
     )
     from lightpaint.lighting.analysis.appearance.color_choices import Choices as Choices
@@ -38,26 +38,26 @@ if TYPE_CHECKING:
     from lightpaint.lighting.analysis.appearance.display_difference import (
         PaintComparison as PaintComparison,
     )
+    from lightpaint.lighting.analysis.appearance.display_difference import (
+        UnpaintedChange as UnpaintedChange,
+    )
+    from lightpaint.lighting.analysis.appearance.display_difference import (
+        change_from_scene as change_from_scene,
+    )
+    from lightpaint.lighting.analysis.appearance.display_difference import (
+        unpainted_change as unpainted_change,
+    )
     from lightpaint.lighting.analysis.appearance.held_answer import (
         hold_to_current as hold_to_current,
     )
     from lightpaint.lighting.analysis.appearance.limiting_reasons import Loosening as Loosening
     from lightpaint.lighting.analysis.appearance.limiting_reasons import Reason as Reason
     from lightpaint.lighting.analysis.appearance.pixel_sample import LimitGroup as LimitGroup
-    from lightpaint.lighting.analysis.appearance.unpainted_change import (
-        UnpaintedChange as UnpaintedChange,
-    )
-    from lightpaint.lighting.analysis.appearance.unpainted_change import (
-        change_from_scene as change_from_scene,
-    )
-    from lightpaint.lighting.analysis.appearance.unpainted_change import (
-        unpainted_change as unpainted_change,
-    )
     from lightpaint.lighting.analysis.diagnosis import Diagnosis as Diagnosis
     from lightpaint.lighting.analysis.diagnosis import Place as Place
     from lightpaint.lighting.analysis.diagnosis import diagnose as diagnose
     from lightpaint.lighting.analysis.diagnosis import error_shares as error_shares
-    from lightpaint.lighting.analysis.noise.noise import denoised_matrix as denoised_matrix
+    from lightpaint.lighting.analysis.noise.basis_noise import denoised_matrix as denoised_matrix
     from lightpaint.lighting.analysis.noise.noise_correction import correct_noise as correct_noise
     from lightpaint.lighting.analysis.noise.noise_correction import refine as refine
     from lightpaint.lighting.analysis.noise.sample_demand import pixel_variances as pixel_variances
@@ -122,7 +122,7 @@ if TYPE_CHECKING:
     from lightpaint.lighting.linear_problem import sum_rows as sum_rows
     from lightpaint.lighting.linear_problem import summed_problem as summed_problem
     from lightpaint.lighting.linear_solve import solve_linear as solve_linear
-    from lightpaint.lighting.live.live import LiveSolver as LiveSolver
+    from lightpaint.lighting.live.live_solver import LiveSolver as LiveSolver
     from lightpaint.lighting.live.live_view import LiveView as LiveView
     from lightpaint.lighting.loss.painting import ignored_paint as ignored_paint
     from lightpaint.lighting.loss.painting import resolve_importance as resolve_importance

@@ -33,7 +33,6 @@ from lightpaint.lighting.linear_problem import (
 )
 from lightpaint.lighting.loss.expected_lights import ExpectedLights, Wash
 from lightpaint.lighting.loss.lit_pixels import LitPixels
-from lightpaint.lighting.loss.loss import Loss, Squares
 from lightpaint.lighting.loss.painting import (
     at_least_mask,
     choose_loss,
@@ -43,6 +42,7 @@ from lightpaint.lighting.loss.painting import (
     target_light,
     unpainted_weight_of,
 )
+from lightpaint.lighting.loss.pixel_loss import Loss, Squares
 from lightpaint.lighting.normal_equations import NormalEquations
 from lightpaint.lighting.unknowns.gamuts import PaintedLight
 from lightpaint.lighting.unknowns.lamps_in_view import GlowPaint

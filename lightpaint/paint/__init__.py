@@ -7,8 +7,8 @@ from lightpaint.lazy_names import lazy_names
 if TYPE_CHECKING:
     from lightpaint.paint.launch import paint_in_browser as paint_in_browser
     from lightpaint.paint.server.address import Reach as Reach
-    from lightpaint.paint.server.server import Server as Server
-    from lightpaint.paint.server.server import check_installed as check_installed
+    from lightpaint.paint.server.page_server import Server as Server
+    from lightpaint.paint.server.page_server import check_installed as check_installed
     from lightpaint.paint.store.database import SESSION_FILE as SESSION_FILE
     from lightpaint.paint.store.session_requests import DEFAULT_NEAR as DEFAULT_NEAR
     from lightpaint.paint.store.session_requests import SessionRequests as SessionRequests

@@ -17,7 +17,7 @@ from typing import Any
 from lightpaint.errors import OutputError
 from lightpaint.files import check_writable, replacing
 from lightpaint.paint.server.address import BoundSocket, listen
-from lightpaint.paint.server.server import Server, check_installed
+from lightpaint.paint.server.page_server import Server, check_installed
 from lightpaint.paint.store.database import SESSION_FILE, set_aside
 from lightpaint.paint.store.history_steps import Identity
 from lightpaint.paint.store.session_file import Store

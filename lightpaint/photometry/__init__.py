@@ -12,14 +12,14 @@ if TYPE_CHECKING:
     from lightpaint.photometry.glare import GlareReading as GlareReading
     from lightpaint.photometry.illuminance import LARGEST_ERROR as LARGEST_ERROR
     from lightpaint.photometry.illuminance import NORMAL_95 as NORMAL_95
+    from lightpaint.photometry.illuminance import PRESETS as PRESETS
     from lightpaint.photometry.illuminance import Illuminance as Illuminance
+    from lightpaint.photometry.illuminance import LightCase as LightCase
+    from lightpaint.photometry.illuminance import MeasuringPlane as MeasuringPlane
     from lightpaint.photometry.illuminance import PlaneReading as PlaneReading
+    from lightpaint.photometry.illuminance import PowerBudget as PowerBudget
+    from lightpaint.photometry.illuminance import plane_title as plane_title
     from lightpaint.photometry.illuminance import relative_intervals as relative_intervals
-    from lightpaint.photometry.measuring_plane import PRESETS as PRESETS
-    from lightpaint.photometry.measuring_plane import LightCase as LightCase
-    from lightpaint.photometry.measuring_plane import MeasuringPlane as MeasuringPlane
-    from lightpaint.photometry.measuring_plane import PowerBudget as PowerBudget
-    from lightpaint.photometry.measuring_plane import plane_title as plane_title
     from lightpaint.photometry.readings_file import PLANES as PLANES
     from lightpaint.photometry.readings_file import POINTS as POINTS
     from lightpaint.photometry.readings_file import false_colours as false_colours

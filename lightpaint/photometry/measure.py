@@ -25,8 +25,7 @@ from lightpaint.errors import SceneError
 from lightpaint.keywords import keywords
 from lightpaint.luminaires import POINT_PLUGIN
 from lightpaint.photometry.glare import Glare, GlareObserver, GlareSources, position_index
-from lightpaint.photometry.illuminance import Illuminance, PlaneReading, floored
-from lightpaint.photometry.measuring_plane import MeasuringPlane
+from lightpaint.photometry.illuminance import Illuminance, MeasuringPlane, PlaneReading, floored
 from lightpaint.progress import Progress, listener, silent
 from lightpaint.scene import ENVIRONMENTS, Emitter, MeasuringPoints, Scene
 from lightpaint.validation import Check, between, number

@@ -14,7 +14,7 @@ import numpy as np
 from lightpaint.arrays import Bools, Doubles, Indices, Position
 from lightpaint.display_text import with_similar_name
 from lightpaint.errors import SceneError
-from lightpaint.photometry.measuring_plane import MeasuringPlane, Wishes
+from lightpaint.photometry.illuminance import MeasuringPlane, Wishes
 from lightpaint.photometry.room_rays import RoomRays
 
 #: Maximum number of points of a plane, and of cells that are tried for it.

@@ -17,8 +17,7 @@ from lightpaint.errors import SceneError
 from lightpaint.files import is_name, one_line, read_text
 from lightpaint.keywords import keywords
 from lightpaint.photometry.glare import GlareObserver
-from lightpaint.photometry.measure import DEFAULT_ERROR, LEAST_ERROR
-from lightpaint.photometry.measuring_plane import (
+from lightpaint.photometry.illuminance import (
     PRESETS,
     LightCase,
     MeasuringPlane,
@@ -26,6 +25,7 @@ from lightpaint.photometry.measuring_plane import (
     Ratio,
     Wishes,
 )
+from lightpaint.photometry.measure import DEFAULT_ERROR, LEAST_ERROR
 from lightpaint.photometry.plane_placement import CYLINDRICAL, PlaneRequest, place_plane
 from lightpaint.photometry.room_rays import CAMERA, ObserverRequest, RoomRays, place_observers
 from lightpaint.scene import FARTHEST, Scene

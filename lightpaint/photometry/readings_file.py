@@ -18,8 +18,14 @@ from lightpaint.display_text import visible
 from lightpaint.files import one_line, write_bytes, write_text
 from lightpaint.images.formats import png_bytes
 from lightpaint.photometry.glare import Glare, GlareReading
-from lightpaint.photometry.illuminance import Illuminance, PlaneReading, relative_intervals
-from lightpaint.photometry.measuring_plane import PRESETS, MeasuringPlane, Wishes
+from lightpaint.photometry.illuminance import (
+    PRESETS,
+    Illuminance,
+    MeasuringPlane,
+    PlaneReading,
+    Wishes,
+    relative_intervals,
+)
 from lightpaint.storage.json_records import strict_json
 
 FORMAT = "lightpaint-illuminance 1"

@@ -29,8 +29,8 @@ from lightpaint.pipeline.job.solve_job import Job, PaintedView
 from lightpaint.progress import Announcement, Listener, Pace, Progress, labelled, listener
 from lightpaint.report import LEAST_SHARE, picture_errors, spoken_percent
 from lightpaint.scene import Scene
-from lightpaint.scene.limits import MAX_SPP
 from lightpaint.sentences import Hint, Sentence, Word
+from lightpaint.validation import MAX_SPP
 
 #: Rounds of samples, each of which at most doubles their number.
 MAX_ROUNDS = 20

@@ -336,10 +336,10 @@ def test_without_dask_the_line_is_said_that_installs_it(
 def test_workers_of_another_version_are_left_out(
     workers: Workers, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    from lightpaint.batch.cluster import worker as cluster_worker
+    from lightpaint.batch.cluster import parcels
 
     workers.await_all()
-    own_versions = {**cluster_worker.versions(), "lightpaint": "other"}
+    own_versions = {**parcels.versions(), "lightpaint": "other"}
     # Workers find the function by its name, and theirs is not changed.
     monkeypatch.setattr("lightpaint.batch.cluster.workers.own_versions", lambda: own_versions)
     listener = ItemListener()

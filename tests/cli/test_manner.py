@@ -15,7 +15,7 @@ from lightpaint.basis.file.basis_file import write_basis
 from lightpaint.cli.options.parser import command_parser
 from lightpaint.cli.output.documents import Tolerances
 from lightpaint.images.formats.exr import write_rgb
-from lightpaint.lighting.analysis.appearance.appearance import Appearance
+from lightpaint.lighting.analysis.appearance.answer_appearance import Appearance
 
 #: A name that steers a terminal, breaks lines, and would end a text of JSON.
 BAD = 'b\x1b[2J\r\n\t\x7f\x9b\u202e\u2028"\\'

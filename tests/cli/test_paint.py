@@ -408,7 +408,7 @@ def test_a_page_that_cannot_be_bundled_is_one_line(
     def refuse() -> None:
         raise BundleError("paint/page/x.js: cannot bundle `export *`: write it as another export")
 
-    monkeypatch.setattr("lightpaint.paint.server.server.page_files", refuse)
+    monkeypatch.setattr("lightpaint.paint.server.page_server.page_files", refuse)
     completed = run(work_folder, "paint", "room.basis.exr", "--no-browser", "-q")
     assert completed.returncode == 2
     assert completed.stderr == (

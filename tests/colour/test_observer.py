@@ -7,10 +7,11 @@ import pytest
 
 from lightpaint.colour.color import ciede2000, lab
 from lightpaint.colour.primaries import REC709, colour_science, rgb_to_xyz
-from lightpaint.colour.spectra.observer import EYE, read_observer
 from lightpaint.colour.spectra.spectrum import (
+    EYE,
     WAVELENGTHS,
     named_spectrum,
+    read_observer,
     rgb_of_powers,
     spectrum_of,
 )

@@ -13,7 +13,7 @@ from lightpaint.basis.basis import Basis
 from lightpaint.colour.display.view_transform import ViewTransform
 from lightpaint.lighting.constraints.constraint_table import Constraints
 from lightpaint.lighting.fit import Fit
-from lightpaint.lighting.loss import lit_pixels, loss, reweighting
+from lightpaint.lighting.loss import lit_pixels, pixel_loss, reweighting
 from lightpaint.lighting.loss.lit_pixels import LitPixels
 from lightpaint.lighting.loss.reweighting import sample_pixels
 from lightpaint.lighting.problem import Problem
@@ -30,7 +30,7 @@ def few_samples(monkeypatch: pytest.MonkeyPatch) -> pytest.MonkeyPatch:
     """Samples of 400 pixels, and strips of 500."""
     monkeypatch.setattr(reweighting, "MIN_SAMPLE", 400)
     monkeypatch.setattr(reweighting, "PIXELS_PER_LIGHT", 1)
-    monkeypatch.setattr(loss, "STRIP_PIXELS", 500)
+    monkeypatch.setattr(pixel_loss, "STRIP_PIXELS", 500)
     return monkeypatch
 
 

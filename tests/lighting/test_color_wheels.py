@@ -16,7 +16,7 @@ from lightpaint.lighting.analysis.answer_analysis import analyse
 from lightpaint.lighting.answer.lighting_file import read_lighting, write_lighting
 from lightpaint.lighting.constraints.constraint_table import Constraints
 from lightpaint.lighting.fit import Fit, resolve_for_targets
-from lightpaint.lighting.live.live import LiveSolver
+from lightpaint.lighting.live.live_solver import LiveSolver
 from lightpaint.lighting.live.live_view import LiveView
 from lightpaint.lighting.problem import Problem
 from lightpaint.lighting.solver import solve, solve_frames

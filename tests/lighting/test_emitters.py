@@ -11,7 +11,7 @@ from lightpaint.arrays import Doubles
 from lightpaint.basis.basis import Basis
 from lightpaint.basis.lights import Lights
 from lightpaint.lighting.fit import resolve_for_targets
-from lightpaint.lighting.live.live import LiveSolver
+from lightpaint.lighting.live.live_solver import LiveSolver
 from lightpaint.lighting.live.live_view import LiveView
 from lightpaint.lighting.loss.painting import find_glow_paint
 from lightpaint.lighting.unknowns.lamps_in_view import LampsInView

@@ -19,7 +19,7 @@ from lightpaint.colour.color import kelvin_to_rgb
 from lightpaint.colour.display.exposure import choose_exposure
 from lightpaint.lighting.analysis.noise.noise_correction import correct_noise
 from lightpaint.lighting.fit import resolve_for_targets
-from lightpaint.lighting.live.live import LiveSolver
+from lightpaint.lighting.live.live_solver import LiveSolver
 from lightpaint.lighting.live.live_view import LiveView
 from lightpaint.lighting.loss.lit_pixels import bin_pixels, block_side
 from lightpaint.lighting.loss.painting_loss import PaintingLoss

@@ -8,9 +8,8 @@ from conftest import BasisFactory
 
 from lightpaint.arrays import Doubles
 from lightpaint.basis.basis import Basis
-from lightpaint.basis.lights import BasisLight, Lights
+from lightpaint.basis.lights import BasisLight, Lights, joined_texels, light_images, texel_lights
 from lightpaint.basis.planes import as_planes
-from lightpaint.basis.texel_images import joined_texels, light_images, texel_lights
 from lightpaint.lighting.fit import Fit
 from lightpaint.lighting.loss import weight_penalty
 from lightpaint.lighting.loss.weight_penalty import image_prior

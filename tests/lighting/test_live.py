@@ -15,7 +15,7 @@ from lightpaint.basis.planes import MemoryPlanes
 from lightpaint.images.estimate import Estimate
 from lightpaint.lighting.constraints.constraint_table import Constraints
 from lightpaint.lighting.fit import Fit, resolve_for_targets
-from lightpaint.lighting.live.live import ANSWERS_PER_READING, LiveSolver
+from lightpaint.lighting.live.live_solver import ANSWERS_PER_READING, LiveSolver
 from lightpaint.lighting.live.live_view import LiveView
 from lightpaint.lighting.loss.painting import unpainted_weight_of
 from lightpaint.lighting.problem import Problem

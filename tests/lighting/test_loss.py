@@ -15,9 +15,9 @@ from lightpaint.colour.display.view_transform import ViewTransform
 from lightpaint.lighting.analysis.answer_analysis import analyse
 from lightpaint.lighting.constraints.constraint_table import Constraints
 from lightpaint.lighting.fit import Fit
-from lightpaint.lighting.loss import loss as loss_module
+from lightpaint.lighting.loss import pixel_loss as loss_module
 from lightpaint.lighting.loss.lit_pixels import DeferredSquares, LitPixels
-from lightpaint.lighting.loss.loss import Cut, Loss, PixelLoss, planes_of
+from lightpaint.lighting.loss.pixel_loss import Cut, Loss, PixelLoss, planes_of
 from lightpaint.lighting.normal_equations import NormalEquations
 from lightpaint.lighting.problem import Problem
 from lightpaint.lighting.solver import solution_of

@@ -8,9 +8,9 @@ import pytest
 
 from lightpaint.lighting.constraints.constraint_table import Constraints, Requirements
 from lightpaint.lighting.fit import Fit, resolve_for_targets
-from lightpaint.lighting.live import live as live_module
+from lightpaint.lighting.live import live_solver as live_module
 from lightpaint.lighting.live import many_lights
-from lightpaint.lighting.live.live import LiveSolver
+from lightpaint.lighting.live.live_solver import LiveSolver
 from lightpaint.lighting.live.live_view import LiveView
 from lightpaint.lighting.live.many_lights import SomeLights
 from lightpaint.lighting.problem import Problem

@@ -22,8 +22,8 @@ from lightpaint.lighting.constraints.constraint_table import Constraints
 from lightpaint.lighting.fit import Fit
 from lightpaint.lighting.loss import lit_pixels, painting_loss, reweighting
 from lightpaint.lighting.loss.lit_pixels import LitPixels
-from lightpaint.lighting.loss.loss import image_of, planes_of
 from lightpaint.lighting.loss.painting_loss import PaintingLoss
+from lightpaint.lighting.loss.pixel_loss import image_of, planes_of
 from lightpaint.lighting.normal_equations import inner_products
 from lightpaint.lighting.problem import Problem
 from lightpaint.lighting.solution import Solution

@@ -36,5 +36,5 @@ def without_reasons(monkeypatch: pytest.MonkeyPatch) -> None:
 
     For tests in which nobody is told of it.
     """
-    reasons_of = "lightpaint.lighting.analysis.appearance.appearance.reasons_of"
+    reasons_of = "lightpaint.lighting.analysis.appearance.answer_appearance.reasons_of"
     monkeypatch.setattr(reasons_of, lambda *_: ())

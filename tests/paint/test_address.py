@@ -13,7 +13,7 @@ from patience import PATIENCE_S
 from lightpaint.errors import PaintError
 from lightpaint.paint.server import address
 from lightpaint.paint.server.address import Reach, listen
-from lightpaint.paint.server.server import Server
+from lightpaint.paint.server.page_server import Server
 
 
 def has_ipv6() -> bool:

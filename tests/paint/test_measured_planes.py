@@ -22,8 +22,8 @@ from lightpaint.paint.session.painting_session import Session
 from lightpaint.paint.session.session_planes import SessionPlanes
 from lightpaint.paint.store.history_steps import Identity
 from lightpaint.paint.store.session_file import MemoryStore
-from lightpaint.photometry.illuminance import Illuminance
-from lightpaint.photometry.measuring_plane import (
+from lightpaint.photometry.illuminance import (
+    Illuminance,
     LightCase,
     MeasuringPlane,
     PowerBudget,

@@ -34,7 +34,7 @@ from lightpaint.paint.protocol import (
 from lightpaint.paint.server import client, session_clients
 from lightpaint.paint.server.address import Address, Reach
 from lightpaint.paint.server.guard import Guard
-from lightpaint.paint.server.server import page_app
+from lightpaint.paint.server.page_server import page_app
 from lightpaint.paint.server.session_clients import Connections
 from lightpaint.paint.session.look_library import MAX_PROPOSALS, LookLibrary
 from lightpaint.paint.session.painting_session import Session

@@ -10,7 +10,7 @@ from nightly import nightly, seeds
 from lightpaint.colour.display.view_transform import ViewTransform
 from lightpaint.images.object_map import Objects
 from lightpaint.lighting.analysis.answer_analysis import Analysis, analyse
-from lightpaint.lighting.analysis.appearance.appearance import INVISIBLE
+from lightpaint.lighting.analysis.appearance.answer_appearance import INVISIBLE
 from lightpaint.lighting.constraints.constraint_table import Constraints
 from lightpaint.paint.protocol import Advice
 from lightpaint.paint.session.session_messages import advice, sketch_headline

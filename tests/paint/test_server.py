@@ -32,10 +32,10 @@ from lightpaint.paint.protocol import (
     PictureData,
     PictureUpdate,
 )
-from lightpaint.paint.server import client, server
+from lightpaint.paint.server import client, page_server
 from lightpaint.paint.server.address import Address, Reach
 from lightpaint.paint.server.guard import Guard
-from lightpaint.paint.server.server import page_app, page_files
+from lightpaint.paint.server.page_server import page_app, page_files
 from lightpaint.paint.server.session_clients import Connections
 
 DEFAULT_PORT = 8421
@@ -810,9 +810,9 @@ def test_answers_to_what_was_asked_are_not_dropped_and_who_is_too_slow_is_sent_a
 
 
 def test_without_its_libraries_the_line_to_run_is_said(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(server, "find_spec", lambda name: None if name == "uvicorn" else name)
+    monkeypatch.setattr(page_server, "find_spec", lambda name: None if name == "uvicorn" else name)
     with pytest.raises(PaintError, match=r"needs uvicorn: pip install 'lightpaint\[paint\]'"):
-        server.check_installed()
+        page_server.check_installed()
 
 
 def test_names_from_files_are_text() -> None:

@@ -10,11 +10,11 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 import lightpaint as lp
-from lightpaint.lighting.analysis.appearance.appearance import Appearance
+from lightpaint.lighting.analysis.appearance.answer_appearance import Appearance
 from lightpaint.lighting.analysis.appearance.area_lights import AreaLights
 from lightpaint.lighting.analysis.appearance.delivery import Delivery, spoken_share
+from lightpaint.lighting.analysis.appearance.display_difference import UnpaintedChange
 from lightpaint.lighting.analysis.appearance.limiting_reasons import Loosening, Reason
-from lightpaint.lighting.analysis.appearance.unpainted_change import UnpaintedChange
 from lightpaint.lighting.analysis.diagnosis import Place
 from lightpaint.paint.protocol import Advice
 from lightpaint.paint.session.session_messages import (

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from lit_planes import UP
 
-from lightpaint.photometry.measuring_plane import MeasuringPlane
+from lightpaint.photometry.illuminance import MeasuringPlane
 from lightpaint.photometry.readings_file import (
     GROUND,
     LARGEST_CELL,

@@ -11,8 +11,7 @@ from lit_planes import plane_of
 
 from lightpaint.basis.lights import BasisLight, Lights
 from lightpaint.errors import SceneError
-from lightpaint.photometry.illuminance import Illuminance
-from lightpaint.photometry.measuring_plane import MeasuringPlane, Ratio, Wishes
+from lightpaint.photometry.illuminance import Illuminance, MeasuringPlane, Ratio, Wishes
 from lightpaint.photometry.readings_file import missed_wishes
 
 LIGHTS = Lights(

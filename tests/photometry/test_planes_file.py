@@ -8,7 +8,7 @@ from lit_planes import BULB, box, floor, lit_scene, rectangle, write_scene
 from webs import cosine, ies_text
 
 from lightpaint.errors import SceneError
-from lightpaint.photometry.measuring_plane import MeasuringPlane, PowerBudget, Ratio, Wishes
+from lightpaint.photometry.illuminance import MeasuringPlane, PowerBudget, Ratio, Wishes
 from lightpaint.photometry.plane_placement import cell_counts
 from lightpaint.photometry.planes_file import PlanesFile, read_planes
 from lightpaint.scene.mitsuba_scene import Scene

@@ -19,7 +19,7 @@ from lightpaint.errors import SizeError
 from lightpaint.files import write_bytes
 from lightpaint.images.formats.exr import write_rgb
 from lightpaint.images.formats.png import png_bytes
-from lightpaint.lighting.analysis.appearance.appearance import Appearance
+from lightpaint.lighting.analysis.appearance.answer_appearance import Appearance
 from lightpaint.lighting.analysis.appearance.delivery import Delivery
 from lightpaint.lighting.analysis.appearance.limiting_reasons import Reason
 from lightpaint.lighting.analysis.diagnosis import Place

@@ -5,7 +5,7 @@ from typing import Any
 
 import pytest
 
-from lightpaint.lighting.analysis.appearance.appearance import Appearance
+from lightpaint.lighting.analysis.appearance.answer_appearance import Appearance
 from lightpaint.lighting.analysis.appearance.area_lights import AreaLights
 from lightpaint.lighting.analysis.appearance.delivery import Delivery
 from lightpaint.lighting.analysis.appearance.limiting_reasons import Reason

@@ -14,11 +14,11 @@ from conftest import BasisFactory
 from lightpaint.basis.file.basis_file import write_basis
 from lightpaint.images.estimate import Estimate
 from lightpaint.images.formats.exr import write_rgb
-from lightpaint.lighting.analysis.appearance.appearance import Appearance
+from lightpaint.lighting.analysis.appearance.answer_appearance import Appearance
 from lightpaint.lighting.analysis.appearance.area_lights import AreaLights
 from lightpaint.lighting.analysis.appearance.delivery import Delivery
+from lightpaint.lighting.analysis.appearance.display_difference import UnpaintedChange
 from lightpaint.lighting.analysis.appearance.limiting_reasons import HEADLINE_SHARE, Reason
-from lightpaint.lighting.analysis.appearance.unpainted_change import UnpaintedChange
 from lightpaint.lighting.analysis.diagnosis import Place
 from lightpaint.lighting.answer.combination import combine
 from lightpaint.lighting.answer.lighting_file import read_lighting

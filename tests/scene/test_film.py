@@ -16,7 +16,6 @@ from lightpaint.images.pixel_blocks import block_mean, enlarged, whole_factor
 from lightpaint.pipeline.job.job_checks import remarks_of_film, remarks_of_target
 from lightpaint.pipeline.job.settings import Settings
 from lightpaint.progress import silent
-from lightpaint.scene.limits import MAX_PIXELS
 from lightpaint.scene.properties.film import (
     Film,
     even_reductions,
@@ -31,6 +30,7 @@ from lightpaint.scene.scene_reader import load_scene
 from lightpaint.scene.scene_render import Stream, render
 from lightpaint.scene.surfaces import render_surfaces
 from lightpaint.target.painted_target import Target
+from lightpaint.validation import MAX_PIXELS
 
 FULL_HD = Film(0, (1920, 1080), (1920, 1080), (0, 0))
 CROPPED = Film(0, (640, 360), (320, 180), (80, 60))

@@ -10,8 +10,7 @@ from lightpaint.display_text import brief
 from lightpaint.errors import SceneError
 from lightpaint.progress import Progress
 from lightpaint.scene import largest_pass, plan_passes
-from lightpaint.scene.limits import MAX_SPP
-from lightpaint.validation import whole
+from lightpaint.validation import MAX_SPP, whole
 
 #: Seconds of work that a crash may lose, both in wall time and in processor time, so that a busy
 #: machine does not save more often.

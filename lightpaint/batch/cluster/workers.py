@@ -18,9 +18,9 @@ from functools import partial
 from pathlib import Path
 from typing import Any, TypeVar
 
-from lightpaint.batch.cluster import worker as cluster_worker
+from lightpaint.batch.cluster import parcels
 from lightpaint.batch.cluster.parcels import Parcel, files_to_send, pieces
-from lightpaint.batch.cluster.worker import versions as own_versions
+from lightpaint.batch.cluster.parcels import versions as own_versions
 from lightpaint.errors import BatchError, LightpaintError
 from lightpaint.files import call_with_timeout, first_line
 from lightpaint.progress import Listener
@@ -88,7 +88,7 @@ class ClusterWorkers:
     def submit(self, parcel: Parcel, worker: str, key: str) -> Any:
         """Submit an item to a worker that has its files; return a future of the result."""
         options: dict[str, Any] = {"key": key, "workers": [worker], "pure": False}
-        return self._ask(lambda: self._client.submit(cluster_worker.do_parcel, parcel, **options))
+        return self._ask(lambda: self._client.submit(parcels.do_parcel, parcel, **options))
 
     def forget_files(self, worker: str, sums: Collection[str]) -> None:
         """Forget that a worker has these files."""
@@ -139,7 +139,7 @@ class ClusterWorkers:
         """Return the new workers that cannot be used, and why."""
         if not workers:
             return {}
-        ask = partial(self._client.run, cluster_worker.versions, workers=workers)
+        ask = partial(self._client.run, parcels.versions, workers=workers)
         replies = self._ask(partial(ask, on_error="return"))
         own_packages, reasons = own_versions(), {}
         for worker, reply in replies.items():
@@ -169,9 +169,7 @@ class ClusterWorkers:
             except OSError as error:
                 raise BatchError(f"cannot read {file}: {error.strerror or error}") from None
             for piece in pieces(data):
-                put = partial(
-                    self._client.run, cluster_worker.put, digest, *piece, workers=receivers
-                )
+                put = partial(self._client.run, parcels.put, digest, *piece, workers=receivers)
                 self._ask(partial(put, on_error="ignore"))
             for receiver in receivers:
                 self._files_at.setdefault(receiver, set()).add(digest)

@@ -21,10 +21,19 @@ from lightpaint.lighting import DEFAULT_HOLD, Constraints, Lighting, LightSettin
 from lightpaint.pipeline import Settings
 from lightpaint.relit import FORMS
 from lightpaint.scene import check_resolution
-from lightpaint.scene.limits import MAX_SPP
 from lightpaint.sentences import Datum, Hint, Sentence
 from lightpaint.target import Paint
-from lightpaint.validation import BRIGHTEST, MAX_LISTED, SWITCH, Check, a, checks_of, one_of, whole
+from lightpaint.validation import (
+    BRIGHTEST,
+    MAX_LISTED,
+    MAX_SPP,
+    SWITCH,
+    Check,
+    a,
+    checks_of,
+    one_of,
+    whole,
+)
 
 #: Variations that are solved.
 SOLVED_WORDS = ("fewer lights", "white only", "held harder")

@@ -4,7 +4,7 @@ import os
 import shlex
 from collections.abc import Mapping, Sequence
 
-from lightpaint.batch import RunOptions, as_key
+from lightpaint.batch import RunOptions
 from lightpaint.pipeline import Settings
 from lightpaint.sentences import Datum, Hint, Lead, Sentence, SourceKey, Word
 from lightpaint.validation import options_of
@@ -69,6 +69,8 @@ def spoken_of_manifest(text: str) -> str:
     """Return `text` of the library with the keys of a manifest, and options for what has none."""
     if not isinstance(text, Sentence):
         return text
+    from lightpaint.batch import as_key  # late: keys of a manifest need NumPy, and --help does not
+
     return text.spelled(lambda datum: as_key(datum) or _spell(datum))
 
 

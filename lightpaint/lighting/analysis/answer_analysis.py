@@ -16,7 +16,7 @@ from lightpaint.images import in_turns
 from lightpaint.keywords import keywords
 from lightpaint.lighting.algebra.quadratic import UNREACHED_POWER
 from lightpaint.lighting.algebra.symmetric_matrices import eigenvectors
-from lightpaint.lighting.analysis.appearance.appearance import (
+from lightpaint.lighting.analysis.appearance.answer_appearance import (
     Appearance,
     compare_appearance,
     with_undetermined,

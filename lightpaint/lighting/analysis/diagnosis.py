@@ -24,7 +24,7 @@ from lightpaint.display_text import short_repr
 from lightpaint.images import bands_of
 from lightpaint.keywords import keywords
 from lightpaint.lighting.analysis.active_bounds import bounds_of
-from lightpaint.lighting.analysis.noise.noise import pseudo_inverse
+from lightpaint.lighting.analysis.noise.basis_noise import pseudo_inverse
 from lightpaint.lighting.analysis.noise.residuals import Residuals, channel_grain
 from lightpaint.lighting.analysis.noise.weight_directions import all_columns
 from lightpaint.lighting.answer.certificate import Bound

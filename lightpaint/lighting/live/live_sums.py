@@ -20,8 +20,8 @@ from lightpaint.lighting.loss.expected_lights import (
     wish_places,
     wish_shares,
 )
-from lightpaint.lighting.loss.loss import STRIP_PIXELS
 from lightpaint.lighting.loss.painting_loss import PaintedPixels, join_pixels
+from lightpaint.lighting.loss.pixel_loss import STRIP_PIXELS
 from lightpaint.lighting.loss.reweighting import interpolate
 from lightpaint.lighting.normal_equations import NormalEquations
 from lightpaint.target import Wish, extend_marked

@@ -30,7 +30,7 @@ from lightpaint.basis import (
 from lightpaint.colour import ViewTransform
 from lightpaint.images import Estimate, block_sums, enlarged
 from lightpaint.lighting.joined_views import Views
-from lightpaint.lighting.loss.loss import (
+from lightpaint.lighting.loss.pixel_loss import (
     Cut,
     Loss,
     PixelLoss,

@@ -20,8 +20,8 @@ from lightpaint.errors import TargetError
 from lightpaint.images import box_mean
 from lightpaint.lighting.fit import Emitters, Fit
 from lightpaint.lighting.joined_views import Views
-from lightpaint.lighting.loss.loss import Loss, Squares
 from lightpaint.lighting.loss.painting_loss import PaintingLoss
+from lightpaint.lighting.loss.pixel_loss import Loss, Squares
 from lightpaint.sentences import Hint, Word
 from lightpaint.target import Target
 

@@ -11,7 +11,7 @@ import numpy.typing as npt
 from lightpaint.arrays import Bools, Doubles, Floats, Indices
 from lightpaint.colour import ViewTransform
 from lightpaint.images import BAND_PIXELS, block_sums, by_bands
-from lightpaint.lighting.loss.loss import (
+from lightpaint.lighting.loss.pixel_loss import (
     STRIP_PIXELS,
     Cut,
     Loss,

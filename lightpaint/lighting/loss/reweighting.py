@@ -22,7 +22,7 @@ import numpy as np
 from lightpaint.arrays import Doubles
 from lightpaint.basis import Basis, MemoryPlanes
 from lightpaint.lighting.loss.lit_pixels import LitPixels, SummedSquares
-from lightpaint.lighting.loss.loss import Loss, PixelLoss, Squares, image_in_place
+from lightpaint.lighting.loss.pixel_loss import Loss, PixelLoss, Squares, image_in_place
 from lightpaint.lighting.normal_equations import NormalEquations
 
 #: Maximum number of rounds.

@@ -52,8 +52,8 @@ from lightpaint.paint.studio.file_imports import begin_with_layers
 from lightpaint.paint.subject import Subject, obtain_bases, painting_transform
 from lightpaint.progress import Progress, silent
 from lightpaint.report import page_reduction
-from lightpaint.scene.limits import MAX_SPP
 from lightpaint.scene.runtime.render_lock import MITSUBA
+from lightpaint.validation import MAX_SPP
 
 #: Name of this task in reports of progress.
 SAMPLING = "sampling"

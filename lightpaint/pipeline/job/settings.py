@@ -6,10 +6,18 @@ from typing import Annotated, TypedDict
 from lightpaint.errors import LightpaintError
 from lightpaint.keywords import keywords
 from lightpaint.lighting import Colors, Emitters, Fit, Method, Space
-from lightpaint.scene.limits import MAX_SPP, MAX_TEXELS
 from lightpaint.scene.quality_presets import Quality, samples
 from lightpaint.sentences import Hint
-from lightpaint.validation import Option, a, between, number, parse_share, whole
+from lightpaint.validation import (
+    MAX_SPP,
+    MAX_TEXELS,
+    Option,
+    a,
+    between,
+    number,
+    parse_share,
+    whole,
+)
 
 #: Maximum number of rounds of rendering and solving again: a larger number is a typing error.
 MAX_REFINE = 100

@@ -28,7 +28,7 @@ from lightpaint.display_text import some_names
 from lightpaint.errors import SceneError
 from lightpaint.images import blocks_in, left_over, whole_factor
 from lightpaint.keywords import describe_value
-from lightpaint.scene.limits import MAX_PIXELS, MAX_SPP
+from lightpaint.validation import MAX_PIXELS, MAX_SPP
 
 #: Wavelengths of the channels in nm.
 WAVES = np.arange(380, 781, dtype=np.float64)

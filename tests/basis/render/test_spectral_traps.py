@@ -15,8 +15,14 @@ from lightpaint.basis.render.rendered_basis import basis_lights
 from lightpaint.colour.color import ciede2000, delta_e, lab, luminance
 from lightpaint.colour.lamp import Lamp, LampEmitter
 from lightpaint.colour.primaries import colour_science
-from lightpaint.colour.spectra.observer import EYE, Observer
-from lightpaint.colour.spectra.spectrum import WAVELENGTHS, Spectrum, named_spectrum, spectrum_of
+from lightpaint.colour.spectra.spectrum import (
+    EYE,
+    WAVELENGTHS,
+    Observer,
+    Spectrum,
+    named_spectrum,
+    spectrum_of,
+)
 from lightpaint.lighting.answer.combination import combine
 from lightpaint.lighting.answer.lighting import Lighting
 from lightpaint.lighting.constraints.constraints_file import constraints_of

@@ -10,15 +10,17 @@ from lightpaint.colour.color import delta_e, luminance
 from lightpaint.colour.display.view_transform import ViewTransform
 from lightpaint.images.object_map import Objects
 from lightpaint.lighting.analysis.answer_analysis import analyse
-from lightpaint.lighting.analysis.appearance.appearance import (
+from lightpaint.lighting.analysis.appearance.answer_appearance import (
     CLOSE,
     Appearance,
     compare_appearance,
     with_undetermined,
 )
-from lightpaint.lighting.analysis.appearance.display_difference import PaintComparison
+from lightpaint.lighting.analysis.appearance.display_difference import (
+    PaintComparison,
+    unpainted_change,
+)
 from lightpaint.lighting.analysis.appearance.pixel_sample import PixelSample
-from lightpaint.lighting.analysis.appearance.unpainted_change import unpainted_change
 from lightpaint.lighting.analysis.noise.uncertainty import error_bars
 from lightpaint.lighting.answer.combination import combine
 from lightpaint.lighting.constraints.constraint_table import Constraints

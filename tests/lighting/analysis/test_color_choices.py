@@ -5,7 +5,7 @@ from typing import Any, get_args
 import numpy as np
 import pytest
 
-from lightpaint.lighting.analysis.appearance.appearance import compare_appearance
+from lightpaint.lighting.analysis.appearance.answer_appearance import compare_appearance
 from lightpaint.lighting.analysis.appearance.color_choices import MIN_SAMPLE, color_choices
 from lightpaint.lighting.constraints.constraint_table import Constraints
 from lightpaint.lighting.fit import Colors

@@ -9,7 +9,7 @@ import pytest
 from lightpaint.colour.display.view_transform import ViewTransform
 from lightpaint.colour.primaries import colour_science
 from lightpaint.images.object_map import Objects
-from lightpaint.lighting.analysis.appearance.appearance import compare_appearance
+from lightpaint.lighting.analysis.appearance.answer_appearance import compare_appearance
 from lightpaint.lighting.analysis.appearance.delivery import (
     Delivery,
     DeliveryReport,

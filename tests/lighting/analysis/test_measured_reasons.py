@@ -8,7 +8,7 @@ import pytest
 
 from lightpaint.basis.lights import BasisLight
 from lightpaint.colour.display.view_transform import ViewTransform
-from lightpaint.lighting.analysis.appearance.appearance import compare_appearance
+from lightpaint.lighting.analysis.appearance.answer_appearance import compare_appearance
 from lightpaint.lighting.analysis.noise.noise_correction import correct_noise
 from lightpaint.lighting.constraints.constraint_table import Constraints
 from lightpaint.lighting.constraints.light_constraints import ConstraintsByLight

@@ -11,8 +11,8 @@ from lightpaint.basis.file.half_floats import EncodedPlanes, encoded_plane
 from lightpaint.basis.file.lit_planes import LitPlane, LitPlanes
 from lightpaint.basis.planes import MemoryPlanes
 from lightpaint.colour.display.view_transform import ViewTransform
-from lightpaint.lighting.analysis.noise import noise, noise_rows
-from lightpaint.lighting.analysis.noise.noise import NoisyPixels, noise_sums
+from lightpaint.lighting.analysis.noise import noise_rows
+from lightpaint.lighting.analysis.noise.basis_noise import NoisyPixels, noise_sums
 from lightpaint.lighting.analysis.noise.noise_rows import FOLDED_PIXELS, MANY_LIGHTS, folded
 from lightpaint.lighting.solver import solve
 from lightpaint.target.painted_target import Target
@@ -104,7 +104,7 @@ def test_error_bars_of_folded_pixels_are_those_of_all(
 def test_noise_in_half_floats_is_summed_in_float32(make_basis: Any, unit: float) -> None:
     """To the round-off of float32, in any unit of light."""
     rng = np.random.default_rng(6)
-    shape = noise.MIN_SINGLE_LIGHTS, 3, *SIZE
+    shape = basis_noise.MIN_SINGLE_LIGHTS, 3, *SIZE
     images = rng.random(shape).astype(np.float16)
     halves = rng.normal(0, 0.2, shape).astype(np.float16) * images
     stored = [EncodedPlanes([encoded_plane(x, unit) for x in y]) for y in (images, halves)]

@@ -17,8 +17,8 @@ from lightpaint.basis.planes import MemoryPlanes
 from lightpaint.errors import BasisError, SizeError
 from lightpaint.images.estimate import Estimate
 from lightpaint.lighting.analysis.noise import uncertainty
+from lightpaint.lighting.analysis.noise.basis_noise import denoised_matrix, pseudo_inverse
 from lightpaint.lighting.analysis.noise.dominant_pixels import NORMAL_95
-from lightpaint.lighting.analysis.noise.noise import denoised_matrix, pseudo_inverse
 from lightpaint.lighting.analysis.noise.noise_correction import correct_noise, refine
 from lightpaint.lighting.analysis.noise.uncertainty import (
     _least_power,

@@ -9,8 +9,8 @@ from lightpaint.basis.lights import BasisLight, Lights
 from lightpaint.lighting.algebra import symmetric_matrices
 from lightpaint.lighting.algebra.symmetric_matrices import excess_above
 from lightpaint.lighting.analysis.appearance import limiting_reasons
-from lightpaint.lighting.analysis.noise import noise
-from lightpaint.lighting.analysis.noise.noise import denoised_matrix, pseudo_inverse
+from lightpaint.lighting.analysis.noise import basis_noise as noise
+from lightpaint.lighting.analysis.noise.basis_noise import denoised_matrix, pseudo_inverse
 from lightpaint.lighting.analysis.noise.weight_directions import Directions
 from lightpaint.lighting.constraints.constraint_table import Constraints
 from lightpaint.lighting.normal_equations import NormalEquations, block_diagonal

@@ -10,7 +10,7 @@ from scipy.optimize import nnls
 import lightpaint as lp
 from lightpaint.colour.color import cct_and_duv, kelvin_to_rgb, luminance
 from lightpaint.lighting.fit import resolve_for_targets
-from lightpaint.lighting.live.live import LiveSolver
+from lightpaint.lighting.live.live_solver import LiveSolver
 from lightpaint.lighting.live.live_view import LiveView
 from lightpaint.lighting.normal_equations import NormalEquations
 from lightpaint.lighting.problem import Problem

@@ -12,7 +12,7 @@ from lightpaint.basis.basis import Basis
 from lightpaint.colour.color import LUMINANCE
 from lightpaint.errors import ConstraintError
 from lightpaint.lighting.fit import resolve_for_targets
-from lightpaint.lighting.live.live import LiveSolver
+from lightpaint.lighting.live.live_solver import LiveSolver
 from lightpaint.lighting.live.live_view import LiveView
 
 #: By light, as somebody has set them; the third stays as it is.

@@ -10,7 +10,7 @@ from lightpaint.colour.color import kelvin_to_rgb
 from lightpaint.colour.color_ranges import DIRECTIONS, chromaticity, white_range
 from lightpaint.lighting.fit import resolve_for_targets
 from lightpaint.lighting.linear_problem import PaintReading
-from lightpaint.lighting.live.live import LiveSolver
+from lightpaint.lighting.live.live_solver import LiveSolver
 from lightpaint.lighting.live.live_view import LiveView
 from lightpaint.lighting.unknowns.gamuts import PAINTED_MARGIN, Gamuts, PaintedLight
 

@@ -24,8 +24,8 @@ from lightpaint.lighting.wishes.wish_problems import (
     with_wishes,
 )
 from lightpaint.lighting.wishes.wished_light import wished_light
-from lightpaint.photometry.illuminance import Illuminance
-from lightpaint.photometry.measuring_plane import (
+from lightpaint.photometry.illuminance import (
+    Illuminance,
     LightCase,
     MeasuringPlane,
     PowerBudget,

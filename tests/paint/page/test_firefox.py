@@ -23,7 +23,7 @@ from websockets.sync.client import ClientConnection, connect
 
 import lightpaint as lp
 from lightpaint.colour.primaries import to_8_bit
-from lightpaint.paint.server.server import Server
+from lightpaint.paint.server.page_server import Server
 from lightpaint.paint.store.session_file import MemoryStore
 from lightpaint.paint.studio.session_studio import Studio
 from lightpaint.paint.subject import Subject

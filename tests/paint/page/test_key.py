@@ -12,7 +12,7 @@ from typing import Any
 import pytest
 from foreign_server import ForeignServer
 
-from lightpaint.paint.server.server import Server
+from lightpaint.paint.server.page_server import Server
 from lightpaint.paint.store.session_file import MemoryStore
 from lightpaint.paint.studio.session_studio import Studio
 from lightpaint.paint.subject import Subject

@@ -13,7 +13,7 @@ from axe import violations
 from patience import PATIENCE_S
 from renderer import write_room
 
-from lightpaint.paint.server.server import Server
+from lightpaint.paint.server.page_server import Server
 from lightpaint.paint.store.session_file import Store
 from lightpaint.paint.studio.session_studio import Studio
 from lightpaint.paint.subject import Subject

@@ -24,7 +24,7 @@ from lightpaint.paint.layers.canvas import ViewLayers
 from lightpaint.paint.layers.layer_files import write_layers_openraster
 from lightpaint.paint.layers.layer_pixels import LayerPixels
 from lightpaint.paint.layers.layer_stack import Layer, LayerStack
-from lightpaint.paint.server.server import Server
+from lightpaint.paint.server.page_server import Server
 from lightpaint.paint.store.history_steps import Pixels
 from lightpaint.paint.store.session_file import Store
 from lightpaint.paint.studio.session_studio import Studio

@@ -32,7 +32,7 @@ from lightpaint.dmx.levels import encode_levels
 from lightpaint.dmx.network.console_link import ConsoleLink
 from lightpaint.images.object_map import Objects
 from lightpaint.lighting.analysis.noise.noise_correction import correct_noise
-from lightpaint.paint.server.server import Server
+from lightpaint.paint.server.page_server import Server
 from lightpaint.paint.store.history_steps import name_in_view
 from lightpaint.paint.store.session_file import Store
 from lightpaint.paint.studio.console_switch import Console, drives_of_session

@@ -13,7 +13,7 @@ from painter_page import Painter
 from PIL import Image
 
 import lightpaint as lp
-from lightpaint.paint.server.server import Server
+from lightpaint.paint.server.page_server import Server
 from lightpaint.paint.store.session_file import Store
 from lightpaint.paint.studio.session_studio import Studio
 from lightpaint.paint.subject_factory import make_subject

@@ -13,15 +13,16 @@ import numpy as np
 
 from lightpaint.arrays import Doubles, Floats
 from lightpaint.images import is_large
-from lightpaint.lighting.analysis.appearance.display_difference import NOTICED, PaintComparison
+from lightpaint.lighting.analysis.appearance.display_difference import (
+    NOTICED,
+    PaintComparison,
+    UnpaintedChange,
+    change_from_scene,
+)
 from lightpaint.lighting.analysis.appearance.pixel_sample import (
     LimitGroup,
     PixelSample,
     limit_groups,
-)
-from lightpaint.lighting.analysis.appearance.unpainted_change import (
-    UnpaintedChange,
-    change_from_scene,
 )
 from lightpaint.lighting.analysis.noise.noise_correction import correct_noise
 from lightpaint.lighting.constraints.constraint_table import Constraints

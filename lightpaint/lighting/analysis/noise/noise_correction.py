@@ -27,7 +27,7 @@ from lightpaint.basis import BLOCK_PIXELS, Basis, Planes, as_planes
 from lightpaint.errors import BasisError, LightpaintError, SizeError
 from lightpaint.images import Estimate, SurfaceFilter, box_mean
 from lightpaint.keywords import keywords
-from lightpaint.lighting.analysis.noise.noise import (
+from lightpaint.lighting.analysis.noise.basis_noise import (
     Noise,
     denoised_matrix,
     gradient_bias,

@@ -32,7 +32,7 @@ import numpy.typing as npt
 
 from lightpaint.arrays import Bools, Doubles, Floats, Indices
 from lightpaint.images import box_mean, enlarged
-from lightpaint.lighting.loss.loss import PixelLoss, planes_of
+from lightpaint.lighting.loss.pixel_loss import PixelLoss, planes_of
 from lightpaint.lighting.solution import Solution
 
 _Kind = TypeVar("_Kind", bound=np.generic)

@@ -14,7 +14,7 @@ import numpy as np
 
 from lightpaint.arrays import Bools, Doubles, Indices
 from lightpaint.basis import BLOCK_PIXELS
-from lightpaint.lighting.analysis.noise.noise import NoisyPixels
+from lightpaint.lighting.analysis.noise.basis_noise import NoisyPixels
 from lightpaint.lighting.analysis.noise.weight_directions import gradient_response
 from lightpaint.lighting.solution import Solution
 from lightpaint.threads import parallel_map

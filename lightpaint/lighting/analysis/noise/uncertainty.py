@@ -35,8 +35,7 @@ from lightpaint.basis import BLOCK_PIXELS, FEW_LIGHTS
 from lightpaint.colour import LUMINANCE
 from lightpaint.display_text import short_repr
 from lightpaint.keywords import keywords
-from lightpaint.lighting.analysis.noise.dominant_pixels import NORMAL_95, t_ratios
-from lightpaint.lighting.analysis.noise.noise import (
+from lightpaint.lighting.analysis.noise.basis_noise import (
     Noise,
     denoised_matrix,
     gradient_bias,
@@ -44,6 +43,7 @@ from lightpaint.lighting.analysis.noise.noise import (
     painting_covariance,
     pseudo_inverse,
 )
+from lightpaint.lighting.analysis.noise.dominant_pixels import NORMAL_95, t_ratios
 from lightpaint.lighting.analysis.noise.weight_directions import WeightResponse, solve_for
 from lightpaint.lighting.answer.lighting import LightSetting
 from lightpaint.lighting.loss.expected_lights import NoisyBlocks, Wash

@@ -13,12 +13,12 @@ import numpy as np
 
 from lightpaint.arrays import Bools, Doubles, Indices
 from lightpaint.lighting.algebra.symmetric_matrices import excess_above, sandwich
-from lightpaint.lighting.analysis.noise.dominant_pixels import NORMAL_95
-from lightpaint.lighting.analysis.noise.noise import (
+from lightpaint.lighting.analysis.noise.basis_noise import (
     NULL_EIGENVALUE,
     noise_sums,
     pseudo_inverse,
 )
+from lightpaint.lighting.analysis.noise.dominant_pixels import NORMAL_95
 from lightpaint.lighting.normal_equations import NormalEquations
 from lightpaint.lighting.solution import Solution
 from lightpaint.lighting.unknowns.reduced_problem import ReducedOptimum, solve_reduced

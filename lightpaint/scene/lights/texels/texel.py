@@ -22,7 +22,7 @@ from lightpaint.arrays import Doubles, Indices
 from lightpaint.errors import SceneError
 from lightpaint.files import one_line
 from lightpaint.scene.lights.texels.image_domains import GridSize, ImageDomain
-from lightpaint.scene.limits import MAX_TEXELS
+from lightpaint.validation import MAX_TEXELS
 
 #: Longest side of a written image, in pixels: a larger one is a typing error.
 MAX_MAP_SIDE = 8192

@@ -32,7 +32,9 @@ from lightpaint.lighting.analysis.appearance.display_difference import (
     NOTICED,
     SPOT,
     PaintComparison,
+    UnpaintedChange,
     block_differences,
+    change_from_scene,
     lights_at,
     object_with_most_error,
     place_with_most_error,
@@ -44,10 +46,6 @@ from lightpaint.lighting.analysis.appearance.limiting_reasons import (
     reasons_of,
 )
 from lightpaint.lighting.analysis.appearance.pixel_sample import LimitGroup
-from lightpaint.lighting.analysis.appearance.unpainted_change import (
-    UnpaintedChange,
-    change_from_scene,
-)
 from lightpaint.lighting.analysis.diagnosis import (
     Diagnosis,
     Place,
