@@ -11,7 +11,7 @@ from lightpaint.basis.file.half_floats import EncodedPlanes, encoded_plane
 from lightpaint.basis.file.lit_planes import LitPlane, LitPlanes
 from lightpaint.basis.planes import MemoryPlanes
 from lightpaint.colour.display.view_transform import ViewTransform
-from lightpaint.lighting.analysis.noise import noise_rows
+from lightpaint.lighting.analysis.noise import basis_noise, noise_rows
 from lightpaint.lighting.analysis.noise.basis_noise import NoisyPixels, noise_sums
 from lightpaint.lighting.analysis.noise.noise_rows import FOLDED_PIXELS, MANY_LIGHTS, folded
 from lightpaint.lighting.solver import solve
