@@ -29,10 +29,17 @@ def _controller() -> ThreadpoolController:
 
 
 def find_loaded_libraries() -> None:
-    """Include libraries in `one_thread` that were loaded after its first call: SciPy has a BLAS of
-    its own.
+    """Limit libraries that were loaded after the first call of `one_thread` to one thread for good:
+    SciPy has a BLAS of its own.
+
+    Blocks that are limited already do not know these libraries, whose threads would then wait for
+    each other while jobs run side by side.
     """
+    known = {x.filepath for x in _controller().lib_controllers}
     _controller.cache_clear()
+    for library in _controller().lib_controllers:
+        if library.filepath not in known and library.user_api == "blas":
+            library.set_num_threads(1)
 
 
 _limits = local()

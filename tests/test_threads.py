@@ -1,6 +1,8 @@
 """The limit on BLAS's threads: within, nested, in jobs side by side, and lifted after."""
 
 import os
+import subprocess
+import sys
 from threading import Barrier, get_ident
 
 import numpy as np
@@ -109,3 +111,31 @@ def test_inner_products_of_few_lights_are_formed_on_one_thread(monkeypatch: pyte
         inner_products(images, target, np.ones((4, 4), np.float32))
     assert thread_names
     assert all(threads == {1} for threads in thread_names)
+
+
+def test_a_library_that_is_loaded_within_a_limit_has_one_thread() -> None:
+    """In a process of its own, in which SciPy's BLAS is not loaded yet."""
+    code = """
+import numpy
+from threadpoolctl import threadpool_info
+from lightpaint.lighting.algebra.symmetric_matrices import large_libraries
+from lightpaint.threads import one_thread
+
+def numbers():
+    return [x["num_threads"] for x in threadpool_info() if x["user_api"] == "blas"]
+
+with one_thread():
+    before = numbers()
+    large_libraries()
+    assert len(numbers()) >= len(before), numbers()
+    assert set(numbers()) == {1}, numbers()
+print(len(before), len(numbers()))
+"""
+    done = subprocess.run(
+        [sys.executable, "-c", code],
+        env={**os.environ, "OPENBLAS_NUM_THREADS": "2"},
+        capture_output=True,
+        text=True,
+        check=False,
+    )
+    assert done.returncode == 0, done.stderr

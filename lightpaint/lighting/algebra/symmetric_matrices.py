@@ -21,9 +21,7 @@ SMALL_MATRIX = 256
 
 @cache
 def large_libraries() -> tuple[Any, Any]:
-    """Return SciPy's LAPACK and BLAS, loaded where unknowns are many; `one_thread` limits them
-    from then on.
-    """
+    """Return SciPy's LAPACK and BLAS, loaded where unknowns are many, on one thread."""
     from scipy.linalg import blas, lapack
 
     find_loaded_libraries()
