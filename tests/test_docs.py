@@ -13,7 +13,7 @@ from typing import Any
 import pytest
 
 import lightpaint as lp
-from lightpaint.basis.cache.cache import MAX_BYTES
+from lightpaint.basis.cache.basis_cache import MAX_BYTES
 from lightpaint.batch.cluster.dask_engine import LIMIT_FACTOR, MIN_LIMIT_S
 from lightpaint.batch.manifest.checks import SOLVE_STEPS
 from lightpaint.batch.manifest.entries import MAX_LOOKS
