@@ -19,7 +19,7 @@ import numpy as np
 from rows import add_csv, write_rows
 from scipy.optimize import nnls
 
-from lightpaint.basis.basis import Basis, Origin
+from lightpaint.basis.light_basis import Basis, Origin
 from lightpaint.basis.lights import BasisLight
 from lightpaint.basis.planes import BLOCK_PIXELS
 from lightpaint.lighting.algebra.optimum import minimise

@@ -40,8 +40,8 @@ import numpy as np
 from scipy.ndimage import gaussian_filter
 
 import lightpaint as lp
-from lightpaint.basis.basis import meter_exposure
 from lightpaint.basis.cache.cached_render import obtain_basis
+from lightpaint.basis.light_basis import meter_exposure
 from lightpaint.colour.color import delta_e, kelvin_to_rgb, luminance
 from lightpaint.errors import PaintError
 from lightpaint.paint.presets.lighting_presets import PRESETS

@@ -22,7 +22,7 @@ from pathlib import Path
 import numpy as np
 
 import lightpaint as lp
-from lightpaint.basis.basis import Basis
+from lightpaint.basis.light_basis import Basis
 from lightpaint.basis.render.basis_render import train_tracer
 from lightpaint.basis.render.rendered_basis import basis_of_sums
 from lightpaint.scene.mitsuba_scene import Scene

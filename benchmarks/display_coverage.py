@@ -23,7 +23,7 @@ from coverage import rendered_bases
 from rows import add_csv, write_rows
 
 import lightpaint as lp
-from lightpaint.basis.basis import Basis
+from lightpaint.basis.light_basis import Basis
 from lightpaint.scene.mitsuba_scene import Scene
 from lightpaint.scene.runtime.variant import use_variant
 from lightpaint.target.painted_target import Target

@@ -44,7 +44,7 @@ ROOT = Path(__file__).resolve().parent.parent
 sys.path.insert(0, str(ROOT))
 
 import lightpaint as lp  # noqa: E402
-from lightpaint.basis.basis import Basis, Origin  # noqa: E402
+from lightpaint.basis.light_basis import Basis, Origin  # noqa: E402
 from lightpaint.basis.lights import BasisLight  # noqa: E402
 from lightpaint.dmx.levels import decode_levels  # noqa: E402
 from lightpaint.dmx.mvr import DESCRIPTION, read_rig  # noqa: E402

@@ -25,7 +25,7 @@ from image_lights import MATERIALS, SCENE, TARGET_SPP, map_error
 
 import lightpaint as lp
 from lightpaint.arrays import Doubles, Floats
-from lightpaint.basis.basis import Basis
+from lightpaint.basis.light_basis import Basis
 from lightpaint.basis.lights import light_images
 from lightpaint.images.formats.exr import write_rgb
 from lightpaint.lighting.loss import weight_penalty

@@ -31,7 +31,7 @@ from image_light_rivals import adam
 
 import lightpaint as lp
 from lightpaint.arrays import Doubles, Floats
-from lightpaint.basis.basis import Basis
+from lightpaint.basis.light_basis import Basis
 from lightpaint.basis.lights import LightImage, light_images
 from lightpaint.colour.color import delta_e, luminance
 from lightpaint.images.formats.exr import write_rgb

@@ -50,8 +50,8 @@ import OpenEXR
 from scipy.ndimage import gaussian_filter, label
 
 import lightpaint as lp
-from lightpaint.basis.basis import meter_exposure
 from lightpaint.basis.cache.cached_render import obtain_basis
+from lightpaint.basis.light_basis import meter_exposure
 from lightpaint.colour.color import delta_e, kelvin_to_rgb, luminance
 from lightpaint.images.denoiser import denoised
 from lightpaint.lighting.analysis.appearance import limiting_reasons

@@ -24,8 +24,8 @@ import numpy as np
 from hall import write_hall
 
 import lightpaint as lp
-from lightpaint.basis.basis import Basis, Origin
 from lightpaint.basis.file.file_planes import RowPlanes
+from lightpaint.basis.light_basis import Basis, Origin
 from lightpaint.basis.lights import BasisLight, Lights
 from lightpaint.images.denoiser import Features
 from lightpaint.images.formats.png import png_bytes

@@ -16,7 +16,7 @@ import argparse
 import numpy as np
 
 import lightpaint as lp
-from lightpaint.basis.basis import Basis, Origin
+from lightpaint.basis.light_basis import Basis, Origin
 from lightpaint.basis.lights import BasisLight
 
 SIZE = (36, 64)

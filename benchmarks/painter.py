@@ -55,7 +55,7 @@ import numpy as np
 from playwright.sync_api import Page, sync_playwright
 
 import lightpaint as lp
-from lightpaint.basis.basis import Origin
+from lightpaint.basis.light_basis import Origin
 from lightpaint.basis.lights import BasisLight
 from lightpaint.lighting.fit import resolve_fit
 from lightpaint.lighting.live.live_solver import LiveSolver

@@ -37,8 +37,8 @@ from known_places import PLACES, references
 from scipy.ndimage import gaussian_filter
 
 import lightpaint as lp
-from lightpaint.basis.basis import meter_exposure
 from lightpaint.basis.cache.cached_render import obtain_basis
+from lightpaint.basis.light_basis import meter_exposure
 from lightpaint.colour.color import delta_e, luminance
 from lightpaint.paint.protocol import ApplyPreset, LookLike, PlacePair
 from lightpaint.paint.session.painting_session import Session

@@ -33,9 +33,9 @@ from lightpaint.scene.runtime.drjit_import import choose_llvm_at_import
 from lightpaint.version import __version__
 
 if TYPE_CHECKING:
-    from lightpaint.basis.basis import Basis as Basis
     from lightpaint.basis.file.basis_file import read_basis as read_basis
     from lightpaint.basis.file.basis_file import write_basis as write_basis
+    from lightpaint.basis.light_basis import Basis as Basis
     from lightpaint.basis.lightgroups.frame_sequence import FrameSequence as FrameSequence
     from lightpaint.basis.lightgroups.frame_sequence import find_frames as find_frames
     from lightpaint.basis.lightgroups.light_groups import LightGroups as LightGroups

@@ -16,8 +16,8 @@ from typing import Any
 
 import numpy as np
 
-from lightpaint.basis.basis import Basis, Origin
 from lightpaint.basis.file.basis_file import write_basis
+from lightpaint.basis.light_basis import Basis, Origin
 from lightpaint.basis.lights import BasisLight
 from lightpaint.images.formats.exr import write_rgb
 

@@ -20,7 +20,7 @@ from renderer import write_room
 from threadpoolctl import threadpool_limits
 
 from lightpaint import progress
-from lightpaint.basis.basis import Basis, Origin
+from lightpaint.basis.light_basis import Basis, Origin
 from lightpaint.basis.lights import BasisLight
 from lightpaint.basis.render.basis_render import render_basis
 from lightpaint.placement.paths import view_paths

@@ -10,7 +10,7 @@ import numpy as np
 import numpy.typing as npt
 
 import lightpaint as lp
-from lightpaint.basis.basis import Origin
+from lightpaint.basis.light_basis import Origin
 from lightpaint.basis.lights import BasisLight
 from lightpaint.images.denoiser import Features
 from lightpaint.paint import protocol

@@ -10,7 +10,7 @@ import numpy as np
 from layered_sessions import bases_of, identity_of
 
 import lightpaint as lp
-from lightpaint.basis.basis import Basis
+from lightpaint.basis.light_basis import Basis
 from lightpaint.basis.lights import Lights
 from lightpaint.paint import protocol
 from lightpaint.paint.rig.added_lights import light_of_new, new_emitter

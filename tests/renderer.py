@@ -7,7 +7,7 @@ from pathlib import Path
 import numpy as np
 
 from lightpaint.arrays import RGB
-from lightpaint.basis.basis import Basis
+from lightpaint.basis.light_basis import Basis
 from lightpaint.basis.render.basis_render import render_basis
 from lightpaint.images.formats.exr import write_rgb
 from lightpaint.lighting.answer.lighting import Lighting

@@ -10,8 +10,8 @@ from PIL import Image
 from renderer import LIGHTS, write_room
 
 import lightpaint as lp
-from lightpaint.basis.basis import Basis
 from lightpaint.basis.file.basis_file import write_basis
+from lightpaint.basis.light_basis import Basis
 from lightpaint.basis.render.basis_render import render_basis
 from lightpaint.cli import main
 from lightpaint.colour.display.view_transform import ViewTransform

@@ -13,7 +13,7 @@ from typing import Any
 import pytest
 
 import lightpaint as lp
-from lightpaint.basis.cache.cache import MAX_BYTES
+from lightpaint.basis.cache.basis_cache import MAX_BYTES
 from lightpaint.batch.cluster.dask_engine import LIMIT_FACTOR, MIN_LIMIT_S
 from lightpaint.batch.manifest.checks import SOLVE_STEPS
 from lightpaint.batch.manifest.entries import MAX_LOOKS
@@ -32,7 +32,6 @@ from lightpaint.paint.server.address import DEFAULT_PORT
 from lightpaint.paint.server.client import MAX_QUEUED, MAX_QUEUED_BYTES
 from lightpaint.paint.server.http_server import MAX_UNAUTHENTICATED
 from lightpaint.paint.server.session_clients import MAX_PAGES
-from lightpaint.paint.subject_factory import MAX_PAGE_BYTES
 from lightpaint.photometry.measure import DEFAULT_ERROR
 from lightpaint.pipeline.job.settings import MAX_SUGGEST
 from lightpaint.scene.lights.light_choice import MAX_SEPARATE
@@ -317,7 +316,6 @@ def test_numbers_in_documents_are_those_of_the_code() -> None:
         f"lists {MAX_LISTED:,} sensors or paintings",
         f"scans {MAX_VISITED:,} files",
         f"texts of {MAX_CHARACTERS} characters and lists of {MAX_VALUES} values",
-        f"at most {MAX_PAGE_BYTES // 2**30} GiB in half floats",
     ):
         assert phrase in limits
     solving = text("solving.md")

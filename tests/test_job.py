@@ -14,8 +14,8 @@ from light_groups import channels, interleaved, pictures, write
 from renderer import LIGHTS, write_room
 
 from lightpaint import Constraints, Job, Painting, SceneFile, Settings, paint_with_light, run
-from lightpaint.basis.basis import Basis
 from lightpaint.basis.file.basis_file import write_basis
+from lightpaint.basis.light_basis import Basis
 from lightpaint.basis.lightgroups.light_groups import read_light_groups
 from lightpaint.colour.display.view_transform import TransformChoice, ViewTransform
 from lightpaint.errors import (

@@ -11,7 +11,7 @@ from PIL import Image
 from renderer import write_room
 
 import lightpaint as lp
-from lightpaint.basis.cache import cache
+from lightpaint.basis.cache import basis_cache
 from lightpaint.errors import TargetError
 from lightpaint.images.denoiser import DENOISED_KEY
 from lightpaint.images.formats.exr import read_parts
@@ -62,10 +62,10 @@ def test_an_untouched_template_solves_to_the_present_lighting(folder: Path):
 def test_files_that_other_seeds_and_lights_need_are_theirs(folder: Path):
     """What is kept is that of the same lights, groups, film and seed."""
     for option in (("--seed", 1), ("--lights", "panel"), ("--resolution", "1/2")):
-        entry_count = len(cache.entries())
+        entry_count = len(basis_cache.entries())
         succeed(folder, "template", "room.xml", "--spp", 4, "--force", "-o", "other", *option)
-        assert len(cache.entries()) == entry_count + 1
-    entry_count = len(cache.entries())
+        assert len(basis_cache.entries()) == entry_count + 1
+    entry_count = len(basis_cache.entries())
     succeed(
         folder,
         "template",
@@ -79,7 +79,7 @@ def test_files_that_other_seeds_and_lights_need_are_theirs(folder: Path):
         "--seed",
         7,
     )
-    assert len(cache.entries()) == entry_count
+    assert len(basis_cache.entries()) == entry_count
 
 
 def test_pictures_are_clean_and_say_so(folder: Path):
@@ -131,7 +131,7 @@ def test_where_each_light_takes_a_render_only_a_kept_basis_is_used(tmp_path: Pat
     first = run(tmp_path, "template", room, *arguments)
     assert first.returncode == 0, first.stderr
     assert "each light needs a render of its own" in first.stderr
-    integrators = [entry.origin.integrator for entry in cache.entries() if entry.origin]
+    integrators = [entry.origin.integrator for entry in basis_cache.entries() if entry.origin]
     assert "volpath" not in integrators
     succeed(tmp_path, "basis", room, *arguments)
     second = run(tmp_path, "template", room, *arguments, "--force")

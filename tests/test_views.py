@@ -12,7 +12,7 @@ import numpy as np
 import pytest
 from renderer import LIGHTS, write_room
 
-from lightpaint.basis.basis import Basis
+from lightpaint.basis.light_basis import Basis
 from lightpaint.basis.render.basis_render import render_basis
 from lightpaint.cli import main
 from lightpaint.cli.commands.paint_command import command_for_paintings

@@ -28,9 +28,9 @@ sys.path.insert(0, str(ROOT / "benchmarks"))
 from known_places import references  # noqa: E402
 
 import lightpaint as lp  # noqa: E402
-from lightpaint.basis.basis import meter_exposure  # noqa: E402
 from lightpaint.basis.cache.cached_render import obtain_basis  # noqa: E402
 from lightpaint.basis.denoised_mixes import denoise_current_look, denoise_mix  # noqa: E402
+from lightpaint.basis.light_basis import meter_exposure  # noqa: E402
 from lightpaint.paint.presets.lighting_presets import PRESETS  # noqa: E402
 from lightpaint.paint.protocol import ApplyPreset, LookLike  # noqa: E402
 from lightpaint.paint.session.painting_session import Session  # noqa: E402

@@ -7,7 +7,7 @@ from typing import Any, get_type_hints
 
 from dataclass_schemas import Schema, list_of, schema_of, value_schema
 
-from lightpaint.basis.basis import Origin
+from lightpaint.basis.light_basis import Origin
 from lightpaint.lighting.analysis.appearance.color_choices import ColorChoice
 from lightpaint.lighting.analysis.appearance.delivery import Delivery
 from lightpaint.lighting.analysis.appearance.display_difference import UnpaintedChange

@@ -10,7 +10,7 @@ from field_pages import described, field_page
 from manifest_schema import manifest_schema
 from report_schema import report_schema
 
-from lightpaint.basis.basis import Origin
+from lightpaint.basis.light_basis import Origin
 from lightpaint.basis.lights import BasisLight
 from lightpaint.batch.gallery.summary import SummaryRow
 from lightpaint.batch.manifest.file_names import SUMMARY_FORMAT

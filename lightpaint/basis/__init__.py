@@ -5,9 +5,6 @@ from typing import TYPE_CHECKING
 from lightpaint.lazy_names import lazy_names
 
 if TYPE_CHECKING:
-    from lightpaint.basis.basis import Basis as Basis
-    from lightpaint.basis.basis import Origin as Origin
-    from lightpaint.basis.basis import meter_exposure as meter_exposure
     from lightpaint.basis.cache.denoised_planes import DenoisedPlanes as DenoisedPlanes
     from lightpaint.basis.cache.denoised_planes import RoughPlanes as RoughPlanes
     from lightpaint.basis.cache.denoised_planes import as_halves as as_halves
@@ -33,6 +30,9 @@ if TYPE_CHECKING:
     from lightpaint.basis.file.basis_file import read_basis as read_basis
     from lightpaint.basis.file.basis_file import write_basis as write_basis
     from lightpaint.basis.file.file_planes import spooled as spooled
+    from lightpaint.basis.light_basis import Basis as Basis
+    from lightpaint.basis.light_basis import Origin as Origin
+    from lightpaint.basis.light_basis import meter_exposure as meter_exposure
     from lightpaint.basis.lightgroups.frame_sequence import SIGN as SIGN
     from lightpaint.basis.lightgroups.frame_sequence import FrameSequence as FrameSequence
     from lightpaint.basis.lightgroups.frame_sequence import find_frames as find_frames

@@ -13,7 +13,7 @@ import numpy as np
 import numpy.typing as npt
 
 from lightpaint.arrays import Doubles, Floats
-from lightpaint.basis.basis import Basis
+from lightpaint.basis.light_basis import Basis
 from lightpaint.images import Quality, block_mean, box_mean, denoised, oidn_is_installed, shifted
 
 #: Radius in pixels over which noise and the change made by the denoiser are averaged.

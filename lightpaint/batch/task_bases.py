@@ -9,7 +9,7 @@ from dataclasses import replace
 from pathlib import Path
 
 from lightpaint.basis import Basis, write_basis
-from lightpaint.basis.cache import cache
+from lightpaint.basis.cache import basis_cache
 from lightpaint.batch.distributed_work import PartwiseRender
 from lightpaint.batch.engine import Engine
 from lightpaint.batch.plan.plan_steps import PlaceGroup
@@ -42,7 +42,7 @@ def has_basis(task: Task, worker_cache: WorkerCache) -> bool:
     film = on_film(scene.content, settings.quality, settings.resolution)
     requested_spp = replace(settings, time_s=None).basis_spp
     sensor = film.sensor_names[film.sensor]
-    cached_spp = cache.cached_spp(film.identity, sensor, settings.seed, film.size)
+    cached_spp = basis_cache.cached_spp(film.identity, sensor, settings.seed, film.size)
     goal_spp = film.spp if requested_spp is None else requested_spp
     has_enough = cached_spp == goal_spp if settings.exact_spp else cached_spp >= goal_spp
     return settings.use_cache and has_enough

@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 
 from lightpaint.basis import Basis, LightGroups, Lights, meter_exposure
-from lightpaint.basis.cache import SceneFacts, cache, find_opening, scene_facts
+from lightpaint.basis.cache import SceneFacts, basis_cache, find_opening, scene_facts
 from lightpaint.colour import TransformChoice, ViewTransform, read_observer
 from lightpaint.display_text import some_names
 from lightpaint.errors import PaintError
@@ -202,7 +202,7 @@ class Subject:
             yield opened
             return
         of_scene = scene.identity, sensor_name(scene), settings.seed, scene.size
-        done_spp = cache.cached_spp(*of_scene) if settings.use_cache else 0
+        done_spp = basis_cache.cached_spp(*of_scene) if settings.use_cache else 0
         if settings.use_cache and settings.time_s is None:
             for spp in PREVIEW_SPP:
                 if done_spp < spp < target_spp:
@@ -226,7 +226,7 @@ class Subject:
         if record is None or settings.time_s is not None or settings.exact_spp:
             return None
         of_scene = record.identity, record.sensor, settings.seed, record.size
-        cached = find_opening(*of_scene) or cache.find(*of_scene)
+        cached = find_opening(*of_scene) or basis_cache.find(*of_scene)
         return self._with_lights(cached, record.lights)
 
     def _opened_basis(self, scene: Scene) -> Basis | None:

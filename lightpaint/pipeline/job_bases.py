@@ -10,7 +10,7 @@ import numpy as np
 
 from lightpaint.arrays import Doubles, Indices
 from lightpaint.basis import Basis, texel_lights
-from lightpaint.basis.cache import Render, cache, folder, obtain_basis, top_up_basis
+from lightpaint.basis.cache import Render, basis_cache, folder, obtain_basis, top_up_basis
 from lightpaint.basis.render import ONE_PASS, KeptTracer, kept_loaded, render_basis, samples_for
 from lightpaint.colour import LUMINANCE
 from lightpaint.errors import BasisError
@@ -75,7 +75,7 @@ def obtain(
     )
     if watch.is_all_rendered and not watch.is_reused:
         basis = replace(basis, render_s=time.perf_counter() - began_s)
-    if settings.use_cache and not cache.is_cached(basis):
+    if settings.use_cache and not basis_cache.is_cached(basis):
         listen.say(
             f"the basis could not be saved in {folder()}, so the next run renders it again: "
             "is the disk full, or the folder not yours?"

@@ -17,7 +17,7 @@ from lightpaint.basis import (
     light_images,
     meter_exposure,
 )
-from lightpaint.basis.cache import cache, obtain_basis
+from lightpaint.basis.cache import basis_cache, obtain_basis
 from lightpaint.basis.render import emitters_seen, is_of, render_basis, why_not_one_pass
 from lightpaint.colour import ViewTransform, choose_exposure
 from lightpaint.errors import LightpaintError, OutputError
@@ -79,7 +79,7 @@ def render_sheet(scene: Scene, path: Path, progress: Progress = silent) -> str:
     why nothing was written, if rendering would take too long.
     """
     sensor = scene.sensor_names[scene.sensor]
-    basis = cache.find_most_sampled(
+    basis = basis_cache.find_most_sampled(
         scene.identity, sensor, samples=SHEET.spp * LIGHT_MIN_PIXELS, largest=MAX_BASIS_BYTES
     )
     if basis is None:
@@ -286,7 +286,7 @@ def _basis_of(scene: Scene, settings: Settings, listen: Listener) -> Basis | Non
     if settings.use_cache:
         # A cached basis with all the requested samples needs no further render.
         sensor = scene.sensor_names[scene.sensor]
-        cached = cache.find(scene.identity, sensor, settings.seed, scene.size)
+        cached = basis_cache.find(scene.identity, sensor, settings.seed, scene.size)
         spp = scene.spp if settings.spp is None else settings.spp
         if cached is not None and is_of(scene, cached, settings.seed) and cached.origin.spp >= spp:
             return obtain(scene, settings, listen)

@@ -10,7 +10,6 @@ import numpy as np
 import OpenEXR
 import pytest
 
-from lightpaint.basis.basis import Basis
 from lightpaint.basis.file.basis_file import (
     FORMAT_KEY,
     ORIGIN_KEY,
@@ -21,6 +20,7 @@ from lightpaint.basis.file.basis_file import (
     write_basis,
 )
 from lightpaint.basis.file.file_parts import CHECKSUMS_KEY, LIGHT_KEY, NAMES_KEY, OBJECTS_KEY
+from lightpaint.basis.light_basis import Basis
 from lightpaint.errors import BasisError, ImageError, SizeError
 from lightpaint.images.estimate import HALF_DIFFERENCE
 from lightpaint.images.formats.exr import ExrPart, read_parts, write_parts, write_rgb

@@ -16,13 +16,13 @@ from command import run
 from nightly import nightly
 from renderer import LIGHTS, assert_equal_bits, same_basis, write_room
 
-from lightpaint.basis.basis import Basis
-from lightpaint.basis.cache import cache
-from lightpaint.basis.cache.cache import SUFFIX, SUMS_SUFFIX, TAG
+from lightpaint.basis.cache import basis_cache
+from lightpaint.basis.cache.basis_cache import SUFFIX, SUMS_SUFFIX, TAG
 from lightpaint.basis.cache.cached_render import obtain_basis
 from lightpaint.basis.file import basis_file
 from lightpaint.basis.file.basis_file import read_basis, write_basis
 from lightpaint.basis.file.file_planes import FilePlanes
+from lightpaint.basis.light_basis import Basis
 from lightpaint.basis.render.basis_render import render_basis
 from lightpaint.basis.render.rendered_basis import is_on_the_way
 from lightpaint.errors import LightpaintError, OutputError, SceneError
@@ -70,8 +70,8 @@ def test_what_is_kept_is_copied_rather_than_written_again(
     write_basis(path, basis)
     expected = path.read_bytes()
     written: list[Basis] = []
-    monkeypatch.setattr(cache, "write_basis", lambda path, basis: written.append(basis))
-    cache.write_from_cache(path, basis)
+    monkeypatch.setattr(basis_cache, "write_basis", lambda path, basis: written.append(basis))
+    basis_cache.write_from_cache(path, basis)
     assert not written
     assert path.read_bytes() == expected
     lights = [replace(light, name=f"{light.name} of the hall") for light in basis.lights]
@@ -83,7 +83,7 @@ def test_what_is_kept_is_copied_rather_than_written_again(
         replace(basis, origin=replace(basis.origin, seed=7)),  # never rendered
     ]
     for other in others:
-        cache.write_from_cache(path, other)
+        basis_cache.write_from_cache(path, other)
     assert written == others
     assert path.read_bytes() == expected
 
@@ -93,7 +93,7 @@ def test_more_samples_are_added(scene: Scene) -> None:
     assert obtain_basis(scene, spp=20).origin.spp == 20
     # As many as are asked for at once, whatever number of runs has rendered them.
     assert obtain_basis(scene, spp=20).origin == render_basis(scene, spp=20).origin
-    assert [entry.origin.spp for entry in cache.entries() if entry.origin] == [20]
+    assert [entry.origin.spp for entry in basis_cache.entries() if entry.origin] == [20]
 
 
 @pytest.mark.parametrize("use_cache", [True, False])
@@ -114,7 +114,7 @@ def test_what_is_large_is_read_from_its_file_as_soon_as_it_is_kept(
     scene: Scene, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     expected = obtain_basis(scene, spp=16)
-    cache.delete_entries(cache.entries())
+    basis_cache.delete_entries(basis_cache.entries())
     monkeypatch.setattr(basis_file, "IN_MEMORY_MAX_BYTES", 0)
     large = obtain_basis(scene, spp=16)
     assert isinstance(large.planes, FilePlanes)
@@ -152,16 +152,16 @@ def test_what_is_kept_beyond_what_is_asked_for_is_said(scene: Scene) -> None:
 def test_exactly_what_is_asked_for_whatever_is_kept(scene: Scene) -> None:
     fresh_basis = obtain_basis(scene, spp=16, use_cache=False)
     obtain_basis(scene, spp=32)
-    before = [entry.path.read_bytes() for entry in cache.entries()]
+    before = [entry.path.read_bytes() for entry in basis_cache.entries()]
     exact, messages = _obtain_basis(scene, spp=16, exact_spp=True)
     assert messages == []
     same_basis(exact, fresh_basis)
     # The one with more samples is not thrown away.
-    assert [entry.path.read_bytes() for entry in cache.entries()] == before
-    cache.delete_entries(cache.entries())
+    assert [entry.path.read_bytes() for entry in basis_cache.entries()] == before
+    basis_cache.delete_entries(basis_cache.entries())
     obtain_basis(scene, spp=8)
     same_basis(obtain_basis(scene, spp=16, exact_spp=True), fresh_basis)
-    [entry] = cache.entries()
+    [entry] = basis_cache.entries()
     assert entry.origin == fresh_basis.origin
     log: list[int] = []
     same_basis(obtain_basis(scene, spp=16, exact_spp=True, progress=passes(log)), fresh_basis)
@@ -191,7 +191,7 @@ def test_the_first_samples_of_what_is_asked_for_are_gone_on_with(
         with pytest.raises(Interrupted):
             obtain_basis(scene, spp=64, exact_spp=True, progress=press_ctrl_c)
         [unfinished] = _cached_bases()
-        exact = replace(unfinished, sums=cache.sums_of(unfinished))
+        exact = replace(unfinished, sums=basis_cache.sums_of(unfinished))
         assert is_on_the_way(scene, exact, 64)
         assert not is_on_the_way(scene, unfinished, 64)
         log: list[int] = []
@@ -199,13 +199,13 @@ def test_the_first_samples_of_what_is_asked_for_are_gone_on_with(
         assert_equal_bits(continuation, fresh_basis)
         assert not sums_files()
         assert 0 < sum(count > 0 for count in log) < max(pass_counts)
-        cache.delete_entries(cache.entries())
+        basis_cache.delete_entries(basis_cache.entries())
     # One that fewer samples ended has other passes.
     assert not is_on_the_way(scene, obtain_basis(scene, spp=6, use_cache=False), 64)
 
 
 def sums_files() -> list[Path]:
-    return list(cache.folder().glob(f"*{SUMS_SUFFIX}"))
+    return list(basis_cache.folder().glob(f"*{SUMS_SUFFIX}"))
 
 
 def _render_and_kill(scene: Scene, spp: int, after: int) -> None:
@@ -250,7 +250,7 @@ def test_without_its_sums_what_is_unfinished_counts_and_is_not_exact(
         file.unlink()
     else:
         np.savez(file, sums_a=np.zeros(3, np.float32), sums_b=np.zeros(3, np.float32))
-    [entry] = cache.entries()
+    [entry] = basis_cache.entries()
     before = entry.path.read_bytes()
     same_basis(obtain_basis(scene, spp=32), single_render, of_file=True)
     entry.path.write_bytes(before)
@@ -261,14 +261,14 @@ def test_without_its_sums_what_is_unfinished_counts_and_is_not_exact(
 def test_sums_go_with_their_basis(scene: Scene) -> None:
     obtain_basis(scene, spp=2, is_final=False)
     obtain_basis(scene, spp=8, is_final=False)
-    [file], [entry] = sums_files(), cache.entries()
+    [file], [entry] = sums_files(), basis_cache.entries()
     assert entry.size == entry.path.stat().st_size + file.stat().st_size
-    cache.delete_entries([entry])
+    basis_cache.delete_entries([entry])
     assert not sums_files()
 
 
 def _cached_bases() -> list[Basis]:
-    return [read_basis(entry.path) for entry in cache.entries()]
+    return [read_basis(entry.path) for entry in basis_cache.entries()]
 
 
 def test_exact_samples_and_a_time_go_ill_together(scene: Scene) -> None:
@@ -302,18 +302,18 @@ def test_another_scene_sensor_or_seed_is_another_basis(scene: Scene, tmp_path: P
     text = scene.path.read_text(encoding="utf-8")
     scene.path.write_text(text.replace("0.7 0.5 0.4", "0.7 0.5 0.5"), encoding="utf-8")
     obtain_basis(load_scene(scene.path), spp=2)
-    assert len(cache.entries()) == 4
+    assert len(basis_cache.entries()) == 4
 
 
 def test_no_cache_leaves_none(scene: Scene) -> None:
     obtain_basis(scene, spp=2, use_cache=False)
-    assert cache.entries() == []
+    assert basis_cache.entries() == []
 
 
 @pytest.mark.parametrize("damage", ["cut", "junk", "empty"])
 def test_a_damaged_one_is_made_anew(scene: Scene, damage: str) -> None:
     obtain_basis(scene, spp=2)
-    [entry] = cache.entries()
+    [entry] = basis_cache.entries()
     content = entry.path.read_bytes()
     entry.path.write_bytes(
         {"cut": content[: len(content) // 2], "junk": b"junk", "empty": b""}[damage]
@@ -328,17 +328,17 @@ def test_a_damaged_one_is_made_anew(scene: Scene, damage: str) -> None:
 def test_the_longest_unused_goes_first(scene: Scene, monkeypatch: pytest.MonkeyPatch) -> None:
     for seed in range(3):
         obtain_basis(scene, spp=2, seed=seed)
-    oldest, *_ = by_age = cache.entries()
+    oldest, *_ = by_age = basis_cache.entries()
     for age, entry in enumerate(by_age):
         os.utime(entry.path, (1000 + age, 1000 + age))
-    monkeypatch.setattr(cache, "MAX_BYTES", int(2.5 * oldest.size))
+    monkeypatch.setattr(basis_cache, "MAX_BYTES", int(2.5 * oldest.size))
     obtain_basis(scene, spp=2, seed=3)
-    remaining_files = {entry.path for entry in cache.entries()}
+    remaining_files = {entry.path for entry in basis_cache.entries()}
     assert by_age[2].path in remaining_files
     assert len(remaining_files) == 2
-    left_over = cache.entries()
-    assert cache.delete_entries(left_over) == sum(entry.size for entry in left_over)
-    assert cache.entries() == []
+    left_over = basis_cache.entries()
+    assert basis_cache.delete_entries(left_over) == sum(entry.size for entry in left_over)
+    assert basis_cache.entries() == []
 
 
 def test_a_folder_that_cannot_be_written_costs_nothing_but_time(
@@ -365,23 +365,25 @@ def test_bases_are_dropped_by_scene_or_file(
     for scene, identity in origins:
         basis = make_basis(2)
         origin = replace(basis.origin, scene=scene, scene_identity=identity)
-        assert cache.keep(replace(basis, origin=origin))
+        assert basis_cache.keep(replace(basis, origin=origin))
     content = next(empty_cache.glob(f"*{SUFFIX}")).read_bytes()
     (empty_cache / f"{DAMAGED}{SUFFIX}").write_bytes(
         content[: content.index(b"lightpaint-basis") + 20]
     )
 
     def scenes(pattern: str) -> list[str]:
-        return sorted(x.origin.scene if x.origin else "?" for x in cache.entries_named(pattern))
+        return sorted(
+            x.origin.scene if x.origin else "?" for x in basis_cache.entries_named(pattern)
+        )
 
     assert scenes("hall.xml") == scenes("hall") == scenes("h*") == ["hall.xml"] * 2
     assert scenes("*.xml") == ["hall.xml"] * 2 + ["room.xml"]
     assert scenes(DAMAGED) == scenes("da*") == ["?"]
     assert scenes("hal") == scenes("") == []
-    [file] = {entry.path.name for entry in cache.entries_named("room")}
+    [file] = {entry.path.name for entry in basis_cache.entries_named("room")}
     assert scenes(file) == scenes(file.removesuffix(SUFFIX)) == ["room.xml"]
     environment = {"LIGHTPAINT_CACHE": str(empty_cache)}
-    size = sum(entry.size for entry in cache.entries_named("hall"))
+    size = sum(entry.size for entry in basis_cache.entries_named("hall"))
     completed = run(tmp_path, "cache", "drop", "hall", "h*", **environment)
     assert completed.returncode == 0, completed.stderr
     assert completed.stdout.count("hall.xml") == 2
@@ -402,14 +404,14 @@ def test_bases_are_dropped_by_scene_or_file(
     assert scenes("*") == ["?", "room.xml"]
     assert "of at most 8590 MB" in run(tmp_path, "cache", **environment).stdout
     assert run(tmp_path, "cache", "clear", **environment).stdout.startswith("2 deleted")
-    assert cache.entries() == []
+    assert basis_cache.entries() == []
 
 
 def bases_of(make_basis: Any, *scenes: str) -> None:
     for k, scene in enumerate(scenes):
         basis = make_basis(2)
         origin = replace(basis.origin, scene=scene, scene_identity=f"{k:032x}")
-        assert cache.keep(replace(basis, origin=origin))
+        assert basis_cache.keep(replace(basis, origin=origin))
 
 
 def test_a_folder_with_other_files_is_no_cache(
@@ -431,9 +433,9 @@ def test_a_folder_with_other_files_is_no_cache(
         [line_] = completed.stderr.splitlines()
         assert f"LIGHTPAINT_CACHE names {work}, which has other files in it" in line_
         assert "evening.basis.exr" in line_
-    assert not cache.keep(make_basis(2))
+    assert not basis_cache.keep(make_basis(2))
     with pytest.raises(OutputError, match="name a folder that is new or empty"):
-        cache.find("0", "sensor", 0, (4, 4))
+        basis_cache.find("0", "sensor", 0, (4, 4))
     assert sorted(work.rglob("*")) == before
 
 
@@ -480,16 +482,16 @@ def test_a_folder_from_before_there_was_a_mark_is_taken_on(
     bases_of(make_basis, "hall.xml")
     (empty_cache / TAG).unlink()
     (empty_cache / ".drjit").mkdir()
-    assert [entry.origin.scene for entry in cache.entries() if entry.origin] == ["hall.xml"]
+    assert [entry.origin.scene for entry in basis_cache.entries() if entry.origin] == ["hall.xml"]
     bases_of(make_basis, "hall.xml", "room.xml")
     assert (empty_cache / TAG).read_text().startswith("Signature: 8a477f597d28d172789f06886806bc55")
     # Once it is ours, what others put there is no reason to lose it.
     (empty_cache / "notes.txt").write_text("mine")
-    assert len(cache.entries()) == 2
+    assert len(basis_cache.entries()) == 2
     # The mark of another program's cache is none of ours.
     (empty_cache / TAG).write_text("Signature: 8a477f597d28d172789f06886806bc55\n# by another")
     with pytest.raises(OutputError, match="other files"):
-        cache.entries()
+        basis_cache.entries()
 
 
 def test_what_somebody_else_has_put_there_is_not_believed(
@@ -497,22 +499,25 @@ def test_what_somebody_else_has_put_there_is_not_believed(
 ) -> None:
     basis = make_basis(2)
     request = (basis.origin.scene_identity, "sensor", 0, basis.size)
-    assert cache.keep(basis)
-    assert cache.find(*request) is not None
+    assert basis_cache.keep(basis)
+    assert basis_cache.find(*request) is not None
     [path] = empty_cache.glob("*.basis.exr")
     owner = path.stat().st_uid
-    monkeypatch.setattr(cache, "is_trusted_owner", lambda status: status.st_uid != owner)
-    assert cache.find(*request) is None
-    assert cache.entries() == []
-    assert cache.cached_spp(*request) == 0
-    assert cache.find_most_sampled(*request[:2], samples=1, largest=2**30) is None
+    monkeypatch.setattr(basis_cache, "is_trusted_owner", lambda status: status.st_uid != owner)
+    assert basis_cache.find(*request) is None
+    assert basis_cache.entries() == []
+    assert basis_cache.cached_spp(*request) == 0
+    assert basis_cache.find_most_sampled(*request[:2], samples=1, largest=2**30) is None
 
 
 def test_who_is_believed() -> None:
     """Who runs the program, and who runs the machine."""
     me = os.geteuid()
     for owner, believed in ((me, True), (0, True), (me + 1, False)):
-        assert cache.is_trusted_owner(os.stat_result((0o644, 1, 1, 1, owner, *5 * [0]))) == believed
+        assert (
+            basis_cache.is_trusted_owner(os.stat_result((0o644, 1, 1, 1, owner, *5 * [0])))
+            == believed
+        )
 
 
 @pytest.mark.parametrize("jump_s", [-10 * 365 * 86400.0, 10 * 365 * 86400.0])
@@ -521,11 +526,13 @@ def test_a_clock_that_jumps_costs_no_basis(
 ) -> None:
     bases_of(make_basis, "hall.xml", "room.xml")
     clock_s = time.time() + jump_s
-    monkeypatch.setattr("lightpaint.basis.cache.cache.time", SimpleNamespace(time=lambda: clock_s))
+    monkeypatch.setattr(
+        "lightpaint.basis.cache.basis_cache.time", SimpleNamespace(time=lambda: clock_s)
+    )
     bases_of(make_basis, "hall.xml")
-    assert len(cache.entries()) == 2
-    for entry in cache.entries():
+    assert len(basis_cache.entries()) == 2
+    for entry in basis_cache.entries():
         os.utime(entry.path, (clock_s, clock_s))
-    assert len(cache.entries()) == 2
+    assert len(basis_cache.entries()) == 2
     origin = make_basis(2).origin
-    assert cache.find(f"{0:032x}", origin.sensor, origin.seed, make_basis(2).size) is not None
+    assert basis_cache.find(f"{0:032x}", origin.sensor, origin.seed, make_basis(2).size) is not None

@@ -12,8 +12,7 @@ import pytest
 from damaged_files import Case, damage, flip_bit, outcomes, read_despite_cut, wrong_outcomes
 from nightly import FIFTHS, fifth_of
 
-from lightpaint.basis.basis import Basis
-from lightpaint.basis.cache import cache
+from lightpaint.basis.cache import basis_cache
 from lightpaint.basis.file.basis_file import (
     ORIGIN_KEY,
     as_stored,
@@ -22,6 +21,7 @@ from lightpaint.basis.file.basis_file import (
     write_basis,
 )
 from lightpaint.basis.file.file_parts import CHECKSUMS_KEY, LIGHT_KEY
+from lightpaint.basis.light_basis import Basis
 from lightpaint.basis.lightgroups.light_groups import read_light_groups
 from lightpaint.basis.lightgroups.render_layers import MAX_FILES, is_light_groups
 from lightpaint.errors import BasisError, ImageError
@@ -211,16 +211,16 @@ def test_a_basis_in_the_place_of_another_is_not_taken(
 ) -> None:
     monkeypatch.setenv("LIGHTPAINT_CACHE", str(tmp_path))
     origin = basis.origin
-    assert cache.keep(basis)
+    assert basis_cache.keep(basis)
     request = (origin.scene_identity, origin.sensor, origin.seed, SIZE)
-    assert cache.find(*request) is not None
+    assert basis_cache.find(*request) is not None
     (basis_file,) = tmp_path.glob("*.basis.exr")
-    other = cache._path("another", *request[1:])
+    other = basis_cache.path_for("another", *request[1:])
     basis_file.rename(other)
-    assert cache.find("another", *request[1:]) is None
+    assert basis_cache.find("another", *request[1:]) is None
     other.unlink()
     (tmp_path / f"{'0a' * 16}.basis.exr").symlink_to("nowhere")
-    assert cache.entries() == []
+    assert basis_cache.entries() == []
 
 
 def test_a_folder_of_very_many_files(tmp_path: Path) -> None:

@@ -7,10 +7,10 @@ from typing import Any
 import numpy as np
 import pytest
 
-from lightpaint.basis.basis import Basis, Origin
 from lightpaint.basis.cache.denoised_planes import RoughPlanes
 from lightpaint.basis.denoised_mixes import blend_by_noise, denoise_mix, denoise_plane
 from lightpaint.basis.file.basis_file import as_stored, read_basis, write_basis
+from lightpaint.basis.light_basis import Basis, Origin
 from lightpaint.basis.lights import BasisLight
 from lightpaint.basis.planes import IndirectLight, as_planes
 from lightpaint.errors import BasisError

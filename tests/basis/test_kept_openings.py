@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 import lightpaint as lp
-from lightpaint.basis.cache import cache, opening
+from lightpaint.basis.cache import basis_cache, opening
 from lightpaint.basis.file import basis_file
 from lightpaint.basis.file.deferred_planes import DeferredPlanes
 from lightpaint.basis.plane_results import array_name, array_once
@@ -28,8 +28,8 @@ def kept(make_basis: Any) -> lp.Basis:
     """A cached basis, as it is read, of which all that a session begins with was computed."""
     rng = np.random.default_rng(3)
     images = rng.random((N, 12, 10, 3)) * (rng.random((N, 12, 10, 1)) < 0.3)
-    assert cache.keep(make_basis(images=images, half_differences=images / 8))
-    basis = cache.find(*arguments(make_basis(N)))
+    assert basis_cache.keep(make_basis(images=images, half_differences=images / 8))
+    basis = basis_cache.find(*arguments(make_basis(N)))
     assert basis is not None
     _ = basis.current_look, basis.power
     array_once(basis.noise, "loudest", lambda: np.array([x.max() for x in basis.noise]))
@@ -71,18 +71,18 @@ def test_what_is_known_needs_no_planes(kept: lp.Basis, monkeypatch: pytest.Monke
 
 
 def test_another_basis_is_not_opened_by_what_was_known(kept: lp.Basis, make_basis: Any) -> None:
-    assert cache.keep(make_basis(N, seed=1))
+    assert basis_cache.keep(make_basis(N, seed=1))
     assert find(kept) is None
 
 
 def test_a_damaged_file_of_known_walks_is_as_none(kept: lp.Basis) -> None:
-    path = cache.companion_path(kept, cache.OPENING_SUFFIX)
+    path = basis_cache.companion_path(kept, basis_cache.OPENING_SUFFIX)
     path.write_bytes(path.read_bytes()[:-40])
     assert find(kept) is None
 
 
 def test_damaged_pixels_are_found_by_the_first_walk(kept: lp.Basis) -> None:
-    path = cache.file_of(kept)
+    path = basis_cache.file_of(kept)
     assert path is not None
     opened = find(kept)
     assert opened is not None
@@ -101,12 +101,14 @@ def test_few_lights_are_read_at_once(kept: lp.Basis, monkeypatch: pytest.MonkeyP
 
 
 def test_openings_are_listed_and_deleted_with_their_basis(kept: lp.Basis) -> None:
-    [entry] = cache.entries()
-    files = [file.stat().st_size for file in cache.folder().glob("*.*") if file.suffix != ".TAG"]
+    [entry] = basis_cache.entries()
+    files = [
+        file.stat().st_size for file in basis_cache.folder().glob("*.*") if file.suffix != ".TAG"
+    ]
     assert entry.size == sum(files)
     assert len(files) == 2
-    cache.delete_entries([entry])
-    assert not list(cache.folder().glob("*.npz"))
+    basis_cache.delete_entries([entry])
+    assert not list(basis_cache.folder().glob("*.npz"))
 
 
 def test_the_name_of_an_array_covers_what_it_depends_on() -> None:

@@ -9,7 +9,6 @@ import numpy as np
 import pytest
 
 import lightpaint as lp
-from lightpaint.basis.basis import Basis
 from lightpaint.basis.file import basis_file, file_parts, lit_planes
 from lightpaint.basis.file.basis_file import FORMAT_KEY, LIT_FORMAT, as_stored, is_file_of
 from lightpaint.basis.file.file_planes import FilePlanes
@@ -25,6 +24,7 @@ from lightpaint.basis.file.noise_rounding import (
     noise_ratios,
     round_to_noise,
 )
+from lightpaint.basis.light_basis import Basis
 from lightpaint.basis.planes import IndirectLight, MemoryPlanes
 from lightpaint.errors import BasisError
 from lightpaint.images.formats.exr import read_parts, write_parts

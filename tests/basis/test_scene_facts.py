@@ -14,9 +14,9 @@ import pytest
 from PIL import Image
 
 import lightpaint
-from lightpaint.basis.basis import Basis
-from lightpaint.basis.cache import cache, scene_facts
+from lightpaint.basis.cache import basis_cache, scene_facts
 from lightpaint.basis.cache.scene_facts import SceneFacts, facts_key, recall_facts, remember_facts
+from lightpaint.basis.light_basis import Basis
 from lightpaint.basis.render.rendered_basis import basis_lights
 from lightpaint.scene.mitsuba_scene import Scene
 from lightpaint.scene.scene_reader import load_scene
@@ -60,7 +60,7 @@ def keep_basis(scene: Scene, make_basis: Any) -> Basis:
     source = make_basis(len(scene.lights), scene.size)
     origin = replace(source.origin, scene_identity=scene.identity, sensor=scene.sensor_names[0])
     basis: Basis = replace(source, lights=basis_lights(scene), origin=origin)
-    assert cache.keep(basis)
+    assert basis_cache.keep(basis)
     return basis
 
 
@@ -92,11 +92,11 @@ def test_it_is_what_the_scene_would_have_told(folder: Path, make_basis: Any) -> 
         basis_lights(scene),
         ("one",),
     )
-    [entry] = cache.entries()
+    [entry] = basis_cache.entries()
     assert entry.size > entry.path.stat().st_size
-    cache.delete_entries([entry])
+    basis_cache.delete_entries([entry])
     assert recall_facts(key) is None
-    assert [x.name for x in cache.folder().iterdir()] == [cache.TAG]
+    assert [x.name for x in basis_cache.folder().iterdir()] == [basis_cache.TAG]
 
 
 def rewrite_same_bytes(path: Path) -> None:
@@ -186,7 +186,7 @@ def test_what_is_damaged_is_not_believed(folder: Path, make_basis: Any) -> None:
     scene = load_scene(folder / "hall.xml")
     key, later_s = key_of_facts(folder), time.time() + LATER_S
     assert remember_facts(key, scene, keep_basis(scene, make_basis), remarks=(), began_s=later_s)
-    [path] = cache.folder().glob("*.known.json")
+    [path] = basis_cache.folder().glob("*.known.json")
     text = path.read_text("utf-8")
     for damage in ("", "[]", text[:-9], text.replace('"spp"', '"ssp"'), text.replace("lamp", "[")):
         path.write_text(damage, "utf-8")
@@ -196,13 +196,13 @@ def test_what_is_damaged_is_not_believed(folder: Path, make_basis: Any) -> None:
 def test_what_lies_beside_no_basis_goes_when_it_was_not_used(tmp_path: Path) -> None:
     place = tmp_path / "cache"
     place.mkdir()
-    (place / cache.TAG).write_text(cache.TAG_TEXT)
+    (place / basis_cache.TAG).write_text(basis_cache.TAG_TEXT)
     orphan = place / f"{'0a' * 16}.clean.npz"
     user_file = place / "notes.clean.npz"
     for path in (orphan, user_file):
         np.savez(path, made_of=np.array("0"))
     size = orphan.stat().st_size
-    assert cache.delete_orphans(3600) == 0
-    assert cache.delete_orphans() == size
+    assert basis_cache.delete_orphans(3600) == 0
+    assert basis_cache.delete_orphans() == size
     assert not orphan.exists()
     assert user_file.exists()

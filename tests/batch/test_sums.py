@@ -11,7 +11,7 @@ from conftest import BasisFactory
 from light_groups import interleaved, pictures
 from renderer import LIGHTS, write_room
 
-from lightpaint.basis.basis import Basis
+from lightpaint.basis.light_basis import Basis
 from lightpaint.basis.render import basis_render, render_parts
 from lightpaint.batch.plan.planner import plan_batch
 from lightpaint.batch.run import run_batch

@@ -12,7 +12,7 @@ from command import succeed
 from nightly import nightly
 from renderer import CORNELL, REPOSITORY, write_room
 
-from lightpaint.basis.cache.cache import TAG
+from lightpaint.basis.cache.basis_cache import TAG
 
 WARM = REPOSITORY / "targets" / "cornell" / "warm.exr"
 

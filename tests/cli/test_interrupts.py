@@ -13,9 +13,9 @@ from nightly import nightly
 from patience import PATIENCE_S
 from renderer import CORNELL, LIGHTS, PATH, assert_equal_bits, write_room
 
-from lightpaint.basis.basis import Basis
 from lightpaint.basis.cache.cached_render import obtain_basis
 from lightpaint.basis.file.basis_file import read_basis
+from lightpaint.basis.light_basis import Basis
 from lightpaint.basis.render.rendered_basis import ONE_PASS, SEPARATE
 from lightpaint.scene.scene_reader import load_scene
 

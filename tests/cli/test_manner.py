@@ -158,10 +158,10 @@ def test_every_command_has_a_document(tmp_path: Path) -> None:
 
 
 def test_the_cache_and_the_doctor(work_folder: Path, make_basis: Any, monkeypatch: Any) -> None:
-    from lightpaint.basis.cache import cache
+    from lightpaint.basis.cache import basis_cache
 
     monkeypatch.setenv("LIGHTPAINT_CACHE", str(work_folder / "cache"))
-    assert cache.keep(make_basis(2, names=["a", BAD]))
+    assert basis_cache.keep(make_basis(2, names=["a", BAD]))
     record = document(work_folder, "cache")
     [entry] = record["kept"]
     assert (entry["scene"], entry["lights"], entry["size"]) == ("scene.xml", 2, [10, 12])

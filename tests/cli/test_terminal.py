@@ -11,7 +11,7 @@ from command import run, run_refused, spawn, succeed
 from renderer import write_room
 from rich.markup import escape
 
-from lightpaint.basis.cache import cache
+from lightpaint.basis.cache import basis_cache
 from lightpaint.basis.file.basis_file import write_basis
 from lightpaint.cli.output import lines, terminal
 from lightpaint.display_text import some_names, visible
@@ -95,7 +95,7 @@ def test_the_cache_and_solve(tmp_path: Path, make_basis: Any) -> None:
     folder = tmp_path / "cache"
     with pytest.MonkeyPatch.context() as patch:
         patch.setenv("LIGHTPAINT_CACHE", str(folder))
-        assert cache.keep(basis)
+        assert basis_cache.keep(basis)
     completed = run(tmp_path, "cache", "list", LIGHTPAINT_CACHE=str(folder))
     assert completed.returncode == 0
     assert not STEERS.search(completed.stdout)

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from conftest import BasisFactory
 
-from lightpaint.basis.basis import meter_exposure
+from lightpaint.basis.light_basis import meter_exposure
 from lightpaint.colour.display.exposure import choose_exposure
 
 SIZE = (60, 80)

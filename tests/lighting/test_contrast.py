@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 import lightpaint as lp
-from lightpaint.basis.basis import meter_exposure
+from lightpaint.basis.light_basis import meter_exposure
 from lightpaint.colour.color import kelvin_to_rgb, luminance
 from lightpaint.lighting import hold_to_current, solver
 from lightpaint.lighting.live.live_sums import SmallFilm

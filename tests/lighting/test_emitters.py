@@ -8,7 +8,7 @@ import pytest
 
 import lightpaint as lp
 from lightpaint.arrays import Doubles
-from lightpaint.basis.basis import Basis
+from lightpaint.basis.light_basis import Basis
 from lightpaint.basis.lights import Lights
 from lightpaint.lighting.fit import resolve_for_targets
 from lightpaint.lighting.live.live_solver import LiveSolver

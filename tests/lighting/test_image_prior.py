@@ -7,7 +7,7 @@ import pytest
 from conftest import BasisFactory
 
 from lightpaint.arrays import Doubles
-from lightpaint.basis.basis import Basis
+from lightpaint.basis.light_basis import Basis
 from lightpaint.basis.lights import BasisLight, Lights, joined_texels, light_images, texel_lights
 from lightpaint.basis.planes import as_planes
 from lightpaint.lighting.fit import Fit

@@ -10,7 +10,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from lightpaint.basis.basis import Basis
+from lightpaint.basis.light_basis import Basis
 from lightpaint.basis.planes import MemoryPlanes
 from lightpaint.images.estimate import Estimate
 from lightpaint.lighting.constraints.constraint_table import Constraints

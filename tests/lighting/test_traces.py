@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from light_groups import pictures
 
-from lightpaint.basis.basis import Basis, Origin
+from lightpaint.basis.light_basis import Basis, Origin
 from lightpaint.basis.lights import BasisLight
 from lightpaint.lighting.constraints.constraint_table import Constraints
 from lightpaint.lighting.problem import remove_traces

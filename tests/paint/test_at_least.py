@@ -11,7 +11,7 @@ from hypothesis import strategies as st
 from nightly import examples
 
 import lightpaint as lp
-from lightpaint.basis.basis import Origin
+from lightpaint.basis.light_basis import Origin
 from lightpaint.basis.lights import BasisLight
 from lightpaint.colour.color import delta_e
 from lightpaint.images.formats.exr import ExrPart, write_parts

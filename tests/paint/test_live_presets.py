@@ -7,7 +7,7 @@ import pytest
 from nightly import nightly
 
 import lightpaint as lp
-from lightpaint.basis.basis import meter_exposure
+from lightpaint.basis.light_basis import meter_exposure
 from lightpaint.colour.color import delta_e
 from lightpaint.errors import PaintError
 from lightpaint.paint import protocol

@@ -10,7 +10,7 @@ import pytest
 from moving import MovingStudio
 from renderer import LIGHTS
 
-from lightpaint.basis.basis import Basis
+from lightpaint.basis.light_basis import Basis
 from lightpaint.basis.lights import Lights
 from lightpaint.colour.display.view_transform import ViewTransform
 from lightpaint.errors import LightpaintError

@@ -13,7 +13,7 @@ from command import spawn
 from renderer import assert_equal_bits, write_room
 
 import lightpaint as lp
-from lightpaint.basis.cache import cache, scene_facts
+from lightpaint.basis.cache import basis_cache, scene_facts
 from lightpaint.basis.render.rendered_basis import basis_lights
 from lightpaint.errors import ConstraintError, PaintError
 from lightpaint.images.denoiser import Features
@@ -72,7 +72,7 @@ def keep_basis(
         features=Features(flat, flat),
         objects=Objects(np.zeros(scene.size, np.int32), ("wall",)),
     )
-    assert cache.keep(basis)
+    assert basis_cache.keep(basis)
     opening._began_s = time.time() + 60  # as if its files were older
     opening.remarks = ("a remark",)
     before_keeping()

@@ -15,7 +15,7 @@ from nightly import examples, nightly
 from renderer import REPOSITORY
 
 import lightpaint as lp
-from lightpaint.basis.basis import Origin
+from lightpaint.basis.light_basis import Origin
 from lightpaint.basis.lights import BasisLight
 from lightpaint.cli.commands.paint_command import options_of
 from lightpaint.colour.color import LUMINANCE, kelvin_to_rgb

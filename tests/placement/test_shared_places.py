@@ -5,7 +5,7 @@ import pytest
 from renderer import write_room
 
 import lightpaint as lp
-from lightpaint.basis.basis import Basis
+from lightpaint.basis.light_basis import Basis
 from lightpaint.errors import SceneError
 from lightpaint.scene.mitsuba_scene import Scene
 from lightpaint.scene.scene_reader import load_scene

@@ -12,7 +12,7 @@ import pytest
 from nightly import nightly
 from renderer import LIGHTS, PLASTIC, write_room
 
-from lightpaint.basis.basis import Basis
+from lightpaint.basis.light_basis import Basis
 from lightpaint.basis.render.basis_render import render_basis
 from lightpaint.colour.display.view_transform import ViewTransform
 from lightpaint.errors import SceneError

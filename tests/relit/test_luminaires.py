@@ -12,7 +12,7 @@ from renderer import LIGHTS, write_room
 from webs import Distribution, batwing, cosine, ies_text, street, write_web
 
 from lightpaint.arrays import RGB, Doubles
-from lightpaint.basis.basis import Basis
+from lightpaint.basis.light_basis import Basis
 from lightpaint.basis.render.basis_render import render_basis
 from lightpaint.lighting.answer.combination import combine
 from lightpaint.lighting.answer.lighting import Lighting

@@ -12,7 +12,7 @@ from light_groups import interleaved, pictures
 from PIL import Image
 
 import lightpaint as lp
-from lightpaint.basis.basis import Basis
+from lightpaint.basis.light_basis import Basis
 from lightpaint.lighting.analysis.answer_analysis import analyse
 from lightpaint.lighting.problem import Problem
 from lightpaint.pipeline.results.look import Look

@@ -13,7 +13,7 @@ import pytest
 from nightly import nightly
 
 from lightpaint import threads
-from lightpaint.basis.basis import Basis
+from lightpaint.basis.light_basis import Basis
 from lightpaint.colour.display.view_transform import ViewTransform
 from lightpaint.images.estimate import Estimate
 from lightpaint.lighting import solver as solve_module

@@ -6,7 +6,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from lightpaint.basis.basis import Basis
+from lightpaint.basis.light_basis import Basis
 from lightpaint.report.contact_sheet import EDGE, GROUND, MAX_LIGHTS, _grid, light_sheet
 
 

@@ -5,12 +5,12 @@ from typing import TYPE_CHECKING
 from lightpaint.lazy_names import lazy_names
 
 if TYPE_CHECKING:
-    from lightpaint.basis.cache.cache import PARTS as PARTS
-    from lightpaint.basis.cache.cache import Entry as Entry
-    from lightpaint.basis.cache.cache import delete_orphans as delete_orphans
-    from lightpaint.basis.cache.cache import folder as folder
-    from lightpaint.basis.cache.cache import is_trusted_owner as is_trusted_owner
-    from lightpaint.basis.cache.cache import write_from_cache as write_from_cache
+    from lightpaint.basis.cache.basis_cache import PARTS as PARTS
+    from lightpaint.basis.cache.basis_cache import Entry as Entry
+    from lightpaint.basis.cache.basis_cache import delete_orphans as delete_orphans
+    from lightpaint.basis.cache.basis_cache import folder as folder
+    from lightpaint.basis.cache.basis_cache import is_trusted_owner as is_trusted_owner
+    from lightpaint.basis.cache.basis_cache import write_from_cache as write_from_cache
     from lightpaint.basis.cache.cached_render import Render as Render
     from lightpaint.basis.cache.cached_render import check_same_view as check_same_view
     from lightpaint.basis.cache.cached_render import obtain_basis as obtain_basis

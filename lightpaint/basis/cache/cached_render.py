@@ -6,8 +6,7 @@ from dataclasses import replace
 from typing import Any
 
 from lightpaint.arrays import Indices
-from lightpaint.basis.basis import Basis
-from lightpaint.basis.cache import cache
+from lightpaint.basis.cache import basis_cache
 from lightpaint.basis.cache.plane_reuse import (
     as_sampled,
     counts_of,
@@ -18,6 +17,7 @@ from lightpaint.basis.cache.plane_reuse import (
     restrict,
 )
 from lightpaint.basis.file.basis_file import as_stored, is_large, leave_indirect
+from lightpaint.basis.light_basis import Basis
 from lightpaint.basis.render.basis_render import render_basis
 from lightpaint.basis.render.pixel_top_up import KeptTracer, top_up
 from lightpaint.basis.render.rendered_basis import (
@@ -102,7 +102,7 @@ def obtain_basis(
 
     def keep(basis: Basis) -> bool:
         is_best = cached is None or basis.origin.mean_spp >= cached.origin.mean_spp
-        return is_best and cache.keep(_marked(basis, is_composed=is_composed))
+        return is_best and basis_cache.keep(_marked(basis, is_composed=is_composed))
 
     if start is not None:
         # A basis cached by an earlier version may know less about the same lights.
@@ -117,7 +117,7 @@ def obtain_basis(
 
 def _cached_basis(scene: Scene, seed: int) -> Basis | None:
     """Return the cached basis of the scene in its present state, if there is one."""
-    cached = cache.find(scene.identity, scene.sensor_names[scene.sensor], seed, scene.size)
+    cached = basis_cache.find(scene.identity, scene.sensor_names[scene.sensor], seed, scene.size)
     return cached if cached is not None and is_of(scene, cached, seed) else None
 
 
@@ -146,7 +146,7 @@ def _starting_planes(
     lacks_samples = goal_spp is None or cached is None or cached.origin.spp < goal_spp
     start = cached
     if cached is not None and lacks_samples:
-        start = replace(cached, sums=cache.sums_of(cached))
+        start = replace(cached, sums=basis_cache.sums_of(cached))
     if exact_spp:
         is_usable = start is not None and is_on_the_way(scene, start, goal_spp)
         return start if is_usable else None
@@ -162,10 +162,12 @@ def _as_from_cache(scene: Scene, basis: Basis, keep: Callable[[Basis], bool]) ->
     if not is_large(len(basis.lights), basis.size):
         # The next run, which reads the file, must find the same planes.
         basis = replace(as_stored(basis, keep), sums=None)
-        file = cache.file_of(basis)
+        file = basis_cache.file_of(basis)
         return basis if file is None else leave_indirect(basis, file)
     if keep(basis):
-        of_file = cache.find(scene.identity, basis.origin.sensor, basis.origin.seed, basis.size)
+        of_file = basis_cache.find(
+            scene.identity, basis.origin.sensor, basis.origin.seed, basis.size
+        )
         if of_file is not None and of_file.origin == basis.origin:
             basis = replace(basis, planes=of_file.planes, noise=of_file.noise)
             return replace(basis, indirect=of_file.indirect, sums=None)
@@ -236,7 +238,7 @@ def top_up_basis(
     """Return `basis` with additional samples in some pixels, and replace it in the cache. See
     `top_up`.
     """
-    keep = cache.keep if use_cache else None
+    keep = basis_cache.keep if use_cache else None
     topped_up_basis = top_up(
         scene,
         basis,

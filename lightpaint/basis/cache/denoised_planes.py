@@ -18,9 +18,9 @@ import numpy as np
 import numpy.typing as npt
 
 from lightpaint.arrays import Doubles, Floats
-from lightpaint.basis.basis import Basis
-from lightpaint.basis.cache import cache
+from lightpaint.basis.cache import basis_cache
 from lightpaint.basis.denoised_mixes import denoise_current_look, denoise_plane, share_of_clean
+from lightpaint.basis.light_basis import Basis
 from lightpaint.basis.planes import mix
 from lightpaint.errors import LightpaintError
 from lightpaint.files import replacing
@@ -217,15 +217,15 @@ def read_denoised_planes(basis: Basis, *, factor: int = 1) -> DenoisedPlanes | N
     factor: side of blocks; planes of such blocks are accepted as well as whole planes.
     """
     with suppress(OSError, LightpaintError):
-        if not cache.companion_path(basis, cache.DENOISED_SUFFIX).exists():
+        if not basis_cache.companion_path(basis, basis_cache.DENOISED_SUFFIX).exists():
             return None  # before all planes are read for their keys
     return _read(basis, _content_keys(basis), factor)
 
 
 def _read(basis: Basis, keys: list[str], factor: int) -> DenoisedPlanes | None:
     with suppress(*_READ_ERRORS, LightpaintError):
-        path = cache.companion_path(basis, cache.DENOISED_SUFFIX)
-        if not cache.is_own(path):
+        path = basis_cache.companion_path(basis, basis_cache.DENOISED_SUFFIX)
+        if not basis_cache.is_own(path):
             return None
         with path.open("rb") as file, np.load(file, allow_pickle=False) as file_arrays:
             if file_arrays["made_of"].tolist() != keys:
@@ -249,7 +249,7 @@ def _read_shared(basis: Basis, keys: list[str], factor: int) -> dict[int, tuple[
     """
     missing = {key: k for k, key in enumerate(keys[:-1])}
     found: dict[int, tuple[Halves, float]] = {}
-    for path in cache.companions_with(cache.DENOISED_SUFFIX):
+    for path in basis_cache.companions_with(basis_cache.DENOISED_SUFFIX):
         with suppress(*_READ_ERRORS), path.open("rb") as file, np.load(file) as file_arrays:
             made_of = file_arrays["made_of"].tolist()[:-1]
             numbers = {key: number for number, key in enumerate(made_of) if key in missing}
@@ -271,7 +271,7 @@ def cache_denoised_planes(basis: Basis, planes: DenoisedPlanes) -> bool:
 
 def _write(basis: Basis, keys: list[str], planes: DenoisedPlanes) -> bool:
     try:
-        path = cache.companion_path(basis, cache.DENOISED_SUFFIX)
+        path = basis_cache.companion_path(basis, basis_cache.DENOISED_SUFFIX)
         with replacing(path) as place, place.open("wb") as file:
             made_of = np.array(keys)
             arrays = (planes.halves, planes.scales, planes.current)

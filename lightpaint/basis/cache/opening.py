@@ -14,9 +14,9 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from lightpaint.basis.basis import Basis
-from lightpaint.basis.cache import cache
+from lightpaint.basis.cache import basis_cache
 from lightpaint.basis.file.basis_file import DeferredFile
+from lightpaint.basis.light_basis import Basis
 from lightpaint.basis.plane_results import known_arrays, set_known_arrays
 from lightpaint.errors import LightpaintError
 from lightpaint.files import replacing
@@ -37,8 +37,8 @@ def find_opening(
     scene_identity: str, sensor: str, seed: int, size: tuple[int, int]
 ) -> Basis | None:
     """Return the cached basis for these arguments as `open_kept` does."""
-    path = cache.path_for(scene_identity, sensor, seed, size)
-    return open_kept(path) if cache.is_own(path) else None
+    path = basis_cache.path_for(scene_identity, sensor, seed, size)
+    return open_kept(path) if basis_cache.is_own(path) else None
 
 
 def open_kept(path: Path) -> Basis | None:
@@ -49,7 +49,7 @@ def open_kept(path: Path) -> Basis | None:
     with suppress(RowsUnsupportedError, OSError, LightpaintError):
         file = DeferredFile(path)
         basis = file.basis()
-        arrays = _read(cache.companion_path(basis, cache.OPENING_SUFFIX), file.content)
+        arrays = _read(basis_cache.companion_path(basis, basis_cache.OPENING_SUFFIX), file.content)
         if arrays is None:
             return None
         for prefix, planes in zip(PREFIXES, (basis.planes, basis.noise), strict=True):
@@ -70,8 +70,8 @@ def keep_opening(basis: Basis) -> bool:
         for name, array in known_arrays(planes).items()
     }
     try:
-        content = DeferredFile(cache.file_of(basis) or Path(basis.source)).content
-        path = cache.companion_path(basis, cache.OPENING_SUFFIX)
+        content = DeferredFile(basis_cache.file_of(basis) or Path(basis.source)).content
+        path = basis_cache.companion_path(basis, basis_cache.OPENING_SUFFIX)
         if (kept := _read(path, content)) is not None and kept.keys() >= arrays.keys():
             return True
         with replacing(path) as place, place.open("wb") as file:
@@ -84,7 +84,7 @@ def keep_opening(basis: Basis) -> bool:
 
 def _read(path: Path, content: str) -> Arrays | None:
     with suppress(*_READ_ERRORS, LightpaintError):
-        if not cache.is_own(path):
+        if not basis_cache.is_own(path):
             return None
         with path.open("rb") as file, np.load(file, allow_pickle=False) as arrays:
             if str(arrays[CONTENT]) == _digest(content):

@@ -12,10 +12,10 @@ from typing import Any
 import numpy as np
 
 from lightpaint.arrays import Bools
-from lightpaint.basis.basis import Basis
-from lightpaint.basis.cache import cache
+from lightpaint.basis.cache import basis_cache
 from lightpaint.basis.derived_planes import PlaneReference, compose_planes
 from lightpaint.basis.file.basis_file import is_large
+from lightpaint.basis.light_basis import Basis
 from lightpaint.basis.lights import Lights
 from lightpaint.basis.planes import IndirectLight, Planes
 from lightpaint.basis.render.render_budget import half_of
@@ -87,14 +87,14 @@ def gather_planes(
     best = BestPlanes(scene.light_identities, cached)
     if before is not None:
         best.take_from(before)
-    entries = cache.entries() if use_cache else []
+    entries = basis_cache.entries() if use_cache else []
     candidates = [entry for entry in entries if _is_like(entry, scene, seed)]
     while candidates:
         entry = max(candidates, key=lambda entry: best.gain(entry, spp))
         if best.gain(entry, spp) == 0:
             break
         candidates.remove(entry)
-        if (other := cache.read(entry)) is not None:
+        if (other := basis_cache.read(entry)) is not None:
             best.take_from(other)
     sources = best.bases
     if not sources or sources == [cached]:
@@ -122,7 +122,7 @@ class BestPlanes:
             for plane, identity in zip(self.planes, self._identities, strict=True)
         ]
 
-    def gain(self, entry: cache.Entry, spp: int | None) -> int:
+    def gain(self, entry: basis_cache.Entry, spp: int | None) -> int:
         """Return the number of samples per pixel that the planes of `entry` would add.
 
         spp: the number beyond which a plane is good enough.
@@ -221,7 +221,7 @@ def merge(scene: Scene, whole: Basis, part: Basis) -> Basis:
     return replace(merged_basis, features=part.features, objects=part.objects)
 
 
-def _is_like(entry: cache.Entry, scene: Scene, seed: int) -> bool:
+def _is_like(entry: basis_cache.Entry, scene: Scene, seed: int) -> bool:
     """Return whether a cached basis may have planes of `scene`, judging by its origin."""
     origin = entry.origin
     return (

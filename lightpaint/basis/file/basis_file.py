@@ -13,7 +13,6 @@ from pathlib import Path
 import numpy as np
 
 from lightpaint.arrays import is_finite, release_freed_memory
-from lightpaint.basis.basis import Basis, Origin
 from lightpaint.basis.file.deferred_planes import DeferredPlanes, LoadOnce
 from lightpaint.basis.file.file_parts import (
     CHECKSUMS_KEY,
@@ -45,6 +44,7 @@ from lightpaint.basis.file.light_channels import (
 from lightpaint.basis.file.lit_parts import as_encoded_plane, as_lit_plane, lit_channels
 from lightpaint.basis.file.lit_planes import MIN_LIGHTS, LitCollector, LitPlane, LitPlanes
 from lightpaint.basis.file.noise_rounding import MANY_LIGHTS
+from lightpaint.basis.light_basis import Basis, Origin
 from lightpaint.basis.lights import BasisLight, Lights
 from lightpaint.basis.planes import IndirectLight, Planes, as_planes
 from lightpaint.errors import BasisError, ImageError, LightpaintError

@@ -16,7 +16,6 @@ from typing import Any
 import numpy as np
 
 from lightpaint.arrays import Floats, Indices
-from lightpaint.basis.basis import Basis
 from lightpaint.basis.file.deferred_planes import loaded
 from lightpaint.basis.file.half_floats import (
     EncodedPlane,
@@ -32,6 +31,7 @@ from lightpaint.basis.file.light_channels import (
 from lightpaint.basis.file.lit_parts import read_lit_planes
 from lightpaint.basis.file.lit_planes import LitPlane, LitPlanes
 from lightpaint.basis.file.noise_rounding import MANY_LIGHTS, round_to_noise
+from lightpaint.basis.light_basis import Basis
 from lightpaint.basis.lights import BasisLight, free_name
 from lightpaint.basis.planes import Planes
 from lightpaint.errors import BasisError

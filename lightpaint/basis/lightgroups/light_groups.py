@@ -17,7 +17,7 @@ import numpy as np
 import numpy.typing as npt
 
 from lightpaint.arrays import Floats
-from lightpaint.basis.basis import LIGHT_GROUPS, Basis, Origin
+from lightpaint.basis.light_basis import LIGHT_GROUPS, Basis, Origin
 from lightpaint.basis.lightgroups.beauty_comparison import (
     NEGLIGIBLE_SHARE,
     describe_sum,

@@ -16,9 +16,9 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from lightpaint.arrays import Bools, Floats
-from lightpaint.basis.basis import Basis
 from lightpaint.basis.file.file_planes import RowPlanes, TemporaryArray
 from lightpaint.basis.file.lit_planes import MIN_LIGHTS
+from lightpaint.basis.light_basis import Basis
 from lightpaint.basis.render.integrators import depth_limit, has_indirect_planes, plane_count
 from lightpaint.basis.render.render_budget import BLOCK_SPP
 from lightpaint.basis.render.rendered_basis import ONE_PASS, mean_and_half_difference, method_of

@@ -15,7 +15,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from lightpaint.arrays import Floats, Indices
-from lightpaint.basis.basis import Basis
+from lightpaint.basis.light_basis import Basis
 from lightpaint.basis.planes import IndirectLight, Planes, as_planes
 from lightpaint.basis.render.basis_render import train_tracer
 from lightpaint.basis.render.integrators import has_indirect_planes, plane_count

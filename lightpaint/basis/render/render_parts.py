@@ -16,7 +16,7 @@ from typing import Any
 import numpy as np
 
 from lightpaint.arrays import Floats
-from lightpaint.basis.basis import Basis
+from lightpaint.basis.light_basis import Basis
 from lightpaint.basis.planes import as_planes
 from lightpaint.basis.render.banded_film import (
     FileSums,

@@ -8,7 +8,7 @@ from dataclasses import replace
 import numpy as np
 
 from lightpaint.arrays import Bools, Floats
-from lightpaint.basis.basis import Basis, Origin
+from lightpaint.basis.light_basis import Basis, Origin
 from lightpaint.basis.lights import BasisLight, Lights
 from lightpaint.basis.planes import IndirectLight, Planes, as_planes
 from lightpaint.basis.render.integrators import why_not_one_pass

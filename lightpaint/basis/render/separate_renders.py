@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 
 from lightpaint.arrays import RGB, Bools, Floats
-from lightpaint.basis.basis import Basis
+from lightpaint.basis.light_basis import Basis
 from lightpaint.basis.render.integrators import depth_limit
 from lightpaint.basis.render.render_budget import PASS_DIVISOR, Budget, Clock, Keeper, next_pair
 from lightpaint.images import block_mean

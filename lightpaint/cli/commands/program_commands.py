@@ -16,7 +16,7 @@ import numpy as np
 
 from lightpaint.arrays import Floats, Position
 from lightpaint.basis import LightGroups, find_frames, first_frame, is_pattern
-from lightpaint.basis.cache import cache as bases
+from lightpaint.basis.cache import basis_cache as bases
 from lightpaint.basis.cache import delete_orphans, folder
 from lightpaint.cli.commands import console_commands
 from lightpaint.cli.doctor import examine

@@ -7,7 +7,7 @@ from pathlib import Path
 from typing import Any
 
 from lightpaint.basis import Basis
-from lightpaint.basis.cache import cache
+from lightpaint.basis.cache import basis_cache
 from lightpaint.cli.doctor import Finding
 from lightpaint.cli.output.tables import photometry_at_full, photometry_of
 from lightpaint.lighting import Appearance, FullLamp
@@ -161,7 +161,7 @@ def verified_document(folder: Path, result: Verification) -> dict[str, Any]:
     return {"folder": str(folder), **dict(finite(verification_numbers(result)))}
 
 
-def kept_document(entry: cache.Entry) -> dict[str, Any]:
+def kept_document(entry: basis_cache.Entry) -> dict[str, Any]:
     """Return the document of one basis in the cache, without unreadable fields."""
     document: dict[str, Any] = {"file": str(entry.path), "bytes": entry.size}
     if (origin := entry.origin) is not None and entry.image_size is not None:

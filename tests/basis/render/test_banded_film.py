@@ -11,12 +11,12 @@ from nightly import nightly
 from renderer import assert_equal_bits
 
 import lightpaint.scene.scene_render
-from lightpaint.basis.basis import Basis
-from lightpaint.basis.cache import cache
+from lightpaint.basis.cache import basis_cache
 from lightpaint.basis.cache.cached_render import obtain_basis
 from lightpaint.basis.file import basis_file
 from lightpaint.basis.file.file_planes import FilePlanes
 from lightpaint.basis.file.half_floats import EncodedPlanes
+from lightpaint.basis.light_basis import Basis
 from lightpaint.basis.planes import MemoryPlanes
 from lightpaint.basis.render import banded_film, basis_render, render_parts
 from lightpaint.basis.render.banded_film import (
@@ -129,7 +129,7 @@ def test_an_interrupted_band_goes_on_to_the_same_bits(
         with pytest.raises(Interrupted, match="are kept"):
             obtain_basis(small_room, spp=20, seed=3)
     sensor = small_room.sensor_names[small_room.sensor]
-    part = cache.find(small_room.identity, sensor, 3, small_room.size)
+    part = basis_cache.find(small_room.identity, sensor, 3, small_room.size)
     assert part is not None
     assert 0 < part.origin.spp < 20
     basis = obtain_basis(small_room, spp=20, seed=3)

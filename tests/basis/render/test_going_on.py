@@ -10,8 +10,8 @@ import pytest
 from renderer import LIGHTS, assert_equal_bits, same_basis, write_room
 
 import lightpaint.scene.scene_render
-from lightpaint.basis.basis import Basis
 from lightpaint.basis.file.basis_file import read_basis, write_basis
+from lightpaint.basis.light_basis import Basis
 from lightpaint.basis.render import basis_render, render_budget
 from lightpaint.basis.render.basis_render import render_basis
 from lightpaint.errors import BasisError

@@ -12,14 +12,14 @@ import pytest
 from nightly import nightly
 from renderer import LIGHTS, render_in_parts, same_basis, write_room
 
-from lightpaint.basis.basis import Basis
-from lightpaint.basis.cache import cache
+from lightpaint.basis.cache import basis_cache
 from lightpaint.basis.cache import cached_render as obtain_module
 from lightpaint.basis.cache.cached_render import obtain_basis
 from lightpaint.basis.cache.plane_reuse import mean_variance
 from lightpaint.basis.file import basis_file
 from lightpaint.basis.file.basis_file import read_basis, write_basis
 from lightpaint.basis.file.file_planes import FilePlanes
+from lightpaint.basis.light_basis import Basis
 from lightpaint.basis.render.basis_render import render_basis
 from lightpaint.basis.render.render_budget import Budget, steps
 from lightpaint.batch.distributed_work import PartwiseRender
@@ -422,7 +422,9 @@ def test_what_is_larger_than_memory(
 ) -> None:
     first = obtain_basis(room(tmp_path), spp=16)
     expected = obtain_basis(room(tmp_path, MOVED), spp=16)
-    cache.delete_entries([entry for entry in cache.entries() if entry.origin == expected.origin])
+    basis_cache.delete_entries(
+        [entry for entry in basis_cache.entries() if entry.origin == expected.origin]
+    )
     monkeypatch.setattr(basis_file, "IN_MEMORY_MAX_BYTES", 0)
     large = obtain_basis(room(tmp_path, MOVED), spp=16)
     assert [record[0] for record in rendered_lights] == [NAMES, ("bulb",), ("bulb",)]
@@ -430,8 +432,10 @@ def test_what_is_larger_than_memory(
     assert reused_lights(large, first) == {*NAMES} - {"bulb"}
     assert large.lights == expected.lights
     # Where it cannot be kept it stays in several files.
-    cache.delete_entries([entry for entry in cache.entries() if entry.origin == large.origin])
-    monkeypatch.setattr(cache, "keep", lambda basis: False)
+    basis_cache.delete_entries(
+        [entry for entry in basis_cache.entries() if entry.origin == large.origin]
+    )
+    monkeypatch.setattr(basis_cache, "keep", lambda basis: False)
     separate = obtain_basis(room(tmp_path, MOVED), spp=16)
     assert reused_lights(separate, large) >= {*NAMES} - {"bulb"}
     weights = np.linspace(0, 1, 15).reshape(5, 3)
@@ -445,19 +449,19 @@ def test_a_damaged_file_costs_its_planes(
     tmp_path: Path, rendered_lights: Rendered, damage: str, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     obtain_basis(room(tmp_path), spp=16)
-    [entry] = cache.entries()
-    listed = cache.entries
+    [entry] = basis_cache.entries()
+    listed = basis_cache.entries
     if damage == "cut":
         content = entry.path.read_bytes()
         entry.path.write_bytes(content[: len(content) * 3 // 4])
     else:  # between being listed and being read
 
-        def and_gone() -> list[cache.Entry]:
+        def and_gone() -> list[basis_cache.Entry]:
             entries = listed()
             entry.path.unlink(missing_ok=True)
             return entries
 
-        monkeypatch.setattr(cache, "entries", and_gone)
+        monkeypatch.setattr(basis_cache, "entries", and_gone)
     basis = obtain_basis(scene := room(tmp_path, MOVED), spp=16)
     assert [record[0] for record in rendered_lights] == [NAMES] * 2
     assert basis.origin.scene_identity == scene.identity
@@ -471,8 +475,8 @@ def test_planes_without_an_identity_are_none_of_anybodys(
     """As in files of versions that knew of none."""
     first = obtain_basis(room(tmp_path), spp=16)
     lights = tuple(replace(light, identity="") for light in first.lights)
-    cache.delete_entries(cache.entries())
-    assert cache.keep(replace(first, lights=lights))
+    basis_cache.delete_entries(basis_cache.entries())
+    assert basis_cache.keep(replace(first, lights=lights))
     obtain_basis(room(tmp_path, MOVED), spp=16)
     assert [record[0] for record in rendered_lights] == [NAMES] * 2
     same_basis(obtain_basis(room(tmp_path), spp=16), first)

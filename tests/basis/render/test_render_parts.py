@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 from renderer import LIGHTS, write_room
 
-from lightpaint.basis.basis import Basis
+from lightpaint.basis.light_basis import Basis
 from lightpaint.basis.render import basis_render, render_budget
 from lightpaint.basis.render import render_parts as parts_module
 from lightpaint.basis.render.basis_render import render_basis

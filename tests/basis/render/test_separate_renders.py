@@ -13,9 +13,9 @@ from nightly import nightly
 from renderer import LIGHTS, SAME_SAMPLES, mitsuba_render, same_basis, write_room
 
 import lightpaint.scene.scene_render
-from lightpaint.basis.basis import Basis
 from lightpaint.basis.cache.cached_render import obtain_basis
 from lightpaint.basis.file.basis_file import read_basis, write_basis
+from lightpaint.basis.light_basis import Basis
 from lightpaint.basis.render.basis_render import render_basis
 from lightpaint.basis.render.rendered_basis import ONE_PASS, SEPARATE
 from lightpaint.basis.render.separate_renders import BLACK, WHITE

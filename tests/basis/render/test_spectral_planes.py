@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from renderer import LIGHTS, write_room
 
-from lightpaint.basis.basis import Basis
+from lightpaint.basis.light_basis import Basis
 from lightpaint.basis.render.basis_render import render_basis
 from lightpaint.colour.color import delta_e, luminance, matching_functions
 from lightpaint.colour.lamp import Lamp, LampEmitter

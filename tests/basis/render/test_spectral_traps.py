@@ -9,7 +9,7 @@ import pytest
 from nightly import nightly
 from spectral_room import DRIVES, write_spectral_room
 
-from lightpaint.basis.basis import Basis
+from lightpaint.basis.light_basis import Basis
 from lightpaint.basis.render.basis_render import render_basis
 from lightpaint.basis.render.rendered_basis import basis_lights
 from lightpaint.colour.color import ciede2000, delta_e, lab, luminance

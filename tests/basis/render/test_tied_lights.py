@@ -14,9 +14,9 @@ from renderer import (
     write_room,
 )
 
-from lightpaint.basis.basis import Basis
 from lightpaint.basis.cache.cached_render import obtain_basis
 from lightpaint.basis.file.basis_file import read_basis, write_basis
+from lightpaint.basis.light_basis import Basis
 from lightpaint.basis.render.basis_render import render_basis
 from lightpaint.basis.render.rendered_basis import SEPARATE, is_of
 from lightpaint.basis.render.separate_renders import BLACK, WHITE

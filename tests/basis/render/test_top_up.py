@@ -12,10 +12,10 @@ from nightly import nightly
 from renderer import LIGHTS, SAME_SAMPLES, render_in_parts, same_basis, write_room
 
 import lightpaint.scene.scene_render
-from lightpaint.basis.basis import Basis
-from lightpaint.basis.cache import cache
+from lightpaint.basis.cache import basis_cache
 from lightpaint.basis.cache.cached_render import obtain_basis, top_up_basis
 from lightpaint.basis.file.basis_file import read_basis, write_basis
+from lightpaint.basis.light_basis import Basis
 from lightpaint.basis.render import basis_render, pixel_top_up
 from lightpaint.basis.render.basis_render import render_basis
 from lightpaint.basis.render.rendered_basis import is_on_the_way
@@ -224,7 +224,7 @@ def test_what_is_kept_is_not_taken_for_uniform_samples(
     assert exact.extra is None
     np.testing.assert_array_equal(exact.images, basis.images)
     # Fewer samples do not replace more of them.
-    assert cache.is_cached(topped)
+    assert basis_cache.is_cached(topped)
     assert obtain_basis(small_room, spp=16).origin.extra_spp == topped.origin.extra_spp
 
 

@@ -10,7 +10,7 @@ from nightly import nightly
 from renderer import LIGHTS, PLASTIC, write_room
 
 from lightpaint.arrays import Doubles
-from lightpaint.basis.basis import Basis
+from lightpaint.basis.light_basis import Basis
 from lightpaint.basis.render import basis_render
 from lightpaint.basis.render.basis_render import render_basis
 from lightpaint.basis.render.rendered_basis import ONE_PASS

@@ -4,7 +4,7 @@ from typing import Any
 
 import numpy as np
 
-from lightpaint.basis.basis import Basis, Origin
+from lightpaint.basis.light_basis import Basis, Origin
 from lightpaint.basis.lights import BasisLight
 from lightpaint.lighting.analysis.answer_analysis import ambiguities, indistinguishable
 from lightpaint.lighting.solver import solve

@@ -7,7 +7,7 @@ import pytest
 from renderer import LIGHTS, write_room
 
 import lightpaint as lp
-from lightpaint.basis.basis import Basis
+from lightpaint.basis.light_basis import Basis
 from lightpaint.basis.render import basis_render
 from lightpaint.basis.render.basis_render import render_basis
 from lightpaint.lighting.analysis.noise import uncertainty

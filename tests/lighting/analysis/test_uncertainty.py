@@ -10,8 +10,8 @@ import pytest
 import scipy
 from nightly import nightly
 
-from lightpaint.basis.basis import Basis, Origin
 from lightpaint.basis.file.lit_planes import LitPlane, LitPlanes
+from lightpaint.basis.light_basis import Basis, Origin
 from lightpaint.basis.lights import BasisLight
 from lightpaint.basis.planes import MemoryPlanes
 from lightpaint.errors import BasisError, SizeError

@@ -8,7 +8,7 @@ import pytest
 from scipy.optimize import nnls
 
 import lightpaint as lp
-from lightpaint.basis.basis import Basis
+from lightpaint.basis.light_basis import Basis
 from lightpaint.colour.color import LUMINANCE
 from lightpaint.errors import ConstraintError
 from lightpaint.lighting.fit import resolve_for_targets

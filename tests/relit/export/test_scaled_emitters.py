@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from renderer import write_room
 
-from lightpaint.basis.basis import Basis
+from lightpaint.basis.light_basis import Basis
 from lightpaint.basis.render.basis_render import render_basis
 from lightpaint.lighting.answer.lighting import Lighting
 from lightpaint.relit.exported_answer import emitters_of, rig_lights

@@ -25,7 +25,6 @@ import numpy as np
 from platformdirs import user_cache_path
 
 from lightpaint.arrays import Floats
-from lightpaint.basis.basis import Basis, Origin
 from lightpaint.basis.file.basis_file import (
     FORMAT,
     is_file_of,
@@ -33,6 +32,7 @@ from lightpaint.basis.file.basis_file import (
     read_origin,
     write_basis,
 )
+from lightpaint.basis.light_basis import Basis, Origin
 from lightpaint.display_text import some_names
 from lightpaint.errors import BasisError, LightpaintError, OutputError
 from lightpaint.files import replacing, write_text
