@@ -10,7 +10,7 @@ from lightpaint.colour.color import delta_e, luminance
 from lightpaint.lighting.loss import weight_penalty
 from lightpaint.lighting.loss.expected_lights import Wash
 from lightpaint.lighting.loss.footprints import Footprint, find_footprint, footprint_term
-from lightpaint.target.target import Wish
+from lightpaint.target.painted_target import Wish
 
 H, W = 36, 64
 
