@@ -157,15 +157,17 @@ class Gamuts:
         own_reach = chromaticity(self._own) @ DIRECTIONS.T
         lamps, whites = (reach_of(white_range(*k).colors) for k in (LAMP_KELVINS, ALL_KELVINS))
         self._reach = np.maximum(own_reach + 2 * REACH_STEP, lamps + WHITE_MARGIN)
-        if in_view is not None:
-            self._reach[in_view.lamps] = own_reach[in_view.lamps] + 2 * REACH_STEP
         self._whites = whites
         self._cool_whites = reach_of(white_range(LAMP_KELVINS[1], ALL_KELVINS[1]).colors)
         # Off-white lamps lie near the whites, and so do surfaces under them; coloured lamps do not.
         self._off_white = np.maximum(own_reach - whites, 0).max(axis=1)
         is_near_white = self._off_white <= PAINTED_MARGIN
         self._tolerance = float(self._off_white[is_near_white].max(initial=0.0))
-        self._sides = sides_of(self._reach - REACH_STEP)
+        self._own_reach = own_reach + 2 * REACH_STEP
+        allowed = self._reach
+        if in_view is not None:
+            allowed = np.where(in_view.lamps[:, None], self._own_reach, self._reach)
+        self._sides = sides_of(allowed - REACH_STEP)
         self._needed: _NeededLight | None = None
         self._gamuts: dict[int, ColorHull] = {}
         self._former_gamuts: dict[int, ColorHull] = {}
@@ -175,31 +177,33 @@ class Gamuts:
 
     def __getitem__(self, light: int) -> ColorHull:
         if light not in self._gamuts:
+            reach = self._painted_reach(light)
             if self._in_view is not None and self._in_view.lamps[light]:
                 painted = chromaticity(self._in_view.painted()[light]) @ DIRECTIONS.T
-                reach = np.maximum(self._reach[light], painted.max(axis=0) + WHITE_MARGIN)
-                self._gamuts[light] = self._hull(light, reach)
-                return self._gamuts[light]
-            if self._needed is None:
-                self._needed = _NeededLight.of(self._light(), self._power, self._current)
-            needed = self._needed.reach(light)
-            lamp = chromaticity(self._own[light]) @ DIRECTIONS.T
-            cooler = lamp + COOL_OVERSHOOT * np.maximum(needed - lamp, 0)
-            cooler = np.minimum(cooler, self._cool_whites) + WHITE_MARGIN
-            own_reach = np.maximum(self._reach[light], cooler)
-            if self._is_bold:
-                reach = np.maximum(self._whites, needed) + BOLD_MARGIN
-                self._gamuts[light] = self._hull(light, np.maximum(own_reach, reach))
-                return self._gamuts[light]
-            margin = np.clip(2 * (needed - own_reach + WHITE_MARGIN), WHITE_MARGIN, PAINTED_MARGIN)
-            reach = np.maximum(own_reach, needed + margin)
-            # Paint that is cooler or warmer asks for other whites, and for none that is greener.
-            off_white = max(self._off_white[light], WHITE_MARGIN)
-            beyond_whites = np.maximum(needed - self._whites - self._tolerance, 0)
-            whites = np.maximum(own_reach, self._whites + off_white)
-            reach = np.minimum(reach, whites + PAINTED_FACTOR * beyond_whites)
+                seen = np.maximum(self._own_reach[light], painted.max(axis=0) + WHITE_MARGIN)
+                reach = np.minimum(reach, seen)
             self._gamuts[light] = self._hull(light, reach)
         return self._gamuts[light]
+
+    def _painted_reach(self, light: int) -> Doubles:
+        """Return the reach of a light's own colour, of whites and of what is painted, (k,)."""
+        if self._needed is None:
+            self._needed = _NeededLight.of(self._light(), self._power, self._current)
+        needed = self._needed.reach(light)
+        lamp = chromaticity(self._own[light]) @ DIRECTIONS.T
+        cooler = lamp + COOL_OVERSHOOT * np.maximum(needed - lamp, 0)
+        cooler = np.minimum(cooler, self._cool_whites) + WHITE_MARGIN
+        own_reach = np.maximum(self._reach[light], cooler)
+        if self._is_bold:
+            bold = np.maximum(self._whites, needed) + BOLD_MARGIN
+            return np.asarray(np.maximum(own_reach, bold))
+        margin = np.clip(2 * (needed - own_reach + WHITE_MARGIN), WHITE_MARGIN, PAINTED_MARGIN)
+        reach = np.maximum(own_reach, needed + margin)
+        # Paint that is cooler or warmer asks for other whites, and for none that is greener.
+        off_white = max(self._off_white[light], WHITE_MARGIN)
+        beyond_whites = np.maximum(needed - self._whites - self._tolerance, 0)
+        whites = np.maximum(own_reach, self._whites + off_white)
+        return np.asarray(np.minimum(reach, whites + PAINTED_FACTOR * beyond_whites))
 
     def _hull(self, light: int, reach: Doubles) -> ColorHull:
         """Return the gamut of a reach, (k,): the same object as before where it is equal."""
