@@ -106,7 +106,7 @@ class PlanesAnswer:
     def more_luminaires(self, outcome: WishOutcome) -> tuple[int, str] | None:
         """Return how many more luminaires would bring a plane to the mean that is wished for, and
         of which photometric file: the one of which fewest would do, if each gave as much light as
-        those of the file do on average. None if no luminaire lights the plane.
+        the mean of the luminaires of that file. None if no luminaire lights the plane.
         """
         wish, illuminance = outcome.wish, self.wished.illuminance
         weights = self.weights_by_case[wish.case]
