@@ -59,7 +59,7 @@ MOST_STOPS, LEAST_DIFFERENCE = 5.0, 0.03
 class Footprint:
     """A group of lamps whose light ends where a wish ends.
 
-    lamps: (n,), the group. emission: (n, 3), of all lights, those of each group changed alike.
+    lamps: (n,), the group. emission: (n, 3), of all lights; within a group all change alike.
     confidence: from 0 to 1, how well the outlines agree and how clearly the painting asks for one
     change within the wish and one outside.
     """
