@@ -19,7 +19,7 @@ from lit_planes import (
 )
 from radiance import illuminance_of_panel
 
-from lightpaint.basis.render import render_budget
+from lightpaint.basis.render import banded_film, render_budget
 from lightpaint.basis.render.basis_render import render_basis
 from lightpaint.basis.render.render_budget import BLOCK_SPP
 from lightpaint.colour.color import LUMINANCE
@@ -59,10 +59,15 @@ def test_a_point_light_has_the_cosine_law(tmp_path: Path) -> None:
     np.testing.assert_allclose(lux(found, "bulb"), expected, rtol=ROUNDING)
 
 
-def test_many_samples_are_summed_without_loss(tmp_path: Path) -> None:
+@pytest.mark.parametrize("in_bands", [False, True])
+def test_many_samples_are_summed_without_loss(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, in_bands: bool
+) -> None:
     """Each of 2^17 samples of a half adds the same light, in eight parts, that a float32 sum of all
     of them rounds to up to 3 % more or less.
     """
+    if in_bands:
+        monkeypatch.setattr(banded_film, "WHOLE_MAX_BYTES", 0)
     found = measured(lit_scene(tmp_path, BULB, max_depth=2), plane_of(POINTS), spp=2**18)
     away = (0, 2, 0) - np.array(POINTS, float)
     expected = 100 * away[:, 1] / np.linalg.norm(away, axis=1) ** 3
@@ -110,7 +115,11 @@ def test_a_disc_of_light_over_its_axis_and_beside_it(tmp_path: Path) -> None:
 
 
 def test_a_furnace_has_pi_times_its_radiance(tmp_path: Path) -> None:
-    """L / (1 − ρ) from everywhere, in each direction, also of a cylinder, in its own colour."""
+    """L / (1 − ρ) from everywhere, in each direction, also of a cylinder, in its own colour.
+
+    Mitsuba's own `path` in `llvm_ad_rgb` gives .06 to .09 % too much in a sphere that shines
+    inwards, and so does this; in a cube, and in `scalar_rgb`, nothing.
+    """
     planes = [
         plane_of(POINTS, name="up"),
         plane_of(POINTS, (1, -2, 3), name="tilted"),

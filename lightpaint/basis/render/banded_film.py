@@ -46,14 +46,6 @@ def _is_banded(scene: Scene) -> bool:
     return 2 * 12 * plane_count(scene) * height * width > WHOLE_MAX_BYTES
 
 
-def sums_in_blocks(scene: Scene) -> bool:
-    """Return whether a one-pass render of `scene` sums samples in blocks (see `LightPlanes`).
-
-    A film in bands has one sum for all samples, of which it would take days to trace too many.
-    """
-    return not _is_banded(scene)
-
-
 class FilmSums(ABC):
     """The sums of both halves of the samples of a film, traced in bands of rows.
 
@@ -117,8 +109,7 @@ class WholeFilm(FilmSums):
                 planes.end_block()
 
     def _planes(self, rows: range, start: Floats | None = None) -> "LightPlanes":
-        is_in_blocks = sums_in_blocks(self._tracer.scene)
-        return self._tracer.planes(rows, start, is_in_blocks=is_in_blocks)
+        return self._tracer.planes(rows, start)
 
     def _trace(self, half: int, rows: range, first: int, spp: int) -> None:
         self._tracer.add(self._halves[half], half, rows, first, spp)
@@ -155,7 +146,9 @@ class BandedFilm(FilmSums):
 
     def _trace(self, half: int, rows: range, first: int, spp: int) -> None:
         start = self.sums.read(half, rows)
-        planes = self._tracer.planes(rows, start, is_in_blocks=False)
+        planes = self._tracer.planes(rows, start)
+        if first >= BLOCK_SPP:
+            planes.end_block()
         self._tracer.add(planes, half, rows, first, spp)
         self._seen[rows.start : rows.stop] |= planes.seen() > 0
         self.sums.write(half, rows, planes.sums(shares_memory=True))
@@ -321,7 +314,7 @@ def memory_needed(scene: Scene, *, in_bands: bool = False) -> int:
     if in_bands:
         # Half floats of images and half differences, and of indirect light; the remainder is for a
         # band.
-        return images * plane_count(scene) // len(scene.lights) + 6 * BAND_BYTES
+        return images * plane_count(scene) // len(scene.lights) + 8 * BAND_BYTES
     # Sums of two halves, the images and half differences computed from them, and a copy of both
     # when they are written to a file; passes are small in comparison.
     sets = 12 if has_indirect_planes(scene) else 6

@@ -22,7 +22,6 @@ from lightpaint.basis.render.banded_film import (
     FileSums,
     planes_of_sums,
     renders_in_bands,
-    sums_in_blocks,
 )
 from lightpaint.basis.render.basis_render import with_first_hits
 from lightpaint.basis.render.integrators import plane_count
@@ -145,8 +144,7 @@ class PartRenderer:
         rows, size = range(part.top, part.bottom), (part.bottom - part.top, self._scene.size[1])
         # A running kernel cannot be interrupted.
         step = largest_pass(size[0] * size[1], shorter=PASS_DIVISOR)
-        is_in_blocks = sums_in_blocks(self._scene)
-        halves = [self._tracer.planes(rows, is_in_blocks=is_in_blocks) for _ in range(2)]
+        halves = [self._tracer.planes(rows) for _ in range(2)]
         with self._scene.variant(), tracing() as let_others_through:
             for half, planes in enumerate(halves):
                 for done in range(0, part.spp, step):

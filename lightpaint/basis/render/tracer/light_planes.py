@@ -35,8 +35,7 @@ class LightPlanes:
     images; None if there are none.
 
     Float32 sums of many samples would lose what each of them adds. So the tracer calls `end_block`
-    after each block of samples, and blocks are summed in turn. is_in_blocks: False if memory for
-    the ended blocks is not affordable.
+    after each block of samples, and blocks are summed in turn.
 
     The sums are attributes of this object rather than variables of the tracing loop, because Dr.Jit
     rejects a loop variable that never changes, such as `seen` where all lights are points.
@@ -50,11 +49,10 @@ class LightPlanes:
         *,
         is_shared: bool = False,
         is_split: bool = False,
-        is_in_blocks: bool = True,
         start: Floats | None = None,
         texels: TexelTable | None = None,
     ) -> None:
-        self._texels, self.is_in_blocks = texels, is_in_blocks
+        self._texels = texels
         self.count, self.size = lights * (2 if is_split else 1), size
         self._first_indirect = lights if is_split else 0
         pixels = size[0] * size[1]
@@ -196,12 +194,9 @@ class SpectralPlanes(LightPlanes):
         *,
         tables: ColorTables,
         is_split: bool = False,
-        is_in_blocks: bool = True,
         start: Floats | None = None,
     ) -> None:
-        super().__init__(
-            light_of, lights, size, is_split=is_split, is_in_blocks=is_in_blocks, start=start
-        )
+        super().__init__(light_of, lights, size, is_split=is_split, start=start)
         self._tables = tables
 
     @dr.syntax

@@ -158,16 +158,13 @@ class Tracer:
         """True once the guide is trained."""
         return self.guide_table is not None
 
-    def planes(
-        self, rows: range, start: Floats | None = None, *, is_in_blocks: bool = True
-    ) -> LightPlanes:
+    def planes(self, rows: range, start: Floats | None = None) -> LightPlanes:
         """Return planes for some rows, without added samples.
 
-        start: initial sums of earlier samples, (planes, rows, columns, 3). is_in_blocks: as in
-        `LightPlanes`.
+        start: initial sums of earlier samples, (planes, rows, columns, 3).
         """
         size = len(rows), self.scene.size[1]
-        return self._planes(size, start=start, is_in_blocks=is_in_blocks)
+        return self._planes(size, start=start)
 
     def pixel_planes(self, pixels: int) -> LightPlanes:
         """Return planes for a number of single pixels, without added samples."""
@@ -182,11 +179,11 @@ class Tracer:
         with self.scene.variant(), kernels():
             while spp > 0:
                 # Blocks begin at multiples of their size, however samples are divided into passes.
-                part = min(spp, BLOCK_SPP - first % BLOCK_SPP) if planes.is_in_blocks else spp
+                part = min(spp, BLOCK_SPP - first % BLOCK_SPP)
                 self._trace_rows(half, planes, rows, first, part)
                 planes.evaluate()
                 first, spp = first + part, spp - part
-                if planes.is_in_blocks and first % BLOCK_SPP == 0:
+                if first % BLOCK_SPP == 0:
                     planes.end_block()
 
     def top_up(
