@@ -207,6 +207,16 @@ def test_a_plan_is_met_or_says_by_how_much_it_is_not(tmp_path: Path):
     assert set(drives_of(tmp_path / "bright").values()) == {1.0}
 
 
+def test_planes_without_wishes_or_light_are_named(tmp_path: Path) -> None:
+    below = "[plane.desk]\ncorners = [[1, 1, -1], [2, 1, -1], [2, 2, -1]]\ngrid = 1\n"
+    write_room(tmp_path, batwing, planes=below)
+    output = succeed(tmp_path, "measure", "room.xml", "--spp", "16")
+    assert "desk: no lamp reaches it: is it below the floor" in output
+    refused = run(tmp_path, "plan", "room.xml", "--watts", "20")
+    assert refused.returncode == 2
+    assert "wishes for no light: give a plane a mean, a uniformity or a preset" in refused.stderr
+
+
 def _paint(folder: Path) -> None:
     """Paint the room at half of its light."""
     succeed(folder, "template", "room.xml", "-o", "template", "--spp", "16")

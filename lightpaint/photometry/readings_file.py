@@ -29,6 +29,9 @@ from lightpaint.photometry.illuminance import (
 from lightpaint.storage.json_records import strict_json
 
 FORMAT = "lightpaint-illuminance 1"
+#: What is said of a plane that no lamp reaches.
+NO_LIGHT = "no lamp reaches it: is it below the floor, or do its points face away?"
+
 #: Files of a measurement; each plane has a picture beside them.
 POINTS, PLANES, PICTURE_SUFFIX = "planes.csv", "planes.json", ".png"
 
@@ -149,11 +152,16 @@ def wishes_document(wishes: Wishes) -> dict[str, Any]:
 
 
 def missed_wishes(measured: Illuminance, weights: Doubles) -> list[str]:
-    """Return a sentence for each wish that is not met at the sure end of its 95 % interval."""
+    """Return a sentence for each wish that is not met at the sure end of its 95 % interval, and for
+    each plane that no lamp reaches.
+    """
     readings, missed = measured.readings(weights), list[str]()
     for plane in measured.planes:
         wishes, reading = plane.wishes, readings[plane.name]
         least = reading.mean - reading.mean_interval
+        if not measured.matrix[measured.points_of(plane.name)].any():
+            missed.append(f"{plane.name}: {NO_LIGHT}")
+            continue
         if wishes.mean is not None and least < wishes.mean * (1 - CLOSE):
             sure = _sure(reading.mean, least, wishes.mean, " lx")
             missed.append(f"{plane.name}: a mean of {sure}, wished for {wishes.mean:g}")

@@ -12,6 +12,7 @@ from lightpaint.arrays import Doubles
 from lightpaint.basis import BasisLight, Lights
 from lightpaint.basis.render import basis_lights
 from lightpaint.display_text import some_names
+from lightpaint.errors import SceneError
 from lightpaint.keywords import keywords
 from lightpaint.lighting import (
     Constraints,
@@ -333,8 +334,15 @@ def plan_lighting(
 
 
 def plan_of(planes: MeasuredPlanes, reduction: Reduction, *, scene_identity: str = "") -> LightPlan:
-    """Return the plan for measured planes. reduction: of the lights, without requirements."""
+    """Return the plan for measured planes. reduction: of the lights, without requirements.
+
+    Raises SceneError if nothing is wished for but a limit of power.
+    """
     wished = planes.wished_of(reduction)
+    if all(wish.is_hard for wish in wished.wishes):
+        raise SceneError(
+            "the planes file wishes for no light: give a plane a mean, a uniformity or a preset"
+        )
     required = reduction.with_requirements(wished.requirements)
     program = least_watts(wished, required)
     weights = required.weights(program.x)

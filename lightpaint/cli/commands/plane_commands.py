@@ -70,7 +70,7 @@ def measure(
         )
     with terminal.TerminalListener() as listen, stage("placing the points", listen):
         found = read_planes(planes_path, content)
-    for remark in found.remarks(content):
+    for remark in (*_luminaire_remarks(content), *found.remarks(content)):
         terminal.say(remark)
     weights = _weights(content, emission)
     inputs = [*content.read_files, planes_path, *([] if lighting is None else [lighting])]
@@ -104,6 +104,11 @@ def measure(
     terminal.write(f"{output / POINTS}: all points; a picture of each plane beside it")
     written = {"scene": str(content.path), "files": [*map(str, files)]}
     return CommandOutcome(lambda: readings_document(measured, weights, glare=glare) | written)
+
+
+def _luminaire_remarks(scene: Scene) -> list[str]:
+    """Return what the luminaires of a scene are taken for, each remark once."""
+    return list(dict.fromkeys(text for x in scene.luminaires for text in x.remarks()))
 
 
 def _lit_scene(
@@ -204,6 +209,8 @@ def plan(
     folder = output or Path(f"{content.path.stem}-plan")
     results = plan_folder(content, path, folder, force=settings.force)
     results.check()
+    for remark in _luminaire_remarks(content):
+        terminal.say(remark)
     with terminal.TerminalListener() as listen:
         found = plan_lighting(
             content, path, constraints=constraints, settings=settings, progress=listen

@@ -273,7 +273,7 @@ class Reduction:
         assert requirements is not None
         unknown, light, rgb = self.columns
         entry, channel = np.nonzero(rgb)
-        given = requirements.rows.reshape(len(requirements), -1)
+        given = requirements.rows.reshape(len(requirements), self.fixed_weights.size)
         parts = given[:, 3 * light[entry] + channel]
         parts *= rgb[entry, channel]
         columns, first = np.unique(unknown[entry], return_index=True)
