@@ -10,12 +10,7 @@ import numpy.typing as npt
 from lightpaint.arrays import Bools, Doubles, Floats, Indices, read_only
 from lightpaint.basis.lights import Lights
 from lightpaint.basis.plane_results import array_name, array_once, forget_results
-from lightpaint.basis.planes import (
-    IndirectLight,
-    Planes,
-    as_planes,
-    relative_variances,
-)
+from lightpaint.basis.planes import IndirectLight, Planes, as_planes, relative_variances
 from lightpaint.colour import choose_exposure, luminance
 from lightpaint.dataframes import CHANNELS, pandas, xarray
 from lightpaint.display_text import Shown, some_names, some_of

@@ -22,14 +22,7 @@ from lightpaint.dmx.console_rig import ConsoleRig, RigEmitter, RigFixture, RigLi
 from lightpaint.dmx.mvr import KIND, PlacedModel
 from lightpaint.errors import SceneError
 from lightpaint.files import first_line, read_bytes
-from lightpaint.scene.checks.tokens import (
-    attributes,
-    decoded,
-    encoding_of,
-    line_of,
-    markup,
-    tag,
-)
+from lightpaint.scene.checks.tokens import attributes, decoded, encoding_of, line_of, markup, tag
 from lightpaint.scene.properties.site import across
 from lightpaint.storage.rig_archive import MAX_XML, RigArchive
 

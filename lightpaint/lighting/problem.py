@@ -19,10 +19,7 @@ from lightpaint.keywords import keywords
 from lightpaint.lighting.constraints.absolute_scale import with_scale
 from lightpaint.lighting.constraints.constraint_table import Constraints
 from lightpaint.lighting.constraints.constraints_file import constraints_of
-from lightpaint.lighting.constraints.light_constraints import (
-    held_at_start,
-    start_weights,
-)
+from lightpaint.lighting.constraints.light_constraints import held_at_start, start_weights
 from lightpaint.lighting.fit import Fit, Space, resolve_for_targets
 from lightpaint.lighting.joined_views import Views, joint_basis
 from lightpaint.lighting.linear_problem import (

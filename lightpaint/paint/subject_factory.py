@@ -25,13 +25,7 @@ from lightpaint.lighting import (
 from lightpaint.paint.layers.layer_files import check_kind
 from lightpaint.paint.store.session_requests import SessionRequests
 from lightpaint.paint.subject import LazyScene, Subject, check_view_names, session_identity
-from lightpaint.pipeline import (
-    BasisFile,
-    GroupsFile,
-    SceneFile,
-    check_nothing_unused,
-    content,
-)
+from lightpaint.pipeline import BasisFile, GroupsFile, SceneFile, check_nothing_unused, content
 from lightpaint.pipeline.job.settings import Settings
 from lightpaint.scene import Scene
 from lightpaint.scene.lights.lights_file import lights_file_for
@@ -159,11 +153,7 @@ def _with_spectra(scene: Scene, *, settings: Settings, constraints: Constraints)
     """
     if not settings.spectral:
         return scene
-    from lightpaint.pipeline import (
-        check_spectral,
-        observer_of,
-        spectral_scene,
-    )
+    from lightpaint.pipeline import check_spectral, observer_of, spectral_scene
 
     every = constraints_of(scene.requests).and_then(constraints)
     check_spectral(settings, every)

@@ -53,14 +53,7 @@ from lightpaint.pipeline.wished_planes import (
     require,
 )
 from lightpaint.placement import MoveSuggestion, Placement, Suggestion, suggest_lights
-from lightpaint.progress import (
-    Listener,
-    Progress,
-    listener,
-    silent,
-    spoken_duration,
-    stage,
-)
+from lightpaint.progress import Listener, Progress, listener, silent, spoken_duration, stage
 from lightpaint.relit import (
     SPECTRAL_DOUBLINGS,
     LightShares,

@@ -23,11 +23,7 @@ from lightpaint.basis.file.half_floats import (
     encode_pair,
     encoded_plane,
 )
-from lightpaint.basis.file.light_channels import (
-    PLANE_CHANNELS,
-    has_indirect_channels,
-    is_lit_part,
-)
+from lightpaint.basis.file.light_channels import PLANE_CHANNELS, has_indirect_channels, is_lit_part
 from lightpaint.basis.file.lit_parts import read_lit_planes
 from lightpaint.basis.file.lit_planes import LitPlane, LitPlanes
 from lightpaint.basis.file.noise_rounding import MANY_LIGHTS, round_to_noise

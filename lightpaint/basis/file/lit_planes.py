@@ -14,14 +14,7 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from lightpaint.arrays import (
-    Bools,
-    Doubles,
-    Floats,
-    Indices,
-    copy_as_singles,
-    release_freed_memory,
-)
+from lightpaint.arrays import Bools, Doubles, Floats, Indices, copy_as_singles, release_freed_memory
 from lightpaint.basis.file.file_planes import KeptMixes, RowPlanes
 from lightpaint.basis.planes import LitEntries
 from lightpaint.progress import with_progress

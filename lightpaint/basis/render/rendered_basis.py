@@ -13,9 +13,7 @@ from lightpaint.basis.lights import BasisLight, Lights
 from lightpaint.basis.planes import IndirectLight, Planes, as_planes
 from lightpaint.basis.render.integrators import why_not_one_pass
 from lightpaint.basis.render.render_budget import half_of
-from lightpaint.basis.render.separate_renders import (
-    plan_of_light,
-)
+from lightpaint.basis.render.separate_renders import plan_of_light
 from lightpaint.display_text import some_names
 from lightpaint.errors import SceneError
 from lightpaint.scene import Scene

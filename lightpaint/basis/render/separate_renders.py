@@ -239,10 +239,7 @@ def emitters_seen(scene: Scene) -> Bools:
 def _seen_through_glass(scene: Scene, loaded: Any) -> Bools:
     """Return the pixels in which a ray reaches an emitter through clear surfaces only, (h, w)."""
     from lightpaint.basis.render.tracer.one_pass import view_of
-    from lightpaint.basis.render.tracer.path_tracer import (
-        emitters_seen_through,
-        has_clear_surfaces,
-    )
+    from lightpaint.basis.render.tracer.path_tracer import emitters_seen_through, has_clear_surfaces
 
     if not has_clear_surfaces(loaded):
         return np.zeros(scene.size, dtype=bool)

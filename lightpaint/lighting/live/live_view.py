@@ -15,11 +15,7 @@ from lightpaint.lighting.live.live_sums import (
     PaintedTiles,
     SmallFilm,
 )
-from lightpaint.lighting.loss.painting import (
-    affected_region,
-    dark_threshold,
-    find_glow_paint,
-)
+from lightpaint.lighting.loss.painting import affected_region, dark_threshold, find_glow_paint
 from lightpaint.lighting.unknowns.lamps_in_view import GlowPaint
 
 #: Pixels of a part of a row over which importance is summed.

@@ -26,13 +26,7 @@ from lightpaint.paint.protocol import (
     PlanesReading,
     PlaneWish,
 )
-from lightpaint.photometry import (
-    Illuminance,
-    LightCase,
-    MeasuringPlane,
-    PowerBudget,
-    plane_title,
-)
+from lightpaint.photometry import Illuminance, LightCase, MeasuringPlane, PowerBudget, plane_title
 
 
 @dataclass(frozen=True)

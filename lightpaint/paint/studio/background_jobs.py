@@ -159,11 +159,7 @@ class BackgroundJobs:
         stop_count: how often exports had been stopped when this one was requested.
         """
         # Imported here: it loads all rooms, and painting needs only a few.
-        from lightpaint.paint.studio.session_exports import (
-            NEEDS_PAINTING,
-            WRITES_PAINTING,
-            export,
-        )
+        from lightpaint.paint.studio.session_exports import NEEDS_PAINTING, WRITES_PAINTING, export
 
         def check() -> None:
             if self._stop_count != stop_count:

@@ -104,11 +104,7 @@ class PlaneMeasurements:
         a limit of power.
         """
         # Imported here: a session without planes needs no renderer.
-        from lightpaint.pipeline import (
-            constraints_and_scale,
-            limited_power,
-            measure_planes,
-        )
+        from lightpaint.pipeline import constraints_and_scale, limited_power, measure_planes
 
         settings, sights = self._subjects[0].settings, tuple[PlaneSight, ...]()
         if settings.planes is None:

@@ -14,13 +14,7 @@ from lightpaint.basis.render import (
     renders_in_bands,
 )
 from lightpaint.display_text import some_names
-from lightpaint.errors import (
-    BasisError,
-    ConstraintError,
-    LightpaintError,
-    SceneError,
-    TargetError,
-)
+from lightpaint.errors import BasisError, ConstraintError, LightpaintError, SceneError, TargetError
 from lightpaint.images import MISSING_REMARK, Size, left_over, oidn_is_installed, whole_factor
 from lightpaint.lighting import Constraints, check_same_lights
 from lightpaint.pipeline.job.settings import Settings

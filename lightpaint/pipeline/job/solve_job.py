@@ -62,12 +62,7 @@ from lightpaint.pipeline.job.sources import (
     observer_of,
     spectral_scene,
 )
-from lightpaint.pipeline.results.look import (
-    SOLVE_RESULTS,
-    VIEW_RESULTS,
-    checked_names,
-    view_names,
-)
+from lightpaint.pipeline.results.look import SOLVE_RESULTS, VIEW_RESULTS, checked_names, view_names
 from lightpaint.pipeline.results.result_folder import ResultFolder, answer_files, files_of_planes
 from lightpaint.placement import PlacementRecord, Rigging, check_suggestible
 from lightpaint.relit import plugin_remark, spoken_unreadable

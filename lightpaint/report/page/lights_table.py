@@ -23,12 +23,7 @@ from lightpaint.lighting import (
     Uncertainty,
     renderings_of,
 )
-from lightpaint.report.basis_memo import (
-    ROWS_SHOWN,
-    SPARE_ROWS,
-    cached_clean_planes,
-    page_reduction,
-)
+from lightpaint.report.basis_memo import ROWS_SHOWN, SPARE_ROWS, cached_clean_planes, page_reduction
 from lightpaint.report.diagnosis_sentences import (
     UNDETERMINED,
     UNTOLD_HERE,

@@ -46,12 +46,7 @@ from lightpaint.lighting.analysis.appearance.limiting_reasons import (
     reasons_of,
 )
 from lightpaint.lighting.analysis.appearance.pixel_sample import LimitGroup
-from lightpaint.lighting.analysis.diagnosis import (
-    Diagnosis,
-    Place,
-    diagnose,
-    error_shares,
-)
+from lightpaint.lighting.analysis.diagnosis import Diagnosis, Place, diagnose, error_shares
 from lightpaint.lighting.analysis.noise.uncertainty import Uncertainty
 from lightpaint.lighting.constraints.light_constraints import constraints_by_light, tied_lights
 from lightpaint.lighting.solution import Solution

@@ -18,10 +18,7 @@ from lightpaint.basis import Basis, thinned
 from lightpaint.colour import LUMINANCE, luminance
 from lightpaint.images import Objects
 from lightpaint.lighting.analysis.appearance.display_difference import NO_NAME, object_with_most
-from lightpaint.lighting.constraints.light_constraints import (
-    SINGLE_LIGHT_KINDS,
-    ConstraintsByLight,
-)
+from lightpaint.lighting.constraints.light_constraints import SINGLE_LIGHT_KINDS, ConstraintsByLight
 from lightpaint.lighting.loss.lit_pixels import LitPixels
 from lightpaint.lighting.loss.painting import unpainted_weight_of
 from lightpaint.lighting.loss.painting_loss import PaintingLoss

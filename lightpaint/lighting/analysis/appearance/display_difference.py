@@ -15,15 +15,9 @@ from lightpaint.arrays import Bools, Doubles, Floats, Indices, as_rgb
 from lightpaint.basis import Basis, Planes, light_images, thinned
 from lightpaint.colour import LUMINANCE, ViewTransform, ciede2000, lab, luminance
 from lightpaint.images import Objects
-from lightpaint.lighting.analysis.diagnosis import (
-    REGIONS,
-    Place,
-)
+from lightpaint.lighting.analysis.diagnosis import REGIONS, Place
 from lightpaint.lighting.analysis.noise.uncertainty import Uncertainty
-from lightpaint.lighting.constraints.light_constraints import (
-    ConstraintKind,
-    ConstraintsByLight,
-)
+from lightpaint.lighting.constraints.light_constraints import ConstraintKind, ConstraintsByLight
 from lightpaint.lighting.loss.painting import at_least_mask, target_light
 from lightpaint.lighting.problem import Problem, display_light, display_transform
 from lightpaint.lighting.solution import Solution

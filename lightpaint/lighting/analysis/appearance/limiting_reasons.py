@@ -26,10 +26,7 @@ from lightpaint.lighting.analysis.appearance.pixel_sample import (
 )
 from lightpaint.lighting.analysis.noise.noise_correction import correct_noise
 from lightpaint.lighting.constraints.constraint_table import Constraints
-from lightpaint.lighting.constraints.light_constraints import (
-    ALL_LIGHTS_KINDS,
-    ConstraintKind,
-)
+from lightpaint.lighting.constraints.light_constraints import ALL_LIGHTS_KINDS, ConstraintKind
 from lightpaint.lighting.fit import Fit
 from lightpaint.lighting.problem import Problem
 from lightpaint.lighting.solution import Solution

@@ -35,10 +35,7 @@ from lightpaint.lighting.analysis.noise.basis_noise import (
     pseudo_inverse,
 )
 from lightpaint.lighting.analysis.noise.residuals import Residuals
-from lightpaint.lighting.analysis.noise.weight_directions import (
-    free_directions,
-    solve_for,
-)
+from lightpaint.lighting.analysis.noise.weight_directions import free_directions, solve_for
 from lightpaint.lighting.joined_views import joint_basis
 from lightpaint.lighting.normal_equations import NormalEquations, block_diagonal
 from lightpaint.lighting.problem import Refinement
