@@ -4,13 +4,13 @@ from typing import Any
 
 import numpy as np
 import pytest
+from lightpaint.target.target import Wish
 
 import lightpaint as lp
 from lightpaint.colour.color import delta_e, luminance
 from lightpaint.lighting.loss import weight_penalty
 from lightpaint.lighting.loss.expected_lights import Wash
 from lightpaint.lighting.loss.footprints import Footprint, find_footprint, footprint_term
-from lightpaint.target.target import Wish
 
 H, W = 36, 64
 
