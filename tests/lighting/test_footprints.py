@@ -1,5 +1,6 @@
 """Lamps whose pools a wish in numbers outlines."""
 
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -96,6 +97,12 @@ def test_an_answer_is_nearer_to_what_was_meant(
 def test_a_brush_that_paints_the_pool_itself_outlines_none(make_basis: Any) -> None:
     basis = room(make_basis)
     target = painting(basis, outshone(basis), basis.mix(meant_weights(basis)))
+    assert footprint_of(basis, target) is None
+
+
+def test_outlines_that_are_found_in_a_painting_are_none(make_basis: Any) -> None:
+    basis = room(make_basis)
+    target = replace(flat(basis, outshone(basis)), wishes=())
     assert footprint_of(basis, target) is None
 
 

@@ -6,7 +6,7 @@ lamps that all change a little are nearer to such a flat painting than the lamps
 follows. So where some lamps, changed as a group against all others, outshine these just within the
 area of a wish, the picture of the two groups is asked for, too. It is found so that the median
 change within the wish and outside comes out as painted. A brush that paints the pools themselves
-asks for no such picture.
+asks for no such picture, and outlines that are found in strokes follow pools in any case.
 """
 
 from dataclasses import dataclass
@@ -162,7 +162,7 @@ def find_footprint(wash: Wash, own: Doubles) -> Footprint | None:
 
     own: (n, 3), weights of the lights in the look.
     """
-    if not 2 <= len(own) <= MAX_LIGHTS:
+    if not (wash.is_outlined and 2 <= len(own) <= MAX_LIGHTS):
         return None
     sampled = slice(None, None, ceil(wash.counts.size / SEARCH_BLOCKS))
     dark = DARK * float(np.maximum(wash.look, 0).mean()) or 1.0
