@@ -195,14 +195,15 @@ class Gamuts:
         cooler = np.minimum(cooler, self._cool_whites) + WHITE_MARGIN
         own_reach = np.maximum(self._reach[light], cooler)
         if self._is_bold:
-            return np.maximum(own_reach, np.maximum(self._whites, needed) + BOLD_MARGIN)
+            bold = np.maximum(self._whites, needed) + BOLD_MARGIN
+            return np.asarray(np.maximum(own_reach, bold))
         margin = np.clip(2 * (needed - own_reach + WHITE_MARGIN), WHITE_MARGIN, PAINTED_MARGIN)
         reach = np.maximum(own_reach, needed + margin)
         # Paint that is cooler or warmer asks for other whites, and for none that is greener.
         off_white = max(self._off_white[light], WHITE_MARGIN)
         beyond_whites = np.maximum(needed - self._whites - self._tolerance, 0)
         whites = np.maximum(own_reach, self._whites + off_white)
-        return np.minimum(reach, whites + PAINTED_FACTOR * beyond_whites)
+        return np.asarray(np.minimum(reach, whites + PAINTED_FACTOR * beyond_whites))
 
     def _hull(self, light: int, reach: Doubles) -> ColorHull:
         """Return the gamut of a reach, (k,): the same object as before where it is equal."""
