@@ -296,6 +296,21 @@ def test_places_in_one_part_of_the_picture_are_told_apart_by_what_is_in_them():
     ]
 
 
+def test_places_on_one_object_are_told_apart_by_where_they_lie():
+    areas = [np.zeros(SIZE, np.float32) for _ in range(3)]
+    for k, area in enumerate(areas):
+        area[2:6, 4 + 16 * k : 8 + 16 * k] = 1
+    index = np.ones(SIZE, np.int32)
+    index[:8] = 0
+    objects = Objects(index, ("back_wall", "floor"))
+    wishes = [Wish("Strokes", area, layer=1) for area in areas]
+    assert [x.name for x in wish_parts(wishes, objects)[:3]] == [
+        "Strokes, back wall (top left)",
+        "Strokes, back wall (top)",
+        "Strokes, back wall (top right)",
+    ]
+
+
 def test_views_count_by_what_they_ask_for():
     stalls = Delivery("Key", 1.0, None, 2.0, 10.0, 0.0, 300.0, layers=(3,), kind="layer")
     balcony = Delivery("Key", 0.0, 0.5, 8.0, 10.0, 6.0, 100.0, layers=(3,), kind="layer")

@@ -214,11 +214,15 @@ def _part_name(wish: Wish, objects: Objects | None) -> str:
 
 
 def _with_object(name: str, area: Floats, objects: Objects) -> str:
-    """Return a name with the object that takes most of the area, if one takes a fair part of it."""
+    """Return a name with the object that takes most of the area, if one takes a fair part of it;
+    with the part of the picture, if the name has this object.
+    """
     index = objects.index.ravel().astype(np.intp)
     weights = area.ravel().astype(np.float64)
     found = object_with_most(objects, index, weights, least=FAIR_SHARE).replace("_", " ").strip()
-    return f"{name} ({found})" if found and found.lower() != name.lower() else name
+    if found and name.lower().endswith(found.lower()):
+        found = _ninth(area)
+    return f"{name} ({found})" if found else name
 
 
 def _place_name(area: Floats, objects: Objects | None) -> str:
@@ -229,6 +233,11 @@ def _place_name(area: Floats, objects: Objects | None) -> str:
         index = objects.index.ravel().astype(np.intp)
         if name := object_with_most(objects, index, area.ravel().astype(np.float64)):
             return name.replace("_", " ").strip()
+    return _ninth(area)
+
+
+def _ninth(area: Floats) -> str:
+    """Return the ninth of the picture in which an area, (h, w), lies: `top left`."""
     total = max(float(area.sum()), 1e-12)
     centers = [
         float(area.sum(axis=1 - axis) @ np.arange(length)) / total / length
