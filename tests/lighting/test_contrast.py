@@ -95,6 +95,32 @@ def test_rows_are_the_formula(make_basis: Any) -> None:
     np.testing.assert_allclose(rows[0], np.tile([-3.0, -0.2], (3, 1)), rtol=1e-5)
 
 
+@pytest.mark.parametrize("has_strokes", [True, False])
+def test_strokes_have_a_weak_contrast_even_to_numbers(make_basis: Any, has_strokes: bool) -> None:
+    """A rest in numbers keeps its light as well beside them, exactly and under the brush."""
+    basis, area = room(make_basis), subject().astype(np.float32)
+    wishes = (
+        Wish("rest", 1 - area, layer=1, is_exact=True),
+        Wish("strokes", area, layer=2, has_strokes=has_strokes),
+    )
+    image = basis.current_look * np.where(subject()[..., None], 3, 0.35)
+    target = replace(painting(basis, image), wishes=wishes)
+    film = SmallFilm(basis, target.image, target.importance)
+    weights = np.array([[0.1, 0.1, 0.1], [0.5, 0.5, 0.5]])
+    strength = weight_penalty.CONTRAST if has_strokes else weight_penalty.EXACT_CONTRAST
+    for wash in (Wash.of(basis, target), film.wash(lambda _side: wishes, is_sketch=True)):
+        rows = ContrastRows.of(wash, target.transform)
+        contrast, rest = (
+            np.einsum("kcn,nc->kc", x, weights)[0] for x in (rows.contrast, rows.rest)
+        )
+        missed = weight_penalty.EXACT_REST * (rest - rows.rest_goal[0]) ** 2
+        term = rows.term(7.0)
+        assert term is not None
+        np.testing.assert_allclose(
+            term.objective(weights), 7.0 * (strength * contrast**2 + missed), rtol=1e-5
+        )
+
+
 def test_a_small_subject_stands_out(make_basis: Any, monkeypatch: pytest.MonkeyPatch) -> None:
     """Its spot lights half of the room, too: pixels alone would leave the subject dark."""
     spill = np.tile(np.arange(W) < W // 2, (H, 1)) * 0.8

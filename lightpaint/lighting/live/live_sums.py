@@ -17,7 +17,7 @@ from lightpaint.lighting.loss.expected_lights import (
     Wash,
     are_outlined,
     counted_wishes,
-    exact_share,
+    joint_cover,
     wish_places,
     wish_shares,
 )
@@ -262,9 +262,11 @@ class SmallFilm:
             marks = self._marks.T.reshape(*self._size, 3)
             painted = extend_marked(painted, small_importance, marks, wishes, look)
         shares = wish_shares(wishes, painted, small_importance, look)
-        exact, places = exact_share(wishes, self._size), wish_places(shares, self._size)
+        exact = joint_cover([x for x in wishes if x.is_exact], self._size)
+        strokes = joint_cover([x for x in wishes if x.has_strokes], self._size)
+        places = wish_places(shares, self._size)
         light = self.rows, painted.reshape(-1, 3).T, self._current
-        about = shares, exact, places, flames, are_outlined(wishes)
+        about = shares, exact, strokes, places, flames, are_outlined(wishes)
         return Wash(*light, importance, counts, *about)
 
     def _flames(self, covers: Sequence[Wish], layers: LayerWishes) -> FlameWishes:

@@ -107,9 +107,10 @@ class Wash:
     rows: (3, n, p), Φ. painted, look: (3, p), linear. importance: (p,), the share of a block that
     is painted. counts: (p,), the number of its pixels that count. wishes: (k, p), the share of a
     block that each wish covers; exact: (p,), the cover of wishes whose colours were given as
-    numbers. places: (k, p), the number of the separate place of each wish to which a block belongs,
-    and 0 for none. flames: the wishes for emitters in view. is_outlined: whether layers say where
-    wishes end, and none was found in strokes.
+    numbers; strokes: (p,), the cover of layers of strokes. places: (k, p), the number of the
+    separate place of each wish to which a block belongs, and 0 for none. flames: the wishes for
+    emitters in view. is_outlined: whether layers say where wishes end, and none was found in
+    strokes.
     """
 
     rows: Floats
@@ -119,6 +120,7 @@ class Wash:
     counts: Doubles
     wishes: Floats
     exact: Doubles
+    strokes: Doubles
     places: Indices
     flames: FlameWishes
     is_outlined: bool = False
@@ -133,7 +135,7 @@ class Wash:
         """Return the washes of several views behind each other."""
         if len(views) == 1:
             return views[0]
-        names = "rows", "painted", "look", "importance", "counts", "exact"
+        names = "rows", "painted", "look", "importance", "counts", "exact", "strokes"
         joined = {k: np.concatenate([getattr(x, k) for x in views], axis=-1) for k in names}
         pixels = np.cumsum([0, *(x.counts.size for x in views)])
         wishes = np.zeros((sum(len(x.wishes) for x in views), pixels[-1]))
@@ -244,7 +246,8 @@ class PaintedBlocks:
             self.importance.ravel(),
             self.counts.ravel(),
             wishes,
-            exact_share(self.layers, self.importance.shape),
+            joint_cover([x for x in self.layers if x.is_exact], self.importance.shape),
+            joint_cover([x for x in self.layers if x.has_strokes], self.importance.shape),
             wish_places(wishes, self.importance.shape),
             self.flames,
             are_outlined(self.layers),
@@ -310,12 +313,12 @@ def _weighted_means(image: Floats, weight: Doubles, side: int) -> Doubles:
     return np.asarray(sums / np.where(total > 0, total, 1)[..., None])
 
 
-def exact_share(layers: Sequence[Wish], size: tuple[int, int]) -> Doubles:
-    """Return the share of each block of pixels whose colours were given as numbers, (p,).
+def joint_cover(wishes: Sequence[Wish], size: tuple[int, int]) -> Doubles:
+    """Return the share of each block of pixels that some wishes cover together, (p,).
 
-    layers: see `wish_shares`. size: (h, w), in blocks.
+    wishes: see `wish_shares`. size: (h, w), in blocks.
     """
-    areas = [wish.area for wish in layers if wish.is_exact]
+    areas = [wish.area for wish in wishes]
     return np.minimum(
         np.sum(areas, axis=0, dtype=np.float64, initial=0) + np.zeros(size), 1
     ).ravel()

@@ -30,8 +30,9 @@ A wish may be about several places, as three sculptures are. Then each counts by
 mean, one that is very bright would stand for all.
 
 A brush is sloppy, and numbers are meant: the more of the rest was adjusted by a number, the
-stronger a contrast to it. A subject that cannot be lifted, as under a locked lamp, must not pull
-such a rest down instead, so the light of the rest shall come as painted, too:
+stronger a contrast to it, unless the wish was painted by strokes itself. A subject that cannot be
+lifted, as under a locked lamp, must not pull such a rest down instead, so the light of the rest
+shall come as painted, too:
 
     F += s' Σ_k Σ_c A_kc² (P_r / R − 1)²
 
@@ -131,14 +132,15 @@ class ContrastRows:
 
     contrast: (k, 3, n), A_o (ō_i / O − r̄_i / R), which shall be 0. rest: (k, 3, n), A_r r̄_i / R,
     whose sum over the lights shall be A_r, (k, 3), `rest_goal`. exact: (k,), the share of the rest
-    that was adjusted by a number, without what texels light. share: (k,), of all contrasts;
-    each wish has the same.
+    that was adjusted by a number, without what texels light. by_numbers: (k,), the share of
+    the wish that was not painted by strokes. share: (k,), of all contrasts; each wish has the same.
     """
 
     contrast: Doubles
     rest: Doubles
     rest_goal: Doubles
     exact: Doubles
+    by_numbers: Doubles
     share: Doubles
 
     @classmethod
@@ -154,11 +156,14 @@ class ContrastRows:
         n = wash.rows.shape[1]
         goal = np.where(wash.importance > 0, wash.painted, wash.look)
         total = float(wash.counts.sum())
-        wishes = zip(wash.wishes, wash.places, strict=True)
-        found = [x for wish in wishes if (x := _subjects_and_rests(wash, *wish, total))]
+        pairs = [
+            _subjects_and_rests(wash, *wish, total)
+            for wish in zip(wash.wishes, wash.places, strict=True)
+        ]
+        found = [x for x in pairs if x]
         if not found:
             none = np.zeros((0, 3, n))
-            return cls(none, none, np.zeros((0, 3)), np.zeros(0), np.zeros(0))
+            return cls(none, none, np.zeros((0, 3)), *np.zeros((3, 0)))
         shares = np.array([x for parts in found for pair in parts for x in pair])  # (2 k, p)
         if transform is not None:
             shares = shares * seen_share(goal, transform)
@@ -184,6 +189,7 @@ class ContrastRows:
             rest_amplitude[..., None] * rest,
             rest_amplitude,
             shares[1::2] @ exact * by_lamps,
+            1 - np.repeat(_stroke_shares(wash), [len(x) for x in pairs]),
             np.array([1 / len(found) / len(parts) for parts in found for _ in parts]),
         )
 
@@ -192,7 +198,8 @@ class ContrastRows:
         if not len(self.contrast) or strength <= 0:
             return None
         each = strength * self.share
-        lift = each * (CONTRAST + self.exact * (EXACT_CONTRAST - CONTRAST))
+        exact = self.exact * self.by_numbers
+        lift = each * (CONTRAST + exact * (EXACT_CONTRAST - CONTRAST))
         keep = each * EXACT_REST * self.exact
         M = np.einsum("k,kci,kcj->cij", lift, self.contrast, self.contrast)
         M += np.einsum("k,kci,kcj->cij", keep, self.rest, self.rest)
@@ -239,6 +246,14 @@ def _subjects_and_rests(
     parts = [own * (places == k) for k in range(1, places.max(initial=0) + 1)]
     subjects = [x for x in parts if x.any()] or [own]
     return [(x / x.sum(), rest / rest.sum()) for x in subjects]
+
+
+def _stroke_shares(wash: Wash) -> Doubles:
+    """Return the share of each wish that layers of strokes paint, (k,)."""
+    areas = wash.wishes * wash.counts
+    common = np.minimum(areas, wash.strokes * wash.counts).sum(axis=1)
+    total = areas.sum(axis=1)
+    return np.asarray(common / np.where(total > 0, total, 1))
 
 
 def _texel_share(own: Doubles, look: Doubles, texel_weights: Doubles | None) -> Doubles:

@@ -195,8 +195,8 @@ class Gamuts:
         cooler = np.minimum(cooler, self._cool_whites) + WHITE_MARGIN
         own_reach = np.maximum(self._reach[light], cooler)
         if self._is_bold:
-            reach = np.maximum(self._whites, needed) + BOLD_MARGIN
-            return np.asarray(np.maximum(own_reach, reach))
+            bold = np.maximum(self._whites, needed) + BOLD_MARGIN
+            return np.asarray(np.maximum(own_reach, bold))
         margin = np.clip(2 * (needed - own_reach + WHITE_MARGIN), WHITE_MARGIN, PAINTED_MARGIN)
         reach = np.maximum(own_reach, needed + margin)
         # Paint that is cooler or warmer asks for other whites, and for none that is greener.
