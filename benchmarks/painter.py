@@ -15,7 +15,8 @@ of a stroke is timed in this process. Up to a frame of the display, 16.7 ms, of 
 waiting for it. With --minutes, how the memory of page and server grows while somebody paints.
 
 With --start, how soon `lightpaint paint SCENE` can be used: a first time with nothing kept, then
-with what that has kept, from the start of its process. The browser is open already.
+with what that has kept, from the start of its process, and its largest resident memory until then.
+The browser is open already. SCENE may be a saved basis.
 
 With --moves, the same while a light of the scene is dragged at 960x540, from the move of the
 pointer until its picture is drawn: its plane along frozen paths, the lights solved around it.
@@ -528,6 +529,17 @@ def cpu_seconds(pid: int) -> float:
     return sum(map(int, ticks)) / os.sysconf("SC_CLK_TCK")
 
 
+def largest_gb(pid: int) -> float:
+    """Largest resident memory of a process so far, in GB."""
+    status = Path(f"/proc/{pid}/status").read_text()
+    return int(status.partition("VmHWM:")[2].split()[0]) * 1024 / 1e9
+
+
+def is_saved(scene: str) -> bool:
+    """Whether what is painted is a saved basis, of which no planes are kept."""
+    return scene.endswith(".exr")
+
+
 def wait_until_idle(pid: int) -> None:
     """Wait until a process takes less than a twentieth of a processor."""
     before = cpu_seconds(pid)
@@ -558,7 +570,7 @@ def print_starts(scene: str, times: int) -> None:
         }
         environment.pop("PYTHONDONTWRITEBYTECODE", None)
         print(f"{scene}: s from the start of its process, and s of the processor that it took")
-        heads = ("", "address", *STAGES, "stroke", "processor")
+        heads = ("", "address", *STAGES, "stroke", "processor", "GB")
         print(f"{heads[0]:12s}" + "".join(f"{head:>10s}" for head in heads[1:]))
         print_times("nothing kept", [started(browser, scene, folder, environment, is_first=True)])
         every = []
@@ -605,10 +617,10 @@ def started(
     page.wait_for_function(f"() => {PAINTER}.engine.mirror.strokes.count && {PAINTER}.engine.mirror"
                            ".strokes.isPending === false", timeout=60_000)  # fmt: skip
     times.append(time.perf_counter() - begin)
-    times.append(cpu_seconds(painter.pid))
+    times += [cpu_seconds(painter.pid), largest_gb(painter.pid)]
     if is_first:
-        until = time.monotonic() + 600
-        while not list(Path(folder).glob("*.clean.npz")) and time.monotonic() < until:
+        until, kept = time.monotonic() + 600, "*.opening.npz" if is_saved(scene) else "*.clean.npz"
+        while not list(Path(folder).glob(kept)) and time.monotonic() < until:
             time.sleep(0.5)
     page.context.close()
     painter.terminate()

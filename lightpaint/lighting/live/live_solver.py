@@ -45,7 +45,7 @@ from lightpaint.lighting.loss.painting import unpainted_weight
 from lightpaint.lighting.loss.weight_penalty import PaintTerms, pull_to_current
 from lightpaint.lighting.normal_equations import NormalEquations
 from lightpaint.lighting.unknowns.gamuts import PaintedLight
-from lightpaint.lighting.unknowns.lamps_in_view import GlowPaint
+from lightpaint.lighting.unknowns.lamps_in_view import GlowPaint, light_of_emitters_seen
 from lightpaint.lighting.unknowns.reduced_problem import nearest_weights, solve_reduced
 from lightpaint.lighting.unknowns.reduction import Reduction
 from lightpaint.lighting.unknowns.white_mixes import (
@@ -236,6 +236,8 @@ class LiveSolver:
             reads_wash = self._problem.fit.reads_wishes(is_sketch=self._is_sketch)
             if not self._has_tiles or reads_wash or self._problem.fit.colors == "white":
                 self._film(view)
+            if self._problem.fit.keeps_to_hues(is_sketch=self._is_sketch):
+                light_of_emitters_seen(view.basis)
 
     @property
     def lamps(self) -> Mapping[int, Lamp]:

@@ -14,7 +14,7 @@ from typing import Self
 import numpy as np
 
 from lightpaint.arrays import Bools, Doubles, Floats, Indices
-from lightpaint.basis import Basis
+from lightpaint.basis import Basis, array_name, array_once
 from lightpaint.colour import luminance
 
 #: A painting (h, w, 3), linear, its importance (h, w), and where brighter is as good, (h, w, 3), or
@@ -49,10 +49,8 @@ class Glow:
     @classmethod
     def of(cls, basis: Basis, current: Doubles) -> Self:
         """Find the pixels. current: (n, 3), the present weights of the lights."""
-        pixels = np.flatnonzero(basis.emitters_seen)
-        pixels = pixels[:: max(1, ceil(pixels.size / MAX_GLOW_PIXELS))]
-        rows = basis.planes.pixels(pixels).astype(np.float64)
-        rows = np.maximum(rows * current[:, None], 0)
+        pixels, rows = light_of_emitters_seen(basis)
+        rows = np.maximum(rows.astype(np.float64) * current[:, None], 0)
         light = np.asarray(luminance(rows), np.float64)
         lamp, total = light.argmax(axis=0), light.sum(axis=0)
         has_surface = np.array([x.parameter not in WITHOUT_SURFACE for x in basis.lights], bool)
@@ -74,6 +72,13 @@ class Glow:
         np.add.at(sums[0], self.lamp, weight * image.reshape(-1, 3)[self.pixels])
         np.add.at(sums[1], self.lamp, weight * self.light)
         return sums[0], sums[1]
+
+
+def light_of_emitters_seen(basis: Basis) -> tuple[Indices, Floats]:
+    """Return some pixels in which emitters are seen, (p,), and the light in them, (n, p, 3)."""
+    pixels, planes = np.flatnonzero(basis.emitters_seen), basis.planes
+    pixels = pixels[:: max(1, ceil(pixels.size / MAX_GLOW_PIXELS))]
+    return pixels, array_once(planes, array_name("pixels", pixels), lambda: planes.pixels(pixels))
 
 
 @dataclass(frozen=True)
