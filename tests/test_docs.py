@@ -32,6 +32,7 @@ from lightpaint.paint.server.address import DEFAULT_PORT
 from lightpaint.paint.server.client import MAX_QUEUED, MAX_QUEUED_BYTES
 from lightpaint.paint.server.http_server import MAX_UNAUTHENTICATED
 from lightpaint.paint.server.session_clients import MAX_PAGES
+from lightpaint.paint.session.picture_table import MAX_PAGE_VALUES
 from lightpaint.photometry.measure import DEFAULT_ERROR
 from lightpaint.pipeline.job.settings import MAX_SUGGEST
 from lightpaint.scene.lights.light_choice import MAX_SEPARATE
@@ -316,6 +317,7 @@ def test_numbers_in_documents_are_those_of_the_code() -> None:
         f"lists {MAX_LISTED:,} sensors or paintings",
         f"scans {MAX_VISITED:,} files",
         f"texts of {MAX_CHARACTERS} characters and lists of {MAX_VALUES} values",
+        f"at most {round(MAX_PAGE_VALUES / 1e6)} million pixels of all lights",
     ):
         assert phrase in limits
     solving = text("solving.md")
