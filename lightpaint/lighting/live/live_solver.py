@@ -236,7 +236,7 @@ class LiveSolver:
             reads_wash = self._problem.fit.reads_wishes(is_sketch=self._is_sketch)
             if not self._has_tiles or reads_wash or self._problem.fit.colors == "white":
                 self._film(view)
-            if self._fit.keeps_to_hues(is_sketch=self._is_sketch):
+            if self._problem.fit.keeps_to_hues(is_sketch=self._is_sketch):
                 light_of_emitters_seen(view.basis)
 
     @property
