@@ -15,6 +15,7 @@ from lightpaint.lighting.loss.expected_lights import (
     ON_EMITTERS,
     FlameWishes,
     Wash,
+    are_outlined,
     counted_wishes,
     exact_share,
     wish_places,
@@ -263,7 +264,8 @@ class SmallFilm:
         shares = wish_shares(wishes, painted, small_importance, look)
         exact, places = exact_share(wishes, self._size), wish_places(shares, self._size)
         light = self.rows, painted.reshape(-1, 3).T, self._current
-        return Wash(*light, importance, counts, shares, exact, places, flames)
+        about = shares, exact, places, flames, are_outlined(wishes)
+        return Wash(*light, importance, counts, *about)
 
     def _flames(self, covers: Sequence[Wish], layers: LayerWishes) -> FlameWishes:
         """Return the wishes for emitters in view. covers: the wishes averaged over blocks."""

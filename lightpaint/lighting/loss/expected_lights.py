@@ -108,7 +108,8 @@ class Wash:
     is painted. counts: (p,), the number of its pixels that count. wishes: (k, p), the share of a
     block that each wish covers; exact: (p,), the cover of wishes whose colours were given as
     numbers. places: (k, p), the number of the separate place of each wish to which a block belongs,
-    and 0 for none. flames: the wishes for emitters in view.
+    and 0 for none. flames: the wishes for emitters in view. is_outlined: whether layers say where
+    wishes end, and none was found in strokes.
     """
 
     rows: Floats
@@ -120,6 +121,7 @@ class Wash:
     exact: Doubles
     places: Indices
     flames: FlameWishes
+    is_outlined: bool = False
 
     @classmethod
     def of(cls, basis: Basis, target: Target) -> "Wash":
@@ -142,7 +144,8 @@ class Wash:
             wishes[own], places[own] = view.wishes, view.places
             first += len(view.wishes)
         flames = FlameWishes.joined([x.flames for x in views])
-        return cls(**joined, wishes=wishes, places=places, flames=flames)
+        is_outlined = all(view.is_outlined for view in views)
+        return cls(**joined, wishes=wishes, places=places, flames=flames, is_outlined=is_outlined)
 
     def sample(self, count: int, count_of_wish: int) -> tuple[Indices, Doubles]:
         """Return about `count` painted blocks, (m,), and the number of painted pixels for which
@@ -244,6 +247,7 @@ class PaintedBlocks:
             exact_share(self.layers, self.importance.shape),
             wish_places(wishes, self.importance.shape),
             self.flames,
+            are_outlined(self.layers),
         )
 
 
@@ -343,6 +347,11 @@ def counted_wishes(wishes: Sequence[Wish], counted: Doubles) -> list[Wish]:
         replace(wish, area=(np.maximum(wish.area - (1 - counted), 0) / known).astype(np.float32))
         for wish in wishes
     ]
+
+
+def are_outlined(layers: Sequence[Wish]) -> bool:
+    """Return whether layers say where wishes end, and none is found in strokes."""
+    return bool(layers) and not any(wish.has_strokes for wish in layers)
 
 
 def wish_places(shares: Doubles, size: tuple[int, int]) -> Indices:

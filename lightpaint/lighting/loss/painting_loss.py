@@ -463,3 +463,14 @@ class PaintingLoss(Loss):
             current=mean(self.current, current_weight),
             at_least=mean(self.at_least.astype(np.float64), painted_weight) > 0.5,
         )
+
+
+def display_amplitude(light: Doubles, transform: ViewTransform | None) -> Doubles:
+    """Return how much values of the loss change with a relative change of light, (3, k).
+
+    light: (3, k), linear. transform: the view transform of the loss; None for linear light.
+    """
+    if transform is None:
+        return np.maximum(light, 0)
+    low, high = (transform.encode_planes(light * x) for x in (0.98, 1.02))
+    return np.asarray(np.abs(high - low) / 0.04, np.float64)

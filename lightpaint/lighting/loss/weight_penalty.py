@@ -64,6 +64,8 @@ from lightpaint.lighting.loss.expected_lights import (
     Wash,
     adjusted_share,
 )
+from lightpaint.lighting.loss.footprints import find_footprint, footprint_term
+from lightpaint.lighting.loss.painting_loss import display_amplitude
 from lightpaint.lighting.normal_equations import NormalEquations
 from lightpaint.threads import one_thread
 
@@ -261,17 +263,6 @@ def seen_share(light: Doubles, transform: ViewTransform) -> Doubles:
     return np.asarray(np.minimum(1, transform.white / np.maximum(mean, transform.white)))
 
 
-def display_amplitude(light: Doubles, transform: ViewTransform | None) -> Doubles:
-    """Return how much values of the loss change with a relative change of light, (3, k).
-
-    light: (3, k), linear. transform: the view transform of the loss; None for linear light.
-    """
-    if transform is None:
-        return np.maximum(light, 0)
-    low, high = (transform.encode_planes(light * x) for x in (0.98, 1.02))
-    return np.asarray(np.abs(high - low) / 0.04, np.float64)
-
-
 @dataclass(frozen=True)
 class PaintTerms:
     """The lights that a painting lets one expect, and its terms of the loss in the weights.
@@ -302,10 +293,17 @@ class PaintTerms:
         """
         keeps_colors = fit.colors in ("gentle", "white")
         texel_weights = own * texels[:, None] if texels.any() else None
+        contrast = ContrastRows.of(wash, fit.transform, texel_weights)
+        footprint = None if texels.any() or importance <= 0 else find_footprint(wash, own)
+        # The picture of a footprint has its own contrast.
+        left = 1.0 if footprint is None else 1 - footprint.confidence
         return cls(
             ExpectedLights.of(wash, own) if keeps_colors else None,
             _sum(
-                ContrastRows.of(wash, fit.transform, texel_weights).term(importance),
+                contrast.term(left * importance),
+                None
+                if footprint is None
+                else footprint_term(wash, footprint, fit.transform, importance),
                 flame_term(wash.flames, fit.transform, importance),
             ),
             restrain_lights(wash, own, fit.transform, unpainted=unpainted),
