@@ -29,7 +29,7 @@ from lightpaint.photometry.illuminance import (
 from lightpaint.storage.json_records import strict_json
 
 FORMAT = "lightpaint-illuminance 1"
-#: What is said of a plane that no lamp reaches.
+#: The remark on a plane that no lamp reaches.
 NO_LIGHT = "no lamp reaches it: is it below the floor, or do its points face away?"
 
 #: Files of a measurement; each plane has a picture beside them.

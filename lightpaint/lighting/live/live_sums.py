@@ -266,8 +266,8 @@ class SmallFilm:
         strokes = joint_cover([x for x in wishes if x.has_strokes], self._size)
         places = wish_places(shares, self._size)
         light = self.rows, painted.reshape(-1, 3).T, self._current
-        about = shares, exact, strokes, places, flames, are_outlined(wishes)
-        return Wash(*light, importance, counts, *about)
+        outlined = are_outlined(wishes)
+        return Wash(*light, importance, counts, shares, exact, strokes, places, flames, outlined)
 
     def _flames(self, covers: Sequence[Wish], layers: LayerWishes) -> FlameWishes:
         """Return the wishes for emitters in view. covers: the wishes averaged over blocks."""
