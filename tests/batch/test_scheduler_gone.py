@@ -1,10 +1,12 @@
 """A scheduler that ends, while it is being reached or later: one line, and soon."""
 
 import contextlib
+import gc
 import logging
 import socket
 import threading
 import time
+import weakref
 from collections import deque
 from collections.abc import Callable, Iterator
 from pathlib import Path
@@ -17,7 +19,7 @@ from batches import SilentListener
 from lightpaint.batch.cluster import workers
 from lightpaint.batch.cluster.dask_engine import Cluster
 from lightpaint.batch.cluster.parcels import unpack
-from lightpaint.batch.cluster.workers import ClusterWorkers
+from lightpaint.batch.cluster.workers import ClusterWorkers, collect_lost_clients
 from lightpaint.batch.work.work_items import ItemResult
 from lightpaint.errors import BatchError, OutputError
 
@@ -67,6 +69,22 @@ def test_one_that_ends_while_it_is_reached(
     assert [x for x in caplog.records if x.levelno >= logging.WARNING] == []
 
 
+def test_a_client_that_reached_nothing_is_closed_before_another_starts() -> None:
+    class Lost:
+        itself: object = None
+
+    lost = Lost()
+    lost.itself, is_collected = lost, weakref.ref(lost)
+    del lost
+    gc.disable()
+    try:
+        with fake_server(b"") as address, pytest.raises(BatchError):
+            ClusterWorkers(address, SilentListener(), "topic")  # type: ignore[arg-type]
+        assert is_collected() is None
+    finally:
+        gc.enable()
+
+
 LATER: dict[str, Callable[[ClusterWorkers], object]] = {
     "refresh": lambda at: (setattr(at, "_looked_s", -1e9), at.refresh()),
     "is_there": lambda at: at.is_known("tcp://127.0.0.1:1"),
@@ -80,6 +98,7 @@ def test_one_that_ends_later(call: str, caplog: pytest.LogCaptureFixture) -> Non
     options = {"n_workers": 0, "processes": False, "protocol": "tcp://", "dashboard_address": None}
     # Without a dashboard it still listens for HTTP: here on any port that is free.
     any_port = {"dashboard_address": "127.0.0.1:0"}
+    collect_lost_clients()
     with distributed.LocalCluster(**options, scheduler_kwargs=any_port) as cluster:
         cluster_workers = ClusterWorkers(cluster.scheduler_address, SilentListener(), "topic")  # type: ignore[arg-type]
     caplog.clear()

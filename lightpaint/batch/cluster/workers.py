@@ -6,6 +6,7 @@ certificates by its own configuration (`distributed.comm.tls`), as its scheduler
 """
 
 import asyncio
+import gc
 import logging
 import os
 import socket
@@ -205,6 +206,7 @@ def _connect(address: str) -> Any:
         place = get_address_host_port(address, strict=True)
         with socket.create_connection(place, timeout=ANSWER_S) as connection:
             _check_trust(address, connection)
+        collect_lost_clients()
         # Dask would wait for ever for a server that accepts the connection and stays silent.
         make = partial(Client, address, timeout=ANSWER_S, set_as_default=False)
         return call_with_timeout(make, ANSWER_S + GONE_S)
@@ -215,6 +217,15 @@ def _connect(address: str) -> Any:
             f"no scheduler answers at {address}: {_reason(error) or 'none is there'}; give its "
             "address, like tcp://host:8786 or tls://host:8786 (dask scheduler tells it)"
         ) from error
+
+
+def collect_lost_clients() -> None:
+    """Close Dask's clients that did not reach their scheduler, and that nothing refers to any more.
+
+    A client closes itself when it is collected, under a lock of Dask's that the start of another
+    one holds. If it were collected during that, both would wait for ever (distributed 2026.8.0).
+    """
+    gc.collect()
 
 
 def _check_trust(address: str, connection: socket.socket) -> None:
