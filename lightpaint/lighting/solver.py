@@ -49,7 +49,7 @@ from lightpaint.lighting.loss.reweighting import (
     is_sampled,
     total_loss,
 )
-from lightpaint.lighting.loss.weight_penalty import pull_to_current
+from lightpaint.lighting.loss.weight_penalty import is_spoilt_by_contrast, pull_to_current
 from lightpaint.lighting.normal_equations import NormalEquations
 from lightpaint.lighting.problem import Problem
 from lightpaint.lighting.solution import Solution
@@ -80,9 +80,6 @@ ROUGH_STEP = 1e-3
 #: a shot of 24 frames (benchmarks/frames.py) it takes a third of the flicker out of four inexact
 #: paintings; ten times as much doubles the error of pictures between two.
 TIE = 1e-2
-
-#: Share of the loss of contrasts now from which they count as missed.
-MISSED_CONTRAST = 0.5
 
 #: Largest number of rounds over all frames, and the change of a weight, relative to the largest, at
 #: which they end.
@@ -195,26 +192,14 @@ def solution_of(problem: Problem, *, start: Doubles | None = None) -> Solution:
     """
     begin = problem.start if start is None else start
     solution = _solve_whole(problem, begin)
-    if _is_spoilt_by_contrast(solution):
+    found = solution.problem
+
+    def objective(weights: Doubles) -> float:
+        return float(found.objective(weights).sum())
+
+    if is_spoilt_by_contrast(found.contrast, solution.weights, found.reference, objective):
         solution = _solve_whole(replace(problem, contrast=None), begin)
     return solution
-
-
-def _is_spoilt_by_contrast(solution: Solution) -> bool:
-    """Return whether the answer misses the painting by more than the current lights do, and yet
-    most of the contrasts.
-
-    A contrast is a ratio to the rest of the picture. Where no light can lift the subject alone,
-    all lights go down for it, as everything that is missed is less in the dark.
-    """
-    problem = solution.problem
-    contrast, now = problem.contrast, problem.reference
-    if contrast is None:
-        return False
-    missed, missed_now = (float(contrast.objective(w).sum()) for w in (solution.weights, now))
-    if missed <= MISSED_CONTRAST * missed_now:
-        return False
-    return sum(solution.certificate.objective) > float(problem.objective(now).sum())
 
 
 def _solve_whole(problem: Problem, begin: Doubles) -> Solution:

@@ -529,7 +529,7 @@ def test_a_contrast_out_of_reach_does_not_darken_the_picture(
     solution = lp.solve(basis, target)
     objective = solution.problem.objective
     assert objective(solution.weights).sum() < objective(basis.current_weights).sum()
-    monkeypatch.setattr(solver, "MISSED_CONTRAST", np.inf)  # never given up
+    monkeypatch.setattr(weight_penalty, "MISSED_CONTRAST", np.inf)  # never given up
     dark = lp.solve(basis, target).weights
     assert objective(dark).sum() > objective(basis.current_weights).sum()
     assert basis.mix(dark).mean() < 0.9 * basis.mix(solution.weights).mean()

@@ -411,7 +411,7 @@ def as_key(datum: Datum) -> str | None:
     """Return an argument as a key of a manifest, in TOML; None for what has no key there."""
     if not isinstance(datum, Hint):
         return None
-    if str(datum) == "verify=False":
+    if (datum.name, datum.value) == ("verify", False):
         return 'want without "verify"'
     name = OTHER_NAMES.get(datum.name, datum.name)
     if name not in SETTINGS and name not in DEFAULT_KEYS:

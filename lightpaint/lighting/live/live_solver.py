@@ -42,7 +42,11 @@ from lightpaint.lighting.live.many_lights import MANY_LIGHTS, MAX_FILM_VALUES, M
 from lightpaint.lighting.loss.expected_lights import ExpectedLights, Wash
 from lightpaint.lighting.loss.lit_pixels import block_side
 from lightpaint.lighting.loss.painting import unpainted_weight
-from lightpaint.lighting.loss.weight_penalty import PaintTerms, pull_to_current
+from lightpaint.lighting.loss.weight_penalty import (
+    PaintTerms,
+    is_spoilt_by_contrast,
+    pull_to_current,
+)
 from lightpaint.lighting.normal_equations import NormalEquations
 from lightpaint.lighting.unknowns.gamuts import PaintedLight
 from lightpaint.lighting.unknowns.lamps_in_view import GlowPaint, light_of_emitters_seen
@@ -207,6 +211,7 @@ class LiveSolver:
         self._answers_left = 0
         self._last_multipliers = LastMultipliers(close=MET_UNDER_BRUSH)
         self._is_kept_to = False  # whether the last answer kept to the constraints
+        self._gives_up_contrast = False  # whether lights cannot bring what was last read
         self._many = ManyLights(len(self._basis.lights))
         self._films = None if self._start != constraints.start else self._films
         self._start = constraints.start
@@ -297,6 +302,11 @@ class LiveSolver:
         # After a change of the painting the last answer may be worse than the current lighting.
         starts = start, self._unpainted_answer()
         mixed = self._improve(starts, views, unpainted, while_moving=while_moving)
+        if self._is_spoilt_by_contrast(mixed, views, unpainted):
+            self._gives_up_contrast = True
+            self._problem = replace(self._problem, contrast=None)
+            starts = mixed, self._unpainted_answer()
+            mixed = self._improve(starts, views, unpainted, while_moving=while_moving)
         if not self._within.open_wheels:
             return mixed
         mixing, self._within = self._within, self._within.with_slots(mixed)
@@ -305,6 +315,22 @@ class LiveSolver:
         weights = self._improve((at_slots,), views, unpainted, while_moving=while_moving)
         self._within = mixing
         return weights
+
+    def _is_spoilt_by_contrast(
+        self, weights: Doubles, views: tuple[LiveView, ...], unpainted: float
+    ) -> bool:
+        """Return whether contrasts are to be given up, as exact answers do."""
+        if self._problem.contrast is None:
+            return False
+        transform = self._problem.fit.transform
+        films = self._joint_films(views)
+        pixels = films.pixels(unpainted, transform)
+        return is_spoilt_by_contrast(
+            self._problem.contrast,
+            weights,
+            self._problem.reference,
+            lambda w: films.objective(pixels, w),
+        )
 
     def _improve(
         self,
@@ -357,6 +383,10 @@ class LiveSolver:
             reading = LiveReading(views, films, self._problem, is_sketch=self._is_sketch)
             self._reading = reading
         terms = reading.read(unpainted)
+        # What cannot be brought to unchanged paint is not tried again.
+        self._gives_up_contrast = self._gives_up_contrast and self._last_read == views
+        if self._gives_up_contrast:
+            terms = replace(terms, contrast=None)
         self._problem = replace(
             self._problem,
             power=reading.power,

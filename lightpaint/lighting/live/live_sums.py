@@ -350,6 +350,10 @@ class Films:
         parts = [film.pixels(rest_weight, transform) for film in self._films]
         return parts[0] if len(parts) == 1 else join_pixels(parts)
 
+    def objective(self, pixels: PaintedPixels, weights: Doubles) -> float:
+        """Return the loss of weights (n, 3), all channels together."""
+        return float(pixels.objective(*self._shown(weights, pixels)).sum())
+
     def improve(
         self,
         pixels: PaintedPixels,
@@ -368,7 +372,7 @@ class Films:
         """
 
         def missed(w: Doubles) -> float:
-            value = float(pixels.objective(*self._shown(w, pixels)).sum())
+            value = self.objective(pixels, w)
             return value if pull is None else value + float(pull.objective(w).sum())
 
         values = [missed(w) for w in starts]

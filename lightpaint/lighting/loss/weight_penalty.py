@@ -44,6 +44,7 @@ Texels of an image could meet any contrast by a patchwork of odd colours. So as 
 a wish comes from texels, its contrast stays the contrast of a brush.
 """
 
+from collections.abc import Callable
 from dataclasses import dataclass
 from functools import reduce
 from math import ceil
@@ -124,6 +125,9 @@ FINER_SHARE = 1 / 9
 #: Share in the picture, relative to its share of the image, below which a texel counts as
 #: unseen: it stays as it is, however bright its neighbours get.
 SEEN_SHARE = 1e-3
+
+#: Share of the loss of contrasts now from which they count as missed.
+MISSED_CONTRAST = 0.5
 
 
 @dataclass(frozen=True)
@@ -536,3 +540,24 @@ def image_prior(
     color = (GENTLE_IMAGE_COLOR + expected.clarity * (IMAGE_COLOR - GENTLE_IMAGE_COLOR))[:, None]
     colors = pull_to_colors(color * shares, current, texel_lights(lights))
     return even + staying + colors
+
+
+def is_spoilt_by_contrast(
+    contrast: NormalEquations | None,
+    weights: Doubles,
+    current: Doubles,
+    objective: Callable[[Doubles], float],
+) -> bool:
+    """Return whether weights (n, 3) miss the painting by more than the current lights do, and yet
+    most of the contrasts.
+
+    A contrast is a ratio to the rest of the picture. Where no light can lift the subject alone,
+    all lights go down for it, as everything that is missed is less in the dark. objective: the
+    loss of weights, without contrasts.
+    """
+    if contrast is None:
+        return False
+    missed, missed_now = (float(contrast.objective(w).sum()) for w in (weights, current))
+    if missed <= MISSED_CONTRAST * missed_now:
+        return False
+    return objective(weights) > objective(current)
