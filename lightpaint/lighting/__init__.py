@@ -60,7 +60,6 @@ if TYPE_CHECKING:
     from lightpaint.lighting.analysis.noise.basis_noise import denoised_matrix as denoised_matrix
     from lightpaint.lighting.analysis.noise.noise_correction import correct_noise as correct_noise
     from lightpaint.lighting.analysis.noise.noise_correction import refine as refine
-    from lightpaint.lighting.analysis.noise.residuals import channel_grain as channel_grain
     from lightpaint.lighting.analysis.noise.sample_demand import pixel_variances as pixel_variances
     from lightpaint.lighting.analysis.noise.sample_demand import sample_demand as sample_demand
     from lightpaint.lighting.analysis.noise.sample_demand import top_up_counts as top_up_counts

@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from lightpaint.arrays import Doubles, Floats
+from lightpaint.arrays import Floats
 from lightpaint.basis import Basis, BasisLight
 from lightpaint.errors import SceneError
 from lightpaint.images import block_mean, whole_factor
@@ -18,7 +18,6 @@ from lightpaint.lighting import (
     Problem,
     Reduction,
     Solution,
-    channel_grain,
     reduce_to,
 )
 from lightpaint.scene import Scene, reduction_to
@@ -105,8 +104,7 @@ class LookGoal:
 
     goal: (p, 3); importance: (p, 3), >= 0. reduction: of its unknowns by constraints. pull: penalty
     on weights, beside the picture. noise: (p, 3), half differences of the goal as far as it is the
-    current look, whose noise is the basis's own. grain: (p, 3), standard deviation of the noise of
-    the painting, as of a render; None without any.
+    current look, whose noise is the basis's own.
     """
 
     goal: Floats
@@ -114,7 +112,6 @@ class LookGoal:
     reduction: Reduction
     pull: NormalEquations | None
     noise: Floats
-    grain: Doubles | None = None
 
     @property
     def norm2(self) -> float:
@@ -142,12 +139,10 @@ def goal_of(
     images: list[Floats] = [np.zeros((height * width, 3)) for height, width in sizes]
     weights: list[Floats] = [np.zeros_like(plane) for plane in images]
     noises: list[Floats] = [np.zeros_like(plane) for plane in images]
-    grains: list[Floats] = [np.zeros_like(plane) for plane in images]
     for k, view in enumerate(views):
         problem = solution.problem.view_problem(k)
-        factor = problem.basis.size[0] // sizes[view][0]
-        reduced = *reduced_goal(problem, factor), painting_grain(problem, solution.weights, factor)
-        for listed, image in zip((images, weights, noises, grains), reduced, strict=True):
+        reduced = reduced_goal(problem, problem.basis.size[0] // sizes[view][0])
+        for listed, image in zip((images, weights, noises), reduced, strict=True):
             whole = np.broadcast_to(image, (*image.shape[:-1], 3))
             listed[view] = whole.reshape(-1, 3)
     all_constraints = solution.problem.constraints.and_then(
@@ -159,7 +154,6 @@ def goal_of(
         _with_new_lights(solution.problem.local_reduction, new, all_constraints),
         pull_with_more(solution, len(new)),
         np.concatenate(noises),
-        np.concatenate(grains),
     )
 
 
@@ -246,25 +240,3 @@ def reduced_goal(problem: Problem, factor: int) -> tuple[Floats, Floats, Floats]
         shared = squares.share * problem.basis.current_noise
         noise = block_mean(shared * importance, factor) / total
     return goal, weight * factor**2, noise
-
-
-def painting_grain(problem: Problem, weights: Doubles, factor: int) -> Doubles:
-    """Return the standard deviation of a painting's noise on a film of blocks, (h, w, 3).
-
-    It is what the residual of weights (n, 3) scatters from pixel to pixel beyond the noise of the
-    prediction.
-    """
-    squares, predicted = problem.squares, problem.basis.predict(weights)
-    half = predicted.half_difference - squares.share * problem.basis.current_noise
-    importance = np.broadcast_to(squares.weight.astype(np.float64), squares.image.shape)
-    weight = block_mean(importance, factor)
-    residual, noise = (
-        block_mean(x * importance, factor) / np.where(weight > 0, weight, 1)
-        for x in (squares.image - predicted.image, half)
-    )
-    grain = np.zeros_like(residual)
-    for c in range(3):
-        counted = weight[..., c] > 0
-        of_both, of_prediction = (channel_grain(x[..., c], counted) for x in (residual, noise))
-        grain[..., c] = np.sqrt(np.maximum(of_both - of_prediction, 0)) * counted
-    return grain

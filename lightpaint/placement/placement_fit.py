@@ -35,9 +35,6 @@ from lightpaint.placement.look_goals import LookGoal, balanced, goal_of
 #: Share of a column that others cannot replace, below which it counts as none.
 LEAST_OWN = 1e-3
 
-#: Seed of the signs of a painting's noise.
-SEED = 1
-
 #: Noise of a pixel, as a share of ‖Ψ‖², above which the pixel tells nothing.
 NOISY = 1e-3
 
@@ -123,8 +120,6 @@ class PlacementFit:
         self._root = np.sqrt(importance.astype(np.float64))
         self._goal = np.concatenate([look.goal for look in self._looks], axis=1) * self._root
         self._goal_noise = np.concatenate([look.noise for look in self._looks], axis=1) * self._root
-        grains = [np.zeros_like(x.goal) if x.grain is None else x.grain for x in self._looks]
-        self._grain = np.concatenate(grains, axis=1) * self._root
         self.norm2 = float(np.square(self._goal).sum())
 
     @property
@@ -142,15 +137,13 @@ class PlacementFit:
         fit = copy(self)
         seen = ~left_out[:, None]
         fit._root, fit._goal = self._root * seen, self._goal * seen
-        fit._grain = self._grain * seen
         fit._goal_noise = self._goal_noise * seen[: len(self._goal_noise)]
         return fit
 
     def of_half(self, sign: int) -> "PlacementFit":
         """Return the fit to columns of one half of the basis's samples, 1 or -1.
 
-        Noise of a half has √2 times the deviation of the noise of both. The goal has the noise of
-        its painting once more, of either sign in each pixel, and of the other for the other half.
+        Noise of a half has √2 times the deviation of the noise of both.
         """
         fit, p = copy(self), self.pixels
         half = self.columns[:, p:, :3]
@@ -161,9 +154,6 @@ class PlacementFit:
         if len(self._goal_noise):
             fit._goal = self._goal + sign * self._goal_noise
             fit._goal_noise = math.sqrt(2) * self._goal_noise
-        # A path carries all channels, so their noise has one sign.
-        signs = np.random.default_rng(SEED).choice([-1.0, 1.0], (self.pixels, 1))
-        fit._goal = fit._goal + sign * signs * self._grain
         return fit
 
     def replaced(self, changed: Mapping[int, Floats]) -> Floats:

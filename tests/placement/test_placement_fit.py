@@ -1,15 +1,12 @@
 """The loss of a search is that of columns without their noise."""
 
-from typing import Any
-
 import numpy as np
 import pytest
 
-import lightpaint as lp
 from lightpaint.arrays import Doubles, Floats
 from lightpaint.lighting.unknowns.knobs import Knob
 from lightpaint.lighting.unknowns.reduction import Reduction
-from lightpaint.placement.look_goals import LookGoal, painting_grain
+from lightpaint.placement.look_goals import LookGoal
 from lightpaint.placement.placement_fit import PlacementFit, Slopes
 
 PIXELS = 20_000
@@ -121,30 +118,3 @@ def test_the_fit_of_a_half_is_to_the_samples_of_that_half(rng: np.random.Generat
         fitted = alone.fitted(alone.columns)
         assert fitted.weights == pytest.approx(np.full((1, 3), 2.0), rel=1e-9)
         assert abs(fitted.missed) < 1e-9 * fit.norm2
-
-
-def test_halves_have_the_noise_of_the_painting_with_opposite_signs() -> None:
-    reduction = Reduction(np.zeros((1, 3)), ("",), (Knob.of_any_colour(0),))
-    goal, grain = 2 * TRUE, 0.1 * TRUE
-    look = LookGoal(goal, np.full_like(goal, 4.0), reduction, None, np.zeros_like(goal), grain)
-    fit = PlacementFit(np.concatenate([TRUE, 0 * TRUE])[None].astype(np.float32), [look])
-    levels = [fit.of_half(sign).fitted(fit.columns).weights for sign in (1, -1)]
-    # Goals that differ alike in both ways; the noise has the sign of its pixel.
-    np.testing.assert_allclose(np.mean(levels, axis=0), 2, rtol=1e-6)  # columns are float32
-    scatter = np.sqrt(np.square(0.1 * TRUE**2).sum(axis=0)) / np.square(TRUE).sum(axis=0)
-    assert (np.abs(levels[0] - 2) < 4 * scatter).all()
-    assert (levels[0] != 2).all()
-
-
-def test_the_noise_of_a_render_is_found_on_a_film_of_blocks(make_basis: Any) -> None:
-    """Smooth light under noise of 5 %; a mean of 2 × 2 pixels has half of it."""
-    rng, size = np.random.default_rng(0), (64, 96)
-    y, x = np.mgrid[: size[0], : size[1]] / size[0]
-    basis = make_basis(images=(1 + 0.5 * np.sin(x + y))[None, ..., None] * np.ones((1, 1, 1, 3)))
-    for noise in (0.05, 0.0):
-        image = (2 + x[..., None] / 4 + noise * rng.normal(size=(*size, 3))).astype(np.float32)
-        target = lp.Target("render", image, np.ones(size, np.float32), everything=True)
-        solution = lp.solve(basis, target, literal=True)
-        grain = painting_grain(solution.problem, solution.weights, 2)
-        # Blocks of 8 x 8 and those around them: a tenth or so.
-        assert grain.mean() == pytest.approx(noise / 2, rel=0.15, abs=2e-3)
