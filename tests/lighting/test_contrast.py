@@ -10,7 +10,7 @@ import pytest
 import lightpaint as lp
 from lightpaint.basis.light_basis import meter_exposure
 from lightpaint.colour.color import kelvin_to_rgb, luminance
-from lightpaint.lighting import hold_to_current, solver
+from lightpaint.lighting import hold_to_current
 from lightpaint.lighting.live.live_sums import SmallFilm
 from lightpaint.lighting.loss import expected_lights, weight_penalty
 from lightpaint.lighting.loss.expected_lights import ExpectedLights, Wash, adjusted_share
