@@ -216,7 +216,7 @@ def warmth(light: Any) -> float:
 def test_a_flame_in_view_does_not_turn_blue_for_a_warm_cloth(
     make_basis: Any, monkeypatch: pytest.MonkeyPatch, kind: str
 ) -> None:
-    """What lights the cloth warms the cage too, and blue light of the lantern would hide that."""
+    """The lamp on the cloth also warms the cage, which blue light of the lantern could undo."""
     basis = lantern_on_a_cloth(make_basis)
     own = basis.current_weights[2]
     answer = answers_to_a_warm_cloth(basis)[kind][2]

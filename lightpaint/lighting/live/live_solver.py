@@ -211,7 +211,7 @@ class LiveSolver:
         self._answers_left = 0
         self._last_multipliers = LastMultipliers(close=MET_UNDER_BRUSH)
         self._is_kept_to = False  # whether the last answer kept to the constraints
-        self._gives_up_contrast = False  # whether lights cannot bring what was last read
+        self._given_up: NormalEquations | None = None  # contrasts that lights cannot bring
         self._many = ManyLights(len(self._basis.lights))
         self._films = None if self._start != constraints.start else self._films
         self._start = constraints.start
@@ -303,7 +303,7 @@ class LiveSolver:
         starts = start, self._unpainted_answer()
         mixed = self._improve(starts, views, unpainted, while_moving=while_moving)
         if self._is_spoilt_by_contrast(mixed, views, unpainted):
-            self._gives_up_contrast = True
+            self._given_up = self._problem.contrast
             self._problem = replace(self._problem, contrast=None)
             starts = mixed, self._unpainted_answer()
             mixed = self._improve(starts, views, unpainted, while_moving=while_moving)
@@ -383,9 +383,8 @@ class LiveSolver:
             reading = LiveReading(views, films, self._problem, is_sketch=self._is_sketch)
             self._reading = reading
         terms = reading.read(unpainted)
-        # What cannot be brought to unchanged paint is not tried again.
-        self._gives_up_contrast = self._gives_up_contrast and self._last_read == views
-        if self._gives_up_contrast:
+        # Contrasts that were given up are not tried again while the paint asks for the same ones.
+        if _are_equal(terms.contrast, self._given_up):
             terms = replace(terms, contrast=None)
         self._problem = replace(
             self._problem,
@@ -445,6 +444,13 @@ class LiveSolver:
 def _allowed(reduction: Reduction, weights: Doubles) -> Doubles:
     """Return weights (n, 3) between allowed ones, with the colours that lights may have."""
     return clip_to_gamuts(reduction, snap_to_whites(reduction, weights))
+
+
+def _are_equal(first: NormalEquations | None, second: NormalEquations | None) -> bool:
+    """Return whether both are there, and the same to the last bit."""
+    if first is None or second is None:
+        return False
+    return np.array_equal(first.M, second.M) and np.array_equal(first.b, second.b)
 
 
 def _power(views: Sequence[LiveView]) -> Doubles:
