@@ -28,7 +28,7 @@ from lightpaint.target.template import Template
 FULL = 0.04
 
 #: Tolerance in display values between the 8-bit roundings of two programs: half a code each; some
-#: truncate instead of rounding, some dither.
+#: truncate instead of rounding, some dither (Mitsuba does, always).
 ROUNDING = 1.6 / 255
 
 #: Weight of a relative change of light above display white, in display values: about the slope of
