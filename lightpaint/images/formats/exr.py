@@ -62,6 +62,7 @@ class ExrPart:
     display: (height, width) of the display window, which is the picture; None if equal to `size`.
     offset: (y, x) of the first stored pixel in that window: programs crop empty borders or keep a
     margin.
+    origin: (y, x) of that pixel in the coordinates of the file, whose window may begin anywhere.
     primaries: CIE xy of red, green, blue and white, if the header declares `chromaticities`.
     views: names of the views in the part, beginning with the one whose channels have no prefix.
     compression: its name. loss: its largest relative error, as in COMPRESSION_LOSS; 0 if lossless.
@@ -72,6 +73,7 @@ class ExrPart:
     attributes: Mapping[str, str] = field(default_factory=dict)
     display: tuple[int, int] | None = None
     offset: tuple[int, int] = (0, 0)
+    origin: tuple[int, int] = (0, 0)
     primaries: tuple[float, ...] | None = None
     views: tuple[str, ...] = ()
     compression: str = ""
@@ -205,6 +207,7 @@ def _part(path: Path, part: Any) -> ExrPart:
         _texts(part.header),
         display,
         offset,
+        (y0, x0),
         _primaries(part.header),
         tuple(map(str, views)) if isinstance(views, list) else (),
         *_compression(part.header),

@@ -8,6 +8,7 @@ non-triangular faces or unknown types, are not checked here.
 
 import struct
 import zlib
+from collections.abc import Iterable
 from pathlib import Path
 from typing import Any
 
@@ -16,7 +17,7 @@ import numpy.typing as npt
 
 from lightpaint.errors import ImageError, SceneError
 from lightpaint.files import file_length, one_line
-from lightpaint.images.formats import read_parts
+from lightpaint.images.formats import ExrPart, read_parts
 from lightpaint.luminaires import LUMINAIRE_PLUGINS, read_web
 
 #: Maximum size in bytes of a file that is read.
@@ -104,7 +105,7 @@ def _check_picture(path: Path, length: int) -> None:
         head = file.read(32)
         if head.startswith(b"\x76\x2f\x31\x01"):
             # Only a complete read shows whether Mitsuba's reader will survive.
-            read_parts(path)
+            _check_origin(path, read_parts(path))
             return
         width = height = 0
         if head.startswith(b"\x89PNG") and len(head) >= 24:
@@ -116,6 +117,16 @@ def _check_picture(path: Path, length: int) -> None:
         raise ImageError(
             f"{path} declares {width}x{height} pixels, in {length} bytes: too many to read"
         )
+
+
+def _check_origin(path: Path, parts: Iterable[ExrPart]) -> None:
+    for part in parts:
+        if min(part.origin) < 0:
+            y, x = part.origin
+            raise ImageError(
+                f"{path} begins at pixel ({x}, {y}), which Mitsuba cannot read: crop it to its "
+                "display window"
+            )
 
 
 def _jpeg_size(data: bytes) -> tuple[int, int]:

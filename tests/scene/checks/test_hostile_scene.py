@@ -9,6 +9,7 @@ import struct
 import subprocess
 import sys
 import zlib
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -19,7 +20,8 @@ from patience import PATIENCE_S
 from renderer import GLOSSY, LIGHTS, PATH, ROOM, write_room
 
 from lightpaint.errors import SceneError
-from lightpaint.images.formats.exr import write_rgb
+from lightpaint.images.formats.exr import ExrPart, read_parts, write_parts, write_rgb
+from lightpaint.scene.checks.assets import check_asset
 from lightpaint.scene.scene_reader import load_scene
 
 ROOM_TEXT = ROOM.format(integrator=PATH, film="", sensors="", wall=GLOSSY, lights=LIGHTS["bulb"])
@@ -270,3 +272,19 @@ def test_the_command_says_it_in_one_line(tmp_path: Path, name: str) -> None:
     assert completed.stdout == ""
     assert len(completed.stderr.splitlines()) == 1
     assert path.name in completed.stderr
+
+
+def test_a_picture_that_begins_before_its_coordinates_is_refused(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Mitsuba 3.9.1 ends with a segmentation fault on it, so none is written here."""
+    path = tmp_path / "slide.exr"
+    pixels = {"Y": np.ones((2, 3), np.float32)}
+    write_parts(path, [ExrPart("", pixels, display=(4, 4), offset=(2, 1))])
+    (part,) = read_parts(path)
+    assert part.origin == (2, 1)
+    check_asset(path, "projector")
+    before = replace(part, origin=(-2, 0))
+    monkeypatch.setattr("lightpaint.scene.checks.assets.read_parts", lambda path: [before])
+    with pytest.raises(SceneError, match=r"slide\.exr begins at pixel \(0, -2\), .*: crop it"):
+        check_asset(path, "projector")
