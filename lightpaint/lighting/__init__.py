@@ -121,7 +121,7 @@ if TYPE_CHECKING:
     from lightpaint.lighting.linear_problem import reduce_lights as reduce_lights
     from lightpaint.lighting.linear_problem import sum_rows as sum_rows
     from lightpaint.lighting.linear_problem import summed_problem as summed_problem
-    from lightpaint.lighting.linear_solve import solve_linear as solve_linear
+    from lightpaint.lighting.linear_solve import solve_squares as solve_squares
     from lightpaint.lighting.live.live_solver import LiveSolver as LiveSolver
     from lightpaint.lighting.live.live_view import LiveView as LiveView
     from lightpaint.lighting.loss.painting import ignored_paint as ignored_paint

@@ -285,17 +285,13 @@ class SummedProblem(LinearProblem):
     contrast: NormalEquations | None = None
     restraint: NormalEquations | None = None
     tether: NormalEquations | None = None
+    painted_share: float = 1.0  # on which nothing in literal problems depends
 
     __repr__ = short_repr
 
     @property
     def transform(self) -> None:
         """None: display values have no such sums."""
-
-    @property
-    def painted_share(self) -> float:
-        """1: nothing in such a problem depends on it."""
-        return 1.0
 
     def objective(self, weights: Doubles) -> Doubles:
         """Return the loss of weights (n, 3), (3,)."""

@@ -11,6 +11,7 @@ short search moves single wheels where the loss falls.
 
 from collections.abc import Callable, Collection, Sequence
 from dataclasses import dataclass, replace
+from functools import cached_property
 from typing import Any, Generic, Protocol, TypeVar
 
 import numpy as np
@@ -29,7 +30,7 @@ from lightpaint.lighting.unknowns.reduced_problem import (
     reduced_problems,
 )
 from lightpaint.lighting.unknowns.reduction import Reduction, only_knobs
-from lightpaint.lighting.unknowns.white_mixes import solve_on_locus
+from lightpaint.lighting.unknowns.white_mixes import Multipliers, solve_on_locus
 
 #: Sizes beyond K that are tried, so that people see the gain of a few more lights.
 EXTRA_SIZES = 2
@@ -119,31 +120,82 @@ def _least_objective(problem: ReducedProblem, on: Collection[int]) -> float:
 
 @dataclass(frozen=True)
 class LinearAnswer(Generic[_Problem]):
-    """The lighting that solves the squares of a problem.
+    """The optimum of the squares of a problem, as weights and as a lighting.
 
-    problem: with the lights that `sparse` has chosen. weights: (n, 3). tried: see `Solution`.
+    problem: with the lights that `sparse` has chosen, and the whites, sides of gamuts and slots
+    that lights came to. optimum: of `equations`, the squares with the pull. found: (n, 3), the
+    weights that stand for it. reached: (n, 3), the channels in which lights reach something. tried,
+    curve: see `Solution` and `Certificate`.
     """
 
     problem: _Problem
-    lighting: Lighting
-    weights: Doubles
+    optimum: ReducedOptimum
+    equations: NormalEquations
+    found: Doubles
+    reached: Bools
     tried: tuple[tuple[int, Doubles], ...] = ()
+    curve: tuple[tuple[int, float], ...] = ()
+
+    @cached_property
+    def weights(self) -> Doubles:
+        """(n, 3), the weights without those that round-off made."""
+        is_constrained = np.array([bool(x) for x in self.problem.reduction.labels], dtype=bool)
+        return self.problem.remove_traces(self.found, is_constrained)
+
+    @cached_property
+    def lighting(self) -> Lighting:
+        """The lighting, with its certificate."""
+        problem = self.problem
+        return Lighting.of_weights(
+            problem.lights,
+            self.weights,
+            labels=_labels_and_effects(problem, self.equations, self.optimum),
+            reached=self.reached,
+            lamps=problem.reduction.lamps,
+            mixed_emissions=problem.reduction.mixed_emissions,
+            target=problem.name,
+            certificate=self._certificate(),
+            scene_identity=problem.scene_identity,
+            cd_per_unit=problem.constraints.cd_per_unit,
+        )
+
+    def with_problem(self, problem: _Problem) -> "LinearAnswer[_Problem]":
+        """Return this lighting as the answer to a problem with less freedom."""
+        changed = replace(self, problem=problem)
+        vars(changed).update(weights=self.weights, lighting=self.lighting)  # as they are cached
+        return changed
+
+    def _certificate(self) -> Certificate:
+        problem, optimum, transform = self.problem, self.optimum, self.problem.transform
+        names = problem.lights.names
+        return Certificate(
+            kkt_residual=as_rgb(optimum.kkt_residual),
+            objective=(0, 0, 0),
+            relative_objective=(0, 0, 0),
+            sweeps=optimum.sweeps,
+            converged=optimum.converged,
+            unreached=tuple(n for n, ok in zip(names, self.reached, strict=True) if not ok.any()),
+            display="" if transform is None else transform.spoken,
+            hold=problem.fit.hold or 0.0,
+            colors=problem.fit.colors or "free",
+            noise_removed=problem.noise_removed,
+            software=Software.installed(),
+            basis_spp=problem.spp,
+            curve=self.curve,
+        ).with_objective(problem.objective(self.weights), problem.norm2)
 
 
-def solve_linear(problem: _Problem, start: Doubles) -> LinearAnswer[_Problem]:
+def solve_squares(problem: _Problem, start: Doubles) -> LinearAnswer[_Problem]:
     """Solve the squares from weights (n, 3); with `sparse`, for the best lights alone. Colour
     wheels come to slots.
     """
     mixed = solve_mixed(problem, start)
-    answer = at_slots(mixed, solve_reduction, _loss_with_pull)
+    answer = at_slots(mixed, solve_linear)
     if answer is None:
         return mixed
-    answer = replace(answer, problem=answer.problem.with_final_slots())
-    certificate, former = answer.lighting.certificate, mixed.lighting.certificate
-    assert certificate is not None
-    assert former is not None
-    lighting = answer.lighting.with_certificate(replace(certificate, curve=former.curve))
-    return replace(answer, lighting=lighting, tried=mixed.tried)
+    answer = at_better_slots(answer, solve_linear, _loss_with_pull)
+    answer = replace(answer, tried=mixed.tried, curve=mixed.curve)
+    return answer.with_problem(answer.problem.with_final_slots())
 
 
 class _Answered(Protocol):
@@ -158,21 +210,25 @@ class _Answered(Protocol):
 _Answer = TypeVar("_Answer", bound=_Answered)
 
 
-def at_slots(
-    mixed: _Answer,
-    solve_again: Callable[[Any, Doubles], _Answer],
-    loss: Callable[[_Answer], float],
-) -> _Answer | None:
+def at_slots(mixed: _Answer, solve_again: Callable[[Any, Doubles], _Answer]) -> _Answer | None:
     """Return an answer whose colour wheels are at slots; None without a wheel.
 
     mixed: the answer whose wheels mix their slots. solve_again: solves its problem with other
     slots, from weights (n, 3).
     """
-    answer = mixed
     if mixed.problem.reduction.open_wheels:
-        answer = solve_again(mixed.problem.with_slots(mixed.weights), mixed.weights)
-    if not answer.problem.reduction.slots:
-        return None
+        return solve_again(mixed.problem.with_slots(mixed.weights), mixed.weights)
+    return mixed if mixed.problem.reduction.slots else None
+
+
+def at_better_slots(
+    answer: _Answer,
+    solve_again: Callable[[Any, Doubles], _Answer],
+    loss: Callable[[_Answer], float],
+) -> _Answer:
+    """Return the better of an answer with wheels at slots and one with the slots that a short
+    search finds. solve_again: as for `at_slots`.
+    """
     better = answer.problem.with_better_slots(answer.weights)
     return answer if better is None else min(answer, solve_again(better, answer.weights), key=loss)
 
@@ -183,83 +239,46 @@ def _loss_with_pull(answer: LinearAnswer[_Problem]) -> float:
 
 
 def solve_mixed(problem: _Problem, start: Doubles) -> LinearAnswer[_Problem]:
-    """Solve as `solve_linear` does, but for colour wheels, which mix their slots."""
+    """Solve as `solve_squares` does, but for colour wheels, which mix their slots."""
     count = problem.constraints.sparse
     if count is None or not problem.full.knobs:
-        return solve_reduction(problem, start)
+        return solve_linear(problem, start)
     equations, curve = problem.with_pull(problem.solved), []
     path = _choose_knobs(reduced_problems(equations, problem.full), problem.full, count)
     for chosen in path:
         _, optimum = solve_on_locus(equations, only_knobs(problem.full, chosen), start)
         curve.append((len(chosen), optimum.weights))
     best = max((chosen for chosen in path if len(chosen) <= count), key=len)
-    answer = solve_reduction(problem.with_reduction(only_knobs(problem.full, best)), start)
+    answer = solve_linear(problem.with_reduction(only_knobs(problem.full, best)), start)
     # Chosen lights that come out dark are left out as well.
     on = [k for k, x in enumerate(problem.full.knobs) if answer.weights[list(x.lights)].any()]
     solved = answer.problem.with_reduction(only_knobs(answer.problem.full, on))
     norm = np.where(problem.norm2 > 0, problem.norm2, 1).sum()
     errors = [(n, float(np.sqrt(problem.objective(w).sum() / norm))) for n, w in curve]
-    certificate = answer.lighting.certificate
-    assert certificate is not None
-    lighting = answer.lighting.with_certificate(replace(certificate, curve=tuple(errors)))
-    return replace(answer, problem=solved, lighting=lighting, tried=tuple(curve))
+    return replace(answer, tried=tuple(curve), curve=tuple(errors)).with_problem(solved)
 
 
-def solve_reduction(
-    problem: _Problem, start: Doubles, reached: Bools | None = None
-) -> LinearAnswer[_Problem]:
-    """Solve the squares under the current reduction. reached: as in `make_answer`."""
-    equations, method = problem.with_pull(problem.solved), problem.fit.method
-    reduction, optimum = solve_on_locus(equations, problem.reduction, start, method=method)
-    return make_answer(problem.with_whites(reduction), optimum, optimum.weights, equations, reached)
-
-
-def make_answer(
+def solve_linear(
     problem: _Problem,
-    optimum: ReducedOptimum,
-    weights: Doubles,
-    equations: NormalEquations,
+    start: Doubles,
     reached: Bools | None = None,
+    *,
+    steps: int | None = None,
+    near: Multipliers | None = None,
 ) -> LinearAnswer[_Problem]:
-    """Make an answer of weights (n, 3). optimum: of `equations`, the problem with its pull.
+    """Solve the squares from weights (n, 3) under the current reduction.
 
     reached: (n, 3), the channels in which lights reach something, if known from before: in the last
-    linear problem of a loss they may reach less.
+    linear problem of a loss they may reach less. steps, near: for an answer under a moving brush,
+    see `solve_on_locus`.
     """
-    reached = optimum.reached if reached is None else reached
-    transform, names = problem.transform, problem.lights.names
-    labels = problem.reduction.labels
-    weights = problem.remove_traces(weights, np.array([bool(x) for x in labels], dtype=bool))
-    certificate = Certificate(
-        kkt_residual=as_rgb(optimum.kkt_residual),
-        objective=(0, 0, 0),
-        relative_objective=(0, 0, 0),
-        sweeps=optimum.sweeps,
-        converged=optimum.converged,
-        unreached=tuple(n for n, ok in zip(names, reached, strict=True) if not ok.any()),
-        display="" if transform is None else transform.spoken,
-        hold=problem.fit.hold or 0.0,
-        colors=problem.fit.colors or "free",
-        noise_removed=problem.noise_removed,
-        software=Software.installed(),
-        basis_spp=problem.spp,
-    ).with_objective(problem.objective(weights), problem.norm2)
-    labels_and_effects = _labels_and_effects(problem, equations, optimum)
-    fields: dict[str, Any] = {"target": problem.name, "certificate": certificate}
-    fields |= {
-        "scene_identity": problem.scene_identity,
-        "cd_per_unit": problem.constraints.cd_per_unit,
-    }
-    lighting = Lighting.of_weights(
-        problem.lights,
-        weights,
-        labels=labels_and_effects,
-        reached=reached,
-        lamps=problem.reduction.lamps,
-        mixed_emissions=problem.reduction.mixed_emissions,
-        **fields,
+    equations, method = problem.with_pull(problem.solved), problem.fit.method
+    reduction, optimum = solve_on_locus(
+        equations, problem.reduction, start, steps=steps, near=near, method=method
     )
-    return LinearAnswer(problem, lighting, weights)
+    reached = optimum.reached if reached is None else reached
+    solved = problem.with_whites(reduction)
+    return LinearAnswer(solved, optimum, equations, optimum.weights, reached)
 
 
 def _labels_and_effects(

@@ -25,11 +25,11 @@ from lightpaint.lighting.fit import Fit
 from lightpaint.lighting.held_mixes import choose_held_mixes, with_mixes_at
 from lightpaint.lighting.linear_solve import (
     LinearAnswer,
+    at_better_slots,
     at_slots,
-    make_answer,
     solve_linear,
     solve_mixed,
-    solve_reduction,
+    solve_squares,
 )
 from lightpaint.lighting.loss.lit_pixels import (
     BinnedPixels,
@@ -214,9 +214,10 @@ def _solve_whole(problem: Problem, begin: Doubles) -> Solution:
         near = nearest_weights(at_slots.reduction, weights)
         return _descend(at_slots, near, reached, blocks)
 
-    solution = at_slots(mixed, with_slots_of, loss_with_pull)
+    solution = at_slots(mixed, with_slots_of)
     if solution is None:
         return mixed
+    solution = at_better_slots(solution, with_slots_of, loss_with_pull)
     final, curve = solution.problem.with_final_slots(), mixed.certificate.curve
     solution = replace(solution, problem=final, tried=mixed.tried)
     return solution.with_certificate_fields(curve=curve)
@@ -286,14 +287,14 @@ def solve_tethered(solution: Solution, problem: Problem) -> Solution:
 
 def _solve_squares(problem: Problem, start: Doubles) -> Solution:
     """Solve the squares; with `sparse`, for the best lights alone."""
-    return _solution(solve_linear(problem, start))
+    return _solution(solve_squares(problem, start))
 
 
 def _solve_under_reduction(
     problem: Problem, start: Doubles, reached: Bools | None = None
 ) -> Solution:
-    """Solve the squares under the current reduction. reached: as in `make_answer`."""
-    return _solution(solve_reduction(problem, start, reached))
+    """Solve the squares under the current reduction. reached: as in `solve_linear`."""
+    return _solution(solve_linear(problem, start, reached))
 
 
 def _solution(answer: LinearAnswer[Problem]) -> Solution:
@@ -305,8 +306,8 @@ def _descend(
 ) -> Solution:
     """Descend from weights (n, 3) to the least loss under the constraints.
 
-    reached: as in `make_answer`. blocks: from `_blocks_of`. The two whites that lights mix, and the
-    lights that are confined to their gamuts, stay the same while the loss falls, and are chosen
+    reached: as in `solve_linear`. blocks: from `_blocks_of`. The two whites that lights mix, and
+    the lights that are confined to their gamuts, stay the same while the loss falls, and are chosen
     anew at its minimum: of many lights at first near it.
     """
     until = ROUGH_STEP if len(start) >= MANY_LIGHTS else MIN_STEP
@@ -417,14 +418,15 @@ def _least_loss(
 def _solution_at(
     problem: Problem, low: _LeastLoss, reached: Bools, blocks: BinnedPixels | None
 ) -> Solution:
-    """Return the solution at the end of a descent. reached: as in `make_answer`."""
+    """Return the solution at the end of a descent. reached: as in `solve_linear`."""
     descent, optimum = low.descent, low.optimum
     if blocks is not None:
         solved = _problem_of_blocks(problem, descent, blocks)
     else:
         solved = replace(problem, squares=descent.squares, equations=descent.equations)
     equations = solved.with_pull(solved.solved)
-    solution = _solution(make_answer(solved, optimum, descent.weights, equations, reached))
+    answer = LinearAnswer(solved, optimum, equations, descent.weights, reached)
+    solution = _solution(answer)
     converged = optimum.converged and descent.reweighting.converged
     result = solution.with_certificate_fields(converged=converged)
     return replace(result, reweighting=descent.reweighting)

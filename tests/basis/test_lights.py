@@ -11,7 +11,7 @@ from lightpaint.lighting.answer.lighting import Lighting
 from lightpaint.lighting.constraints.constraint_table import Constraints
 from lightpaint.lighting.fit import Fit, resolve_fit
 from lightpaint.lighting.linear_problem import Sums, reduce_lights, summed_problem
-from lightpaint.lighting.linear_solve import solve_linear
+from lightpaint.lighting.linear_solve import solve_squares
 from lightpaint.lighting.normal_equations import NormalEquations
 from lightpaint.scene.lights.lights_file import SceneRequests
 
@@ -50,7 +50,7 @@ def test_a_lighting_and_a_solve_need_no_pixel() -> None:
     M = np.tile(np.diag([2.0, 3.0]), (3, 1, 1))
     sums = Sums(NormalEquations(M, np.tile([4.0, 9.0], (3, 1)), np.full(3, 50.0)), np.ones((2, 3)))
     problem = summed_problem(lights, "it", sums, constraints=Constraints(), fit=Fit(literal=True))
-    optimum = solve_linear(problem, problem.start)
+    optimum = solve_squares(problem, problem.start)
     np.testing.assert_allclose(optimum.weights, [[2.0] * 3, [0.25] * 3])
     assert optimum.lighting.weights_for(lights).tolist() == optimum.weights.tolist()
     assert Lighting.of_weights(lights, optimum.weights).emission == optimum.lighting.emission

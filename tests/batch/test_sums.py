@@ -22,7 +22,7 @@ from lightpaint.lighting.answer.lighting_file import read_lighting
 from lightpaint.lighting.constraints.constraint_table import Constraints
 from lightpaint.lighting.fit import Fit
 from lightpaint.lighting.linear_problem import Sums, reason_against_sums, sum_rows, summed_problem
-from lightpaint.lighting.linear_solve import solve_linear
+from lightpaint.lighting.linear_solve import solve_squares
 from lightpaint.lighting.solver import solve
 from lightpaint.scene.runtime.kernel_threads import limit_threads
 from lightpaint.target.painted_target import Target
@@ -44,7 +44,7 @@ def solve_sums(basis: Basis, sums: Sums, **constraint_words: Any) -> np.ndarray:
     constraints = constraint_words.pop("constraints", Constraints())
     fit = Fit(literal=True, **constraint_words)
     problem = summed_problem(basis.lights, "it", sums, constraints=constraints, fit=fit)
-    return solve_linear(problem, problem.start).weights
+    return solve_squares(problem, problem.start).weights
 
 
 @pytest.mark.parametrize(

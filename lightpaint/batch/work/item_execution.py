@@ -39,7 +39,7 @@ from lightpaint.lighting import (
     Sums,
     read_lighting,
     solution_of,
-    solve_linear,
+    solve_squares,
     sum_rows,
     summed_problem,
 )
@@ -297,7 +297,7 @@ def publish_solved_lights(
         scene_identity=scene_identity,
         spp=spp,
     )
-    _publish_lighting_only(job, solve_linear(problem, problem.start).lighting)
+    _publish_lighting_only(job, solve_squares(problem, problem.start).lighting)
 
 
 def _publish_lighting_only(job: Job, lighting: Lighting) -> None:

@@ -18,12 +18,14 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import partial, reduce
 from operator import add
+from typing import Any
 
 import numpy as np
 
 from lightpaint.arrays import RGB, Bools, Doubles
-from lightpaint.basis import Basis, Lights, texel_lights
+from lightpaint.basis import Basis, texel_lights
 from lightpaint.colour import Lamp
+from lightpaint.display_text import short_repr
 from lightpaint.lighting.constraints.constraint_table import Constraints
 from lightpaint.lighting.constraints.light_constraints import (
     WhiteLimits,
@@ -31,11 +33,12 @@ from lightpaint.lighting.constraints.light_constraints import (
 )
 from lightpaint.lighting.fit import Fit, Space
 from lightpaint.lighting.linear_problem import (
-    LinearProblem,
     PaintReading,
+    SummedProblem,
     reduce_lights,
     whites_for,
 )
+from lightpaint.lighting.linear_solve import at_slots, solve_linear
 from lightpaint.lighting.live.live_sums import MAX_FILM_PIXELS, Films, SmallFilm
 from lightpaint.lighting.live.live_view import LiveView
 from lightpaint.lighting.live.many_lights import MANY_LIGHTS, MAX_FILM_VALUES, ManyLights
@@ -53,11 +56,11 @@ from lightpaint.lighting.unknowns.lamps_in_view import GlowPaint, light_of_emitt
 from lightpaint.lighting.unknowns.reduced_problem import nearest_weights, solve_reduced
 from lightpaint.lighting.unknowns.reduction import Reduction
 from lightpaint.lighting.unknowns.white_mixes import (
-    LastMultipliers,
+    Multipliers,
     center_windows,
     clip_to_gamuts,
     snap_to_whites,
-    solve_under_brush,
+    solve_on_locus,
 )
 from lightpaint.threads import one_thread
 
@@ -68,6 +71,9 @@ ANSWERS_PER_READING = 8
 #: Largest miss of a requirement under the brush, relative to its size: none that shows.
 MET_UNDER_BRUSH = 1e-5
 
+#: Steps of lights to other whites, or sides of their gamuts, for one answer; the next continues.
+BRUSH_STEPS = 3
+
 #: Largest relative difference of weights that comes from round-off.
 ROUND_OFF = 1e-12
 
@@ -76,29 +82,49 @@ GAMUT_BLOCKS, GAMUT_WISH_BLOCKS = 2**8, 2**5
 
 
 @dataclass(frozen=True, kw_only=True)
-class LiveProblem(LinearProblem):
+class LiveProblem(SummedProblem):
     """The linear problem of live views, whose squares follow the brush.
 
-    lights, power, painted_share: see `LinearProblem`. reference: (n, 3), the lights to start from.
+    painted_share: see `LinearProblem`. full: what constraints leave; reduction: that with the
+    gamuts that the painting asks for, and the whites, sides and slots of the last answer.
     """
 
-    lights: Lights
-    power: Doubles
-    reference: Doubles
-    constraints: Constraints
-    reduction: Reduction
-    full: Reduction
-    fit: Fit
     painted_share: float = 0.0
-    expected: ExpectedLights | None = None
-    contrast: NormalEquations | None = None
-    restraint: NormalEquations | None = None
-    tether: NormalEquations | None = None
+
+    __repr__ = short_repr
 
     @property
     def keeps_color(self) -> Bools:
         """(n,), the lights with a pull to their colour, as far as the pictures of all show."""
         return self.full.is_free & self.power.any(axis=1) & ~texel_lights(self.lights)
+
+    def with_squares(self, equations: NormalEquations) -> "LiveProblem":
+        """Return this problem with other squares."""
+        return self._with_same_pull(equations=equations)
+
+    def with_reduction(self, reduction: Reduction) -> "LiveProblem":
+        """Return this problem with another reduction of the same `full`."""
+        return self._with_same_pull(reduction=reduction)
+
+    with_whites = with_reduction
+
+    def with_slots(self, weights: Doubles) -> "LiveProblem":
+        """Return this problem with colour wheels at the slots closest to weights (n, 3)."""
+        return self.with_reduction(self.reduction.with_slots(weights))
+
+    def _with_same_pull(self, **changes: Any) -> "LiveProblem":
+        """Return this problem with other fields, on which the pull does not depend."""
+        changed = replace(self, **changes)
+        vars(changed)["pull"] = self.pull  # as `cached_property` keeps it
+        return changed
+
+
+@dataclass(frozen=True)
+class _Improved:
+    """Weights (n, 3), as close to the squares of views as some steps come, and their problem."""
+
+    problem: LiveProblem
+    weights: Doubles
 
 
 class LiveReading(PaintReading):
@@ -193,23 +219,25 @@ class LiveSolver:
 
     def constrain(self, fit: Fit, constraints: Constraints) -> None:
         """Change fit and constraints. Raises ConstraintError for impossible ones."""
-        reduction = reduce_lights(constraints, self._basis.lights, fit)
+        lights = self._basis.lights
+        reduction = reduce_lights(constraints, lights, fit)
         self._problem = LiveProblem(
-            lights=self._basis.lights,
+            name="",
+            lights=lights,
             power=self._basis.power,
-            reference=start_weights(constraints.start, self._basis.lights),
+            equations=_no_squares(len(lights)),
             constraints=constraints,
             reduction=reduction,
             full=reduction,
             fit=fit,
+            start=start_weights(constraints.start, lights),
         )
         self._whites: WhiteLimits | None = None
         self._untouched: Doubles | None = None
         self._mixed_emissions: Mapping[int, RGB] = {}
-        self._within = reduction
         self._reading: LiveReading | None = None
         self._answers_left = 0
-        self._last_multipliers = LastMultipliers(close=MET_UNDER_BRUSH)
+        self._near = Multipliers(MET_UNDER_BRUSH)
         self._is_kept_to = False  # whether the last answer kept to the constraints
         self._given_up: NormalEquations | None = None  # contrasts that lights cannot bring
         self._many = ManyLights(len(self._basis.lights))
@@ -247,7 +275,7 @@ class LiveSolver:
     @property
     def lamps(self) -> Mapping[int, Lamp]:
         """The lamps that mix lights from emitters, by the light's index."""
-        return {k: lamp.while_painting for k, lamp in self._problem.reduction.lamps.items()}
+        return {k: lamp.while_painting for k, lamp in self._problem.full.lamps.items()}
 
     @property
     def mixed_emissions(self) -> Mapping[int, RGB]:
@@ -292,7 +320,7 @@ class LiveSolver:
             return self._unpainted_answer()
         if not self._is_kept_to:
             # Weights that the constraints forbid may well be closer to the painting.
-            start = _nearest(start, views, self._problem.reduction)
+            start = _nearest(start, views, self._problem.full)
             self._is_kept_to = True
         painted, rest = reduce(add, (view.counts for view in views))
         unpainted = unpainted_weight(float(painted), float(rest), self._problem.fit)
@@ -301,20 +329,17 @@ class LiveSolver:
         self._answers_left -= 1
         # After a change of the painting the last answer may be worse than the current lighting.
         starts = start, self._unpainted_answer()
-        mixed = self._improve(starts, views, unpainted, while_moving=while_moving)
-        if self._is_spoilt_by_contrast(mixed, views, unpainted):
-            self._given_up = self._problem.contrast
-            self._problem = replace(self._problem, contrast=None)
-            starts = mixed, self._unpainted_answer()
-            mixed = self._improve(starts, views, unpainted, while_moving=while_moving)
-        if not self._within.open_wheels:
-            return mixed
-        mixing, self._within = self._within, self._within.with_slots(mixed)
-        self._mixed_emissions = self._within.mixed_emissions
-        at_slots = nearest_weights(self._within, mixed)
-        weights = self._improve((at_slots,), views, unpainted, while_moving=while_moving)
-        self._within = mixing
-        return weights
+        improve = partial(self._improve, views=views, unpainted=unpainted, is_moving=while_moving)
+        mixed = improve(self._problem, starts)
+        if self._is_spoilt_by_contrast(mixed.weights, views, unpainted):
+            self._given_up = mixed.problem.contrast
+            without = replace(mixed.problem, contrast=None)
+            mixed = improve(without, (mixed.weights, self._unpainted_answer()))
+        self._problem = mixed.problem
+        answer = at_slots(mixed, lambda x, w: improve(x, (nearest_weights(x.reduction, w),)))
+        answer = answer or mixed
+        self._mixed_emissions = answer.problem.reduction.mixed_emissions
+        return answer.weights
 
     def _is_spoilt_by_contrast(
         self, weights: Doubles, views: tuple[LiveView, ...], unpainted: float
@@ -334,42 +359,52 @@ class LiveSolver:
 
     def _improve(
         self,
+        problem: LiveProblem,
         starts: tuple[Doubles, ...],
+        *,
         views: tuple[LiveView, ...],
         unpainted: float,
-        *,
-        while_moving: bool,
-    ) -> Doubles:
-        """Return the best weights (n, 3) within the present reduction, from the best of some, the
-        first of which are the last ones.
+        is_moving: bool,
+    ) -> _Improved:
+        """Improve the best of some weights (n, 3), the first of which are the last ones.
 
-        unpainted: the weight of each unpainted pixel. while_moving: as for `answer`.
+        unpainted: the weight of each unpainted pixel. is_moving: whether a light is being moved.
         """
-        reduction, pull = self._within, self._problem.pull
-
-        def best(equations: NormalEquations, begin: Doubles) -> Doubles:
-            return self._best(equations if pull is None else equations + pull, begin)
-
+        if self._has_tiles and not is_moving:
+            squares = reduce(add, (x.tiles().equations(unpainted) for x in views))
+            return self._solve(problem, squares, starts[0])
+        films, reduction = self._joint_films(views), problem.reduction
+        pixels = films.pixels(unpainted, problem.fit.transform)
         allowed = partial(_allowed, reduction)
-
-        if self._has_tiles and not while_moving:
-            return best(reduce(add, (x.tiles().equations(unpainted) for x in views)), starts[0])
-        films = self._joint_films(views)
-        pixels = films.pixels(unpainted, self._problem.fit.transform)
         starts = allowed(starts[0]), *starts[1:]
         if self._are_many:
-            self._within, weights = self._many.improve(
-                films.rows, pixels, starts, reduction, self._solve_some, pull, _allowed
+            reduction, weights = self._many.improve(
+                films.rows, pixels, starts, reduction, self._solve_some, problem.pull, _allowed
             )
-            return weights
-        return films.improve(pixels, starts, best, pull, allowed)
+            return _Improved(problem.with_reduction(reduction), weights)
+        solved = problem
+
+        def best(squares: NormalEquations, begin: Doubles) -> Doubles:
+            nonlocal solved
+            found = self._solve(problem, squares, begin)
+            solved = found.problem
+            return found.weights
+
+        weights = films.improve(pixels, starts, best, problem.pull, allowed)
+        return _Improved(solved, weights)
+
+    def _solve(self, problem: LiveProblem, squares: NormalEquations, start: Doubles) -> _Improved:
+        """Solve some squares from weights (n, 3), with wheels that mix their slots."""
+        squares_of_now = problem.with_squares(squares)
+        answer = solve_linear(squares_of_now, start, steps=BRUSH_STEPS, near=self._near)
+        return _Improved(answer.problem, answer.weights)
 
     def _unpainted_answer(self) -> Doubles:
         """Return the answer without paint, (n, 3)."""
         if self._untouched is None:
             reference = self._problem.reference
-            at_slots = self._problem.reduction.with_slots(reference)
-            self._untouched = _nearest(reference, self._views, at_slots)
+            reduction = self._problem.full.with_slots(reference)
+            self._untouched = _nearest(reference, self._views, reduction)
         return self._untouched
 
     def _read_paint(self, views: tuple[LiveView, ...], unpainted: float) -> None:
@@ -394,10 +429,10 @@ class LiveSolver:
         )
         self._follow_whites(whites_for(terms.expected, self._problem.fit))
         # Lights that the last answer confined to their gamuts are confined from the start.
-        if self._within.gamuts is not None and not is_new:
-            self._within.gamuts.refresh()
+        if (known := self._problem.reduction.gamuts) is not None and not is_new:
+            known.refresh()
         elif (gamuts := reading.gamuts(reading.around(terms.expected))) is not None:
-            self._within = self._problem.reduction.with_gamuts(gamuts)
+            self._problem = self._problem.with_reduction(self._problem.full.with_gamuts(gamuts))
         self._last_read, self._answers_left = views, ANSWERS_PER_READING
 
     def _follow_whites(self, whites: WhiteLimits | None) -> None:
@@ -406,22 +441,18 @@ class LiveSolver:
             return
         problem = self._problem
         reduction = reduce_lights(problem.constraints, problem.lights, problem.fit, whites=whites)
-        self._whites, self._within = whites, reduction
+        self._whites = whites
         self._problem = replace(problem, reduction=reduction, full=reduction)
-
-    def _best(self, equations: NormalEquations, start: Doubles) -> Doubles:
-        """Return the best weights (n, 3) under the constraints, from those to begin with."""
-        method, last = self._problem.fit.method, self._last_multipliers
-        self._within, weights = solve_under_brush(
-            equations, self._within, start, method=method, last=last
-        )
-        return weights
 
     def _solve_some(
         self, equations: NormalEquations, reduction: Reduction, start: Doubles
     ) -> tuple[Reduction, Doubles]:
         """Solve for some of many lights, whose misses of requirements would add up over rounds."""
-        return solve_under_brush(equations, reduction, start, method=self._problem.fit.method)
+        method = self._problem.fit.method
+        reduction, optimum = solve_on_locus(
+            equations, reduction, start, steps=BRUSH_STEPS, method=method
+        )
+        return reduction, optimum.weights
 
     def _joint_films(self, views: tuple[LiveView, ...]) -> Films:
         if self._films is None or self._films[0] != views:
@@ -444,6 +475,12 @@ class LiveSolver:
 def _allowed(reduction: Reduction, weights: Doubles) -> Doubles:
     """Return weights (n, 3) between allowed ones, with the colours that lights may have."""
     return clip_to_gamuts(reduction, snap_to_whites(reduction, weights))
+
+
+def _no_squares(count: int) -> NormalEquations:
+    """Return the sums over no pixel, for some lights."""
+    M = np.broadcast_to(0.0, (3, count, count))
+    return NormalEquations(M, np.zeros((3, count)), np.zeros(3))
 
 
 def _are_equal(first: NormalEquations | None, second: NormalEquations | None) -> bool:

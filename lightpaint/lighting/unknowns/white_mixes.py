@@ -15,23 +15,22 @@ reaches the edge. The end is the same; a thousand lights have three thousand unk
 twice as many, which are determined.
 """
 
-from collections.abc import Callable, Collection, Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass, replace
-from functools import partial
 from typing import Any
 
 import numpy as np
 
 from lightpaint.arrays import Doubles, Indices
 from lightpaint.colour import ColorHull, Lamp, WhiteRange
-from lightpaint.lighting.algebra.method import Method
+from lightpaint.lighting.algebra.required_sums import CLOSE
 from lightpaint.lighting.normal_equations import NormalEquations
 from lightpaint.lighting.unknowns.knobs import Knob, brightest_whites
 from lightpaint.lighting.unknowns.reduced_problem import ReducedOptimum, solve_reduced
 from lightpaint.lighting.unknowns.reduction import Reduction
 
 #: Widths of windows, in pieces of the range, before they are of one piece.
-WINDOW_WIDTHS = (8, 2)
+WINDOW_WIDTHS: tuple[int, ...] = (8, 2)
 
 #: Maximum number of steps between neighbours.
 MAX_STEPS = 200
@@ -44,14 +43,6 @@ MANY_CONFINED = 64
 
 #: Ends of windows, by the places of their knobs.
 Windows = Mapping[int, tuple[int, int]]
-
-#: Maximum number of times that lights move to other sides for one answer under the brush, and of
-#: steps between whites; the next answer continues.
-MAX_TURNS, BRUSH_STEPS = 3, 2
-
-#: Width, in pieces of a range of white, of the window in which a light under the brush first finds
-#: its white.
-BRUSH_WIDTH = 8
 
 
 @dataclass(frozen=True)
@@ -70,28 +61,66 @@ class _WhiteLights:
     unit: Doubles
 
 
+@dataclass
+class Multipliers:
+    """The multipliers of requirements, (m,), in the last of some similar problems, with which the
+    next solve begins; None before the first. Updated in place.
+
+    close: the largest miss of a requirement to end at, relative to its size.
+    """
+
+    close: float = CLOSE
+    required: Doubles | None = None
+
+    def solve(
+        self,
+        equations: NormalEquations,
+        reduction: Reduction,
+        start: Doubles,
+        **options: Any,
+    ) -> ReducedOptimum:
+        """Solve as `solve_reduced` does, and keep the multipliers."""
+        options |= {"required": self.required, "close": self.close}
+        optimum = solve_reduced(equations, reduction, start, **options)
+        self.required = optimum.required
+        return optimum
+
+
 def solve_on_locus(
     equations: NormalEquations,
     reduction: Reduction,
     start: Doubles,
+    *,
+    steps: int | None = None,
+    near: Multipliers | None = None,
     **options: Any,
 ) -> tuple[Reduction, ReducedOptimum]:
-    """Solve as `solve_reduced` does, and choose the two whites of each light.
+    """Solve as `solve_reduced` does, and choose the two whites of each light, or the side of its
+    gamut.
 
-    Return the reduction with the whites that lights came to, and its optimum.
+    Return the reduction with the whites and sides that lights came to, and its optimum.
 
     start: (n, 3). A reduction whose lights still mix the ends of their ranges is solved like that
-    first; another one continues from the whites nearest to the start. options: of `solve_reduced`.
+    first; another one continues from the whites nearest to the start. steps: the most steps from
+    there to other whites or sides, for an answer under a moving brush, where the next one
+    continues; None for as many as help. near: the multipliers of a similar problem. options: of
+    `solve_reduced`.
     """
+    near = Multipliers() if near is None else near
     if not reduction.white_knobs:
-        return next_whites(equations, reduction, start, **options)
-    groups, weights = _groups(reduction), start
-    if all(_is_whole(reduction, k) for k in reduction.white_knobs):
-        weights = solve_reduced(equations, reduction, _snap(groups, start), **options).weights
-    for width in WINDOW_WIDTHS:
+        if steps is not None:
+            reduction = reduction.confined_to_sides(_repainted_sides(reduction))
+        return next_whites(equations, reduction, start, steps=steps, near=near, **options)
+    groups, weights, widths = _groups(reduction), start, WINDOW_WIDTHS
+    if steps is not None:
+        widths, steps = WINDOW_WIDTHS[:1], steps - 1
+    elif all(_is_whole(reduction, k) for k in reduction.white_knobs):
+        weights = near.solve(equations, reduction, _snap(groups, start), **options).weights
+    for width in widths:
         reduction = reduction.with_windows(_windows_about(groups, weights, width))
-        weights = solve_reduced(equations, reduction, _snap(groups, weights), **options).weights
-    return next_whites(equations, center_windows(reduction, weights, 1), weights, **options)
+        weights = near.solve(equations, reduction, _snap(groups, weights), **options).weights
+    reduction = center_windows(reduction, weights)
+    return next_whites(equations, reduction, weights, steps=steps, near=near, **options)
 
 
 def next_whites(
@@ -99,26 +128,26 @@ def next_whites(
     reduction: Reduction,
     start: Doubles,
     *,
-    steps: int = MAX_STEPS,
+    steps: int | None = None,
+    near: Multipliers | None = None,
     only: Collection[int] | None = None,
     **options: Any,
 ) -> tuple[Reduction, ReducedOptimum]:
     """Solve for two whites of each light, and continue to their neighbours.
 
-    steps: the most steps between neighbours. only: the knobs that move, if not all do. For the
-    other arguments and the result see `solve_on_locus`.
+    only: the knobs that move, if not all do. For the other arguments and the result see
+    `solve_on_locus`.
     """
-    groups = _groups(reduction, only)
-    optimum = solve_reduced(equations, reduction, _snap(groups, start), **options)
-    for _ in range(steps):
-        sides = _next_gamut_parts(equations, reduction, optimum)
+    near, groups = Multipliers() if near is None else near, _groups(reduction, only)
+    most = MANY_CONFINED if steps is None and reduction.requirements is None else 0
+    optimum = near.solve(equations, reduction, _snap(groups, start), **options)
+    for _ in range(MAX_STEPS if steps is None else steps):
+        sides = _next_gamut_parts(equations, reduction, optimum, most)
         windows = {} if sides else _better_windows(equations, reduction, groups, optimum)
         if not (windows or sides):
             break
         reduction = reduction.with_windows(windows).confined_to_sides(sides)
-        if reduction.requirements is not None:
-            options["required"] = optimum.required
-        optimum = solve_reduced(equations, reduction, _snap(groups, optimum.weights), **options)
+        optimum = near.solve(equations, reduction, _snap(groups, optimum.weights), **options)
     return reduction, optimum
 
 
@@ -153,21 +182,22 @@ def _knobs_outside_gamuts(reduction: Reduction, weights: Doubles) -> list[int]:
 
 
 def _next_gamut_parts(
-    equations: NormalEquations, reduction: Reduction, optimum: ReducedOptimum
+    equations: NormalEquations, reduction: Reduction, optimum: ReducedOptimum, most: int
 ) -> dict[int, int | None]:
     """Return places of the knobs to keep within their gamuts, or within another triangle of them,
     by its side; None for a whole gamut.
+
+    most: lights that are kept within whole gamuts.
     """
     beyond = _knobs_outside_gamuts(reduction, optimum.weights)
-    most = MANY_CONFINED if reduction.requirements is None else 0
     if not reduction.has_sides and len(beyond) + len(reduction.confined_knobs) <= most:
         return dict.fromkeys(beyond)
-    sides: dict[int, int | None] = {**_sides_outside(reduction, optimum.weights)}
+    sides: dict[int, int | None] = {**_sides_outside(reduction, beyond, optimum.weights)}
     for k in reduction.confined_knobs:
         knob = reduction.knobs[k]
         if knob.side is None and knob.gamut is not None:
             sides[k] = knob.gamut.side_towards(optimum.weights[knob.lights[0]])
-    return sides or {**_next_sides(equations, reduction, optimum)}
+    return sides | _next_sides(equations, reduction, optimum)
 
 
 def clip_to_gamuts(reduction: Reduction, weights: Doubles) -> Doubles:
@@ -331,84 +361,6 @@ def move_to_best_white(knob: Knob, gradient: Doubles) -> Knob:
     return knob.with_window(knob.whites.window(float(best), 1))
 
 
-@dataclass
-class LastMultipliers:
-    """The multipliers of requirements, (m,), in the last answer under a moving brush, with which
-    the next solve begins; None before the first. Updated in place.
-
-    close: the largest miss of a requirement to end at, relative to its size.
-    """
-
-    close: float
-    required: Doubles | None = None
-
-
-def solve_under_brush(
-    equations: NormalEquations,
-    reduction: Reduction,
-    start: Doubles,
-    *,
-    method: Method,
-    last: LastMultipliers | None = None,
-) -> tuple[Reduction, Doubles]:
-    """Solve as `solve_on_locus` does, in few steps from the last answer under a moving brush.
-
-    start: (n, 3). last: of the answers under this brush. Return the reduction to continue with, and
-    the weights (n, 3).
-    """
-    solve = partial(_solve_from_last, equations, method=method, last=last)
-    if not reduction.white_knobs:
-        return _solve_near_sides(equations, reduction, start, solve)
-    start = snap_to_whites(reduction, start)
-    wide = center_windows(reduction, start, BRUSH_WIDTH)
-    start = solve(wide, start).weights
-    centered = center_windows(reduction, start)
-    _, optimum = next_whites(equations, centered, start, steps=BRUSH_STEPS, method=method)
-    return reduction, optimum.weights
-
-
-def _solve_from_last(
-    equations: NormalEquations,
-    reduction: Reduction,
-    start: Doubles,
-    *,
-    method: Method,
-    last: LastMultipliers | None,
-) -> ReducedOptimum:
-    """Solve from the last multipliers, if there are any, and keep the multipliers of this
-    optimum."""
-    if last is None:
-        return solve_reduced(equations, reduction, start, method=method)
-    options: dict[str, Any] = {"required": last.required, "close": last.close, "method": method}
-    optimum = solve_reduced(equations, reduction, start, **options)
-    last.required = optimum.required
-    return optimum
-
-
-def _solve_near_sides(
-    equations: NormalEquations,
-    reduction: Reduction,
-    start: Doubles,
-    solve: Callable[[Reduction, Doubles], ReducedOptimum],
-) -> tuple[Reduction, Doubles]:
-    """Solve with each light kept within its gamut towards the side where it would leave it.
-
-    start: (n, 3). solve: solves the equations under a reduction, from weights. Return the reduction
-    with the sides that lights came to, and the weights (n, 3).
-    """
-    reduction = reduction.confined_to_sides(_repainted_sides(reduction))
-    optimum = solve(reduction, start)
-    for _ in range(MAX_TURNS):
-        sides = _sides_outside(reduction, optimum.weights) | _next_sides(
-            equations, reduction, optimum
-        )
-        if not sides:
-            break
-        reduction = reduction.confined_to_sides(sides)
-        optimum = solve(reduction, optimum.weights)
-    return reduction, optimum.weights
-
-
 def _repainted_sides(reduction: Reduction) -> dict[int, int]:
     """Return places of the knobs whose gamuts the painting has changed, and their sides of now."""
     sides, gamuts = {}, reduction.gamuts
@@ -420,10 +372,12 @@ def _repainted_sides(reduction: Reduction) -> dict[int, int]:
     return sides
 
 
-def _sides_outside(reduction: Reduction, weights: Doubles) -> dict[int, int]:
-    """Return places of the knobs of lights that leave their gamuts, and the sides where they do."""
+def _sides_outside(
+    reduction: Reduction, beyond: Collection[int], weights: Doubles
+) -> dict[int, int]:
+    """Return the sides where the lights of some knobs leave their gamuts, by place of the knob."""
     sides, gamuts = {}, reduction.gamuts
-    for k in _knobs_outside_gamuts(reduction, weights):
+    for k in beyond:
         assert gamuts is not None
         light = reduction.knobs[k].lights[0]
         sides[k] = gamuts[light].side_towards(weights[light])
@@ -445,6 +399,8 @@ def _next_sides(
         return sides
     gradient = optimum.gradient(equations)
     for k in reduction.confined_knobs:
+        if reduction.knobs[k].side is None:
+            continue
         gamut, side, light = _confined_gamut(reduction, k)
         x = optimum.x[list(reduction.places[k])]
         if x[1] and x[2]:
