@@ -143,7 +143,8 @@ def next_whites(
     optimum = near.solve(equations, reduction, _snap(groups, start), **options)
     for _ in range(MAX_STEPS if steps is None else steps):
         sides = _next_gamut_parts(equations, reduction, optimum, most)
-        windows = {} if sides else _better_windows(equations, reduction, groups, optimum)
+        is_done = bool(sides) or not groups
+        windows = {} if is_done else _better_windows(equations, reduction, groups, optimum)
         if not (windows or sides):
             break
         reduction = reduction.with_windows(windows).confined_to_sides(sides)
