@@ -6,19 +6,21 @@ from collections.abc import Callable
 from importlib import import_module
 from typing import Any
 
-#: An import for type checkers, as formatters write it: its module, and the name.
-IMPORT = re.compile(r"^    from (\S+) import \(?\s*(\w+) as \2\b", re.MULTILINE)
+#: An import for type checkers: its module, and its names, in brackets or in one line; and a name.
+IMPORT = re.compile(r"^    from (\S+) import (?:\(([^)]*)\)|(.*))$", re.MULTILINE)
+NAME = re.compile(r"(\w+)(?: as \1)?")
 
 
 def lazy_names(package: str) -> tuple[Callable[[str], Any], Callable[[], list[str]], list[str]]:
     """Return `__getattr__`, `__dir__` and `__all__` of a package that is being imported.
 
-    They offer what the package imports under `if TYPE_CHECKING:`, as `from … import name as name`,
-    so that a name stands once. package: its `__name__`.
+    They offer what the package imports under `if TYPE_CHECKING:`, so that a name stands once.
+    package: its `__name__`.
     """
     module = sys.modules[package]
     source = module.__spec__.loader.get_source(package)  # type: ignore[union-attr]
-    homes = {name: home for home, name in IMPORT.findall(source)}
+    found = IMPORT.findall(source)
+    homes = {name: home for home, more, one in found for name in NAME.findall(more or one)}
 
     def get(name: str) -> Any:
         if name not in homes:

@@ -12,20 +12,15 @@ LUMINAIRE_PLUGINS = frozenset({POINT_PLUGIN, AREA_PLUGIN})
 FULL = "× at full"
 
 if TYPE_CHECKING:
-    from lightpaint.luminaires.luminaire_request import LUMINAIRE_KEYS as LUMINAIRE_KEYS
-    from lightpaint.luminaires.luminaire_request import NUMBER_KEYS as NUMBER_KEYS
-    from lightpaint.luminaires.luminaire_request import PHOTOMETRY as PHOTOMETRY
-    from lightpaint.luminaires.luminaire_request import LuminaireRequest as LuminaireRequest
-    from lightpaint.luminaires.luminaire_request import luminaires_in as luminaires_in
-    from lightpaint.luminaires.web import EMITTER_FROM_WEB as EMITTER_FROM_WEB
-    from lightpaint.luminaires.web import PhotometricWeb as PhotometricWeb
-    from lightpaint.luminaires.web import SpotPart as SpotPart
-    from lightpaint.luminaires.web import hanging_frame as hanging_frame
-    from lightpaint.luminaires.web import spots_of as spots_of
-    from lightpaint.luminaires.web import world_from_web as world_from_web
-    from lightpaint.luminaires.web_file import flux_remark as flux_remark
-    from lightpaint.luminaires.web_file import read_web as read_web
-    from lightpaint.luminaires.web_file import unread_remark as unread_remark
+    # fmt: off
+    from lightpaint.luminaires.luminaire_request import (
+        LUMINAIRE_KEYS, NUMBER_KEYS, PHOTOMETRY, LuminaireRequest, luminaires_in,
+    )
+    from lightpaint.luminaires.web import (
+        EMITTER_FROM_WEB, PhotometricWeb, SpotPart, hanging_frame, spots_of, world_from_web,
+    )
+    from lightpaint.luminaires.web_file import flux_remark, read_web, unread_remark
+    # fmt: on
 
 if not TYPE_CHECKING:  # a type checker would take any name
     __getattr__, __dir__, __all__ = lazy_names(__name__)
