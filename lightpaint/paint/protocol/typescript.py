@@ -2,7 +2,7 @@
 
     python -m lightpaint.paint.protocol.typescript
 
-writes `page/engine/messages.d.ts` again after a change of the dataclasses.
+writes `page/engine/messages.d.ts`, which is not kept with the sources.
 """
 
 import inspect
