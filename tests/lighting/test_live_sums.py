@@ -5,7 +5,10 @@ from typing import Any
 import numpy as np
 import pytest
 
-from lightpaint.lighting.live.live_sums import PaintedTiles
+import lightpaint as lp
+from lightpaint.lighting.live.live_sums import PaintedTiles, SmallFilm
+from lightpaint.lighting.loss import expected_lights
+from lightpaint.lighting.loss.expected_lights import Wash
 from lightpaint.lighting.normal_equations import NormalEquations
 
 SIZE = 40, 70
@@ -50,3 +53,32 @@ def test_what_was_painted_first_has_the_same_rest(make_basis: Any):
     for name in ("M", "b", "target_norm2"):
         one, other = (getattr(x.equations(1.0), name) for x in (before, after))
         np.testing.assert_array_equal(one, other)
+
+
+def test_the_film_reads_the_paint_as_exact_answers_do(
+    make_basis: Any, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Importance of more than 1 is no larger cover; a block of emitters alone asks for nothing."""
+    size, side = (16, 24), 4
+    pixels = size[0] * size[1] // side**2
+    monkeypatch.setattr(expected_lights, "BLOCKS", pixels)
+    rng = np.random.default_rng(5)
+    seen = np.zeros(size, bool)
+    seen[:4, :6] = True  # a block of emitters alone, and half of another one
+    basis = make_basis(2, size, seen=seen)
+    importance = rng.choice([0, 0.3, 1, 4], size).astype(np.float32)
+    importance[8:12, 8:] = 0
+    target = lp.Target(
+        "painting",
+        rng.random((*size, 3), np.float32),
+        importance,
+        everything=False,
+        over_look=True,
+    )
+    film = SmallFilm(basis, target.image, importance, pixels)
+    live, exact = film.wash(lambda _side: (), is_sketch=True), Wash.of(basis, target)
+    counts = exact.counts > 0
+    for name in ("painted", "importance", "counts", "exact", "strokes"):
+        one, other = (np.asarray(getattr(x, name))[..., counts] for x in (live, exact))
+        np.testing.assert_allclose(one, other, rtol=1e-6, err_msg=name)
+    np.testing.assert_array_equal(live.importance, exact.importance)

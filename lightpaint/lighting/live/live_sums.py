@@ -150,9 +150,11 @@ class SmallFilm:
             self.albedo = _planes(self._average(basis.features.albedo))
         self._current = _planes(self._average(basis.current_look))
         self._painted = self._current.copy()
+        # The paint as the wash averages it: importance beyond 1 is no larger cover.
+        self._washed = self._current.copy()
         self._transform: ViewTransform | None = None
         self._seen_painted = self._seen_current = self._current
-        self._a, self._left = np.zeros((2, rows * columns))
+        self._a, self._left, self._cover = np.zeros((3, rows * columns))
         self.update((slice(0, height), slice(0, width)))
 
     def _averages(self, planes: Planes) -> Floats:
@@ -211,13 +213,19 @@ class SmallFilm:
         total, lit, unpainted = (block_sums(x, side) for x in (a, light, rest))
         rows = slice(top // side, -(-bottom // side))
         columns = slice(left // side, -(-right // side))
-        is_lit = total > 0
-        mean = lit / np.where(is_lit, total, 1)[..., None]
-        painted = self._painted.reshape(3, *self._size)[:, rows, columns]
-        current = self._current.reshape(3, *self._size)[:, rows, columns]
-        painted[...] = np.where(is_lit, mean.transpose(2, 0, 1), current)
-        self._a.reshape(self._size)[rows, columns] = total
-        self._left.reshape(self._size)[rows, columns] = unpainted
+        painted, washed, current = (
+            x.reshape(3, *self._size)[:, rows, columns]
+            for x in (self._painted, self._washed, self._current)
+        )
+        painted[...] = _painted_means(lit, total, current)
+        cover, covered_light = total, lit
+        if (a > 1).any():
+            share = np.minimum(a, 1)
+            cover = block_sums(share, side)
+            covered_light = block_sums(self._image[pixels] * share[..., None], side)
+        washed[...] = _painted_means(covered_light, cover, current)
+        for sums, own in ((self._a, total), (self._left, unpainted), (self._cover, cover)):
+            sums.reshape(self._size)[rows, columns] = own
         if self._transform is not None:
             seen = self._seen_painted.reshape(3, *self._size)[:, rows, columns]
             planes = np.ascontiguousarray(painted).reshape(3, -1)
@@ -252,8 +260,8 @@ class SmallFilm:
         the paint lies over the look.
         """
         counts = self._counts
-        importance = np.minimum(self._a / np.where(counts > 0, counts, 1), 1)
-        painted: Floats = self._painted.T.reshape(*self._size, 3)
+        importance = np.where(counts > 0, self._cover / np.where(counts > 0, counts, 1), 0)
+        painted: Floats = self._washed.T.reshape(*self._size, 3)
         look = self._current.T.reshape(*self._size, 3)
         small_importance = importance.reshape(self._size)
         covers = layers(self._side)
@@ -449,6 +457,16 @@ def _block_range(along: slice, side: int, length: int) -> tuple[int, int]:
 def _spread(blocks: Doubles, side: int, size: tuple[int, ...]) -> Doubles:
     """Return the value of its block for each pixel, (h, w)."""
     return np.asarray(enlarged(blocks, side)[: size[0], : size[1]])
+
+
+def _painted_means(light: Doubles, total: Doubles, current: Doubles) -> Doubles:
+    """Return the mean paint of blocks, (3, h', w'); the current look where nothing is painted.
+
+    light: (h', w', 3), sums of weight times paint; total: (h', w'), of the weight.
+    """
+    is_painted = total > 0
+    mean = light / np.where(is_painted, total, 1)[..., None]
+    return np.where(is_painted, mean.transpose(2, 0, 1), current)
 
 
 def _planes(image: Floats) -> Doubles:
