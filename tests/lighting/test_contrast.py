@@ -11,7 +11,11 @@ import lightpaint as lp
 from lightpaint.basis.light_basis import meter_exposure
 from lightpaint.colour.color import kelvin_to_rgb, luminance
 from lightpaint.lighting import hold_to_current
+from lightpaint.lighting.constraints.constraint_table import Constraints
+from lightpaint.lighting.fit import resolve_for_targets
+from lightpaint.lighting.live.live_solver import LiveSolver
 from lightpaint.lighting.live.live_sums import SmallFilm
+from lightpaint.lighting.live.live_view import LiveView
 from lightpaint.lighting.loss import expected_lights, weight_penalty
 from lightpaint.lighting.loss.expected_lights import ExpectedLights, Wash, adjusted_share
 from lightpaint.lighting.loss.weight_penalty import ContrastRows
@@ -533,6 +537,46 @@ def test_a_contrast_out_of_reach_does_not_darken_the_picture(
     dark = lp.solve(basis, target).weights
     assert objective(dark).sum() > objective(basis.current_weights).sum()
     assert basis.mix(dark).mean() < 0.9 * basis.mix(solution.weights).mean()
+
+
+def test_contrasts_given_up_under_the_brush_come_back(
+    make_basis: Any, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Once the paint asks for others: the answer then is the answer of a brush that begins there.
+
+    A place that no lamp lights alone is painted first, and then a place under a spot instead.
+    """
+    basis, target = out_of_reach(make_basis)
+    corner = np.zeros((H, W, 1), bool)
+    corner[:5, 30:38] = True
+    images = np.stack([*basis.planes, np.where(corner, np.float32(1), 0.1) * np.ones(3)])
+    emission = [*(light.emission for light in basis.lights), (0.02, 0.02, 0.02)]
+    basis = make_basis(images=images, names=["dome", "bulb", "spot"], emission=emission)
+    fit = resolve_for_targets(lp.Fit(), [target])
+    lit = basis.current_look * np.where(corner, 3.0, 0.5)
+    image, importance = lit.copy(), np.ones((H, W), np.float32)
+
+    def live() -> tuple[LiveSolver, LiveView]:
+        view = LiveView(basis, image, importance)
+        return LiveSolver([view], fit=fit, constraints=Constraints(), is_sketch=True), view
+
+    def rested(solver: LiveSolver, weights: np.ndarray) -> np.ndarray:
+        for _ in range(20):
+            weights = solver.answer(weights)
+        return weights
+
+    fresh = rested(live()[0], basis.current_weights)
+    image[...] = target.image
+    solver, view = live()
+    weights = rested(solver, basis.current_weights)
+    with monkeypatch.context() as never:
+        never.setattr(weight_penalty, "MISSED_CONTRAST", np.inf)
+        kept = rested(live()[0], basis.current_weights)
+    assert basis.mix(kept).mean() < 0.9 * basis.mix(weights).mean()  # they were given up
+    image[...] = lit
+    view.update((slice(0, H), slice(0, W)))
+    # Squares under a brush are sums in float32.
+    np.testing.assert_allclose(rested(solver, weights), fresh, rtol=1e-3)
 
 
 def test_lights_stay_where_every_change_leads_away_from_the_paint(make_basis: Any) -> None:
