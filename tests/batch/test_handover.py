@@ -125,6 +125,7 @@ def test_forms_that_a_look_has_nothing_for_are_told_before(folder: Path) -> None
         ('light_groups = "gone.exr"\n', "light_groups: no such file or folder: gone.exr"),
         (groups + 'basis = "groups.exr"\n', "light_groups stand for scene and basis: give them"),
         ('scene = "room.xml"\npattern = "{name}"\n', "pattern is of light_groups"),
+        ('basis = "groups.exr"\n', 'are given as light_groups = "groups.exr"'),
         (groups + 'sensors = ["a"]\n', "a basis has only one view"),
         (groups + "settings = { spp = 4 }\n", "spp"),
         (

@@ -11,7 +11,13 @@ from pathlib import Path
 from typing import Any, Self
 
 from lightpaint.arrays import Floats
-from lightpaint.basis import Basis, LightGroups, read_basis, read_light_groups
+from lightpaint.basis import (
+    Basis,
+    LightGroups,
+    is_light_groups,
+    read_basis,
+    read_light_groups,
+)
 from lightpaint.basis.render import basis_lights, check_renders_spectra
 from lightpaint.colour import EYE, Observer, TransformChoice, read_observer
 from lightpaint.errors import BasisError, ConstraintError, LightpaintError, SceneError
@@ -176,7 +182,14 @@ class BasisFile(ReadOnce):
     @cached_property
     def content(self) -> Basis:
         """The basis, read on first use."""
-        return read_basis(Path(self.path))
+        path = Path(self.path)
+        try:
+            return read_basis(path)
+        except BasisError:
+            if not is_light_groups(path):
+                raise
+            how = " is not a basis: light groups of another renderer are given as "
+            raise BasisError(path, how, Hint("light_groups", path.name)) from None
 
 
 @dataclass(frozen=True)
