@@ -288,18 +288,20 @@ def write_answer(
     scene: Scene | None = None,
     groups: LightGroups | None = None,
     has_lighting: bool = False,
+    home: Path | None = None,
 ) -> Scene | None:
     """Write an answer to files for people and programs; return the relit scene.
 
     scene: the scene to relight. groups: light groups of another renderer, which get files for other
-    programs. has_lighting: True if lighting.json exists already, or is not needed. A lighting that
-    says nothing of places gets the places of the scene.
+    programs. has_lighting: True if lighting.json exists already, or is not needed. home: the folder
+    to which these files will be moved, if it is another. A lighting that says nothing of places
+    gets the places of the scene.
     """
     lighting = with_places(lighting.of_lamps(), scene)
     if not has_lighting:
         write_lighting(folder / LIGHTING, lighting)
     if groups is not None:
-        write_exports(folder, groups, lighting)
+        write_exports(folder, groups, lighting, home=home)
     return None if scene is None else relight(scene, lighting, folder / RELIT)
 
 
@@ -348,7 +350,12 @@ def new_answer(
     """
     with results.filled() as folder:
         relit = write_answer(
-            folder, lighting, scene=scene, groups=groups, has_lighting=has_lighting
+            folder,
+            lighting,
+            scene=scene,
+            groups=groups,
+            has_lighting=has_lighting,
+            home=results.folder,
         )
         answer = AnswerFolder(folder, relit)
         yield answer

@@ -162,7 +162,13 @@ LARGEST_HALF = 65504.0
 
 
 @keywords()
-def write_exports(folder: str | Path, groups: LightGroups, lighting: Lighting) -> list[Path]:
+def write_exports(
+    folder: str | Path,
+    groups: LightGroups,
+    lighting: Lighting,
+    *,
+    home: str | Path | None = None,
+) -> list[Path]:
     """Write `lighting`, solved from `groups`, into `folder` for other programs.
 
     The files are lights.csv, a table of multipliers; set_lights.py for Blender's light groups,
@@ -174,6 +180,7 @@ def write_exports(folder: str | Path, groups: LightGroups, lighting: Lighting) -
         folder: Folder to write to.
         groups: The light groups of the solve.
         lighting: The answer.
+        home: Folder to which the files will be moved, which relit.nk names; by default `folder`.
 
     Returns:
         The written files.
@@ -198,7 +205,7 @@ def write_exports(folder: str | Path, groups: LightGroups, lighting: Lighting) -
         if needs_copy(groups):
             parts[LAYERS] = copied_part(groups)
     if groups.sequence is None or not needs_copy(groups):
-        texts["relit.nk"] = nuke_script(groups, lighting, folder)
+        texts["relit.nk"] = nuke_script(groups, lighting, Path(home or folder))
     for name, text in texts.items():
         write_text(folder / name, text)
     for name, part in parts.items():

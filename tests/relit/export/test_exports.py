@@ -336,6 +336,17 @@ def test_layers_that_nuke_would_read_as_one_are_copied(tmp_path: Path, lacks: fl
     assert repr("key 1") in (tmp_path / "out" / "set_lights.py").read_text()
 
 
+def test_the_copy_is_named_where_it_lies_in_the_end(tmp_path: Path):
+    """Results are written elsewhere first, and appear all at once."""
+    groups = _groups(tmp_path, names=ALIKE)
+    painting = _sum(groups, _lighting(groups)).astype(np.float32)
+    write(tmp_path / "painting.exr", ("rgb", channels("", painting)))
+    look = lp.paint_with_light(None, tmp_path / "painting.exr", tmp_path / "out", basis=groups)
+    result = Nuke().run((tmp_path / "out" / "relit.nk").read_text())
+    expected = _sum(groups, look.lighting)
+    np.testing.assert_allclose(result[..., :3], expected, rtol=FLOAT32, atol=FLOAT32)
+
+
 def test_a_name_with_more_dots_than_nuke_parts_is_copied(tmp_path: Path):
     layers = {f"C_{name}": x for name, x in zip(["a.b.c", "a.b.d"], pictures(2), strict=True)}
     groups = read_light_groups(interleaved(tmp_path / "a.exr", layers))
