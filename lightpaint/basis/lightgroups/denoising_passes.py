@@ -1,18 +1,19 @@
 """Passes in the file of light groups that help to denoise: surfaces, and parts of lights.
 
 Layers are proposed by name. A layer named as the direct or indirect part of a light is accepted if
-it is nowhere brighter than the light.
+it is nowhere brighter than the light. Octane may write both parts of a light and not the light,
+which is then their sum.
 """
 
 import re
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
 from lightpaint.arrays import Floats
 from lightpaint.basis.lightgroups.beauty_comparison import rounding
-from lightpaint.basis.lightgroups.naming_conventions import SEPARATORS, is_known
+from lightpaint.basis.lightgroups.naming_conventions import SEPARATORS, is_fixed_name, is_known
 from lightpaint.basis.lightgroups.render_layers import RenderLayer
 from lightpaint.images import Features
 
@@ -89,12 +90,13 @@ def split_passes(layers: Sequence[RenderLayer]) -> tuple[list[RenderLayer], Deno
     for layer in layers:
         is_surface = layer.is_vector or _plain_name(layer) in of_surfaces
         (surfaces if is_surface else light_layers).append(layer)
+    light_layers += _sums_of_parts(light_layers)
     by_name = {x.name: x for x in light_layers}
     parts: dict[str, dict[str, RenderLayer]] = {}
     for layer in light_layers:
         match = PART.fullmatch(layer.name)
         owner = None if match is None else _owner(match, by_name)
-        if match is not None and owner is not None and _is_part(layer, owner):
+        if match and owner and (owner.is_sum or _is_part(layer, owner)):
             which = (match["after"] or match["before"]).casefold()
             parts.setdefault(owner.name, {})[which] = layer
     used_names = [layer.name for pair in parts.values() for layer in pair.values()]
@@ -106,6 +108,25 @@ def split_passes(layers: Sequence[RenderLayer]) -> tuple[list[RenderLayer], Deno
     }
     lights = [x for x in light_layers if x.name not in used_names]
     return lights, DenoisingPasses(tuple(surfaces), indirect)
+
+
+def _sums_of_parts(layers: Sequence[RenderLayer]) -> list[RenderLayer]:
+    """Return the lights of which there are both parts alone, each as their sum.
+
+    Only of names that a renderer fixes: a user may call two lamps `cove direct` and `cove
+    indirect`.
+    """
+    names = {layer.name for layer in layers}
+    pairs: dict[str, list[RenderLayer]] = {}
+    for layer in layers:
+        match = PART.fullmatch(layer.name)
+        if match and is_fixed_name(match["owner"] or "") and match["owner"] not in names:
+            pairs.setdefault(match["owner"], []).append(layer)
+    return [
+        replace(pair[0], name=owner, image=pair[0].image + pair[1].image, is_sum=True, others=())
+        for owner, pair in pairs.items()
+        if len(pair) == 2
+    ]
 
 
 def _plain_name(layer: RenderLayer) -> str:

@@ -157,6 +157,17 @@ def is_known(name: str) -> bool:
     return any(convention.layer.fullmatch(name) for convention in CONVENTIONS)
 
 
+def is_fixed_name(name: str) -> bool:
+    """Return True if a known renderer gives this name to a layer of a light, and no user does: a
+    number follows a fixed word, or it is of the `optional` ones.
+    """
+    return any(
+        name.casefold() in convention.optional
+        or (convention.light != NAME_FIELD and convention.layer.fullmatch(name))
+        for convention in CONVENTIONS
+    )
+
+
 def is_beauty(name: str, *, view: str = "") -> bool:
     """Return True if the last component of a layer's name is one of BEAUTY_NAMES.
 

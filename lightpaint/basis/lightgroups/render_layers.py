@@ -52,7 +52,8 @@ class RenderLayer:
     others: alternative names that a pattern may match.
     image: (h, w, 3) in the display window, as stored: linear light, float16 or float32.
     alpha: (h, w), or None.
-    is_vector: whether its channels are X, Y and Z, so that it is not a light.
+    is_vector: whether its channels are X, Y and Z, so that it is not a light. is_sum: whether it is
+    the sum of two layers, of which it has the channels of one.
     compression, loss: as in ExrPart; no loss if these pixels are stored exactly.
     primaries: CIE xy of red, green, blue and white; None for Rec.709.
     """
@@ -66,6 +67,7 @@ class RenderLayer:
     alpha: Floats | None = None
     primaries: tuple[float, ...] | None = None
     is_vector: bool = False
+    is_sum: bool = False
     compression: str = ""
     loss: float = 0.0
 

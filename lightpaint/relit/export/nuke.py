@@ -130,10 +130,14 @@ def spoken_unreadable(groups: LightGroups, folder: Path) -> list[str]:
 
 
 def needs_copy(groups: LightGroups) -> bool:
-    """Return whether Nuke would merge two layers of a file, or misread the channels of one."""
-    layers = [*dict.fromkeys((x.file, x.part, x.channels) for x in _read(groups))]
-    sources = {(x.file, nuke_layer(x)) for x in _read(groups)}
-    return len(sources) < len(layers) or any(x.channels[0].count(".") > 2 for x in _read(groups))
+    """Return whether Nuke would merge two layers of a file, or misread the channels of one, or
+    needs the sum of two.
+    """
+    read = _read(groups)
+    layers = [*dict.fromkeys((x.file, x.part, x.channels) for x in read)]
+    sources = {(x.file, nuke_layer(x)) for x in read}
+    is_misread = any(x.is_sum or x.channels[0].count(".") > 2 for x in read)
+    return len(sources) < len(layers) or is_misread
 
 
 def copied_part(groups: LightGroups) -> ExrPart:

@@ -13,6 +13,7 @@ from lightpaint.basis.file.basis_file import read_basis, write_basis
 from lightpaint.basis.lightgroups.light_groups import read_light_groups
 from lightpaint.errors import BasisError
 from lightpaint.images.denoiser import denoised, oidn_is_installed
+from lightpaint.relit.export.nuke import needs_copy
 
 Writer = Callable[..., Path]
 
@@ -150,6 +151,32 @@ def test_what_has_no_parts_counts_as_indirect(tmp_path: Path):
     expected = [total[0], indirect[1], groups.basis.images[2]]
     for plane, image in zip(parts.planes, expected, strict=True):
         np.testing.assert_array_equal(plane, image)
+
+
+@pytest.mark.parametrize("pattern", [None, "{name}", "Light pass {name}"])
+def test_both_parts_alone_are_one_light(tmp_path: Path, pattern: str | None):
+    """As Octane may write them; the file has no layer of their sum."""
+    direct, indirect = split()
+    indirect[1] = 0
+    layers = {"Main": (direct + indirect).sum(axis=0)}
+    for k in range(2):
+        layers[f"Light pass {k + 1} direct"] = direct[k]
+        layers[f"Light pass {k + 1} indirect"] = indirect[k]
+    groups = read_light_groups(interleaved(tmp_path / "a.exr", layers), pattern=pattern)
+    names = {None: "light_{}", "{name}": "Light pass {}"}.get(pattern, "{}")
+    assert groups.basis.names == (names.format(1), names.format(2))
+    np.testing.assert_array_equal(groups.basis.images, direct + indirect)
+    assert groups.basis.indirect is not None
+    np.testing.assert_array_equal(groups.basis.indirect.planes.array(), indirect)
+    # No layer of the file is a light, so Nuke reads a copy.
+    assert needs_copy(groups)
+
+
+def test_lamps_that_a_user_calls_direct_and_indirect_are_two(tmp_path: Path):
+    up, down = pictures(2)
+    layers = {"RGBA": up + down, "RGBA_cove_indirect": up, "RGBA_cove_direct": down}
+    groups = read_light_groups(interleaved(tmp_path / "a.exr", layers))
+    assert groups.basis.names == ("cove_direct", "cove_indirect")
 
 
 def test_a_light_may_be_named_like_a_part(tmp_path: Path):
