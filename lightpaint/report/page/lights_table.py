@@ -46,9 +46,6 @@ MAP_WIDTH = 144
 #: Share of its pixels that the map may show too bright to tell.
 CLIPPED_SHARE = 0.02
 
-#: Number of lights beyond which only rows that are not folded have a picture, of 10 kB each.
-MAX_THUMBNAILS = 300
-
 
 def rendering_section(lighting: Lighting, surfaces: Sequence[SurfaceColor] = ()) -> Markup:
     """Return the section; "" without spectra. surfaces: colours of objects under the lighting."""
@@ -260,15 +257,15 @@ def _rows(
 def _thumbnails_of_rows(
     basis: Basis, lighting: Lighting, *, is_clean: bool
 ) -> Mapping[int, Thumbnail]:
-    """Return the pictures of the rows, by the number of the light: of many lights pictures of
-    folded rows are not denoised, and of hundreds these rows have none.
+    """Return the pictures of the rows, by the number of the light: of many lights only of rows that
+    are not folded.
     """
-    count = len(basis.lights)
-    if count <= ROWS_SHOWN + SPARE_ROWS:
+    if len(basis.lights) <= ROWS_SHOWN + SPARE_ROWS:
         return thumbnails_of(basis, is_clean=is_clean)
-    shown = most_visible_lights(basis, lighting)
-    folded = thumbnails_of(basis, is_clean=False) if count <= MAX_THUMBNAILS else {}
-    return {**folded, **_thumbnails(basis, shown, is_clean=is_clean)}
+    texels = [k for image in light_images(basis.lights) if image.is_whole for k in image.lights]
+    others = np.setdiff1d(np.arange(len(basis.lights)), texels)
+    shown = most_visible_lights(basis, lighting, among=others)
+    return _thumbnails(basis, shown, is_clean=is_clean)
 
 
 def thumbnails_of(basis: Basis, *, is_clean: bool) -> Mapping[int, Thumbnail]:

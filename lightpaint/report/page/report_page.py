@@ -58,7 +58,6 @@ from lightpaint.report.measures import (
 from lightpaint.report.page.figures import PagePicture, data_uri, maps, wipe
 from lightpaint.report.page.html import facts, html, name_list
 from lightpaint.report.page.lights_table import (
-    MAX_THUMBNAILS,
     lights_table,
     rendering_section,
     thumbnails_of,
@@ -197,11 +196,9 @@ def _texts(answer: ReportedAnswer) -> dict[str, Any]:
 
 def prepare_page(basis: Basis) -> None:
     """Make the parts of a page that depend on the basis alone; `report_page` then finds them."""
-    has_few_rows = len(basis.lights) <= ROWS_SHOWN + SPARE_ROWS
-    if has_few_rows:
+    if len(basis.lights) <= ROWS_SHOWN + SPARE_ROWS:
         planes_for_page(basis, is_clean=True)
-    if len(basis.lights) <= MAX_THUMBNAILS:
-        thumbnails_of(basis, is_clean=has_few_rows)
+        thumbnails_of(basis, is_clean=True)
 
 
 def _wipe(
