@@ -2,8 +2,9 @@
 
 Direct light is nearly clean after few samples, and has edges of shadows and highlights that a
 denoiser would blur; indirect light is noisy and smooth. So indirect light is denoised fully, and
-direct light only as far as its own noise demands. If Open Image Denoise is not installed, both are
-averaged along surfaces instead.
+direct light only as far as its own noise demands. In reduced pictures direct light, whose noise is
+low there, is averaged along surfaces, in a tenth of the time; if Open Image Denoise is not
+installed, both are.
 """
 
 from collections.abc import Sequence
@@ -98,21 +99,19 @@ def _denoise_pictures(
     pictures: (h, w, 3) each: all light; then, if known, its noise, indirect light, and the noise of
     that.
     """
-    features = basis.features
-    if factor > 1:
-        pictures = [block_mean(picture, factor) for picture in pictures]
-        features = features and features.reduced(factor)
+    pictures = [block_mean(picture, factor) for picture in pictures]
+    features, along_surfaces = basis.surfaces(factor)
 
-    def without_grain(part: Floats) -> Floats:
-        if basis.surface_filter is not None and not oidn_is_installed() and factor == 1:
-            return basis.surface_filter(part)
+    def without_grain(part: Floats, *, is_clean: bool) -> Floats:
+        if along_surfaces is not None and (is_clean or not oidn_is_installed()):
+            return along_surfaces(part)
         return denoised(part, features, quality=quality)
 
     if basis.indirect is None:
         return denoised(pictures[0], features, quality=quality)
     total, noise, indirect, indirect_noise = pictures
-    smooth, direct = without_grain(indirect), np.maximum(total - indirect, 0)
-    clean = without_grain(direct)
+    smooth, direct = without_grain(indirect, is_clean=False), np.maximum(total - indirect, 0)
+    clean = without_grain(direct, is_clean=factor > 1)
     if not basis.knows_noise:
         return smooth + blend_by_grain(direct, clean)
     return smooth + blend_by_noise(direct, noise - indirect_noise, clean)

@@ -324,12 +324,24 @@ class Basis(Shown):
             return self.former.half_difference
         return self.noise.mix(self.current_weights)
 
-    @cached_property
+    @property
     def surface_filter(self) -> SurfaceFilter | None:
         """The filter that averages light along visible surfaces; None if these are unknown."""
-        if self.features is None or self.features.position is None:
-            return None
-        return SurfaceFilter(self.features)
+        return self.surfaces(1)[1]
+
+    def surfaces(self, factor: int) -> tuple[Features | None, SurfaceFilter | None]:
+        """Return features and surface filter of pictures reduced to blocks of factor × factor
+        pixels, made once; None where they are unknown.
+        """
+        if factor not in self._surfaces:
+            features = self.features and self.features.reduced(factor)
+            is_known = features is not None and features.position is not None
+            self._surfaces[factor] = features, SurfaceFilter(features) if is_known else None
+        return self._surfaces[factor]
+
+    @cached_property
+    def _surfaces(self) -> dict[int, tuple[Features | None, SurfaceFilter | None]]:
+        return {}
 
     @property
     def is_fixed(self) -> Bools:
