@@ -36,7 +36,7 @@ NEARNESS, MAX_PULLS = 1e-8, 30
 CLOSE, JOINING = 1e-10, 16
 
 #: Distance of a sum from what it has to reach, relative to its size, at which an answer meets it.
-MET = 1e-9
+MET = 1e-8
 
 #: Violations of bounds and multipliers that are round-off, relative to the largest unknown and b.
 ROUND_OFF = 1e-12
@@ -50,7 +50,7 @@ DEPENDENT = 1e-6
 
 #: Where an interior-point method ends: the limits that hold are clear by then. Most sums that join
 #: for it, and steps after which it is tried with those that have joined: they take as long as it.
-INSIDE_CLOSE, INSIDE_SUMS, PATIENCE = 1e-12, 64, 48
+INSIDE_CLOSE, INSIDE_SUMS, PATIENCE = 1e-16, 64, 48
 
 #: Share of the most wrong multiplier from which others leave with it.
 WORST = 0.5

@@ -47,12 +47,13 @@ class RequiredOptimum:
 
     optimum: of the problem in which the multipliers, (m,), stand for them. multipliers: >= 0, the
     rise of the objective with each required value. miss: the largest shortfall of a sum, relative
-    to its size.
+    to its size. shares: (j,), that are given up; None where nothing may be.
     """
 
     optimum: Optimum
     multipliers: Doubles
     miss: float
+    shares: Doubles | None = None
 
     @property
     def converged(self) -> bool:

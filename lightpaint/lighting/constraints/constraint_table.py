@@ -7,7 +7,7 @@ docs/formats.md lists them.
 """
 
 from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import Any
 
 from lightpaint.arrays import RGB, Doubles
@@ -57,19 +57,29 @@ class Requirements:
     """Sums that have to reach given values: Σ rows·w + watts P ≥ least, P the power of all lamps.
 
     rows: (m, n, 3), the part of each weight. watts: (m,), -1 for a limit of the power, 0 for sums
-    of light. least: (m,).
+    of light. least: (m,). shares: (j,), of what they ask for that may
+    be given up, as many as at the start; None if nothing may. share_sizes: (m, j), by how much
+    giving up all of a share lowers the sums. share_price: of a whole one, in the unit of half the
+    objective.
     """
 
     rows: Doubles
     watts: Doubles
     least: Doubles
+    shares: Doubles | None = None
+    share_sizes: Doubles | None = None
+    share_price: float = 0.0
 
     def __len__(self) -> int:
         return len(self.least)
 
+    def with_shares(self, shares: Doubles, sizes: Doubles, price: float) -> "Requirements":
+        """Return requirements of which shares may be given up."""
+        return replace(self, shares=shares, share_sizes=sizes, share_price=price)
+
     def lowered(self, slack: Doubles) -> "Requirements":
         """Return requirements that ask for less. slack: (m,)."""
-        return Requirements(self.rows, self.watts, self.least - slack)
+        return replace(self, least=self.least - slack)
 
 
 @dataclass(frozen=True)

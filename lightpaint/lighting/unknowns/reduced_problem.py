@@ -22,6 +22,7 @@ from lightpaint.lighting.algebra.optimum import (
 )
 from lightpaint.lighting.algebra.quadratic import Cap, clip_to_sums
 from lightpaint.lighting.algebra.required_sums import CLOSE, MAX_UPDATES, RequiredSums
+from lightpaint.lighting.algebra.sums_with_shares import SumsWithShares
 from lightpaint.lighting.normal_equations import NormalEquations
 from lightpaint.lighting.unknowns.knobs import Knob
 from lightpaint.lighting.unknowns.reduction import Reduction
@@ -201,6 +202,7 @@ class ReducedOptimum:
     fixed lights.
     required: (m,), multipliers of the requirements, >= 0; none without requirements.
     push: (n, 3), the rise of the gradient that they balance; None without.
+    shares: of the requirements that are given up; None where nothing may be.
     """
 
     x: Doubles
@@ -213,6 +215,7 @@ class ReducedOptimum:
     reached: Bools
     required: Doubles = field(default_factory=lambda: np.zeros(0))
     push: Doubles | None = None
+    shares: Doubles | None = None
 
     def gradient(self, equations: NormalEquations) -> Doubles:
         """Return the gradient (n, 3) at the weights, M w - b, less what requirements balance."""
@@ -276,7 +279,7 @@ class ReducedSolver:
         self._pulled: NormalEquations | None = None
         self._families: list[QuadraticFamily] = []
         self._ridged: list[QuadraticFamily] = []
-        self._sums: RequiredSums | None = None
+        self._sums: RequiredSums | SumsWithShares | None = None
 
     def solve(
         self,
@@ -292,10 +295,12 @@ class ReducedSolver:
         reached: Bools = np.ones(lit.shape, dtype=bool) if lit.all() else reduction.determined(lit)
         is_reached = np.any(reached, axis=1)
         x = nearest_unknowns(reduction, start, is_reached) if x is None else x.copy()
+        shares: Doubles | None = None
         if reduction.requirements is None:
             optima, required = self._solve_blocks(equations, lit, start, x, options), NOTHING
         else:
-            optima, required = self._solve_required(equations, lit, start, x, options)
+            optimum, required, shares = self._solve_required(equations, lit, start, x, options)
+            optima = [optimum]
         multipliers, cap_multipliers = np.zeros(x.size), np.zeros(len(reduction.caps))
         tolerance = options.get("tolerance", TOLERANCE)
         residuals, tolerances, sweeps = np.zeros(3), np.full(3, tolerance), [0, 0, 0]
@@ -316,6 +321,7 @@ class ReducedSolver:
             reached,
             required,
             _push(reduction, required),
+            shares,
         )
 
     def _with_pull(self, equations: NormalEquations) -> NormalEquations:
@@ -386,24 +392,15 @@ class ReducedSolver:
         start: Doubles,
         x: Doubles,
         options: dict[str, Any],
-    ) -> tuple[list[Optimum], Doubles]:
-        """Solve under requirements, which make one block; return it, and their multipliers (m,)."""
+    ) -> tuple[Optimum, Doubles, Doubles | None]:
+        """Solve under requirements, which make one block; return it, their multipliers, (m,), and
+        the shares that are given up.
+        """
         reduction = self._reduction
         M, b = _move_fixed_to_right(equations, reduction, lit, start)
         [block] = reduction.blocks
         if self._sums is None:
-            [p] = _block_problems((M, b), equations.coupling, reduction)
-            rows, least = reduction.required
-            self._sums = RequiredSums(
-                p.M,
-                rows if block.unknowns.size == rows.shape[1] else rows[:, block.unknowns],
-                least,
-                lower=p.lower,
-                upper=p.upper,
-                caps=p.caps,
-                method=self._method,
-                parts=_channel_parts(reduction) if equations.coupling is None else (),
-            )
+            self._sums = self._required_sums((M, b), equations.coupling)
         right, begin = block.right_side(b), x[block.unknowns]
         found = self._sums.minimise(
             right,
@@ -419,7 +416,28 @@ class ReducedSolver:
         if found.miss > self._close:
             residual = max(optimum.kkt_residual, found.miss)
             optimum = replace(optimum, kkt_residual=residual)
-        return [optimum], found.multipliers
+        return optimum, found.multipliers, found.shares
+
+    def _required_sums(
+        self, sides: tuple[Doubles, Doubles], coupling: Doubles | None
+    ) -> RequiredSums | SumsWithShares:
+        reduction, required = self._reduction, self._reduction.requirements
+        assert required is not None
+        [p] = _block_problems(sides, coupling, reduction)
+        rows, least = reduction.required
+        if p.unknowns.size < rows.shape[1]:
+            rows = rows[:, p.unknowns]
+        options: dict[str, Any] = {
+            "lower": p.lower,
+            "upper": p.upper,
+            "caps": p.caps,
+            "method": self._method,
+            "parts": _channel_parts(reduction) if coupling is None else (),
+        }
+        if required.shares is None:
+            return RequiredSums(p.M, rows, least, **options)
+        options |= {"sizes": required.share_sizes, "price": required.share_price}
+        return SumsWithShares(p.M, rows, least, shares=required.shares, **options)
 
     def _family(self, problem: ReducedProblem, M: Doubles) -> QuadraticFamily:
         """Return the problems with a matrix (k, k) and the bounds and caps of `problem`."""

@@ -14,6 +14,7 @@ from lightpaint.arrays import Doubles, Indices
 from lightpaint.errors import LightpaintError
 from lightpaint.lighting.algebra.required_sums import RequiredSums
 from lightpaint.lighting.constraints.constraint_table import Requirements
+from lightpaint.lighting.normal_equations import NormalEquations
 from lightpaint.lighting.problem import Problem
 from lightpaint.lighting.unknowns.lamp_parts import watts_of_fixed, watts_of_unknowns
 from lightpaint.lighting.unknowns.reduced_problem import solve_reduced
@@ -22,15 +23,17 @@ from lightpaint.lighting.wishes.wished_light import WishedLight
 from lightpaint.progress import cancellation_check
 
 #: What is given up of a wish is more than its least share by this part of it, so that round-off
-#: leaves room for an answer; and where so little room leaves none that steps find at once.
-ROOMS = (1e-8, 1e-3)
+#: leaves room for an answer.
+ROOM = 1e-8
 
 #: Rows of points that are added at a time, largest miss of a row relative to its size, and most
 #: rounds.
 ADDED_ROWS, CLOSE, MAX_ROUNDS = 40, 1e-9, 200
 
-#: Weight of the power where as much as possible of all wishes is sought: of the brightest answer.
-SECOND = 1e-6
+#: Weight of the power where as much as possible of all wishes is sought, or of the picture: of the
+#: brightest answer, or the largest loss. That loss is counted up to this many times the loss of a
+#: black picture.
+SECOND, MOST_LOSS = 1e-6, 1e4
 
 #: Share of the least power that may be spent on lamps that share the light evenly.
 EVEN = 0.01
@@ -55,30 +58,56 @@ class RequiredProblem:
 def with_wishes(problem: Problem, wished: WishedLight) -> RequiredProblem:
     """Return the problem under wishes; where these contradict the limits of lamps or each other,
     under as much of them as possible.
+
+    It starts from the answer to its squares.
     """
     if wished.is_empty:
         return RequiredProblem(problem, wished, np.zeros(0))
-    within = _solved_at_once(_required(problem, wished.requirements))
-    if within is not None:
-        return RequiredProblem(within, wished, np.zeros(len(wished.wishes)))
-    shares = _shares_given_up(wished, problem.reduction)
-    for room in ROOMS if shares.any() else ():
-        lowered = _required(problem, _lowered(wished, shares, room))
-        if (solved := _solved_at_once(lowered)) is not None:
-            return RequiredProblem(solved, wished, shares)
-    return RequiredProblem(_required(problem, _lowered(wished, shares)), wished, shares)
+    strict = _required(problem, wished.requirements)
+    equations = strict.with_pull(strict.solved)
+    nothing, middle = np.zeros(len(wished.wishes)), problem.reduction.at_middle_colors()
+    priced = wished.requirements.with_shares(
+        nothing, _share_sizes(wished), _price(equations, strict.reduction)
+    )
+    # What tinted light would add to a wish is nothing to rely on: a painting chooses the colours.
+    reduction = middle.with_requirements(priced)
+    found = solve_reduced(equations, reduction, problem.start, max_updates=0)
+    assert found.shares is not None
+    if not found.converged:
+        return _within_reach_of_lamps(problem, wished)
+    shares = np.where(found.shares < LEAST_SHARE, 0.0, found.shares)
+    if not shares.any():
+        return RequiredProblem(replace(strict, start=found.weights), wished, shares)
+    if middle is problem.reduction:
+        within = replace(priced, shares=found.shares)
+    else:  # tints could reach more
+        within = priced.lowered(wished.slack_of(shares))
+    required = replace(_required(problem, within), start=found.weights)
+    return RequiredProblem(required, wished, shares)
 
 
-def _solved_at_once(required: Problem) -> Problem | None:
-    """Return the problem with the answer of its squares to start from; None if that is not found
-    at once.
+def _within_reach_of_lamps(problem: Problem, wished: WishedLight) -> RequiredProblem:
+    """Return the problem under as much of the wishes as a linear program finds possible."""
+    requirements, shares = requirements_within_reach(wished, problem.reduction)
+    return RequiredProblem(_required(problem, requirements), wished, shares)
 
-    What tinted light would add to a wish is nothing to rely on: a painting chooses the colours.
+
+def _price(equations: NormalEquations, reduction: Reduction) -> float:
+    """Return the price of a whole wish, at which a share of `SECOND` counts as much as the largest
+    loss: of a black picture, or with all lamps at full, as far as that is bounded.
     """
-    middle = required.reduction.at_middle_colors()
-    equations = required.with_pull(required.solved)
-    found = solve_reduced(equations, middle, required.start, max_updates=0)
-    return replace(required, start=found.weights) if found.converged else None
+    black = float(equations.target_norm2.sum())
+    _, high = reduction.weight_ranges
+    at_full = float(equations.objective(np.where(np.isfinite(high), high, 0.0)).sum())
+    return min(max(black, at_full), MOST_LOSS * black) / SECOND
+
+
+def _share_sizes(wished: WishedLight) -> Doubles:
+    """Return by how much giving up all of a wish lowers each row, (m, w)."""
+    sizes = np.zeros((len(wished.requirements), len(wished.wishes)))
+    for k, wish in enumerate(wished.wishes):
+        sizes[wish.rows, k] = 0.0 if wish.is_hard else wish.size
+    return sizes
 
 
 def _required(problem: Problem, requirements: Requirements) -> Problem:
@@ -105,11 +134,11 @@ def _shares_given_up(wished: WishedLight, reduction: Reduction) -> Doubles:
     return shares_given_up(wished, own.with_requirements(wished.requirements))
 
 
-def _lowered(wished: WishedLight, shares: Doubles, room: float = ROOMS[0]) -> Requirements:
-    """Return the requirements without shares of the wishes, (w,), and a part of these more."""
+def _lowered(wished: WishedLight, shares: Doubles) -> Requirements:
+    """Return the requirements without shares of the wishes, (w,), and a hair more."""
     if not shares.any():
         return wished.requirements
-    return wished.requirements.lowered(wished.slack_of(shares) * (1 + room))
+    return wished.requirements.lowered(wished.slack_of(shares) * (1 + ROOM))
 
 
 def without_wishes(problem: Problem) -> Problem:
@@ -205,9 +234,7 @@ def _solve(
         least = least - slack * (1 + CLOSE)
     given = np.zeros((len(rows), 0))
     if slack is None:  # the last column is of the largest share
-        given = np.zeros((len(rows), len(wished.wishes) + 1))
-        for k, wish in enumerate(wished.wishes):
-            given[wish.rows, k] = 0.0 if wish.is_hard else wish.size
+        given = np.hstack([_share_sizes(wished), np.zeros((len(rows), 1))])
     count = len(reduction.unknowns)
     columns = np.hstack([rows, given])
     sizes = np.maximum(np.abs(columns).max(axis=1, initial=0), 1e-300)
