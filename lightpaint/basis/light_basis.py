@@ -335,8 +335,10 @@ class Basis(Shown):
         """
         if factor not in self._surfaces:
             features = self.features and self.features.reduced(factor)
-            is_known = features is not None and features.position is not None
-            self._surfaces[factor] = features, SurfaceFilter(features) if is_known else None
+            surface_filter = None
+            if features is not None and features.position is not None:
+                surface_filter = SurfaceFilter(features)
+            self._surfaces[factor] = features, surface_filter
         return self._surfaces[factor]
 
     @cached_property
