@@ -75,6 +75,18 @@ def as_rgb(values: Iterable[Any]) -> RGB:
     return r, g, b
 
 
+def as_position(values: Iterable[Any]) -> Position:
+    """Return the three numbers of an array or any other iterable as a place or a direction."""
+    return as_rgb(values)
+
+
+def as_singles(numbers: npt.NDArray[np.float16]) -> Floats:
+    """Return half floats as float32."""
+    singles = np.empty(numbers.shape, np.float32)
+    copy_as_singles(numbers, singles)
+    return singles
+
+
 def aligned(values: npt.ArrayLike, kind: type[_Kind]) -> npt.NDArray[_Kind]:
     """Return a copy, (n,), in memory that begins at a multiple of `ALIGNMENT`.
 

@@ -13,7 +13,7 @@ from xml.etree.ElementTree import Element
 
 import numpy as np
 
-from lightpaint.arrays import Doubles, Position
+from lightpaint.arrays import Doubles, as_position
 from lightpaint.display_text import some_names
 from lightpaint.dmx.console_rig import ConsoleRig, RigAxis, RigFixture, RigHead, RigLight
 from lightpaint.dmx.gdtf.fixture_type import FixtureType
@@ -23,7 +23,7 @@ from lightpaint.errors import RigError
 from lightpaint.files import read_bytes
 from lightpaint.scene.properties.site import unit
 from lightpaint.sentences import Hint
-from lightpaint.storage.rig_archive import RigArchive, library, reading
+from lightpaint.storage.rig_archive import RigArchive, as_utf_8, library, reading
 
 #: The file in an MVR.
 DESCRIPTION = "GeneralSceneDescription.xml"
@@ -300,7 +300,7 @@ class _ShowReader:
         missing = []
         for spec in sorted(specs):
             member = self.archive.find(spec) or self.archive.find(f"{spec}.gdtf")
-            name = _plain(spec)
+            name = as_utf_8(spec)
             if (file := own.get(name.casefold())) is not None:
                 self.types[spec] = FixtureType(read_bytes(file, "GDTF", RigError), file.name)
             elif member is not None:
@@ -350,7 +350,7 @@ def _placed(name: str, light: ModeLight, matrix: Doubles, target: Doubles | None
         raise ValueError(f"the matrix of {name}, which has no volume")
     return RigLight(
         name,
-        _three(position),
+        as_position(position),
         unit(direction),
         unit(up),
         light.beam_angle,
@@ -380,11 +380,6 @@ def _uncontrolled(light: RigLight) -> RigLight:
     return replace(light, emitters=emitters, dimmers=(), masters=(), filters=(), chromaticity=())
 
 
-def _three(values: Doubles) -> Position:
-    x, y, z = values.tolist()
-    return x, y, z
-
-
 def _id_of(fixture: Any) -> str:
     """Return the number that a console shows; programs write 0 for none."""
     text = (fixture.fixture_id or "").strip()
@@ -410,14 +405,6 @@ def _addresses_of(element: Element) -> dict[int, int]:
                 raise ValueError(f"the address {text}")
             found[address.dmx_break] = absolute
     return found
-
-
-def _plain(spec: str) -> str:
-    """Return the name of a GDTF as people write it: pymvr returns it as of code page 437."""
-    try:
-        return spec.encode("cp437").decode("utf-8")
-    except UnicodeError:
-        return spec
 
 
 def _files_in(folder: Path) -> dict[str, Path]:

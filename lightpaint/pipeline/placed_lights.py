@@ -36,6 +36,7 @@ from lightpaint.placement import (
     free_light,
     on_small_film,
     place,
+    place_rigged,
     rigged_lights,
 )
 from lightpaint.progress import Listener
@@ -110,15 +111,11 @@ def find_places(jobs: Sequence[Job], bases: Sequence[Basis], listen: Listener) -
         solution = solution_of(problem_of(job, [bases[k] for k in places]))
         solutions.append(without_noise(job, solution))
     films = [scenes[k] for k in range(len(bases))]
-    lights_with_moves = rigged_lights(jobs[0].all_rigging, films[0])
-    return place(
+    return place_rigged(
         films,
         bases,
         solutions[0] if len(jobs) == 1 else solutions,
-        lights_with_moves.freedoms,
-        new=lights_with_moves.new,
-        pairs=lights_with_moves.pairs,
-        constraints=lights_with_moves.constraints,
+        rigged_lights(jobs[0].all_rigging, films[0]),
         seed=jobs[0].settings.seed,
         progress=lambda label, done, total, unit="": listen(label, done, total, "steps"),
     )

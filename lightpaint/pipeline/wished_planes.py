@@ -4,6 +4,7 @@ plans: settings of the lamps that meet such wishes with the least power.
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
+from functools import partial
 from pathlib import Path
 
 import numpy as np
@@ -264,9 +265,7 @@ def _with_costs(answer: PlanesAnswer, solution: Solution, planes: MeasuredPlanes
         return answer
     free, look = without_wishes(problem), PaintComparison.of_problem(problem)
     rows = look.rows(problem.basis.planes)
-
-    def missed(weights: Doubles) -> float:
-        return look.mean(look.difference(np.einsum("npc,nc->pc", rows, weights)))
+    missed = partial(look.missed, rows)
 
     def cost_beside(other: Problem) -> float:
         other_weights = solution_of(other, start=solution.weights).weights

@@ -19,7 +19,9 @@ if TYPE_CHECKING:
     from lightpaint.placement.new_lights import NewLights
     from lightpaint.placement.paths.frozen_paths import FrozenPaths, PathSums
     from lightpaint.placement.paths.panel_lights import PanelSite, is_panel, panel_site
-    from lightpaint.placement.place_search import check_suggestible, place, suggest_lights
+    from lightpaint.placement.place_search import (
+        check_suggestible, place, place_rigged, suggest_lights,
+    )
     from lightpaint.placement.rigging import LIGHT_KINDS, Rigging, rigging_of
     from lightpaint.placement.search.new_light_search import SearchSize, usual_pace
     from lightpaint.placement.suggestion import MoveSuggestion, Suggestion

@@ -1,36 +1,21 @@
 """The rigging of a lights file, applied to the lights of a scene."""
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
 from fnmatch import fnmatchcase
 from typing import Any
 
 import numpy as np
 
-from lightpaint.arrays import Position
+from lightpaint.arrays import Position, as_position
 from lightpaint.display_text import some_names, with_similar_name
 from lightpaint.errors import ConstraintError, SceneError
 from lightpaint.lighting import Constraints, is_pattern
-from lightpaint.placement.free_space import as_position
 from lightpaint.placement.freedom import Freedom
 from lightpaint.placement.lights_to_place import followers_of, free_light, new_lights_of
-from lightpaint.placement.new_lights import MirroredPair, NewLights
+from lightpaint.placement.new_lights import MirroredPair, NewLights, RiggedLights
 from lightpaint.placement.rigging import Rigging, constraint_of, names_of
 from lightpaint.scene import Light, Scene
 from lightpaint.sentences import Lead, SourceKey
-
-
-@dataclass(frozen=True)
-class RiggedLights:
-    """The lights of a scene that may move, and those that may be added to it.
-
-    freedoms: by name. constraints: on new lights, by their generated names.
-    """
-
-    freedoms: Mapping[str, Freedom]
-    new: tuple[NewLights, ...]
-    pairs: tuple[MirroredPair, ...]
-    constraints: Constraints
 
 
 def rigged_lights(rigging: Rigging, scene: Scene) -> RiggedLights:

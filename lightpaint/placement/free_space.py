@@ -6,13 +6,13 @@ places are chosen along these: inside a room, out through its windows, behind th
 such places, a few distant ones are kept.
 """
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 
-from lightpaint.arrays import Bools, Floats, Position
+from lightpaint.arrays import Bools, Floats
 from lightpaint.scene import Scene, Stream, pass_seed
 
 #: Points of the picture from which the search starts, and rays from each.
@@ -159,12 +159,6 @@ def seen_by_camera(scene: Scene, loaded: Any, places: Floats) -> Bools:
     ray = mi.Ray3f(start, mi.Vector3f(way.T.astype(np.float32)))
     ray.maxt = 1.0
     return np.asarray(np.array(at) & ~np.array(loaded.ray_test(ray)))
-
-
-def as_position(place: Iterable[Any]) -> Position:
-    """Return a row of `places` as a position."""
-    x, y, z = (float(v) for v in place)
-    return x, y, z
 
 
 def _visible(scene: Scene, loaded: Any, rng: np.random.Generator) -> tuple[Floats, Floats]:

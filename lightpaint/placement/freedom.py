@@ -12,11 +12,11 @@ from typing import Any
 
 import numpy as np
 
-from lightpaint.arrays import Doubles, Floats, Position
+from lightpaint.arrays import Doubles, Floats, Position, as_position
 from lightpaint.display_text import brief
 from lightpaint.errors import SceneError
 from lightpaint.keywords import keywords
-from lightpaint.placement.free_space import as_position, far_apart
+from lightpaint.placement.free_space import far_apart
 from lightpaint.placement.paths.panel_lights import PanelSite
 from lightpaint.placement.permitted_places import (
     OVERSAMPLING,

@@ -11,13 +11,12 @@ from typing import Literal
 
 import numpy as np
 
-from lightpaint.arrays import RGB, Floats
+from lightpaint.arrays import RGB, Floats, as_position
 from lightpaint.colour import lambertian_flux, point_flux, spot_flux
 from lightpaint.display_text import rounded_text
 from lightpaint.errors import SceneError
 from lightpaint.files import read_text
 from lightpaint.keywords import keywords
-from lightpaint.placement.free_space import as_position
 from lightpaint.scene import NewEmitter, Pose, Scene
 from lightpaint.scene.properties.site import Site
 from lightpaint.sentences import Hint

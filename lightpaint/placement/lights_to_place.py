@@ -8,14 +8,19 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from lightpaint.arrays import Floats, Position
+from lightpaint.arrays import Floats, Position, as_position
 from lightpaint.basis import BasisLight
 from lightpaint.display_text import some_names, with_similar_name
 from lightpaint.errors import NoPlaceError, SceneError
 from lightpaint.luminaires import LUMINAIRE_PLUGINS
-from lightpaint.placement.free_space import as_position
 from lightpaint.placement.freedom import Freedom, FreeLight, places_of
-from lightpaint.placement.new_lights import NEW_CONE, Mirror, MirroredPair, NewLights
+from lightpaint.placement.new_lights import (
+    NEW_CONE,
+    Mirror,
+    MirroredPair,
+    NewLights,
+    RiggedLights,
+)
 from lightpaint.placement.paths.panel_lights import PanelSite, is_panel, panel_site
 from lightpaint.placement.paths.view_paths import SearchPaths
 from lightpaint.placement.permitted_places import BoxOfPlaces, Places, places_on
@@ -133,8 +138,7 @@ def new_lights_of(scene: Scene, groups: Sequence[NewLights]) -> list[NewLight]:
 def movables_of(
     scene: Scene,
     names: Sequence[str],
-    freedoms: Mapping[str, Freedom],
-    pairs: Sequence[MirroredPair],
+    rigged: RiggedLights,
     paths: SearchPaths,
     *,
     seed: int,
@@ -143,10 +147,10 @@ def movables_of(
 
     Raises NoPlaceError for a light that may hang only where nothing of the picture is seen.
     """
-    followers = followers_of(scene, freedoms, pairs)
+    followers = followers_of(scene, rigged.freedoms, rigged.pairs)
     movables = []
-    for name, freedom in freedoms.items():
-        if freedom.is_still or name in {x.lights[1] for x in pairs}:
+    for name, freedom in rigged.freedoms.items():
+        if freedom.is_still or name in {x.lights[1] for x in rigged.pairs}:
             continue
         site = _site(scene, name)
         light = FreeLight(name, site, freedom, _places(scene, site, freedom, paths, seed))

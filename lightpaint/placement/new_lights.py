@@ -2,16 +2,17 @@
 
 import math
 import re
+from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 from typing import Any, get_args
 
 import numpy as np
 
-from lightpaint.arrays import Doubles, Position
+from lightpaint.arrays import Doubles, Position, as_position
 from lightpaint.display_text import brief
 from lightpaint.errors import SceneError
 from lightpaint.keywords import keywords
-from lightpaint.placement.free_space import as_position
+from lightpaint.lighting import Constraints
 from lightpaint.placement.freedom import Freedom
 from lightpaint.scene import FARTHEST
 from lightpaint.scene.properties.site import NewKind, Site
@@ -191,3 +192,21 @@ def _sides(value: Any) -> tuple[float, float]:
             f"size is {brief(value)}: expected the smallest and the largest side of panels"
         )
     return low, high
+
+
+@dataclass(frozen=True)
+class RiggedLights:
+    """The lights of a scene that may move, and those that may be added to it.
+
+    freedoms: by name. constraints: on new lights, by their generated names.
+    """
+
+    freedoms: Mapping[str, Freedom]
+    new: tuple[NewLights, ...]
+    pairs: tuple[MirroredPair, ...]
+    constraints: Constraints
+
+    @property
+    def moving(self) -> set[str]:
+        """Names of the lights that may move."""
+        return {*self.freedoms, *(name for pair in self.pairs for name in pair.lights)}

@@ -9,13 +9,13 @@ from typing import Any
 
 import numpy as np
 
-from lightpaint.arrays import RGB, Position, as_rgb
+from lightpaint.arrays import RGB, Position, as_position, as_rgb
 from lightpaint.basis import Basis
 from lightpaint.basis.render import why_not_one_pass
 from lightpaint.errors import NoPlaceError, SceneError
 from lightpaint.keywords import keywords
 from lightpaint.lighting import Constraints, Solution
-from lightpaint.placement.free_space import as_position, pixels_of
+from lightpaint.placement.free_space import pixels_of
 from lightpaint.placement.freedom import Freedom
 from lightpaint.placement.light_changes import AddedLight, Move, Placement, hung
 from lightpaint.placement.lights_to_place import (
@@ -28,7 +28,7 @@ from lightpaint.placement.lights_to_place import (
     new_movables_of,
 )
 from lightpaint.placement.look_goals import check_looks, check_views, films_of
-from lightpaint.placement.new_lights import MirroredPair, NewLights
+from lightpaint.placement.new_lights import MirroredPair, NewLights, RiggedLights
 from lightpaint.placement.paths.panel_lights import PanelSite, without_panels
 from lightpaint.placement.paths.view_paths import SearchPaths
 from lightpaint.placement.placement_fit import fit_of
@@ -116,22 +116,45 @@ def place(
         >>> {move.name for move in placement.moves} <= {"bulb"}
         True
     """
+    rigged = RiggedLights(freedoms or {}, tuple(new), tuple(pairs), constraints or Constraints())
+    return place_rigged(
+        scenes,
+        bases,
+        solution,
+        rigged,
+        seed=seed,
+        progress=progress,
+        watch=watch,
+        is_enough=is_enough,
+    )
+
+
+def place_rigged(
+    scenes: Scene | Sequence[Scene],
+    bases: Basis | Sequence[Basis],
+    solution: Solution | Sequence[Solution],
+    rigged: RiggedLights,
+    *,
+    seed: int = 0,
+    progress: Progress = silent,
+    watch: Callable[[Mapping[str, Site]], None] | None = None,
+    is_enough: Callable[[], bool] | None = None,
+) -> Placement:
+    """Search as `place` does, with the same arguments but for the lights that may move."""
     views = check_views(scenes, bases)
     scene, view_bases = views[0][0], [basis for _, basis in views]
     looks = check_looks(solution, view_bases)
-    freedoms = freedoms or {}
-    for name, freedom in freedoms.items():
+    for name, freedom in rigged.freedoms.items():
         free_light(scene, name, freedom)
-    lights, names = new_lights_of(scene, new), [light.name for light in view_bases[0].lights]
+    lights, names = new_lights_of(scene, rigged.new), [light.name for light in view_bases[0].lights]
     # Only paths are traced in these: a panel that moves must not hide where it hung.
-    moving = {*freedoms, *(name for pair in pairs for name in pair.lights)}
-    small, large = ([without_panels(x, moving) for x in films] for films in films_of(views))
+    small, large = ([without_panels(x, rigged.moving) for x in films] for films in films_of(views))
 
     def search(loaded: Any) -> _Result:
         paths = SearchPaths(small, large, loaded, seed=seed)
         if not len(paths.space.points):
             raise NoPlaceError(f"the camera of {scene.path} sees nothing that light falls on")
-        movables = movables_of(scene, names, freedoms, pairs, paths, seed=seed)
+        movables = movables_of(scene, names, rigged, paths, seed=seed)
         slots = new_movables_of(scene, lights, len(names), paths, seed=seed)
         with_panels = any(isinstance(x.light.site, PanelSite) for x in (*movables, *slots))
         coarse, fine = (
@@ -140,7 +163,7 @@ def place(
                 looks,
                 [x.size for x in films],
                 [light.as_basis_light for light in lights],
-                constraints,
+                rigged.constraints,
                 with_panels=with_panels,
                 with_noise=films is large,
             )

@@ -12,7 +12,7 @@ from typing import Any
 
 import numpy as np
 
-from lightpaint.arrays import RGB, Doubles, Floats, Position
+from lightpaint.arrays import RGB, Floats, Position, as_position
 from lightpaint.basis import LightGroups, joined_texels
 from lightpaint.colour import photometry
 from lightpaint.errors import LightpaintError
@@ -213,17 +213,12 @@ def slide_images_of(scene: Scene, lighting: Lighting) -> list[SlideImage]:
                 name,
                 f"{safe_name(name)}.slide.exr",
                 shown,
-                _position(to_world[:3, 3]),
-                tuple(_position(axis) for axis in axes),
+                as_position(to_world[:3, 3]),
+                tuple(as_position(axis) for axis in axes),
                 half_slide(props, columns / rows),
             )
         )
     return images
-
-
-def _position(values: Doubles) -> Position:
-    x, y, z = values.tolist()
-    return x, y, z
 
 
 def half_slide(props: Any, aspect: float) -> tuple[float, float]:

@@ -102,7 +102,7 @@ class RigArchive:
     def name_of(self, member: zipfile.ZipInfo) -> str:
         """Return the name of a member as people write it, also where it is not marked as UTF-8."""
         is_marked = member.flag_bits & 0x800
-        return member.filename if is_marked else _as_utf_8(member.filename)
+        return member.filename if is_marked else as_utf_8(member.filename)
 
     @cached_property
     def _by_name(self) -> dict[str, str]:
@@ -113,7 +113,7 @@ class RigArchive:
 
     def find(self, name: str) -> str | None:
         """Return the member that a file in the archive refers to; None if there is none."""
-        proper = _as_utf_8(name)
+        proper = as_utf_8(name)
         ways = (name, proper, proper.casefold(), name.casefold())
         return next((self._by_name[way] for way in ways if way in self._by_name), None)
 
@@ -182,7 +182,8 @@ def _refuse_declaration(name: str) -> Callable[..., None]:
     return refuse
 
 
-def _as_utf_8(name: str) -> str:
+def as_utf_8(name: str) -> str:
+    """Return a name in UTF-8 that a library has read as one in code page 437."""
     try:
         return name.encode("cp437").decode("utf-8")
     except UnicodeError:

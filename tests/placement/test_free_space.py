@@ -9,7 +9,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 from renderer import LIGHTS, write_room
 
-from lightpaint.placement.free_space import as_position, far_apart, free_space, pixels_of
+from lightpaint.arrays import as_position
+from lightpaint.placement.free_space import far_apart, free_space, pixels_of
 from lightpaint.scene.scene_reader import load_scene
 
 #: A closed box, two wide, with a sphere of radius 0.5 in its middle, seen from a corner.

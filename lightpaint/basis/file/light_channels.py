@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 import numpy.typing as npt
 
-from lightpaint.arrays import Floats, Indices, copy_as_singles, round_to_halves
+from lightpaint.arrays import Floats, Indices, as_singles, round_to_halves
 from lightpaint.errors import BasisError
 from lightpaint.images import HALF_DIFFERENCE
 from lightpaint.images.formats import PartLayout, RowFile
@@ -60,13 +60,6 @@ def noise_numbers(
 ) -> npt.NDArray[np.float16]:
     """Return the stored numbers of a half difference from those that its image has, and ratios."""
     return round_to_halves(as_singles(light) * as_singles(ratios))
-
-
-def as_singles(numbers: npt.NDArray[np.float16]) -> npt.NDArray[np.float32]:
-    """Return half floats as float32."""
-    singles = np.empty(numbers.shape, np.float32)
-    copy_as_singles(numbers, singles)
-    return singles
 
 
 def lit_pixels(steps: npt.NDArray[np.float16], size: tuple[int, int]) -> npt.NDArray[np.uint32]:

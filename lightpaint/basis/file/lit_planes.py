@@ -14,7 +14,14 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from lightpaint.arrays import Bools, Doubles, Floats, Indices, copy_as_singles, release_freed_memory
+from lightpaint.arrays import (
+    Bools,
+    Doubles,
+    Floats,
+    Indices,
+    as_singles,
+    release_freed_memory,
+)
 from lightpaint.basis.file.file_planes import KeptMixes, RowPlanes
 from lightpaint.basis.planes import LitEntries
 from lightpaint.progress import with_progress
@@ -112,7 +119,7 @@ class _LitStrip:
             return sums
         is_counted = counted[self.lit]
         for c, channel in enumerate(self.numbers):
-            values = _singles(channel).astype(np.float64)
+            values = as_singles(channel).astype(np.float64)
             # The numbers of a plane follow each other.
             sums[1, is_lit, c] = np.add.reduceat(values, first)
             sums[0, is_lit, c] = np.add.reduceat(np.square(values, out=values) * is_counted, first)
@@ -129,7 +136,7 @@ class _LitStrip:
         places += self.lit
         block = np.zeros(3 * n * self.size, np.float32)
         for c, channel in enumerate(self.numbers):
-            block[c * self.size :][places] = _singles(channel)
+            block[c * self.size :][places] = as_singles(channel)
         return block.reshape(n, 3, self.size)
 
     def lit_of(self, i: int) -> tuple[npt.NDArray[Any], npt.NDArray[Any]]:
@@ -148,7 +155,7 @@ class _LitStrip:
             has_column = its_columns >= 0
             lights, its_columns = lights[has_column], its_columns[has_column]
             numbers = numbers[:, has_column]
-        return lights, its_columns, _singles(numbers)
+        return lights, its_columns, as_singles(numbers)
 
     def mix(self, weights: Doubles) -> Doubles:
         """Return Σ w_i of the planes, (3, pixels) float64. weights: (n, 3), with the scales."""
@@ -156,16 +163,10 @@ class _LitStrip:
 
         lit, begins = self.lit.astype(np.int32), self.begins.astype(np.int32)
         shape = self.size, len(weights)
-        channels = (_singles(channel).astype(np.float64) for channel in self.numbers)
+        channels = (as_singles(channel).astype(np.float64) for channel in self.numbers)
         return np.stack(
             [csc_array((x, lit, begins), shape) @ weights[:, c] for c, x in enumerate(channels)]
         )
-
-
-def _singles(numbers: npt.NDArray[Any]) -> npt.NDArray[np.float32]:
-    singles = np.empty(numbers.shape, np.float32)
-    copy_as_singles(numbers, singles)
-    return singles
 
 
 class LitPlanes(RowPlanes):
@@ -236,7 +237,7 @@ class LitPlanes(RowPlanes):
             pixels, values = slice(None), self._clean[i].copy()
         else:
             stored = self.stored(i)
-            pixels, values = stored.pixels.astype(np.intp), _singles(stored.numbers)
+            pixels, values = stored.pixels.astype(np.intp), as_singles(stored.numbers)
         if self._scales[i] != 1:
             values *= self._scales[i]
         return pixels, values

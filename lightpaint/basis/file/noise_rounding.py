@@ -15,9 +15,9 @@ from functools import lru_cache
 import numpy as np
 import numpy.typing as npt
 
-from lightpaint.arrays import Doubles, Floats, Indices, read_only, round_to_halves
+from lightpaint.arrays import Doubles, Floats, Indices, as_singles, read_only, round_to_halves
 from lightpaint.basis.file.half_floats import CLEAN, TILE, inner_pixels, scale_of
-from lightpaint.basis.file.light_channels import as_singles, noise_numbers
+from lightpaint.basis.file.light_channels import noise_numbers
 from lightpaint.basis.file.lit_planes import LitPlane
 
 #: Number of lights from which planes are rounded so: with fewer it takes longer than it saves.

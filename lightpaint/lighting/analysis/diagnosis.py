@@ -18,7 +18,7 @@ from itertools import pairwise
 import numpy as np
 import numpy.typing as npt
 
-from lightpaint.arrays import Doubles, Floats, as_rgb
+from lightpaint.arrays import Bools, Doubles, Floats, as_rgb
 from lightpaint.colour import luminance
 from lightpaint.display_text import short_repr
 from lightpaint.images import bands_of
@@ -311,20 +311,41 @@ def _place(solution: Solution, unreachable: Floats) -> Place | None:
     energy = (counted * np.square(lacking)).sum(axis=-1)
     if not energy.any():
         return None
-    region = np.zeros((REGIONS, REGIONS))
-    place_of = [REGIONS * np.arange(length) // length for length in energy.shape]
-    np.add.at(region, np.ix_(*place_of), energy)
-    worst = np.unravel_index(int(np.argmax(region)), region.shape)
-    inside = (place_of[0] == worst[0])[:, None] & (place_of[1] == worst[1])
-    y, x = np.unravel_index(int(np.argmax(np.where(inside, energy, -1))), energy.shape)
+    worst = WorstRegion.of(energy)
+    y, x = worst.block
     painted = (block_sums(lambda part_rows: D[part_rows] * solution.image[part_rows]) / safe)[y, x]
     return Place(
-        region=(int(worst[0]), int(worst[1])),
-        share=float(region[worst] / energy.sum()),
+        region=worst.region,
+        share=worst.share,
         box=(int(rows[y]), int(columns[x]), int(rows[y + 1]), int(columns[x + 1])),
         painted=as_rgb(painted),
         reached=as_rgb(painted - lacking[y, x]),
     )
+
+
+@dataclass(frozen=True)
+class WorstRegion:
+    """The region of the picture with most of what blocks (rows, columns) miss.
+
+    region: its row and column. share: of all that is missed. inside: (rows, columns), its blocks.
+    block: row and column of the one with most.
+    """
+
+    region: tuple[int, int]
+    share: float
+    inside: Bools
+    block: tuple[int, int]
+
+    @classmethod
+    def of(cls, amount: Doubles) -> "WorstRegion":
+        """Find it. amount: (rows, columns), not all 0."""
+        sums = np.zeros((REGIONS, REGIONS))
+        rows, columns = (REGIONS * np.arange(length) // length for length in amount.shape)
+        np.add.at(sums, np.ix_(rows, columns), amount)
+        row, column = divmod(int(np.argmax(sums)), REGIONS)
+        inside = (rows == row)[:, None] & (columns == column)
+        block = divmod(int(np.argmax(np.where(inside, amount, -1))), amount.shape[1])
+        return cls((row, column), float(sums[row, column] / sums.sum()), inside, block)
 
 
 def _edges(length: int, parts: int) -> npt.NDArray[np.int_]:

@@ -13,8 +13,7 @@ from typing import Any
 
 import numpy as np
 
-from lightpaint.arrays import Doubles, Floats, Indices, Position, aligned
-from lightpaint.placement.free_space import as_position
+from lightpaint.arrays import Doubles, Floats, Indices, Position, aligned, as_position
 from lightpaint.scene import MULTIPLE, Light, Scene, without_emitters
 from lightpaint.scene.properties.site import Site
 from lightpaint.scene.runtime.render_lock import tracing

@@ -15,8 +15,7 @@ from functools import partial
 
 import numpy as np
 
-from lightpaint.arrays import Bools, Doubles, Floats, Indices
-from lightpaint.placement.free_space import as_position
+from lightpaint.arrays import Bools, Doubles, Floats, Indices, as_position
 from lightpaint.placement.freedom import FreeLight
 from lightpaint.placement.lights_to_place import Arrangement, Movable, all_sites, by_column
 from lightpaint.placement.paths.panel_lights import PanelSite

@@ -6,8 +6,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from lightpaint.arrays import Doubles
-from lightpaint.placement.free_space import as_position
+from lightpaint.arrays import Doubles, as_position
 from lightpaint.placement.freedom import FreeLight
 from lightpaint.placement.lights_to_place import Arrangement, Movable, all_sites, by_column
 from lightpaint.placement.paths.panel_lights import PanelSite

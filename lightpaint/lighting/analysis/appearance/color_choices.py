@@ -7,7 +7,7 @@ also the answer's, are solved over a sample of its pixels, so that errors of the
 from collections.abc import Callable, Mapping, Sequence
 from contextlib import suppress
 from dataclasses import dataclass, replace
-from functools import cache
+from functools import cache, partial
 from typing import get_args
 
 import numpy as np
@@ -193,10 +193,7 @@ def _with_colors(
 def _view_choices(view: Solution, delta_e: float, answers: Mapping[Colors, Doubles]) -> Choices:
     look = PaintComparison.of_problem(view.problem, max_pixels=COMPARED_PIXELS)
     rows = look.rows(view.basis.planes)
-
-    def missed(weights: Doubles) -> float:
-        return look.mean(look.difference(np.einsum("npc,nc->pc", rows, weights)))
-
+    missed = partial(look.missed, rows)
     chosen, choices = answers[view.problem.fit.colors or "free"], []
     own = missed(chosen)
     for colors, weights in answers.items():

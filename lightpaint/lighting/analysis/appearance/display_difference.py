@@ -15,7 +15,7 @@ from lightpaint.arrays import Bools, Doubles, Floats, Indices, as_rgb
 from lightpaint.basis import Basis, Planes, light_images, thinned
 from lightpaint.colour import LUMINANCE, ViewTransform, ciede2000, lab, luminance
 from lightpaint.images import Objects
-from lightpaint.lighting.analysis.diagnosis import REGIONS, Place
+from lightpaint.lighting.analysis.diagnosis import REGIONS, Place, WorstRegion
 from lightpaint.lighting.analysis.noise.uncertainty import Uncertainty
 from lightpaint.lighting.constraints.light_constraints import ConstraintKind, ConstraintsByLight
 from lightpaint.lighting.loss.painting import at_least_mask, target_light
@@ -106,6 +106,10 @@ class PaintComparison:
     def rows(self, planes: Planes) -> Floats:
         """Return the painted pixels of whole pictures (H, W, 3), (n, p, 3)."""
         return np.stack([x[:: self.step, :: self.step][self.counts] for x in planes])
+
+    def missed(self, rows: Floats, weights: Doubles) -> float:
+        """Return the mean difference of a lighting, weights (n, 3), by the rows of its planes."""
+        return self.mean(self.difference(np.einsum("npc,nc->pc", rows, weights)))
 
     def goal(self, pixels: Doubles) -> Doubles:
         """Return the goal, (p, 3): the paint, or light `pixels` (p, 3) where brighter is as
@@ -258,26 +262,21 @@ def place_with_most_error(
     amount = weights * _block_errors(look, light, grain)
     if not amount.any():
         amount = weights * missed
-    region = np.zeros((REGIONS, REGIONS))
-    regions_of = [REGIONS * np.arange(length) // length for length in amount.shape]
-    np.add.at(region, np.ix_(*regions_of), amount)
-    worst = np.unravel_index(int(np.argmax(region)), region.shape)
-    inside = (regions_of[0] == worst[0])[:, None] & (regions_of[1] == worst[1])
-    row, column = np.unravel_index(int(np.argmax(np.where(inside, amount, -1))), amount.shape)
+    worst = WorstRegion.of(amount)
     # Paint and answer there, weighted by the error.
-    error_weights = np.where(inside, amount, 0)
+    error_weights = np.where(worst.inside, amount, 0)
     painted, reached = (
         np.average(look.in_blocks(x).reshape(-1, 3), axis=0, weights=error_weights.ravel())
         for x in (look.painted[look.counts].astype(np.float64), light)
     )
     place = Place(
-        region=(int(worst[0]), int(worst[1])),
-        share=float(region[worst] / region.sum()),
-        box=look.box(int(row), int(column)),
+        region=worst.region,
+        share=worst.share,
+        box=look.box(*worst.block),
         painted=as_rgb(painted),
         reached=as_rgb(reached),
     )
-    return place, float((weights * (missed > NOTICED) * inside).sum() / weights.sum())
+    return place, float((weights * (missed > NOTICED) * worst.inside).sum() / weights.sum())
 
 
 def _block_errors(look: PaintComparison, light: Doubles, grain: Doubles) -> Doubles:
